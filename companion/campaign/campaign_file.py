@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from companion.campaign.swept import Swept
+from companion.campaign.tune.section import Tune
 from companion.files.yaml_file import PathKey, Section
 
 Name = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
@@ -102,6 +103,8 @@ class CampaignFile(Section):
     faults: Annotated[dict[Word, FaultScenario], Field(default_factory=dict, max_length=100)]
     """Fault scenarios by the name that the factor `fault` uses."""
     limits: CampaignLimits = CampaignLimits()
+    tune: Tune | None = None
+    """What `companion campaign tune` searches; running the campaign ignores it."""
 
     @model_validator(mode="after")
     def _consistent(self) -> "CampaignFile":

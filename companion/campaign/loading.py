@@ -70,6 +70,8 @@ class _Reading:
         ]
         check_keys(file.set, base, f"{name}: set")
         check_keys(swept, base, f"{name}: sweep")
+        if file.tune is not None:
+            check_keys(file.tune.search, base, f"{name}: tune.search")
         self._check_faults()
         changes = dict(file.set)
         if TRAJECTORY in {*swept, *changes} and MANEUVERS not in {*swept, *changes}:

@@ -95,7 +95,7 @@ class _Run:
         number, case_s = (0, None) if begun else self._checked()
         try:
             with (
-                _interruptible(),
+                interruptible(),
                 connected(self._options.scheduler, self._options.workers) as client,
             ):
                 if not number_of_workers(client):
@@ -197,7 +197,7 @@ class _Run:
 
 
 @contextmanager
-def _interruptible() -> Iterator[None]:
+def interruptible() -> Iterator[None]:
     """SIGTERM ends the campaign as Ctrl-C does; while it ends, neither comes through."""
 
     def interrupt(number: int, frame: FrameType | None) -> NoReturn:

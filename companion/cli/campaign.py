@@ -23,6 +23,13 @@ def report(options: argparse.Namespace) -> int:
     return page.run(options)
 
 
+def tune(options: argparse.Namespace) -> int:
+    """Search limits, gains and weights over the flights of a campaign."""
+    from companion.campaign.tune import command  # noqa: PLC0415
+
+    return command.run(options)
+
+
 def rerun(options: argparse.Namespace) -> int:
     """Fly one case again, and say whether it is the same flight."""
     from companion.campaign.rerun import rerun as fly_again  # noqa: PLC0415

@@ -7,7 +7,7 @@ from pathlib import Path
 from companion.cli.tool_options import Commands
 
 _CAMPAIGN, _RUN = "campaign", "run"
-_SUB_COMMANDS = (_RUN, "report", "rerun", "-h", "--help")
+_SUB_COMMANDS = (_RUN, "report", "rerun", "tune", "-h", "--help")
 
 
 def with_campaign_command(arguments: Sequence[str]) -> list[str]:
@@ -34,6 +34,7 @@ def add_campaign(commands: Commands) -> None:
     _add_run(kinds)
     _add_report(kinds)
     _add_rerun(kinds)
+    _add_tune(kinds)
 
 
 def _add_run(kinds: Commands) -> None:
@@ -95,6 +96,25 @@ def _add_report(kinds: Commands) -> None:
     report.add_argument("folder", type=Path, metavar="FOLDER", help="the campaign's folder")
     report.add_argument("--out", type=Path, metavar="FILE", help="the page (FOLDER/report.html)")
     report.set_defaults(run="campaign.report")
+
+
+def _add_tune(kinds: Commands) -> None:
+    tune = kinds.add_parser(
+        "tune",
+        help="search limits, gains and weights over the flights of a campaign",
+        description="Search the keys in `tune.search` of the campaign's file for the smallest true "
+        "error under its constraint, compare the result with the start on flights that the search "
+        "has not seen, and write it as YAML with its reasons. A search that was stopped goes on.",
+    )
+    tune.add_argument("file", type=Path, metavar="FILE", help="a campaign's file with `tune:`")
+    tune.add_argument(
+        "--out", type=Path, metavar="FOLDER", help="for the search (runs/campaigns/NAME-tune)"
+    )
+    tune.add_argument(
+        "--trials", type=_workers, metavar="NUMBER", help="instead of tune.trials of the file"
+    )
+    add_cluster_options(tune)
+    tune.set_defaults(run="campaign.tune")
 
 
 def _workers(text: str) -> int:

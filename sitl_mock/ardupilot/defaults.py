@@ -106,8 +106,8 @@ AIRFRAME: dict[str, Any] = {
     "rotor_lag_ms": ROTOR_LAG_MS,
     # Its simulator's drag acts along the body's axes. Measured along one of them: 0.31 per second
     # at 2 m/s, 0.41 at 5 m/s; in a circle at 5 m/s 0.27 per second and 0.034 per metre.
-    "drag_n_s_per_m": 0.25,
-    "axis_drag_n_s2_per_m2": 0.033,
+    "drag_n_s_per_m": 0.255,
+    "axis_drag_n_s2_per_m2": 0.032,
 }
 
 BATTERY: dict[str, Any] = {

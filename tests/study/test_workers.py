@@ -36,7 +36,11 @@ def test_outcomes_keep_their_order_and_every_part_is_told():
 
 
 @pytest.mark.parametrize(
-    ("study", "message"), [(fails_in_second, "the disk is full"), (is_killed, "worker .* killed")]
+    ("study", "message"),
+    [
+        (fails_in_second, "the disk is full"),
+        pytest.param(is_killed, "worker .* killed", marks=pytest.mark.slow),
+    ],
 )
 def test_an_error_in_a_worker_ends_the_run(study, message):
     with pytest.raises(OSError, match=message):

@@ -1,0 +1,10 @@
+"""Search of limits, gains and weights over the cases of a campaign.
+
+section     `tune:` of a campaign's file
+candidates  the values that are searched, and where the search starts
+scores      how good a candidate is on some cases
+search      the search itself, with Optuna; it can be interrupted and continued
+certainty   the comparison with the start on cases that the search has not seen
+writing     the result as YAML with its reasons
+command     `companion campaign tune`
+"""

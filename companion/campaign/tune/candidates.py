@@ -1,0 +1,168 @@
+"""The values that are searched, and where the search starts."""
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from companion.campaign.campaign import Campaign
+from companion.campaign.case import Case
+from companion.campaign.keys import with_keys
+from companion.campaign.swept import Swept
+from companion.campaign.tune.section import Tune
+from companion.config import Config
+from companion.config.known_drag import drag_prior
+from companion.control.hold_settings import disturbance_bandwidth, hold_weights
+from companion.files.yaml_file import ConfigError
+from companion.tuning import propose
+
+if TYPE_CHECKING:
+    from optuna import Trial
+
+Values = Mapping[str, Any]
+"""Value of each searched key."""
+_UNSEEN = 1_000_003
+"""Added to the campaign's seed for the cases that the search does not see."""
+
+
+_SPREAD = 0.15
+"""Standard deviation of the candidates near a start, as a share of the range."""
+
+
+class Start(NamedTuple):
+    """A candidate with which the search starts.
+
+    Attributes:
+        name: where its values come from.
+        values: of the searched keys; a missing one is drawn by the search.
+    """
+
+    name: str
+    values: Values
+
+
+def section_of(campaign: Campaign) -> Tune:
+    """The section `tune` of a campaign.
+
+    Raises:
+        ConfigError: there is none, the campaign is a batch, or a searched key is also swept.
+    """
+    tune = campaign.file.tune
+    if tune is None:
+        raise ConfigError(f"{campaign.name}: there is no section `tune` that says what to search")
+    if campaign.file.kind != "flights":
+        raise ConfigError(f"{campaign.name}: tune needs kind: flights")
+    swept = {key for name, each in campaign.file.sweep.items() for key in each.keys or (name,)}
+    for key in tune.search.keys() & swept:
+        raise ConfigError(f"{campaign.name}: `{key}` stands in sweep and in tune.search")
+    return tune
+
+
+def cases(campaign: Campaign, values: Values) -> list[Case]:
+    """The cases of a campaign, flown with a candidate.
+
+    Raises:
+        ConfigError: a value is refused.
+    """
+    config, _ = with_keys(campaign.base, campaign.base.mock or {}, values)
+    base = config.model_copy(update={"mock": campaign.base.mock})
+    return list(replace(campaign, base=base).cases())
+
+
+def unseen(campaign: Campaign, samples: int) -> Campaign:
+    """The campaign with samples, noise and gusts that the search does not see."""
+    told = {"seed": campaign.file.seed + _UNSEEN, "samples": samples}
+    return replace(campaign, file=campaign.file.model_copy(update=told))
+
+
+def suggested(trial: "Trial", search: Mapping[str, Swept]) -> dict[str, Any]:
+    """The values that the search tries next, three digits each."""
+    found: dict[str, Any] = {}
+    for key, swept in search.items():
+        if swept.choice is not None:
+            found[key] = trial.suggest_categorical(key, list(swept.choice))
+        else:
+            low, high = swept.uniform or swept.loguniform or (0.0, 1.0)
+            value = trial.suggest_float(key, low, high, log=swept.loguniform is not None)
+            found[key] = min(max(float(f"{value:.3g}"), low), high)
+    return found
+
+
+def starts(campaign: Campaign, tune: Tune) -> Iterator[Start]:
+    """The configuration as it is, and what `companion tune` proposes for it."""
+    yield Start("the configuration", within(_present(campaign.base, tune.search), tune.search))
+    try:
+        changes = propose(_analysed(campaign.base)).changes
+    except ConfigError:
+        return  # its rate loop is not known, or the linear analysis does not cover it
+    told = {
+        f"{section}.{key}": value
+        for section, keys in changes.items()
+        for key, value in keys.items()
+    }
+    present = _present(campaign.base, tune.search)
+    yield Start("companion tune", within({**present, **told}, tune.search))
+
+
+def near(start: Start, search: Mapping[str, Swept], count: int, seed: int) -> Iterator[Start]:
+    """Candidates around a start: each value moved by a normal share of its range.
+
+    The optimum is more often near a reasonable start than anywhere in the ranges.
+    """
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        moved = dict(start.values)
+        for key, value in start.values.items():
+            swept = search[key]
+            if swept.loguniform is not None:
+                low, high = swept.loguniform
+                moved[key] = value * (high / low) ** float(rng.normal(0.0, _SPREAD))
+            elif swept.uniform is not None:
+                low, high = swept.uniform
+                moved[key] = value + (high - low) * float(rng.normal(0.0, _SPREAD))
+        yield Start(f"near {start.name}", within(moved, search))
+
+
+def _analysed(config: Config) -> Config:
+    """The configuration with the planner that `companion tune` analyses."""
+    planner = config.planner.model_copy(update={"name": "auto"})
+    return config.model_copy(update={"planner": planner})
+
+
+def _present(config: Config, keys: Collection[str]) -> dict[str, Any]:
+    """The values in force; where a key is null, the one that the program derives."""
+    weights, drag = hold_weights(config), drag_prior(config).drag
+    derived = {
+        "guidance.position_weight_per_s4": weights.position,
+        "guidance.velocity_weight_per_s2": weights.velocity,
+        "guidance.disturbance_bandwidth_rad_s": disturbance_bandwidth(config),
+        "guidance.drag_per_s": drag.linear,
+        "guidance.quadratic_drag_per_m": drag.quadratic,
+        "thrust.lag_ms": 1e3 * config.thrust.lag,
+    }
+    own = set_values(config, keys)
+    return {key: value for key in keys if (value := own.get(key, derived.get(key))) is not None}
+
+
+def set_values(config: Config, keys: Iterable[str]) -> dict[str, Any]:
+    """The values of some dotted keys; those that are null are left out."""
+    found = {}
+    for key in keys:
+        section, _, name = key.partition(".")
+        value = getattr(getattr(config, section), name)
+        if value is not None:
+            found[key] = value
+    return found
+
+
+def within(values: Values, search: Mapping[str, Swept]) -> dict[str, Any]:
+    """The searched ones of some values, moved into the ranges of the search."""
+    found: dict[str, Any] = {}
+    for key, value in values.items():
+        swept = search.get(key)
+        if swept is None or (swept.choice is not None and value not in swept.choice):
+            continue
+        pair = swept.uniform or swept.loguniform
+        found[key] = value if pair is None else min(max(float(value), pair[0]), pair[1])
+    return found

@@ -1,0 +1,148 @@
+"""`companion campaign tune`: searches, checks the result on unseen cases, and writes it."""
+
+import argparse
+import shlex
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+from companion.campaign import engine, estimate, folder
+from companion.campaign.campaign import Campaign
+from companion.campaign.case import Case
+from companion.campaign.cluster import ClusterError, connected, require_packages, wait_for_workers
+from companion.campaign.loading import load
+from companion.campaign.running import interruptible
+from companion.campaign.tune.candidates import cases, section_of, set_values, starts, unseen
+from companion.campaign.tune.certainty import compared
+from companion.campaign.tune.scores import Row, scored
+from companion.campaign.tune.search import Fly, Found, Search
+from companion.campaign.tune.writing import Result, result_text, summary_lines
+from companion.campaign.versions import VersionError
+from companion.extras import require
+from companion.files.write_whole import write_whole
+from companion.files.yaml_file import ConfigError
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+RESULT = "tuned.yaml"
+_DONE, _FAILED = 0, 1
+
+
+def run(options: argparse.Namespace) -> int:
+    """Search, or continue a search; returns the exit code.
+
+    Args:
+        options: `file`, `out`, `trials`, `scheduler` and `workers` of the command line.
+
+    Raises:
+        ConfigError: the file is wrong, or the folder cannot be used.
+        MissingExtraError: the extra `campaign` is missing.
+    """
+    require_packages()
+    require("optuna", "campaign", "`companion campaign tune`")
+    campaign = load(options.file)
+    tune = section_of(campaign)
+    place: Path = options.out or folder.RUNS / f"{campaign.file.name}-tune"
+    console = Console(highlight=False, soft_wrap=True)
+    for start in starts(campaign, tune):
+        cases(campaign, start.values)  # refuses a bad value before any work
+    with folder.locked(place):
+        try:
+            _begin(place, campaign)
+            with interruptible(), connected(options.scheduler, options.workers) as client:
+                wait_for_workers(client)
+                console.print(f"Dask's dashboard: {client.dashboard_link}")
+                fly = _flyer(client, campaign)
+                found = _searched(campaign, place, fly, options.trials or tune.trials, console)
+                return _concluded(campaign, place, fly, found, console)
+        except VersionError as error:
+            raise ConfigError(str(error)) from error
+        except (KeyboardInterrupt, ClusterError) as error:
+            why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
+            command = f"companion campaign tune {shlex.quote(str(options.file))}"
+            command += f" --out {shlex.quote(str(place))}"
+            console.print(f"{why}; the candidates so far are kept. Go on with\n  {command}")
+            return _FAILED
+
+
+def _begin(place: Path, campaign: Campaign) -> None:
+    """Make the folder of the search, or check that it holds this one."""
+    if folder.begun(place):
+        folder.resume(place, campaign)
+    else:
+        folder.make(place, campaign, folder.describe(campaign, 1, None))
+
+
+def _flyer(client: "Client", campaign: Campaign) -> Fly:
+    """Flies cases on the cluster."""
+    kind = campaign.file.kind
+    case_s = estimate.measured(kind, list(campaign.cases())[:1])
+
+    def fly(some: Sequence[Case]) -> Sequence[Row]:
+        return engine.rows(client, kind, some, case_s)
+
+    return fly
+
+
+def _searched(campaign: Campaign, place: Path, fly: Fly, trials: int, console: Console) -> Found:
+    search = Search(campaign, section_of(campaign), place, fly)
+    with _progress(console, trials) as show:
+        found = search.run(trials, show)
+        show(found)
+    return found
+
+
+@contextmanager
+def _progress(console: Console, trials: int) -> Iterator[Callable[[Found], None]]:
+    columns = (
+        TextColumn("candidates"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        TextColumn("{task.description}"),
+    )
+    with Progress(*columns, console=console) as bar:
+        task = bar.add_task("", total=trials)
+
+        def show(found: Found) -> None:
+            best = "" if found.best is None else f"best {found.best.score.rms:.3f} m"
+            bar.update(task, completed=found.tried, description=best)
+
+        yield show
+
+
+def _concluded(campaign: Campaign, place: Path, fly: Fly, found: Found, console: Console) -> int:
+    """Check the best candidate on unseen cases, write it, and say what came of it."""
+    tune = section_of(campaign)
+    if found.best is None:
+        console.print(
+            f"None of the {found.tried} candidates kept {tune.inside_share:.1%} of the flights "
+            "inside the envelope: widen tune.search or tune.envelope_m, or raise tune.trials."
+        )
+        return _FAILED
+    other = unseen(campaign, tune.check_samples)
+    console.print(f"checking on {other.number_of_cases} flights that the search has not seen…")
+    before = scored(fly(list(other.cases())), tune.envelope_m)
+    after = scored(fly(cases(other, found.best.values)), tune.envelope_m)
+    comparison = compared(before, after, tune.check_samples)
+    result = Result(campaign, found, found.best, before, after, comparison)
+    path = place / RESULT
+    write_whole(path, result_text(result, set_values(campaign.base, tune.search)))
+    for line in summary_lines(result):
+        console.print(line, markup=False)
+    console.print(f"Written to {path}; let your configuration include it.", markup=False)
+    return _DONE

@@ -1,0 +1,96 @@
+"""How good a candidate is on some cases."""
+
+from collections.abc import Mapping, Sequence
+from math import inf, isfinite
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.campaign.swept import Value
+
+Floats = NDArray[np.float64]
+Row = Mapping[str, Value]
+
+
+class Score(NamedTuple):
+    """The score of a candidate.
+
+    Attributes:
+        true: RMS of the true distance from the reference in each case, m; infinite where a case was
+            not flown to its end.
+        estimated: the same of the estimated position: what the program could know of its error.
+        inside: whether each case stayed inside the envelope.
+    """
+
+    true: tuple[float, ...]
+    estimated: tuple[float, ...]
+    inside: tuple[bool, ...]
+
+    @property
+    def rms(self) -> float:
+        """RMS over all cases, m; infinite if one was not flown to its end."""
+        return pooled(np.array(self.true))
+
+    @property
+    def share(self) -> float:
+        """Share of the cases inside the envelope."""
+        return sum(self.inside) / len(self.inside)
+
+    def first(self, count: int) -> "Score":
+        """The score on the first cases alone."""
+        return Score(self.true[:count], self.estimated[:count], self.inside[:count])
+
+    def and_then(self, rest: "Score") -> "Score":
+        """The score on these cases and on further ones."""
+        return Score(
+            self.true + rest.true, self.estimated + rest.estimated, self.inside + rest.inside
+        )
+
+    def as_attributes(self) -> dict[str, Any]:
+        """The score as JSON; an infinite number is null."""
+        true, estimated = (
+            [each if isfinite(each) else None for each in values]
+            for values in (self.true, self.estimated)
+        )
+        return {"true": true, "estimated": estimated, "inside": list(self.inside)}
+
+    @classmethod
+    def from_attributes(cls, told: Mapping[str, Any]) -> "Score":
+        """The score that `as_attributes` wrote."""
+        true, estimated = (
+            tuple(inf if each is None else float(each) for each in told[name])
+            for name in ("true", "estimated")
+        )
+        return cls(true, estimated, tuple(told["inside"]))
+
+
+def scored(rows: Sequence[Row], envelope: float | None) -> Score:
+    """The score of rows of results.
+
+    Args:
+        rows: one a case.
+        envelope: largest true distance from the reference inside the envelope, m; None: any.
+    """
+    return Score(
+        tuple(_number(row, "position_rms_m") for row in rows),
+        tuple(_number(row, "estimated_rms_m") for row in rows),
+        tuple(_inside(row, envelope) for row in rows),
+    )
+
+
+def pooled(rms: Floats) -> float:
+    """RMS over cases of (cases,) RMS errors."""
+    return float(np.sqrt(np.mean(np.square(rms))))
+
+
+def _number(row: Row, name: str) -> float:
+    value = row.get(name)
+    flown = row.get("result") == "ok" and not row.get("crashed")
+    return float(value) if flown and isinstance(value, float) else inf
+
+
+def _inside(row: Row, envelope: float | None) -> bool:
+    if not isfinite(_number(row, "position_rms_m")):
+        return False
+    return envelope is None or _number(row, "position_max_m") <= envelope

@@ -1,0 +1,207 @@
+"""The search over candidates with Optuna; it can be interrupted at any time and continued."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from companion.campaign.campaign import Campaign
+from companion.campaign.case import Case
+from companion.campaign.tune.candidates import (
+    Start,
+    Values,
+    cases,
+    near,
+    starts,
+    suggested,
+    within,
+)
+from companion.campaign.tune.scores import Row, Score, pooled, scored
+from companion.campaign.tune.section import Tune
+from companion.files.yaml_file import ConfigError
+
+if TYPE_CHECKING:
+    from optuna import Study, Trial
+    from optuna.trial import FrozenTrial
+
+Fly = Callable[[Sequence[Case]], Sequence[Row]]
+"""Flies cases; returns a row for each, in order."""
+
+STORAGE = "tune.db"
+"""Optuna's storage in the folder of the search."""
+_NAME = "tune"
+_STARTS, _FEWEST_NEAR = 2, 4
+"""Number of starts, and smallest number of candidates near the last of them."""
+_FIRST_SHARE = 4
+"""A candidate flies the first 1/4 of its cases, at least `_FEWEST`, before the others."""
+_FEWEST = 2
+_HOPELESS = 1.3
+"""A candidate is not flown further when its error is so many times that of the best one."""
+_UNFLOWN = 10.0
+"""Error that stands for a flight that ended early, m: worse than any that was flown."""
+_VALUES, _SCORE, _MISSED, _WHOLE = "values", "score", "missed", "whole"
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A candidate that has flown all its cases.
+
+    Attributes:
+        number: of the trial.
+        values: of the searched keys.
+        score: on the cases of the search.
+    """
+
+    number: int
+    values: Values
+    score: Score
+
+
+@dataclass
+class Found:
+    """What a search has found so far.
+
+    Attributes:
+        tried: number of candidates, those that were not flown to the end included.
+        stopped_early: number of candidates that were not flown to the end.
+        best: the candidate with the smallest error inside the envelope; None: none stayed inside.
+        near: the best tenth of the candidates, the best one first.
+    """
+
+    tried: int = 0
+    stopped_early: int = 0
+    best: Candidate | None = None
+    near: list[Candidate] = field(default_factory=list)
+
+
+class Search:
+    """A search in a folder.
+
+    Args:
+        campaign: gives the cases and the section `tune`.
+        tune: its section `tune`.
+        folder: for the storage.
+        fly: flies cases.
+    """
+
+    def __init__(self, campaign: Campaign, tune: Tune, folder: Path, fly: Fly) -> None:
+        import optuna  # noqa: PLC0415  an extra
+
+        optuna.logging.set_verbosity(optuna.logging.ERROR)
+        self._optuna = optuna
+        self._campaign, self._tune, self._fly = campaign, tune, fly
+        self._study: Study = optuna.create_study(
+            storage=f"sqlite:///{folder / STORAGE}",
+            study_name=_NAME,
+            sampler=self._sampler(0),
+            load_if_exists=True,
+        )
+        self._begin()
+
+    def run(self, trials: int, on_trial: Callable[[Found], None] = lambda _: None) -> Found:
+        """Try candidates until there are `trials` of them, those of earlier runs included."""
+        while len(self._ended()) < trials:
+            on_trial(self.found())
+            # Each trial has its own seed, so an interruption does not change the candidates.
+            self._study.sampler = self._sampler(len(self._ended()))
+            self._try(self._interrupted() or self._study.ask())
+        return self.found()
+
+    def found(self) -> Found:
+        """What was found so far."""
+        whole = [each for each in self._ended() if each.user_attrs.get(_WHOLE)]
+        good = sorted(
+            (self._candidate(each) for each in whole if not self._missed(each)),
+            key=lambda each: each.score.rms,
+        )
+        tried = len(self._ended())
+        near = good[: max(3, len(good) // 10)]
+        return Found(tried, tried - len(whole), good[0] if good else None, near)
+
+    @property
+    def _near(self) -> int:
+        """Number of candidates near the start that are tried first."""
+        return max(_FEWEST_NEAR, len(self._tune.search))
+
+    def _sampler(self, number: int) -> Any:
+        return self._optuna.samplers.TPESampler(
+            seed=self._campaign.file.seed + number,
+            multivariate=True,
+            n_startup_trials=_STARTS + self._near,
+        )
+
+    def _begin(self) -> None:
+        """Let a new search begin with the starts."""
+        if not self._study.trials:
+            begin = list(starts(self._campaign, self._tune))
+            seed, search = self._campaign.file.seed, self._tune.search
+            for start in (*begin, *near(begin[-1], search, self._near, seed)):
+                self._enqueue(start)
+
+    def _enqueue(self, start: Start) -> None:
+        self._study.enqueue_trial(dict(start.values), user_attrs={"start": start.name})
+
+    def _interrupted(self) -> "Trial | None":
+        """The candidate whose flights were interrupted, to be tried again."""
+        running = self._study.get_trials(states=(self._optuna.trial.TrialState.RUNNING,))
+        return self._optuna.trial.Trial(self._study, running[0]._trial_id) if running else None
+
+    def _ended(self) -> "list[FrozenTrial]":
+        """The trials that came to an end, pruned or not."""
+        states = self._optuna.trial.TrialState
+        ended = states.COMPLETE, states.PRUNED
+        return list(self._study.get_trials(deepcopy=False, states=ended))
+
+    def _try(self, trial: "Trial") -> None:
+        values = within(suggested(trial, self._tune.search), self._tune.search)
+        trial.set_user_attr(_VALUES, values)
+        try:
+            flown = cases(self._campaign, values)
+        except ConfigError:  # keys that do not fit together, such as a minimum above a maximum
+            self._stop(trial, _UNFLOWN, 1.0)
+            return
+        count = min(len(flown), max(_FEWEST, len(flown) // _FIRST_SHARE))
+        score = scored(self._fly(flown[:count]), self._tune.envelope_m)
+        missed = self._missed_share(score, len(flown))
+        if count < len(flown) and (missed > 0.0 or self._hopeless(score)):
+            self._stop(trial, _finite(score), max(missed, 0.0))
+            return
+        score = score.and_then(scored(self._fly(flown[count:]), self._tune.envelope_m))
+        trial.set_user_attr(_SCORE, score.as_attributes())
+        self._note_missed(trial, self._missed_share(score, len(flown)))
+        trial.set_user_attr(_WHOLE, True)
+        self._study.tell(trial, _finite(score))
+
+    def _stop(self, trial: "Trial", error: float, missed: float) -> None:
+        """End a candidate before all its cases were flown."""
+        self._note_missed(trial, missed)
+        trial.report(error, 0)
+        self._study.tell(trial, state=self._optuna.trial.TrialState.PRUNED)
+
+    def _note_missed(self, trial: "Trial", missed: float) -> None:
+        """Tell the sampler by how much the constraint is missed; up to 0 it is kept."""
+        trial.set_user_attr(_MISSED, missed)
+        trial.set_constraint(_MISSED, missed)
+
+    def _missed_share(self, score: Score, of: int) -> float:
+        """By how much the share inside the envelope is missed, if the rest of `of` cases stay."""
+        outside = sum(not each for each in score.inside)
+        return self._tune.inside_share - (of - outside) / of
+
+    def _hopeless(self, score: Score) -> bool:
+        best = self.found().best
+        return best is not None and score.rms > _HOPELESS * best.score.first(len(score.true)).rms
+
+    def _missed(self, trial: "FrozenTrial") -> bool:
+        return float(trial.user_attrs[_MISSED]) > 0.0
+
+    def _candidate(self, trial: "FrozenTrial") -> Candidate:
+        told = trial.user_attrs
+        return Candidate(trial.number, told[_VALUES], Score.from_attributes(told[_SCORE]))
+
+
+def _finite(score: Score) -> float:
+    """The RMS error for Optuna, m: a flight that ended early counts as `_UNFLOWN`."""
+    return pooled(np.minimum(score.true, _UNFLOWN))

@@ -1,0 +1,36 @@
+"""The section `tune` of a campaign's file: which keys are searched, and under which constraint."""
+
+from typing import Annotated
+
+from pydantic import Field, field_validator
+
+from companion.campaign.swept import Swept
+from companion.files.yaml_file import Section
+
+
+class Tune(Section):
+    """What `companion campaign tune` searches. Running the campaign ignores it."""
+
+    search: Annotated[dict[str, Swept], Field(min_length=1, max_length=30)]
+    """Searched keys of the application, dotted, each with uniform, loguniform or choice."""
+    trials: Annotated[int, Field(ge=1, le=100_000)] = 100
+    """Number of candidates that are tried."""
+    envelope_m: Annotated[float, Field(gt=0.0, le=1000.0)] | None = 1.0
+    """Largest true distance from the reference that a flight inside the envelope has. null: such a
+    flight must only be flown to its end."""
+    inside_share: Annotated[float, Field(gt=0.0, le=1.0)] = 0.999
+    """Share of the flights that must stay inside the envelope."""
+    check_samples: Annotated[int, Field(ge=2, le=10_000)] = 8
+    """Samples that the search does not see. On them the result is compared with the start."""
+
+    @field_validator("search")
+    @classmethod
+    def _searchable(cls, search: dict[str, Swept]) -> dict[str, Swept]:
+        for key, swept in search.items():
+            if not (swept.uniform or swept.loguniform or swept.choice):
+                raise ValueError(f"{key}: give uniform, loguniform or choice")
+            if swept.times_base or swept.keys:
+                raise ValueError(f"{key}: times_base and keys belong to `sweep`")
+            if key.startswith("mock."):
+                raise ValueError(f"{key}: the mock vehicle is what it is; search our own keys")
+        return search

@@ -1,0 +1,134 @@
+"""The result of a search as YAML with its reasons, for a configuration to include."""
+
+from collections.abc import Iterator, Mapping
+from math import isfinite
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from companion.campaign.campaign import Campaign
+from companion.campaign.swept import Swept
+from companion.campaign.tune.certainty import Comparison
+from companion.campaign.tune.scores import Score, pooled
+from companion.campaign.tune.search import Candidate, Found
+from companion.files import bounded_yaml
+
+_AT_EDGE = 0.02
+"""A value this close to an end of its range, as a share of the range, lies at the end."""
+
+
+class Result(NamedTuple):
+    """What a search has come to.
+
+    Attributes:
+        campaign: with the section `tune`.
+        found: what the search has found.
+        best: the candidate that is proposed.
+        before: score of the configuration as it was, on the unseen cases.
+        after: score of the proposal, on the unseen cases.
+        comparison: of the two; None where a case was not flown to its end.
+    """
+
+    campaign: Campaign
+    found: Found
+    best: Candidate
+    before: Score
+    after: Score
+    comparison: Comparison | None
+
+
+def summary_lines(result: Result) -> list[str]:
+    """What was searched, what was found, and how sure it is."""
+    found, best, tune = result.found, result.best, result.campaign.file.tune
+    assert tune is not None
+    cases = len(best.score.true)
+    envelope = "to its end" if tune.envelope_m is None else f"within {tune.envelope_m:g} m"
+    lines = [
+        f"{found.tried} candidates over {cases} flights each, {found.stopped_early} of them "
+        f"stopped early; candidate {best.number} is the best.",
+        f"Constraint: {tune.inside_share:.1%} of the flights {envelope}; in the search "
+        f"{best.score.share:.1%} were.",
+        f"RMS of the true error in the search: {best.score.rms:.3f} m.",
+    ]
+    return [*lines, *_certainty(result)]
+
+
+def _certainty(result: Result) -> Iterator[str]:
+    unseen = len(result.after.true)
+    early = [
+        sum(not isfinite(each) for each in score.true) for score in (result.before, result.after)
+    ]
+    if any(early):
+        yield (
+            f"Of {unseen} flights that the search has not seen, {early[0]} ended early before, and "
+            f"{early[1]} with the result; the errors below are those of the other samples."
+        )
+    told = result.comparison
+    if told is None:
+        return
+    yield (
+        f"On {told.samples} samples that the search has not seen, RMS of the true error in m with "
+        f"its 95 % interval: {told.before} -> {told.after}."
+    )
+    yield (
+        f"That is {told.ratio.value:.2f} times the error before, 95 % interval "
+        f"{told.ratio.low:.2f} to {told.ratio.high:.2f}; better in {told.better} of "
+        f"{told.samples} samples."
+    )
+    yield (
+        "Of that the program knew (error of the estimated position): "
+        f"{_estimated(result.before)} -> {_estimated(result.after)} m. The rest is the "
+        "autopilot's estimate."
+    )
+    if told.ratio.high >= 1.0:
+        yield "The interval holds 1: fly more samples before you believe that it is better."
+
+
+def _estimated(score: Score) -> str:
+    known = np.array(score.estimated)
+    return f"{pooled(known[np.isfinite(known)]):.3f}"
+
+
+def result_text(result: Result, present: Mapping[str, Any]) -> str:
+    """The text of the file.
+
+    Args:
+        result: of the search.
+        present: values of the searched keys as they were; a key that was not set is missing.
+    """
+    tune = result.campaign.file.tune
+    assert tune is not None
+    name = result.campaign.file.name
+    lines = [f"# Found by `companion campaign tune` for the campaign {name}.", "#"]
+    lines += [f"# {line}" for line in summary_lines(result)]
+    sections: dict[str, list[str]] = {}
+    for key, value in result.best.values.items():
+        section, _, short = key.partition(".")
+        reason = _reason(key, tune.search[key], result, present.get(key))
+        dumped = bounded_yaml.dump_value(value)
+        sections.setdefault(section, []).extend([f"  # {reason}", f"  {short}: {dumped}"])
+    for section, told in sections.items():
+        lines += ["", f"{section}:", *told]
+    return "\n".join(lines) + "\n"
+
+
+def _reason(key: str, swept: Swept, result: Result, before: Any) -> str:
+    """Why a key has its value."""
+    was = "not set before" if before is None else f"before {_shown(before)}"
+    near = [each.values[key] for each in result.found.near if key in each.values]
+    pair = swept.uniform or swept.loguniform
+    if pair is None:
+        same = sum(each == result.best.values[key] for each in near)
+        return f"{was}; {same} of the best {len(near)} candidates have it"
+    low, high = pair
+    told = f"{was}; the best {len(near)} candidates have {min(near):.3g} to {max(near):.3g}"
+    told += f" of {low:g} to {high:g}"
+    value = float(result.best.values[key])
+    if min(value - low, high - value) < _AT_EDGE * (high - low):
+        return f"{told}; it lies at an end of its range: widen the range"
+    wide = max(near) - min(near) > 0.5 * (high - low)
+    return f"{told}; it matters little here" if wide else told
+
+
+def _shown(value: Any) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
