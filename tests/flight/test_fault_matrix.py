@@ -19,7 +19,7 @@ AUTOPILOTS = ("px4", "ardupilot")
 PILOTED = {"px4": "POSCTL", "ardupilot": "LOITER"}
 """What the pilot's mode is called."""
 PHASES = ("stream", "takeoff", "offboard", "maneuvers", "hand back", "land")
-AFTER = dict(zip(PHASES, (0.0, 0.8, 1.3, 0.3, 0.02, 0.3), strict=True))
+AFTER = dict(zip(PHASES, (0.0, 0.8, 1.3, 0.3, 0.0, 0.3), strict=True))
 """How long after the phase began the fault does, s; offboard begins with a judgement of 1 s."""
 
 GROUND, OK, LANDED, HELD, PILOT = "ground", "ok", "landed", "held", "pilot"
@@ -135,7 +135,7 @@ def excess(state):
 
 @pytest.mark.parametrize(("autopilot", "fault", "phase", "end"), list(cells()))
 def test_a_fault_in_a_phase_ends_as_documented(tmp_path, autopilot, fault, phase, end):
-    with mock_vehicle(autopilot=autopilot, full_rate=True, in_lockstep=True) as mock:
+    with mock_vehicle(tmp_path, autopilot=autopilot, in_lockstep=True) as mock:
         observer = Begin(mock, fault, phase)
         summary = fly(mock, tmp_path / "log", observer, **SHORT)
         assert observer.wanted is None, summary.events
