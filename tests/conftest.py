@@ -18,6 +18,10 @@ def state_directory(tmp_path_factory):
 
 
 def pytest_collection_finish():
-    """What was imported by now stays: to walk through it again and again costs flights a tenth."""
+    """What was imported by now stays: to walk through it again and again costs flights a tenth.
+
+    Of the rest little is garbage, and it is looked for more rarely.
+    """
     gc.collect()
     gc.freeze()
+    gc.set_threshold(50_000, 20, 50)

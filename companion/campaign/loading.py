@@ -195,5 +195,7 @@ def _following(config: Config, path: Path) -> Config:
 def as_written(campaign: Campaign) -> dict[str, Any]:
     """The campaign file as it was resolved: with the keys of its configuration and all defaults."""
     data = campaign.file.model_dump(mode="json")
+    if campaign.file.tune is None:
+        del data["tune"]  # a section without keys would be read as an empty one
     data["config"] = campaign.base.model_dump(mode="json")
     return data

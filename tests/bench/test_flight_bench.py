@@ -1,6 +1,7 @@
 """Flights in one process are measured, and are quicker than real time."""
 
 import json
+from functools import partial
 
 import pytest
 
@@ -8,11 +9,13 @@ from companion.batch import can_compile
 from companion.bench import flight
 from companion.bench.profile import PARTS
 from companion.cli.main import main
+from tests.flight.fly import QuickVehicle
 
 
 def test_the_table_of_the_bench_is_also_json(capsys, monkeypatch):
     monkeypatch.setattr(flight, "FILES", {"px4": flight.FILES["px4"]})
     monkeypatch.setattr(flight, "_FLIGHTS", 1)
+    monkeypatch.setattr(flight, "MockVehicle", partial(QuickVehicle, full_rate=True))
     assert main(["bench", "flight", "--seconds", "0.2", "--json", "--profile"]) == 0
     figures = json.loads(capsys.readouterr().out)
     for clocks in figures.values():

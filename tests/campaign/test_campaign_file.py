@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from companion.campaign import folder, loading
+from companion.campaign import estimate, folder, loading
 from companion.campaign.design import samples_of, seed_of
 from companion.campaign.swept import Swept
 from companion.cli.main import main
@@ -66,7 +66,9 @@ def test_the_grid_is_flown_with_every_sample(tmp_path):
         assert case.mock["wind"]["gust_m_s"] == 0.0  # as it was
         assert case.mock["seed"] == case.seed == seed_of(1, case.index)
     assert len({case.seed for case in cases}) == len(cases)
-    again = list(load(tmp_path, **campaign.file.model_dump(exclude={"name", "config"})).cases())
+    again = list(
+        load(tmp_path, **campaign.file.model_dump(exclude={"name", "config", "tune"})).cases()
+    )
     assert again == cases
 
 
@@ -165,13 +167,17 @@ def test_what_is_wrong_is_said_before_work_begins(tmp_path, told, words):
     assert str(tmp_path) in said
 
 
-def test_too_many_flights_are_refused_with_their_number_and_time(tmp_path, capsys):
-    short = {"flight.maneuvers": ["hover"], "hover.duration_s": 0.1, "mock.prearm_delay_s": 0.2}
-    path = written(tmp_path, samples=30_000, set=short, sweep={"limits.max_tilt_deg": [20, 30]})
+def test_too_many_flights_are_refused_with_their_number_and_time(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(estimate, "measured", lambda _, cases: 2.0 * len(cases))
+    path = written(tmp_path, samples=30_000, sweep={"limits.max_tilt_deg": [20, 30]})
     assert main(["campaign", str(path), "--workers", "3", "--out", str(tmp_path / "out")]) == 2
     said = capsys.readouterr().err
-    assert "60000 flights, about" in said
-    assert "with 3 workers" in said
-    assert "limits.max_cases" in said
-    assert "--yes" in said
+    # Only one of the cases was measured.
+    assert "60000 flights, about 11 h with 3 workers, more than limits.max_cases allows" in said
+    assert "raise limits.max_cases, or say --yes" in said
+    path = written(tmp_path, samples=1000, sweep={"limits.max_tilt_deg": [20, 30]})
+    monkeypatch.setattr(estimate, "measured", lambda *_: 60.0)
+    assert main(["campaign", str(path), "--workers", "3", "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert "2000 flights, about 11 h with 3 workers, more than limits.max_hours allows (4)" in said
     assert not (tmp_path / "out").exists()

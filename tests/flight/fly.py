@@ -102,10 +102,11 @@ class QuickVehicle(testing.MockVehicle):
         told = {} if config is None else bounded_yaml.parse(config.read_text("utf-8"))["mock"]
         autopilot = autopilot or told.get("autopilot", "px4")
         stepping = {"enabled": lockstep} if isinstance(lockstep, bool) else lockstep
-        delay_s = others.pop("delay_s", 0.0)
+        kept = {"delay_s": others.pop("delay_s", 0.0)}
+        kept["compiled"] = others.pop("compiled", can_compile())
         known = merged(told, {**others, "autopilot": autopilot, "lockstep": stepping})
         known = quick_vehicle(autopilot, known, full_rate=full_rate)
-        super().__init__(delay_s=delay_s, compiled=can_compile(), **known)
+        super().__init__(**kept, **known)
 
 
 def quick_flight(autopilot, changes, **link):

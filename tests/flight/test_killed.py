@@ -65,7 +65,7 @@ def carried(folder, autopilot, speed, held, after):
     """One flight whose setpoints end `after` s of its circle; PX4 is set to hold afterwards."""
     folder.mkdir()
     settings = {HELD[autopilot]: held, **({"COM_OBL_RC_ACT": 5} if autopilot == "px4" else {})}
-    with mock_vehicle(folder, autopilot=autopilot, parameters=settings) as mock:
+    with mock_vehicle(autopilot=autopilot, full_rate=True, parameters=settings) as mock:
         session = None
 
         def leave():

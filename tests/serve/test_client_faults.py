@@ -12,6 +12,8 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion import testing
 from companion.batch import can_compile
+from companion.files import bounded_yaml
+from tests.flight.fly import LOOP_HZ, merged
 from tests.serve.setpoint_judge import AT_ONCE, HAND_BACK, HOLD, TIMEOUT, SetpointJudge
 from tests.serve.virtual import (
     ALL,
@@ -402,12 +404,22 @@ def documented():
     return dict(re.findall(r"^\| (.+?) \| (.+?) \|", table, re.MULTILINE))
 
 
+def slow_loop(config):
+    """The shipped vehicle with a loop of 100 Hz."""
+    mock = bounded_yaml.parse(config.read_text("utf-8"))["mock"]
+    autopilot = mock["autopilot"]
+    loop = {"inner_loop_hz": LOOP_HZ}
+    if autopilot == "ardupilot":
+        loop = {"parameters": {"SCHED_LOOP_RATE": float(LOOP_HZ)}}
+    return merged(mock, loop)
+
+
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 def test_every_fault_of_a_client_ends_in_its_documented_state(autopilot):
     # The limits of these scenes were measured after the take-off of the shipped vehicle.
     config = CONFIGS / f"mock-{autopilot}.yaml"
-    vehicle = testing.MockVehicle(lockstep=False, config=config, compiled=can_compile())
+    vehicle = testing.MockVehicle(lockstep=False, compiled=can_compile(), **slow_loop(config))
     seen = {}
 
     async def whole():

@@ -143,7 +143,7 @@ def table(out, name):
     return {row[0]: dict(zip(header[1:], row[1:], strict=True)) for row in body}
 
 
-def test_json_prints_one_list_with_a_row_for_each_case(tmp_path, monkeypatch, capsys):
+def test_json_prints_one_list_and_the_tables_hold_what_was_flown(tmp_path, monkeypatch, capsys):
     said = studied(monkeypatch, capsys, tmp_path, "--json")
     rows = json.loads(said.out)
     assert "Open" in said.err
@@ -169,10 +169,6 @@ def test_json_prints_one_list_with_a_row_for_each_case(tmp_path, monkeypatch, ca
     assert row["not_led_rms_m"] == pytest.approx(0.15)
     assert row["not_led_max_m"] == pytest.approx(0.30)
     assert row["result"] == "ok"
-
-
-def test_the_tables_hold_what_was_flown(tmp_path, monkeypatch, capsys):
-    studied(monkeypatch, capsys, tmp_path)
     row = table(tmp_path, "track")["circle, 7 m/s, linear"]
     assert float(row["first-order"]) == pytest.approx(27.0)
     assert float(row[OURS]) == pytest.approx(0.5 * 32.0)
