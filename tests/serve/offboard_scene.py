@@ -136,37 +136,12 @@ class Program:
         report["disarmed"] = True
         return report
 
-    async def hover_until_lost(self, parameter):
-        """Take off, and hold by a repeated velocity until another station has the vehicle."""
-        report = {"armable": await self.armable(), "parameter": await self.parameter(parameter)}
-        async with asyncio.timeout(90.0):
-            while not await self.takes_off(5.0):  # noqa: ASYNC110
-                await asyncio.sleep(1.0)
-        await self.climbed(4.6)
-        await asyncio.sleep(3.0)
-        await self.velocity_body(0.0, 0.0, 0.0)
-        await self.start()
-        while not await self.active():  # noqa: ASYNC110
-            await asyncio.sleep(0.1)
-        print("IN CONTROL", flush=True)
-        place = self.place
-        while await self.active():
-            report["strayed_m"] = math.dist(place, self.place)
-            await asyncio.sleep(0.1)
-        report["lost"] = True
-        return report
-
 
 def main(run):
-    """Run `run(endpoint, fly)`.
-
-    The arguments are endpoint, hover thrust, parameter; then `ground`, `lose` or nothing.
-    """
-    endpoint, hover, parameter, *how = sys.argv[1:]
+    """Run `run(endpoint, fly)`; the further arguments are those of `Program.fly`."""
+    endpoint, hover, parameter, *ground = sys.argv[1:]
 
     def fly(program):
-        if how == ["lose"]:
-            return program.hover_until_lost(parameter)
-        return program.fly(float(hover), parameter, from_ground=how == ["ground"])
+        return program.fly(float(hover), parameter, from_ground=bool(ground))
 
     print("REPORT " + json.dumps(asyncio.run(run(endpoint, fly))), flush=True)

@@ -41,11 +41,11 @@ class Serving:
 
 
 @contextlib.contextmanager
-def serving(port, *endpoints, config="configs/mock-px4.yaml", settings=(), options=()):
+def serving(port, *endpoints, config="configs/mock-px4.yaml", settings=()):
     """`companion serve` between the vehicle that sends to `port` and these endpoints."""
     command = [
         sys.executable, "-c", "import sys; from companion.cli.main import main; sys.exit(main())",
-        "serve", "--json", "--config", config, "--endpoint", f"udpin://127.0.0.1:{port}", *options,
+        "serve", "--json", "--config", config, "--endpoint", f"udpin://127.0.0.1:{port}",
     ]  # fmt: skip
     for endpoint in endpoints:
         command += ["--client", endpoint]
