@@ -116,7 +116,7 @@ def threads(monkeypatch):
 
     @contextmanager
     def connected(_scheduler, _workers):
-        options = {"processes": False, "dashboard_address": None, "protocol": "inproc://"}
+        options = {"processes": False, "dashboard_address": "127.0.0.1:0", "protocol": "inproc://"}
         with (
             LocalCluster(n_workers=1, threads_per_worker=1, **options) as cluster,
             Client(cluster) as client,
