@@ -144,7 +144,7 @@ class _BeginFault(Silent):
     def __init__(self, vehicle: MockVehicle, fault: Fault | None) -> None:
         self._vehicle, self._fault = vehicle, fault
         self.begun = False
-        self._phases = () if fault is None else (fault.phase,)
+        self._phases: tuple[str, ...] = () if fault is None else (fault.phase,)
         if self._phases == ("stream",):
             self._phases = "stream", "arm"  # the first of them: some get no setpoints on the ground
 
