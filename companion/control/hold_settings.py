@@ -16,8 +16,13 @@ _USUAL_RATE_LOOP = 0.12
 _HOLD_RANGE = 0.065, 0.08
 """Range over which the hold changes from stiff to normal: dead time, plus half the lag, plus half
 the time in which the rate loop slews to the largest roll-pitch rate, s."""
+_SHORTEST_DELAY = 0.275
+"""Shortest delay for which the hold is made stiffer, s. Higher weights multiply the noise of the
+estimate so much that the autopilot's rate loop always slews, and the vehicle swings."""
 _OBSERVER_RANGE = 0.035, 0.06
 """Range over which the observer changes from quick to normal: dead time plus half the lag, s."""
+_GAIN_RANGE = 5.0, 7.0
+"""Range over which the observer changes from quick to normal: gain of the planner, 1/s."""
 _SHARPENING = 0.6
 """Relative increase of the observer's bandwidth with a quick rate loop."""
 _CALM_BANDWIDTH = 1.0
@@ -42,13 +47,13 @@ _LARGEST_CORRECTION = 0.2
 def hold_weights(config: Config) -> Weights:
     """The weights of the position hold; those not configured follow from the delay T.
 
-    T is the delay of the attitude behind its target (`attitude_delay`).
+    T is the delay of the attitude behind its target (`attitude_delay`), but at least 0.275 s.
 
     The weights 1/T⁴ and 1/T² place the poles of the hold at 1/T. A quick rate loop allows twice the
     position weight. `tests/control/test_margins.py` checks the stability margins against errors of
     T and of the thrust.
     """
-    guidance, delay = config.guidance, attitude_delay(config)
+    guidance, delay = config.guidance, _hold_delay(config)
     position, velocity = guidance.position_weight_per_s4, guidance.velocity_weight_per_s2
     return Weights(
         (1.0 + _hold_quickness(config)) / delay**4 if position is None else position,
@@ -88,7 +93,15 @@ def observer_quickness(config: Config) -> float:
     """
     if config.guidance.disturbance_bandwidth_rad_s is not None or flies_identify(config):
         return 0.0
-    return _quickness(_lateness(config), _OBSERVER_RANGE)
+    return _quickness(_lateness(config), _OBSERVER_RANGE) * _gain_quickness(config)
+
+
+def _gain_quickness(config: Config) -> float:
+    """1 if the planner's gain is low enough for a quick observer, whose noise it multiplies.
+
+    At 90 °/s the mock ArduPilot swung without end with a gain of 7.5 and a quick observer.
+    """
+    return _quickness(config.planner.gain_per_s, _GAIN_RANGE)
 
 
 def observer_settings(config: Config) -> ObserverSettings:
@@ -118,7 +131,7 @@ def correction_settings(config: Config) -> CorrectionSettings:
 def disturbance_bandwidth(config: Config) -> float:
     """Bandwidth of the wind estimate, rad/s: as configured, or 1.5 times that of the hold."""
     configured = config.guidance.disturbance_bandwidth_rad_s
-    return 1.5 / attitude_delay(config) if configured is None else configured
+    return 1.5 / _hold_delay(config) if configured is None else configured
 
 
 def attitude_delay(config: Config) -> float:
@@ -130,6 +143,11 @@ def attitude_delay(config: Config) -> float:
     excess = 1.0 / sensible_gain(config) - 1.0 / config.planner.gain_per_s
     delay = feedback_delay(config) + max(0.0, excess)
     return delay if config.vehicle.known else delay + _USUAL_RATE_LOOP
+
+
+def _hold_delay(config: Config) -> float:
+    """The delay T from which the weights and the wind estimate follow, s."""
+    return max(_SHORTEST_DELAY, attitude_delay(config))
 
 
 def feedback_delay(config: Config) -> float:

@@ -8,6 +8,7 @@ import yaml
 
 from companion.attitude.representation import wrap_angle
 from companion.config import Config
+from companion.config.files import load
 from companion.files.yaml_file import ConfigError, parse
 from companion.flight import maneuvers
 from companion.guidance import Pose
@@ -102,3 +103,21 @@ def test_a_trajectory_along_its_path_begins_with_a_turn_from_the_vehicles_headin
     assert part.duration <= longest
     end = part.at(part.duration, start)
     assert end.position_ned == pytest.approx(start.position_ned, abs=1e-6)
+
+
+@pytest.mark.parametrize("gain", [6.0, 10.0])
+def test_a_high_gain_does_not_make_a_quick_vehicle_swing(gain):
+    """The ArduPilot mock at 90 °/s: a stiffer hold and a quick observer swung by 5° and more."""
+    shipped = load(CONFIGS / "mock-ardupilot.yaml").model_dump(exclude_unset=True)
+    changes = {
+        "vehicle": shipped["vehicle"],
+        "guidance": shipped["guidance"],
+        "thrust": shipped["thrust"],
+        "planner": {"name": "auto", "gain_per_s": gain},
+        "flight": {"maneuvers": ["hover", "circle"]},
+        "hover": {"duration_s": 4.0},
+    }
+    with mock_vehicle(autopilot="ardupilot", full_rate=True) as mock:
+        figures = fly(mock, None, **changes).as_dict()
+    swings = [part["swing_rms_deg"] for part in figures["maneuvers"]]
+    assert max(swings) < 1.0, swings
