@@ -23,6 +23,9 @@ from companion.mavlink.transport.endpoint import parse_endpoint
 from companion.serve.report_pages import ReportPages
 from companion.serve.session import ServeSession
 
+_PAGE_AFTER_STOP = 40.0
+"""Time after a stop for which the report of a flight is still waited for, s."""
+
 
 def serve(options: argparse.Namespace) -> int:
     """Pass everything between the vehicle and other programs, and fly their setpoints."""
@@ -66,18 +69,22 @@ async def _until_stopped(session: ServeSession, pages: ReportPages) -> dict[str,
     loop = asyncio.get_running_loop()
     stopped_at: float | None = None
 
+    def stop() -> None:
+        session.stop()
+        loop.call_later(_PAGE_AFTER_STOP, pages.leave)
+
     def interrupt() -> None:
         nonlocal stopped_at
         if stopped_at is None:
             stopped_at = loop.time()
-            session.stop()
+            stop()
         elif loop.time() - stopped_at >= LEAVE_AFTER:
             session.leave()
             pages.leave()
 
     loop.add_signal_handler(signal.SIGINT, interrupt)
     for number in (signal.SIGTERM, signal.SIGHUP):
-        loop.add_signal_handler(number, session.stop)
+        loop.add_signal_handler(number, stop)
     return await session.run()
 
 

@@ -9,6 +9,10 @@ from typing import NamedTuple
 from companion.attitude.history import between
 from companion.guidance.reference import Horizontal, Vector, VehicleMotion, limited, rotated
 
+_LARGEST_STEP = 0.5
+"""Largest product of the pull and the time between two measurements: with a larger one, the
+observer is unstable at low position rates, and a gap in the positions makes a false wind."""
+
 
 class ObserverGains(NamedTuple):
     """How one measurement corrects the observer.
@@ -47,9 +51,9 @@ class ObserverSettings:
     sharpening: float = 0.0
     smooth_pull: float = 0.0
 
-    def pull(self, smoothness: float) -> float:
-        """Correction of the velocity per position error, 1/s; `smoothness` as in `gains`."""
-        return self.position_pull + smoothness * self.smooth_pull
+    def pull(self, dt: float, smoothness: float) -> float:
+        """Correction of the velocity per position error, 1/s; arguments as in `gains`."""
+        return min(self.position_pull + smoothness * self.smooth_pull, _LARGEST_STEP / dt)
 
     def gains(self, dt: float, smoothness: float = 0.0) -> ObserverGains:
         """The gains for measurements `dt` seconds apart.
@@ -110,7 +114,7 @@ class MotionObserver:
             self._motion = measured
             return
         settings, disturbance = self._settings, self.disturbance
-        gains, pull = settings.gains(dt, smoothness), settings.pull(smoothness)
+        gains, pull = settings.gains(dt, smoothness), settings.pull(dt, smoothness)
         position, velocity = list(measured.position_ned), list(measured.velocity_ned)
         found = [0.0, 0.0]
         for axis in (0, 1):

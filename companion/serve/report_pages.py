@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -12,6 +13,8 @@ from companion.realtime import schedule_as_usual
 
 _LONGEST = 120.0
 """Time allowed for one page, s; a small computer needs some ten seconds."""
+_LOOK_PERIOD = 1.0
+"""Period of asking whether to go on waiting for the process, s."""
 _NICE = 19
 """The process gives way to everything else: the next flight may have begun."""
 _INTERRUPTED = "interrupted"
@@ -40,7 +43,7 @@ class ReportPages:
             self._note(told)
 
     def leave(self) -> None:
-        """Write no page any more: the user wants to leave at once."""
+        """Write no page any more: the program is to end."""
         self._left = True
         if self._process is not None:
             self._process.kill()
@@ -54,25 +57,37 @@ class ReportPages:
         """
         if self._left:
             raise RuntimeError(_INTERRUPTED)
-        with subprocess.Popen(
+        self._process = subprocess.Popen(
             [sys.executable, "-m", "companion", "report", str(folder)],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
             start_new_session=True,  # a Ctrl-C is for the program, which says what becomes of it
-        ) as self._process:
-            _give_way(self._process.pid)
-            try:
-                out, errors = self._process.communicate(timeout=_LONGEST)
-            except subprocess.TimeoutExpired:
-                self._process.kill()
-                raise RuntimeError(f"it was not written within {_LONGEST:g} s") from None
-        if self._left:
-            raise RuntimeError(_INTERRUPTED)
+        )
+        _give_way(self._process.pid)
+        out, errors = self._output(self._process)
         if self._process.returncode != 0:
             raise RuntimeError(" ".join(errors.split()) or f"exit {self._process.returncode}")
         return out.strip()
+
+    def _output(self, process: "subprocess.Popen[str]") -> tuple[str, str]:
+        """What the process printed, once it has ended.
+
+        Raises:
+            RuntimeError: it was not waited for any longer. It is killed, but its end is not waited
+                for, because on a disk that hangs no process ends.
+        """
+        deadline = time.monotonic() + _LONGEST
+        while True:
+            with suppress(subprocess.TimeoutExpired):
+                told = process.communicate(timeout=_LOOK_PERIOD)
+                if not self._left:
+                    return told
+            if self._left or time.monotonic() > deadline:
+                process.kill()
+                late = f"it was not written within {_LONGEST:g} s"
+                raise RuntimeError(_INTERRUPTED if self._left else late)
 
 
 def _give_way(pid: int) -> None:

@@ -91,7 +91,8 @@ def _states(
     To the known acceleration, the measured position and the measured velocity, from
     z·x = (I − K·C)·(A·x + B·a) + K·y.
     """
-    gains, pull = observer.gains(period, smoothness=1.0), observer.pull(1.0)  # as PX4's estimate
+    # As smooth as PX4's estimate.
+    gains, pull = observer.gains(period, smoothness=1.0), observer.pull(period, smoothness=1.0)
     a = np.array([[1.0, period, 0.5 * period**2], [0.0, 1.0, period], [0.0, 0.0, 1.0]])
     b = np.array([0.5 * period**2, period, 0.0])
     c = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])

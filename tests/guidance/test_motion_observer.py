@@ -89,3 +89,22 @@ def test_a_gap_and_a_reset_begin_anew():
     observer.reset()
     assert observer.disturbance == (0.0, 0.0)
     assert observer.at(11.0, (0.0, 0.0)) is None
+
+
+@pytest.mark.parametrize("hz", [2.0, 5.0, 8.0])
+def test_with_rare_positions_a_strong_pull_is_still_stable(hz):
+    quick = ObserverSettings(9.0, 0.1, position_pull=13.0, largest=6.0)
+    rows = flown(lambda _: (1.0, 0.0), seconds=20.0, dt=1.0 / hz, settings=quick)
+    assert np.abs(rows[len(rows) // 2 :, :2] - (1.0, 0.0)).max() <= 0.5
+    assert np.abs(rows[len(rows) // 2 :, 2:]).max() <= 0.5
+
+
+def test_a_gap_in_the_positions_makes_no_false_wind():
+    quick, found = ObserverSettings(9.0, 0.1, position_pull=13.0, largest=6.0), []
+    for gap in (0.02, 0.3):
+        observer = MotionObserver(quick)
+        observer.observe(0.0, VehicleMotion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), (0.0, 0.0))
+        moved = VehicleMotion((0.5 * gap**2, 0.0, 0.0), (gap, 0.0, 0.0))  # by a wind of 1 m/s²
+        observer.observe(gap, moved, (0.0, 0.0))
+        found.append(observer.disturbance[0])
+    assert max(found) <= 1.25

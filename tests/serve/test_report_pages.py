@@ -1,5 +1,8 @@
 """The page about a served flight: `test_programs.py` flies one; here none can be written."""
 
+import subprocess
+
+from companion.serve import report_pages
 from companion.serve.report_pages import ReportPages
 
 
@@ -14,3 +17,34 @@ def test_a_page_that_cannot_be_written_is_told_in_one_sentence(tmp_path):
     assert "\n" not in failed
     assert failed.endswith(f"`companion report {tmp_path}` tries again")
     assert left.startswith("No report: interrupted; ")
+
+
+class Hung:
+    """A process that no signal ends, as on a disk that hangs."""
+
+    pid, killed = 0, 0
+
+    def __init__(self, meanwhile):
+        self._meanwhile = meanwhile
+
+    def communicate(self, timeout):
+        self._meanwhile()
+        raise subprocess.TimeoutExpired("companion report", timeout)
+
+    def kill(self):
+        self.killed += 1
+
+
+def test_a_process_that_cannot_be_killed_is_not_waited_for(tmp_path, monkeypatch):
+    told = []
+    pages = ReportPages(told.append)
+    monkeypatch.setattr(report_pages, "_give_way", lambda pid: None)
+    monkeypatch.setattr(report_pages, "_LONGEST", 0.0)
+    hung, left = Hung(lambda: None), Hung(pages.leave)
+    monkeypatch.setattr(subprocess, "Popen", lambda *_, **__: [hung, left][len(told)])
+    pages.write(tmp_path)
+    pages.write(tmp_path)
+    assert told[0].startswith("No report: it was not written within 0 s; ")
+    assert told[1].startswith("No report: interrupted; ")
+    assert hung.killed >= 1
+    assert left.killed >= 1
