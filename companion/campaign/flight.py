@@ -108,11 +108,12 @@ class _Flight:
         result = summary.result
         if self._too_long:
             result = f"not over after {self._case.flight_s:g} s of vehicle time"
-        good = figures["verdict"]["good"] and not crashed and not self._too_long
+        failed = outcomes.failed_checks(figures)
+        good = result == "ok" and not failed and not crashed
         return {
             "ok": good,
             "result": result.replace(f"{self._place}/", ""),
-            "failed_checks": outcomes.failed_checks(figures),
+            "failed_checks": failed,
             "phase": summary.phase,
             "crashed": crashed,
             "as_documented": documented,
