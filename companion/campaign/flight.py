@@ -108,11 +108,12 @@ class _Flight:
         result = summary.result
         if self._too_long:
             result = f"not over after {self._case.flight_s:g} s of vehicle time"
-        good = figures["verdict"]["good"] and not crashed and not self._too_long
+        failed = outcomes.failed_checks(figures)
+        good = result == "ok" and not failed and not crashed
         return {
             "ok": good,
             "result": result.replace(f"{self._place}/", ""),
-            "failed_checks": outcomes.failed_checks(figures),
+            "failed_checks": failed,
             "phase": summary.phase,
             "crashed": crashed,
             "as_documented": documented,
@@ -144,13 +145,13 @@ class _BeginFault(Silent):
     def __init__(self, vehicle: MockVehicle, fault: Fault | None) -> None:
         self._vehicle, self._fault = vehicle, fault
         self.begun = False
-        self._phase = "" if fault is None else fault.phase
-        if vehicle.autopilot == "ardupilot" and self._phase == "stream":
-            self._phase = "arm"  # ArduPilot gets its first setpoints in the air
+        self._phases: tuple[str, ...] = () if fault is None else (fault.phase,)
+        if self._phases == ("stream",):
+            self._phases = "stream", "arm"  # the first of them: some get no setpoints on the ground
 
     def phase(self, name: str, waits_for: str) -> None:
         """Inject the faults if this is their phase."""
-        if self._fault is None or self.begun or name != self._phase:
+        if self._fault is None or self.begun or name not in self._phases:
             return
         self.begun = True
         at = self._vehicle.time + self._fault.after

@@ -37,6 +37,8 @@ def write(folder):
     writer.message("/maneuver", second, cdr.words_message((2.0, 3.0), ("hover",)))
     writer.message("/maneuver", second, cdr.words_message((4.0, 5.0), ("",)))
     writer.message("/alarm", second, cdr.words_message((3.0, 1.0), ("fence", "too far", "land")))
+    values = '{"limits": {"max_tilt_deg": 20.0}}'
+    writer.message("/change", second, cdr.words_message((1.5, 0.0), (values,)))
     writer.message("/log", 3 * second, cdr.log_message(3 * second, 3, "armed", "autopilot"))
     writer.message(
         "/tf",
@@ -68,6 +70,7 @@ def test_what_is_written_is_read_again_by_both_readers(tmp_path):
     assert phase == (0.5, "connect", "a heartbeat é")
     assert event == (2.0, "armed", 3, "autopilot")
     assert alarm == (2.0, True, "fence", "too far", "land")
+    assert record.changes == ((1.5, False, {"limits": {"max_tilt_deg": 20.0}}),)
     assert record.maneuvers == ((2.0, 3.0, "hover"), (4.0, 5.0, None))
 
     official = {}
