@@ -68,11 +68,6 @@ ELSE = {
     # when the judgement before it is a second old, so before the take-over.
     ("ardupilot", "stream", "freeze clock"): LANDED,
     ("ardupilot", "stream", "NaN attitude"): LANDED,
-    # PX4's heartbeat comes once a second, so these vehicles have landed when it is missed.
-    ("px4", "land", "drop"): LANDED,
-    ("px4", "land", "drop downlink"): LANDED,
-    ("px4", "land", "corrupt"): LANDED,
-    ("px4", "land", "stop telemetry"): LANDED,
 }
 """Where a family differs."""
 SHORT = {
