@@ -54,7 +54,7 @@ def rerun(place: Path, index: int) -> Rerun:
     case = campaign.case(next(islice(campaign.samples(), index, None)))
     recording = flight_folder(place / _CASES / f"case-{index:05d}")
     row = fly_case(case, recording)
-    lines = [f"{case.described()}: {row['result']}"]
+    lines = [f"{case.described()}: {_judged(row)}"]
     if other := difference(description.versions, versions()):
         lines.append(f"The campaign was flown by another version: here is {other}.")
     before = _row(place, campaign, description, index)
@@ -67,6 +67,13 @@ def rerun(place: Path, index: int) -> Rerun:
         else f"It is the campaign's flight to the bit: digest {row['digest']}."
     )
     return Rerun(row, recording, not changed, tuple(lines))
+
+
+def _judged(row: dict[str, Value]) -> str:
+    """Whether the flight was good, in words."""
+    if row["ok"]:
+        return "good"
+    return f"not good: {row['failed_checks'] or row['result']}"
 
 
 def _row(

@@ -177,7 +177,9 @@ class _Run:
                 f"{times} of the {self._noun} failed by the program's own fault: {error}",
                 markup=False,
             )
-        say(f"{progress.flown} {self._noun} are in {self._place}; see them with")
+        good = sum(store.read(self._place)["ok"].to_pylist())
+        say(f"{good} of {progress.flown} {self._noun} were good. All are in {self._place};")
+        say("see them with")
         say(f"  companion campaign report {shlex.quote(str(self._place))}")
         return FAILED if errors else DONE
 

@@ -199,6 +199,10 @@ def assigned(texts: Sequence[str]) -> dict[str, dict[str, Any]]:
             raise ConfigError(f"--set {text}: write SECTION.KEY=VALUE, as limits.max_tilt_deg=20")
         if section not in Config.model_fields:
             raise ConfigError(f"--set {text}: there is no section `{section}`")
+        if section == "mock":
+            raise ConfigError(
+                f"--set {text}: the mock vehicle reads its section from the file; write it there"
+            )
         try:
             changes.setdefault(section, {})[name] = bounded_yaml.parse(value)
         except bounded_yaml.YamlError as error:

@@ -139,6 +139,7 @@ def test_a_starting_file_can_be_checked_and_is_never_replaced(name, tmp_path, ca
         ("steepness=20", "write SECTION.KEY=VALUE"),
         ("limits.max_tilt_deg", "write SECTION.KEY=VALUE"),
         ("limit.max_tilt_deg=20", "there is no section `limit`"),
+        ("mock.wind.speed_m_s=5", "the mock vehicle reads its section from the file"),
         ("limits.max_tild_deg=20", "did you mean `max_tilt_deg`?"),
         ("limits.max_tilt_deg=[", "not valid YAML"),
         ("limits.max_tilt_deg=99", "less than or equal to 60"),

@@ -172,7 +172,7 @@ def _most_influential(results: Results, found: dict[str, list[Influence]]) -> It
         default=None,
         key=lambda each: each[0].high,
     )
-    if worst is not None and worst[0].share < 1.0:
+    if worst is not None and worst[0].share < np.mean(results.good):
         lowest, name, value = worst
         yield f"Success is lowest with {name} = {value}: {lowest}."
 
