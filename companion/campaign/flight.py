@@ -1,11 +1,11 @@
 """One whole flight of a campaign, in this process on one virtual clock."""
 
 import tempfile
-from math import acos
 from pathlib import Path
 
 import numpy as np
 
+from companion.attitude.kinematics import tilt_angle
 from companion.batch import can_compile
 from companion.campaign import outcomes
 from companion.campaign.case import Case, Fault
@@ -127,8 +127,7 @@ class _Flight:
         if self._steps % _TRUTH_EVERY == 0:
             state = self._vehicle.state()
             _, x, y, _ = state["q"]
-            tilt = acos(max(-1.0, 1.0 - 2.0 * (x * x + y * y)))
-            self._truth.append((self._vehicle.time, *state["position"], tilt))
+            self._truth.append((self._vehicle.time, *state["position"], tilt_angle(x, y)))
 
 
 class _BeginFault(Silent):

@@ -14,6 +14,7 @@ from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
+    ProgressColumn,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
@@ -147,15 +148,7 @@ class _Run:
 
     def _shown(self, client: "Client", description: Description) -> int:
         """Run it with a progress bar; returns the exit code."""
-        columns = (
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(),
-        )
-        with Progress(*columns, console=self._console) as bar:
+        with progress_bar(self._console, TextColumn("{task.description}")) as bar:
             task = bar.add_task(self._noun, total=description.cases)
 
             def show(progress: engine.Progress) -> None:
@@ -196,6 +189,20 @@ class _Run:
             f"{why}; the results of {units} units are kept. Go on with\n  {command}", markup=False
         )
         return FAILED
+
+
+def progress_bar(console: Console, what: ProgressColumn, *more: ProgressColumn) -> Progress:
+    """A bar with numbers and times; `what` stands before it, `more` behind it."""
+    return Progress(
+        what,
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        *more,
+        console=console,
+    )
 
 
 @contextmanager

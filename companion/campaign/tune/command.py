@@ -8,21 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import TextColumn
 
 from companion.campaign import engine, estimate, folder
 from companion.campaign.campaign import Campaign
 from companion.campaign.case import Case
 from companion.campaign.cluster import ClusterError, connected, require_packages, wait_for_workers
 from companion.campaign.loading import load
-from companion.campaign.running import interruptible
+from companion.campaign.running import DONE, FAILED, interruptible, progress_bar
 from companion.campaign.tune.candidates import cases, section_of, set_values, starts, unseen
 from companion.campaign.tune.certainty import compared
 from companion.campaign.tune.scores import Row, scored
@@ -37,7 +30,6 @@ if TYPE_CHECKING:
     from distributed import Client
 
 RESULT = "tuned.yaml"
-_DONE, _FAILED = 0, 1
 
 
 def run(options: argparse.Namespace) -> int:
@@ -74,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
             command = f"companion campaign tune {shlex.quote(str(options.file))}"
             command += f" --out {shlex.quote(str(place))}"
             console.print(f"{why}; the candidates so far are kept. Go on with\n  {command}")
-            return _FAILED
+            return FAILED
 
 
 def _begin(place: Path, campaign: Campaign) -> None:
@@ -106,16 +98,8 @@ def _searched(campaign: Campaign, place: Path, fly: Fly, trials: int, console: C
 
 @contextmanager
 def _progress(console: Console, trials: int) -> Iterator[Callable[[Found], None]]:
-    columns = (
-        TextColumn("candidates"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        TextColumn("{task.description}"),
-    )
-    with Progress(*columns, console=console) as bar:
+    best_so_far = TextColumn("{task.description}")
+    with progress_bar(console, TextColumn("candidates"), best_so_far) as bar:
         task = bar.add_task("", total=trials)
 
         def show(found: Found) -> None:
@@ -133,7 +117,7 @@ def _concluded(campaign: Campaign, place: Path, fly: Fly, found: Found, console:
             f"None of the {found.tried} candidates kept {tune.inside_share:.1%} of the flights "
             "inside the envelope: widen tune.search or tune.envelope_m, or raise tune.trials."
         )
-        return _FAILED
+        return FAILED
     other = unseen(campaign, tune.check_samples)
     console.print(f"checking on {other.number_of_cases} flights that the search has not seen…")
     before = scored(fly(list(other.cases())), tune.envelope_m)
@@ -145,4 +129,4 @@ def _concluded(campaign: Campaign, place: Path, fly: Fly, found: Found, console:
     for line in summary_lines(result):
         console.print(line, markup=False)
     console.print(f"Written to {path}; let your configuration include it.", markup=False)
-    return _DONE
+    return DONE
