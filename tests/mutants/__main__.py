@@ -20,11 +20,16 @@ from tests.mutants.seconds import measured_seconds
 ROOMS = {
     "attitude": ["tests/attitude"],
     "guidance": ["tests/guidance", "tests/trajectory"],
-    "control": ["tests/control"],
+    "control": [
+        "tests/control",
+        "tests/flight/test_changes.py",
+        "tests/flight/test_predictive.py",
+        "tests/flight/test_thrust.py",
+    ],
     "safety": ["tests/safety"],
     "vehicle": ["tests/vehicle", "tests/mavlink"],
 }
-"""Room of `companion` -> the folders of tests that judge it, of those that exist."""
+"""Room of `companion` -> the folders and files of tests that judge it, of those that exist."""
 
 _ROOT = Path(__file__).parents[2]
 _COPIED = ["sitl_mock", "configs", "docs", "README.md"]
