@@ -100,7 +100,7 @@ class ServedControl:
             )
             self._answer(client, frame, REJECTED)
             return True
-        if self.in_control and starves_control(frame, self.needed_rates()):
+        if self._flight is not None and starves_control(frame, self.needed_rates()):
             self._answer(client, frame, ACCEPTED)
             return True
         owner = self.ownership.owner

@@ -2,9 +2,11 @@
 
 import asyncio
 import math
+from itertools import count
 from types import SimpleNamespace
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion import testing
 from companion.config import Config
@@ -46,7 +48,16 @@ def test_a_client_that_asks_again_does_not_take_the_fence_along(autopilot):
             def distance():
                 return math.dist(vehicle.state()["position"][:2], (north, east))
 
-            await begin_control(session, script, autopilot, to(0.0))
+            sent = count()
+
+            def hold(_):
+                """A station asks for rare telemetry now and then, as MAVProxy does."""
+                if next(sent) % 10 == 0:
+                    ground.send(dialect.MAVLink_request_data_stream_message(1, 1, 0, 4, 1))
+                to(0.0)(0.0)
+
+            await begin_control(session, script, autopilot, hold)
+            assert "control was not given" not in " ".join(script.texts())
             await stream(5.0, to(6.0), 0.1)
             script.command(*HOLD[autopilot])
             await asyncio.sleep(1.5)
