@@ -1,6 +1,7 @@
 """The guidance loop: a timer that makes a new command from the newest position."""
 
 from collections.abc import Callable
+from functools import cache
 from math import degrees, isfinite
 
 from companion.attitude import Quaternion, Target, heading, is_unit
@@ -225,7 +226,8 @@ class GuidanceLoop:
 
     def _write_command(self, now: float, inputs: GuidanceInput) -> Reference:
         """Write the command for `now`; return the reference from which it was made."""
-        reference_at = self.flown.reference(now, inputs.now, self._heading())
+        # Target and heading are made from references at the same times.
+        reference_at = cache(self.flown.reference(now, inputs.now, self._heading()))
         reference = reference_at(now)
         linear = self.guidance.command(reference_at, now, inputs)
         if self.predictive is not None:
