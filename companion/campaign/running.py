@@ -30,6 +30,7 @@ from companion.campaign.cluster import (
     require_packages,
     wait_for_workers,
 )
+from companion.campaign.design import too_few_samples
 from companion.campaign.folder import Description
 from companion.campaign.loading import load
 from companion.campaign.unit import check_cases, ranges, size_of_units
@@ -144,6 +145,8 @@ class _Run:
         if case_s is not None:
             words = estimate.size_in_words(self._campaign, cases * case_s / workers, workers)
         self._console.print(f"{words}; results in {self._place}")
+        if warning := too_few_samples(self._campaign.file):
+            self._console.print(warning, markup=False)
         return description
 
     def _shown(self, client: "Client", description: Description) -> int:
