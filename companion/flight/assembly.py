@@ -224,7 +224,7 @@ def assemble(
         trace,
         flight.began,
         phase,
-        recorder.status,
+        recorder.status if recorder.wants_status else None,
         clock,
         real_time=real_time,
     )
