@@ -231,7 +231,6 @@ def test_a_guidance_loop_knows_nothing_before_its_first_step():
     guidance = fresh.guidance_loop
     assert (guidance.motion, guidance.off_course, guidance.given_up) == (None, None, None)
     assert guidance.attitude() == (1.0, 0.0, 0.0, 0.0)
-    assert guidance.before_step(1.0) is None
 
 
 def test_actions_and_steps_are_recorded():
