@@ -1,8 +1,9 @@
 """The table of docs/serve.md by MAVSDK, in real time: `python -m tests.serve.circle_by_mavsdk`.
 
-One program of MAVSDK (`mavsdk_native.py`, or the one that is named before the autopilots) flies a circle of 5 m at 5 m/s,
-50 setpoints a second. Directly means that `serve` passes the setpoints on (`serve.control: false`),
-so the mock autopilot flies them itself. On a busy computer begin it with `chrt -f 50`.
+One program of MAVSDK (`mavsdk_native.py`, or the one that is named before the autopilots) flies a
+circle of 5 m at 5 m/s, 50 setpoints a second. Directly means that `serve` passes the setpoints on
+(`serve.control: false`), so the mock autopilot flies them itself. On a busy computer begin it with
+`chrt -f 50`.
 """
 
 import contextlib
