@@ -146,7 +146,9 @@ class Program:
             await self.start()
         report["start_s"] = time.monotonic() - began
         report["active"] = await self.active()
-        if not only_circle:
+        if only_circle:
+            report["back"] = await self.settle(start, 8.0)  # until it is surely in control
+        else:
             await self.every_kind(start, hover, report)
         report["circle_rms_m"] = await self.circle(start, 12.0)
         await self.position(*self.place)
