@@ -116,12 +116,12 @@ class Assembled:
 
     def close(self) -> None:
         """End the process of predictive control."""
-        if self.context.guidance_loop.predictive is not None:
-            self.context.guidance_loop.predictive.close()
+        if self.context.guidance_loop.maker.predictive is not None:
+            self.context.guidance_loop.maker.predictive.close()
 
     def predictive_figures(self) -> PredictiveFigures | None:
         """The figures of predictive control; None where it did not fly."""
-        predictive = self.context.guidance_loop.predictive
+        predictive = self.context.guidance_loop.maker.predictive
         if predictive is None:
             return None
         record = predictive.record
@@ -204,7 +204,7 @@ def assemble(
             for text in part.notes:
                 flight.note(text)
             if config.guidance.kind == "nmpc":
-                guidance_loop.predictive = predictive(config, part, flight.note)
+                guidance_loop.maker.predictive = predictive(config, part, flight.note)
     changes = changes or Changes(config)
     if record is not None:
         record.metadata("configuration", flat(changes.flown.model_dump(mode="json")))
