@@ -1,5 +1,6 @@
 """Makes the command of one step of guidance from reference and motion."""
 
+from functools import cache
 from math import isfinite
 
 from companion.control.flown_source import FlownSource
@@ -70,7 +71,8 @@ class CommandMaker:
             turn: sum of the heading resets, rad.
             offboard_active: whether the autopilot obeys the setpoints.
         """
-        reference_at = self._flown.reference(now, inputs.now, heading)
+        # Target and heading are made from references at the same times.
+        reference_at = cache(self._flown.reference(now, inputs.now, heading))
         reference = reference_at(now)
         linear = self.guidance.command(reference_at, now, inputs)
         if self.predictive is not None:

@@ -194,7 +194,7 @@ def assemble(
     loop.ask_mode = watch.ask_mode
     flight = Flight(context, plan, watch, recorder, ask_landing)
     ladder.note = context.note = preflight.note = guidance_loop.record.note = flight.note
-    link.clock.on_event = rate_requester.note = flight.note
+    rate_requester.note = flight.note
     drag_is_set = config.guidance.drag is not None
     remembered = None if folder is None else folder.parent
     memory = VehicleMemory(remembered, guidance_loop.estimate.drag, drag_is_set, flight.note)
@@ -224,7 +224,7 @@ def assemble(
         trace,
         flight.began,
         phase,
-        recorder.status,
+        recorder.status if recorder.wants_status else None,
         clock,
         real_time=real_time,
     )
