@@ -54,24 +54,28 @@ def check_case(case: Case) -> None:
         ConfigError: its planner keeps state, it has no open-loop maneuver, its sample rate does not
             divide 1000 Hz, or it has a fault.
     """
-    config, where = case.config, case.described()
+    if fault := _unflyable(case):
+        raise ConfigError(f"{case.described()}: {fault}")
+
+
+def _unflyable(case: Case) -> str | None:
+    """Why a case cannot be flown in a batch, or None."""
+    config = case.config
     if config.planner_name not in LAW_NAMES:
-        raise ConfigError(
-            f"{where}: kind: batch flies planners without memory ({', '.join(LAW_NAMES)}), not "
+        return (
+            f"kind: batch flies planners without memory ({', '.join(LAW_NAMES)}), not "
             f"{config.planner_name}; set planner.name, or kind: flights"
         )
     if not set(MANEUVERS) & set(config.flight.maneuvers):
-        raise ConfigError(
-            f"{where}: kind: batch flies open-loop steps; set flight.maneuvers to [corners] or "
-            "[steps]"
-        )
+        return "kind: batch flies open-loop steps; set flight.maneuvers to [corners] or [steps]"
     if STEP_HZ % config.link.attitude_rate_hz:
-        raise ConfigError(
-            f"{where}: kind: batch needs a link.attitude_rate_hz that divides {STEP_HZ}, not "
+        return (
+            f"kind: batch needs a link.attitude_rate_hz that divides {STEP_HZ}, not "
             f"{config.link.attitude_rate_hz:g}"
         )
     if case.fault is not None:
-        raise ConfigError(f"{where}: kind: batch has no faults; set kind: flights")
+        return "kind: batch has no faults; set kind: flights"
+    return None
 
 
 def _run_case(case: Case) -> dict[str, Value]:
