@@ -1,6 +1,6 @@
 """Drag per mass: the same in all directions, and what an angular body adds to it."""
 
-from math import cos, hypot, pi, sin
+from math import cos, pi, sin
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -78,12 +78,53 @@ class AxisDrag(NamedTuple):
         """Deceleration north and east, m/s², at a horizontal velocity in m/s."""
         if self.coefficient == 0.0:
             return 0.0, 0.0
+        return along_axes(self.coefficient, cos(self.heading), sin(self.heading), north, east)
+
+    def growth(
+        self,
+        velocity: tuple[float, float],
+        acceleration: tuple[float, float],
+        heading_rate: float,
+    ) -> tuple[float, float]:
+        """The time derivative of `deceleration`, m/s³.
+
+        Args:
+            velocity: north, east, m/s.
+            acceleration: north, east, m/s².
+            heading_rate: rad/s.
+        """
+        if self.coefficient == 0.0:
+            return 0.0, 0.0
         cosine, sine = cos(self.heading), sin(self.heading)
-        forward, right = cosine * north + sine * east, cosine * east - sine * north
-        usual = _MEAN_SHARE * hypot(north, east)
-        forward *= self.coefficient * (abs(forward) - usual)
-        right *= self.coefficient * (abs(right) - usual)
+        forward, right = _in_axes(cosine, sine, *velocity)
+        a_forward, a_right = _in_axes(cosine, sine, *acceleration)
+        # Growth of the components along the axes, which turn.
+        g_forward, g_right = a_forward + heading_rate * right, a_right - heading_rate * forward
+        speed = _speed((forward, right, 0.0))
+        usual = _MEAN_SHARE * speed
+        speeding = _MEAN_SHARE * (forward * g_forward + right * g_right) / speed
+        f_forward = forward * (abs(forward) - usual)
+        f_right = right * (abs(right) - usual)
+        h_forward = g_forward * (2.0 * abs(forward) - usual) - speeding * forward
+        h_right = g_right * (2.0 * abs(right) - usual) - speeding * right
+        forward = self.coefficient * (h_forward - heading_rate * f_right)
+        right = self.coefficient * (h_right + heading_rate * f_forward)
         return cosine * forward - sine * right, sine * forward + cosine * right
+
+
+def along_axes(
+    coefficient: Number, cosine: Number, sine: Number, north: Number, east: Number
+) -> tuple[Number, Number]:
+    """The deceleration of `AxisDrag` with this cosine and sine of its heading, m/s²."""
+    forward, right = _in_axes(cosine, sine, north, east)
+    usual = _MEAN_SHARE * _speed((forward, right, 0.0 * right))
+    forward = coefficient * forward * (abs(forward) - usual)
+    right = coefficient * right * (abs(right) - usual)
+    return cosine * forward - sine * right, sine * forward + cosine * right
+
+
+def _in_axes(cosine: Number, sine: Number, north: Number, east: Number) -> tuple[Number, Number]:
+    return cosine * north + sine * east, cosine * east - sine * north
 
 
 ROUND = AxisDrag()

@@ -138,6 +138,13 @@ def test_own_guidance_stays_with_its_point_in_wind(folder: Path) -> None:
     assert landed == "landed: True"
 
 
+def test_the_fence_holds_above_own_guidance(folder: Path) -> None:
+    began, why, landed = output(folder, "fence.py").splitlines()
+    assert "beyond limits.fence_radius_m" in why
+    assert landed.startswith("landed: True")
+    assert 4.0 < numbers(landed)[0] - numbers(began)[0] < 8.0
+
+
 def test_the_learned_policy_reaches_its_goal(folder: Path) -> None:
     assert numbers(output(folder, "learned_policy.py"))[0] < 0.2
 

@@ -8,6 +8,8 @@ from functools import cache
 from math import exp, log, nan, sqrt
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from companion.attitude.reference import first_order_step
 from companion.batch.compiler import Compiler
 from companion.batch.loops import Array
@@ -53,14 +55,13 @@ def step_figures(flight: StepFlight, gain: float, period: float) -> StepFigures:
     """
     measure, fit = _compiled()
     figures = measure(flight.path, flight.targets, flight.commanded, 1.0 / gain, period)
-    constants = [fit(flight.path, flight.targets, axis, period) for axis in (0, 1)]
-    return StepFigures(*figures, *constants)
+    return StepFigures(*figures, *fit(flight.path, flight.targets, period))
 
 
 @cache
 def _compiled() -> tuple[Any, Any]:
     compiler = Compiler({})
-    return compiler.function(_measured), compiler.function(_time_constant)
+    return compiler.function(_measured), compiler.function(_time_constants)
 
 
 def _measured(
@@ -89,34 +90,59 @@ def _measured(
     return sqrt(away), across, sqrt(squares / path.shape[0]), sqrt(fastest)
 
 
-def _time_constant(path: Array, targets: Array, axis: int, period: float) -> float:
-    """The time constant that fits one axis best, s, by golden-section search; NaN: no step."""
-    asked = 0.0
-    for k in range(targets.shape[0]):
-        asked = max(asked, abs(targets[k, axis]))
-    if asked <= _ASKED:
-        return nan
-    low, high = _SHORTEST, _LONGEST
-    left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-    at_left = _squares(path, targets, axis, exp(left), period)
-    at_right = _squares(path, targets, axis, exp(right), period)
+def _time_constants(path: Array, targets: Array, period: float) -> tuple[float, float]:
+    """The time constants that fit north and east best, s, by golden-section search; NaN: no step.
+
+    Both searches go on together, because a processor computes their two models in the time of one.
+    """
+    low, high = np.full(2, _SHORTEST), np.full(2, _LONGEST)
+    left, right, tried, asked = np.empty(2), np.empty(2), np.empty(2), np.zeros(2)
+    for axis in range(2):
+        left[axis] = high[axis] - _GOLDEN * (high[axis] - low[axis])
+        right[axis] = low[axis] + _GOLDEN * (high[axis] - low[axis])
+        for k in range(targets.shape[0]):
+            asked[axis] = max(asked[axis], abs(targets[k, axis]))
+    at_left, at_right, found = np.empty(2), np.empty(2), np.empty(2)
+    to_left = np.empty(2, np.bool_)
+    _squares(path, targets, left, period, at_left)
+    _squares(path, targets, right, period, at_right)
     for _ in range(_NARROWINGS):
-        if at_left < at_right:
-            high, right, at_right = right, left, at_left
-            left = high - _GOLDEN * (high - low)
-            at_left = _squares(path, targets, axis, exp(left), period)
-        else:
-            low, left, at_left = left, right, at_right
-            right = low + _GOLDEN * (high - low)
-            at_right = _squares(path, targets, axis, exp(right), period)
-    return exp(0.5 * (low + high))
+        for axis in range(2):
+            to_left[axis] = at_left[axis] < at_right[axis]
+            if to_left[axis]:
+                high[axis], right[axis], at_right[axis] = right[axis], left[axis], at_left[axis]
+                left[axis] = high[axis] - _GOLDEN * (high[axis] - low[axis])
+                tried[axis] = left[axis]
+            else:
+                low[axis], left[axis], at_left[axis] = left[axis], right[axis], at_right[axis]
+                right[axis] = low[axis] + _GOLDEN * (high[axis] - low[axis])
+                tried[axis] = right[axis]
+        _squares(path, targets, tried, period, found)
+        for axis in range(2):
+            if to_left[axis]:
+                at_left[axis] = found[axis]
+            else:
+                at_right[axis] = found[axis]
+    north, east = exp(0.5 * (low[0] + high[0])), exp(0.5 * (low[1] + high[1]))
+    return north if asked[0] > _ASKED else nan, east if asked[1] > _ASKED else nan
 
 
-def _squares(path: Array, targets: Array, axis: int, time_constant: float, period: float) -> float:
-    """Sum of the squared differences from a first-order model."""
-    model, total = path[0, axis], 0.0
+def _squares(path: Array, targets: Array, logarithms: Array, period: float, found: Array) -> None:
+    """Fill in the sums of squared differences from first-order models, north and east.
+
+    Args:
+        path: (N, 2), coefficients.
+        targets: (N, 4).
+        logarithms: (2,), of the time constants, in s.
+        period: time between two samples, s.
+        found: (2,), is filled.
+    """
+    constant_north, constant_east = exp(logarithms[0]), exp(logarithms[1])
+    north, east, total_north, total_east = path[0, 0], path[0, 1], 0.0, 0.0
     for k in range(1, path.shape[0]):
-        _, model = first_order_step(model, targets[k - 1, axis], time_constant, period)
-        apart = path[k, axis] - model
-        total += apart * apart
-    return total
+        _, north = first_order_step(north, targets[k - 1, 0], constant_north, period)
+        _, east = first_order_step(east, targets[k - 1, 1], constant_east, period)
+        apart_north, apart_east = path[k, 0] - north, path[k, 1] - east
+        total_north += apart_north * apart_north
+        total_east += apart_east * apart_east
+    found[0], found[1] = total_north, total_east

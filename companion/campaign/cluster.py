@@ -25,6 +25,8 @@ _CLOSE_S = 5.0
 _PACKAGES = ("dask", "distributed", "numba", "pyarrow", "scipy")
 _LOCAL = {
     "distributed.scheduler.allowed-failures": DEATHS - 1,
+    # Dask's own profiler, which nobody reads here, uses 10 % of a worker's time.
+    "distributed.worker.profile.enabled": False,
     # Dask sets the variables of BLAS and OpenMP to 1 itself.
     "distributed.nanny.pre-spawn-environ.NUMBA_NUM_THREADS": "1",
 }

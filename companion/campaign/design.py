@@ -37,6 +37,23 @@ def number_of_cases(file: CampaignFile) -> int:
     return repeats * prod(len(swept.grid()) for swept in file.sweep.values() if not swept.sampled)
 
 
+def too_few_samples(file: CampaignFile) -> str | None:
+    """A warning if `samples` is too small for the distributions; else None."""
+    most = file.samples
+    names = [
+        name
+        for name, swept in file.sweep.items()
+        if swept.sampled and most < (2 if swept.choice is None else len(swept.choice))
+    ]
+    if not names:
+        return None
+    values = "a single value" if most == 1 else f"{most} values at most"
+    return (
+        f"samples is {most}, so {values} of {', '.join(names)} will be flown; raise samples, or "
+        "give a list, of which every value is flown"
+    )
+
+
 def samples_of(file: CampaignFile) -> Iterator[Sample]:
     """All cases in order: every point of the grid with the first sample, then with the next.
 

@@ -1,6 +1,6 @@
 """Dotted keys of a campaign: of the application's configuration, and of the mock vehicle's."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from companion.config import Config
@@ -29,29 +29,27 @@ _WITHOUT_EFFECT = (
 _SIGNING = ("link.signing_key_file", "mock.signing")
 
 
-def check_keys(keys: Iterable[str], base: Config, where: str) -> None:
-    """Check that each dotted key exists, and that a campaign can change it.
+def check_key(key: str, base: Config, where: str) -> None:
+    """Check that a dotted key exists, and that a campaign can change it.
 
     Args:
-        keys: dotted.
-        base: configuration whose keys are meant.
-        where: names the keys in messages.
+        key: dotted.
+        base: configuration whose key is meant.
+        where: the key stands in its file, for messages.
 
     Raises:
         ConfigError: the message names the key, and the nearest right one.
     """
-    for key in keys:
-        section, dot, name = key.partition(".")
-        if not (dot and section and name):
-            raise ConfigError(f"{where}: `{key}`: write SECTION.KEY, as limits.max_tilt_deg")
-        for other in _WITHOUT_EFFECT:
-            if f"{key}.".startswith(f"{other}."):
-                raise ConfigError(
-                    f"{where}: `{key}` has no effect in a campaign, or the campaign sets it itself"
-                )
-        if any(f"{key}.".startswith(f"{other}.") for other in _SIGNING):
-            raise ConfigError(f"{where}: `{key}`: campaigns fly without signing")
-        _check_exists(key, base, where)
+    section, dot, name = key.partition(".")
+    if not (dot and section and name):
+        raise ConfigError(f"{where}: `{key}`: write SECTION.KEY, as limits.max_tilt_deg")
+    if any(f"{key}.".startswith(f"{other}.") for other in _WITHOUT_EFFECT):
+        raise ConfigError(
+            f"{where}: `{key}` has no effect in a campaign, or the campaign sets it itself"
+        )
+    if any(f"{key}.".startswith(f"{other}.") for other in _SIGNING):
+        raise ConfigError(f"{where}: `{key}`: campaigns fly without signing")
+    _check_exists(key, base, where)
 
 
 def _check_exists(key: str, base: Config, where: str) -> None:

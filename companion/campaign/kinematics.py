@@ -10,6 +10,7 @@ import hashlib
 from collections.abc import Sequence
 from functools import lru_cache
 from math import inf, isfinite, radians
+from typing import NamedTuple
 
 import numpy as np
 
@@ -53,24 +54,28 @@ def check_case(case: Case) -> None:
         ConfigError: its planner keeps state, it has no open-loop maneuver, its sample rate does not
             divide 1000 Hz, or it has a fault.
     """
-    config, where = case.config, case.described()
+    if fault := _unflyable(case):
+        raise ConfigError(f"{case.described()}: {fault}")
+
+
+def _unflyable(case: Case) -> str | None:
+    """Why a case cannot be flown in a batch, or None."""
+    config = case.config
     if config.planner_name not in LAW_NAMES:
-        raise ConfigError(
-            f"{where}: kind: batch flies planners without memory ({', '.join(LAW_NAMES)}), not "
+        return (
+            f"kind: batch flies planners without memory ({', '.join(LAW_NAMES)}), not "
             f"{config.planner_name}; set planner.name, or kind: flights"
         )
     if not set(MANEUVERS) & set(config.flight.maneuvers):
-        raise ConfigError(
-            f"{where}: kind: batch flies open-loop steps; set flight.maneuvers to [corners] or "
-            "[steps]"
-        )
+        return "kind: batch flies open-loop steps; set flight.maneuvers to [corners] or [steps]"
     if STEP_HZ % config.link.attitude_rate_hz:
-        raise ConfigError(
-            f"{where}: kind: batch needs a link.attitude_rate_hz that divides {STEP_HZ}, not "
+        return (
+            f"kind: batch needs a link.attitude_rate_hz that divides {STEP_HZ}, not "
             f"{config.link.attitude_rate_hz:g}"
         )
     if case.fault is not None:
-        raise ConfigError(f"{where}: kind: batch has no faults; set kind: flights")
+        return "kind: batch has no faults; set kind: flights"
+    return None
 
 
 def _run_case(case: Case) -> dict[str, Value]:
@@ -149,22 +154,35 @@ def _targets(config: Config, longest: float, heading: float) -> Array:
         steps = config.steps
         scale = steps.coefficient, steps.coefficient
         unit = Steps(1.0, steps.duration_s, steps.settle_s)
-    wanted = _pattern(unit, config.link.attitude_rate_hz) * scale
-    targets = np.zeros((len(wanted), 4))
+    pattern = _pattern(unit, config.link.attitude_rate_hz)
+    targets = np.zeros((pattern.samples, 4))
     targets[:, 2] = heading
-    changes = np.flatnonzero(np.any(np.diff(wanted, axis=0), axis=1)) + 1
-    for begin, end in zip((0, *changes), (*changes, len(wanted)), strict=True):
-        north, east = wanted[begin].tolist()
-        targets[begin:end] = limited_target(Target(north, east, heading), longest)
+    for begin, end, (north, east) in pattern.steps:
+        wanted = Target(north * scale[0], east * scale[1], heading)
+        targets[begin:end] = limited_target(wanted, longest)
     return targets
 
 
+class _Pattern(NamedTuple):
+    """A maneuver from its first open-loop step to the last; level between them.
+
+    Attributes:
+        samples: number of samples.
+        steps: first sample, sample after the last, and coefficients of each step and level part.
+    """
+
+    samples: int
+    steps: tuple[tuple[int, int, Coefficients], ...]
+
+
 @lru_cache(maxsize=64)
-def _pattern(maneuver: Corners | Steps, rate_hz: float) -> Array:
-    """(samples, 2), the coefficients from the first open-loop step to the last; level between."""
+def _pattern(maneuver: Corners | Steps, rate_hz: float) -> _Pattern:
     pose = Pose((0.0, 0.0, 0.0), 0.0)
     times = np.arange(round(maneuver.duration * rate_hz)) / rate_hz
     asked = [maneuver.at(float(time), pose).coefficients for time in times]
     steps = [k for k, coefficients in enumerate(asked) if coefficients is not None]
     level = Coefficients(0.0, 0.0)
-    return np.array([each or level for each in asked[steps[0] : steps[-1] + 1]])
+    wanted = [each or level for each in asked[steps[0] : steps[-1] + 1]]
+    ends = [k for k in range(1, len(wanted)) if wanted[k] != wanted[k - 1]]
+    parts = zip((0, *ends), (*ends, len(wanted)), strict=True)
+    return _Pattern(len(wanted), tuple((begin, end, wanted[begin]) for begin, end in parts))

@@ -16,12 +16,12 @@ from companion.campaign.campaign_file import (
     CampaignFile,
     FaultPhase,
 )
-from companion.campaign.keys import check_keys, with_keys
+from companion.campaign.keys import check_key, with_keys
 from companion.campaign.swept import Swept
 from companion.config import Config, trajectory_file
 from companion.config.files import load as load_config
 from companion.files import yaml_file
-from companion.files.yaml_file import ConfigError, validated
+from companion.files.yaml_file import ConfigError, place_of, validated
 from companion.flight.flown_config import copy_trajectory
 from companion.testing.settings import complete_mock
 
@@ -50,7 +50,9 @@ class _Reading:
 
     def __init__(self, path: Path) -> None:
         self._path, self._folder = path, path.parent
-        self._file = yaml_file.load(path, CampaignFile)
+        contents = yaml_file.read(path, CampaignFile)
+        self._places = contents.places
+        self._file = validated(contents.keys, str(path), CampaignFile, contents.places)
         self._files: dict[str, str] = {}
         self._collected: dict[Path, Path] = {}
 
@@ -68,10 +70,13 @@ class _Reading:
             if key not in _OWN
             for key in each.keys or (key,)
         ]
-        check_keys(file.set, base, f"{name}: set")
-        check_keys(swept, base, f"{name}: sweep")
-        if file.tune is not None:
-            check_keys(file.tune.search, base, f"{name}: tune.search")
+        for key in file.set:
+            check_key(key, base, self._at("set", key))
+        for key, each in file.sweep.items():
+            for changed in () if key in _OWN else each.keys or (key,):
+                check_key(changed, base, self._at("sweep", key))
+        for key in () if file.tune is None else file.tune.search:
+            check_key(key, base, self._at("tune", "search", key))
         self._check_faults()
         changes = dict(file.set)
         if TRAJECTORY in {*swept, *changes} and MANEUVERS not in {*swept, *changes}:
@@ -87,6 +92,10 @@ class _Reading:
         sweep = {key: self._with_files(key, each) for key, each in file.sweep.items()}
         file = file.model_copy(update={"sweep": sweep, "set": {}})
         return Campaign(file, base, self._files, name)
+
+    def _at(self, *where: str) -> str:
+        """The line of a key, and the section in which it stands, for messages."""
+        return f"{place_of(where, self._places, str(self._path))}: {'.'.join(where[:-1])}"
 
     def _base(self) -> Config:
         told = self._file.config

@@ -30,9 +30,10 @@ from companion.campaign.cluster import (
     require_packages,
     wait_for_workers,
 )
+from companion.campaign.design import too_few_samples
 from companion.campaign.folder import Description
 from companion.campaign.loading import load
-from companion.campaign.unit import check_cases, size_of_units
+from companion.campaign.unit import check_cases, ranges, size_of_units
 from companion.campaign.versions import VersionError
 from companion.files.yaml_file import ConfigError
 
@@ -144,6 +145,8 @@ class _Run:
         if case_s is not None:
             words = estimate.size_in_words(self._campaign, cases * case_s / workers, workers)
         self._console.print(f"{words}; results in {self._place}")
+        if warning := too_few_samples(self._campaign.file):
+            self._console.print(warning, markup=False)
         return description
 
     def _shown(self, client: "Client", description: Description) -> int:
@@ -181,12 +184,16 @@ class _Run:
         if not folder.begun(self._place):
             self._console.print(f"{why}; nothing was begun", markup=False)
             return FAILED
-        units = len(store.finished_units(self._place))
+        description = folder.read_description(self._place)
+        units = ranges(description.cases, description.unit)
+        kept = sum(len(units[number]) for number in store.finished_units(self._place))
         command = f"companion campaign {shlex.quote(str(self._place))}"
         if self._options.scheduler:
             command += f" --scheduler {self._options.scheduler}"
         self._console.print(
-            f"{why}; the results of {units} units are kept. Go on with\n  {command}", markup=False
+            f"{why}; the results of {kept} of {description.cases} {self._noun} are kept. Go on "
+            f"with\n  {command}",
+            markup=False,
         )
         return FAILED
 

@@ -12,8 +12,8 @@ from companion.campaign.swept import Value
 from companion.campaign.versions import Versions, require_equal, versions
 
 Row = dict[str, Value]
-SECONDS = 5.0
-"""A unit takes about this long, s: long against the time to send it, short if it is lost."""
+SECONDS = 2.5
+"""A unit takes at most this long, s: long against the time to send it, short if it is lost."""
 _UNITS_PER_WORKER = 4
 """At least this number of units for each worker, so that all end at about the same time."""
 

@@ -41,7 +41,7 @@ def serve(options: argparse.Namespace) -> int:
     with helper(options, config, options.config, read, None, console, follows=False) as beside:
         told = observer if beside is None else Several(observer, beside)
         session = ServeSession(config, note, told, directory=config.recording.directory)
-        pages = ReportPages(note)
+        pages = ReportPages()
         if config.recording.report:
             session.records.on_recorded = pages.write
         serving = _until_stopped(session, pages)

@@ -21,12 +21,13 @@ from companion.control.estimator_resets import EstimatorResets
 from companion.control.guidance_command import GuidanceCommand
 from companion.control.loop_record import Deadlines, LoopRecord, Unanswered
 from companion.control.planner_runner import PlannerRunner
-from companion.control.sample_rows import Answer, LoopFlags, SampleEntry, SampleRows
+from companion.control.sample_recorder import SampleRecorder
+from companion.control.sample_rows import LoopFlags
 from companion.guidance import HoverThrust
 from companion.mavlink.errors import InvalidSetpoint
 from companion.recording.trace import FlightTrace
 from companion.vehicle.clock_jumps import Misfit
-from companion.vehicle.records import AttitudeSample, AttitudeTarget
+from companion.vehicle.records import AttitudeSample
 
 SendSetpoint = Callable[[int, BodyRates, float], bool]
 """Sends the sample's time_boot_ms, body rates and thrust; False if the link does not accept it."""
@@ -83,11 +84,9 @@ class ControlLoop:
         self._deadlines = deadlines
         self._trace = trace
         self._limits = limits
-        self._rows = SampleRows(limits, hover_thrust.limits)
-        self._checked = nan
-        self._sent: Answer | None = None
-        if trace.recorder is not None:
-            self.planner.on_attitude_target = self._record_attitude_target
+        self._recorder = SampleRecorder(
+            trace.recorder, self.planner, limits, hover_thrust.limits, clock
+        )
 
     def retune(self, constants: Constants, limits: Limits) -> None:
         """Use other gains and limits from the next sample on.
@@ -96,13 +95,12 @@ class ControlLoop:
             TypeError: the planner is of another package and cannot change them.
         """
         self.planner.retune(constants)
-        self._rows = SampleRows(limits, self._hover_thrust.limits)
+        self._recorder.retune(limits)
         self._limits = limits
 
     def on_sample(self, sample: AttitudeSample) -> None:
         """Answer `sample`, or count why not. The link calls this when the datagram arrives."""
-        recorder = self._trace.recorder
-        if recorder is None:
+        if not self._recorder.on:
             self._take(sample)
             return
         flags = LoopFlags(
@@ -112,11 +110,9 @@ class ControlLoop:
             self.awaiting_mode,
             self.is_same_vehicle(),
         )
-        self._checked, self._sent = nan, None
+        self._recorder.begin()
         self._take(sample)
-        reason = self.record.reason if flags.on else None
-        entry = SampleEntry(sample, reason, flags, self._checked, self._sent)
-        recorder.add(sample.received, self._rows.sample, entry)
+        self._recorder.end(sample, flags, self.record.reason)
 
     def _take(self, sample: AttitudeSample) -> None:
         if sample.misfit is None and self.resets.on_attitude(sample):
@@ -164,7 +160,7 @@ class ControlLoop:
         try:
             rates, thrust = self._answer(sample, command, period)
             # This process may have been stopped since the sample came.
-            now = self._checked = self._clock()
+            now = self._recorder.checked = self._clock()
             if sample.age + now - sample.received > self._deadlines.telemetry_stale:
                 return Unanswered.LATE
             if not self._send(sample.time_boot_ms, rates, thrust):
@@ -218,11 +214,8 @@ class ControlLoop:
         latency = record.latency_ns = self._clock_ns() - sample.received_ns
         record.missed_deadlines += latency > deadlines.deadline * 1e9
         self._trace.add_latency(latency)
-        if self._trace.recorder is not None:
-            planned = not command.idle and command.body_rates is None
-            asked, plan = (self.planner.asked, self.planner.planned) if planned else (None, None)
-            flags = command.is_step, command.idle
-            self._sent = Answer(rates, thrust, latency, asked, plan, *flags)
+        if self._recorder.on:
+            self._recorder.answer(command, rates, thrust, latency)
         if self.offboard_active:
             self._hover_thrust.sent(thrust, sample.q)
             self._trace.add_rates(
@@ -240,18 +233,12 @@ class ControlLoop:
     def drop_command(self) -> None:
         """Drop the newest command, so that nothing is sent until guidance makes another one."""
         self.command = None
-        if self._trace.recorder is not None:
-            self._trace.recorder.action(self._clock(), "drop_command")
+        self._recorder.action("drop_command")
 
     def restart_planner(self) -> None:
         """Reset the planner at the next sample, because its state is not valid any more."""
         self.planner.restart()
-        if self._trace.recorder is not None:
-            self._trace.recorder.action(self._clock(), "restart_planner")
-
-    def _record_attitude_target(self, target: AttitudeTarget) -> None:
-        if self._trace.recorder is not None:
-            self._trace.recorder.add(self._clock(), self._rows.attitude_target, target)
+        self._recorder.action("restart_planner")
 
     def resume(self) -> None:
         """Answer again after a gap, because the autopilot has confirmed offboard."""

@@ -1,22 +1,22 @@
 """The guidance loop: a timer that makes a new command from the newest position."""
 
 from collections.abc import Callable
-from math import degrees, isfinite
+from math import degrees
 
 from companion.attitude import Quaternion, Target, heading, is_unit
 from companion.attitude.kinematics import tilt_angle
+from companion.control.command_maker import CommandMaker
 from companion.control.control_loop import ControlLoop
 from companion.control.flown_source import FlownSource
 from companion.control.guidance_command import GuidanceCommand
 from companion.control.hover_learning import HoverLearning
 from companion.control.motion_estimate import MotionEstimate
-from companion.control.predictive import Predictive
 from companion.control.step_recorder import StepRecorder
 from companion.control.step_rows import StepFlags, StepOutput
 from companion.control.telemetry import Clock, FreshPosition, Ground, Telemetry
 from companion.control.ticker import Ticker
 from companion.control.tracking_record import TrackingRecord
-from companion.guidance import GRAVITY, GuidanceInput, HoverThrust, Pose, Reference, VehicleMotion
+from companion.guidance import GuidanceInput, HoverThrust, Pose, Reference, VehicleMotion
 from companion.guidance.linear import Guidance
 from companion.guidance.source import Source
 from companion.recording.trace import FlightTrace
@@ -40,11 +40,9 @@ class GuidanceLoop:
         motion: motion of the vehicle at the last step, without resets, or None.
         off_course: distance from the reference at the last step, m; see
             `FlownSource.tracking_error`.
-        predictive: predictive control, which flies trajectories instead of linear guidance, or
-            None.
         estimate: estimates the motion.
         learning: learns the hover thrust.
-        guidance: makes targets of references.
+        maker: makes the commands.
         max_tilt: largest tilt in open loop, rad.
         before_step: called at the beginning of each step with the time, s.
         record: records how the reference is tracked.
@@ -71,15 +69,13 @@ class GuidanceLoop:
         self.bound_to_hold = False
         self.motion: VehicleMotion | None = None
         self.off_course: float | None = None
-        self.predictive: Predictive | None = None
         self.estimate = estimate
         self.learning = HoverLearning(hover_thrust, state)
+        self.maker = CommandMaker(guidance, self.flown, estimate, self.learning, period)
         self._loop = loop
-        self.guidance = guidance
         self._ground = ground
         self.record = TrackingRecord(trace, self.flown)
         self.max_tilt = max_tilt
-        self._period = period
         self._fresh = FreshPosition(state, vehicle_clock, position_stale)
         self.before_step: Callable[[float], None] = lambda _: None
         self._clock = clock
@@ -114,13 +110,13 @@ class GuidanceLoop:
 
     def _hold_here(self, now: float) -> None:
         self.flown.clear()
-        self.flown.pose = Pose(self._guidance_input(now).now.position_ned, self._heading())
+        self.flown.pose = Pose(self.maker.guidance_input(now).now.position_ned, self._heading())
 
     def hold_reference(self) -> None:
         """Hold the pose of the present reference, at which a maneuver has ended."""
         now = self._clock()
         self._recorder.action(now, "hold_reference")
-        motion = self._guidance_input(now).now
+        motion = self.maker.guidance_input(now).now
         reference = self.flown.reference(now, motion, self._heading())(now)
         self.flown.clear()
         self.flown.pose = Pose(reference.position_ned, reference.heading)
@@ -164,7 +160,7 @@ class GuidanceLoop:
         Raises:
             RuntimeError: no position has come yet.
         """
-        return self._guidance_input(self._clock()).now
+        return self.maker.guidance_input(self._clock()).now
 
     def attitude(self) -> Quaternion:
         """The newest attitude, in the frame without estimator resets."""
@@ -206,7 +202,7 @@ class GuidanceLoop:
         position = self._loop.resets.without_jumps(position)
         self.estimate.turn_to(self._loop.resets.turn)
         self.estimate.note_position(position, offboard_active=self._loop.offboard_active)
-        inputs = self._guidance_input(now)
+        inputs = self.maker.guidance_input(now)
         self.motion = inputs.now
         self._give_up_if_tilted(now, inputs.now)
         reference = self._write_command(now, inputs)
@@ -225,39 +221,19 @@ class GuidanceLoop:
 
     def _write_command(self, now: float, inputs: GuidanceInput) -> Reference:
         """Write the command for `now`; return the reference from which it was made."""
-        reference_at = self.flown.reference(now, inputs.now, self._heading())
-        reference = reference_at(now)
-        linear = self.guidance.command(reference_at, now, inputs)
-        if self.predictive is not None:
-            turn = self._loop.resets.turn
-            vehicle, following = self.estimate.vehicle(now, inputs), self.flown.following(now, turn)
-            linear = self.predictive.instead_of(linear, turn, vehicle, following)
-        target, later, down = linear
-        # Open-loop steps, predictive control and `InnerResponse.target` ignore the learned limit.
-        target, later = (self.learning.limit_tilt(each, down) for each in (target, later))
-        if not all(map(isfinite, (*target, *later, down))):
-            return reference  # of another package's guidance: the command before grows stale
-        self.estimate.vertical = GRAVITY - down if self._loop.offboard_active else GRAVITY
-        self._loop.command = GuidanceCommand(
-            target,
-            down,
+        reference, command = self.maker.make(
             now,
-            is_step=reference.coefficients is not None and reference.thrust is None,
-            body_rates=reference.body_rates,
-            thrust=reference.thrust,
-            turn=self._loop.resets.turn,
-            later=later,
-            period=self._period,
+            inputs,
+            self._heading(),
+            self._loop.resets.turn,
+            offboard_active=self._loop.offboard_active,
         )
+        if command is not None:  # else the command before grows stale
+            self._loop.command = command
         return reference
 
     def _heading(self) -> float:
         return heading(self.attitude())
-
-    def _guidance_input(self, now: float) -> GuidanceInput:
-        return self.estimate.guidance_input(
-            now, self.guidance.acts_after, self.learning.thrust_limits
-        )
 
     def _give_up_if_tilted(self, now: float, motion: VehicleMotion) -> None:
         """Hold here if open-loop rates have tilted the vehicle too far."""

@@ -139,20 +139,17 @@ class MotionEstimate:
         )
 
     def vehicle(self, now: float, inputs: GuidanceInput) -> Vehicle:
-        """`inputs` with attitude and rates at `now`, s of event-loop time.
-
-        Predictive control knows only `Drag`, so the drag along the body's axes counts as wind.
-        """
-        wind, (north, east, _) = inputs.disturbance, inputs.now.velocity_ned
-        more_north, more_east = inputs.axis_drag.deceleration(north, east)
+        """`inputs` with attitude and rates at `now`, s of event-loop time."""
+        north, east = inputs.disturbance
         return Vehicle(
             now,
             inputs.now.position_ned,
             inputs.now.velocity_ned,
             self._q,
             self._body_rates,
-            (wind[0] - more_north, wind[1] - more_east, 0.0),
+            (north, east, 0.0),
             inputs.drag,
+            inputs.axis_drag.coefficient,
         )
 
     def vehicle_time(self, now: float, position: LocalPosition) -> float:

@@ -79,10 +79,11 @@ class Retuning:
             TypeError: planner or guidance is of another package and cannot change.
         """
         guidance_loop = self._guidance_loop
-        if not isinstance(guidance_loop.guidance, LinearGuidance):
-            raise TypeError(f"{type(guidance_loop.guidance).__name__} cannot be retuned")
+        guidance = guidance_loop.maker.guidance
+        if not isinstance(guidance, LinearGuidance):
+            raise TypeError(f"{type(guidance).__name__} cannot be retuned")
         self._loop.retune(values.constants, values.limits)
-        guidance_loop.guidance.retune(values.guidance)
+        guidance.retune(values.guidance)
         guidance_loop.estimate.retune(values.observer)
         guidance_loop.max_tilt = values.max_tilt
 

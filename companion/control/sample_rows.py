@@ -1,7 +1,8 @@
 """What the control loop records of a sample: values in, messages of `flight.mcap` out.
 
 The loop hands over what it has at hand. The functions here run in the recorder's thread and take
-the numbers out of it, in the order of the columns in `companion.recording.mcap_file.channels`.
+the numbers out of it, in the order of the columns in
+`companion.recording.mcap_file.loop_channels`.
 """
 
 from math import nan, sqrt
@@ -11,8 +12,8 @@ from companion.attitude import BodyRates, Limits, Quaternion, Target
 from companion.attitude.history import PlannedTilt
 from companion.attitude.kinematics import tilt_products
 from companion.control.loop_record import Unanswered
-from companion.recording.mcap_file.channels import ATTITUDE_TARGET, SAMPLE, SETPOINT
 from companion.recording.mcap_file.fields import CDR
+from companion.recording.mcap_file.loop_channels import ATTITUDE_TARGET, SAMPLE, SETPOINT
 from companion.recording.mcap_file.writer import McapWriter
 from companion.vehicle.clock_jumps import Misfit
 from companion.vehicle.records import AttitudeSample, AttitudeTarget

@@ -11,8 +11,8 @@ from companion.control.guidance_command import GuidanceCommand
 from companion.guidance import GuidanceInput, Reference
 from companion.guidance.reference import Vector
 from companion.recording.mcap_file import cdr
-from companion.recording.mcap_file.channels import GUIDANCE, INPUT, TARGET
 from companion.recording.mcap_file.fields import CDR
+from companion.recording.mcap_file.loop_channels import GUIDANCE, INPUT, TARGET
 from companion.recording.mcap_file.writer import McapWriter
 from companion.vehicle.records import AttitudeTargetThrust, Battery, LocalPosition
 

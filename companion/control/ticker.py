@@ -2,7 +2,6 @@
 
 import asyncio
 from collections.abc import Callable
-from contextlib import suppress
 
 
 class Ticker:
@@ -16,17 +15,33 @@ class Ticker:
     def __init__(self, period: float, clock: Callable[[], float]) -> None:
         self._period, self._clock = period, clock
         self._due = clock()
-        self._soon = asyncio.Event()
+        self._soon = False
+        self._waiting: asyncio.Future[None] | None = None
 
     def soon(self) -> None:
         """End the wait of `tick` at once; the next period begins then."""
-        self._soon.set()
+        self._soon = True
+        if self._waiting is not None:
+            _wake(self._waiting)
 
     async def tick(self) -> None:
         """Wait for the next period, or for `soon`; missed periods are not repeated."""
         self._due = max(self._due + self._period, self._clock())
-        with suppress(TimeoutError):
-            async with asyncio.timeout(self._due - self._clock()):
-                await self._soon.wait()
-                self._due = self._clock()
-        self._soon.clear()
+        if not self._soon:
+            await self._sleep(self._due - self._clock())
+        if self._soon:
+            self._soon, self._due = False, self._clock()
+
+    async def _sleep(self, seconds: float) -> None:
+        loop = asyncio.get_running_loop()
+        self._waiting = loop.create_future()
+        timer = loop.call_later(seconds, _wake, self._waiting)
+        try:
+            await self._waiting
+        finally:
+            timer.cancel()
+
+
+def _wake(waiting: asyncio.Future[None]) -> None:
+    if not waiting.done():
+        waiting.set_result(None)

@@ -187,7 +187,7 @@ def validated(
         details = without_consequences(error.errors(include_url=False))
         told, before = [], Place("")
         for detail in details[:_FAULTS_TOLD]:
-            place = _place(detail["loc"], places or {}, name)
+            place = place_of(detail["loc"], places or {}, name)
             repeats = place.file == before.file
             where = (
                 ""
@@ -202,7 +202,7 @@ def validated(
         raise ConfigError("; ".join(told) + (f"; and {more} more" if more > 0 else "")) from error
 
 
-def _place(where: Where, places: Mapping[Where, Place], name: str) -> Place:
-    """The place of a key, or of what it is part of."""
+def place_of(where: Where, places: Mapping[Where, Place], name: str) -> Place:
+    """The place of a key, or of what it is part of; without a line if neither is known."""
     ends = range(len(where), 0, -1)
     return next((places[where[:end]] for end in ends if where[:end] in places), Place(name))

@@ -116,12 +116,12 @@ class Assembled:
 
     def close(self) -> None:
         """End the process of predictive control."""
-        if self.context.guidance_loop.predictive is not None:
-            self.context.guidance_loop.predictive.close()
+        if self.context.guidance_loop.maker.predictive is not None:
+            self.context.guidance_loop.maker.predictive.close()
 
     def predictive_figures(self) -> PredictiveFigures | None:
         """The figures of predictive control; None where it did not fly."""
-        predictive = self.context.guidance_loop.predictive
+        predictive = self.context.guidance_loop.maker.predictive
         if predictive is None:
             return None
         record = predictive.record
@@ -194,7 +194,7 @@ def assemble(
     loop.ask_mode = watch.ask_mode
     flight = Flight(context, plan, watch, recorder, ask_landing)
     ladder.note = context.note = preflight.note = guidance_loop.record.note = flight.note
-    link.clock.on_event = rate_requester.note = flight.note
+    rate_requester.note = flight.note
     drag_is_set = config.guidance.drag is not None
     remembered = None if folder is None else folder.parent
     memory = VehicleMemory(remembered, guidance_loop.estimate.drag, drag_is_set, flight.note)
@@ -204,7 +204,7 @@ def assemble(
             for text in part.notes:
                 flight.note(text)
             if config.guidance.kind == "nmpc":
-                guidance_loop.predictive = predictive(config, part, flight.note)
+                guidance_loop.maker.predictive = predictive(config, part, flight.note)
     changes = changes or Changes(config)
     if record is not None:
         record.metadata("configuration", flat(changes.flown.model_dump(mode="json")))
@@ -224,7 +224,7 @@ def assemble(
         trace,
         flight.began,
         phase,
-        recorder.status,
+        recorder.status if recorder.wants_status else None,
         clock,
         real_time=real_time,
     )

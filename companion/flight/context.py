@@ -15,7 +15,7 @@ from companion.flight.vehicle_identity import SameVehicle
 from companion.guidance import ManeuverSequence
 from companion.mavlink.commands import MAV_CMD_REQUEST_MESSAGE
 from companion.mavlink.errors import LinkError
-from companion.safety.snapshot_builder import SnapshotBuilder
+from companion.safety.snapshot_builder import FenceCentre, SnapshotBuilder
 from companion.vehicle.link import Link
 from companion.vehicle.records import LocalPosition
 
@@ -42,6 +42,8 @@ class FlightContext:
         heartbeat_limit: an older mode is unknown, s; the checks set it from the heartbeat rate.
         mode_at_checks: the mode when the checks ended; another one before arming is a takeover.
         arm_sent: whether we commanded arming.
+        fence_centre: of an earlier flight, where the vehicle has not been disarmed since; None: the
+            fence is centred where control begins.
         note: records and shows an event.
     """
 
@@ -59,6 +61,7 @@ class FlightContext:
     heartbeat_limit: float = SLOWEST_HEARTBEAT
     mode_at_checks: str | None = None
     arm_sent: bool = False
+    fence_centre: FenceCentre | None = None
     note: Callable[[str], None] = lambda _: None
 
     def release(self) -> None:

@@ -163,7 +163,7 @@ class FlightFiles:
                 name: value - self._counted.get(name, 0) for name, value in _counters(stats).items()
             },
             trace=trace,
-            events=flight.events,
+            events=list(flight.events),
             log=self.folder,
             dead_times=dead_times,
             predictive=assembled.predictive_figures(),

@@ -71,10 +71,8 @@ def require_inside(config: Config, parts: Iterable[Maneuver], origin: Place | No
     Raises:
         ConfigError: a maneuver leaves the fence, or could not stop inside it.
     """
-    check = _fence_check(config, origin)
     for part in parts:
-        for motion in _motions(part, least_drag(config)):
-            _refuse(part.name, check(motion))
+        _require_motions_inside(config, part, _motions(part, least_drag(config)), origin)
 
 
 def require_followable(config: Config, maneuver: Maneuver, begin: Vector) -> None:
@@ -125,14 +123,23 @@ def _part(config: Config, name: str) -> Maneuver:
         return _follow(config)
     part = _simple(config, name)
     try:
-        require_inside(config, [part], None)
+        motions = list(_motions(part, least_drag(config)))
+        _require_motions_inside(config, part, motions, None)
     except TrajectoryError as error:
         raise ConfigError(f"{name}: {error}") from error
     if name == "circle":
-        (motion,) = _motions(part, least_drag(config))
-        for broken in judge(motion, replace(_envelope(config), max_tilt_rate=None, fence=None)):
+        for broken in judge(motions[0], replace(_envelope(config), max_tilt_rate=None, fence=None)):
             _refuse(part.name, broken, assumption(config))
     return part
+
+
+def _require_motions_inside(
+    config: Config, part: Maneuver, motions: Iterable[Motion], origin: Place | None
+) -> None:
+    """Check predicted motions of a maneuver, as `require_inside`."""
+    check = _fence_check(config, origin)
+    for motion in motions:
+        _refuse(part.name, check(motion))
 
 
 def _simple(config: Config, name: str) -> Maneuver:

@@ -123,6 +123,11 @@ class EventRecorder:
         """Pass on."""
         self._tell(lambda observer: observer.waiting(name, detail, elapsed, timeout))
 
+    @property
+    def wants_status(self) -> bool:
+        """Whether the observer does something with the status, which takes time to put together."""
+        return type(self._observer).status is not Silent.status
+
     def status(self, status: FlightStatus) -> None:
         """Pass on; the caller notes what the observer raises, and asks no more."""
         self._observer.status(status)

@@ -100,7 +100,7 @@ class StatusReporter:
         trace: takes the motion.
         began: when the flight began, s on our clock.
         phase: returns the running phase.
-        show: takes the state; it must return at once.
+        show: takes the state; it must return at once. None: nobody looks at it.
         clock: ours, s.
         real_time: whether latencies mean anything: not where the vehicle waits for us.
     """
@@ -112,7 +112,7 @@ class StatusReporter:
         trace: FlightTrace,
         began: float,
         phase: Callable[[], PhaseNow],
-        show: Callable[[FlightStatus], None],
+        show: Callable[[FlightStatus], None] | None,
         clock: Callable[[], float],
         *,
         real_time: bool,
@@ -130,7 +130,8 @@ class StatusReporter:
         due = self._clock()
         while True:
             self.record()
-            self._show(self.status())
+            if self._show is not None:
+                self._show(self.status())
             due = max(due + _PERIOD, self._clock())
             await asyncio.sleep(due - self._clock())
 

@@ -49,7 +49,7 @@ async def offboard(context: FlightContext) -> None:
     context.detail = "the preflight checks before the takeover"
     await context.preflight.require(Stage.AIRBORNE)
     context.guidance_loop.hold_here()
-    context.snapshot_builder.begin(asyncio.get_running_loop().time())
+    context.snapshot_builder.begin(asyncio.get_running_loop().time(), context.fence_centre)
     await _take_over(context)
     context.guidance_loop.hold_here()
     context.loop.offboard_active, context.loop.taking_over = True, False

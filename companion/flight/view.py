@@ -12,7 +12,7 @@ _RATES = ("roll", "pitch", "yaw")
 
 
 def view(context: FlightContext, now: float) -> dict[str, Any]:
-    """The newest values, with the names and units of `companion.recording.mcap_file.channels`.
+    """The newest values, with the names and units of the channels of `flight.mcap`.
 
     Values that are not known are left out.
     """

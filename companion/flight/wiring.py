@@ -38,6 +38,7 @@ def connected(link: Link, assembled: Assembled) -> Iterator[None]:
 
     link.on_attitude = on_attitude
     link.on_error = flight.fail
+    on_event, link.clock.on_event = link.clock.on_event, flight.note
     ends = (
         link.subscribe("HEARTBEAT", on_heartbeat),
         link.subscribe("CURRENT_MODE", on_current_mode),
@@ -48,6 +49,7 @@ def connected(link: Link, assembled: Assembled) -> Iterator[None]:
             yield
     finally:
         link.on_attitude = link.on_error = None
+        link.clock.on_event = on_event
         for end in ends:
             end()
         state_logger.log_changes()

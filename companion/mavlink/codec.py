@@ -1,4 +1,4 @@
-"""Fast codecs of the control loop's messages and of lockstep's.
+"""Fast codecs of the control loop's messages, of lockstep's, and of ODOMETRY.
 
 The control loop receives ATTITUDE_QUATERNION and sends SET_ATTITUDE_TARGET; lockstep uses
 SYSTEM_TIME. pymavlink takes about 40 us for one message, because its checksum is computed in
@@ -27,6 +27,7 @@ No other mask is sent: with any other the autopilot chooses a value itself."""
 _FLOAT32_MAX = 3.4028234663852886e38
 _ATTITUDE = struct.Struct("<I7f")
 _ATTITUDE_BYTES = _ATTITUDE.size
+_RESET_COUNTER_AT = struct.calcsize("<Q55fBB")
 _SETPOINT = struct.Struct("<BBBBBBBHB I4f3ff BBB")
 _SETPOINT_PAYLOAD_BYTES = 39
 _SETPOINT_EXTRA = CRC_EXTRA[SET_ATTITUDE_TARGET]
@@ -47,6 +48,14 @@ def decode_attitude(payload: bytes) -> tuple[int, Quaternion, BodyRates] | None:
     if not isfinite(w + x + y + z + roll + pitch + yaw):
         return None
     return time_boot_ms, (w, x, y, z), BodyRates(roll, pitch, yaw)
+
+
+def decode_reset_counter(payload: bytes) -> int:
+    """`reset_counter` of an ODOMETRY payload; 0 where an old autopilot does not send it.
+
+    The message has 60 other numbers, which nothing here uses.
+    """
+    return payload[_RESET_COUNTER_AT] if len(payload) > _RESET_COUNTER_AT else 0
 
 
 class SetpointEncoder:

@@ -5,6 +5,8 @@ defined here, and the events, whose payloads are passed on undecoded.
 """
 
 import struct
+from collections.abc import Callable
+from operator import itemgetter
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega
@@ -59,6 +61,15 @@ CRC_EXTRA: dict[int, bytes] = {
 }
 
 
+_ORDERED: dict[int, Callable[[tuple[Any, ...]], tuple[Any, ...]]] = {
+    number: itemgetter(*kind.orders)
+    for number, kind in _CLASSES.items()
+    if len(kind.orders) > 1 and set(kind.lengths) == {1} and "s" not in kind.unpacker.format
+}
+"""Puts the values of a payload in the order of the constructor, for messages that hold neither
+arrays nor texts: most of what comes often."""
+
+
 def message_id(name: str) -> int:
     """Number of a message by its name, such as `ATTITUDE_QUATERNION`.
 
@@ -78,6 +89,8 @@ def decode(number: int, payload: bytes) -> Message:
     kind = _CLASSES[number]
     size = kind.unpacker.size
     flat = kind.unpacker.unpack(payload[:size].ljust(size, b"\0"))
+    if number in _ORDERED:
+        return kind(*_ORDERED[number](flat))
     wire: list[Any] = []
     at = 0
     for length in kind.lengths:

@@ -100,7 +100,7 @@ class FrameCounter:
         missing = self._sequence.missing(sequence)
         if missing < 0:
             stats.repeated += 1
-        else:
+        elif missing:
             # A frame of an unknown message has a sequence number too. It came, so it is not lost.
             explained = min(missing, stats.unknown - self._explained)
             self._explained += explained

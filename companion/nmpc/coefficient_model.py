@@ -83,7 +83,8 @@ class Symbols:
     def translation(self, settings: Settings) -> ca.SX:
         """(6,), see `model.translation`."""
         axis = ca.vertcat(self.c, _cos_tilt(self.c))
-        return translation(self.state[3:6], self.control[3], axis, self.constants, settings)
+        velocity, thrust = self.state[3:6], self.control[3]
+        return translation(velocity, thrust, axis, self.heading, self.constants, settings)
 
     def model(
         self,

@@ -12,7 +12,7 @@ from companion.nmpc.reference import Start
 READY = b"ready"
 """First message of the solver's process, sent when it can take requests."""
 
-_HEAD = struct.Struct("<q24d")
+_HEAD = struct.Struct("<q25d")
 _INPUT = struct.Struct("<5d")
 _ANSWER = struct.Struct("<2q9d")
 
@@ -28,6 +28,7 @@ class Vehicle(NamedTuple):
         body_rates: rad/s, FRD.
         disturbance: acceleration by wind and other unmodelled forces, m/s², NED.
         drag: estimated drag.
+        axis_drag: coefficient of `AxisDrag`, 1/m.
     """
 
     time: float
@@ -37,6 +38,7 @@ class Vehicle(NamedTuple):
     body_rates: BodyRates
     disturbance: Vector = (0.0, 0.0, 0.0)
     drag: Drag = NO_DRAG
+    axis_drag: float = 0.0
 
 
 class Input(NamedTuple):
@@ -129,6 +131,7 @@ def pack_request(request: Request) -> bytes:
         *vehicle.body_rates,
         *vehicle.disturbance,
         *vehicle.drag,
+        vehicle.axis_drag,
     )
     return head + b"".join(_INPUT.pack(*one) for one in request.inputs)
 
@@ -144,6 +147,7 @@ def unpack_request(message: bytes) -> Request:
         BodyRates(v[15], v[16], v[17]),
         (v[18], v[19], v[20]),
         Drag(v[21], v[22]),
+        v[23],
     )
     inputs = tuple(Input(*values) for values in _INPUT.iter_unpack(message[_HEAD.size :]))
     return Request(number, vehicle, at, Start((v[0], v[1], v[2]), v[3]), inputs)

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-from companion.drag import Drag
+from companion.drag import Drag, along_axes
 from companion.nmpc.reference import Node
 from companion.nmpc.settings import Settings
 
@@ -43,6 +43,7 @@ class Conditions(NamedTuple):
     Attributes:
         w_n, w_e, w_d: acceleration by wind and other unmodelled forces, m/s², NED.
         linear_drag, quadratic_drag: `Drag`, 1/s and 1/m.
+        axis_drag: coefficient of `AxisDrag`, 1/m.
     """
 
     w_n: float
@@ -50,6 +51,7 @@ class Conditions(NamedTuple):
     w_d: float
     linear_drag: float
     quadratic_drag: float
+    axis_drag: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +95,7 @@ class Model:
 
 
 def constants_symbols(own: int = 0) -> ca.SX:
-    """(5 + own,), symbols of `Conditions` and of `own` further constants of the model."""
+    """(6 + own,), symbols of `Conditions` and of `own` further constants of the model."""
     return ca.SX.sym("constants", len(Conditions._fields) + own)
 
 
@@ -103,7 +105,12 @@ def own_constant(constants: ca.SX) -> ca.SX:
 
 
 def translation(
-    velocity: ca.SX, thrust: ca.SX, axis: ca.SX, constants: ca.SX, settings: Settings
+    velocity: ca.SX,
+    thrust: ca.SX,
+    axis: ca.SX,
+    heading: ca.SX,
+    constants: ca.SX,
+    settings: Settings,
 ) -> ca.SX:
     """Velocity and acceleration, (6,), of a point mass with drag (equation 10 with drag).
 
@@ -111,6 +118,7 @@ def translation(
         velocity: (3,), NED, m/s.
         thrust: specific thrust, m/s².
         axis: (3,), coefficients north and east, and cos(tilt).
+        heading: of the body's forward axis, rad.
         constants: symbols that begin with `Conditions`.
         settings: settings, which contain gravity.
     """
@@ -121,6 +129,9 @@ def translation(
     drag = Drag(conditions.linear_drag, conditions.quadratic_drag)
     moving: list[Any] = ca.vertsplit(velocity)
     slowed = ca.vertcat(*drag.deceleration((moving[0], moving[1], moving[2])))
+    forward: list[Any] = [ca.cos(heading), ca.sin(heading)]
+    more = along_axes(conditions.axis_drag, forward[0], forward[1], moving[0], moving[1])
+    slowed += ca.vertcat(*more, 0.0)
     disturbance = ca.vertcat(conditions.w_n, conditions.w_e, conditions.w_d)
     return ca.vertcat(velocity, lift + weight - slowed + disturbance)
 

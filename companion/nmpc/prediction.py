@@ -47,6 +47,11 @@ def motion_of(vehicle: Vehicle) -> Motion:
     )
 
 
+def conditions_of(vehicle: Vehicle) -> Conditions:
+    """Wind and drag on the vehicle for the models."""
+    return Conditions(*vehicle.disturbance, *vehicle.drag, vehicle.axis_drag)
+
+
 class Predictor:
     """Integrates the motion to a later time by `coefficient_model`, with the inputs until then.
 
@@ -68,7 +73,7 @@ class Predictor:
         """
         motion = motion_of(vehicle)
         time = vehicle.time
-        conditions = Conditions(*vehicle.disturbance, *vehicle.drag)
+        conditions = conditions_of(vehicle)
         constants = list(self._model.constants_of(conditions, motion))
         acting = [one for one in inputs if self._acts_at(one) <= time][-1:] or [*inputs[:1]]
         current = acting[0] if acting else self._holding_input(vehicle.time, motion)

@@ -4,7 +4,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from companion.attitude import wrap_angle
-from companion.drag import Drag
+from companion.drag import AxisDrag, Drag
 from companion.guidance.trajectory.sample import Sample, Vector
 
 _LEAST_LIFT = 0.2
@@ -49,7 +49,13 @@ class Start(NamedTuple):
 
 
 def node_of(
-    sample: Sample, start: Start, near: float, drag: Drag, gravity: float, disturbance: Vector
+    sample: Sample,
+    start: Start,
+    near: float,
+    drag: Drag,
+    axis_drag: float,
+    gravity: float,
+    disturbance: Vector,
 ) -> Node:
     """Attitude and thrust of a sample: differential flatness of a point mass with drag.
 
@@ -62,14 +68,19 @@ def node_of(
         start: start of the trajectory.
         near: a heading, rad; that of the node is at most π from it.
         drag: drag of the vehicle.
+        axis_drag: coefficient of `AxisDrag`, 1/m.
         gravity: m/s².
         disturbance: w, acceleration by wind and other unmodelled forces, m/s².
     """
     velocity, acceleration, jerk = sample.velocity, sample.acceleration, sample.jerk
     slowed, growing = drag.deceleration(velocity), drag.growth(velocity, acceleration)
-    f_n, f_e, f_d = (acceleration[i] + slowed[i] - disturbance[i] for i in range(3))
+    heading = near + wrap_angle(start.turned + sample.heading - near)
+    along_axes = AxisDrag(axis_drag, heading)
+    more = *along_axes.deceleration(*velocity[:2]), 0.0
+    growing_more = *along_axes.growth(velocity[:2], acceleration[:2], sample.heading_rate), 0.0
+    f_n, f_e, f_d = (acceleration[i] + slowed[i] + more[i] - disturbance[i] for i in range(3))
     f_d = min(f_d - gravity, -_LEAST_LIFT * gravity)
-    d_n, d_e, d_d = (jerk[i] + growing[i] for i in range(3))
+    d_n, d_e, d_d = (jerk[i] + growing[i] + growing_more[i] for i in range(3))
     thrust = sqrt(f_n * f_n + f_e * f_e + f_d * f_d)
     growth = (f_n * d_n + f_e * d_e + f_d * d_d) / thrust
     north, east = f_n / thrust, f_e / thrust
@@ -82,6 +93,6 @@ def node_of(
         (d_n - north * growth) / thrust,
         (d_e - east * growth) / thrust,
         thrust,
-        near + wrap_angle(start.turned + sample.heading - near),
+        heading,
         sample.heading_rate,
     )

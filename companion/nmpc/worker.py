@@ -26,8 +26,8 @@ from companion.nmpc.messages import (
     pack_answer,
     unpack_request,
 )
-from companion.nmpc.model import Conditions, Model
-from companion.nmpc.prediction import Predictor, TiltedTooFarError
+from companion.nmpc.model import Model
+from companion.nmpc.prediction import Predictor, TiltedTooFarError, conditions_of
 from companion.nmpc.receding_horizon import Plan, RecedingHorizon
 from companion.nmpc.reference import Node, Start, node_of
 from companion.nmpc.settings import Settings
@@ -102,7 +102,7 @@ class Worker:
         vehicle = request.vehicle
         until = vehicle.time + self._ahead
         motion = self._predictor.predict(vehicle, request.inputs, until)
-        conditions = Conditions(*vehicle.disturbance, *vehicle.drag)
+        conditions = conditions_of(vehicle)
         nodes = self._nodes(request, motion.heading)
         return self._horizon.solve(until, motion, nodes, conditions)
 
@@ -116,6 +116,7 @@ class Worker:
                 request.start,
                 heading,
                 request.vehicle.drag,
+                request.vehicle.axis_drag,
                 settings.gravity,
                 request.vehicle.disturbance,
             )

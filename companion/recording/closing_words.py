@@ -62,7 +62,7 @@ def _headline_and_reasons(figures: Figures) -> tuple[str, list[str]]:
     beyond = [check for check in judged if not check.good]
     names = _enumerated([maneuver["name"] for maneuver in figures["maneuvers"]])
     if is_good(figures):
-        headline = f"The flight was good: {names}, all {len(judged)} figures within their limits."
+        headline = f"The flight was good: {names}, all within their limits."
     elif beyond:
         headline = (
             f"The flight was not good: {names}, {len(beyond)} of {len(judged)} figures beyond "

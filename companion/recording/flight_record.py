@@ -4,8 +4,9 @@
     guidance = record.rows("guidance")       # a structured array, one named field per column
     guidance["estimated_north_m"]            # (N,) float64
 
-The columns of each channel are in `companion.recording.mcap_file.channels`, with their units. A
-channel without messages has 0 rows, never an error. NaN: not known, or does not apply.
+The columns of each channel are in `companion.recording.mcap_file` (`loop_channels` and `channels`),
+with their units. A channel without messages has 0 rows, never an error. NaN: not known, or does not
+apply.
 
 Three clocks: our clock (event-loop time; `began` is when the flight began on it), the vehicle's
 clock (`vehicle_time_s`), and the time since the flight began, which phases, events, alarms and the

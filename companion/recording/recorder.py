@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 from companion.recording.background_file import BackgroundFile
 from companion.recording.mcap_file import cdr
-from companion.recording.mcap_file.channels import ACTION, ACTIONS
 from companion.recording.mcap_file.fields import CDR, Channel
+from companion.recording.mcap_file.loop_channels import ACTION, ACTIONS
 from companion.recording.mcap_file.writer import McapWriter
 
 _MOST_WAITING = 50_000

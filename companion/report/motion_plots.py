@@ -22,7 +22,7 @@ from companion.report.plots import (
 )
 
 _NORTH, _EAST, _HEIGHT = range(3)
-_EYE = {"x": 1.5, "y": -1.9, "z": 1.1}
+_EYE = {"x": 1.3, "y": -1.7, "z": 1.0}
 """From the south-east and above, so far away that the titles of the axes are in the picture."""
 
 
@@ -44,7 +44,7 @@ def _plan(flights: Sequence[FlightData]) -> Plot:
     """The track from above."""
     traces = []
     for number, flight in enumerate(flights):
-        for which, dash in (("reference", "dash"), ("position", "solid")):
+        for which, dash in (("position", "solid"), ("reference", "dash")):  # the latter on top
             if which in flight.curves:
                 place = flight.curves[which].values[evenly(len(flight.curves[which].time))]
                 first = which == "reference" and len(flights) == 1
@@ -72,29 +72,34 @@ def _place_of_end(flights: Sequence[FlightData]) -> list[dict[str, Any]]:
 
 
 def _space(flights: Sequence[FlightData]) -> Plot:
-    """The track in three dimensions."""
+    """The track in three dimensions, of a single flight with its reference."""
     traces = []
     for number, flight in enumerate(flights):
+        colour = _colour(flights, number)
         if "position" in flight.curves:
-            curve = flight.curves["position"]
-            place = curve.values[evenly(len(curve.time))]
-            traces.append(
-                {
-                    "type": "scatter3d",
-                    "mode": "lines",
-                    "name": _name(flights, flight, "flown"),
-                    "x": numbers(place[:, _EAST]),
-                    "y": numbers(place[:, _NORTH]),
-                    "z": numbers(place[:, _HEIGHT]),
-                    "line": {"color": _colour(flights, number), "width": 4},
-                }
-            )
+            traces.append(_track(_name(flights, flight, "flown"), flight, "position", colour))
+        if "reference" in flight.curves and len(flights) == 1:
+            traces.append(_track("reference", flight, "reference", REFERENCE))
     scene = {
         **axes(x="east, m", y="north, m", z="height, m"),
         "aspectmode": "data",
-        "camera": {"eye": _EYE},
+        "camera": {"eye": _EYE, "center": {"x": 0.0, "y": 0.0, "z": -0.15}},
     }
-    return Plot("Track in space", "Drag to turn it.", traces, {"scene": scene}, 420)
+    return Plot("Track in space", "Drag to turn it.", traces, {"scene": scene}, 520)
+
+
+def _track(name: str, flight: FlightData, which: str, colour: str) -> dict[str, Any]:
+    curve = flight.curves[which]
+    place = curve.values[evenly(len(curve.time))]
+    return {
+        "type": "scatter3d",
+        "mode": "lines",
+        "name": name,
+        "x": numbers(place[:, _EAST]),
+        "y": numbers(place[:, _NORTH]),
+        "z": numbers(place[:, _HEIGHT]),
+        "line": {"color": colour, "width": 4 if which == "position" else 2},
+    }
 
 
 def _height(flights: Sequence[FlightData]) -> Plot:
@@ -107,7 +112,28 @@ def _error(flights: Sequence[FlightData]) -> Plot:
     traces = _lines(flights, "error", "distance from the reference") + limit_lines(flights, "error")
     layout = time_axis(flights, y="error, m")
     note = "Distance from the reference by the autopilot's estimate; a gap has no reference."
+    largest = _largest_error(flights)
+    if largest is not None:
+        layout["yaxis"]["range"] = [0.0, 1.2 * largest]
+        note += " On the way back from open-loop steps it is larger: double-click to see it all."
     return Plot("Tracking error", note, traces, layout)
+
+
+def _largest_error(flights: Sequence[FlightData]) -> float | None:
+    """The largest error in the maneuvers that have a reference throughout, m.
+
+    None where the plot shall show all: of several flights, of an early end, and where there is no
+    larger error elsewhere.
+    """
+    flight = flights[0]
+    if len(flights) > 1 or flight.end is not None or "error" not in flight.curves:
+        return None
+    time, error = flight.curves["error"].time, flight.curves["error"].values[:, 0]
+    parts = [error[(time >= span.begin) & (time < span.end)] for span in flight.maneuvers]
+    throughout = [part.max() for part in parts if len(part) and not np.isnan(part).any()]
+    if not throughout or max(throughout) >= np.nanmax(error):
+        return None
+    return float(max(throughout))
 
 
 def _lines(flights: Sequence[FlightData], which: str, what: str) -> list[dict[str, Any]]:

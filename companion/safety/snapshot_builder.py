@@ -28,6 +28,18 @@ _RESETS_WITHIN = 30.0
 """Estimator resets are counted over this time, s."""
 
 
+class FenceCentre(NamedTuple):
+    """Where the fence is centred.
+
+    Attributes:
+        position_ned: m, in the autopilot's frame.
+        place: its latitude and longitude; None: they are not known.
+    """
+
+    position_ned: Vector
+    place: Place | None
+
+
 class _Counters(NamedTuple):
     """Counters at one call of `listen`; `late` is how late that call came, s."""
 
@@ -67,20 +79,33 @@ class SnapshotBuilder:
         self._good_flags = 0
         self._timeline = 0
 
-    def begin(self, now: float) -> None:
-        """Note that control begins at `now`, s of event-loop time.
+    def begin(self, now: float, centre: FenceCentre | None = None) -> None:
+        """Note that control begins at `now`; earlier resets do not count.
 
-        The fence is centred at the present position, and earlier resets do not count.
+        Args:
+            now: s of event-loop time.
+            centre: of the fence; None: the present position.
         """
         state, resets = self._link.state, self._loop.resets
         motion = self._guidance_loop.motion
         self._start = None if motion is None else motion.position_ned
         self._origin = self._place(now)
+        if centre is not None:
+            self._start = _minus(centre.position_ned, resets.shift)
+            self._origin = centre.place
         self._began_at, self._turn, self._shift = now, resets.turn, resets.shift
         resets.largest_tilt = 0.0
         self._good_flags = 0 if state.estimator is None else state.estimator.flags
         self._timeline = self._link.clock.timeline
         self._counted.clear()
+
+    @property
+    def fence_centre(self) -> FenceCentre | None:
+        """Where the fence is centred, or None before control began."""
+        if self._start is None:
+            return None
+        back = _minus((0.0, 0.0, 0.0), self._loop.resets.shift)
+        return FenceCentre(_minus(self._start, back), self._origin)
 
     @property
     def origin_ned(self) -> Vector | None:
@@ -203,3 +228,7 @@ class SnapshotBuilder:
         if newest is None or now - newest.received > _PLACE_LASTS:
             return None
         return Place(newest.latitude_deg, newest.longitude_deg)
+
+
+def _minus(left: Vector, right: Vector) -> Vector:
+    return left[0] - right[0], left[1] - right[1], left[2] - right[2]

@@ -10,6 +10,7 @@ from companion.flight.observer import Observer
 from companion.mavlink.framing import Frame
 from companion.serve.component import Component
 from companion.serve.flight_records import FlightRecords
+from companion.serve.kept_fence import KeptFence
 from companion.serve.mode_requests import (
     asks_for_control,
     leaves_control,
@@ -22,12 +23,13 @@ from companion.serve.ownership import Ownership
 from companion.serve.programs import Program, Programs
 from companion.serve.served_flight import ACCEPTED, IN_PROGRESS, REJECTED, Asked, ServedFlight
 from companion.serve.setpoints.approach import UnplannableError
-from companion.serve.setpoints.request import RefusedSetpoint, Request, climbs
+from companion.serve.setpoints.request import RefusedSetpoint, Request
 from companion.serve.setpoints.understand import SETPOINTS, Setpoints
 from companion.serve.situation import SituationKeeper
 from companion.vehicle.autopilot import ControlEntry, Role
 from companion.vehicle.link import Link
 
+_ENDS = "the vehicle is held, and control ends"
 _TRY_AGAIN = 2.0
 """After a takeover has failed, setpoints alone do not begin another one for this long, s."""
 
@@ -62,7 +64,7 @@ class ServedControl:
         self._clock, self._not_before = asyncio.get_running_loop().time, 0.0
         self._records, self._changes = records, changes
         self.ownership = Ownership(config.serve.setpoint_timeout, config.serve.hold_s)
-        self._programs = Programs()
+        self._programs, self._fence = Programs(), KeptFence(config, link)
         self._flight: ServedFlight | None = None
         self._task: asyncio.Task[None] | None = None
         self._unfinished: set[asyncio.Task[None]] = set()
@@ -98,7 +100,7 @@ class ServedControl:
             )
             self._answer(client, frame, REJECTED)
             return True
-        if self.in_control and starves_control(frame, self.needed_rates()):
+        if self._flight is not None and starves_control(frame, self.needed_rates()):
             self._answer(client, frame, ACCEPTED)
             return True
         owner = self.ownership.owner
@@ -127,8 +129,6 @@ class ServedControl:
             "LOCAL_POSITION_NED": link.position_rate_hz,
         }
 
-    # --- setpoints
-
     def _take_setpoint(self, client: Client, frame: Frame) -> None:
         autopilot = self._link.state.autopilot
         if autopilot is None:
@@ -147,7 +147,7 @@ class ServedControl:
             request = setpoints.understand(frame, situation)
             refusal = self.ownership.setpoint(owner, now)
             if refusal is None:
-                self._fly_request(owner, request, now)
+                refusal = self._fly_request(owner, request, now)
         except RefusedSetpoint as error:
             refusal = str(error)
         except UnplannableError as error:
@@ -156,17 +156,21 @@ class ServedControl:
         if refusal is not None:
             self._component.answer(client, f"setpoint refused: {refusal}")
 
-    def _fly_request(self, owner: Program, request: Request, now: float) -> None:
-        """Give a request to the flight, or begin one where setpoints alone ask for control.
+    def _fly_request(self, owner: Program, request: Request, now: float) -> str | None:
+        """Give a request to the flight, or begin one; returns why it is not flown, or None.
 
         Raises:
             UnplannableError: there is no motion to it; the request before still counts.
         """
-        if self._flight is not None and self.ownership.owner == owner:
-            self._flight.give(request)
+        flight = self._flight
+        if flight is not None and not flight.ends and self.ownership.owner == owner:
+            flight.give(request)
         self._programs.keep(owner, request)
+        if flight is not None and flight.ends:
+            return _ENDS
         if self._flight is None and self._may_begin(owner, now):
             self._begin(owner, None)
+        return None
 
     def _may_begin(self, owner: Program, now: float) -> bool:
         """Whether setpoints alone give control: in ArduPilot's GUIDED, in the air."""
@@ -178,16 +182,23 @@ class ServedControl:
         if not state.flying:
             self._component.answer(owner.client, "setpoints are flown in the air: take off first")
             return False
-        return self.ownership.streams(owner, now) and self.ownership.ask(owner, now) is None
-
-    # --- control
+        if not self.ownership.streams(owner, now):
+            return False
+        refusal = self._fence.refusal() or self.ownership.ask(owner, now)
+        if refusal is not None:
+            self._component.answer(owner.client, f"control refused: {refusal}")
+        return refusal is None
 
     def _take_wish(self, client: Client, frame: Frame) -> None:
         """Answer a command that asks for control: by a takeover, or by a refusal."""
         now, owner = self._clock(), self._programs.asking(client, frame)
         refusal, standing = self.ownership.ask(owner, now), not self._link.state.flying
-        if refusal is None and self._flight is None and standing:
-            refusal = self._no_takeoff(self._programs.newest(owner))
+        if refusal is None and self._flight is not None and self._flight.ends:
+            refusal = _ENDS
+        elif refusal is None and self._flight is None:
+            refusal = self._fence.refusal()
+            if refusal is None and standing:
+                refusal = self._keeper.takeoff_refusal(self._programs.newest(owner))
         if refusal is not None:
             if self._flight is None:
                 self.ownership.release()
@@ -197,15 +208,6 @@ class ServedControl:
             self._begin(owner, Asked(client, frame), from_ground=standing)
         else:
             self._answer(client, frame, ACCEPTED if self.in_control else IN_PROGRESS)
-
-    def _no_takeoff(self, request: Request) -> str | None:
-        """Why the vehicle does not take off for a client that asks for control on the ground."""
-        state, situation = self._link.state, self._keeper.situation()
-        if not state.landed or situation is None:
-            return "take off first: it is not known whether the vehicle stands on the ground"
-        if climbs(request, situation):
-            return None
-        return "command a height of 1 m or more above the ground, or take off first"
 
     def _begin(self, owner: Program, asked: Asked | None, *, from_ground: bool = False) -> None:
         """Begin a flight under a client's control."""
@@ -219,6 +221,7 @@ class ServedControl:
             self._environment,
             self._records,
             self._changes,
+            self._fence.centre,
             from_ground=from_ground,
         )
         flight.give(self._programs.newest(owner))
@@ -233,6 +236,7 @@ class ServedControl:
             begun = await flight.run(asked)
         finally:
             self.ownership.release()
+            self._fence.keep(flight.fence_centre)
             self._flight = self._task = None
             if not begun:
                 self._not_before = self._clock() + _TRY_AGAIN

@@ -1,9 +1,11 @@
 """The records of the flights under clients' control, each in a folder of its own."""
 
+import asyncio
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TypeVar
 
 from companion import realtime
 from companion.config import Config
@@ -13,6 +15,9 @@ from companion.flight.flight_files import FlightFiles
 from companion.mavlink.transport.base import Tap
 from companion.recording.folder import flight_folder
 from companion.recording.measurements.summary import Summary
+
+Argument = TypeVar("Argument")
+Result = TypeVar("Result")
 
 
 class FlightRecords:
@@ -27,8 +32,8 @@ class FlightRecords:
 
     Attributes:
         grants: real-time settings that were requested.
-        on_recorded: called with the folder of each flight once its record is whole; in a thread
-            beside the event loop, except on a virtual clock.
+        on_recorded: called with the folder of each flight once its record is whole, in a thread
+            beside the event loop, except on a virtual clock; returns a sentence to tell, or None.
     """
 
     def __init__(
@@ -38,7 +43,7 @@ class FlightRecords:
         note: Callable[[str], None],
     ) -> None:
         self.grants: tuple[realtime.Grant, ...] = ()
-        self.on_recorded: Callable[[Path], None] = lambda _: None
+        self.on_recorded: Callable[[Path], str | None] = lambda _: None
         self._directory = directory
         self._environment, self._note = environment, note
         self._tap: Tap | None = None
@@ -76,19 +81,35 @@ class FlightRecords:
             finally:
                 self._tap = None
 
-    def keep(self, record: FlightFiles, summary: Summary) -> None:
-        """Write the summary of a flight that is over; its log is closed."""
-        record.save(summary)
+    async def keep(self, record: FlightFiles, summary: Summary) -> None:
+        """Write the summary of a flight that is over; its log is closed.
+
+        The next flight may begin meanwhile: it has a record of its own.
+        """
+        await self._beside(record.save, summary)
         if record.folder is not None:
             self._note(f"recorded in {record.folder}")
-            self.on_recorded(record.folder)
+            told = await self._beside(self.on_recorded, record.folder)
+            if told is not None:
+                self._note(told)
 
-    def discard(self, record: FlightFiles) -> None:
+    async def discard(self, record: FlightFiles) -> None:
         """Remove the record of a takeover that failed: nothing was flown."""
-        _remove(record.folder)
+        await self._beside(_remove, record.folder)
 
     def _record(self, config: Config, folder: Path | None) -> FlightFiles:
-        return FlightFiles(config, folder, self._environment, self._note, follows=False)
+        loop = asyncio.get_running_loop()
+
+        def note(text: str) -> None:  # `FlightFiles.save` calls it in a thread
+            loop.call_soon_threadsafe(self._note, text)
+
+        return FlightFiles(config, folder, self._environment, note, follows=False)
+
+    async def _beside(self, work: Callable[[Argument], Result], argument: Argument) -> Result:
+        """Call `work` in a thread, so that a slow disk stops nothing."""
+        if not self._environment.realtime:  # a virtual clock knows no threads
+            return work(argument)
+        return await asyncio.to_thread(work, argument)
 
 
 def _remove(folder: Path | None) -> None:

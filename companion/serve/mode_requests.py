@@ -19,6 +19,7 @@ _MISSION_ITEMS = dialect.MAVLINK_MSG_ID_MISSION_ITEM, dialect.MAVLINK_MSG_ID_MIS
 _GUIDED_ITEMS = 2, 3
 """Values of `current` with which ArduPilot flies to a mission item, or to its height, at once."""
 _SET_MESSAGE_INTERVAL = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
+_STEERING = dialect.MAV_CMD_DO_REPOSITION, dialect.MAV_CMD_DO_PAUSE_CONTINUE
 _LEAVING = MAV_CMD_DO_SET_MODE, MAV_CMD_NAV_LAND, MAV_CMD_NAV_RETURN_TO_LAUNCH
 _CUSTOM_MODE = 1
 _MAIN_MODE = 0xFF << 16
@@ -57,7 +58,8 @@ def steers_in_our_mode(frame: Frame, autopilot: Autopilot) -> bool:
     """Whether a frame lets the autopilot fly elsewhere without leaving the mode of our setpoints.
 
     ArduPilot in GUIDED flies to DO_REPOSITION and to single mission items as it does to setpoints,
-    so such a frame would fight the client in control. PX4 leaves OFFBOARD for them.
+    and after DO_PAUSE_CONTINUE it obeys none until that is undone. So such a frame would fight the
+    client in control. PX4 leaves OFFBOARD for them.
     """
     if autopilot.control_entry is not ControlEntry.BY_FIRST_SETPOINT:
         return False
@@ -66,7 +68,7 @@ def steers_in_our_mode(frame: Frame, autopilot: Autopilot) -> bool:
     if frame.message_id not in (_COMMAND_LONG, _COMMAND_INT):
         return False
     command = decode(frame.message_id, frame.payload).command
-    return bool(command == dialect.MAV_CMD_DO_REPOSITION)
+    return command in _STEERING
 
 
 def leaves_control(frame: Frame) -> bool:

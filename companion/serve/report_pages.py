@@ -5,7 +5,6 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -21,26 +20,20 @@ _INTERRUPTED = "interrupted"
 
 
 class ReportPages:
-    """Writes pages, one after the other. `write` is called in threads beside the event loop.
+    """Writes pages, one after the other. `write` is called in threads beside the event loop."""
 
-    Args:
-        note: takes a sentence that says where a page is, or why there is none.
-    """
-
-    def __init__(self, note: Callable[[str], None]) -> None:
-        self._note = note
+    def __init__(self) -> None:
         self._turn = threading.Lock()
         self._process: subprocess.Popen[str] | None = None
         self._left = False
 
-    def write(self, folder: Path) -> None:
-        """Write `report.html` about the flight in `folder`, and wait until it is written."""
+    def write(self, folder: Path) -> str:
+        """Write `report.html` about the flight in `folder`; returns where it is, or why not."""
         with self._turn:
             try:
-                told = f"Report: {self._written(folder)}"
+                return f"Report: {self._written(folder)}"
             except (OSError, RuntimeError) as error:
-                told = f"No report: {error}; `companion report {folder}` tries again"
-            self._note(told)
+                return f"No report: {error}; `companion report {folder}` tries again"
 
     def leave(self) -> None:
         """Write no page any more: the program is to end."""

@@ -2,12 +2,10 @@
 
 import asyncio
 from collections.abc import Coroutine
-from math import atan2, degrees
 from typing import Any, NamedTuple
 
 from companion.attitude.representation import heading
 from companion.config import Config
-from companion.config.in_flight import differences
 from companion.flight.assembly import assemble
 from companion.flight.changes import Changes
 from companion.flight.context import cancel
@@ -15,17 +13,17 @@ from companion.flight.environment import Environment
 from companion.flight.observer import Observer, decline_landing
 from companion.flight.plan import TakeoverPlan
 from companion.flight.wiring import connected
-from companion.guidance import GRAVITY
 from companion.mavlink.framing import Frame
 from companion.mavlink.messages import dialect
 from companion.recording.measurements.summary import Summary
 from companion.safety.actions import internal
-from companion.serve.component import Component
+from companion.safety.snapshot_builder import FenceCentre
+from companion.serve.component import WARNING, Component
 from companion.serve.flight_records import FlightRecords
+from companion.serve.motion_settings import change_refusal, commanded_motion
 from companion.serve.network.addresses import Address
 from companion.serve.network.client import Client
 from companion.serve.ownership import Control, Ownership
-from companion.serve.setpoints.motion import CommandedMotion, MotionLimits
 from companion.serve.setpoints.request import Request
 from companion.serve.source import ServedSource
 from companion.vehicle.link import Link
@@ -37,10 +35,6 @@ REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
 _PROGRESS_PERIOD = 0.4
 """A client that asked for control is told so often that the takeover goes on, s."""
 _LOOK_PERIOD = 0.05
-_MOTION_LIMITS = frozenset(
-    {"limits.max_climb_m_s", "limits.max_descent_m_s", "limits.max_yaw_rate_deg_s"}
-)
-"""Limits of `CommandedMotion`, which takes them at the takeover."""
 _VALUES_PERIOD = 0.5
 
 
@@ -67,6 +61,7 @@ class ServedFlight:
         environment: of the flight.
         records: makes the record of the flight.
         changes: of the values that may change in flight.
+        fence_centre: see `FlightContext`.
         from_ground: whether the vehicle stands armed, and takes off first.
     """
 
@@ -81,6 +76,7 @@ class ServedFlight:
         environment: Environment,
         records: FlightRecords,
         changes: Changes,
+        fence_centre: FenceCentre | None = None,
         *,
         from_ground: bool = False,
     ) -> None:
@@ -94,7 +90,8 @@ class ServedFlight:
         self._clock = asyncio.get_running_loop().time
         settings = link.settings
         self._autopilot = Address(settings.target_system, settings.target_component)
-        self._source = ServedSource(name, _motion(changes.wanted), ownership, self._heading)
+        motion = commanded_motion(changes.wanted)
+        self._source = ServedSource(name, motion, ownership, self._heading)
         self._assembled = assemble(
             config,
             link,
@@ -106,11 +103,27 @@ class ServedFlight:
             changes,
         )
         self._source.resets = self._assembled.context.loop.resets
+        self._assembled.context.fence_centre = fence_centre
+        ladder = self._assembled.ladder
+        self._note_alarm, ladder.note = ladder.note, self._tell_alarm
 
     @property
     def in_control(self) -> bool:
         """Whether the autopilot obeys us."""
         return self._assembled.context.loop.offboard_active
+
+    @property
+    def ends(self) -> bool:
+        """Whether no request is flown any more: a monitor holds the vehicle, or the exit flies."""
+        begun, flown = self._source.pose is not None, self._assembled.context.guidance_loop.flown
+        given_up = begun and flown.source is not self._source
+        return given_up or self._assembled.flight.failed_in is not None
+
+    @property
+    def fence_centre(self) -> FenceCentre | None:
+        """Where the fence is centred, if control has begun."""
+        begun = self._source.pose is not None
+        return self._assembled.context.snapshot_builder.fence_centre if begun else None
 
     @property
     def tracking_error(self) -> float | None:
@@ -132,7 +145,7 @@ class ServedFlight:
 
     async def run(self, asked: Asked | None) -> bool:
         """Fly; returns whether control had begun."""
-        limited = self._changes.limited_by(_refusal_in_control)
+        limited = self._changes.limited_by(change_refusal)
         with self._records.recording(self._record), limited:
             result = "left at once"
             self._record.begin_counting(self._link.stats)
@@ -147,13 +160,11 @@ class ServedFlight:
         return self._source.pose is not None
 
     async def save(self) -> None:
-        """Write the rest of the record, beside the event loop; of a failed takeover, remove it."""
+        """Write the rest of the record; of a failed takeover, remove it."""
         if self._summary is None or self._source.pose is None:
-            self._records.discard(self._record)
-        elif self._environment.realtime:
-            await asyncio.to_thread(self._records.keep, self._record, self._summary)
-        else:  # a virtual clock knows no threads
-            self._records.keep(self._record, self._summary)
+            await self._records.discard(self._record)
+        else:
+            await self._records.keep(self._record, self._summary)
 
     async def _fly(self, asked: Asked | None) -> str:
         """Fly, tell clients meanwhile; returns the result."""
@@ -172,6 +183,11 @@ class ServedFlight:
             await work
         except Exception as error:
             self._assembled.flight.note(internal(error))
+
+    def _tell_alarm(self, text: str) -> None:
+        """Tell the clients, too, what a safety monitor says."""
+        self._note_alarm(text)
+        self._component.tell(text, WARNING)
 
     def _tell_end(self, asked: Asked | None, result: str) -> None:
         name = self._source.name
@@ -214,36 +230,3 @@ class ServedFlight:
     def _heading(self) -> float:
         """The vehicle's heading without the jumps of estimator resets, rad."""
         return heading(self._assembled.context.guidance_loop.attitude())
-
-
-def _refusal_in_control(before: Config, after: Config) -> str | None:
-    """Why a change is refused while a client is in control: its motions are planned already.
-
-    Their limits are those at the takeover. With lower ones in the loops, the reference would run
-    away from the vehicle.
-    """
-    names = {each.name for each in differences(before, after)} & _MOTION_LIMITS
-    if names:
-        return f"{', '.join(sorted(names))} must not change while a client is in control"
-    needed = atan2(after.serve.max_acceleration_m_s2, GRAVITY)
-    if after.limits.max_tilt < min(needed, before.limits.max_tilt):
-        return (
-            f"limits.max_tilt_deg {after.limits.max_tilt_deg:g} is less than the "
-            f"{degrees(needed):.1f}° that serve.max_acceleration_m_s2 needs"
-        )
-    return None
-
-
-def _motion(config: Config) -> CommandedMotion:
-    serve, limits = config.serve, config.limits
-    return CommandedMotion(
-        MotionLimits(
-            serve.max_speed_m_s,
-            serve.max_acceleration_m_s2,
-            serve.max_jerk_m_s3,
-            limits.max_climb_m_s,
-            limits.max_descent_m_s,
-            limits.max_yaw_rate,
-            serve.setpoint_timeout,
-        )
-    )

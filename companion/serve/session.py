@@ -99,6 +99,7 @@ class ServeSession:
         async with open_link(config, self.records, self._note, opener) as link:
             state_logger = StateLogger(link.state, self._note)
             link.subscribe("HEARTBEAT", lambda _: state_logger.log_changes())
+            link.clock.on_event = self._note
             async with Network(link, config.serve.clients, self._note) as network:
                 return await self._serve(link, network)
 

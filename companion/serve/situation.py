@@ -11,7 +11,7 @@ from companion.mavlink.errors import LinkError
 from companion.mavlink.messages import Message
 from companion.serve.network.network import Network
 from companion.serve.setpoints.origin import OriginEstimate
-from companion.serve.setpoints.request import Situation
+from companion.serve.setpoints.request import Request, Situation, climbs
 from companion.vehicle.link import Link
 
 _CHECK_PERIOD = 1.0
@@ -51,6 +51,15 @@ class SituationKeeper:
         w, x, y, z = q
         yaw = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
         return Situation(position.position_ned, yaw, self._origin.origin)
+
+    def takeoff_refusal(self, request: Request) -> str | None:
+        """Why the vehicle does not take off for a client that asks for control on the ground."""
+        situation = self.situation()
+        if not self._link.state.landed or situation is None:
+            return "take off first: it is not known whether the vehicle stands on the ground"
+        if climbs(request, situation):
+            return None
+        return "command a height of 1 m or more above the ground, or take off first"
 
     async def keep_telemetry(self, wanted: Callable[[], Mapping[str, float]]) -> None:
         """Ask for telemetry while no attitude comes, until cancelled: ArduPilot is silent before.

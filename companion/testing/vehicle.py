@@ -63,6 +63,7 @@ class MockVehicle:
             pays from 2 minutes of flights in a process on: a process needs 0.6 s to load them, and
             the first process on a computer 10 s to compile them.
         settings: keys of the section `mock`, such as `wind`, `faults`, `parameters` or `seed`.
+            `gcs_port` has no effect.
 
     Attributes:
         in_lockstep: whether `lockstep` was asked for.
@@ -91,7 +92,8 @@ class MockVehicle:
             lockstep = {"enabled": lockstep}
         own = {} if autopilot is None else {"autopilot": autopilot}
         stepping = {"lockstep": {"enabled": True, **lockstep}}
-        known = load_settings(config, {"gcs_port": 0, **own, **settings, **stepping})
+        # Without a socket, telemetry for a ground station would be built for nobody.
+        known = load_settings(config, {**own, **settings, **stepping, "gcs_port": 0})
         self.autopilot: str = known.autopilot
         self.in_lockstep, self.delay_s = known.lockstep.enabled, delay_s
         self.setpoints: list[ReceivedSetpoint] = []

@@ -1,9 +1,14 @@
 """An asyncio event loop whose time is a mock vehicle's: nothing sleeps, nothing is polled."""
 
-from typing import Protocol
+import asyncio
+from collections.abc import Callable
+from contextvars import Context
+from typing import Protocol, TypeVarTuple
 
 from companion.mavlink.lockstep import LockstepEventLoop, SettlingSelector
 from companion.mavlink.loop import Ready
+
+Arguments = TypeVarTuple("Arguments")
 
 
 class VirtualClock:
@@ -46,10 +51,15 @@ class World(Protocol):
 
 
 class _VirtualSelector(SettlingSelector):
-    """Lets the vehicle go on instead of waiting."""
+    """Lets the vehicle go on, instead of waiting, until the application has something to do.
+
+    Attributes:
+        scheduled: number of callbacks and timers that were scheduled so far.
+    """
 
     def __init__(self, clock: VirtualClock, world: World) -> None:
         super().__init__()
+        self.scheduled = 0
         self._clock, self._world = clock, world
 
     def wait(self, timeout: float | None) -> Ready:
@@ -57,7 +67,10 @@ class _VirtualSelector(SettlingSelector):
             self._world.deliver_due()
         else:
             until = float("inf") if timeout is None else self._clock.now + timeout
-            self._world.advance(until)
+            before = self.scheduled
+            # Most messages only call functions of the application, and schedule nothing.
+            while self.scheduled == before and not self.settling and self._clock.now < until:
+                self._world.advance(until)
         return []
 
 
@@ -75,8 +88,40 @@ class VirtualEventLoop(LockstepEventLoop):
 
     def __init__(self, clock: VirtualClock, world: World) -> None:
         self.clock, self.world = clock, world
-        super().__init__(clock, _VirtualSelector(clock, world))
+        self._virtual = _VirtualSelector(clock, world)
+        super().__init__(clock, self._virtual)
 
     def time(self) -> float:
         """The clock's time, s."""
         return self.clock.now
+
+    def call_soon(
+        self,
+        callback: Callable[[*Arguments], object],
+        *args: *Arguments,
+        context: Context | None = None,
+    ) -> asyncio.Handle:
+        """As in every loop; the vehicle then waits until the callback has run."""
+        self._virtual.scheduled += 1
+        return super().call_soon(callback, *args, context=context)
+
+    def call_soon_threadsafe(
+        self,
+        callback: Callable[[*Arguments], object],
+        *args: *Arguments,
+        context: Context | None = None,
+    ) -> asyncio.Handle:
+        """As `call_soon`, from another thread."""
+        self._virtual.scheduled += 1
+        return super().call_soon_threadsafe(callback, *args, context=context)
+
+    def call_at(
+        self,
+        when: float,
+        callback: Callable[[*Arguments], object],
+        *args: *Arguments,
+        context: Context | None = None,
+    ) -> asyncio.TimerHandle:
+        """As in every loop; the vehicle then goes on to this timer at most."""
+        self._virtual.scheduled += 1
+        return super().call_at(when, callback, *args, context=context)

@@ -5,9 +5,8 @@ before it was addressed by a valid frame (`PeerRule`), and it forgets a peer tha
 """
 
 import asyncio
-import heapq
+from collections import deque
 from collections.abc import Callable
-from itertools import count
 from typing import Any
 
 from companion.mavlink.errors import EndpointError
@@ -118,8 +117,8 @@ class FreeWire(Wire):
         super().__init__(vehicle, clock)
         self._delay = vehicle.delay_s
         self._burst = vehicle.settings.burst_ms * 1e-3
-        self._under_way: list[tuple[float, int, bool, bytes]] = []
-        self._order = count()
+        # All datagrams need the same time, so they arrive in the order of sending.
+        self._under_way: deque[tuple[float, bool, bytes]] = deque()
         self._slipped = clock.now - vehicle.time
         vehicle.set_clock(lambda: round((clock.now - self._slipped) * 1e9))
 
@@ -149,27 +148,23 @@ class FreeWire(Wire):
 
     def _reached_application(self) -> bool:
         """Deliver what is due; returns whether some of it went to the application."""
-        under_way, reached = self._under_way, False
-        while under_way and under_way[0][0] <= self._clock.now:
-            _, _, to_application, datagram = heapq.heappop(under_way)
+        under_way, now, reached = self._under_way, self._clock.now, False
+        while under_way and under_way[0][0] <= now:
+            _, to_application, datagram = under_way.popleft()
             if to_application:
                 reached = True
-                self._deliver(datagram, self._clock.now)
+                self._deliver(datagram, now)
             else:
                 self._vehicle.receive(datagram)
                 self._send(self._vehicle.sent())
         return reached
 
     def _take(self, frame: bytes) -> None:
-        self._put(frame, to_application=False)
+        self._under_way.append((self._clock.now + self._delay, False, frame))
 
     def _send(self, datagrams: list[bytes]) -> None:
-        for datagram in datagrams:
-            self._put(datagram, to_application=True)
-
-    def _put(self, datagram: bytes, *, to_application: bool) -> None:
         due = self._clock.now + self._delay
-        heapq.heappush(self._under_way, (due, next(self._order), to_application, datagram))
+        self._under_way.extend((due, True, datagram) for datagram in datagrams)
 
 
 def wire_to(vehicle: MockVehicle, clock: VirtualClock) -> LockstepWire | FreeWire:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields
 from math import isfinite
 
 from companion.attitude import Quaternion, is_unit
+from companion.mavlink.codec import decode_reset_counter
 from companion.mavlink.messages import Message
 from companion.mavlink.router import Router
 from companion.mavlink.stats import LinkStats
@@ -94,10 +95,10 @@ class VehicleState(ModeState, _Values):
             "HOME_POSITION": self._on_home,
             "ESTIMATOR_STATUS": self._on_estimator,
             "EKF_STATUS_REPORT": self._on_estimator,
-            "ODOMETRY": self._on_odometry,
             "STATUSTEXT": self._on_text,
         }.items():
             router.subscribe(name, callback)
+        router.subscribe_raw("ODOMETRY", self._on_odometry)
 
     def forget(self) -> None:
         """Forget everything but the newest heartbeat: the rest may be of another vehicle."""
@@ -184,8 +185,8 @@ class VehicleState(ModeState, _Values):
         good = bool(message.onboard_control_sensors_health & _PREARM_CHECK)
         self.prearm = Prearm(self._clock(), good)
 
-    def _on_odometry(self, message: Message) -> None:
-        self.reset_counter = message.reset_counter
+    def _on_odometry(self, payload: bytes) -> None:
+        self.reset_counter = decode_reset_counter(payload)
 
     def _on_battery(self, message: Message) -> None:
         if message.id != 0:

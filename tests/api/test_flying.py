@@ -98,9 +98,12 @@ def test_accelerations_from_a_coroutine_stop_the_vehicle_where_it_wants(autopilo
     assert errors[0] < 0.15
 
 
-@pytest.mark.parametrize(("period", "with_jerk"), [(0.02, False), (0.04, True)])
+@pytest.mark.parametrize(
+    ("autopilot", "period", "with_jerk"),
+    [("px4", 0.02, False), ("px4", 0.04, True), ("ardupilot", 0.02, False)],
+)
 def test_references_from_a_coroutine_are_followed_as_the_built_in_ones_are(
-    tmp_path, period, with_jerk
+    autopilot, period, with_jerk
 ):
     """A figure-eight up to 5 m/s: by `follow`, and streamed by a coroutine every `period` s."""
     eight = trajectory_file.load(CONFIGS / "trajectories" / "figure8.yaml")
@@ -126,8 +129,7 @@ def test_references_from_a_coroutine_are_followed_as_the_built_in_ones_are(
 
     error = {}
     for program in (built_in, streamed):
-        mock = QuickVehicle()
-        summary, _ = flown(program, mock, **quick)
+        summary, _ = flown(program, QuickVehicle(autopilot), **quick)
         assert summary.result == "ok"
         error[program.__name__] = summary.tracking()["position_rms_m"]
     assert error["built_in"] < 0.1
@@ -165,6 +167,8 @@ async def returns_infinity(control):
         ("px4", stops, companion.FlightEnded, "the program gave no new command for"),
         ("ardupilot", stops, companion.FlightEnded, "the program gave no new command for"),
         ("px4", raises, ZeroDivisionError, "the program raised ZeroDivisionError('mine')"),
+        ("ardupilot", raises, ZeroDivisionError, "the program raised ZeroDivisionError('mine')"),
+        ("px4", returns_nan, ValueError, "a command must be finite"),
         ("ardupilot", returns_nan, ValueError, "a command must be finite"),
         ("px4", returns_infinity, ValueError, "a command must be finite"),
     ],

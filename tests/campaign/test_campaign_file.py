@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from companion.campaign import estimate, folder, loading
-from companion.campaign.design import samples_of, seed_of
+from companion.campaign.design import samples_of, seed_of, too_few_samples
 from companion.campaign.swept import Swept
 from companion.cli.main import main
 from companion.files import bounded_yaml
@@ -136,7 +136,10 @@ FAULTS = {"gone": {"inject": [{"kind": "gps_los"}]}}
 @pytest.mark.parametrize(
     ("told", "words"),
     [
-        ({"sweep": {"limits.max_tilt_dg": [20]}}, ("limits.max_tilt_dg", "`max_tilt_deg`?")),
+        (
+            {"sweep": {"limits.max_tilt_dg": [20]}},
+            ("campaign.yaml, line 4: sweep: ", "limits.max_tilt_dg", "`max_tilt_deg`?"),
+        ),
         ({"sweep": {"limit.max_tilt_deg": [20]}}, ("`limit`", "`limits`?")),
         ({"sweep": {"mock.wind.speed": [2]}}, ("mock.wind.speed", "speed_m_s?")),
         ({"set": {"mock.parameters.COM_OF_LOS_T": 2}}, ("COM_OF_LOS_T", "COM_OF_LOSS_T?")),
@@ -165,6 +168,23 @@ def test_what_is_wrong_is_said_before_work_begins(tmp_path, told, words):
     said = refusal(tmp_path, **told)
     assert all(word in said for word in words), said
     assert str(tmp_path) in said
+
+
+def test_too_few_samples_are_said(tmp_path):
+    wind = {"mock.wind.speed_m_s": {"uniform": [2, 6]}}
+    laws = {"planner.name": {"choice": ["first-order", "exact", "so3"]}}
+
+    def said(samples, sweep):
+        return too_few_samples(load(tmp_path, samples=samples, sweep=sweep).file)
+
+    assert said(1, {**wind, **laws}).startswith(
+        "samples is 1, so a single value of mock.wind.speed_m_s, planner.name will be flown"
+    )
+    assert said(2, {**wind, **laws}).startswith(
+        "samples is 2, so 2 values at most of planner.name will be flown"
+    )
+    assert said(3, {**wind, **laws}) is None
+    assert said(1, {"limits.max_tilt_deg": [20, 30]}) is None
 
 
 def test_too_many_flights_are_refused_with_their_number_and_time(tmp_path, capsys, monkeypatch):

@@ -19,6 +19,7 @@ CAMPAIGN = {
     "name": "planners",
     "config": {"mock": {"autopilot": "px4"}},
     "samples": 60,
+    "set": {"limits.max_tilt_deg": 21.0, "mock.wind.gust_m_s": 0.3},
     "sweep": {
         "planner.name": ["first-order", "so3", "euler"],
         "mock.wind.speed_m_s": {"uniform": [0, 10]},
@@ -81,6 +82,14 @@ def test_the_page_says_what_was_flown_how_it_went_and_what_to_look_at(flown, cap
     assert re.search(r"planner.name explains \d\d% ± \d+% of the variance", body)
     assert f"companion campaign rerun {place} {crashed[0]}<" in body
     assert "http" not in body
+    # What it flew with: what was set, limits that are the default, and nothing that was swept.
+    flown_with = re.search(r"Configuration of every case.*?</table>", body, re.S)[0]
+    assert "<td>limits.max_tilt_deg</td><td>21.0</td>" in flown_with
+    assert "<td>limits.max_tilt_rate_deg_s</td>" in flown_with
+    assert "<td>mock.wind.gust_m_s</td><td>0.3</td><td>0.0</td><td>m/s</td>" in flown_with
+    assert "planner.name" not in flown_with
+    assert "mass_kg" not in flown_with
+    assert "its own report measures by the autopilot" in body
     influence = re.search(r"Share of the variance.*?</table>", body, re.S)[0]
     shares = dict(re.findall(r"<td>(\S+)</td><td>(-?\d+)%", influence))
     assert int(shares["planner.name"]) > int(shares["mock.wind.speed_m_s"]) > 5

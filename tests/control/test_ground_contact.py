@@ -83,3 +83,42 @@ def test_without_a_position_the_flag_alone_tells_a_landing():
         vehicle.now += 0.4
         vehicle.ground.update()
     assert vehicle.ground.touched_down
+
+
+@pytest.mark.parametrize(
+    ("height", "idles"), [(1.5, True), (-1.5, True), (1.51, False)], ids=["at it", "below", "over"]
+)
+def test_the_height_of_the_ground_is_allowed(height, idles):
+    assert Vehicle().tell(height=height).may_idle is idles
+
+
+def test_half_a_metre_a_second_is_too_quick_for_the_ground():
+    assert not Vehicle().tell(sinks=0.5).may_idle
+    assert Vehicle().tell(sinks=0.49).may_idle
+
+
+def test_it_has_lifted_off_once_it_is_a_metre_higher_than_at_the_command():
+    vehicle = Vehicle()
+    vehicle.tell(height=1.0)
+    vehicle.ground.command_takeoff()
+    for height in (1.5, 2.0):
+        assert vehicle.tell(height=height).standing
+    vehicle.tell(height=2.25)
+    assert not vehicle.tell(height=1.0).standing
+
+
+def test_a_vertical_speed_lasts_half_a_second():
+    vehicle = Vehicle()
+    vehicle.tell(sinks=1.0)
+    vehicle.now = vehicle.state.position.received + 0.5
+    assert not vehicle.ground.may_idle
+    vehicle.now += 0.01
+    assert vehicle.ground.may_idle
+
+
+def test_a_vehicle_that_already_flew_neither_stands_nor_idles():
+    vehicle = Vehicle()
+    assert (vehicle.ground.takeoff_commanded, vehicle.ground.touched_down) == (False, False)
+    vehicle.ground.note_flying()
+    assert vehicle.ground.takeoff_commanded is True
+    assert not vehicle.tell().standing

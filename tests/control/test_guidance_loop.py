@@ -1,13 +1,15 @@
-"""The commands of the guidance loop while a maneuver commands body rates."""
+"""The commands of the guidance loop, on the ground, in a hold, and while a maneuver flies."""
 
+import asyncio
 from math import cos, radians, sin
 from types import SimpleNamespace
 
 import pytest
 
-from companion.attitude import BodyRates
+from companion.attitude import BodyRates, Target
 from companion.config import Config
 from companion.control.estimator_resets import EstimatorResets
+from companion.control.guidance_command import GuidanceCommand
 from companion.control.guidance_loop import GuidanceLoop
 from companion.control.outer_loop import make_guidance, motion_estimate
 from companion.guidance import Doublets, ManeuverSequence
@@ -15,6 +17,7 @@ from companion.guidance.source import ManeuverSource
 from companion.recording.trace import FlightTrace
 from companion.vehicle.clock import VehicleClock
 from companion.vehicle.records import AttitudeSample, LocalPosition
+from tests.control.kept_messages import KeptMessages
 
 DOUBLETS = Doublets(1.0, 0.25, 0.8, 1.0, climb=2.0, climb_step=0.25, settle=1.0)
 IN_FIRST_DOUBLET, IN_HOLD, IN_CLIMB = 1.1, 3.0, DOUBLETS.duration - 1.5
@@ -45,11 +48,13 @@ class HoverSpy:
 class Bench:
     """A guidance loop that flies the doublets, with a clock set by hand."""
 
-    def __init__(self):
+    def __init__(self, recorder=None):
         self.now, self.clock = 10.0, VehicleClock()
         self.hover = HoverSpy()
         self.loop = SimpleNamespace(command=None, offboard_active=True, resets=EstimatorResets())
-        self.state = SimpleNamespace(position=None, battery=None)
+        self.state = SimpleNamespace(
+            position=None, battery=None, attitude_target_thrust=None, height=5.0, armed=True
+        )
         self.ground = SimpleNamespace(standing=False, may_idle=True)
         self.guidance_loop = GuidanceLoop(
             self.loop,
@@ -58,7 +63,7 @@ class Bench:
             self.hover,
             self.state,
             self.ground,
-            FlightTrace(),
+            FlightTrace(recorder=recorder),
             max_tilt=radians(30.0),
             period=0.02,
             position_stale=0.3,
@@ -167,3 +172,121 @@ def test_the_hover_thrust_is_learned_in_hold_only(after, learns):
     bench.fly(after)
     assert bench.hover.observed - observed == int(learns)
     assert bench.hover.paused - paused == int(not learns)
+
+
+def test_on_the_ground_the_command_is_idle_only_while_that_is_safe():
+    bench = Bench()
+    bench.ground.standing, bench.loop.offboard_active = True, False
+    idle = GuidanceCommand(Target(0.0, 0.0, 0.0), 0.0, 13.0, idle=True)
+    assert bench.fly(IN_HOLD) == idle
+    bench.ground.may_idle = False
+    assert not bench.fly(IN_HOLD).idle
+    bench.ground.standing, bench.ground.may_idle = False, True
+    assert not bench.fly(IN_HOLD).idle
+    bench.ground.standing, bench.loop.offboard_active = True, True  # "landed" is not believed
+    assert not bench.fly(IN_HOLD).idle
+
+
+def test_a_command_tells_when_it_was_made_and_where_its_target_moves():
+    bench = Bench()
+    bench.loop.resets.turn = 0.25
+    command = bench.fly(IN_HOLD)
+    assert (command.made_at, command.period, command.turn) == (13.0, 0.02, 0.25)
+    assert (command.idle, command.is_step, command.thrust) == (False, False, None)
+    assert command.later is not None
+
+
+def test_what_a_phase_tells_guidance():
+    bench, elsewhere = Bench(), (0.0, 4.0, -5.0)
+    guidance = bench.guidance_loop
+    assert (guidance.bound_to_hold, guidance.given_up) == (False, None)
+    source = guidance.flown.source
+    bench.fly(IN_HOLD, elsewhere)
+    assert guidance.motion_now().position_ned == pytest.approx(elsewhere, abs=0.01)
+    guidance.hold_reference()
+    assert guidance.flown.source is None
+    assert guidance.flown.pose.position_ned == pytest.approx(HERE)
+    guidance.stand_by()
+    assert guidance.flown.pose is None
+    guidance.follow(source)  # from where it is, because no pose is held
+    assert guidance.flown.pose.position_ned == pytest.approx(elsewhere, abs=0.01)
+    assert (guidance.flown.source, guidance.flown.begun_at) == (source, bench.now)
+    guidance.hold_here()
+    assert guidance.flown.source is None
+    guidance.flown.pose = guidance.flown.pose._replace(position_ned=HERE)
+    guidance.follow(source)  # from the held pose
+    assert guidance.flown.pose.position_ned == HERE
+    guidance.give_up()
+    assert guidance.bound_to_hold is True
+    guidance.follow(source)
+    assert guidance.flown.source is None
+    assert guidance.flown.pose.position_ned == pytest.approx(elsewhere, abs=0.01)
+
+
+def test_a_guidance_loop_knows_nothing_before_its_first_step():
+    fresh = Bench.__new__(Bench)
+    fresh.fly = lambda *_: None
+    with pytest.raises(RuntimeError, match="before any position came"):
+        Bench.__init__(fresh)
+    guidance = fresh.guidance_loop
+    assert (guidance.motion, guidance.off_course, guidance.given_up) == (None, None, None)
+    assert guidance.attitude() == (1.0, 0.0, 0.0, 0.0)
+    assert guidance.before_step(1.0) is None
+
+
+def test_actions_and_steps_are_recorded():
+    bench = Bench(kept := KeptMessages())
+    guidance, offset = bench.guidance_loop, bench.clock.offset
+    assert kept.actions == [(10.0, "hold_here", offset), (10.0, "follow", offset)]
+    kept.actions.clear()
+    for name in ("hold_reference", "give_up", "stand_by"):
+        getattr(guidance, name)()
+    assert kept.actions == [
+        (10.0, name, offset) for name in ("hold_reference", "give_up", "stand_by")
+    ]
+    seen, kept.messages = [], KeptMessages().messages
+    guidance.before_step = seen.append
+    bench.fly(IN_HOLD)
+    assert seen == [13.0]
+    (read,) = kept.rows("/guidance_input")
+    assert (read["time_s"], read["height_m"], read["armed"], read["clock_offset_s"]) == (
+        13.0,
+        5.0,
+        1,
+        pytest.approx(bench.clock.offset),
+    )
+    flags = ("fresh", "standing", "may_idle", "offboard_active")
+    assert [read[name] for name in flags] == [1, 0, 0, 1]
+    assert [row["time_s"] for row in kept.rows("/target")] == [13.0]
+    (made,) = kept.rows("/guidance")
+    assert (made["time_s"], made["estimated_north_m"]) == (13.0, pytest.approx(3.0, abs=0.01))
+    bench.now += 1.0  # the position is stale: no command, and nothing was computed
+    guidance.step()
+    assert [len(kept.messages[name]) for name in ("/guidance_input", "/target", "/guidance")] == [
+        2,
+        1,
+        1,
+    ]
+    assert [kept.rows("/guidance_input")[-1][name] for name in flags] == [0, 0, 0, 1]
+    bench.ground.standing, bench.loop.offboard_active = True, False
+    bench.fly(IN_HOLD + 2.0)
+    assert [kept.rows("/guidance_input")[-1][name] for name in flags] == [1, 1, 1, 0]
+    assert (kept.rows("/target")[-1]["idle"], len(kept.messages["/guidance"])) == (1, 1)
+
+
+def test_it_steps_in_its_period_and_at_once_when_asked():
+    async def run():
+        guidance, steps = Bench().guidance_loop, []
+        guidance.step = lambda: steps.append(1)
+        running = asyncio.create_task(guidance.run())
+        await asyncio.sleep(0)
+        assert len(steps) == 1
+        guidance.step_soon()
+        for _ in range(5):
+            await asyncio.sleep(0)
+        assert len(steps) == 2
+        await asyncio.sleep(0.1)
+        assert len(steps) >= 3
+        running.cancel()
+
+    asyncio.run(run())

@@ -46,7 +46,7 @@ def test_from_standing_into_the_circle_it_neither_swings_nor_leaves(tmp_path):
     async def note_pid(session):
         while session._assembled is None:  # noqa: ASYNC110
             await asyncio.sleep(0.1)
-        pids.append(session._assembled.context.guidance_loop.predictive._solver.pid)
+        pids.append(session._assembled.context.guidance_loop.maker.predictive._solver.pid)
 
     summary = flown(tmp_path, "circle5.yaml", note_pid)
     assert not Path(f"/proc/{pids[0]}").exists()  # the process ends with the flight
@@ -71,7 +71,9 @@ def test_the_solvers_death_is_reported_and_costs_little(tmp_path):
         while not begun():  # noqa: ASYNC110
             await asyncio.sleep(0.1)
         await asyncio.sleep(7.0)  # in the middle of the eight, at 5 m/s
-        os.kill(session._assembled.context.guidance_loop.predictive._solver.pid, signal.SIGKILL)
+        os.kill(
+            session._assembled.context.guidance_loop.maker.predictive._solver.pid, signal.SIGKILL
+        )
 
     summary = flown(tmp_path, "figure8.yaml", kill)
     (told,) = [text for _, text in summary.events if "predictive" in text]

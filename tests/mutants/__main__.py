@@ -20,11 +20,16 @@ from tests.mutants.seconds import measured_seconds
 ROOMS = {
     "attitude": ["tests/attitude"],
     "guidance": ["tests/guidance", "tests/trajectory"],
-    "control": ["tests/control"],
+    "control": [
+        "tests/control",
+        "tests/flight/test_changes.py",
+        "tests/flight/test_predictive.py",
+        "tests/flight/test_thrust.py",
+    ],
     "safety": ["tests/safety"],
     "vehicle": ["tests/vehicle", "tests/mavlink"],
 }
-"""Room of `companion` -> the folders of tests that judge it, of those that exist."""
+"""Room of `companion` -> the folders and files of tests that judge it, of those that exist."""
 
 _ROOT = Path(__file__).parents[2]
 _COPIED = ["sitl_mock", "configs", "docs", "README.md"]
@@ -84,7 +89,9 @@ def _prepare(folder: Path, room: str, limit_s: float) -> None:
     print(f"{room}: {len(seconds) - len(slow)} tests; {len(slow)} take over {limit_s:g} s of CPU")
     # Names with ° are escaped anew by each run in one process, and then not found.
     unescaped = "disable_test_id_escaping_and_forfeit_all_rights_to_community_support=true"
-    arguments = ["-m", "not slow", "-p", "no:cacheprovider", "-o", unescaped, *_NOT_RUN]
+    # Mutants are slow, and mutmut ends an endless loop by itself.
+    arguments = ["-m", "not slow", "-p", "no:cacheprovider", "-o", unescaped, "-o", "timeout=0"]
+    arguments += _NOT_RUN
     arguments += [argument for test in slow for argument in ("--deselect", test)]
     settings = {
         "source_paths": ["companion"],

@@ -10,9 +10,9 @@ from companion.nmpc.model import Conditions, Motion
 from companion.nmpc.receding_horizon import plan_on_reference
 from companion.nmpc.reference import Start, node_of
 
-GRAVITY, DRAG = 9.80665, Drag(0.8, 0.1)
+GRAVITY, DRAG, AXIS_DRAG = 9.80665, Drag(0.8, 0.1), 0.05
 WIND = np.array([0.4, -0.3, 0.2])
-CONDITIONS = Conditions(*WIND, *DRAG)
+CONDITIONS = Conditions(*WIND, *DRAG, AXIS_DRAG)
 POSITION, VELOCITY = (1.0, -2.0, 3.0), (2.0, -1.0, 0.5)
 H = 1e-5
 """Step of the finite differences, s."""
@@ -23,7 +23,12 @@ def acceleration(r, thrust, velocity):
     """NED, of an attitude (body → world); thrust pushes along −body z."""
     share = DRAG.linear + DRAG.quadratic * np.linalg.norm(velocity)
     lift = thrust * r.apply([0.0, 0.0, 1.0])
-    return [0.0, 0.0, GRAVITY] - lift - share * np.asarray(velocity) + WIND
+    level = Rotation.from_euler("Z", heading(r))
+    forward, right, _ = level.inv().apply([*velocity[:2], 0.0])
+    usual = 8.0 / (3.0 * np.pi) * np.hypot(forward, right)
+    bluff = [forward * (abs(forward) - usual), right * (abs(right) - usual), 0.0]
+    slowed = share * np.asarray(velocity) + AXIS_DRAG * level.apply(bluff)
+    return [0.0, 0.0, GRAVITY] - lift - slowed + WIND
 
 
 def turned(r, body_rates, seconds):
@@ -67,7 +72,7 @@ def nodes_about(time, step=H):
     start, nodes, near = Start((1.0, 2.0, -3.0)), [], 3.0
     for k in range(-1, 2):
         sample = HELIX.at(time + k * step)
-        nodes.append(node_of(sample, start, near, DRAG, GRAVITY, tuple(WIND)))
+        nodes.append(node_of(sample, start, near, DRAG, AXIS_DRAG, GRAVITY, tuple(WIND)))
         near = nodes[-1].heading
     return nodes
 

@@ -87,7 +87,8 @@ def flight(shared):
 
 
 def test_what_is_sent_is_what_arrives():
-    asked = request(3, disturbance=(0.1, 0.2, 0.3), body_rates=BodyRates(1.0, 2.0, 3.0))
+    others = {"disturbance": (0.1, 0.2, 0.3), "axis_drag": 0.05}
+    asked = request(3, **others, body_rates=BodyRates(1.0, 2.0, 3.0))
     asked = asked._replace(start=Start((1.0, 2.0, 3.0), 0.5))
     assert unpack_request(pack_request(asked)) == asked
     assert unpack_request(pack_request(asked._replace(inputs=()))) == asked._replace(inputs=())

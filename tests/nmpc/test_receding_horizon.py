@@ -20,7 +20,7 @@ CIRCLE = circle(5.0, Laps(5.0, laps=4.0))
 STEADY = 6.0
 """On it, s: long after its beginning, long before its end."""
 DRAG = Drag(0.75, 0.05)
-CONDITIONS = Conditions(0.0, 0.0, 0.0, *DRAG)
+CONDITIONS = Conditions(0.0, 0.0, 0.0, *DRAG, 0.0)
 SETTINGS = Settings(iterations=30)
 
 
@@ -32,6 +32,7 @@ def nodes(settings, time):
             start,
             0.0,
             DRAG,
+            0.0,
             settings.gravity,
             (0,) * 3,
         )

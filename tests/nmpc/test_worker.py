@@ -20,7 +20,7 @@ STILL = BodyRates(0.0, 0.0, 0.0)
 
 def wanted(at):
     """The target that keeps a first-order response on the circle, and its thrust."""
-    node = node_of(CIRCLE.at(at), Start((0.0, 0.0, 0.0)), 0.0, DRAG, 9.80665, (0.0, 0.0, 0.0))
+    node = node_of(CIRCLE.at(at), Start((0.0, 0.0, 0.0)), 0.0, DRAG, 0.0, 9.80665, (0.0, 0.0, 0.0))
     led = node.north + node.speed_north / 5.0, node.east + node.speed_east / 5.0
     return node, led
 

@@ -5,9 +5,10 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from tests.real.flight import Flight
 from tests.real.flights import configuration, shipped
 from tests.real.relay import SETPOINT, frames
-from tests.real.vehicle import Flight, Vehicle
+from tests.real.vehicle import Vehicle
 
 _WATCHED_S = 12.0
 _BATTERY = {"px4": 75.0, "ardupilot": 96.0}

@@ -90,7 +90,9 @@ def run(program: str, autopilot: str, endpoint: str, more: list[str]) -> dict:
         return {"error": f"the program did not end within {_LONGEST_S:g} s"}
     if ended.returncode != 0:
         return {"error": ended.stderr[-1500:]}
-    return json.loads(ended.stdout.split("REPORT ")[1].splitlines()[0])
+    report = json.loads(ended.stdout.split("REPORT ")[1].splitlines()[0])
+    del report["wanted"]
+    return report
 
 
 def measured(vehicle, folder: Path, arrival: float) -> dict:

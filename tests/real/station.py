@@ -10,6 +10,7 @@ from pymavlink import mavutil
 
 from tests.real.build import Build
 from tests.real.hil_truth import HilTruth
+from tests.real.modes import ARDUPILOT_MODES, PX4_MODES, Told, mode_name
 from tests.real.truth import north_east
 
 _UNREAD = (30, 31, 32, 33, 36, 65, 83, 85, 100)
@@ -26,19 +27,6 @@ class Seen(NamedTuple):
     east: float
     up: float
     tilt: float
-
-
-class Told(NamedTuple):
-    """What the autopilot told of itself."""
-
-    time: float
-    custom_mode: int
-    base_mode: int
-    status: int
-
-    @property
-    def armed(self) -> bool:
-        return bool(self.base_mode & 128)
 
 
 class Station:
@@ -131,13 +119,7 @@ class Station:
         return bool(self.told) and self.told[-1].armed
 
     def name(self, told: Told) -> str:
-        if self.autopilot == "px4":
-            key = (told.custom_mode >> 16 & 255, told.custom_mode >> 24 & 255)
-            return next((name for name, each in PX4_MODES.items() if each == key), str(key))
-        number = told.custom_mode
-        name = next((n for n, each in ARDUPILOT_MODES.items() if each == number), str(number))
-        by_rates = name == "GUIDED" and told.armed and not told.base_mode & 8
-        return "GUIDED by rates" if by_rates else name
+        return mode_name(self.autopilot, told)
 
     @property
     def obeys(self) -> bool:
@@ -241,24 +223,3 @@ class Station:
 
 def _tilt(cosine: float) -> float:
     return degrees(acos(max(-1.0, min(1.0, cosine))))
-
-
-PX4_MODES = {
-    "ALTCTL": (2, 0),
-    "POSCTL": (3, 0),
-    "TAKEOFF": (4, 2),
-    "LOITER": (4, 3),
-    "RTL": (4, 5),
-    "LAND": (4, 6),
-    "DESCEND": (4, 20),
-    "OFFBOARD": (6, 0),
-}
-ARDUPILOT_MODES = {
-    "STABILIZE": 0,
-    "ALT_HOLD": 2,
-    "GUIDED": 4,
-    "LOITER": 5,
-    "RTL": 6,
-    "LAND": 9,
-    "BRAKE": 17,
-}

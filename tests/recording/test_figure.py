@@ -10,8 +10,9 @@ from companion.cli.main import main
 from companion.extras import MissingExtraError
 from companion.recording.figure import FigureError, draw_flight
 from companion.recording.history import HEIGHTS, Marks, Span, draw_history, marks_of
-from companion.recording.mcap_file.channels import MOTION, SAMPLE, SETPOINT
+from companion.recording.mcap_file.channels import MOTION
 from companion.recording.mcap_file.fields import CDR
+from companion.recording.mcap_file.loop_channels import SAMPLE, SETPOINT
 from companion.recording.mcap_file.writer import McapWriter
 from companion.recording.measurements.recorded_summary import _KEYS
 

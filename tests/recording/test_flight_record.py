@@ -9,7 +9,8 @@ from zstandard import ZstdError
 from companion.control.loop_record import Unanswered
 from companion.recording.flight_record import RecordError, read_flight
 from companion.recording.mcap_file import cdr, reader, writer
-from companion.recording.mcap_file.channels import ACTION, CHANNELS, REASONS, RESOURCES, SETPOINT
+from companion.recording.mcap_file.channels import CHANNELS, RESOURCES
+from companion.recording.mcap_file.loop_channels import ACTION, REASONS, SETPOINT
 from companion.recording.mcap_file.writer import WORDS, McapWriter
 from companion.recording.measurements.recorded_summary import derived_summary, summary_of
 from companion.replay.entries import entries

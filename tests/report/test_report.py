@@ -85,6 +85,9 @@ def test_the_page_says_first_whether_the_flight_was_good_and_shows_all_of_it(fol
     assert {"Track", "Step response", "Tracking error", "Body rate, yaw", "Thrust"} <= set(plots)
     heights = [y for y in plots["Height"]["traces"][0]["y"] if y is not None]
     assert 1.8 < max(heights) < 2.3
+    error = plots["Tracking error"]
+    drawn = [y for y in error["traces"][0]["y"] if y is not None]
+    assert error["layout"]["yaxis"]["range"][1] < 0.5 * max(drawn), "the way back sets no scale"
     measured = next(t for t in plots["Step response"]["traces"] if t["name"] == "measured")
     assert max(measured["y"]) == pytest.approx(0.25, abs=0.05)
     assert [one["text"] for one in plots["Height"]["layout"]["annotations"]] == [

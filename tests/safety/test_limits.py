@@ -87,59 +87,68 @@ def autopilot(**told):
 
 
 SAID = [
-    (autopilot_judges.landed, autopilot(landed=True), "the autopilot says that it has landed"),
-    (autopilot_judges.failsafe, autopilot(failsafe=True), "the autopilot reports a failsafe"),
     (
-        autopilot_judges.estimator_flags,
+        lambda: autopilot_judges.landed,
+        autopilot(landed=True),
+        "the autopilot says that it has landed",
+    ),
+    (
+        lambda: autopilot_judges.failsafe,
+        autopilot(failsafe=True),
+        "the autopilot reports a failsafe",
+    ),
+    (
+        lambda: autopilot_judges.estimator_flags,
         autopilot(estimator=Estimator(OLD, 0x33F)),
         "the estimator's state is not reported any more",
     ),
     (
-        autopilot_judges.estimator_reset,
+        lambda: autopilot_judges.estimator_reset,
         at(resets=Resets(1, 0.5, 0.3)),
         "the estimator was reset: 0.5 m and 17° of heading in total; the references moved with it",
     ),
     (
-        autopilot_judges.battery(0.2),
+        lambda: autopilot_judges.battery(0.2),
         autopilot(battery=Battery(OLD, 16.0, 0.9)),
         "the battery's state is not reported any more",
     ),
     (
-        autopilot_judges.battery(0.7),
+        lambda: autopilot_judges.battery(0.7),
         autopilot(battery=Battery(inf, 14.0, 0.6)),
         "battery at 60 %, below limits.min_battery_percent 70",
     ),
     (
-        link_judges.loss(0.2),
+        lambda: link_judges.loss(0.2),
         at(health=Health(lost=0.6)),
         "60 % of the vehicle's frames are lost",
     ),
     (
-        link_judges.round_trip(0.2),
+        lambda: link_judges.round_trip(0.2),
         at(health=Health(round_trip=0.6)),
         "the link's round trip takes 600 ms",
     ),
     (
-        link_judges.deadlines(0.2),
+        lambda: link_judges.deadlines(0.2),
         at(health=Health(missed=0.6)),
         "60 % of the answers miss deadman.deadline_ms",
     ),
     (
-        link_judges.starvation(0.2),
+        lambda: link_judges.starvation(0.2),
         at(health=Health(starved=0.6)),
         "CPU starvation: the program's timer is late by 60 % of the time",
     ),
     (
-        link_judges.gaps(2),
+        lambda: link_judges.gaps(2),
         at(health=Health(gaps=3)),
         "3 times within 5 s no setpoint could be sent for longer than deadman.telemetry_stale_ms",
     ),
 ]
+"""A judge, the breach that it sees, its words. The tests make the judge, so that mutants count."""
 
 
-@pytest.mark.parametrize(("judge", "snapshot", "words"), SAID, ids=[row[2] for row in SAID])
-def test_a_breach_is_told_in_these_words(judge, snapshot, words):
-    assert judge(snapshot, False) == words
+@pytest.mark.parametrize(("make", "snapshot", "words"), SAID, ids=[row[2] for row in SAID])
+def test_a_breach_is_told_in_these_words(make, snapshot, words):
+    assert make()(snapshot, False) == words
 
 
 def test_lost_velocity_and_lost_position_are_told_together():
@@ -176,6 +185,8 @@ def test_exactly_the_limit_of_silence_is_none_and_a_vehicle_not_heard_cannot_be_
     unheard = silent(heard=NOW - 0.75)
     assert silence(0.5, heard=True)(unheard, False) is None
     assert silence(0.5, heard=False)(unheard, False)
+    at_the_limit = Snapshot(0.3, control=Control(answered=-1.0, heard=0.0))
+    assert silence(0.5, heard=False)(at_the_limit, False)
     verdict = SafetyLadder(monitors(Config()), 1.0).step(unheard)
     assert (verdict.action, verdict.mutes) == (Action.RELEASE, True)
 
@@ -194,7 +205,8 @@ def test_it_brakes_in_time_before_a_fence_on_the_map():
 def odd(name, then=Action.LAND, action=Action.HOLD):
     """A monitor that is wrong while its bit of the flags is set: 1 for a, 2 for b."""
     bit = 1 << "ab".index(name)
-    return Monitor(name, lambda s, _: name if s.good_flags & bit else None, action, then=then)
+    reason = f"reason {name}"
+    return Monitor(name, lambda s, _: reason if s.good_flags & bit else None, action, then=then)
 
 
 def test_what_holding_does_not_mend_goes_on_to_the_graver_next_rung_in_time():
@@ -202,10 +214,26 @@ def test_what_holding_does_not_mend_goes_on_to_the_graver_next_rung_in_time():
     ladder = SafetyLadder([odd("a", Action.HAND_BACK), odd("b", Action.LAND)], 2.0)
     ladder.note = told.append
     both = Snapshot(0.0, good_flags=3)
-    assert ladder.step(both) == (Action.HOLD, "a", False)
+    assert ladder.step(both) == (Action.HOLD, "reason a", False)
     assert ladder.step(both._replace(now=1.75)) is None
-    assert ladder.step(both._replace(now=2.0)) == (Action.LAND, "b", False)
-    assert told == ["safety: a: a → hold", "safety: b: b → hold"]
+    assert ladder.step(both._replace(now=2.0)) == (Action.LAND, "reason b", False)
+    assert told == ["safety: a: reason a → hold", "safety: b: reason b → hold"]
+
+
+def test_raised_and_ended_alarms_are_reported_with_name_reason_and_action():
+    changes = []
+    ladder = SafetyLadder([odd("a"), odd("b", action=Action.WARN)], 2.0)
+    ladder.on_change = lambda *change: changes.append(change)
+    ladder.step(Snapshot(0.0, good_flags=3))
+    ladder.step(Snapshot(1.0))
+    ladder.step(Snapshot(2.0))
+    assert changes == [
+        (True, "a", "reason a", "hold"),
+        (True, "b", "reason b", "warn"),
+        (False, "a", "", ""),
+        (False, "b", "", ""),
+    ]
+    assert ladder.breaches == {"reason a": "a", "reason b": "b"}
 
 
 def test_a_ladder_that_nobody_listens_to_still_decides():

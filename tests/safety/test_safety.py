@@ -1,6 +1,6 @@
 """The safety ladder: each monitor's breach, how long it must last, and the action."""
 
-from math import cos, inf, radians, sin
+from math import cos, degrees, inf, radians, sin
 from types import SimpleNamespace
 
 import pytest
@@ -182,6 +182,25 @@ def test_every_row_of_the_table_is_tried_here_and_a_calm_flight_raises_none():
     assert {row[0] for row in BREACHES} == {monitor.name for monitor in table}
     assert [m.name for m in table if m.judge(FINE, False)] == []
     assert [m.name for m in table if m.judge(Snapshot(NOW), False)] == []
+
+
+def test_what_the_rows_of_the_table_say_besides_action_and_time():
+    table = monitors(Config.model_validate({"safety": {"fence_action": "hand_back"}}))
+    calm = {"battery": 5.0, "link loss": 2.0, "round trip": 5.0}
+    assert {row.name: row.calm for row in table} == {
+        row.name: calm.get(row.name, 1.0) for row in table
+    }
+    assert [row.name for row in table if row.mutes is True] == ["unheard", "silence", "clock"]
+    after_hold = {row.name: row.then for row in table if row.action is HOLD}
+    assert after_hold == {"braking": HAND_BACK, "speed": LAND, "tracking": LAND, "thrust": LAND}
+
+
+def test_tilt_is_a_breach_only_above_the_largest_commanded_tilt_and_its_margin():
+    limit = degrees(CONFIG.limits.max_tilt + CONFIG.safety.tilt_margin)
+    assert CONFIG.safety.tilt_margin > 0.0
+    (tilt,) = (row for row in monitors(CONFIG) if row.name == "tilt")
+    assert tilt.judge(motion(q=roll(limit - 0.1)), False) is None
+    assert tilt.judge(motion(q=roll(limit + 0.1)), False)
 
 
 def test_a_breach_that_comes_and_goes_is_not_one_and_an_alarm_needs_calm_to_be_over():

@@ -135,6 +135,22 @@ def test_what_is_not_known_is_none(command):
     assert flight.snapshot().motion.origin is None
 
 
+def test_before_control_begins_everything_counts_from_the_start_of_the_clock():
+    flight = Flight()
+    flight.record.gaps.append(0.5)
+    flight.resets.times.append(0.5)
+    flight.listen(1.0, 4.0)
+    told = flight.snapshot(4.0)
+    assert (told.motion.offset, told.motion.origin, told.good_flags) == (None, None, 0)
+    assert flight.builder.origin_ned is None
+    assert told.control.heard == 0.0
+    assert told.control.clock_change == "it jumped"
+    flight.clock.timeline = 0
+    assert flight.snapshot(4.0).control.clock_change is None
+    assert told.health.gaps == 1
+    assert told.resets[:3] == (1, pytest.approx(14.0**0.5), 3.0)
+
+
 def test_every_stage_of_a_samples_way_has_its_time(flight):
     flight.record.last_answer, flight.record.last_sample = 9.9, 9.95
     flight.record.reason = Unanswered.LATE
@@ -181,6 +197,24 @@ def test_shares_are_not_known_before_most_of_a_second_is_seen(flight):
     flight.builder.begin(11.0)
     flight.listen(11.0)
     assert flight.snapshot(11.0).health == Health(round_trip=0.04)
+
+
+def test_rates_of_three_looks_far_apart_are_those_since_the_second_one():
+    """And what came late before the second one does not count."""
+    flight = Flight()
+    for now, positions, setpoints in ((10.0, 0, 5), (11.5, 10, 6), (13.0, 13, 7)):
+        flight.state.positions = positions
+        flight.record.setpoints = flight.record.missed_deadlines = setpoints
+        flight.listen(now)
+    told = flight.snapshot(13.0).health
+    assert (told.position_rate, told.missed) == (2.0, 1.0)
+    assert told.starved == pytest.approx(1.47 / 1.5)
+
+
+def test_nine_tenths_of_the_window_are_enough():
+    flight = Flight()
+    flight.listen(0.0, 0.9)
+    assert flight.snapshot(0.9).health.position_rate == 0.0
 
 
 def test_deadlines_do_not_count_in_lockstep():

@@ -30,7 +30,7 @@ _SECONDS = 20.0
 
 def circle_rms(autopilot, *, control, wind):
     """RMS of the true horizontal distance from the setpoints at full speed, m."""
-    vehicle = mock(autopilot, wind=WINDS[wind])
+    vehicle = mock(autopilot, full_rate=True, wind=WINDS[wind])
     squares = []
 
     async def whole():

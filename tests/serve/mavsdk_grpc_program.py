@@ -13,6 +13,7 @@ from mavsdk_grpc.offboard import (
     VelocityBodyYawspeed,
     VelocityNedYaw,
 )
+from mavsdk_grpc.telemetry import FlightMode
 from offboard_scene import Program, first, main
 
 
@@ -20,6 +21,7 @@ class Grpc(Program):
     refusal = ActionError
 
     def __init__(self, system):
+        super().__init__()
         self._system, self._offboard = system, system.offboard
         self._following = asyncio.ensure_future(self._follow())
 
@@ -57,6 +59,10 @@ class Grpc(Program):
 
     async def active(self):
         return await self._offboard.is_active()
+
+    async def lost(self):
+        modes = self._system.telemetry.flight_mode()
+        await first(modes, lambda mode: mode != FlightMode.OFFBOARD)
 
     async def land(self):
         await self._system.action.land()

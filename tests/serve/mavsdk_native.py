@@ -6,7 +6,7 @@ from mavsdk.asyncio.mavsdk import Configuration, Mavsdk
 from mavsdk.asyncio.plugins import offboard
 from mavsdk.asyncio.plugins.action import ActionAsync, ActionError
 from mavsdk.asyncio.plugins.param import ParamAsync
-from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
+from mavsdk.asyncio.plugins.telemetry import FlightMode, TelemetryAsync
 from mavsdk.component_type import ComponentType
 from offboard_scene import Program, first, main
 
@@ -34,6 +34,7 @@ class Native(Program):
     refusal = ActionError
 
     def __init__(self, system):
+        super().__init__()
         self._action, self._offboard = ActionAsync(system), offboard.OffboardAsync(system)
         self._telemetry, self._param = TelemetryAsync(system), ParamAsync(system)
         self._following = asyncio.ensure_future(self._follow())
@@ -70,6 +71,10 @@ class Native(Program):
 
     async def active(self):
         return await self._offboard.is_active()
+
+    async def lost(self):
+        modes = self._telemetry.subscribe_flight_mode()
+        await first(modes, lambda mode: mode is not FlightMode.OFFBOARD)
 
     async def land(self):
         await self._action.land()

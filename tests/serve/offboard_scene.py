@@ -12,6 +12,7 @@ import time
 
 RADIUS = SPEED = 5.0
 RAMP = 3.0
+_HOW = {"ground": "from_ground", "loses": "loses"}
 
 
 async def first(stream, condition):
@@ -42,9 +43,13 @@ class Program:
     Attributes:
         refusal: the package's exception for a refused command.
         place, speed: the newest by telemetry, or None.
+        wanted: (time.monotonic() s, north m, east m) of each setpoint of the circle at full speed.
     """
 
     place = speed = None
+
+    def __init__(self):
+        self.wanted = []
 
     async def settle(self, wanted, seconds):
         """How far the vehicle is from a place after some seconds."""
@@ -60,6 +65,7 @@ class Program:
             await self.position_velocity_acceleration(wanted, velocity, acceleration)
             if now > RAMP + 2.0:
                 errors.append(math.dist(self.place, wanted))
+                self.wanted.append((began + now, *wanted[:2]))
             await asyncio.sleep(max(0.0, 0.02 - (time.monotonic() - began - now)))
         return math.sqrt(sum(error**2 for error in errors) / len(errors))
 
@@ -96,7 +102,17 @@ class Program:
         await self.position(*self.place[:2], -height)
         return True
 
-    async def fly(self, hover, parameter, *, from_ground=False):
+    async def loses_and_regains(self):
+        """Another station takes the vehicle; then the program asks for it again."""
+        print("TAKE IT", flush=True)
+        await self.lost()
+        await asyncio.sleep(2.0)
+        await self.position(*self.place)
+        await self.start()
+        await self.position(*self.place)
+        return await self.active()
+
+    async def fly(self, hover, parameter, *, from_ground=False, loses=False):
         """Fly; returns what was seen."""
         report = {"armable": await self.armable(), "parameter": await self.parameter(parameter)}
         async with asyncio.timeout(90.0):  # ArduPilot is ready after 40 s
@@ -130,18 +146,24 @@ class Program:
         report["circle_rms_m"] = await self.circle(start, 12.0)
         await self.position(*self.place)
         report["still_active"] = await self.active()
+        if loses:
+            report["regained"] = await self.loses_and_regains()
+            report["place"] = await self.settle(self.place, 8.0)
         await self.stop()
         await asyncio.sleep(1.0)
         await self.land()
-        report["disarmed"] = True
+        report["disarmed"], report["wanted"] = True, self.wanted
         return report
 
 
 def main(run):
-    """Run `run(endpoint, fly)`; the further arguments are those of `Program.fly`."""
-    endpoint, hover, parameter, *ground = sys.argv[1:]
+    """Run `run(endpoint, fly)`.
+
+    The arguments are endpoint, hover thrust, parameter, and then `ground` or `loses` or nothing.
+    """
+    endpoint, hover, parameter, *how = sys.argv[1:]
 
     def fly(program):
-        return program.fly(float(hover), parameter, from_ground=bool(ground))
+        return program.fly(float(hover), parameter, **{_HOW[each]: True for each in how})
 
     print("REPORT " + json.dumps(asyncio.run(run(endpoint, fly))), flush=True)

@@ -1,12 +1,17 @@
-"""The mock and `companion serve` as processes."""
+"""The mock and `companion serve` as processes, and where the mock vehicle truly is."""
 
 import contextlib
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
+
+import numpy as np
 
 from tests.mavlink.fakes import free_port
 
@@ -66,3 +71,51 @@ def serving(port, *endpoints, config="configs/mock-px4.yaml", settings=()):
         if process.poll() is None:
             process.kill()
             process.communicate()
+
+
+class TruthLog(threading.Thread):
+    """Asks a mock vehicle for its true position, 100 times a second, while the block runs.
+
+    Args:
+        control_port: of the mock.
+
+    Attributes:
+        rows: (time.monotonic() s, north m, east m, down m).
+        crashed: whether the vehicle has.
+    """
+
+    def __init__(self, control_port):
+        super().__init__(daemon=True)
+        self.rows, self.crashed = [], False
+        self._address, self._over = ("127.0.0.1", control_port), threading.Event()
+
+    def __enter__(self):
+        self.start()
+        return self
+
+    def __exit__(self, *_):
+        self._over.set()
+        self.join()
+
+    def run(self):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as channel:
+            channel.settimeout(0.1)
+            while not self._over.wait(0.01):
+                began = time.monotonic()
+                try:
+                    channel.sendto(b'{"state": true}', self._address)
+                    state = json.loads(channel.recv(65536))
+                except OSError:  # it has not begun, or has ended
+                    continue
+                self.rows.append((0.5 * (began + time.monotonic()), *state["position"]))
+                self.crashed = state["crashed"]
+
+    def rms(self, wanted):
+        """RMS of the horizontal distance from wanted places (time, north, east), m."""
+        times, north, east, _ = np.array(self.rows).T
+        at, *places = np.array(wanted).T
+        off = [
+            np.interp(at, times, true) - place
+            for true, place in zip((north, east), places, strict=True)
+        ]
+        return float(np.sqrt(np.mean(np.square(off).sum(axis=0))))

@@ -5,6 +5,7 @@ The states are those of the table in docs/serve.md. Every setpoint is judged on 
 
 import asyncio
 import math
+import random
 import re
 
 import pytest
@@ -225,6 +226,69 @@ async def contradictions(scene):
     return REFUSED
 
 
+async def no_place(scene):
+    """sends a global position at latitude and longitude 0, or at a height that is no number"""
+
+    def send(_):
+        scene.hover()
+        for place in ((0, 0, 5.0), (473977420, 85455940, NAN)):
+            scene.script.send(
+                dialect.MAVLink_set_position_target_global_int_message(
+                    0, 1, 1, 6, POSITION, *place, *[0.0] * 8
+                )
+            )
+
+    await stream(1.0, send, 0.05)
+    scene.is_said("the position is farther than")
+    scene.is_said("position is not finite")
+    await scene.is_flown()
+    return REFUSED
+
+
+async def clock_jumps(scene):
+    """stamps its setpoints with a clock that jumps"""
+    rng = random.Random(1)
+
+    def send(_):
+        scene.judge.commanded()
+        scene.script.send(
+            dialect.MAVLink_set_position_target_local_ned_message(
+                rng.choice((0, 1, 2**31, 2**32 - 1)), 1, 1, 1, ALL, *scene.home, *[0.0] * 8
+            )
+        )
+
+    await stream(1.0, send)
+    return await scene.is_flown()
+
+
+async def another_id(scene):
+    """goes on under another component id"""
+    await stream(0.5, scene.hover)
+    scene.script.packer.srcComponent = 191 - scene.script.packer.srcComponent
+    await stream(TIMEOUT - 0.1, lambda _: scene.script.local(ALL, scene.home))
+    scene.is_said("is in control")
+    return await scene.is_flown(2.0)
+
+
+async def all_kinds(scene):
+    """changes the kind of its setpoints with each of them"""
+    level, hover = (1.0, 0.0, 0.0, 0.0), {"px4": 0.49, "ardupilot": 0.364}[scene.autopilot]
+    kinds = (
+        scene.hover,
+        lambda: scene.local(VELOCITY, velocity=(1.0, -1.0, 0.0)),
+        lambda: scene.script.attitude(7, level, hover),
+        lambda: scene.local(POSITION & ~2048, scene.home, yaw_rate=0.5),
+        lambda: scene.script.attitude(128, level, hover, (0.2, -0.2, 0.1)),
+        lambda: scene.local(0x0C3F, acceleration=(0.5, 0.0, -0.2)),
+        lambda: scene.local(VELOCITY, velocity=(0.5, 0.0, 0.0), frame=8),
+    )
+    await stream(3.0, lambda time: kinds[round(time / 0.02) % len(kinds)]())
+    assert scene.control.in_control
+    assert math.dist(scene.place, scene.home) < 3.0
+    await scene.recover()
+    return await scene.is_flown()
+
+
 async def upside_down(scene):
     """commands an attitude beyond 90° of tilt"""
     side = math.sqrt(0.5)
@@ -386,6 +450,10 @@ CELLS = (
     not_finite,
     only_not_finite,
     contradictions,
+    no_place,
+    clock_jumps,
+    another_id,
+    all_kinds,
     upside_down,
     beyond_limits,
     two_at_once,

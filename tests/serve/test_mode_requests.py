@@ -3,17 +3,21 @@
 import asyncio
 import gc
 import math
+import threading
 from types import SimpleNamespace
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion.config import Config
+from companion.flight import flight_files
 from companion.flight.changes import Changes
 from companion.flight.environment import THIS_COMPUTER
 from companion.mavlink.framing import FrameScanner
 from companion.mavlink.messages import CRC_EXTRA
 from companion.recording import recorder
+from companion.recording.measurements.summary import LoopCounts, Summary
+from companion.recording.trace import FlightTrace
 from companion.serve.control import ServedControl
 from companion.serve.flight_records import FlightRecords
 from companion.serve.mode_requests import (
@@ -67,6 +71,7 @@ def test_all_that_px4_takes_for_offboard_asks_for_control(frame, asks):
     ("frame", "steers"),
     [
         (command(192, -1.0, 1.0, 0.0), True),
+        (command(193, 0.0, 0.0, 0.0), True),
         (command(176, 1.0, 6.0, 0.0), False),
         (framed(dialect.MAVLink_mission_item_int_message(1, 1, 0, 6, 16, 2, 1, *[0] * 7)), True),
         (framed(dialect.MAVLink_mission_item_message(1, 1, 0, 6, 16, 3, 1, *[0] * 7)), True),
@@ -142,6 +147,33 @@ def test_a_record_that_cannot_be_opened_leaves_a_flight_without_record(tmp_path,
     asyncio.run(scene())
 
 
+def test_what_is_to_be_told_of_a_record_is_told_in_the_event_loop(tmp_path, monkeypatch):
+    """The record is written in a thread, beside the next flight."""
+    told, here = [], threading.get_ident()
+
+    def page(_):
+        assert threading.get_ident() != here
+        return "a page"
+
+    async def scene():
+        def note(text):
+            told.append((threading.get_ident(), text))
+
+        records = FlightRecords(tmp_path, THIS_COMPUTER, note)
+        records.on_recorded = page
+        record = records.new(Config())
+        with records.recording(record):
+            pass
+        monkeypatch.setattr(flight_files, "write_in_time", lambda *_: "the disk is full")
+        await records.keep(record, Summary("ok", "", "", 1.0, LoopCounts(), {}, FlightTrace()))
+        await asyncio.sleep(0.01)
+
+    asyncio.run(scene())
+    assert {thread for thread, _ in told} == {here}
+    texts = " ".join(text for _, text in told)
+    assert all(words in texts for words in ("the disk is full", "recorded in", "a page"))
+
+
 @pytest.mark.parametrize(("next_flight", "times"), [(None, 1), ("begun", 0)])
 def test_garbage_is_collected_only_between_flights(monkeypatch, next_flight, times):
     collected = []
@@ -154,7 +186,10 @@ def test_garbage_is_collected_only_between_flights(monkeypatch, next_flight, tim
     async def save():
         control._flight = next_flight
 
-    control = SimpleNamespace(ownership=SimpleNamespace(release=lambda: None))
-    flight = SimpleNamespace(run=run, save=save)
+    control = SimpleNamespace(
+        ownership=SimpleNamespace(release=lambda: None),
+        _fence=SimpleNamespace(keep=lambda centre: None),
+    )
+    flight = SimpleNamespace(run=run, save=save, fence_centre=None)
     asyncio.run(ServedControl._fly(control, flight, None))
     assert len(collected) == times

@@ -12,39 +12,12 @@ import pytest
 from tests.serve.serving import free_ports, mock, serving
 
 MAVSDK = Path(__file__).with_name("mavsdk_program.py")
-HOVER_AND_PARAMETER = {
-    "px4": ("0.49", "MPC_THR_HOVER"),
-    "ardupilot": ("0.364", "MOT_THST_HOVER"),
-}
 PARAMETERS = 90
 PLAN = """QGC WPL 110
 0\t1\t0\t16\t0\t0\t0\t0\t47.3977418\t8.5455939\t488.0\t1
 1\t0\t3\t22\t0\t0\t0\t0\t47.3977418\t8.5455939\t10.0\t1
 2\t0\t3\t16\t0\t0\t0\t0\t47.3978000\t8.5456000\t10.0\t1
 """
-
-
-def run_program(name, endpoint, hover, parameter):
-    """Run an offboard program of MAVSDK; returns its report."""
-    run = subprocess.run(
-        [sys.executable, Path(__file__).with_name(name), endpoint, hover, parameter],
-        capture_output=True, text=True, timeout=200, check=False,
-    )  # fmt: skip
-    assert run.returncode == 0, run.stdout + run.stderr
-    return json.loads(run.stdout.split("REPORT ")[1].splitlines()[0])
-
-
-def check_report(report, said):
-    """What a program has seen, which flew through us."""
-    for flag in ("armable", "active", "still_active", "disarmed"):
-        assert report[flag], (flag, said)
-    assert 0.0 < report["parameter"] < 1.0
-    assert report["start_s"] < 5.0
-    assert report["position"] < 0.2
-    assert report["back"] < 0.3
-    assert report["velocity"] == pytest.approx(-1.5, abs=0.2)
-    assert report["position_velocity"] < 0.3
-    assert report["acceleration"] == pytest.approx(1.0, abs=0.3)
 
 
 @pytest.mark.timeout(180)
@@ -95,7 +68,7 @@ class mavproxy:  # noqa: N801 - a context manager
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
             text=True, bufsize=1, cwd=folder,
         )  # fmt: skip
-        self._watchdog = threading.Timer(150.0, self._process.kill)
+        self._watchdog = threading.Timer(250.0, self._process.kill)
 
     def __enter__(self):
         self._watchdog.start()
@@ -115,23 +88,3 @@ def read_until(process, words):
         assert line, f"MAVProxy ended before it said {words!r}:\n{said}"
         said += line
     return said
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(240)
-@pytest.mark.parametrize("program", ["mavsdk_native.py", "mavsdk_grpc_program.py"])
-@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
-def test_a_mavsdk_offboard_program_flies_through_us(autopilot, program, tmp_path):
-    """Every kind of setpoint, and a circle of 5 m at 5 m/s, from the ground and back; real time."""
-    config = f"configs/mock-{autopilot}.yaml"
-    vehicle, port = free_ports(2)
-    settings = ["limits.max_tilt_deg=45", f"recording.directory={tmp_path}"]
-    with (
-        mock(vehicle, "--config", config),
-        serving(vehicle, f"udpin://127.0.0.1:{port}", config=config, settings=settings) as served,
-    ):
-        report = run_program(program, f"udpout://127.0.0.1:{port}", *HOVER_AND_PARAMETER[autopilot])
-    check_report(report, served.said)
-    assert report["circle_rms_m"] < 0.15, "as MAVSDK's telemetry tells it, late by itself"
-    (summary,) = tmp_path.glob("*/summary.json")
-    assert json.loads(summary.read_text())["tracking"]["position_rms_m"] < 0.15

@@ -131,14 +131,14 @@ async def begin_control(session, script, autopilot, hold):
 
 @asynccontextmanager
 async def serving(
-    vehicle, autopilot, notes=None, directory=None, **serve
+    vehicle, autopilot, notes=None, directory=None, limits=None, **serve
 ) -> AsyncIterator[ServeSession]:
     """A session over the vehicle in memory."""
     config = changed(
         load(CONFIGS / f"mock-{autopilot}.yaml"),
         {
             "link": {"attitude_rate_hz": attitude_rate_hz(vehicle)},
-            "limits": {"max_tilt_deg": 45.0},
+            "limits": {"max_tilt_deg": 45.0, **(limits or {})},
             "serve": serve,
         },
         "the test",

@@ -238,6 +238,103 @@ def test_what_was_not_told_for_long_is_not_known_any_more(bench):
     assert not bench.state.taking_off
 
 
+def home_at(down):
+    return dialect.MAVLink_home_position_message(
+        473977418, 85455939, 488000, 0, 0, down, [1, 0, 0, 0], 0, 0, 0
+    )
+
+
+def gps_fix(fix_type, satellites=10):
+    return dialect.MAVLink_gps_raw_int_message(0, fix_type, 0, 0, 0, 1, 1, 1, 1, satellites)
+
+
+def test_height_is_counted_from_home(bench):
+    assert bench.state.height is None
+    bench.take(home_at(-0.5))
+    assert bench.state.height is None
+    position(bench, 2.5)
+    assert bench.state.height == -0.5
+    bench.take(home_at(math.nan))
+    assert (bench.state.height, bench.stats.non_finite) == (-0.5, 1)
+
+
+def test_gps_that_was_good_is_missed(bench):
+    assert bench.take(gps_fix(2)).gps_fault is None
+    assert not bench.state.gps_was_good
+    assert bench.take(gps_fix(3)).gps_fault is None
+    assert bench.take(gps_fix(2)).gps_fault == "GPS position lost"
+    assert bench.take(gps_fix(4, satellites=255)).gps_fault is None
+    assert bench.state.gps.satellites is None
+    bench.now += 5.0
+    assert bench.state.gps_fault is None
+    bench.now += 0.1
+    assert bench.state.gps_fault == "GPS is not reported any more"
+
+
+def test_what_decides_about_arming_is_not_older_than_five_seconds(bench):
+    assert bench.state.readiness == (None, None, False, False)
+    bench.take(dialect.MAVLink_estimator_status_message(0, 0x33F, 0, 0, 0, 0, 0, 0, 0, 0))
+    bench.take(sys_status(0, 0, 0x10000000))
+    bench.take(home_at(0.0))
+    position(bench, 2.5)
+    assert bench.state.readiness == (True, 0x33F, True, True)
+    bench.now += 5.1
+    assert bench.state.readiness == (None, None, False, True)
+
+
+def test_resets_of_the_estimate_are_counted_by_the_autopilot(bench):
+    assert bench.state.reset_counter is None
+    message = dialect.MAVLink_odometry_message(
+        0, 1, 1, 0, 0, 0, [1, 0, 0, 0], 0, 0, 0, 0, 0, 0, [0] * 21, [0] * 21, reset_counter=7
+    )
+    assert bench.take(message).reset_counter == 7
+
+
+@pytest.mark.parametrize(
+    ("told", "state"), [(0, (False, False)), (1, (True, False)), (2, (False, True))]
+)
+def test_a_vehicle_flies_only_if_the_autopilot_says_so(bench, told, state):
+    assert (bench.state.landed, bench.state.flying) == (False, False)
+    bench.take(dialect.MAVLink_extended_sys_state_message(0, told))
+    assert (bench.state.landed, bench.state.flying) == state
+
+
+def test_a_thrust_that_is_none_is_passed_over(bench):
+    def target(thrust):
+        q = [1.0, 0.0, 0.0, 0.0]
+        return dialect.MAVLink_attitude_target_message(5000, 0, q, 0, 0, 0, thrust)
+
+    for good in (0.0, 0.25, 1.0):
+        assert bench.take(target(good)).attitude_target_thrust == (10.0, good)
+    for bad in (-0.1, 1.1, math.nan):
+        assert bench.take(target(bad)).attitude_target_thrust == (10.0, 1.0)
+    assert bench.stats.non_finite == 1
+
+
+def test_another_battery_is_not_ours(bench):
+    cells = [4100] + [65535] * 9
+    bench.take(dialect.MAVLink_battery_status_message(1, 0, 0, 0, cells, -1, -1, -1, 55))
+    assert bench.state.battery is None
+    unknown = [65535] * 10
+    bench.take(dialect.MAVLink_battery_status_message(0, 0, 0, 0, unknown, -1, -1, -1, -1))
+    assert bench.state.battery == (10.0, None, None)
+
+
+def test_of_another_vehicle_only_the_heartbeat_is_kept(bench):
+    bench.take(px4_heartbeat(0x00060000, 129))
+    bench.take(development.MAVLink_current_mode_message(0, 0x03040000, 0x03040000))
+    bench.take(sys_status(15800, 73, 0x10000000))
+    bench.take(home_at(0.0))
+    bench.take(gps_fix(3))
+    position(bench, 2.5)
+    bench.state.forget()
+    state = bench.state
+    assert (state.mode, state.armed) == ("OFFBOARD", True)
+    assert (state.position, state.battery, state.home, state.gps) == (None, None, None, None)
+    assert (state.positions, state.armings, state.gps_was_good) == (0, 0, False)
+    assert state.readiness == (None, None, False, False)
+
+
 def global_position(latitude, longitude):
     return dialect.MAVLink_global_position_int_message(0, latitude, longitude, 0, 0, 0, 0, 0, 0)
 

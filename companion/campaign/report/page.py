@@ -10,9 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.console import Console
 
+from companion.campaign.campaign import Campaign
 from companion.campaign.cluster import require_packages
+from companion.campaign.folder import FILE
+from companion.campaign.loading import load
 from companion.campaign.report import plots, tables
-from companion.campaign.report.results import RATES, Results, label
+from companion.campaign.report.results import RATES, TRUE_ERROR, Results, label
 from companion.campaign.report.sensitivity import FEWEST, Influence, influences
 from companion.campaign.report.statistics import levels, share_of
 from companion.extras import require
@@ -46,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
     require_extra()
     results = Results.read(options.folder)
     page = options.out or options.folder / PAGE
-    write_whole(page, page_text(results))
+    write_whole(page, page_text(results, load(options.folder / FILE)))
     write_tables(results.table, options.folder)
     console = Console(highlight=False, soft_wrap=True)
     console.print(headline(results), markup=False)
@@ -77,8 +80,13 @@ def write_tables(table: "pa.Table", folder: Path) -> None:
             part.unlink(missing_ok=True)
 
 
-def page_text(results: Results) -> str:
-    """The page."""
+def page_text(results: Results, campaign: Campaign) -> str:
+    """The page.
+
+    Args:
+        results: of the campaign.
+        campaign: as it stands in the folder.
+    """
     found = {
         name: each
         for name in (results.error, RATES, "ok")
@@ -106,7 +114,7 @@ def page_text(results: Results) -> str:
         good=not results.true_cases("crashed") and bool(results.good.all()),
         lines=[*missing(results), *what_to_look_at(results, found)],
         tables=[each for each in first if each is not None],
-        cases=tables.all_cases(results),
+        last=[tables.configuration(campaign), tables.all_cases(results)],
     )
 
 
@@ -144,6 +152,12 @@ def what_to_look_at(results: Results, found: dict[str, list[Influence]]) -> Iter
         (reason, times) = reasons.most_common(1)[0]
         yield f"Most frequent reason why one was not good, {times} times: {reason}."
     yield from _most_influential(results, found)
+    if results.error == TRUE_ERROR:
+        yield (
+            "Errors are distances of the true vehicle from the reference. A flight does not know "
+            "its true position: its own report measures by the autopilot's estimate, which is "
+            "estimated_rms_m here."
+        )
 
 
 def _reason(results: Results, row: int) -> str:

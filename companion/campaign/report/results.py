@@ -20,7 +20,8 @@ Floats = NDArray[np.float64]
 Column = NDArray[Any]
 
 NOUNS = {"flights": "flights", "batch": "vehicles"}
-ERRORS = ("position_rms_m", "model_deviation_max")
+TRUE_ERROR = "position_rms_m"
+ERRORS = (TRUE_ERROR, "model_deviation_max")
 """Outcomes that may be the campaign's error: the first one that was measured."""
 RATES, THRUST = "rate_rms_rad_s", "thrust_rms"
 LABELS = {

@@ -1,14 +1,20 @@
 """The tables of a campaign's page."""
 
+import json
 import shlex
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from companion.campaign.campaign import Campaign
 from companion.campaign.report.results import LABELS, RATES, Results, label
 from companion.campaign.report.sensitivity import Influence
 from companion.campaign.report.statistics import levels, share_of, worst
+from companion.campaign.store import unit
+from companion.config.reference import keys
+from companion.flight.flown_config import flat
 from companion.report.tables import Table
+from companion.testing.settings import complete_mock
 
 EMPTY = "–"
 _WORST = 10
@@ -42,6 +48,26 @@ def _rerun(results: Results, case: int) -> str:
 def _values(results: Results, row: int) -> str:
     told = (f"{name} = {_cell(results.columns[name][row])}" for name in results.factors)
     return ", ".join(told)
+
+
+def configuration(campaign: Campaign) -> Table:
+    """What every case had: all limits, and the keys that are not the default; no swept keys."""
+    swept = {key for name, each in campaign.file.sweep.items() for key in each.keys or (name,)}
+    rows = [
+        (f"{key.section}.{key.name}", json.dumps(key.value), json.dumps(key.default), key.unit)
+        for key in keys(campaign.base)
+        if key.section == "limits" or key.value != key.default
+    ]
+    mock = complete_mock(campaign.base.mock or {})
+    usual = flat(complete_mock({"autopilot": mock["autopilot"]}))
+    rows += [
+        (f"mock.{key}", value, usual.get(key, EMPTY), unit(key))
+        for key, value in flat(mock).items()
+        if value != usual.get(key)
+    ]
+    title = "Configuration of every case: the limits, and what is not the default"
+    header = ("key", "value", "default", "unit")
+    return Table(title, header, [row for row in rows if row[0] not in swept])
 
 
 def success_by_factor(results: Results, order: Sequence[str]) -> Table:

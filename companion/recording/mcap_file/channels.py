@@ -1,201 +1,20 @@
-"""The channels of numbers in `flight.mcap`. This table is the reference of their columns.
+"""All channels of numbers in `flight.mcap`, with those of the status a few times a second.
 
-Times end with `_s`. `time_s` and `received_s` are on our clock (event-loop time). `vehicle_time_s`
-is the vehicle's clock without its jumps. Positions are NED in the frame of LOCAL_POSITION_NED,
-without jumps of the autopilot's estimator. Rates are about the axes of the body (FRD).
+The columns follow the conventions of `companion.recording.mcap_file.loop_channels`.
 """
 
-from companion.recording.mcap_file.fields import Channel, Code, Field
+from companion.recording.mcap_file.fields import Channel, Field
+from companion.recording.mcap_file.loop_channels import (
+    ACTION,
+    ATTITUDE_TARGET,
+    GUIDANCE,
+    INPUT,
+    SAMPLE,
+    SETPOINT,
+    TARGET,
+    VEHICLE_TIME,
+)
 
-REASONS = (
-    "answered",
-    "control_off",
-    "another_vehicle",
-    "not_newer",
-    "stamped_ahead",
-    "late",
-    "no_target",
-    "old_target",
-    "awaiting_mode",
-    "invalid_attitude",
-    "invalid_setpoint",
-    "not_sent",
-)
-"""Why a sample is unanswered, by number: 0 and 1, then the values of `Unanswered` in order."""
-ACTIONS = (
-    "stand_by",
-    "hold_here",
-    "hold_reference",
-    "give_up",
-    "follow",
-    "drop_command",
-    "restart_planner",
-    "drag_prior",
-)
-"""What a phase told guidance to do, by number."""
-
-
-def _vector(prefix: str, unit: str, meaning: str) -> tuple[Field, ...]:
-    return tuple(
-        Field(f"{prefix}_{axis}_{unit}", f"{meaning}, {axis}, {unit.replace('_s', '/s')}.")
-        for axis in ("north", "east", "down")
-    )
-
-
-def _rates(prefix: str, meaning: str) -> tuple[Field, ...]:
-    return tuple(
-        Field(f"{prefix}_{axis}_rad_s", f"{meaning} about {axis}, rad/s.")
-        for axis in ("roll", "pitch", "yaw")
-    )
-
-
-_VEHICLE_TIME = Field("vehicle_time_s", "Time on the vehicle's clock, s.")
-
-SAMPLE = Channel(
-    "/sample",
-    "One ATTITUDE_QUATERNION that reached the control loop, and whether it was answered.",
-    (
-        Field("received_s", "When it arrived, on our clock, s."),
-        _VEHICLE_TIME,
-        Field("time_boot_ms", "The vehicle's stamp as received, ms."),
-        Field("age_s", "Age at arrival, s. NaN: the stamp does not fit the vehicle's clock."),
-        *(Field(f"q_{part}", "Attitude, body FRD to world NED.") for part in "wxyz"),
-        *_rates("measured", "Measured rate"),
-        Field("checked_s", "When the age was checked again before sending, on our clock, s."),
-    ),
-    (
-        Code("unanswered", "Why it is unanswered; 0: it was answered.", REASONS),
-        Code("misfit", "Why its stamp does not fit.", ("none", "not_newer", "ahead")),
-        Code("age_known", "Whether `age_s` is absolute."),
-        Code("on", "Whether samples are answered at all."),
-        Code("taking_over", "Whether offboard was requested."),
-        Code("offboard_active", "Whether the autopilot obeys the setpoints."),
-        Code("awaiting_mode", "Whether the mode must be confirmed after a gap."),
-        Code("same_vehicle", "Whether it is of the vehicle that was checked."),
-    ),
-)
-SETPOINT = Channel(
-    "/setpoint",
-    "One setpoint that was sent: the answer to a sample, and what the planner made it from.",
-    (
-        Field("received_s", "When its sample arrived, on our clock, s."),
-        _VEHICLE_TIME,
-        *_rates("commanded", "Commanded body rate"),
-        Field("thrust", "Collective thrust, 0..1."),
-        Field("latency_us", "From the sample's arrival to the setpoint, µs. 0 in virtual time."),
-        Field("target_north", "Acceleration coefficient that the planner flies to, north."),
-        Field("target_east", "The same, east."),
-        Field("target_heading_rad", "Heading that the planner flies to, rad."),
-        Field("target_heading_rate_rad_s", "Feedforward of the heading, rad/s."),
-        *(
-            Field(f"q_{part}", "Attitude as the planner sees it, body FRD to NED.")
-            for part in "wxyz"
-        ),
-        Field("measured_north", "Acceleration coefficient of this attitude, north."),
-        Field("measured_east", "The same, east."),
-        Field("planned_north", "Coefficient that the planner plans for now, north; NaN: no plan."),
-        Field("planned_east", "The same, east."),
-    ),
-    (
-        Code("tilt_rate_limited", "Whether the roll-pitch rate is at limits.max_tilt_rate_deg_s."),
-        Code("yaw_rate_limited", "Whether the yaw rate is at limits.max_yaw_rate_deg_s."),
-        Code("thrust_limited", "Whether the thrust is at one of its limits."),
-        Code("offboard_active", "Whether the autopilot obeys the setpoints."),
-        Code("is_step", "Whether it is part of an open-loop step whose response is measured."),
-        Code("idle", "Whether it is the idle setpoint on the ground."),
-    ),
-)
-GUIDANCE = Channel(
-    "/guidance",
-    "One step of guidance: reference, estimate, wind, drag. NaN where the step made none of them.",
-    (
-        Field("time_s", "When, on our clock, s."),
-        _VEHICLE_TIME,
-        *_vector("reference", "m", "Position of the reference"),
-        *_vector("reference", "m_s", "Velocity of the reference"),
-        Field("reference_heading_rad", "Heading of the reference, rad."),
-        *_vector("estimated", "m", "Estimated position now"),
-        *_vector("estimated", "m_s", "Estimated velocity now"),
-        Field("error_m", "Distance from the reference, m. NaN: no reference, or open loop."),
-        Field("wind_north_m_s2", "Acceleration by wind and bias, north, m/s²."),
-        Field("wind_east_m_s2", "The same, east, m/s²."),
-        Field("drag_per_s", "Linear drag per mass, as learned so far, 1/s."),
-        Field("quadratic_drag_per_m", "Quadratic drag per mass, as learned so far, 1/m."),
-    ),
-    (
-        Code("holds_position", "Whether the vehicle should be at the horizontal reference."),
-        Code("holds_height", "Whether the vehicle should be at the height of the reference."),
-        Code("height_steady", "Whether the commanded thrust is steady: no doublet, no own thrust."),
-        Code("offboard_active", "Whether the autopilot obeys the setpoints."),
-    ),
-)
-TARGET = Channel(
-    "/target",
-    "One command that guidance left with the control loop; it holds until the next one.",
-    (
-        Field("time_s", "When it was made, on our clock, s."),
-        Field("north", "Target coefficient, north."),
-        Field("east", "Target coefficient, east."),
-        Field("heading_rad", "Target heading, rad."),
-        Field("heading_rate_rad_s", "Feedforward of the heading, rad/s."),
-        Field("later_north", "Target one period later, north; NaN: the target is constant."),
-        Field("later_east", "The same, east."),
-        Field("later_heading_rad", "The same, heading, rad."),
-        Field("later_heading_rate_rad_s", "The same, feedforward of the heading, rad/s."),
-        Field("acceleration_down_m_s2", "Wanted vertical acceleration, down, m/s²."),
-        *_rates("body", "Body rate to send instead of the planner's (NaN: the planner's)"),
-        Field("thrust", "Thrust to send instead of that for the acceleration; NaN: none."),
-        Field("turn_rad", "Sum of the heading resets when it was made, rad."),
-        Field("period_s", "Period of guidance, s."),
-    ),
-    (
-        Code("idle", "Zero rates and zero thrust, on the ground."),
-        Code("is_step", "Whether it is an open-loop step whose response is measured."),
-    ),
-)
-INPUT = Channel(
-    "/guidance_input",
-    "The telemetry that one step of guidance read; `companion replay` needs it.",
-    (
-        Field("time_s", "When the step began, on our clock, s."),
-        Field("position_received_s", "When the newest position arrived, on our clock, s."),
-        Field("position_vehicle_time_s", "Its stamp on the vehicle's clock, s."),
-        *_vector("position", "m", "LOCAL_POSITION_NED, position"),
-        *_vector("velocity", "m_s", "LOCAL_POSITION_NED, velocity"),
-        Field("clock_offset_s", "Vehicle time minus our time, s; NaN: not known."),
-        Field("battery_received_s", "When the battery was reported, on our clock, s."),
-        Field("battery_v", "Battery voltage, V."),
-        Field("autopilot_thrust_received_s", "When ATTITUDE_TARGET arrived, on our clock, s."),
-        Field("autopilot_thrust", "Thrust in ATTITUDE_TARGET, 0..1."),
-        Field("height_m", "Height above home, m."),
-    ),
-    (
-        Code("armed", "Whether the vehicle is armed."),
-        Code("fresh", "Whether the position is fresh."),
-        Code("standing", "Whether the vehicle stands on the ground."),
-        Code("may_idle", "Whether zero thrust is safe."),
-        Code("offboard_active", "Whether the autopilot obeys the setpoints."),
-    ),
-)
-ATTITUDE_TARGET = Channel(
-    "/attitude_target",
-    "A new ATTITUDE_TARGET of an autopilot that takes body rates along its axes.",
-    (
-        Field("time_boot_ms", "The vehicle's stamp as received, ms."),
-        *(Field(f"q_{part}", "Attitude target, body FRD to world NED.") for part in "wxyz"),
-    ),
-)
-ACTION = Channel(
-    "/action",
-    "What a phase told guidance to do between two steps; `companion replay` needs it.",
-    (
-        Field("time_s", "When, on our clock, s."),
-        Field("clock_offset_s", "Vehicle time minus our time, s; NaN: not known."),
-        Field("drag_per_s", "Linear drag of an earlier flight, 1/s; of `drag_prior` only."),
-        Field("quadratic_drag_per_m", "Quadratic drag of an earlier flight, 1/m; the same."),
-    ),
-    (Code("action", "Which.", ACTIONS),),
-)
 THRUST = Channel(
     "/thrust",
     "The thrust estimator, ten times a second.",
@@ -214,7 +33,7 @@ MOTION = Channel(
     "The motion in all phases, ten times a second.",
     (
         Field("time_s", "s since the flight began."),
-        _VEHICLE_TIME,
+        VEHICLE_TIME,
         Field("height_m", "Height above home, m."),
         Field("speed_m_s", "Speed, m/s."),
         Field("tilt_deg", "Tilt, degrees."),

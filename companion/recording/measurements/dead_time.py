@@ -67,6 +67,7 @@ class DeadTimes:
         if not wrong:
             return None
         return (
-            f"dead time is not as configured: {', '.join(wrong)}; "
-            "find what slows the link, or measure anew with `companion identify`"
+            f"dead time is not as configured: {', '.join(wrong)}; the link is slow, or the "
+            "configured lag is wrong, which is measured as dead time: find what slows the link, or "
+            "measure both anew with `companion identify`"
         )

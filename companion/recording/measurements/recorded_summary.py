@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from companion.files.bounded_file import FileRefusedError, read_text
 from companion.recording.flight_record import FlightRecord, as_recorded
-from companion.recording.mcap_file.channels import REASONS
+from companion.recording.mcap_file.loop_channels import REASONS
 from companion.recording.measurements.course import Course, EarlyEnd
 from companion.recording.measurements.summary import LoopCounts, Summary
 from companion.recording.trace import FlightTrace

@@ -58,10 +58,10 @@ def euler(settings: Settings) -> Model:
     roll, pitch, yaw = state[6], state[7], state[8]
     turning = ca.vertcat(*_euler_rates(roll, pitch, control[0], control[1], control[2]))
     axis = _thrust_axis(roll, pitch, yaw)
-    moving = translation(state[3:6], control[3], axis, constants, settings)
+    heading = _heading(roll, pitch, yaw)
+    moving = translation(state[3:6], control[3], axis, heading, constants, settings)
     derivative = ca.vertcat(moving, turning)
     aim = ca.SX.sym("aim", 4)
-    heading = _heading(roll, pitch, yaw)
     return Model(
         state=state,
         control=control,
@@ -95,10 +95,10 @@ def euler_reduced(settings: Settings) -> Model:
     yaw = own_constant(constants)
     roll, pitch = state[6], state[7]
     axis = _thrust_axis(roll, pitch, yaw)
-    moving = translation(state[3:6], control[2], axis, constants, settings)
+    heading = _heading(roll, pitch, yaw)
+    moving = translation(state[3:6], control[2], axis, heading, constants, settings)
     derivative = ca.vertcat(moving, control[0:2])
     aim = ca.SX.sym("aim", 2)
-    heading = _heading(roll, pitch, yaw)
     return Model(
         state=state,
         control=control,
@@ -137,8 +137,10 @@ def quaternion(settings: Settings) -> Model:
         w * pitch + z * roll - x * yaw,
         w * yaw + x * pitch - y * roll,
     )
-    derivative = ca.vertcat(translation(state[3:6], control[3], axis, constants, settings), turning)
-    aim, heading = ca.SX.sym("aim", 5), 2.0 * ca.atan2(z, w)
+    heading = 2.0 * ca.atan2(z, w)
+    moving = translation(state[3:6], control[3], axis, heading, constants, settings)
+    derivative = ca.vertcat(moving, turning)
+    aim = ca.SX.sym("aim", 5)
     return Model(
         state=state,
         control=control,

@@ -1,0 +1,143 @@
+"""The planned motion of `model-following`, and the rates that follow it in spite of the lag."""
+
+from math import sqrt
+
+from companion.attitude.axis_lead import PITCH, ROLL, AxisLead
+from companion.attitude.history import PlanHistory, PlannedTilt, PlannedYaw
+from companion.attitude.kinematics import heading_of, rates_to_speed, tilt_products
+from companion.attitude.limits import Constants
+from companion.attitude.rate_response import RateResponse
+from companion.attitude.reference_model import ReferenceModel, model_lag
+from companion.attitude.rotation import clamp
+from companion.attitude.types import BodyRates, Coefficients, Quaternion, Target
+from companion.attitude.yaw import HeadingModel, TargetFrame, YawModel
+
+
+class FeedForward:
+    """Plans a smooth, straight motion within the limits, and the rates that make it.
+
+    The `ReferenceModel` plans the coefficients, the `HeadingModel` the heading. `AxisLead`
+    compensates the lag of each axis. The rates take effect one dead time later; the quicker axis
+    is delayed, so that roll and pitch take effect at the same time.
+
+    Yaw responds slowly, so the heading moves while the vehicle tilts. `YawModel` predicts this from
+    the yaw rates that were sent. Roll and pitch rates are along the body axes predicted for the
+    time when they take effect.
+
+    Args:
+        constants: gains and limits.
+        response: response of the vehicle's rate loop.
+        longest_sample: longest sample period, s.
+
+    Attributes:
+        plans: the planned motion since its start, and when it takes effect.
+        frame: heading of ArduPilot's attitude target.
+        tilt: responses of roll and pitch.
+        yaw: response of yaw.
+        lag: of the slower of roll and pitch, s.
+        dead_time: of the slower of roll and pitch, s.
+    """
+
+    def __init__(self, constants: Constants, response: RateResponse, longest_sample: float) -> None:
+        roll, pitch, yaw = (axis.with_least_lag() for axis in response.axes)
+        self.tilt = tilt = roll, pitch
+        self.yaw = yaw
+        self.lag = max(axis.lag for axis in tilt)
+        self.dead_time = dead_time = max(axis.dead_time for axis in tilt)
+        self.frame = TargetFrame(response)
+        self._model = ReferenceModel(
+            constants,
+            model_lag(constants.gain, self.lag),
+            min(axis.acceleration for axis in tilt),
+            max(axis.square for axis in tilt),
+        )
+        self._heading = HeadingModel(constants, yaw)
+        self._body = YawModel(yaw)
+        self.plans = PlanHistory(dead_time, yaw.dead_time, longest_sample)
+        self._roll = AxisLead(ROLL, roll, dead_time - roll.dead_time, self.plans)
+        self._pitch = AxisLead(PITCH, pitch, dead_time - pitch.dead_time, self.plans)
+        self._max_yaw_rate = constants.max_yaw_rate
+        self._still = 0.0
+
+    def retune(self, constants: Constants) -> None:
+        """Use these gains and limits from the next sample on; the planned motion continues."""
+        self._max_yaw_rate = constants.max_yaw_rate
+        self._model.retune(constants, model_lag(constants.gain, self.lag))
+        self._heading.retune(constants)
+
+    def start(self, q: Quaternion, body_rates: BodyRates | None) -> None:
+        """Begin the plan at `q`, a unit quaternion below the recovery angle.
+
+        `body_rates`: rates at the beginning of the plan, rad/s; None: at rest.
+        """
+        w, x, y, z = q
+        square, ax, ay = tilt_products(w, x, y, z)
+        north = east = turn_rate = yaw_rate = 0.0
+        if body_rates is not None:
+            yaw_rate = body_rates[2]
+            north, east, turn_rate = rates_to_speed(w, x, y, z, *body_rates)
+        # The rates sent for this sample take effect one dead time later: the plan begins there.
+        ahead, yaw_ahead = self.dead_time, self.yaw.dead_time
+        c = Coefficients(-2.0 * ay + ahead * north, 2.0 * ax + ahead * east)
+        heading = heading_of(sqrt(square), w, z) + yaw_ahead * turn_rate
+        model = self._model
+        model.start_at(c, Coefficients(north, east))
+        self._heading.start_at(heading, turn_rate)
+        self._body.start(yaw_rate)
+        self.frame.forget()
+        x, y, self._still = model.rates()
+        plans = self.plans
+        plans.time = 0.0
+        plans.tilt.start(
+            0.0,
+            PlannedTilt(model.north, model.east, 0.0, x, y, 0.0, 0.0, self._still),
+            PlannedTilt(north, east, self._still, 0.0, 0.0, 0.0, 0.0, 0.0),
+        )
+        plans.yaw.start(
+            0.0, PlannedYaw(heading, 0.0, yaw_rate), PlannedYaw(turn_rate, yaw_rate, 0.0)
+        )
+        self._roll.advance()
+        self._pitch.advance()
+
+    def advance(
+        self, target: Target, heading: float, yaw_feedback: float, dt: float
+    ) -> tuple[float, float, float]:
+        """Advance the plan by `dt` seconds; return the rates that follow it in spite of lag, rad/s.
+
+        Args:
+            target: an admissible target.
+            heading: heading of the body minus the turn predicted since the plans began, rad.
+            yaw_feedback: feedback to add to the yaw rate, rad/s.
+            dt: s.
+        """
+        still_before, turn_before = self._still, self._heading.turn_rate
+        self._model.advance(target, dt)
+        self._heading.advance(target, dt)
+        x, y, still_after = self._model.rates()
+        turn_after = self._heading.turn_rate
+        yaw = (
+            0.5 * (still_before + still_after + turn_before + turn_after)
+            + self.yaw.lag / dt * (still_after - still_before + turn_after - turn_before)
+            + yaw_feedback
+        )
+        yaw = clamp(yaw, self._max_yaw_rate)
+        self._body.advance(yaw, dt)
+        self._still = still_after
+        still = 0.5 * (still_before + still_after)
+        self.frame.advance(yaw, still, dt)
+        self._append_plan(x, y, still * dt, dt)
+        return self._roll.command(dt, heading), self._pitch.command(dt, heading), yaw
+
+    def _append_plan(self, x: float, y: float, still_turn: float, dt: float) -> None:
+        """Append the plan of `dt` seconds later.
+
+        `x`, `y`: planned roll and pitch rate at heading 0, rad/s. `still_turn`: yaw meanwhile, rad.
+        """
+        model, body = self._model, self._body
+        still = self.plans.tilt.newest.still + still_turn
+        slopes = model.rate_slopes(x, y)
+        self.plans.add(
+            dt,
+            PlannedTilt(model.north, model.east, still, x, y, *slopes, self._still),
+            PlannedYaw(self._heading.heading, body.turned, body.rate),
+        )

@@ -1,0 +1,99 @@
+"""Makes the command of one step of guidance from reference and motion."""
+
+from functools import cache
+from math import isfinite
+
+from companion.control.flown_source import FlownSource
+from companion.control.guidance_command import GuidanceCommand
+from companion.control.hover_learning import HoverLearning
+from companion.control.motion_estimate import MotionEstimate
+from companion.control.predictive import Predictive
+from companion.guidance import GRAVITY, GuidanceInput, Reference
+from companion.guidance.linear import Guidance
+
+
+class CommandMaker:
+    """Asks linear guidance, or predictive control, and limits the tilt to what the thrust can hold.
+
+    Args:
+        guidance: see below.
+        flown: gives the reference.
+        estimate: gives the state of the vehicle, and takes the commanded vertical thrust.
+        learning: gives the largest tilt.
+        period: period of guidance, s.
+
+    Attributes:
+        guidance: makes targets of references.
+        predictive: predictive control, which flies trajectories instead of linear guidance, or
+            None.
+    """
+
+    def __init__(
+        self,
+        guidance: Guidance,
+        flown: FlownSource,
+        estimate: MotionEstimate,
+        learning: HoverLearning,
+        period: float,
+    ) -> None:
+        self.guidance = guidance
+        self.predictive: Predictive | None = None
+        self._flown, self._estimate, self._learning = flown, estimate, learning
+        self._period = period
+
+    def guidance_input(self, now: float) -> GuidanceInput:
+        """The estimated motion at `now` (s of event-loop time) and when a command acts.
+
+        Raises:
+            RuntimeError: no position has come yet.
+        """
+        return self._estimate.guidance_input(
+            now, self.guidance.acts_after, self._learning.thrust_limits
+        )
+
+    def make(
+        self,
+        now: float,
+        inputs: GuidanceInput,
+        heading: float,
+        turn: float,
+        *,
+        offboard_active: bool,
+    ) -> tuple[Reference, GuidanceCommand | None]:
+        """The reference at `now`, and the command that follows it.
+
+        The command is None if guidance of another package made a value that is not finite.
+
+        Args:
+            now: s of event-loop time.
+            inputs: motion of the vehicle, wind, drag and thrust limits.
+            heading: present heading of the vehicle, rad.
+            turn: sum of the heading resets, rad.
+            offboard_active: whether the autopilot obeys the setpoints.
+        """
+        # Target and heading are made from references at the same times.
+        reference_at = cache(self._flown.reference(now, inputs.now, heading))
+        reference = reference_at(now)
+        linear = self.guidance.command(reference_at, now, inputs)
+        if self.predictive is not None:
+            vehicle = self._estimate.vehicle(now, inputs)
+            following = self._flown.following(now, turn)
+            linear = self.predictive.instead_of(linear, turn, vehicle, following)
+        target, later, down = linear
+        # Open-loop steps, predictive control and `InnerResponse.target` ignore the learned limit.
+        target, later = (self._learning.limit_tilt(each, down) for each in (target, later))
+        if not all(map(isfinite, (*target, *later, down))):
+            return reference, None
+        self._estimate.vertical = GRAVITY - down if offboard_active else GRAVITY
+        command = GuidanceCommand(
+            target,
+            down,
+            now,
+            is_step=reference.coefficients is not None and reference.thrust is None,
+            body_rates=reference.body_rates,
+            thrust=reference.thrust,
+            turn=turn,
+            later=later,
+            period=self._period,
+        )
+        return reference, command

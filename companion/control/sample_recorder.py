@@ -1,0 +1,94 @@
+"""Records the samples that reach the control loop, and the setpoints that answer them."""
+
+from collections.abc import Callable
+from math import nan
+
+from companion.attitude import BodyRates, Limits
+from companion.control.guidance_command import GuidanceCommand
+from companion.control.loop_record import Unanswered
+from companion.control.planner_runner import PlannerRunner
+from companion.control.sample_rows import Answer, LoopFlags, SampleEntry, SampleRows
+from companion.recording.recorder import FlightRecorder
+from companion.vehicle.records import AttitudeSample, AttitudeTarget
+
+
+class SampleRecorder:
+    """Records what the control loop made of each sample, if the flight is recorded.
+
+    The loop calls `begin`, sets `checked`, calls `answer` if it sends a setpoint, and then `end`.
+
+    Args:
+        recorder: of the flight, or None.
+        planner: gives what the planner was asked; calls back with each new ATTITUDE_TARGET.
+        limits: of the body rates.
+        thrust_limits: smallest and largest thrust that is sent, 0..1.
+        clock: returns event-loop time, s.
+
+    Attributes:
+        on: whether the flight is recorded.
+        checked: when the age of the sample was checked before sending, s of event-loop time; NaN:
+            it was not.
+    """
+
+    def __init__(
+        self,
+        recorder: FlightRecorder | None,
+        planner: PlannerRunner,
+        limits: Limits,
+        thrust_limits: tuple[float, float],
+        clock: Callable[[], float],
+    ) -> None:
+        self.on = recorder is not None
+        self.checked = nan
+        self._recorder, self._planner = recorder, planner
+        self._thrust_limits, self._clock = thrust_limits, clock
+        self._answer: Answer | None = None
+        self.retune(limits)
+        if self.on:
+            planner.on_attitude_target = self._attitude_target
+
+    def retune(self, limits: Limits) -> None:
+        """Use other limits of the body rates from the next sample on."""
+        self._rows = SampleRows(limits, self._thrust_limits)
+
+    def begin(self) -> None:
+        """Begin a sample: nothing is checked or sent yet."""
+        self.checked, self._answer = nan, None
+
+    def answer(
+        self, command: GuidanceCommand, rates: BodyRates, thrust: float, latency_ns: int
+    ) -> None:
+        """Note the setpoint that was sent; it is recorded at `end`.
+
+        Args:
+            command: of guidance.
+            rates: rad/s.
+            thrust: 0..1.
+            latency_ns: from the sample's arrival, ns.
+        """
+        planned = not command.idle and command.body_rates is None
+        asked, plan = (self._planner.asked, self._planner.planned) if planned else (None, None)
+        self._answer = Answer(rates, thrust, latency_ns, asked, plan, command.is_step, command.idle)
+
+    def end(self, sample: AttitudeSample, flags: LoopFlags, reason: Unanswered | None) -> None:
+        """Record the sample and its answer.
+
+        Args:
+            sample: the sample.
+            flags: the state of the loop when the sample arrived.
+            reason: why the newest sample that arrived while the loop was on is unanswered.
+        """
+        if self._recorder is None:
+            return
+        reason = reason if flags.on else None
+        entry = SampleEntry(sample, reason, flags, self.checked, self._answer)
+        self._recorder.add(sample.received, self._rows.sample, entry)
+
+    def action(self, name: str) -> None:
+        """Record what a phase tells the loop to do."""
+        if self._recorder is not None:
+            self._recorder.action(self._clock(), name)
+
+    def _attitude_target(self, target: AttitudeTarget) -> None:
+        if self._recorder is not None:
+            self._recorder.add(self._clock(), self._rows.attitude_target, target)

@@ -1,0 +1,183 @@
+"""What a flight recorded of its loops, as values: rows of `flight.mcap` in, records out."""
+
+from math import isnan
+from typing import Any, NamedTuple
+
+from companion.attitude import BodyRates, Target
+from companion.control.guidance_command import GuidanceCommand
+from companion.control.sample_rows import LoopFlags
+from companion.control.step_rows import StepFlags, StepInput
+from companion.drag import Drag
+from companion.guidance import Reference
+from companion.recording.mcap_file.loop_channels import ACTIONS, REASONS
+from companion.vehicle.clock_jumps import Misfit
+from companion.vehicle.records import (
+    AttitudeSample,
+    AttitudeTarget,
+    AttitudeTargetThrust,
+    Battery,
+    LocalPosition,
+)
+
+Row = dict[str, Any]
+"""One message: the value of each column of its channel, by name."""
+
+_TARGET = "north", "east", "heading_rad", "heading_rate_rad_s"
+_MISFITS = (None, Misfit.NOT_NEWER, Misfit.AHEAD)
+
+
+class Setpoint(NamedTuple):
+    """A setpoint: body rates in rad/s, and thrust 0..1."""
+
+    rates: BodyRates
+    thrust: float
+
+
+class RecordedSample(NamedTuple):
+    """A sample, and what the flight made of it.
+
+    Attributes:
+        sample: the sample; its time of arrival for latencies is 0.
+        flags: the state of the control loop when it arrived.
+        checked: when its age was checked before sending, s; NaN: it was not.
+        reason: why it is unanswered, of `REASONS`.
+        setpoint: what was sent, or None.
+    """
+
+    sample: AttitudeSample
+    flags: LoopFlags
+    checked: float
+    reason: str
+    setpoint: Setpoint | None
+
+
+class RecordedStep(NamedTuple):
+    """A step of guidance.
+
+    Attributes:
+        read: what it read.
+        command: what it left with the control loop, or None.
+        reference: its reference, or None.
+    """
+
+    read: StepInput
+    command: GuidanceCommand | None
+    reference: Reference | None
+
+
+class RecordedAction(NamedTuple):
+    """What a phase told guidance to do.
+
+    Attributes:
+        time: s on our clock.
+        name: of `ACTIONS`.
+        clock_offset: vehicle time minus our time, s, or None.
+        drag: of an earlier flight, or None.
+    """
+
+    time: float
+    name: str
+    clock_offset: float | None
+    drag: Drag | None
+
+
+def recorded_sample(row: Row, sent: Row | None) -> RecordedSample:
+    """The sample of a row of `SAMPLE`; `sent`: the row of its `SETPOINT`, or None."""
+    sample = AttitudeSample(
+        int(row["time_boot_ms"]),
+        row["vehicle_time_s"],
+        row["received_s"],
+        0,
+        _quaternion(row),
+        _rates(row, "measured"),
+        row["age_s"],
+        _MISFITS[row["misfit"]],
+        bool(row["age_known"]),
+    )
+    setpoint = None if sent is None else Setpoint(_rates(sent, "commanded"), sent["thrust"])
+    flags = LoopFlags(*(bool(row[name]) for name in LoopFlags._fields))
+    return RecordedSample(sample, flags, row["checked_s"], REASONS[row["unanswered"]], setpoint)
+
+
+def recorded_step(row: Row, target: Row | None, made: Row | None) -> RecordedStep:
+    """The step of a row of `INPUT`, with its rows of `TARGET` and `GUIDANCE`, or None."""
+    position = None
+    if not isnan(row["position_received_s"]):
+        position = LocalPosition(
+            row["position_received_s"],
+            row["position_vehicle_time_s"],
+            _vector(row, "position", "m"),
+            _vector(row, "velocity", "m_s"),
+        )
+    battery = thrust = None
+    if not isnan(row["battery_received_s"]):
+        battery = Battery(row["battery_received_s"], _known(row["battery_v"]), None)
+    if not isnan(received := row["autopilot_thrust_received_s"]):
+        thrust = AttitudeTargetThrust(received, row["autopilot_thrust"])
+    read = StepInput(
+        row["time_s"],
+        position,
+        _known(row["clock_offset_s"]),
+        battery,
+        thrust,
+        _known(row["height_m"]),
+        bool(row["armed"]),
+        StepFlags(*(bool(row[name]) for name in StepFlags._fields)),
+    )
+    reference = None
+    if made is not None:
+        reference = Reference(
+            _vector(made, "reference", "m"),
+            _vector(made, "reference", "m_s"),
+            heading=made["reference_heading_rad"],
+            thrust_steps=not made["height_steady"],
+        )
+    return RecordedStep(read, None if target is None else _command(target), reference)
+
+
+def _command(row: Row) -> GuidanceCommand:
+    later = None
+    if not isnan(row["later_north"]):
+        later = Target(*(row[f"later_{name}"] for name in _TARGET))
+    free = isnan(row["body_roll_rad_s"])
+    return GuidanceCommand(
+        Target(*(row[name] for name in _TARGET)),
+        row["acceleration_down_m_s2"],
+        row["time_s"],
+        bool(row["idle"]),
+        bool(row["is_step"]),
+        None if free else _rates(row, "body"),
+        _known(row["thrust"]),
+        row["turn_rad"],
+        later,
+        row["period_s"],
+    )
+
+
+def recorded_action(row: Row) -> RecordedAction:
+    """The action of a row of `ACTION`."""
+    linear = row["drag_per_s"]
+    drag = None if isnan(linear) else Drag(linear, row["quadratic_drag_per_m"])
+    name = ACTIONS[row["action"]]
+    return RecordedAction(row["time_s"], name, _known(row["clock_offset_s"]), drag)
+
+
+def attitude_target(row: Row) -> AttitudeTarget:
+    """The ATTITUDE_TARGET of a row."""
+    return AttitudeTarget(int(row["time_boot_ms"]), _quaternion(row))
+
+
+def _known(value: float) -> float | None:
+    return None if isnan(value) else value
+
+
+def _quaternion(row: Row) -> tuple[float, float, float, float]:
+    return row["q_w"], row["q_x"], row["q_y"], row["q_z"]
+
+
+def _rates(row: Row, prefix: str) -> BodyRates:
+    return BodyRates(*(row[f"{prefix}_{axis}_rad_s"] for axis in ("roll", "pitch", "yaw")))
+
+
+def _vector(row: Row, prefix: str, unit: str) -> tuple[float, float, float]:
+    return row[f"{prefix}_north_{unit}"], row[f"{prefix}_east_{unit}"], row[f"{prefix}_down_{unit}"]

@@ -1,0 +1,47 @@
+"""The limits of clients' motions, and the changes that they do not allow in flight."""
+
+from math import atan2, degrees
+
+from companion.config import Config
+from companion.config.in_flight import differences
+from companion.guidance import GRAVITY
+from companion.serve.setpoints.motion import CommandedMotion, MotionLimits
+
+_MOTION_LIMITS = frozenset(
+    {"limits.max_climb_m_s", "limits.max_descent_m_s", "limits.max_yaw_rate_deg_s"}
+)
+"""Limits of `CommandedMotion`, which takes them at the takeover."""
+
+
+def commanded_motion(config: Config) -> CommandedMotion:
+    """The motion that clients command, within the limits of `serve` and `limits`."""
+    serve, limits = config.serve, config.limits
+    return CommandedMotion(
+        MotionLimits(
+            serve.max_speed_m_s,
+            serve.max_acceleration_m_s2,
+            serve.max_jerk_m_s3,
+            limits.max_climb_m_s,
+            limits.max_descent_m_s,
+            limits.max_yaw_rate,
+            serve.setpoint_timeout,
+        )
+    )
+
+
+def change_refusal(before: Config, after: Config) -> str | None:
+    """Why a change is refused while a client is in control: its motions are planned already.
+
+    Their limits are those at the takeover. With lower ones in the loops, the reference would run
+    away from the vehicle.
+    """
+    names = {each.name for each in differences(before, after)} & _MOTION_LIMITS
+    if names:
+        return f"{', '.join(sorted(names))} must not change while a client is in control"
+    needed = atan2(after.serve.max_acceleration_m_s2, GRAVITY)
+    if after.limits.max_tilt < min(needed, before.limits.max_tilt):
+        return (
+            f"limits.max_tilt_deg {after.limits.max_tilt_deg:g} is less than the "
+            f"{degrees(needed):.1f}° that serve.max_acceleration_m_s2 needs"
+        )
+    return None

@@ -1,0 +1,210 @@
+"""The loops get the values of the configuration, in SI units, each in its place."""
+
+from math import acos, cos, radians, sin
+from types import SimpleNamespace
+
+import pytest
+
+from companion.attitude import BodyRates, Limits, Target
+from companion.attitude.limits import make_constants
+from companion.config import Config
+from companion.control.hover_learning import HoverLearning
+from companion.control.inner_loop import hover_thrust, law_constants, plugin, thrust_limits
+from companion.control.loop_record import Deadlines
+from companion.control.loops import make_loops
+from companion.control.motion_estimate import MotionEstimate
+from companion.control.outer_loop import predictive_settings
+from companion.control.telemetry import FreshPosition
+from companion.drag import Drag
+from companion.files.yaml_file import ConfigError
+from companion.guidance import GRAVITY, ThrustSettings
+from companion.recording.trace import FlightTrace
+from companion.vehicle.records import AttitudeSample, LocalPosition
+
+CONFIG = Config.model_validate(
+    {
+        "deadman": {
+            "telemetry_stale_ms": 90.0,
+            "target_stale_ms": 140.0,
+            "position_stale_ms": 250.0,
+            "deadline_ms": 3.0,
+        },
+        "limits": {
+            "max_tilt_deg": 30.0,
+            "max_tilt_rate_deg_s": 80.0,
+            "max_yaw_rate_deg_s": 50.0,
+            "recovery_angle_deg": 70.0,
+            "min_thrust": 0.15,
+            "max_thrust": 0.85,
+        },
+        "planner": {"name": "first-order", "gain_per_s": 4.0, "yaw_gain_per_s": 1.5},
+        "thrust": {
+            "hover_thrust": 0.45,
+            "correction_limit": 0.3,
+            "correction_time_s": 1.25,
+            "curve_factor": 0.2,
+            "battery_exponent": 1.5,
+            "lag_ms": 30.0,
+            "autopilot_compensates_tilt": True,
+        },
+        "guidance": {"drag_per_s": 0.6, "rate_hz": 40.0},
+        "vehicle": {"lag_ms": 60.0, "dead_time_ms": 35.0, "pitch_lag_ms": 50.0},
+    }
+)
+SAMPLE = AttitudeSample(
+    3000, 3.0, 10.0, 2000, (1.0, 0.0, 0.0, 0.0), BodyRates(0.0, 0.0, 0.0), 0.0, None, True
+)
+
+
+def test_both_loops_are_made_and_answer_a_sample():
+    now, sent = 10.0, []
+    vehicle = SimpleNamespace(
+        position=LocalPosition(10.0, 3.0, (1.0, 2.0, -3.0), (0.0, 0.0, 0.0)),
+        battery=None,
+        attitude_target_thrust=None,
+        height=3.0,
+        armed=True,
+        standing=False,
+        may_idle=False,
+        offset=-7.0,
+        age=lambda vehicle_time, now: now - 7.0 - vehicle_time,
+    )
+    trace = FlightTrace()
+    loop, guidance_loop = make_loops(
+        CONFIG,
+        lambda *setpoint: sent.append(setpoint) or True,
+        vehicle,
+        vehicle,
+        vehicle,
+        trace,
+        lambda: now,
+        lambda: 3_005_000,
+    )
+    guidance_loop.note_attitude(SAMPLE)
+    guidance_loop.step()
+    guidance_loop.hold_here()
+    guidance_loop.step()
+    loop.on = loop.offboard_active = True
+    loop.on_sample(SAMPLE)
+    ((stamp, rates, thrust),) = sent
+    assert (stamp, tuple(rates)) == (3000, pytest.approx((0.0, 0.0, 0.0), abs=1e-9))
+    assert thrust == hover_thrust(CONFIG).normalised(0.0, SAMPLE.q, SAMPLE.body_rates)
+    assert (loop.record.latency_ns, loop.record.missed_deadlines) == (3_003_000, 1)
+    assert (len(trace.rates_rows()), trace.newest_latency_ns) == (1, 3_003_000)
+    assert loop._deadlines == Deadlines(telemetry_stale=0.09, target_stale=0.14, deadline=0.003)
+    assert loop._limits == Limits(radians(30.0), radians(80.0), radians(50.0))
+    assert loop._hover_thrust is guidance_loop.learning._hover_thrust
+    assert guidance_loop.max_tilt == pytest.approx(radians(30.0))
+    assert loop.command.period == pytest.approx(0.025)
+    now = 10.25
+    assert guidance_loop.fresh_position() is vehicle.position
+    now = 10.3
+    assert guidance_loop.fresh_position() is None
+    assert guidance_loop.estimate.vehicle_time(10.0, vehicle.position) == 3.0
+    vehicle.offset = -6.5
+    assert guidance_loop.estimate.vehicle_time(10.0, vehicle.position) == 3.5
+
+
+def test_a_position_that_is_exactly_as_old_as_allowed_counts():
+    state = SimpleNamespace(position=None)
+    fresh = FreshPosition(state, SimpleNamespace(age=lambda *_: 0.25), 0.25)
+    assert fresh.at(10.0) is None
+    state.position = LocalPosition(9.75, 3.0, (1.0, 2.0, -3.0), (0.0, 0.0, 0.0))
+    assert fresh.at(10.0) is state.position
+    assert fresh.at(10.25) is None
+
+
+def test_thrust_and_law():
+    assert hover_thrust(CONFIG)._settings == ThrustSettings(
+        hover=0.45,
+        correction_limit=0.3,
+        correction_time=1.25,
+        lowest=0.15,
+        highest=0.85,
+        curve_factor=0.2,
+        battery_exponent=1.5,
+        lag=0.03,
+        tilt_compensated=True,
+        drag=0.6,
+    )
+    limits = Limits(radians(30.0), radians(80.0), radians(50.0))
+    assert law_constants(CONFIG) == make_constants(4.0, 1.5, limits, radians(70.0))
+    assert thrust_limits(CONFIG) == pytest.approx((GRAVITY / 3.0, 0.85 / 0.45 * GRAVITY))
+
+
+def test_predictive_control():
+    made = predictive_settings(CONFIG)
+    assert (made.gain, made.yaw_gain, made.lag, made.dead_time) == (4.0, 1.5, 0.06, 0.035)
+    assert made.max_tilt == pytest.approx(radians(30.0))
+    assert made.max_tilt_rate == pytest.approx(radians(80.0))
+    assert made.max_yaw_rate == pytest.approx(radians(50.0))
+    assert (made.min_thrust, made.max_thrust) == thrust_limits(CONFIG)
+    assert (made.lead, made.deadline) == (0.025, 0.025)
+    link = CONFIG.link.model_copy(update={"lockstep": True})
+    assert predictive_settings(CONFIG.model_copy(update={"link": link})).deadline == 1.0
+    slow = CONFIG.vehicle.model_copy(update={"lag_ms": 5.0, "pitch_lag_ms": 5.0})
+    with pytest.raises(ConfigError, match=r"^guidance.kind: nmpc does not work .*lag must be"):
+        predictive_settings(CONFIG.model_copy(update={"vehicle": slow}))
+
+
+def test_a_plugin_that_is_not_installed_is_named():
+    with pytest.raises(ConfigError, match="nobodys-planner"):
+        plugin("companion.planners", "nobodys-planner")
+
+
+def test_the_tilt_is_limited_to_what_the_thrust_can_hold():
+    """The largest thrust of 20 m/s² keeps 5 % in reserve."""
+    learning = HoverLearning(SimpleNamespace(largest_tilted=20.0), None)
+    level, sinking = acos(GRAVITY / 19.0), acos((GRAVITY - 2.0) / 19.0)
+    assert learning.largest_tilt() == pytest.approx(level)
+    assert learning.largest_tilt(2.0) == pytest.approx(sinking)
+    inside = Target(0.3, 0.4, 0.5)
+    assert learning.limit_tilt(inside, 0.0) == inside
+    found = learning.limit_tilt(Target(0.6 * 0.99, 0.8 * 0.99, 0.5), 2.0)
+    assert found == pytest.approx((0.6 * sin(sinking), 0.8 * sin(sinking), 0.5, 0.0))
+    assert cos(sinking) < cos(level)
+
+
+class Observer:
+    """Keeps what it is told."""
+
+    disturbance = (0.5, -0.5)
+
+    def __init__(self):
+        self.turns, self.settings = [], []
+        self.turn, self.retune = self.turns.append, self.settings.append
+
+
+def estimate(observer=None, **drag):
+    resets = []
+    correction = SimpleNamespace(reset=lambda: resets.append(1))
+    made = MotionEstimate(observer or Observer(), correction, SimpleNamespace(**drag))
+    return made, resets
+
+
+def test_only_a_new_reset_of_the_heading_turns_the_estimate():
+    made, resets = estimate(observer := Observer())
+    for turn in (0.0, 0.5, 0.5, 0.25):
+        made.turn_to(turn)
+    assert (observer.turns, len(resets)) == ([0.5, -0.25], 2)
+    made.retune("settings")
+    assert observer.settings == ["settings"]
+
+
+@pytest.mark.parametrize(
+    ("learned", "certain", "told"),
+    [
+        (Drag(0.4, 0.03), True, "at 5.0 m/s is 0.55 1/s, but 0.25 was assumed"),
+        (Drag(0.4, 0.03), False, None),
+        (Drag(0.0, 0.01), True, "at 5.0 m/s is 0.05 1/s, but 0.25 was assumed"),
+        (Drag(0.39, 0.0), True, None),
+    ],
+)
+def test_a_drag_that_is_far_off_is_told_with_the_keys_to_set(learned, certain, told):
+    made, _ = estimate(first=Drag(0.25, 0.0), drag=learned, top_speed=5.0, certain=certain)
+    warning = made.mismatch_warning()
+    assert (warning is None) is (told is None)
+    if told is not None:
+        assert told in warning
+        assert f"guidance.drag_per_s to {learned.linear:.2f}" in warning
+        assert f"guidance.quadratic_drag_per_m to {learned.quadratic:.3f}" in warning

@@ -1,0 +1,77 @@
+"""Which part of a flight is flown, and what is recorded of its reference."""
+
+from math import isnan
+from types import SimpleNamespace
+
+import pytest
+
+from companion.attitude import BodyRates
+from companion.control.flown_source import FlownSource
+from companion.control.tracking_record import FlownPart, TrackingRecord, flown_part
+from companion.guidance import Doublets, ManeuverSequence, Pose, Reference, VehicleMotion
+from companion.guidance.follow import Follow
+from companion.guidance.source import ManeuverSource
+from companion.guidance.trajectory import Laps, circle
+from companion.recording.trace import FlightTrace, ManeuverMark
+
+POSE = Pose((1.0, 2.0, -3.0), 0.5)
+HERE = VehicleMotion((1.5, 2.5, -3.5), (0.0, 0.0, 0.0))
+DOUBLETS = Doublets(1.0, 0.25, 0.8, 1.0, climb=2.0, climb_step=0.25, settle=1.0)
+
+
+def program(ends=20.0):
+    """A source that another program commands."""
+    return SimpleNamespace(name="program", begin=lambda *_: None, finished=lambda now: now > ends)
+
+
+def test_what_is_flown_has_its_name_and_its_time():
+    flown, source = FlownSource(), program()
+    assert flown_part(flown, 12.0) is None
+    assert flown.finished(99.0) is False
+    flown.begin(source, POSE, 10.0)
+    assert flown_part(flown, 12.0) == FlownPart("program", 2.0, None, source)
+    assert (flown.finished(20.0), flown.finished(20.5)) == (False, True)
+    assert flown_part(flown, 20.5) is None
+    flown.begin(ManeuverSource(ManeuverSequence([DOUBLETS])), POSE, 30.0)
+    assert flown_part(flown, 31.5) == FlownPart("identify", 1.5, DOUBLETS.duration, DOUBLETS)
+    flown.begun_at = None
+    assert flown_part(flown, 31.5) is None
+
+
+def test_only_a_trajectory_is_followed():
+    flown, follow = FlownSource(), Follow(circle(5.0, Laps(2.0)), yaw_rate=1.0)
+    assert flown.following(12.0, 0.25) is None
+    flown.begin(program(), POSE, 10.0)
+    assert flown.following(12.0, 0.25) is None
+    flown.begin(ManeuverSource(ManeuverSequence([DOUBLETS, follow])), POSE, 10.0)
+    assert flown.following(12.0, 0.25) is None
+    assert flown.following(12.5 + DOUBLETS.duration, 0.25) == (follow, 2.5, POSE, 0.25)
+
+
+def test_a_maneuver_is_told_once_and_its_end_is_marked():
+    trace, flown, told = FlightTrace(), FlownSource(), []
+    record = TrackingRecord(trace, flown)
+    assert record.note("nobody listens") is None
+    record.note = told.append
+    record.add(9.0, 3.0, Reference((1.0, 2.0, -3.0)), HERE)
+    flown.begin(program(), POSE, 10.0)
+    for now in (10.0, 12.0, 21.0, 22.0):
+        record.add(now, now - 6.0, Reference((1.0, 2.0, -3.0)), HERE)
+    assert told == ["maneuver: program"]
+    assert trace.maneuvers == [ManeuverMark(10.0, 4.0, "program"), ManeuverMark(21.0, 15.0, None)]
+    rows = trace.tracking_rows()
+    assert rows[0].tolist() == pytest.approx([3.0, 1.0, 2.0, -3.0, 1.5, 2.5, -3.5])
+
+
+@pytest.mark.parametrize(
+    ("reference", "known"),
+    [
+        (Reference((1.0, 2.0, -3.0), drifting=True), [False, False, True]),
+        (Reference((1.0, 2.0, -3.0), body_rates=BodyRates(0.1, 0.0, 0.0)), [False, False, True]),
+        (Reference((1.0, 2.0, -3.0), holds_height=False), [True, True, False]),
+    ],
+)
+def test_what_is_no_reference_is_nan(reference, known):
+    trace = FlightTrace()
+    TrackingRecord(trace, FlownSource()).add(9.0, 3.0, reference, HERE)
+    assert [not isnan(value) for value in trace.tracking_rows()[0, 1:4]] == known

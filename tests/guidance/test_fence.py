@@ -1,0 +1,115 @@
+"""The fence: on which side of each limit a place lies, how far, and where the vehicle stops."""
+
+from dataclasses import replace
+from math import cos, inf, radians
+
+import pytest
+
+from companion.guidance.fence import (
+    EARTH_RADIUS,
+    Fence,
+    Place,
+    distance_inside,
+    inside,
+    local_polygon,
+)
+
+SQUARE = ((-10.0, -10.0), (-10.0, 10.0), (10.0, 10.0), (10.0, -10.0))
+FENCE = Fence(50.0, 30.0, 2.0, (), (), 2.0, 0.5)
+HOME = Place(47.0, 8.0)
+
+
+def breach(north=0.0, east=0.0, down=0.0, height=10.0, fence=FENCE, **options):
+    return fence.breach((north, east, down), height, **{"origin": HOME, **options})
+
+
+def test_the_limits_themselves_are_allowed():
+    assert breach(30.0, 40.0) is None
+    assert breach(down=-30.0) is None
+    assert breach(height=2.0) is None
+    assert breach(height=None) is None
+
+
+@pytest.mark.parametrize(
+    ("place", "limit", "words", "by"),
+    [
+        (
+            {"north": -33.0, "east": 44.0},
+            "limits.fence_radius_m",
+            "55.0 m from where control began, beyond limits.fence_radius_m",
+            5.0,
+        ),
+        (
+            {"down": -32.5},
+            "limits.fence_ceiling_m",
+            "32.5 m above where control began, above limits.fence_ceiling_m",
+            2.5,
+        ),
+        (
+            {"height": 0.5},
+            "limits.fence_floor_m",
+            "0.5 m above home, below limits.fence_floor_m",
+            1.5,
+        ),
+    ],
+)
+def test_a_breach_tells_its_limit_and_how_far_outside_it_is(place, limit, words, by):
+    found = breach(**place)
+    assert (found.limit, str(found), found.by) == (limit, words, by)
+
+
+def test_a_margin_counts_inwards_from_every_side():
+    polygon = replace(FENCE, polygon=SQUARE)
+    for place in ({"north": 46.0}, {"down": -26.0}, {"height": 6.0}):
+        assert breach(**place, margin=4.0) is None
+        assert breach(**place, margin=4.01) is not None
+    assert breach(6.0, fence=polygon, margin=4.0) is None
+    found = breach(6.5, fence=polygon, margin=4.0)
+    assert (found.limit, found.by) == ("safety.fence_polygon_m", -3.5)
+    assert str(found) == "outside the polygon of the fence"
+    assert breach(12.0, fence=polygon).by == 0.0
+    assert breach(12.0, fence=polygon, margin=1.0).by == pytest.approx(2.0)
+
+
+def test_a_fence_on_the_map_needs_to_know_where_it_is():
+    degree = EARTH_RADIUS * radians(1.0)
+    corners = tuple(
+        (47.0 + north / degree, 8.0 + east / (degree * cos(radians(47.0))))
+        for north, east in SQUARE
+    )
+    fence = replace(FENCE, places=corners)
+    assert breach(9.9, -9.9, fence=fence) is None
+    assert breach(9.9, -10.1, fence=fence).limit == "safety.fence_polygon_deg"
+    unknown = breach(fence=fence, origin=None)
+    assert (unknown.limit, unknown.by) == ("safety.fence_polygon_deg", 0.0)
+    assert str(unknown) == "at a place whose latitude and longitude are not known"
+    flat = [value for corner in local_polygon(corners, HOME) for value in corner]
+    assert flat == pytest.approx([value for corner in SQUARE for value in corner], abs=1e-5)
+
+
+def test_it_stops_after_the_reaction_and_the_braking():
+    """v·t + v²/(2a): 5 m/s needs 2.5 + 6.25 m, 2 m/s down 1 + 1 m."""
+    stop = FENCE.stop((1.0, 2.0, -5.0), (3.0, -4.0, 2.0))
+    assert stop == pytest.approx((1.0 + 0.6 * 8.75, 2.0 - 0.8 * 8.75, -3.0))
+    assert FENCE.stop((0.0, 0.0, 0.0), (0.0, 0.0, -2.0)) == pytest.approx((0.0, 0.0, -2.0))
+
+
+def test_where_it_would_stop_is_judged_with_its_height_there():
+    sinking = ((0.0, 0.0, -5.0), (0.0, 0.0, 2.0))  # 2 m further down
+    assert FENCE.stop_breach(*sinking, 4.0, HOME) is None
+    assert FENCE.stop_breach(*sinking, 3.5, HOME).by == pytest.approx(0.5)
+    assert FENCE.stop_breach(*sinking, 4.0, HOME, margin=0.25).limit == "limits.fence_floor_m"
+    assert FENCE.stop_breach(*sinking, None, HOME) is None
+    leaving = ((45.0, 0.0, -5.0), (5.0, 0.0, 0.0))
+    assert FENCE.stop_breach(*leaving, 10.0, HOME).by == pytest.approx(3.75)
+
+
+def test_how_far_inside_a_polygon_a_place_is():
+    assert distance_inside(0.0, 3.0, SQUARE) == 7.0
+    assert distance_inside(12.0, 0.0, SQUARE) == -2.0
+    assert distance_inside(13.0, 14.0, SQUARE) == -5.0  # from a corner
+    assert inside(9.999, -9.999, SQUARE)
+    assert not inside(0.0, 10.001, SQUARE)
+    point = ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
+    assert distance_inside(3.0, 4.0, point) == -5.0
+    assert distance_inside(0.0, 0.0, (*SQUARE, SQUARE[-1])) < inf  # a corner twice is no side

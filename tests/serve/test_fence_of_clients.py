@@ -1,0 +1,118 @@
+"""The fence and the safety monitors stand above every client."""
+
+import asyncio
+import math
+from itertools import count
+from types import SimpleNamespace
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from companion import testing
+from companion.config import Config
+from companion.config.files import changed
+from companion.safety.snapshot_builder import FenceCentre
+from companion.serve.kept_fence import KeptFence
+from companion.vehicle.records import LocalPosition
+from tests.serve.test_control import REJECTED
+from tests.serve.virtual import (
+    POSITION,
+    MemoryClient,
+    airborne,
+    begin_control,
+    mock,
+    serving,
+    stream,
+)
+
+RADIUS = 9.0
+HOLD = {"px4": (176, 1, 4, 3), "ardupilot": (176, 1, 17)}
+GUIDED = 176, 1, 4
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_a_client_that_asks_again_does_not_take_the_fence_along(autopilot):
+    """It lets go 6 m from where control began, asks again, and commands a place 5 km away."""
+    vehicle = mock(autopilot)
+
+    async def whole():
+        limits = {"fence_radius_m": RADIUS}
+        async with serving(vehicle, autopilot, limits=limits) as session:
+            ground = await airborne(session, vehicle, autopilot)
+            script = MemoryClient().connect(session)
+            north, east, down = vehicle.state()["position"]
+
+            def to(metres):
+                return lambda _: script.local(POSITION, (north + metres, east, down))
+
+            def distance():
+                return math.dist(vehicle.state()["position"][:2], (north, east))
+
+            sent = count()
+
+            def hold(_):
+                """A station asks for rare telemetry now and then, as MAVProxy does."""
+                if next(sent) % 10 == 0:
+                    ground.send(dialect.MAVLink_request_data_stream_message(1, 1, 0, 4, 1))
+                to(0.0)(0.0)
+
+            await begin_control(session, script, autopilot, hold)
+            assert "control was not given" not in " ".join(script.texts())
+            await stream(5.0, to(6.0), 0.1)
+            script.command(*HOLD[autopilot])
+            await asyncio.sleep(1.5)
+            assert not session.control.in_control
+            assert distance() == pytest.approx(6.0, abs=0.4)
+            if autopilot == "ardupilot":
+                ground.command(*GUIDED)
+                await asyncio.sleep(0.5)
+            await begin_control(session, script, autopilot, to(6.0))
+            script.heard.clear()
+            farthest = [0.0]
+            vehicle.after_step.append(lambda: farthest.append(distance()))
+            async with asyncio.timeout(20.0):
+                while session.control.in_control:
+                    await stream(0.1, to(5000.0), 0.05)
+            if autopilot == "px4":
+                asked = asyncio.ensure_future(script.offboard())
+                await stream(0.5, to(0.0))
+                assert await asked == REJECTED
+            await stream(2.0, to(5000.0))
+            assert vehicle.state()["mode"] == "LAND"
+            said = " ".join(script.texts())
+            assert "safety: braking: about to stop" in said, said
+            assert "the vehicle is held, and control ends" in said
+            assert max(farthest) < RADIUS + 2.0, "it was on its way when the landing began"
+
+    testing.run(vehicle, whole())
+
+
+class FakeLink:
+    """What `KeptFence` sees of a vehicle."""
+
+    def __init__(self):
+        self.state = SimpleNamespace(armed=True, height=5.0, position=None)
+
+    def subscribe(self, _, callback):
+        self.heartbeat = lambda: callback(None)
+
+    def at(self, *position):
+        self.state.position = LocalPosition(0.0, 0.0, position, (0.0, 0.0, 0.0))
+
+
+def test_outside_the_fence_of_the_first_flight_control_is_refused_until_the_vehicle_disarms():
+    config, link = changed(Config(), {"limits": {"fence_radius_m": RADIUS}}, "test"), FakeLink()
+    fence = KeptFence(config, link)
+    link.at(100.0, 0.0, -5.0)
+    assert fence.refusal() is None, "nobody was in control yet"
+    fence.keep(FenceCentre((100.0, 0.0, -5.0), None))
+    fence.keep(FenceCentre((108.0, 0.0, -5.0), None))
+    link.at(108.0, 0.0, -5.0)
+    assert fence.refusal() is None
+    link.at(110.0, 0.0, -5.0)
+    assert "10.0 m from where control began, beyond limits.fence_radius_m" in fence.refusal()
+    link.heartbeat()
+    assert fence.refusal() is not None
+    link.state.armed = False
+    link.heartbeat()
+    assert fence.refusal() is None
