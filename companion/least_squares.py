@@ -67,8 +67,8 @@ def minimise(projection: Projection, start: Floats, lowest: Floats, highest: Flo
     """
     unknown, damping = np.clip(start, lowest, highest), 1e-3
     weights, residual = projection(unknown)
+    slopes = _slopes(projection, unknown)
     for _ in range(_MOST_STEPS):
-        slopes = _slopes(projection, unknown)
         curvature, descent = slopes.T @ slopes, -(slopes.T @ residual)
         stiff = curvature + damping * np.diag(np.diagonal(curvature) + 1e-12)
         trial = np.clip(unknown + np.linalg.solve(stiff, descent), lowest, highest)
@@ -77,12 +77,13 @@ def minimise(projection: Projection, start: Floats, lowest: Floats, highest: Flo
         moved = float(np.abs(trial - unknown).max())
         if gained > 0.0:
             unknown, weights, residual = trial, trial_weights, trial_residual
+            slopes = _slopes(projection, unknown)
             damping = max(0.2 * damping, 1e-9)
         else:
             damping *= 5.0
         if moved < 1e-7 or 0.0 < gained < _CONVERGED * float(residual @ residual):
             break
-    return Solution(unknown, weights, residual, _slopes(projection, unknown))
+    return Solution(unknown, weights, residual, slopes)
 
 
 def _slopes(projection: Projection, unknown: Floats) -> Floats:

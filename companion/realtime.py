@@ -30,6 +30,23 @@ def schedule_as_usual(pid: int) -> None:
         os.sched_setscheduler(pid, os.SCHED_OTHER, os.sched_param(0))
 
 
+@contextmanager
+def frozen_objects() -> Iterator[None]:
+    """Keep the garbage collector from walking through the objects that exist now.
+
+    They are mostly modules and live as long as the program. If the caller has frozen objects of its
+    own (`gc.freeze`), all stay frozen at the end: Python cannot unfreeze only some.
+    """
+    frozen_before = gc.get_freeze_count() > 0
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        if not frozen_before:
+            gc.unfreeze()
+
+
 class RealtimeError(Exception):
     """A required setting was refused; the message says which, why, and how to get it."""
 
@@ -158,14 +175,9 @@ def _lock_memory() -> _Undo:
 
 
 def _stop_collecting() -> _Undo:
-    was_enabled = gc.isenabled()
-    gc.collect()
-    gc.freeze()
+    undo = ExitStack()
+    undo.enter_context(frozen_objects())
+    if gc.isenabled():
+        undo.callback(gc.enable)
     gc.disable()
-
-    def undo() -> None:
-        gc.unfreeze()
-        if was_enabled:
-            gc.enable()
-
-    return undo
+    return undo.close

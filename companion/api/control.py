@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator
+from itertools import chain
 from math import inf, isfinite
 
 from companion.api.state import State, state_of
@@ -12,6 +13,7 @@ from companion.guidance.source import CommandedSource
 from companion.safety.actions import FlightEnded
 
 _NOWHERE = (0.0, 0.0, 0.0)
+_AXES = 3
 
 
 class Control:
@@ -75,7 +77,7 @@ class Control:
             heading: rad; None: the one with which control began.
 
         Raises:
-            ValueError: a number is not finite; the newest command still counts.
+            ValueError: a number is not finite or missing; the newest command still counts.
             FlightEnded: control has ended.
         """
         self.follow(
@@ -101,10 +103,10 @@ class Control:
             jerk_ned: rate of its acceleration, m/s³; None: by the difference from the one before.
 
         Raises:
-            ValueError: a number is not finite; the newest command still counts.
+            ValueError: a number is not finite or missing; the newest command still counts.
             FlightEnded: control has ended.
         """
-        _require_finite(reference, jerk_ned or _NOWHERE)
+        _require_usable(reference, jerk_ned or _NOWHERE)
         self._require_control()
         self._source.give(reference, self._clock(), jerk_ned)
         self._context.guidance_loop.step_soon()
@@ -118,7 +120,7 @@ class Control:
             heading: rad; None: the one with which control began.
 
         Raises:
-            ValueError: a number is not finite; the newest command still counts.
+            ValueError: a number is not finite or missing; the newest command still counts.
             FlightEnded: control has ended.
         """
         self.follow(self._open_loop(heading)._replace(coefficients=Coefficients(north, east)))
@@ -130,7 +132,7 @@ class Control:
             body_rates: roll, pitch, yaw, rad/s.
 
         Raises:
-            ValueError: a number is not finite; the newest command still counts.
+            ValueError: a number is not finite or missing; the newest command still counts.
             FlightEnded: control has ended.
         """
         self.follow(self._open_loop(None)._replace(body_rates=BodyRates(*body_rates)))
@@ -148,17 +150,27 @@ class Control:
             raise FlightEnded("the program has ended its control")
 
 
-def _require_finite(reference: Reference, jerk_ned: Vector) -> None:
+def _require_usable(reference: Reference, jerk_ned: Vector) -> None:
+    """Check that vectors have three components, and that all numbers are finite.
+
+    Raises:
+        ValueError: one has not, or is not.
+    """
+    vectors = [
+        reference.position_ned,
+        reference.velocity_ned,
+        reference.acceleration_ned,
+        reference.body_rates or _NOWHERE,
+        jerk_ned,
+    ]
+    if any(len(vector) != _AXES for vector in vectors):
+        raise ValueError(f"a vector must have three components, not as in {reference}")
     values = [
-        *reference.position_ned,
-        *reference.velocity_ned,
-        *reference.acceleration_ned,
+        *chain.from_iterable(vectors),
         reference.heading,
         reference.heading_rate,
         *(reference.coefficients or ()),
-        *(reference.body_rates or ()),
         *(() if reference.thrust is None else (reference.thrust,)),
-        *jerk_ned,
     ]
     if not all(map(isfinite, values)):
         raise ValueError(f"a command must be finite, not {reference}")

@@ -74,7 +74,13 @@ class Vehicle:
         )
 
     async def hold(self, seconds: float) -> None:
-        """Hold the position and the heading for a time, s."""
+        """Hold the position and the heading for a time, s.
+
+        Raises:
+            ValueError: the time is negative or no number; nothing was flown.
+        """
+        if not seconds >= 0.0:
+            raise ValueError(f"the time to hold must be 0 s or more, not {seconds:g}")
         await self._fly(hover(seconds))
 
     async def go_to(

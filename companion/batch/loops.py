@@ -44,10 +44,16 @@ class Loops(NamedTuple):
 
 
 @cache
+def _compiler(any_angle: bool) -> Compiler:
+    """One for all laws: they have most of what they call in common."""
+    return Compiler(_ARCTANGENT if any_angle else _ALL_SERIES)
+
+
+@cache
 def compiled_loops(law: Law, any_angle: bool = False) -> Loops:
     """`law` compiled; without `any_angle` for turns up to 1 rad per sample, which is faster."""
-    compiler = Compiler(_ARCTANGENT if any_angle else _ALL_SERIES)
-    one_law, turned = compiler.function(law), compiler.function(rotation.turned)
+    compiler = _compiler(any_angle)
+    one_law = compiler.function(law)
 
     def apply(q: Array, targets: Array, rates: Array, dt: float, constants: Constants) -> None:
         for i in range(q.shape[1]):
@@ -55,13 +61,22 @@ def compiled_loops(law: Law, any_angle: bool = False) -> Loops:
             target = targets[0, i], targets[1, i], targets[2, i], targets[3, i]
             rates[0, i], rates[1, i], rates[2, i] = one_law(attitude, target, dt, constants)
 
+    return _over_samples(compiler.loop(apply), _compiled_turn(any_angle), compiler.loop, any_angle)
+
+
+@cache
+def _compiled_turn(any_angle: bool) -> _Turn:
+    compiler = _compiler(any_angle)
+    turned = compiler.function(rotation.turned)
+
     def turn(q: Array, rates: Array, after: Array, dt: float) -> None:
         for i in range(q.shape[1]):
             attitude = q[0, i], q[1, i], q[2, i], q[3, i]
             turning = rates[0, i], rates[1, i], rates[2, i]
             after[0, i], after[1, i], after[2, i], after[3, i] = turned(attitude, turning, dt)
 
-    return _over_samples(compiler.loop(apply), compiler.loop(turn), compiler.loop, any_angle)
+    compiled: _Turn = compiler.loop(turn)
+    return compiled
 
 
 @cache

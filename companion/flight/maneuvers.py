@@ -1,7 +1,8 @@
 """The configured maneuvers, checked against limits and fence before the flight."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Hashable, Iterable, Iterator
 from dataclasses import replace
+from functools import lru_cache
 from math import tau
 
 import numpy as np
@@ -166,12 +167,24 @@ def _motions(part: Maneuver, drag: Drag) -> Iterator[Motion]:
     """Predicted motions of a maneuver; for body-rate doublets, at eight initial headings."""
     turns = 8 if isinstance(part, Doublets) else 1
     for k in range(turns):
-        moments = list(predicted(part, tau * k / turns, drag))
-        times, offset, velocity, acceleration = (
-            np.array(column) for column in zip(*moments, strict=True)
-        )
-        jerk, turning = np.zeros_like(offset), np.zeros_like(times)
-        yield Motion(times, offset, velocity, acceleration, jerk, turning)
+        heading = tau * k / turns
+        # A flight checks its maneuvers several times. `Follow` remembers where it began: not kept.
+        if isinstance(part, Hashable):
+            yield _kept_motion(part, heading, drag)
+        else:
+            yield _motion(part, heading, drag)
+
+
+def _motion(part: Maneuver, heading: float, drag: Drag) -> Motion:
+    """The predicted motion of a maneuver that begins at a heading (rad)."""
+    times, offset, velocity, acceleration = (
+        np.array(column) for column in zip(*predicted(part, heading, drag), strict=True)
+    )
+    jerk, turning = np.zeros_like(offset), np.zeros_like(times)
+    return Motion(times, offset, velocity, acceleration, jerk, turning)
+
+
+_kept_motion = lru_cache(maxsize=32)(_motion)
 
 
 def _refuse(name: str, broken: Violation | None, drag: str = "") -> None:

@@ -7,12 +7,13 @@ every packet into a new 256 KiB buffer. `companion bench link` measures this.
 """
 
 import asyncio
-import gc
 import select
 import selectors
 from collections.abc import Callable, Coroutine
 from math import ceil
 from typing import Any, TypeVar
+
+from companion.realtime import frozen_objects
 
 T = TypeVar("T")
 
@@ -94,13 +95,8 @@ def unwatch(loop: asyncio.AbstractEventLoop, fd: int) -> None:
 def run(main: Coroutine[Any, Any, T]) -> T:
     """Run `main` like `asyncio.run`, on a `LinkEventLoop`.
 
-    Objects that exist now, mostly modules, live as long as the program. They are frozen, so that
-    the garbage collector does not walk through them in the middle of a control step.
+    The objects that exist now are frozen, so that the garbage collector does not walk through them
+    in the middle of a control step.
     """
-    gc.collect()
-    gc.freeze()
-    try:
-        with asyncio.Runner(loop_factory=LinkEventLoop) as runner:
-            return runner.run(main)
-    finally:
-        gc.unfreeze()
+    with frozen_objects(), asyncio.Runner(loop_factory=LinkEventLoop) as runner:
+        return runner.run(main)

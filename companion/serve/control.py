@@ -241,7 +241,7 @@ class ServedControl:
             if not begun:
                 self._not_before = self._clock() + _TRY_AGAIN
             await flight.save()
-            if self._flight is None and not gc.isenabled():  # `realtime.freeze_gc`, between flights
+            if self._flight is None and self._config.realtime.freeze_gc:  # between flights
                 gc.collect()
 
     def _answer(self, client: Client, frame: Frame, result: int) -> None:

@@ -58,7 +58,9 @@ def write_page(outcomes: Sequence[Outcome], path: Path) -> None:
 def _lay_out(figure: Figure) -> None:
     """Lay out the figure once; otherwise each `savefig` lays it out twice."""
     figure.set_dpi(_DPI)
-    figure.draw_without_rendering()
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
     figure.set_layout_engine("none")
 
 

@@ -156,6 +156,11 @@ async def returns_nan(control):
     control.accelerate((float("nan"), 0.0, 0.0))
 
 
+async def forgets_an_axis(control):
+    """Commands a horizontal acceleration only."""
+    control.accelerate((0.5, 0.0))
+
+
 async def returns_infinity(control):
     """Commands what no vehicle does."""
     control.rotate((0.0, float("inf"), 0.0))
@@ -170,6 +175,7 @@ async def returns_infinity(control):
         ("ardupilot", raises, ZeroDivisionError, "the program raised ZeroDivisionError('mine')"),
         ("px4", returns_nan, ValueError, "a command must be finite"),
         ("ardupilot", returns_nan, ValueError, "a command must be finite"),
+        ("ardupilot", forgets_an_axis, ValueError, "a vector must have three components"),
         ("px4", returns_infinity, ValueError, "a command must be finite"),
     ],
 )
@@ -240,6 +246,9 @@ def test_what_the_limits_do_not_allow_is_refused_and_the_vehicle_holds_on(tmp_pa
             await vehicle.go_to((north + 500.0, east, down))
         with pytest.raises(ConfigError, match="limits"):
             await vehicle.go_to((north + 20.0, east, down), speed=15.0, acceleration=30.0, jerk=1e3)
+        for seconds in (-1.0, float("nan")):
+            with pytest.raises(ValueError, match="0 s or more"):
+                await vehicle.hold(seconds)
         await vehicle.hold(2.0)
         assert dist(here, vehicle.state.position_ned) < 0.1
         await vehicle.land()

@@ -35,6 +35,20 @@ def attitudes(c, headings):
     ) * Rotation.from_rotvec(np.column_stack([level, level, headings]))
 
 
+def multiplied(p, q):
+    """p ⊗ q of quaternions (..., 4) in the order x, y, z, w, as SciPy has them."""
+    (a, b, c, d), (x, y, z, w) = np.moveaxis(p, -1, 0), np.moveaxis(q, -1, 0)
+    return np.stack(
+        [
+            d * x + a * w + b * z - c * y,
+            d * y - a * z + b * w + c * x,
+            d * z + a * y - b * x + c * w,
+            d * w - a * x - b * y - c * z,
+        ],
+        axis=-1,
+    )
+
+
 def quaternion(r, goal, gain, tilt_rate=np.inf, yaw_rate=np.inf):
     """2p·vec(q⁻¹ ⊗ q_d), the short way round."""
     error = (r.inv() * goal).as_quat(canonical=True)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from companion.attitude import BodyRates
-from tests.attitude.independent import coefficients_of, headings_of
+from tests.attitude.independent import coefficients_of, headings_of, multiplied
 
 LONGEST_STEP = 1e-3  # s
 
@@ -37,21 +37,21 @@ class LagPlant:
         """Hold `command` (N, 3) for `dt`; `push` (rad/s) turns the body without its rate loop."""
         self._times = np.append(self._times, self._time)
         self._commands.append(np.asarray(command, dtype=float))
-        commands = np.array(self._commands)
-        times = np.append(self._times, np.inf)
-        row, column = np.indices(self.rates.shape)
         steps = int(np.ceil(dt / LONGEST_STEP - 1e-9))
         h = dt / steps
-        turns = []
+        now = self._time + h * np.arange(steps)[:, None, None] - self._dead_time
+        times = np.append(self._times, np.inf)
+        which = np.searchsorted(times, now + 1e-9, side="right") - 1
+        first = np.clip(times[which + 1] - now, 0.0, h)
+        later = np.minimum(which + 1, len(self._commands) - 1)
+        commands = np.array(self._commands)
+        row, column = np.indices(self.rates.shape)
+        before, after = commands[which, row, column], commands[later, row, column]
+        turns = np.empty_like(now)
         for step in range(steps):
-            now = self._time + step * h - self._dead_time
-            which = np.searchsorted(times, now + 1e-9, side="right") - 1
-            first = np.clip(times[which + 1] - now, 0.0, h)
-            turned = self._answer(commands[which, row, column], first)
-            later = np.minimum(which + 1, len(commands) - 1)
-            turned = turned + self._answer(commands[later, row, column], h - first)
-            turns.append(turned + np.asarray(push) * h)
-        self.r = self.r * one_after_the_other(np.array(turns))
+            turned = self._answer(before[step], first[step])
+            turns[step] = turned + self._answer(after[step], h - first[step])
+        self.r = self.r * one_after_the_other(turns + np.asarray(push) * h)
         self._time += dt
         self.true_rates = self.rates + push
 
@@ -65,15 +65,14 @@ class LagPlant:
 
 def one_after_the_other(turns):
     """The product of the rotations by (S, N, 3) rotation vectors, of each of N bodies."""
-    count = turns.shape[1]
-    product = Rotation.from_rotvec(turns.reshape(-1, 3))
-    while (left := len(product) // count) > 1:
-        index = np.arange(left * count).reshape(left, count)
-        pairs = index[: left - left % 2]
-        joined = product[pairs[::2].ravel()] * product[pairs[1::2].ravel()]
-        last = [product[index[-1]]] if left % 2 else []
-        product = Rotation.concatenate([joined, *last])
-    return product
+    angle = np.linalg.norm(turns, axis=-1)
+    vector = (0.5 * np.sinc(angle / (2.0 * np.pi)))[..., None] * turns
+    product = np.concatenate([vector, np.cos(0.5 * angle)[..., None]], axis=-1)
+    while len(product) > 1:
+        even = len(product) // 2 * 2
+        joined = multiplied(product[:even:2], product[1:even:2])
+        product = np.concatenate([joined, product[even:]])
+    return Rotation.from_quat(product[0])
 
 
 @dataclass

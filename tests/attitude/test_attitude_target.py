@@ -1,5 +1,6 @@
 """`model-following` on an autopilot that takes the rates along an attitude target, as ArduPilot."""
 
+import math
 from math import inf, nan
 
 import numpy as np
@@ -15,7 +16,33 @@ from tests.attitude.simulate import quaternion
 START, GOAL, HEADING = np.array([-0.4, -0.5]), np.array([0.4, -0.5]), 0.7
 LAG, YAW_LAG = 0.02, 0.12
 KP = 4.5
-LAGS = np.array([LAG, LAG, YAW_LAG])
+LAGS = (LAG, LAG, YAW_LAG)
+
+
+def times(p, q):
+    """p ⊗ q, in the order x, y, z, w."""
+    (a, b, c, d), (x, y, z, w) = p, q
+    return (
+        d * x + a * w + b * z - c * y,
+        d * y - a * z + b * w + c * x,
+        d * z + a * y - b * x + c * w,
+        d * w - a * x - b * y - c * z,
+    )
+
+
+def turn(rates, seconds):
+    """The quaternion of these rates, held for so long."""
+    angle = math.hypot(*rates) * seconds
+    share = 0.5 * seconds * (math.sin(0.5 * angle) / (0.5 * angle) if angle else 1.0)
+    return (*(share * rate for rate in rates), math.cos(0.5 * angle))
+
+
+def rotation_vector(q):
+    """Of a quaternion, the short way round."""
+    x, y, z, w = q if q[3] >= 0.0 else tuple(-each for each in q)
+    sine = math.hypot(x, y, z)
+    share = 2.0 * math.atan2(sine, w) / sine if sine else 2.0
+    return share * x, share * y, share * z
 
 
 class LedByTarget:
@@ -26,7 +53,7 @@ class LedByTarget:
 
     def __init__(self, start):
         self.target = self.body = start
-        self._rates = np.zeros(3)
+        self._rates = (0.0, 0.0, 0.0)
 
     @property
     def body_rates(self):
@@ -34,12 +61,20 @@ class LedByTarget:
 
     def hold(self, command, seconds, steps=8):
         h = seconds / steps
+        step, kept = turn(command, h), [math.exp(-h / lag) for lag in LAGS]
+        target, body = self.target.as_quat().tolist(), self.body.as_quat().tolist()
         for _ in range(steps):
-            self.target = self.target * Rotation.from_rotvec(command * h)
-            ahead = self.body.inv() * self.target
-            aim = ahead.apply(command) + KP * ahead.as_rotvec()
-            self._rates = aim + (self._rates - aim) * np.exp(-h / LAGS)
-            self.body = self.body * Rotation.from_rotvec(self._rates * h)
+            target = times(target, step)
+            back = (-body[0], -body[1], -body[2], body[3])
+            ahead = times(back, target)
+            behind = (-ahead[0], -ahead[1], -ahead[2], ahead[3])
+            seen = times(times(ahead, (*command, 0.0)), behind)
+            aim = [c + KP * away for c, away in zip(seen, rotation_vector(ahead), strict=False)]
+            self._rates = tuple(
+                a + (rate - a) * left for a, rate, left in zip(aim, self._rates, kept, strict=True)
+            )
+            body = times(body, turn(self._rates, h))
+        self.target, self.body = Rotation.from_quat(target), Rotation.from_quat(body)
 
 
 def cross_track(turn, tell=lambda planner, plant, n: None, **options):
@@ -53,7 +88,7 @@ def cross_track(turn, tell=lambda planner, plant, n: None, **options):
         rates = planner.rates(
             quaternion(plant.body), Target(*GOAL, HEADING + turn), 0.004, plant.body_rates
         )
-        plant.hold(np.array(rates), 0.004)
+        plant.hold(rates, 0.004)
         off.append(coefficients_of(plant.body)[1] + 0.5)
     return np.abs(off).max()
 

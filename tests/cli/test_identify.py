@@ -37,7 +37,7 @@ def config_for(folder, endpoint, **changes):
     path = folder / "my.yaml"
     places = {
         "link": {"endpoint": endpoint, "lockstep": True, "attitude_rate_hz": 250.0},
-        "recording": {"directory": str(folder / "flights")},
+        "recording": {"directory": str(folder / "flights"), "report": False},
         "planner": {"name": "model-following"},
         "identify": {"settle_s": 1.0},
         "vehicle": {"lag_ms": 20, "dead_time_ms": 900},  # not to be flown with

@@ -201,6 +201,7 @@ def test_after_a_gap_it_waits_for_the_mode(what):
     bench.run(10)
     assert (len(bench.sent), bench.asked, bench.loop.awaiting_mode) == (10, 1, True)
     bench.loop.resume()
+    assert bench.loop.awaiting_mode is False
     bench.run(10)
     assert (len(bench.sent), bench.asked) == (20, 1)
     bench.time += 0.2

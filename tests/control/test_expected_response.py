@@ -8,7 +8,13 @@ import pytest
 from companion.attitude import Coefficients, Target, attitude, coefficients
 from companion.config import Config
 from companion.config.files import changed
-from companion.control.expected_response import expectations, expected_response
+from companion.control.expected_response import (
+    ExpectedResponse,
+    expectations,
+    expected_response,
+    gain_warning,
+    hold_sentence,
+)
 from companion.control.hold_settings import hold_gains
 from companion.control.inner_loop import planner
 from companion.control.outer_loop import linear_settings
@@ -84,6 +90,36 @@ def test_the_quickest_sensible_gain_and_a_warning_above_it():
     unknown = expected_response(Config())
     assert unknown.quickest_gain is None
     assert "not known before `companion identify`" in unknown.gain_sentence()
+
+
+def test_the_words_about_a_response():
+    otherwise = {
+        "planner.gain_per_s": 0.4,
+        "limits.max_tilt_rate_deg_s": 0.3,
+        "the vehicle's lag": 0.495,  # 1 % less is not told
+    }
+    found = ExpectedResponse(0.25, 0.5, otherwise, 5.0, 5.0)
+    assert found.sentence() == (
+        "a step from -0.25 to 0.25 (±14° of tilt) is expected to have a time constant of 0.50 s; "
+        "limits.max_tilt_rate_deg_s limits it most (0.40 s with twice planner.gain_per_s, "
+        "0.30 s without limits.max_tilt_rate_deg_s)"
+    )
+    assert not found.too_quick
+    assert found.gain_sentence() == (
+        "planner.gain_per_s is 5, and 5.0 is the quickest sensible one (0.45 / (lag + dead time))"
+    )
+
+
+def test_only_our_own_planners_have_an_expected_response_and_a_warning():
+    quick = configured("first-order", 6.0)
+    assert gain_warning(quick) == expected_response(quick).gain_sentence()
+    assert gain_warning(configured("first-order", 5.0)) is None
+    assert gain_warning(Config()) is None
+    assert len(expectations(quick)) == 3
+    other = quick.planner.model_copy(update={"name": "someones-planner"})
+    others = quick.model_copy(update={"planner": other})
+    assert gain_warning(others) is None
+    assert expectations(others) == [hold_sentence(others)]
 
 
 def test_the_gains_that_are_told_are_those_that_fly():

@@ -15,9 +15,9 @@ from companion.control.loops import make_loops
 from companion.control.motion_estimate import MotionEstimate
 from companion.control.outer_loop import predictive_settings
 from companion.control.telemetry import FreshPosition
-from companion.drag import Drag
+from companion.drag import AxisDrag, Drag
 from companion.files.yaml_file import ConfigError
-from companion.guidance import GRAVITY, ThrustSettings
+from companion.guidance import GRAVITY, GuidanceInput, ThrustSettings, VehicleMotion
 from companion.recording.trace import FlightTrace
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
@@ -189,6 +189,21 @@ def test_only_a_new_reset_of_the_heading_turns_the_estimate():
     assert (observer.turns, len(resets)) == ([0.5, -0.25], 2)
     made.retune("settings")
     assert observer.settings == ["settings"]
+
+
+def test_predictive_control_gets_the_newest_attitude_and_the_estimated_wind():
+    made, _ = estimate(first=Drag(), drag=Drag())
+    rates = BodyRates(0.1, 0.2, 0.3)
+    made.note_attitude(SAMPLE._replace(q=(0.8, 0.0, 0.6, 0.0), body_rates=rates))
+    motion = VehicleMotion((1.0, 2.0, -3.0), (4.0, 5.0, 6.0))
+    later = VehicleMotion((9.0, 9.0, 9.0), (9.0, 9.0, 9.0))
+    drag = Drag(0.25, 0.03)
+    inputs = GuidanceInput(
+        motion, later, (7.0, 7.0), (0.5, -0.5), drag, (2.0, 18.0), AxisDrag(0.02, 0.5)
+    )
+    vehicle = made.vehicle(12.0, inputs)
+    assert vehicle[:5] == (12.0, (1.0, 2.0, -3.0), (4.0, 5.0, 6.0), (0.8, 0.0, 0.6, 0.0), rates)
+    assert vehicle[5:] == ((0.5, -0.5, 0.0), drag, 0.02)
 
 
 @pytest.mark.parametrize(

@@ -51,7 +51,6 @@ def test_only_a_trajectory_is_followed():
 def test_a_maneuver_is_told_once_and_its_end_is_marked():
     trace, flown, told = FlightTrace(), FlownSource(), []
     record = TrackingRecord(trace, flown)
-    assert record.note("nobody listens") is None
     record.note = told.append
     record.add(9.0, 3.0, Reference((1.0, 2.0, -3.0)), HERE)
     flown.begin(program(), POSE, 10.0)

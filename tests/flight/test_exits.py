@@ -57,6 +57,8 @@ def levels(state):
 PX4 = Ways("px4", {"COM_OBL_RC_ACT": 4}, "LOITER", lands)
 PATIENT_PX4 = PX4._replace(parameters=PX4.parameters | {"COM_OF_LOSS_T": 5.0})
 ARDUPILOT = Ways("ardupilot", {}, "BRAKE", levels)
+PAGE = {"report": True}
+"""Section `recording`: the flight also ends with its page, which takes a third of a second."""
 BOTH = pytest.mark.parametrize("ways", [PX4, ARDUPILOT], ids=lambda ways: ways.autopilot)
 
 
@@ -67,7 +69,7 @@ def start(mock, folder, *options, **changes):
     quick = merged(quick, {"hover": {"duration_s": 60.0}})
     places = {
         "link": {"endpoint": f"udpin://127.0.0.1:{mock.port}"},
-        "recording": {"directory": str(folder / "flights")},
+        "recording": {"directory": str(folder / "flights"), "report": False},
     }
     config.write_text(yaml.safe_dump(merged(merged(quick, places), changes)))
     return subprocess.Popen(
@@ -94,7 +96,7 @@ def in_offboard(state):
 
 def test_ctrl_c_hands_back_and_leaves_the_vehicle_holding(tmp_path):
     with PX4.mock(tmp_path, in_lockstep=False, speed=1.0) as mock:
-        process = start(mock, tmp_path)
+        process = start(mock, tmp_path, recording=PAGE)
         mock.until(in_offboard)
         process.send_signal(signal.SIGINT)
         result = finish(process, 1)
@@ -127,7 +129,7 @@ def test_other_signals_hand_back_too(tmp_path, ways, number):
 def test_a_terminal_that_goes_away_does_not_end_the_flight(tmp_path):
     """As `companion fly | head -1`: nobody reads any more, and every line fails."""
     with PX4.mock(tmp_path) as mock:
-        process = start(mock, tmp_path, "--lockstep", hover={"duration_s": 3.0})
+        process = start(mock, tmp_path, "--lockstep", hover={"duration_s": 3.0}, recording=PAGE)
         process.stderr.close()
         out = process.stdout.read()
         assert process.wait(timeout=30) == 0
@@ -143,7 +145,8 @@ def test_a_terminal_that_goes_away_does_not_end_the_flight(tmp_path):
 def test_a_second_ctrl_c_leaves_at_once_and_keeps_the_record(tmp_path, ways):
     # The uplink is cut, so that handing back cannot succeed and takes its time.
     with ways.mock(tmp_path, in_lockstep=False, speed=1.0) as mock:
-        process = start(mock, tmp_path, flight={"accept": ["COM_OF_LOSS_T"]})
+        accepted = {"accept": ["COM_OF_LOSS_T"]}
+        process = start(mock, tmp_path, flight=accepted, recording=PAGE)
         mock.until(in_offboard)
         mock.inject({"kind": "drop", "direction": "from_companion"})
         time.sleep(0.1)  # faults begin with the vehicle's next step
@@ -175,7 +178,7 @@ def test_killed_the_autopilot_does_what_it_does_without_us(tmp_path, ways):
 
 def test_a_disk_that_takes_no_more_ends_the_recording_and_not_the_flight(tmp_path):
     with sockets.mock_vehicle(tmp_path) as mock:
-        process = start(mock, tmp_path, "--lockstep", hover={"duration_s": 3.0})
+        process = start(mock, tmp_path, "--lockstep", hover={"duration_s": 3.0}, recording=PAGE)
         prlimit(process.pid, RLIMIT_FSIZE, (300_000, 300_000))
         result = finish(process, 0)
         assert not mock.state()["armed"]

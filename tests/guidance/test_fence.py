@@ -65,7 +65,7 @@ def test_a_margin_counts_inwards_from_every_side():
         assert breach(**place, margin=4.01) is not None
     assert breach(6.0, fence=polygon, margin=4.0) is None
     found = breach(6.5, fence=polygon, margin=4.0)
-    assert (found.limit, found.by) == ("safety.fence_polygon_m", -3.5)
+    assert (found.limit, found.side, found.by) == ("safety.fence_polygon_m", "outside", -3.5)
     assert str(found) == "outside the polygon of the fence"
     assert breach(12.0, fence=polygon).by == 0.0
     assert breach(12.0, fence=polygon, margin=1.0).by == pytest.approx(2.0)
@@ -81,7 +81,9 @@ def test_a_fence_on_the_map_needs_to_know_where_it_is():
     assert breach(9.9, -9.9, fence=fence) is None
     assert breach(9.9, -10.1, fence=fence).limit == "safety.fence_polygon_deg"
     unknown = breach(fence=fence, origin=None)
-    assert (unknown.limit, unknown.by) == ("safety.fence_polygon_deg", 0.0)
+    assert (unknown.limit, unknown.side, unknown.by) == ("safety.fence_polygon_deg", "with", 0.0)
+    still = (0.0, 0.0, -5.0), (0.0, 0.0, 0.0)
+    assert fence.stop_breach(*still, 10.0, HOME) is None
     assert str(unknown) == "at a place whose latitude and longitude are not known"
     flat = [value for corner in local_polygon(corners, HOME) for value in corner]
     assert flat == pytest.approx([value for corner in SQUARE for value in corner], abs=1e-5)
@@ -104,12 +106,36 @@ def test_where_it_would_stop_is_judged_with_its_height_there():
     assert FENCE.stop_breach(*leaving, 10.0, HOME).by == pytest.approx(3.75)
 
 
+@pytest.mark.parametrize(
+    ("north", "east", "within"),
+    [
+        (1.25, 3.0, True),
+        (1.15, 3.0, False),
+        (5.9, 3.0, True),
+        (6.1, 3.0, False),
+        (2.3, 8.0, True),
+        (2.1, 8.0, False),
+        (6.9, 8.0, True),
+        (7.1, 8.0, False),
+        (5.0, 4.0, True),  # as far east as a corner
+        (1.0, 1.9, False),
+        (3.0, 12.1, False),
+    ],
+)
+def test_slanted_sides_bound_a_polygon(north, east, within):
+    triangle = ((1.0, 2.0), (11.0, 4.0), (3.0, 12.0))
+    assert inside(north, east, triangle) is within
+    assert inside(north, east, triangle[::-1]) is within
+
+
 def test_how_far_inside_a_polygon_a_place_is():
     assert distance_inside(0.0, 3.0, SQUARE) == 7.0
     assert distance_inside(12.0, 0.0, SQUARE) == -2.0
     assert distance_inside(13.0, 14.0, SQUARE) == -5.0  # from a corner
     assert inside(9.999, -9.999, SQUARE)
     assert not inside(0.0, 10.001, SQUARE)
+    small = ((0.0, 0.0), (0.0, 0.5), (0.5, 0.0))
+    assert distance_inside(-1.0, 0.25, small) == -1.0
     point = ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
     assert distance_inside(3.0, 4.0, point) == -5.0
     assert distance_inside(0.0, 0.0, (*SQUARE, SQUARE[-1])) < inf  # a corner twice is no side

@@ -1,6 +1,6 @@
 """The predicted motion of a maneuver: its reference, or what its open-loop commands cause."""
 
-from math import pi, tan
+from math import exp, pi, tan
 
 import pytest
 
@@ -22,7 +22,9 @@ class Part:
         return [0.01 * k for k in range(401)]
 
     def at(self, time, start):
-        plain = Reference((time, 2.0, -3.0), (1.0, 0.0, 0.5), (0.1, 0.2, 0.3))
+        north, east, down = start.position_ned
+        pushed = (0.1 + start.heading, 0.2, 0.3)
+        plain = Reference((north + time, east + 2.0, down - 3.0), (1.0, 0.0, 0.5), pushed)
         return plain._replace(**self.command) if time < self.until else plain
 
 
@@ -33,6 +35,7 @@ def moment(time, part, **options):
 def test_in_closed_loop_it_is_the_reference():
     found = moment(3.0, Part())
     assert found == (3.0, (3.0, 2.0, -3.0), (1.0, 0.0, 0.5), (0.1, 0.2, 0.3))
+    assert moment(3.0, Part(), heading=0.5).acceleration == (0.6, 0.2, 0.3)
 
 
 def test_a_coefficient_accelerates_from_rest_and_the_height_is_the_references():
@@ -54,6 +57,9 @@ def test_afterwards_it_is_the_reference_again_and_the_next_step_begins_at_rest()
     assert moment(2.5, part).offset == (2.5, 2.0, -3.0)
     part.at = lambda time, start, at=part.at: at(time % 2.5, start)
     assert moment(3.0, part).velocity[0] == pytest.approx(0.5 * GRAVITY * 0.75, rel=0.05)
+    turned = Part(body_rates=BodyRates(0.3, 0.0, 0.0))
+    turned.at = lambda time, start, at=turned.at: at(time % 2.5, start)
+    assert moment(3.0, turned, heading=pi / 2.0).velocity[0] < -0.3  # to the right: south
 
 
 @pytest.mark.parametrize(
@@ -82,7 +88,8 @@ def test_the_predicted_tilt_has_a_limit():
 
 def test_drag_slows_it():
     """v' = a − d·v: after 2 s the speed is a/d·(1 − e^(−2d))."""
-    found = moment(1.99, Part(coefficients=Coefficients(0.6, 0.0)), drag=Drag(0.5, 0.0))
+    found = moment(1.99, Part(coefficients=Coefficients(0.36, 0.48)), drag=Drag(0.5, 0.0))
     a = GRAVITY * 0.75
-    assert found.velocity[0] == pytest.approx(2.0 * a * (1.0 - 2.718281828 ** (-0.995)), rel=0.01)
-    assert found.acceleration[0] == pytest.approx(a)
+    speed = 2.0 * a * (1.0 - exp(-0.995))
+    assert found.velocity[:2] == pytest.approx((0.6 * speed, 0.8 * speed), rel=0.01)
+    assert found.acceleration[:2] == pytest.approx((0.6 * a, 0.8 * a))

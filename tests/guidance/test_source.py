@@ -28,6 +28,7 @@ def test_maneuvers_count_from_their_beginning():
     sequence = ManeuverSequence([corners])
     source = ManeuverSource(sequence)
     assert (source.name, source.failure, source.finished(99.0)) == (corners.name, None, False)
+    assert source.pose is None
     with pytest.raises(RuntimeError, match="not begun"):
         source.reference(10.0, HERE)
     source.begin(10.0, POSE)
@@ -48,7 +49,10 @@ def test_the_pose_is_held_until_the_first_reference():
 
 
 def test_a_source_without_a_pose_holds_where_the_vehicle_is():
-    assert at(CommandedSource("the program", 0.5, 2.0), 1.0) == Reference(HERE.position_ned)
+    source = CommandedSource("the program", 0.5, 2.0)
+    assert at(source, 1.0) == Reference(HERE.position_ned)
+    at(source, 2.5)
+    assert source.failure is not None
 
 
 def test_a_reference_moves_on_until_it_is_too_old_and_then_the_place_is_held():
@@ -114,16 +118,19 @@ def test_another_kind_of_reference_has_no_jerk(other):
     source.give(accelerating(1.0), 11.0)
     source.give(other._replace(acceleration_ned=(1.2, 0.0, 0.0)), 11.1)
     assert jerk(source, 11.1) == 0.0
-    source.give(accelerating(1.4), 11.1 + 1e-4)
-    assert jerk(source, 11.1 + 1e-4) == 0.0
+    source.give(accelerating(1.0), 11.2)
+    source.give(accelerating(1.2), 11.3)
+    assert jerk(source, 11.3) == pytest.approx(2.0)
+    source.give(other, 11.3 + 1e-4)
+    assert jerk(source, 11.3 + 1e-4) == 0.0
 
 
 def test_a_reference_goes_on_with_its_velocity_acceleration_jerk_and_heading_rate():
     start = Reference(
         (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (0.5, 1.0, 1.5), heading=0.5, heading_rate=0.25
     )
-    later = continued(start, (3.0, 6.0, 9.0), 2.0)
-    assert later.position_ned == pytest.approx((14.0, 22.0, 30.0))
-    assert later.velocity_ned == pytest.approx((11.0, 19.0, 27.0))
-    assert later.acceleration_ned == pytest.approx((6.5, 13.0, 19.5))
-    assert (later.heading, later.heading_rate) == (1.0, 0.25)
+    later = continued(start, (3.0, 6.0, 9.0), 3.0)
+    assert later.position_ned == pytest.approx((28.75, 48.5, 68.25))
+    assert later.velocity_ned == pytest.approx((19.0, 35.0, 51.0))
+    assert later.acceleration_ned == pytest.approx((9.5, 19.0, 28.5))
+    assert (later.heading, later.heading_rate) == (1.25, 0.25)

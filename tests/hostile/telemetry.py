@@ -2,6 +2,7 @@
 
 from math import inf
 
+from sitl_mock.link.framing import Framer
 from tests.hostile.personality import ACCEPTED, FAILED
 from tests.hostile.vehicle import HOME_ALTITUDE
 
@@ -32,7 +33,7 @@ class Telemetry:
         self.samples, self.told = [], []
         self._due, self._latest, self._mode_sent = {}, [], (-inf, None)
         self._dialect = vehicle.kind.dialect
-        self._encoder = self._dialect.MAVLink(None, srcSystem=1, srcComponent=1)
+        self._framer = Framer(1, 1)
         self._makers = {
             "HEARTBEAT": self.heartbeat,
             "CURRENT_MODE": self._current_mode,
@@ -103,7 +104,7 @@ class Telemetry:
     def pack(self, name, *messages):
         """Frames of messages, given as fields."""
         make = getattr(self._dialect, f"MAVLink_{name.lower()}_message")
-        return [make(**fields).pack(self._encoder) for fields in messages]
+        return [self._framer.frame(make(**fields)) for fields in messages]
 
     def _told(self, name, fields):
         """What the lies make of a message's fields: one message, several or none."""

@@ -6,6 +6,7 @@ import time
 
 from companion.testing.virtual_loop import VirtualClock, VirtualEventLoop
 from companion.testing.wire import MemoryTransport
+from sitl_mock.link.framing import Framer
 
 _AGAIN_S, _GONE_S = 0.05, 6.0
 
@@ -20,7 +21,7 @@ class MemoryWorld:
 
     def __init__(self, autopilot, dialect):
         self._autopilot, self._dialect = autopilot, dialect
-        self._encoder = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
+        self._framer = Framer(1, 1)
         self._decoder = dialect.MAVLink(None)
         self._clock, self._transport, self._heard = VirtualClock(0.0), None, None
 
@@ -51,7 +52,7 @@ class MemoryWorld:
         else:
             frames = self._autopilot.step(heard)
         time_ms = self._autopilot.beacon_ms
-        beacon = self._dialect.MAVLink_system_time_message(0, time_ms).pack(self._encoder)
+        beacon = self._framer.frame(self._dialect.MAVLink_system_time_message(0, time_ms))
         self._transport.deliver(b"".join((*frames, beacon)), time_ms * 1_000_000)
 
 
@@ -107,13 +108,13 @@ class Wire:
     def __init__(self, port, dialect):
         self.ending = threading.Event()
         self._peer, self._dialect = ("127.0.0.1", port), dialect
-        self._encoder = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
+        self._framer = Framer(1, 1)
         self._decoder = dialect.MAVLink(None)
         self._socket = _bound()
 
     def exchange(self, frames, beacon_ms):
         """Send a step's frames and its beacon; returns the messages up to the answer."""
-        beacon = self._dialect.MAVLink_system_time_message(0, beacon_ms).pack(self._encoder)
+        beacon = self._framer.frame(self._dialect.MAVLink_system_time_message(0, beacon_ms))
         data, messages, answered = b"".join((*frames, beacon)), [], False
         deadline = time.monotonic() + _GONE_S
         while not answered and not self.ending.is_set():

@@ -6,7 +6,7 @@ from companion.config import Config
 from companion.config.files import changed, load, shipped
 from companion.files.yaml_file import ConfigError
 from companion.live.checks import ChangeChecks
-from companion.serve.served_flight import _refusal_in_control
+from companion.serve.motion_settings import change_refusal
 
 
 def _after(start, *values):
@@ -70,5 +70,5 @@ def test_a_slowed_trajectory_is_judged_as_it_is_flown(tmp_path):
 def test_limits_of_a_clients_motion_stay_while_it_is_in_control(key):
     before = Config()
     after = changed(before, {"limits": {key: 0.5 * getattr(before.limits, key)}}, "a test")
-    told = _refusal_in_control(before, after)
+    told = change_refusal(before, after)
     assert told == f"limits.{key} must not change while a client is in control"

@@ -1,6 +1,7 @@
 """The live page in headless Chromium: it shows, changes, refuses, and outlives its flight."""
 
 from contextlib import suppress
+from importlib.util import find_spec
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
 
@@ -9,10 +10,13 @@ import pytest
 from tests.live.browser import CHROMIUM, chromium
 from tests.live.pages import Page
 
-pytest.importorskip("nicegui", reason="the extra `live` is not installed")
-pytestmark = pytest.mark.skipif(
-    CHROMIUM is None, reason="Chromium is not installed (Debian's package `chromium`)"
-)
+pytestmark = [
+    pytest.mark.skipif(
+        CHROMIUM is None, reason="Chromium is not installed (Debian's package `chromium`)"
+    ),
+    # Not imported here: only the page's own process needs it.
+    pytest.mark.skipif(find_spec("nicegui") is None, reason="the extra `live` is not installed"),
+]
 
 _SHOWN = "window.live && live.frames().length > 3"
 _OPEN_PANEL = "document.querySelector('#live-panel .q-item').click()"

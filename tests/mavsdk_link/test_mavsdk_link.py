@@ -154,7 +154,7 @@ def test_it_flies_the_same_maneuver(tmp_path):
             },
             "hover": {"duration_s": 1.0},
             "flight": {"takeoff_height_m": 2.0},
-            "recording": {"directory": str(tmp_path / "flights")},
+            "recording": {"directory": str(tmp_path / "flights"), "report": False},
             # It flies in real time, on a computer that may have other things to do.
             "deadman": {
                 "telemetry_stale_ms": 400.0,

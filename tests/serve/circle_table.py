@@ -1,4 +1,4 @@
-"""The table of docs/serve.md: `python -m tests.serve.circle_table`.
+"""The circle of docs/serve.md in memory: `python -m tests.serve.circle_table`.
 
 One program streams a circle of 5 m at 5 m/s, 50 setpoints a second. Directly means that `serve`
 passes the setpoints on (`serve.control: false`), so the mock autopilot flies them itself.

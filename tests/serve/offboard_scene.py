@@ -12,7 +12,7 @@ import time
 
 RADIUS = SPEED = 5.0
 RAMP = 3.0
-_HOW = {"ground": "from_ground", "loses": "loses"}
+_HOW = {"ground": "from_ground", "loses": "loses", "circle": "only_circle"}
 
 
 async def first(stream, condition):
@@ -112,22 +112,8 @@ class Program:
         await self.position(*self.place)
         return await self.active()
 
-    async def fly(self, hover, parameter, *, from_ground=False, loses=False):
-        """Fly; returns what was seen."""
-        report = {"armable": await self.armable(), "parameter": await self.parameter(parameter)}
-        async with asyncio.timeout(90.0):  # ArduPilot is ready after 40 s
-            begin = self.starts_on_ground if from_ground else self.takes_off
-            while not await begin(5.0):  # noqa: ASYNC110
-                await asyncio.sleep(1.0)
-        await self.climbed(4.6)
-        await asyncio.sleep(3.0)
-        start = self.place
-        await self.position(*start)
-        began = time.monotonic()
-        if not from_ground:
-            await self.start()
-        report["start_s"] = time.monotonic() - began
-        report["active"] = await self.active()
+    async def every_kind(self, start, hover, report):
+        """Fly every kind of setpoint, and come back."""
         report["position"] = await self.settle((start[0] + 3.0, start[1], start[2]), 5.0)
         await self.velocity(-1.5, 0.0, 0.0)
         await asyncio.sleep(2.5)
@@ -143,6 +129,27 @@ class Program:
         await self.attitude(hover)
         await asyncio.sleep(1.0)
         report["back"] = await self.settle(start, 9.0)
+
+    async def fly(self, hover, parameter, *, from_ground=False, loses=False, only_circle=False):
+        """Fly; returns what was seen."""
+        report = {"armable": await self.armable(), "parameter": await self.parameter(parameter)}
+        async with asyncio.timeout(90.0):  # ArduPilot is ready after 40 s
+            begin = self.starts_on_ground if from_ground else self.takes_off
+            while not await begin(5.0):  # noqa: ASYNC110
+                await asyncio.sleep(1.0)
+        await self.climbed(4.6)
+        await asyncio.sleep(3.0)
+        start = self.place
+        await self.position(*start)
+        began = time.monotonic()
+        if not from_ground:
+            await self.start()
+        report["start_s"] = time.monotonic() - began
+        report["active"] = await self.active()
+        if only_circle:
+            report["back"] = await self.settle(start, 8.0)  # until it is surely in control
+        else:
+            await self.every_kind(start, hover, report)
         report["circle_rms_m"] = await self.circle(start, 12.0)
         await self.position(*self.place)
         report["still_active"] = await self.active()
@@ -159,7 +166,8 @@ class Program:
 def main(run):
     """Run `run(endpoint, fly)`.
 
-    The arguments are endpoint, hover thrust, parameter, and then `ground` or `loses` or nothing.
+    The arguments are endpoint, hover thrust, parameter, and then some of `ground`, `loses` and
+    `circle`.
     """
     endpoint, hover, parameter, *how = sys.argv[1:]
 

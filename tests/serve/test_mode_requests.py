@@ -10,6 +10,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion.config import Config
+from companion.config.files import changed
 from companion.flight import flight_files
 from companion.flight.changes import Changes
 from companion.flight.environment import THIS_COMPUTER
@@ -174,10 +175,12 @@ def test_what_is_to_be_told_of_a_record_is_told_in_the_event_loop(tmp_path, monk
     assert all(words in texts for words in ("the disk is full", "recorded in", "a page"))
 
 
-@pytest.mark.parametrize(("next_flight", "times"), [(None, 1), ("begun", 0)])
-def test_garbage_is_collected_only_between_flights(monkeypatch, next_flight, times):
+@pytest.mark.parametrize(
+    ("freeze_gc", "next_flight", "times"),
+    [(True, None, 1), (True, "begun", 0), (False, None, 0)],
+)
+def test_garbage_is_collected_only_between_flights(monkeypatch, freeze_gc, next_flight, times):
     collected = []
-    monkeypatch.setattr(gc, "isenabled", lambda: False)
     monkeypatch.setattr(gc, "collect", lambda: collected.append(1))
 
     async def run(_):
@@ -189,6 +192,7 @@ def test_garbage_is_collected_only_between_flights(monkeypatch, next_flight, tim
     control = SimpleNamespace(
         ownership=SimpleNamespace(release=lambda: None),
         _fence=SimpleNamespace(keep=lambda centre: None),
+        _config=changed(Config(), {"realtime": {"freeze_gc": freeze_gc}}, "test"),
     )
     flight = SimpleNamespace(run=run, save=save, fence_centre=None)
     asyncio.run(ServedControl._fly(control, flight, None))

@@ -237,13 +237,23 @@ def test_a_yaw_rate_turns_and_no_yaw_holds_the_heading():
     assert motion.reference(8.0).heading == pytest.approx(motion.reference(7.0).heading)
 
 
-def test_without_a_position_the_reference_does_not_run_away_from_the_vehicle():
+@pytest.mark.parametrize("change", [0.0, 1e-6])
+def test_without_a_position_the_reference_does_not_run_away_from_the_vehicle(change):
     """A vehicle that is blown back is not chased by an error that grows without bound."""
     motion = begun()
     for number in range(400):
         now = 0.05 * number
-        motion.command(request(velocity=(3.0 + 1e-6 * number, 0.0, 0.0)), now, STILL)
+        motion.command(request(velocity=(3.0 + change * number, 0.0, 0.0)), now, STILL)
     assert motion.reference(now).position_ned[0] < 2.0
+
+
+@pytest.mark.parametrize(("down", "flown"), [(9.0, DESCENT), (-9.0, -CLIMB), (0.5, 0.5)])
+def test_a_commanded_climb_is_limited_as_guidance_limits_it(down, flown):
+    motion = begun()
+    motion.command(request(velocity=(0.0, 0.0, down)), 0.0, STILL)
+    _, _, velocities, _ = states(motion, 0.0, 5.0)
+    assert velocities[-1, 2] == pytest.approx(flown)
+    assert np.abs(velocities[:, 2]).max() < abs(flown) + 1e-6
 
 
 def test_an_acceleration_beside_a_repeated_velocity_ends_with_the_timeout():

@@ -66,9 +66,14 @@ def measure_response(rows: Floats, gain: float) -> StepResponse | None:
 
 def first_order(run: StepRun, time_constant: float) -> Floats:
     """(n, 2), exact response of τ·ċ = c_d − c from the first sample, each target held."""
-    since, start, target = run.time[0], run.measured[0], run.target[0]
+    return _first_order(run.steps(), time_constant)
+
+
+def _first_order(steps: list[StepRun], time_constant: float) -> Floats:
+    """`first_order` of a run that is split into its steps."""
+    since, start, target = steps[0].time[0], steps[0].measured[0], steps[0].target[0]
     parts = []
-    for step in run.steps():
+    for step in steps:
         start = target + (start - target) * np.exp(-(step.time[0] - since) / time_constant)
         since, target = step.time[0], step.target[0]
         left = np.exp(-(step.time - since) / time_constant)
@@ -101,10 +106,13 @@ def _time_constant(runs: list[StepRun], axis: int, start: float) -> float:
     if not stepped:
         return float("nan")
 
+    steps = [run.steps() for run in stepped]
+    measured = np.concatenate([run.measured for run in stepped])
+
     def apart(unknown: Floats) -> tuple[Floats, Floats]:
         tau = float(np.exp(unknown[0]))
-        parts = [(run.measured - first_order(run, tau)).ravel() for run in stepped]
-        return np.empty(0), np.concatenate(parts)
+        paths = np.concatenate([_first_order(each, tau) for each in steps])
+        return np.empty(0), (measured - paths).ravel()
 
     lowest, highest = np.log(_TIME_CONSTANT)
     found = minimise(apart, np.log([start]), np.array([lowest]), np.array([highest]))

@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.attitude import Coefficients, coefficients
-from companion.attitude.reference import SecondOrderReference
+from companion.attitude import coefficients
 from companion.least_squares import minimise, project
 
 Floats = NDArray[np.float64]
@@ -64,7 +63,6 @@ _TRIED_LAGS, _TRIED_DAMPINGS = np.geomspace(0.05, 1.0, 5), (0.7, 1.5)
 _TRIED_DEAD_TIMES = (0.0, 0.04, 0.1, 0.2)
 _UNANSWERED = 0.03
 """Shortest dead time of a vehicle, s: until then it moves as before the first step."""
-_REST = Coefficients(0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,29 +84,73 @@ class SecondOrderFit:
 
         It starts as the measurement does, and keeps that speed until the first target has effect.
         """
-        model = SecondOrderReference(self.frequency, self.damping)
-        time, steps, state = run.time[::thinning], run.steps(), _initial_state(run)
-        effects = [float(step.time[0]) + self.dead_time for step in steps]
-        out: Floats = state[0] + np.outer(time - run.time[0], state[1])
-        state = np.array([state[0] + self.dead_time * state[1], state[1]])
-        for step, effect, end in zip(steps, effects, [*effects[1:], np.inf], strict=True):
-            goal = np.array([step.target[0], (0.0, 0.0)])
-            inside = (time >= effect) & (time < end)
-            moves = [_transition(model, dt)[0] for dt in (time[inside] - effect).tolist()]
-            out[inside] = np.array(moves).reshape(-1, 2) @ (state - goal) + goal[0]
-            if end < np.inf:
-                state = np.array(_transition(model, end - effect)) @ (state - goal) + goal
+        return self.along(Course.of(run, thinning))
+
+    def along(self, course: "Course") -> Floats:
+        """(m, 2) coefficients of the model at the rows of a course, as `path`."""
+        time, effects = course.time, course.changes + self.dead_time
+        latest = np.searchsorted(effects, time, side="right") - 1
+        acted = np.maximum(time - effects[np.maximum(latest, 0)], 0.0)
+        moves = self._transitions(acted)[:, 0]
+        between = self._transitions(np.diff(effects))
+        first, speed = course.start
+        out: Floats = first + np.outer(time, speed)
+        state = np.array([first + self.dead_time * speed, speed])
+        for number, target in enumerate(course.targets):
+            goal = np.array([target, (0.0, 0.0)])
+            rows = latest == number
+            out[rows] = moves[rows] @ (state - goal) + target
+            if number < len(between):
+                state = between[number] @ (state - goal) + goal
         return out
+
+    def _transitions(self, seconds: Floats) -> Floats:
+        """(m, 2, 2), `SecondOrderReference.transition` over each of these times (m,)."""
+        decay, square = self.damping * self.frequency, self.frequency * self.frequency
+        root = np.sqrt(complex(square * (1.0 - self.damping * self.damping)))
+        slow = np.exp((-1j * root - decay) * seconds)  # the slower of the two: nothing overflows
+        even = (0.5 * slow * (1.0 + np.exp(2j * root * seconds))).real
+        odd = (slow * np.expm1(2j * root * seconds) / (2j * root)).real if root else even * seconds
+        rows = (even + decay * odd, odd), (-square * odd, even - decay * odd)
+        return np.moveaxis(np.array(rows), -1, 0)
+
+
+class Course(NamedTuple):
+    """What a model needs of a run.
+
+    Attributes:
+        time: (m,), of the rows, since the first row of the run, s.
+        start: (2, 2), coefficients and their speed (1/s), measured before the first step acts.
+        changes: (s,), when each target was first in force, on the same clock.
+        targets: (s, 2).
+    """
+
+    time: Floats
+    start: Floats
+    changes: Floats
+    targets: Floats
+
+    @classmethod
+    def of(cls, run: StepRun, thinning: int = 1) -> "Course":
+        """The course of a run at every `thinning`-th row."""
+        since, steps = run.time - run.time[0], run.steps()
+        early = since <= _UNANSWERED
+        columns = np.column_stack((np.ones(int(early.sum())), since[early]))
+        start, _ = project(columns, run.measured[early])
+        changes = np.array([step.time[0] for step in steps]) - run.time[0]
+        return cls(since[::thinning], start, changes, np.array([step.target[0] for step in steps]))
 
 
 def nearest_second_order(runs: list[StepRun]) -> SecondOrderFit:
     """Least squares over ω, ζ and dead time."""
     thinning = 1 + sum(run.time.size for run in runs) // _ENOUGH
+    courses = [Course.of(run, thinning) for run in runs]
+    measured = np.concatenate([run.measured[::thinning] for run in runs])
 
     def apart(unknown: Floats) -> tuple[Floats, Floats]:
         fit = _fit(unknown)
-        rest = [run.measured[::thinning] - fit.path(run, thinning) for run in runs]
-        return np.empty(0), np.concatenate(rest).ravel()
+        paths = np.concatenate([fit.along(course) for course in courses])
+        return np.empty(0), (measured - paths).ravel()
 
     grid = [
         np.array([log(lag), log(damping), dead_time])
@@ -125,17 +167,3 @@ def _fit(unknown: Floats) -> SecondOrderFit:
     """From (log 2ζ/ω, log ζ, dead time): unlike ω and ζ these hardly depend on one another."""
     damping = exp(unknown[1])
     return SecondOrderFit(2.0 * damping / exp(unknown[0]), damping, float(unknown[2]))
-
-
-def _initial_state(run: StepRun) -> Floats:
-    """(2, 2), coefficients and their speed (1/s), measured before the first step acts."""
-    since = run.time - run.time[0]
-    early = since <= _UNANSWERED
-    columns = np.column_stack((np.ones(int(early.sum())), since[early]))
-    start, _ = project(columns, run.measured[early])
-    return start
-
-
-def _transition(model: SecondOrderReference, dt: float) -> tuple[Coefficients, Coefficients]:
-    """What (c, ċ) = (1, 0), as north, and (0, 1), as east, become within `dt` seconds."""
-    return model.after(Coefficients(1.0, 0.0), Coefficients(0.0, 1.0), _REST, dt)

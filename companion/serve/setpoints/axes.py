@@ -117,19 +117,23 @@ class Axes:
 
     def _repeat(self, demand: AxisDemand, now: float, actual: Moving | None) -> None:
         """Follow a demand that is repeated: its sender may hang, so nothing grows for ever."""
-        if demand.position is demand.velocity is None:
-            self._carry_motion(demand, _near(self.at(now), actual, demand), now)
+        if demand.position is None:
+            self._repeat_motion(demand, now, actual)
             return
-        moving = any(demand.acceleration or ())
-        if demand.position is not None:
-            moving = moving or any(demand.velocity or ())
-        if not moving or now - self._given_at <= self._timeout:
-            return
-        if demand.position is not None:
+        moving = any(demand.velocity or ()) or any(demand.acceleration or ())
+        if moving and now - self._given_at > self._timeout:
             self._carry_position(AxisDemand(demand.position, None, None), self.at(now), now)
-        else:
-            self._carry_motion(AxisDemand(None, demand.velocity, None), self.at(now), now)
-        self._given_at = inf
+            self._given_at = inf
+
+    def _repeat_motion(self, demand: AxisDemand, now: float, actual: Moving | None) -> None:
+        """Follow a repeated velocity or acceleration, no further than `_STRAYED` ahead."""
+        current = self.at(now)
+        if demand.velocity is not None and now - self._given_at > self._timeout:
+            demand = AxisDemand(None, demand.velocity, None)
+        strayed = actual is not None and far(current.position, actual.position, _STRAYED)
+        accelerates_on = demand.acceleration is None and any(self._carrier.acceleration)
+        if demand.velocity is None or strayed or accelerates_on:
+            self._carry_motion(demand, _near(current, actual, demand), now)
 
     def _carry_position(self, demand: AxisDemand, current: State, now: float) -> None:
         assert demand.position is not None

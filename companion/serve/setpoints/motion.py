@@ -61,6 +61,7 @@ class CommandedMotion:
         self._horizontal = Axes((each, each), _HORIZONTAL_CONTINUITY, limits.timeout)
         self._vertical = Axes((down,), _VERTICAL_CONTINUITY, limits.timeout)
         self._heading = Axes((turn,), _HEADING_CONTINUITY, limits.timeout)
+        self._climb, self._descent = limits.climb, limits.descent
         self._largest_yaw_rate = limits.yaw_rate
         self._yaw: tuple[float, float, float] | None = None
 
@@ -82,7 +83,7 @@ class CommandedMotion:
         horizontal, vertical = _by_axes(actual)
         try:
             self._horizontal.command(request.horizontal, now, horizontal)
-            self._vertical.command(request.vertical, now, vertical)
+            self._vertical.command(self._within(request.vertical), now, vertical)
             self._heading.command(self._turn(request, now), now)
         except UnplannableError:
             self._horizontal, self._vertical, self._heading, self._yaw = before
@@ -101,6 +102,13 @@ class CommandedMotion:
         (z,), (w,), (c,) = self._vertical.at(time)
         (heading,), (rate,), _ = self._heading.at(time)
         return Reference((x, y, z), (u, v, w), (a, b, c), heading, rate)
+
+    def _within(self, vertical: AxisDemand) -> AxisDemand:
+        """The demand with a velocity that guidance flies; beside a position, as it is."""
+        if vertical.velocity is None or vertical.position is not None:
+            return vertical
+        (down,) = vertical.velocity
+        return vertical._replace(velocity=(min(max(down, -self._climb), self._descent),))
 
     def _turn(self, request: MotionRequest, now: float) -> AxisDemand:
         """The demand on the heading: the short way to a yaw, or a rate, or as it is."""
