@@ -13,11 +13,19 @@ from companion.control.inner_loop import hover_thrust, law_constants, plugin, th
 from companion.control.loop_record import Deadlines
 from companion.control.loops import make_loops
 from companion.control.motion_estimate import MotionEstimate
-from companion.control.outer_loop import predictive_settings
+from companion.control.outer_loop import linear_settings, predictive_settings
+from companion.control.retuning import Retuning, tuning
+from companion.control.slew import Slew
 from companion.control.telemetry import FreshPosition
 from companion.drag import AxisDrag, Drag
 from companion.files.yaml_file import ConfigError
-from companion.guidance import GRAVITY, GuidanceInput, ThrustSettings, VehicleMotion
+from companion.guidance import (
+    GRAVITY,
+    GuidanceInput,
+    LinearGuidance,
+    ThrustSettings,
+    VehicleMotion,
+)
 from companion.recording.trace import FlightTrace
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
@@ -54,6 +62,48 @@ CONFIG = Config.model_validate(
 SAMPLE = AttitudeSample(
     3000, 3.0, 10.0, 2000, (1.0, 0.0, 0.0, 0.0), BodyRates(0.0, 0.0, 0.0), 0.0, None, True
 )
+
+
+def retuned(values):
+    """What a change of values gives to stand-ins for the loops."""
+    seen = {}
+    guidance = LinearGuidance(linear_settings(CONFIG))
+    guidance_loop = SimpleNamespace(
+        maker=SimpleNamespace(guidance=guidance),
+        estimate=SimpleNamespace(retune=lambda settings: seen.update(observer=settings)),
+    )
+    loop = SimpleNamespace(retune=lambda *law: seen.update(law=law))
+    Retuning(loop, guidance_loop).apply(values)
+    return {**seen, "guidance": guidance._settings, "max_tilt": guidance_loop.max_tilt}
+
+
+def test_a_change_of_values_reaches_both_loops():
+    limits = CONFIG.limits.model_copy(update={"max_tilt_deg": 20.0})
+    values = tuning(CONFIG.model_copy(update={"limits": limits}))
+    assert retuned(values) == {
+        "law": (values.constants, values.limits),
+        "observer": values.observer,
+        "guidance": values.guidance,
+        "max_tilt": pytest.approx(radians(20.0)),
+    }
+    others = SimpleNamespace(maker=SimpleNamespace(guidance="another package's"))
+    with pytest.raises(TypeError, match="str cannot be retuned"):
+        Retuning(SimpleNamespace(), others).apply(values)
+
+
+def test_a_change_that_is_stopped_stays_where_it_is():
+    slew = Slew(CONFIG)
+    assert slew.step(10.0) is None
+    limits = CONFIG.limits.model_copy(update={"max_tilt_deg": 20.0})
+    slew.begin(wanted := CONFIG.model_copy(update={"limits": limits}), 10.0)
+    half_way = slew.step(10.35)
+    assert radians(20.0) < half_way.max_tilt < radians(30.0)
+    slew.stop()
+    assert slew.step(11.0) is None
+    assert slew.settled is CONFIG
+    slew.begin(wanted, 12.0)
+    assert slew.step(12.75).max_tilt == pytest.approx(radians(20.0))
+    assert (slew.settled, slew.step(12.8)) == (wanted, None)
 
 
 def test_both_loops_are_made_and_answer_a_sample():

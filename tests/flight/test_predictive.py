@@ -9,11 +9,11 @@ import pytest
 
 from companion.attitude import BodyRates, Target
 from companion.control.predictive import Following, Predictive
-from companion.guidance import GRAVITY, Pose
+from companion.guidance import GRAVITY, LinearCommand, Pose
 from companion.guidance.follow import Follow
 from companion.guidance.trajectory import Laps, circle
 from companion.mavlink import lockstep
-from companion.nmpc import Answer, Status, Trouble, Vehicle
+from companion.nmpc import Answer, Start, Status, Trouble, Vehicle
 from tests.flight.sockets import mock_vehicle, session_for
 from tests.flight.test_tracking import following
 
@@ -140,6 +140,23 @@ def test_the_answer_for_now_is_flown_with_its_thrust():
     assert asked.inputs[-1].thrust == pytest.approx(12.0)
 
 
+def test_it_works_in_the_estimators_frame_with_the_heading_resets():
+    predictive, solver, _ = bench()
+    later = Target(0.15, 0.25, 0.35)
+    linear = LinearCommand(LINEAR[0], later, LINEAR[1])
+    following = where(0.0)._replace(turn=0.5)
+    assert predictive.instead_of(linear, 0.5, vehicle(10.0), following) is linear
+    (asked,) = solver.requests
+    assert (asked.vehicle, asked.start) == (vehicle(10.0), Start((0.0, 0.0, -5.0), 0.9))
+    thrust = (GRAVITY + 0.5) / (1.0 - 0.1**2 - 0.2**2) ** 0.5
+    (flown,) = asked.inputs
+    assert flown == (10.0, 0.1, 0.2, pytest.approx(0.8), pytest.approx(thrust))
+    solver.answer = answer(1, 10.02)
+    command = predictive.instead_of(linear, 0.5, vehicle(10.02), following)
+    assert command.target == command.later == Target(0.3, 0.0, pytest.approx(-0.4))
+    assert command.down == pytest.approx(GRAVITY - 12.0 * (1.0 - 0.3**2) ** 0.5)
+
+
 def test_an_answer_for_another_time_is_not_flown():
     predictive, solver, _ = bench()
     predictive.command(LINEAR, vehicle(10.0), where(0.0))
@@ -156,8 +173,10 @@ def test_without_a_trajectory_nothing_is_asked():
 
 def test_each_kind_of_trouble_is_told_once_and_all_are_counted():
     predictive, solver, notes = bench()
-    for _ in range(3):
-        solver.report(Trouble.LATE, "request 5 took 31.0 ms")
+    solver.report(Trouble.LATE, "request 5 took 31.0 ms")
+    assert len(notes) == 1
+    for _ in range(2):
+        solver.report(Trouble.LATE, "request 6 took 31.0 ms")
     solver.report(Trouble.ABSURD, "the answer to request 9 has a thrust of 99.00 m/s²")
     assert len(notes) == 2
     assert "took 31.0 ms; linear guidance flies on" in notes[0]

@@ -37,3 +37,4 @@ def test_only_what_came_since_then_counts():
 
 def test_setpoints_without_any_time_between_them_have_no_rate():
     assert held(0.0, 0.0).rate_since(HeldRates()) is None
+    assert held(1e-170).rate_since(HeldRates()) is None  # its square is too small for a float

@@ -203,6 +203,7 @@ def sys_status(voltage, remaining, health=0):
 def test_battery(bench):
     assert bench.take(sys_status(15800, 73)).battery == (10.0, 15.8, 0.73)
     assert bench.take(sys_status(65535, -1)).battery == (10.0, None, None)
+    assert bench.take(sys_status(9900, 0)).battery == (10.0, 9.9, 0.0)  # empty, not unknown
     cells = [4100, 4000, 3900, *[65535] * 7]
     message = dialect.MAVLink_battery_status_message(0, 0, 0, 0, cells, -1, -1, -1, 55)
     assert bench.take(message).battery == (10.0, 12.0, 0.55)
@@ -254,8 +255,10 @@ def test_height_is_counted_from_home(bench):
     assert bench.state.height is None
     position(bench, 2.5)
     assert bench.state.height == -0.5
-    bench.take(home_at(math.nan))
-    assert (bench.state.height, bench.stats.non_finite) == (-0.5, 1)
+    assert bench.state.home == (10.0, 47.3977418, 8.5455939, 488.0, -0.5)
+    for bad in (math.nan, math.inf):
+        bench.take(home_at(bad))
+    assert (bench.state.height, bench.stats.non_finite) == (-0.5, 2)
 
 
 def test_gps_that_was_good_is_missed(bench):
@@ -306,9 +309,9 @@ def test_a_thrust_that_is_none_is_passed_over(bench):
 
     for good in (0.0, 0.25, 1.0):
         assert bench.take(target(good)).attitude_target_thrust == (10.0, good)
-    for bad in (-0.1, 1.1, math.nan):
+    for bad in (-0.1, 1.1, math.nan, math.nan):
         assert bench.take(target(bad)).attitude_target_thrust == (10.0, 1.0)
-    assert bench.stats.non_finite == 1
+    assert bench.stats.non_finite == 2
 
 
 def test_another_battery_is_not_ours(bench):
