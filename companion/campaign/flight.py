@@ -41,7 +41,7 @@ def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
     row: dict[str, Value] = {"case": case.index, "seed": case.seed, **case.factors}
     with tempfile.TemporaryDirectory(prefix="companion-case-") as place:
         try:
-            return row | _Flight(case, Path(place)).fly(folder)
+            return row | CaseFlight(case, Path(place)).fly(folder)
         except ConfigError as error:  # such as a trajectory that the limits do not allow
             told = str(error)
         except Exception as error:
@@ -49,12 +49,15 @@ def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
         return row | outcomes.unflown(told.replace(f"{place}/", ""))
 
 
-class _Flight:
+class CaseFlight:
     """The flight of one case.
 
     Args:
         case: to be flown.
         place: a new folder for the files that the flight reads.
+
+    Raises:
+        ConfigError: the configuration cannot be flown.
     """
 
     def __init__(self, case: Case, place: Path) -> None:

@@ -22,6 +22,9 @@ FLOAT_OUTCOMES = (
     "position_max_m",
     "height_rms_m",
     "estimated_rms_m",
+    "level_rms_m",
+    "estimated_level_rms_m",
+    "estimate_level_rms_m",
     "cross_axis_max",
     "model_deviation_max",
     "time_constant_s",
@@ -53,9 +56,30 @@ def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
         place = [np.interp(settled[:, 0], truth[:, 0], each) for each in truth[:, 1:4].T]
         true = np.column_stack([settled[:, :4], *place])
         figures.update(tracking_errors(true))
+        figures.update(_level(settled, true))
         in_maneuvers = (truth[:, 0] >= settled[0, 0]) & (truth[:, 0] <= settled[-1, 0])
         figures["max_tilt_rad"] = float(truth[in_maneuvers, 4].max(initial=0.0))
     return figures
+
+
+def _level(estimated: Floats, true: Floats) -> dict[str, float]:
+    """RMS of horizontal distances, m: true and estimated from the reference, and between both.
+
+    Args:
+        estimated: (N, 7), as `FlightTrace.tracking`.
+        true: the same with the true position.
+    """
+    known = np.isfinite(true[:, 1])
+    place, believed, reference = true[known, 4:6], estimated[known, 4:6], true[known, 1:3]
+
+    def rms(offsets: Floats) -> float:
+        return float(np.sqrt(np.mean(np.sum(offsets**2, axis=1)))) if len(offsets) else nan
+
+    return {
+        "level_rms_m": rms(place - reference),
+        "estimated_level_rms_m": rms(believed - reference),
+        "estimate_level_rms_m": rms(place - believed),
+    }
 
 
 def response(summary: Summary) -> dict[str, float]:

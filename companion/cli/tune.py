@@ -16,11 +16,14 @@ from companion.config.files import changed, load
 from companion.config.known_drag import drag_prior
 from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
+from companion.identification import identify_vehicle, second_order_keys
+from companion.mavlink.errors import LogError
 from companion.recording.learned_file import newest
 from companion.tuning import Disturbances, Proposal, propose
 from companion.tuning.flights import COURSES, Flown, autopilot_like, flown
 from companion.tuning.noise import measured_disturbances
 from companion.tuning.writing import proposal_text, summary_lines
+from companion.vehicle.flight_log import read_flight_log
 
 _VEHICLE, _CONFIG, _LOG = "vehicle.yaml", "config.yaml", "flight.tlog"
 _OUTPUT = "tuned.yaml"
@@ -38,10 +41,11 @@ def tune(options: argparse.Namespace) -> int:
     config, included = _configuration(source, vehicle, options.config)
     config = _with_learned_drag(config, source)
     log = source / _LOG
-    disturbances = Disturbances()
+    disturbances, nearer = Disturbances(), {}
     if source.is_dir() and log.exists():
         disturbances = measured_disturbances(log, drag_prior(config).drag.linear, disturbances)
-    proposal = propose(config, disturbances)
+        nearer = _second_order(log)
+    proposal = propose(config, disturbances, vehicle=nearer)
     flights = {} if options.no_flights else _flights(proposal, console)
     known = _relative(vehicle, output) if included else _vehicle_of(proposal.tuned)
     write_whole(output, proposal_text(proposal, known, flights, source.name))
@@ -107,6 +111,15 @@ def _with_learned_drag(config: Config, source: Path) -> Config:
         "quadratic_drag_per_m": learned.drag.quadratic,
     }
     return changed(config, {"guidance": drag}, str(learned.path))
+
+
+def _second_order(log: Path) -> dict[str, float]:
+    """Keys of a rate loop of second order, if the doublets of this flight show one clearly."""
+    try:
+        rows = read_flight_log(log)
+    except LogError:  # nothing in it was flown by body rates
+        return {}
+    return second_order_keys(identify_vehicle(rows.setpoints, rows.rates, rows.specific_thrust))
 
 
 def _flyable(config: Config) -> Config:

@@ -18,6 +18,8 @@ _SAME_MS = 3.0
 """Lags and dead times of roll and pitch that differ by less count as the same, ms."""
 _SAME_SLEW = 0.1
 """Slew limits of roll and pitch that differ by less than this share count as the same."""
+_DAMPINGS = 0.3, 10.0
+"""Damping ratios that `vehicle.damping` takes."""
 
 
 class AxisValues(NamedTuple):
@@ -76,6 +78,26 @@ def vehicle_fragment(
     lines += ["vehicle:", *mark, *_tilt_keys(axes["roll"], axes["pitch"])]
     lines += _axis_keys("yaw", axes["yaw"], axes["roll"].slew)
     return "\n".join(lines) + "\n"
+
+
+def second_order_keys(vehicle: IdentifiedVehicle) -> dict[str, float]:
+    """Keys of the section `vehicle` that describe roll and pitch as lags of second order.
+
+    Returns:
+        The keys; empty unless second order is clearly better on both axes, without a slew limit.
+    """
+    keys: dict[str, float] = {}
+    for name in ("roll", "pitch"):
+        response, prefix = vehicle.axes[name], _PREFIX[name]
+        fit = response.second_order
+        if fit is None or fit.slew is not None or not response.is_good():
+            return {}
+        if not _DAMPINGS[0] <= fit.damping <= _DAMPINGS[1]:
+            return {}
+        keys[f"{prefix}lag_ms"] = round(2e3 * fit.damping / fit.frequency, 1)
+        keys[f"{prefix}dead_time_ms"] = round(1e3 * fit.dead_time, 1)
+        keys[f"{prefix}damping"] = round(fit.damping, 2)
+    return keys
 
 
 def kept_axes(vehicle: IdentifiedVehicle, known: Known) -> dict[str, AxisValues]:

@@ -1,8 +1,10 @@
 """Proposes gain, weights and bandwidth for an identified vehicle."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from companion.config import Config
+from companion.config.files import changed
 from companion.files.yaml_file import ConfigError
 from companion.tuning.expectation import Disturbances, Expectation, expectation, stability
 from companion.tuning.loop import ModelError
@@ -21,6 +23,7 @@ class Proposal:
         untuned: the configuration before.
         tuned: the configuration with the proposal.
         design: the proposed values.
+        vehicle: proposed keys of the section `vehicle`; may be empty.
         before: what to expect of `untuned`.
         after: what to expect of `tuned`.
         with_errors: margins of `tuned` if the vehicle's times differ from the identified ones.
@@ -31,6 +34,7 @@ class Proposal:
     untuned: Config
     tuned: Config
     design: Design
+    vehicle: Mapping[str, float]
     before: Expectation
     after: Expectation
     with_errors: tuple[tuple[ModelError, Margins], ...]
@@ -47,7 +51,9 @@ class Proposal:
         known = {}
         if drag is not None:
             known = {"drag_per_s": drag.linear, "quadratic_drag_per_m": drag.quadratic}
+        vehicle = {"vehicle": dict(self.vehicle)} if self.vehicle else {}
         return {
+            **vehicle,
             "planner": {"gain_per_s": design.gain},
             "guidance": {
                 "position_weight_per_s4": design.position,
@@ -62,6 +68,7 @@ def propose(
     config: Config,
     disturbances: Disturbances | None = None,
     aims: Aims | None = None,
+    vehicle: Mapping[str, float] | None = None,
 ) -> Proposal:
     """Propose values with the smallest expected position error within the stability margins.
 
@@ -69,6 +76,8 @@ def propose(
         config: the configuration to tune; `vehicle` must be identified.
         disturbances: what disturbs the vehicle; None: the usual ones.
         aims: margins to keep; None: the default ones.
+        vehicle: keys of the section `vehicle` that describe the vehicle better than `config` does,
+            as `companion.identification.second_order_keys` finds them; they are proposed, too.
 
     Raises:
         ConfigError: lag and dead time are not known, the planner or guidance is not one of ours, or
@@ -83,8 +92,9 @@ def propose(
     flight = config.flight.model_copy(update={"maneuvers": _ANALYSED})
     untuned = config.model_copy(update={"flight": flight})
     before = expectation(untuned, disturbances)
-    design = searched(untuned, disturbances, aims)
-    tuned = design.applied(untuned)
+    known = changed(untuned, {"vehicle": dict(vehicle)}, "the vehicle") if vehicle else untuned
+    design = searched(known, disturbances, aims)
+    tuned = design.applied(known)
     after = expectation(tuned, disturbances)
     found = after.margins
     # The values are rounded after the search, which costs up to a twentieth of a margin.
@@ -97,4 +107,6 @@ def propose(
             "vehicle; look at its lag and dead time"
         )
     errors = tuple((error, stability(tuned, error)) for error in errors_to_bear(tuned, aims))
-    return Proposal(untuned, tuned, design, before, after, errors, disturbances, aims)
+    return Proposal(
+        untuned, tuned, design, vehicle or {}, before, after, errors, disturbances, aims
+    )

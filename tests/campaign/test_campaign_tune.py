@@ -10,12 +10,14 @@ from companion.campaign import loading
 from companion.campaign.tune import candidates
 from companion.campaign.tune.candidates import cases, section_of, set_values, starts, unseen
 from companion.campaign.tune.certainty import compared
+from companion.campaign.tune.first_flight import learned
 from companion.campaign.tune.scores import Score, scored
 from companion.campaign.tune.search import Search
 from companion.campaign.tune.writing import Result, result_text, summary_lines
 from companion.cli.main import main
 from companion.config.files import load, shipped
 from companion.files.yaml_file import ConfigError
+from tests.campaign import unlike
 
 FILE = {
     "name": "tuned",
@@ -49,8 +51,9 @@ def row_of(case):
     return {
         "result": "ok",
         "crashed": gain > 7.0,
-        "position_rms_m": error,
-        "estimated_rms_m": 0.5 * error,
+        "level_rms_m": error,
+        "estimated_level_rms_m": 0.5 * error,
+        "estimate_level_rms_m": 0.1,
         "position_max_m": 2.0 * error,
     }
 
@@ -80,7 +83,7 @@ def searched(place, folder, fleet, trials=14):
     with pytest.MonkeyPatch.context() as patch:
         proposal = Proposal({"planner": {"gain_per_s": 5.5}, "limits": {"max_tilt_deg": 30.0}})
         patch.setattr(candidates, "propose", lambda _: proposal)
-        search = Search(made, section_of(made), folder, fleet)
+        search = Search(made, section_of(made), folder, fleet, learn=lambda _: None)
     return search.run(trials), search
 
 
@@ -143,6 +146,9 @@ def test_a_flight_that_ended_early_is_no_error_but_is_told(tmp_path):
     comparison = compared(score, scored(flown, 1.0), 4)
     assert comparison.samples == 3
     assert comparison.ratio.value == pytest.approx(1.0)
+    # The estimated errors are those of the same three samples.
+    assert comparison.known == pytest.approx([0.5 * comparison.before.value] * 2)
+    assert comparison.estimate == pytest.approx([0.1] * 2)
 
 
 @pytest.mark.slow
@@ -151,6 +157,24 @@ def test_the_search_also_starts_with_what_companion_tune_proposes(tmp_path):
     found = list(starts(made, section_of(made)))
     assert [start.name for start in found] == ["the configuration", "companion tune"]
     assert found[1].values["planner.gain_per_s"] != 5.0
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_a_first_flight_teaches_a_vehicle_that_is_40_percent_off(tmp_path):
+    path = tmp_path / "unlike.yaml"
+    path.write_text(json.dumps(unlike.campaign("px4", 1.4)))
+    made = loading.load(path)
+    known = learned(made)
+    assert known.vehicle.lag_ms + known.vehicle.dead_time_ms == pytest.approx(1.4 * 87.0, rel=0.1)
+    assert known.guidance.drag_per_s == pytest.approx(1.4, rel=0.15)
+    found = list(starts(made, section_of(made), known))
+    assert [start.name for start in found] == [
+        "the configuration",
+        "a first flight",
+        "companion tune",
+    ]
+    assert found[1].values["vehicle.lag_ms"] == known.vehicle.lag_ms
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from companion.identification import (
     ThrustMap,
     fit_thrust_map,
     identify_vehicle,
+    second_order_keys,
     vehicle_fragment,
     vehicle_table,
 )
@@ -107,6 +108,20 @@ def test_a_second_order_that_is_nearer_is_not_written_but_a_configured_one_is_ke
     axes = configured(replace(VEHICLE, roll=bad(ROLL)), known).vehicle.axes
     assert axes["roll"] == (74.5, 8.5, None, 0.73)
     assert axes["pitch"] == (49.0, 42.0, None, None)
+
+
+def test_the_keys_of_a_second_order_need_both_axes_without_a_slew_limit():
+    nearer = SecondOrderFit(20.0, 0.75, 0.0084, 1.05, None, 0.998)
+    roll, pitch = replace(ROLL, second_order=nearer), replace(PITCH, second_order=nearer)
+    both = replace(VEHICLE, roll=roll, pitch=pitch)
+    keys = second_order_keys(both)
+    axis = {"lag_ms": 75.0, "dead_time_ms": 8.4, "damping": 0.75}
+    assert keys == axis | {f"pitch_{key}": value for key, value in axis.items()}
+    assert Config.model_validate({"vehicle": keys}).vehicle.axes["pitch"].damping == 0.75
+    too_damped = replace(nearer, damping=0.2)
+    for other in (PITCH, bad(pitch), replace(pitch, second_order=replace(nearer, slew=9.0))):
+        assert second_order_keys(replace(both, pitch=other)) == {}
+    assert second_order_keys(replace(both, roll=replace(ROLL, second_order=too_damped))) == {}
 
 
 def test_an_axis_with_a_bad_fit_keeps_what_the_configuration_knows_and_says_so():

@@ -1,12 +1,16 @@
 """What `companion.tuning.propose` proposes: margins, wrong beliefs, and what it refuses."""
 
+from pathlib import Path
+
 import pytest
+import yaml
 
 from companion.config import Config
 from companion.config.files import changed, load, shipped
 from companion.files.yaml_file import ConfigError
 from companion.tuning import ModelError, propose, stability
 from companion.tuning.search import largest_gain
+from companion.tuning.writing import proposal_text
 
 
 def vehicle(lag, dead_time, slew=None):
@@ -38,6 +42,23 @@ def test_it_keeps_the_margins_and_expects_a_smaller_error_where_they_were_kept(n
     written = changed(VEHICLES[name], proposal.changes, "test")
     assert written.guidance == proposal.tuned.guidance
     assert written.planner == proposal.tuned.planner
+
+
+def test_a_rate_loop_of_second_order_is_proposed_too_and_keeps_the_margins():
+    nearer = {"lag_ms": 74.0, "dead_time_ms": 9.0, "damping": 0.73}
+    proposal = propose(VEHICLES["px4"], vehicle=nearer)
+    assert proposal.after.margins.gain_db >= 6.0
+    assert proposal.after.margins.phase_deg >= 30.0
+    assert proposal.untuned.vehicle.damping is None
+    assert proposal.tuned.vehicle.damping == 0.73
+    written = changed(VEHICLES["px4"], proposal.changes, "test")
+    assert written.vehicle == proposal.tuned.vehicle
+    assert stability(proposal.tuned, ModelError(slower=1.3)).stable
+    text = proposal_text(proposal, Path("vehicle.yaml"), {}, "a flight")
+    assert "second order" in text
+    assert yaml.safe_load(text)["vehicle"] == nearer
+    whole = proposal_text(proposal, {"vehicle": {"lag_ms": 74.0}}, {}, "a flight")
+    assert yaml.safe_load(whole)["vehicle"] == {"lag_ms": 74.0}
 
 
 def test_a_vehicle_that_slews_slowly_gets_a_lower_gain():

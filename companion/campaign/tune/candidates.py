@@ -89,11 +89,21 @@ def suggested(trial: "Trial", search: Mapping[str, Swept]) -> dict[str, Any]:
     return found
 
 
-def starts(campaign: Campaign, tune: Tune) -> Iterator[Start]:
-    """The configuration as it is, and what `companion tune` proposes for it."""
+def starts(campaign: Campaign, tune: Tune, learned: Config | None = None) -> Iterator[Start]:
+    """The configuration as it is, and what `companion tune` proposes.
+
+    Args:
+        campaign: its base is the configuration as it is.
+        tune: its section `tune`.
+        learned: the configuration after a first flight of the vehicle, which is a start, too, and
+            for which `companion tune` then proposes; None: it proposes for the one as it is.
+    """
     yield Start("the configuration", within(_present(campaign.base, tune.search), tune.search))
+    known, present = learned or campaign.base, _present(learned or campaign.base, tune.search)
+    if learned is not None:
+        yield Start("a first flight", within(present, tune.search))
     try:
-        changes = propose(_analysed(campaign.base)).changes
+        changes = propose(_analysed(known)).changes
     except ConfigError:
         return  # its rate loop is not known, or the linear analysis does not cover it
     told = {
@@ -101,7 +111,6 @@ def starts(campaign: Campaign, tune: Tune) -> Iterator[Start]:
         for section, keys in changes.items()
         for key, value in keys.items()
     }
-    present = _present(campaign.base, tune.search)
     yield Start("companion tune", within({**present, **told}, tune.search))
 
 

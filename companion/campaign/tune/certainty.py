@@ -29,6 +29,8 @@ class Comparison(NamedTuple):
         before: RMS of the true error with the start, m.
         after: RMS with the result, m.
         ratio: after / before.
+        known: RMS of the estimated error on the same flights, with the start and the result, m.
+        estimate: RMS of the error of the estimate itself on them, m.
         better: number of samples in which the result is better.
         samples: number of samples.
     """
@@ -36,6 +38,8 @@ class Comparison(NamedTuple):
     before: Interval
     after: Interval
     ratio: Interval
+    known: tuple[float, float]
+    estimate: tuple[float, float]
     better: int
     samples: int
 
@@ -54,12 +58,17 @@ def compared(before: Score, after: Score, samples: int) -> Comparison | None:
     Returns:
         None if fewer than two samples were flown to their end by both.
     """
-    rows = [np.array(score.true).reshape(samples, -1) for score in (before, after)]
+    scores = before, after
+    rows = [np.array(score.true).reshape(samples, -1) for score in scores]
     whole = np.isfinite(np.hstack(rows)).all(axis=1)
     count = int(whole.sum())
     if count < 2:
         return None
     old, new = (each[whole] for each in rows)
+
+    def same_flights(values: tuple[float, ...]) -> float:
+        return pooled(np.array(values).reshape(samples, -1)[whole])
+
     drawn = np.random.default_rng(_SEED).integers(count, size=(_RESAMPLES, count))
     old_spread, new_spread = _resampled(old, drawn), _resampled(new, drawn)
     better = np.mean(np.square(new), axis=1) < np.mean(np.square(old), axis=1)
@@ -67,6 +76,8 @@ def compared(before: Score, after: Score, samples: int) -> Comparison | None:
         _interval(pooled(old), old_spread),
         _interval(pooled(new), new_spread),
         _interval(pooled(new) / pooled(old), new_spread / old_spread),
+        (same_flights(before.estimated), same_flights(after.estimated)),
+        (same_flights(before.estimate), same_flights(after.estimate)),
         int(better.sum()),
         count,
     )

@@ -11,20 +11,24 @@ from companion.campaign.swept import Value
 
 Floats = NDArray[np.float64]
 Row = Mapping[str, Value]
+_ERRORS = "true", "estimated", "estimate"
+"""Attributes of a score that are errors in m."""
 
 
 class Score(NamedTuple):
     """The score of a candidate.
 
     Attributes:
-        true: RMS of the true distance from the reference in each case, m; infinite where a case was
-            not flown to its end.
+        true: RMS of the true horizontal distance from the reference in each case, m; infinite where
+            a case was not flown to its end.
         estimated: the same of the estimated position: what the program could know of its error.
+        estimate: RMS of the horizontal distance between true and estimated position, m.
         inside: whether each case stayed inside the envelope.
     """
 
     true: tuple[float, ...]
     estimated: tuple[float, ...]
+    estimate: tuple[float, ...]
     inside: tuple[bool, ...]
 
     @property
@@ -39,30 +43,34 @@ class Score(NamedTuple):
 
     def first(self, count: int) -> "Score":
         """The score on the first cases alone."""
-        return Score(self.true[:count], self.estimated[:count], self.inside[:count])
+        return Score(
+            self.true[:count], self.estimated[:count], self.estimate[:count], self.inside[:count]
+        )
 
     def and_then(self, rest: "Score") -> "Score":
         """The score on these cases and on further ones."""
         return Score(
-            self.true + rest.true, self.estimated + rest.estimated, self.inside + rest.inside
+            self.true + rest.true,
+            self.estimated + rest.estimated,
+            self.estimate + rest.estimate,
+            self.inside + rest.inside,
         )
 
     def as_attributes(self) -> dict[str, Any]:
         """The score as JSON; an infinite number is null."""
-        true, estimated = (
-            [each if isfinite(each) else None for each in values]
-            for values in (self.true, self.estimated)
-        )
-        return {"true": true, "estimated": estimated, "inside": list(self.inside)}
+        told: dict[str, Any] = {
+            name: [each if isfinite(each) else None for each in getattr(self, name)]
+            for name in _ERRORS
+        }
+        return {**told, "inside": list(self.inside)}
 
     @classmethod
     def from_attributes(cls, told: Mapping[str, Any]) -> "Score":
         """The score that `as_attributes` wrote."""
-        true, estimated = (
-            tuple(inf if each is None else float(each) for each in told[name])
-            for name in ("true", "estimated")
+        true, estimated, estimate = (
+            tuple(inf if each is None else float(each) for each in told[name]) for name in _ERRORS
         )
-        return cls(true, estimated, tuple(told["inside"]))
+        return cls(true, estimated, estimate, tuple(told["inside"]))
 
 
 def scored(rows: Sequence[Row], envelope: float | None) -> Score:
@@ -73,8 +81,9 @@ def scored(rows: Sequence[Row], envelope: float | None) -> Score:
         envelope: largest true distance from the reference inside the envelope, m; None: any.
     """
     return Score(
-        tuple(_number(row, "position_rms_m") for row in rows),
-        tuple(_number(row, "estimated_rms_m") for row in rows),
+        tuple(_number(row, "level_rms_m") for row in rows),
+        tuple(_number(row, "estimated_level_rms_m") for row in rows),
+        tuple(_number(row, "estimate_level_rms_m") for row in rows),
         tuple(_inside(row, envelope) for row in rows),
     )
 
@@ -91,6 +100,6 @@ def _number(row: Row, name: str) -> float:
 
 
 def _inside(row: Row, envelope: float | None) -> bool:
-    if not isfinite(_number(row, "position_rms_m")):
+    if not isfinite(_number(row, "level_rms_m")):
         return False
     return envelope is None or _number(row, "position_max_m") <= envelope

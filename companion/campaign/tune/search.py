@@ -18,8 +18,10 @@ from companion.campaign.tune.candidates import (
     suggested,
     within,
 )
+from companion.campaign.tune.first_flight import learned
 from companion.campaign.tune.scores import Row, Score, pooled, scored
 from companion.campaign.tune.section import Tune
+from companion.config import Config
 from companion.files.yaml_file import ConfigError
 
 if TYPE_CHECKING:
@@ -32,7 +34,7 @@ Fly = Callable[[Sequence[Case]], Sequence[Row]]
 STORAGE = "tune.db"
 """Optuna's storage in the folder of the search."""
 _NAME = "tune"
-_STARTS, _FEWEST_NEAR = 2, 4
+_STARTS, _FEWEST_NEAR = 3, 4
 """Number of starts, and smallest number of candidates near the last of them."""
 _FIRST_SHARE = 4
 """A candidate flies the first 1/4 of its cases, at least `_FEWEST`, before the others."""
@@ -84,9 +86,17 @@ class Search:
         tune: its section `tune`.
         folder: for the storage.
         fly: flies cases.
+        learn: flies the vehicle for a new search, and returns what it teaches.
     """
 
-    def __init__(self, campaign: Campaign, tune: Tune, folder: Path, fly: Fly) -> None:
+    def __init__(
+        self,
+        campaign: Campaign,
+        tune: Tune,
+        folder: Path,
+        fly: Fly,
+        learn: Callable[[Campaign], Config | None] = learned,
+    ) -> None:
         import optuna  # noqa: PLC0415  an extra
 
         optuna.logging.set_verbosity(optuna.logging.ERROR)
@@ -98,7 +108,7 @@ class Search:
             sampler=self._sampler(0),
             load_if_exists=True,
         )
-        self._begin()
+        self._begin(learn)
 
     def run(self, trials: int, on_trial: Callable[[Found], None] = lambda _: None) -> Found:
         """Try candidates until there are `trials` of them, those of earlier runs included."""
@@ -132,10 +142,10 @@ class Search:
             n_startup_trials=_STARTS + self._near,
         )
 
-    def _begin(self) -> None:
+    def _begin(self, learn: Callable[[Campaign], Config | None]) -> None:
         """Let a new search begin with the starts."""
         if not self._study.trials:
-            begin = list(starts(self._campaign, self._tune))
+            begin = list(starts(self._campaign, self._tune, learn(self._campaign)))
             seed, search = self._campaign.file.seed, self._tune.search
             for start in (*begin, *near(begin[-1], search, self._near, seed)):
                 self._enqueue(start)

@@ -4,12 +4,10 @@ from collections.abc import Iterator, Mapping
 from math import isfinite
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from companion.campaign.campaign import Campaign
 from companion.campaign.swept import Swept
 from companion.campaign.tune.certainty import Comparison
-from companion.campaign.tune.scores import Score, pooled
+from companion.campaign.tune.scores import Score
 from companion.campaign.tune.search import Candidate, Found
 from companion.files import bounded_yaml
 
@@ -48,7 +46,7 @@ def summary_lines(result: Result) -> list[str]:
         f"stopped early; candidate {best.number} is the best.",
         f"Constraint: {tune.inside_share:.1%} of the flights {envelope}; in the search "
         f"{best.score.share:.1%} were.",
-        f"RMS of the true error in the search: {best.score.rms:.3f} m.",
+        f"RMS of the true horizontal error in the search: {best.score.rms:.3f} m.",
     ]
     return [*lines, *_certainty(result)]
 
@@ -67,26 +65,25 @@ def _certainty(result: Result) -> Iterator[str]:
     if told is None:
         return
     yield (
-        f"On {told.samples} samples that the search has not seen, RMS of the true error in m with "
-        f"its 95 % interval: {told.before} -> {told.after}."
+        f"On {told.samples} samples that the search has not seen, RMS of the true horizontal error "
+        f"in m with its 95 % interval: {told.before} -> {told.after}."
     )
     yield (
         f"That is {told.ratio.value:.2f} times the error before, 95 % interval "
         f"{told.ratio.low:.2f} to {told.ratio.high:.2f}; better in {told.better} of "
         f"{told.samples} samples."
     )
+    (known, known_after), (floor, floor_after) = told.known, told.estimate
     yield (
-        "Of that the program knew (error of the estimated position): "
-        f"{_estimated(result.before)} -> {_estimated(result.after)} m. The rest is the "
-        "autopilot's estimate."
+        f"On the same flights the estimated position was {known:.3f} -> {known_after:.3f} m from "
+        f"the reference, and {floor:.3f} -> {floor_after:.3f} m from the true one."
+    )
+    yield (
+        "No gain or weight reduces the last: it is the autopilot's estimate. Only "
+        "guidance.position_lateness_ms reduces it, where the estimate is late."
     )
     if told.ratio.high >= 1.0:
         yield "The interval holds 1: fly more samples before you believe that it is better."
-
-
-def _estimated(score: Score) -> str:
-    known = np.array(score.estimated)
-    return f"{pooled(known[np.isfinite(known)]):.3f}"
 
 
 def result_text(result: Result, present: Mapping[str, Any]) -> str:
