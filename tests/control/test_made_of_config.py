@@ -8,13 +8,14 @@ import pytest
 from companion.attitude import BodyRates, Limits, Target
 from companion.attitude.limits import make_constants
 from companion.config import Config
+from companion.control.hold_settings import hold_weights
 from companion.control.hover_learning import HoverLearning
 from companion.control.inner_loop import hover_thrust, law_constants, plugin, thrust_limits
 from companion.control.loop_record import Deadlines
 from companion.control.loops import make_loops
 from companion.control.motion_estimate import MotionEstimate
 from companion.control.outer_loop import linear_settings, predictive_settings
-from companion.control.retuning import Retuning, tuning
+from companion.control.retuning import Retuning, between, tuning
 from companion.control.slew import Slew
 from companion.control.telemetry import FreshPosition
 from companion.drag import AxisDrag, Drag
@@ -89,6 +90,33 @@ def test_a_change_of_values_reaches_both_loops():
     others = SimpleNamespace(maker=SimpleNamespace(guidance="another package's"))
     with pytest.raises(TypeError, match="str cannot be retuned"):
         Retuning(SimpleNamespace(), others).apply(values)
+
+
+def with_gains(**gains):
+    return CONFIG.model_copy(update={"planner": CONFIG.planner.model_copy(update=gains)})
+
+
+def test_a_value_moves_by_equal_factors_and_from_zero_by_equal_amounts():
+    before, after = with_gains(yaw_gain_per_s=0.5), with_gains(yaw_gain_per_s=0.8, gain_per_s=1.0)
+    middle = between(before, after, 0.5).planner
+    assert middle.gain_per_s == pytest.approx(2.0)
+    assert middle.yaw_gain_per_s == pytest.approx(0.4**0.5)
+    started = between(with_gains(yaw_gain_per_s=0.0), with_gains(yaw_gain_per_s=0.8), 0.25)
+    assert started.planner.yaw_gain_per_s == pytest.approx(0.2)
+    weight = hold_weights(CONFIG).velocity
+    heavier = CONFIG.guidance.model_copy(update={"velocity_weight_per_s2": 4.0 * weight})
+    changed = CONFIG.model_copy(update={"guidance": heavier})
+    found = between(CONFIG, changed, 0.5).guidance.velocity_weight_per_s2
+    assert found == pytest.approx(2.0 * weight)
+
+
+def test_a_jump_is_in_effect_at_once():
+    slew, wanted = Slew(CONFIG), with_gains(gain_per_s=1.0)
+    slew.jump(wanted)
+    assert slew.settled is wanted
+    assert slew.step(10.0) is None
+    slew.begin(CONFIG, 11.0)
+    assert slew.step(11.35).constants.gain == pytest.approx(2.0)
 
 
 def test_a_change_that_is_stopped_stays_where_it_is():

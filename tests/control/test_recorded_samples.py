@@ -214,6 +214,8 @@ def test_limits_that_changed_in_flight_count_for_the_flags():
     _, answer = bench.sample(SAMPLE._replace(vehicle_time=3.5), body_rates=rates)
     assert (answer["tilt_rate_limited"], answer["yaw_rate_limited"]) == (1, 1)
     assert answer["thrust_limited"] == 0
+    _, answer = bench.sample(SAMPLE._replace(vehicle_time=3.75))  # by the planner
+    assert (answer["tilt_rate_limited"], answer["yaw_rate_limited"]) == (1, 1)
 
 
 def test_what_a_phase_tells_the_loop_and_a_new_attitude_target_are_recorded():
