@@ -91,6 +91,23 @@ def px4_heartbeat(custom_mode, base_mode=157):
     return dialect.MAVLink_heartbeat_message(2, 12, base_mode, custom_mode, 4, 3)
 
 
+def test_each_arming_is_counted(bench):
+    assert bench.state.armings == 0
+    for base_mode in (1, 129, 129, 1, 129):
+        bench.take(px4_heartbeat(0x00060000, base_mode))
+    assert bench.state.armings == 2
+    assert bench.state.heartbeat == (10.0, 12, 2, "OFFBOARD", 0x00060000, True, 4)
+
+
+def test_an_autopilot_that_is_none_of_ours_is_told_until_one_of_ours_comes(bench):
+    assert (bench.state.current_mode, bench.state.unsupported) == (None, None)
+    state = bench.take(dialect.MAVLink_heartbeat_message(2, 4, 129, 7, 4, 3))
+    assert (state.autopilot, state.mode) == (None, "7")
+    assert state.unsupported is not None
+    state = bench.take(px4_heartbeat(0x00060000))
+    assert (state.unsupported, state.mode) == (None, "OFFBOARD")
+
+
 def test_the_mode_is_what_came_last_of_heartbeat_and_current_mode(bench):
     offboard, hold = 0x00060000, 0x03040000
     bench.take(development.MAVLink_current_mode_message(0, offboard, offboard))
@@ -160,10 +177,12 @@ def position(bench, seconds, north=0.0):
 
 def test_a_position_stamped_no_later_than_the_last_is_counted_never_stored(bench):
     kept = position(bench, 60.0, 1.0)
+    assert bench.state.positions == 1
     for bench.now, stamp in ((10.1, 60.0), (10.2, 59.9), (10.3, 50.0), (20.0, 60.0), (21.0, 57.0)):
         assert position(bench, stamp, 2.0) == kept
     assert bench.stats.outdated == 5
     assert position(bench, 60.1, 3.0).position_ned == (3.0, 0.0, 0.0)
+    assert bench.state.positions == 2
 
 
 def attitudes(bench, seconds, began=0.0):
