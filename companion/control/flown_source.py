@@ -4,6 +4,7 @@ from math import dist
 
 from companion.control.predictive import Following
 from companion.guidance import Pose, Reference, VehicleMotion
+from companion.guidance.braking import Braking
 from companion.guidance.follow import Follow
 from companion.guidance.reference import ReferenceAt
 from companion.guidance.source import ManeuverSource, Source
@@ -25,14 +26,27 @@ class FlownSource:
         self.pose: Pose | None = None
         self.source: Source | None = None
         self.begun_at: float | None = None
+        self._braking: Braking | None = None
         self._off_reference = False
 
     def clear(self) -> None:
         """Fly no source and hold no pose."""
-        self.pose, self.source, self.begun_at = None, None, None
+        self.pose, self.source, self.begun_at, self._braking = None, None, None, None
+
+    def hold(self, braking: Braking) -> None:
+        """Brake, and hold the pose where the vehicle stops."""
+        self.clear()
+        self.pose, self._braking = Pose(braking.stop, braking.heading), braking
 
     def begin(self, source: Source, pose: Pose, now: float) -> None:
-        """Fly `source` from `pose`; `now` in s of event-loop time."""
+        """Fly `source` from `pose`; `now` in s of event-loop time.
+
+        Maneuvers begin when the vehicle has come to rest.
+        """
+        if self._braking is not None and isinstance(source, ManeuverSource):
+            now = max(now, self._braking.ends)
+        else:
+            self._braking = None
         source.begin(now, pose)
         self.pose, self.source, self.begun_at = pose, source, now
 
@@ -50,7 +64,9 @@ class FlownSource:
             motion: present motion of the vehicle.
             heading: present heading of the vehicle, rad.
         """
-        pose, source = self.pose, self.source
+        pose, source, braking = self.pose, self.source, self._braking
+        if braking is not None and (source is None or now < braking.ends):
+            return braking.at
         if source is not None:
             return source.reference(now, motion)
         held = (

@@ -1,7 +1,7 @@
 """The guidance loop: a timer that makes a new command from the newest position."""
 
 from collections.abc import Callable
-from math import degrees
+from math import degrees, tan
 
 from companion.attitude import Quaternion, Target, heading, is_unit
 from companion.attitude.kinematics import tilt_angle
@@ -16,22 +16,33 @@ from companion.control.step_rows import StepFlags, StepOutput
 from companion.control.telemetry import Clock, FreshPosition, Ground, Telemetry
 from companion.control.ticker import Ticker
 from companion.control.tracking_record import TrackingRecord
-from companion.guidance import GuidanceInput, HoverThrust, Pose, Reference, VehicleMotion
+from companion.guidance import (
+    GRAVITY,
+    GuidanceInput,
+    HoverThrust,
+    Pose,
+    Reference,
+    VehicleMotion,
+)
+from companion.guidance.braking import Braking
 from companion.guidance.linear import Guidance
 from companion.guidance.source import Source
 from companion.recording.trace import FlightTrace
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
 _LEVEL = Target(0.0, 0.0, 0.0)
+_BRAKING_SHARE = 0.47
+"""Mean deceleration of braking as a share of the largest horizontal acceleration. The largest
+deceleration is 0.7 of it; the rest is left for wind and feedback."""
 
 
 class GuidanceLoop:
     """Writes a new `GuidanceCommand` to the control loop at a steady rate, while position is fresh.
 
     On the ground the command is idle until a take-off is commanded. After that, without a pose, it
-    damps the motion; `hold_here` holds a pose; `follow` flies a source from it. If open-loop rates
-    tilt the vehicle too far, the source ends and the vehicle holds where it is. Poses and
-    references are in the frame without estimator resets, so no reset moves the vehicle.
+    damps the motion; `hold_here` stops and holds a pose; `follow` flies a source from it. If
+    open-loop rates tilt the vehicle too far, the source ends and the vehicle stops and holds. Poses
+    and references are in the frame without estimator resets, so no reset moves the vehicle.
 
     Attributes:
         flown: the held pose and the source that is flown from it.
@@ -59,6 +70,7 @@ class GuidanceLoop:
         trace: FlightTrace,
         *,
         max_tilt: float,
+        least_braking: float,
         period: float,
         position_stale: float,
         clock: Callable[[], float],
@@ -76,6 +88,7 @@ class GuidanceLoop:
         self._ground = ground
         self.record = TrackingRecord(trace, self.flown)
         self.max_tilt = max_tilt
+        self._least_braking = least_braking
         self._fresh = FreshPosition(state, vehicle_clock, position_stale)
         self.before_step: Callable[[float], None] = lambda _: None
         self._clock = clock
@@ -99,7 +112,7 @@ class GuidanceLoop:
         self.flown.clear()
 
     def hold_here(self) -> None:
-        """Hold the present position and heading.
+        """Brake, and hold the place where the vehicle stops, with the present heading.
 
         Raises:
             RuntimeError: no position has come yet.
@@ -109,8 +122,9 @@ class GuidanceLoop:
         self._hold_here(now)
 
     def _hold_here(self, now: float) -> None:
-        self.flown.clear()
-        self.flown.pose = Pose(self.maker.guidance_input(now).now.position_ned, self._heading())
+        motion = self.maker.guidance_input(now).now
+        deceleration = max(self._least_braking, _BRAKING_SHARE * GRAVITY * tan(self.max_tilt))
+        self.flown.hold(Braking(now, motion, self._heading(), deceleration))
 
     def hold_reference(self) -> None:
         """Hold the pose of the present reference, at which a maneuver has ended."""
@@ -122,7 +136,7 @@ class GuidanceLoop:
         self.flown.pose = Pose(reference.position_ned, reference.heading)
 
     def give_up(self) -> None:
-        """Hold here, and fly no source any more."""
+        """Brake and hold, and fly no source any more."""
         now = self._clock()
         self._recorder.action(now, "give_up")
         self.bound_to_hold = True
@@ -236,7 +250,7 @@ class GuidanceLoop:
         return heading(self.attitude())
 
     def _give_up_if_tilted(self, now: float, motion: VehicleMotion) -> None:
-        """Hold here if open-loop rates have tilted the vehicle too far."""
+        """Brake and hold if open-loop rates have tilted the vehicle too far."""
         name = self.flown.steers_by_rates(now, motion)
         if name is None:
             return

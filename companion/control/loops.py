@@ -62,6 +62,7 @@ def make_loops(
         ground,
         trace,
         max_tilt=config.limits.max_tilt,
+        least_braking=config.safety.braking_m_s2,
         period=1.0 / config.guidance.rate_hz,
         position_stale=deadman.position_stale,
         clock=clock,

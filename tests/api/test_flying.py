@@ -373,3 +373,31 @@ def test_references_in_one_moment_tell_no_jerk():
     assert source.reference(0.11, still)(0.3).acceleration_ned[0] == pytest.approx(1.0)
     source.give(Reference((0.0, 0.0, 0.0), acceleration_ned=(2.0, 0.0, 0.0)), 0.2)
     assert source.reference(0.2, still)(0.3).acceleration_ned[0] == pytest.approx(4.0)
+
+
+@BOTH
+def test_a_fast_vehicle_that_is_to_hold_stops_and_does_not_swing_back(autopilot):
+    speeds = []
+
+    async def watch(vehicle):
+        while True:
+            speeds.append(vehicle.state.velocity_ned[0])
+            await asyncio.sleep(0.05)
+
+    async def program(vehicle):
+        await vehicle.take_off()
+        async with vehicle.control() as control:
+            async for state in control.states(seconds=5.0):
+                north, east, down = state.velocity_ned
+                control.accelerate((2.0 * (5.0 - north), -2.0 * east, -2.0 * down))
+        watching = asyncio.ensure_future(watch(vehicle))
+        await vehicle.hold(4.0)
+        watching.cancel()
+        await vehicle.land()
+
+    limits = {"max_tilt_deg": 30.0, "fence_radius_m": 60.0}
+    summary, _ = flown(program, QuickVehicle(autopilot), limits=limits)
+    assert summary.result == "ok"
+    assert max(speeds) > 4.0
+    assert min(speeds) > -0.5  # it was -4
+    assert abs(speeds[-1]) < 0.2

@@ -65,6 +65,7 @@ class Bench:
             self.ground,
             FlightTrace(recorder=recorder),
             max_tilt=radians(30.0),
+            least_braking=2.5,
             period=0.02,
             position_stale=0.3,
             clock=lambda: self.now,
