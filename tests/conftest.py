@@ -1,12 +1,9 @@
 """Property tests try the same cases on every machine, however slow it is just now."""
 
 import gc
-from pathlib import Path
 
 import pytest
 from hypothesis import settings
-
-from companion.config import known_drag
 
 settings.register_profile("same", derandomize=True, deadline=None)
 settings.load_profile("same")
@@ -24,16 +21,10 @@ def state_directory(tmp_path_factory):
 
 
 @pytest.fixture(autouse=True, scope="session")
-def no_earlier_flights():
-    """What flights learned that somebody flew here, as by `make demo`, counts in no test."""
-    flights = Path(__file__).parents[1] / "flights"
-    newest = known_drag.newest
+def empty_working_folder(tmp_path_factory):
+    """What somebody flew in this folder, as by `make demo`, counts in no test."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            known_drag,
-            "newest",
-            lambda folder: newest(folder) if folder.absolute() != flights else None,
-        )
+        patch.chdir(tmp_path_factory.mktemp("here"))
         yield
 
 

@@ -5,8 +5,9 @@ import importlib.util
 import pytest
 
 from companion.cli.main import main
+from tests.flight.fly import CONFIGS
 
-CONFIG = "configs/mock-px4.yaml"
+CONFIG = str(CONFIGS / "mock-px4.yaml")
 
 
 def refused(arguments, capsys):
