@@ -16,14 +16,7 @@ from companion.control.step_rows import StepFlags, StepOutput
 from companion.control.telemetry import Clock, FreshPosition, Ground, Telemetry
 from companion.control.ticker import Ticker
 from companion.control.tracking_record import TrackingRecord
-from companion.guidance import (
-    GRAVITY,
-    GuidanceInput,
-    HoverThrust,
-    Pose,
-    Reference,
-    VehicleMotion,
-)
+from companion.guidance import GRAVITY, GuidanceInput, HoverThrust, Pose, Reference, VehicleMotion
 from companion.guidance.braking import Assumed, brake
 from companion.guidance.linear import Guidance
 from companion.guidance.source import Source
