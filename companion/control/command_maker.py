@@ -16,7 +16,7 @@ class CommandMaker:
     """Asks linear guidance, or predictive control, and limits the tilt to what the thrust can hold.
 
     Args:
-        guidance: see below.
+        guidance: makes targets of references.
         flown: gives the reference.
         estimate: gives the state of the vehicle, and takes the commanded vertical thrust.
         learning: gives the largest tilt.

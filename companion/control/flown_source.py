@@ -39,16 +39,13 @@ class FlownSource:
         self.pose, self._braking = Pose(braking.stop, braking.heading), braking
 
     def begin(self, source: Source, pose: Pose, now: float) -> None:
-        """Fly `source` from `pose`; `now` in s of event-loop time.
-
-        Maneuvers begin when the vehicle has come to rest.
-        """
-        if self._braking is not None and isinstance(source, ManeuverSource):
-            now = max(now, self._braking.ends)
-        else:
-            self._braking = None
+        """Fly `source` from `pose`; `now` in s of event-loop time."""
         source.begin(now, pose)
-        self.pose, self.source, self.begun_at = pose, source, now
+        self.pose, self.source, self.begun_at, self._braking = pose, source, now, None
+
+    def braking_left(self, now: float) -> float:
+        """Time until the vehicle has come to rest for a hold, s; `now` in s of event-loop time."""
+        return 0.0 if self._braking is None else max(0.0, self._braking.ends - now)
 
     def finished(self, now: float) -> bool:
         """Whether the source has no more to fly."""
@@ -64,11 +61,11 @@ class FlownSource:
             motion: present motion of the vehicle.
             heading: present heading of the vehicle, rad.
         """
-        pose, source, braking = self.pose, self.source, self._braking
-        if braking is not None and (source is None or now < braking.ends):
-            return braking.at
+        pose, source = self.pose, self.source
         if source is not None:
             return source.reference(now, motion)
+        if self._braking is not None:
+            return self._braking.at
         held = (
             Reference(motion.position_ned, heading=heading)
             if pose is None

@@ -16,24 +16,14 @@ from companion.control.step_rows import StepFlags, StepOutput
 from companion.control.telemetry import Clock, FreshPosition, Ground, Telemetry
 from companion.control.ticker import Ticker
 from companion.control.tracking_record import TrackingRecord
-from companion.guidance import (
-    GRAVITY,
-    GuidanceInput,
-    HoverThrust,
-    Pose,
-    Reference,
-    VehicleMotion,
-)
-from companion.guidance.braking import Braking
+from companion.guidance import GRAVITY, GuidanceInput, HoverThrust, Pose, Reference, VehicleMotion
+from companion.guidance.braking import Assumed, brake
 from companion.guidance.linear import Guidance
 from companion.guidance.source import Source
 from companion.recording.trace import FlightTrace
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
 _LEVEL = Target(0.0, 0.0, 0.0)
-_BRAKING_SHARE = 0.47
-"""Mean deceleration of braking as a share of the largest horizontal acceleration. The largest
-deceleration is 0.7 of it; the rest is left for wind and feedback."""
 
 
 class GuidanceLoop:
@@ -70,7 +60,7 @@ class GuidanceLoop:
         trace: FlightTrace,
         *,
         max_tilt: float,
-        least_braking: float,
+        assumed_braking: Assumed,
         period: float,
         position_stale: float,
         clock: Callable[[], float],
@@ -88,7 +78,7 @@ class GuidanceLoop:
         self._ground = ground
         self.record = TrackingRecord(trace, self.flown)
         self.max_tilt = max_tilt
-        self._least_braking = least_braking
+        self._assumed_braking = assumed_braking
         self._fresh = FreshPosition(state, vehicle_clock, position_stale)
         self.before_step: Callable[[float], None] = lambda _: None
         self._clock = clock
@@ -122,9 +112,17 @@ class GuidanceLoop:
         self._hold_here(now)
 
     def _hold_here(self, now: float) -> None:
+        if self.flown.braking_left(now) > 0.0:
+            return  # it goes on braking: a new beginning would stop it further away
         motion = self.maker.guidance_input(now).now
-        deceleration = max(self._least_braking, _BRAKING_SHARE * GRAVITY * tan(self.max_tilt))
-        self.flown.hold(Braking(now, motion, self._heading(), deceleration))
+        acceleration = GRAVITY * tan(min(self.max_tilt, self.learning.largest_tilt()))
+        heading = self._heading()
+        self.flown.hold(brake(now, motion, heading, acceleration, self._assumed_braking))
+
+    @property
+    def braking_left(self) -> float:
+        """Time until the vehicle has come to rest for a hold, s."""
+        return self.flown.braking_left(self._clock())
 
     def hold_reference(self) -> None:
         """Hold the pose of the present reference, at which a maneuver has ended."""

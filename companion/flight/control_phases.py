@@ -53,12 +53,13 @@ async def fly_commanded(context: FlightContext, source: Source) -> None:
 
 
 async def _fly(context: FlightContext, source: Source, progress: Callable[[], str]) -> None:
-    """Fly a source until it is finished.
+    """Fly a source until it is finished; it begins when the vehicle is at rest.
 
     Raises:
         FlightEnded: guidance gave it up, the source failed, or the thrust is too small to steer.
     """
     now = asyncio.get_running_loop().time
+    await asyncio.sleep(context.guidance_loop.braking_left)
     began, sent = now(), context.loop.record.setpoints
     tilt_margin = _TiltMargin(context)
     tilt_margin.check()

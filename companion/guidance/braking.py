@@ -5,15 +5,49 @@ from typing import NamedTuple
 
 from companion.guidance.reference import Reference, Vector, VehicleMotion
 
+_SHARE = 0.47
+"""Mean deceleration as a share of the largest horizontal acceleration. The largest deceleration is
+0.7 of that; the rest is left for wind and feedback."""
 _JERK = 8.0
 """Largest jerk of braking, m/s³: the vehicle tilts and levels by less than 50°/s."""
-
 _AT_REST = 0.1
 """A slower vehicle is at rest, m/s."""
+_NOTICED = 0.1
+"""The monitor of the fence and guidance notice a breach within this time, s."""
+
+
+class Assumed(NamedTuple):
+    """What the monitor of the fence assumes of braking, so what it must achieve.
+
+    Attributes:
+        reaction: `safety.reaction_s`, s.
+        deceleration: `safety.braking_m_s2`, m/s².
+    """
+
+    reaction: float
+    deceleration: float
+
+
+def braking_time(speed: float, acceleration: float, assumed: Assumed) -> float:
+    """Time in which the vehicle brakes from a speed, s; 0 for a vehicle at rest.
+
+    It is long enough for a smooth stop, and so short that the vehicle stops where the monitor of
+    the fence assumes it at the latest.
+
+    Args:
+        speed: horizontal, m/s.
+        acceleration: largest horizontal acceleration, m/s².
+        assumed: what the monitor of the fence assumes.
+    """
+    if speed < _AT_REST:
+        return 0.0
+    smooth = max(speed / (_SHARE * acceleration), sqrt(6.0 * speed / _JERK))
+    reaction = max(0.0, assumed.reaction - _NOTICED)
+    return min(smooth, 2.0 * reaction + speed / assumed.deceleration)
 
 
 class Braking(NamedTuple):
-    """Brakes smoothly and stays where the vehicle stops.
+    """Brakes horizontally and stays where the vehicle stops; the present height is held.
 
     A hold of the present position would let a fast vehicle pass it and swing back. The speed falls
     by 3u² − 2u³ with u from 0 to 1, so the deceleration begins and ends with 0.
@@ -22,21 +56,13 @@ class Braking(NamedTuple):
         begun_at: when the vehicle begins to brake, s.
         motion: its motion then.
         heading: the heading to keep, rad.
-        deceleration: mean one, m/s²; the largest is 1.5 times this.
+        duration: time of braking, s; see `braking_time`.
     """
 
     begun_at: float
     motion: VehicleMotion
     heading: float
-    deceleration: float
-
-    @property
-    def duration(self) -> float:
-        """Time of braking, s; 0 for a vehicle at rest."""
-        speed = hypot(*self.motion.velocity_ned)
-        if speed < _AT_REST:
-            return 0.0
-        return max(speed / self.deceleration, sqrt(6.0 * speed / _JERK))
+    duration: float
 
     @property
     def ends(self) -> float:
@@ -57,10 +83,26 @@ class Braking(NamedTuple):
         way = duration * u * (1.0 - u * u + 0.5 * u * u * u)
         left = 1.0 - u * u * (3.0 - 2.0 * u)
         slowing = 6.0 * u * (1.0 - u) / duration
-        (north, east, down), (v_north, v_east, v_down) = self.motion
+        (north, east, down), (v_north, v_east, _) = self.motion
         return Reference(
-            (north + way * v_north, east + way * v_east, down + way * v_down),
-            (left * v_north, left * v_east, left * v_down),
-            (-slowing * v_north, -slowing * v_east, -slowing * v_down),
+            (north + way * v_north, east + way * v_east, down),
+            (left * v_north, left * v_east, 0.0),
+            (-slowing * v_north, -slowing * v_east, 0.0),
             self.heading,
         )
+
+
+def brake(
+    now: float, motion: VehicleMotion, heading: float, acceleration: float, assumed: Assumed
+) -> Braking:
+    """The braking that begins now.
+
+    Args:
+        now: s.
+        motion: of the vehicle.
+        heading: the heading to keep, rad.
+        acceleration: largest horizontal acceleration, m/s².
+        assumed: what the monitor of the fence assumes.
+    """
+    speed = hypot(motion.velocity_ned[0], motion.velocity_ned[1])
+    return Braking(now, motion, heading, braking_time(speed, acceleration, assumed))

@@ -9,7 +9,7 @@ class Action(Enum):
     WARN = "warn"
     """Report the breach once and fly on."""
     HOLD = "hold"
-    """Give up the maneuver and hold the present position, still in offboard."""
+    """Give up the maneuver, brake and hold the place of the stop, still in offboard."""
     HAND_BACK = "hand_back"
     """Command the autopilot to hold, and end offboard control."""
     LAND = "land"

@@ -25,8 +25,11 @@ class KeptFence:
         link.subscribe("HEARTBEAT", self._forget_if_disarmed)
 
     def keep(self, centre: FenceCentre | None) -> None:
-        """Note the centre of a flight that has ended; that of an earlier one stays."""
-        if self.centre is None:
+        """Note the centre of a flight that has ended; that of an earlier one stays.
+
+        A vehicle that is disarmed by then keeps none.
+        """
+        if self.centre is None and self._state.armed is not False:
             self.centre = centre
 
     def refusal(self) -> str | None:

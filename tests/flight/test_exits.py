@@ -179,7 +179,7 @@ def test_killed_the_autopilot_does_what_it_does_without_us(tmp_path, ways):
 def test_a_disk_that_takes_no_more_ends_the_recording_and_not_the_flight(tmp_path):
     with sockets.mock_vehicle(tmp_path) as mock:
         process = start(mock, tmp_path, "--lockstep", hover={"duration_s": 3.0}, recording=PAGE)
-        prlimit(process.pid, RLIMIT_FSIZE, (300_000, 300_000))
+        prlimit(process.pid, RLIMIT_FSIZE, (150_000, 150_000))
         result = finish(process, 0)
         assert not mock.state()["armed"]
     assert result["result"] == "ok"
