@@ -6,6 +6,7 @@ import socket
 import subprocess
 import sys
 from contextlib import suppress
+from pathlib import Path
 
 import pytest
 import yaml
@@ -33,7 +34,8 @@ class Answering:
     def __init__(self, mock):
         self.mock, self.began = mock, 0.0
         command = [sys.executable, "-m", PROGRAM, str(mock.port)]
-        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, text=True)
+        root = Path(__file__).parents[2]
+        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, text=True, cwd=root)
 
     def flows(self):
         enough = self.mock.state()["setpoints"] + 50
