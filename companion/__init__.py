@@ -1,4 +1,4 @@
-"""MAVLink offboard companion: body rates under which horizontal acceleration answers linearly.
+"""Companion computer for MAVLink: sends body rates for a linear horizontal acceleration.
 
 To fly from Python, see `help(companion.connect)`, `help(companion.Vehicle)` and
 `help(companion.Control)`. They are imported when they are asked for, so that the command line
@@ -32,7 +32,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    """Import one of the names above when it is asked for first."""
+    """Import one of the public names when a program first uses it."""
     if name not in __all__:
         raise AttributeError(f"module 'companion' has no attribute {name!r}")
     from companion import api  # noqa: PLC0415  takes a quarter of a second

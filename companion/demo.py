@@ -20,10 +20,10 @@ from companion.mavlink.transport.endpoint import (
 )
 
 _LOCAL_PORT_OFFSET = 40
-"""The vehicle's own UDP port is this far above the one it sends to."""
+"""Distance from the companion's UDP port to the mock vehicle's own port."""
 
 _READY = "ready on "
-"""First words of the vehicle once its ports are open."""
+"""First words of the vehicle's output when its ports are open."""
 
 _START = 20.0
 """Time allowed for the vehicle to start, s."""
@@ -33,7 +33,7 @@ class Wire(NamedTuple):
     """The connection between the program and the mock vehicle.
 
     Attributes:
-        endpoint: our end, as in `link.endpoint`.
+        endpoint: our end, in the notation of `link.endpoint`.
         vehicle: the vehicle's end, as arguments of its command line.
     """
 
@@ -46,16 +46,16 @@ class VehicleStoppedError(Exception):
 
 
 def default_config() -> Path:
-    """The configuration that ships with the program: in the repository, or where pip put it.
+    """Path of the shipped configuration: in the repository, or where pip installed it.
 
     Raises:
-        ConfigError: it is in neither place.
+        ConfigError: the file is in neither place.
     """
     return shipped("mock-px4.yaml")
 
 
 def free_port() -> int:
-    """A free UDP port for the companion, with a free one for the mock vehicle beside it."""
+    """A free UDP port for the companion whose matching port for the mock vehicle is free too."""
     for _ in range(100):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as first:
             first.bind(("127.0.0.1", 0))
@@ -73,7 +73,7 @@ def udp_wire() -> Wire:
     """A connection by free UDP ports.
 
     Raises:
-        ConfigError: there are none.
+        ConfigError: there are no free ports.
     """
     port = free_port()
     return Wire(f"udpin://127.0.0.1:{port}", ("--port", str(port)))

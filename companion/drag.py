@@ -1,4 +1,4 @@
-"""Drag per mass: the same in all directions, and what an angular body adds to it."""
+"""Drag per mass: an isotropic part, and the addition of an angular body."""
 
 from math import cos, pi, sin
 from typing import NamedTuple, TypeVar
@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Number = TypeVar("Number", float, NDArray[np.float64])
-"""Type of a vector component: a number, an array, or a CasADi symbol."""
+"""Type of a vector component: float, array, or CasADi symbol."""
 
 _TINY = 1e-12
 """Added to the squared speed, (m/s)², so that the speed is differentiable at rest."""
@@ -55,8 +55,9 @@ class Drag(NamedTuple):
 NO_DRAG = Drag()
 
 _MEAN_SHARE = 8.0 / (3.0 * pi)
-"""Mean over all directions of |cos|³ + |sin|³: quadratic drag along two axes, seen along the
-velocity."""
+"""Mean over all directions of |cos|³ + |sin|³: component along the velocity of quadratic drag along
+two axes.
+"""
 
 
 class AxisDrag(NamedTuple):

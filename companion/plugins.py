@@ -5,15 +5,17 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 PLANNERS = "companion.planners"
-"""Entry points of planners: a law (`companion.attitude.Law`), or a class of planners that is made
-of `companion.attitude.Constants`."""
+"""Entry points of planners: a law (`companion.attitude.Law`), or a class of planners with one
+argument, `companion.attitude.Constants`.
+"""
 GUIDANCE = "companion.guidance"
-"""Entry points of guidance: a class by the Protocol `companion.guidance.linear.Guidance`, made of
-`LinearSettings`."""
+"""Entry points of guidance: a class with the Protocol `companion.guidance.linear.Guidance` and one
+argument, `LinearSettings`.
+"""
 
 
 class PluginError(Exception):
-    """A plug-in is not installed or cannot be loaded; the message says which and why."""
+    """A plug-in is not installed or cannot be loaded; the message names it and the reason."""
 
 
 def names(group: str) -> tuple[str, ...]:
@@ -25,7 +27,7 @@ def load(group: str, name: str) -> Any:
     """The object that an entry point names.
 
     Raises:
-        PluginError: there is no such plug-in, two packages give it, or its package fails.
+        PluginError: there is no such plug-in, two packages provide it, or its package fails.
     """
     found = tuple(entry_points(group=group, name=name))
     if len(found) != 1:

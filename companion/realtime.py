@@ -48,11 +48,11 @@ def frozen_objects() -> Iterator[None]:
 
 
 class RealtimeError(Exception):
-    """A required setting was refused; the message says which, why, and how to get it."""
+    """A required setting was refused; the message gives the reason and the remedy."""
 
 
 class Refused(Exception):  # noqa: N818 - a refusal is not an error of this program
-    """The system refuses a setting; the message says why and what to do."""
+    """The system refuses a setting; the message gives the reason and the remedy."""
 
 
 class Grant(NamedTuple):
@@ -95,7 +95,7 @@ class Wishes:
 
 @contextmanager
 def asked_for(wishes: Wishes) -> Iterator[tuple[Grant, ...]]:
-    """Context manager that requests all settings, and undoes the granted ones at its end.
+    """Request all settings; undo the granted ones at the end of the block.
 
     Raises:
         RealtimeError: a setting is refused although `required`.

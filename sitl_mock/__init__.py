@@ -1,1 +1,1 @@
-"""A multirotor with an autopilot that speaks MAVLink: to test programs that fly one."""
+"""A mock multirotor with an autopilot that speaks MAVLink, to test programs that fly one."""

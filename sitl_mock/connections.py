@@ -22,9 +22,9 @@ class Connections:
         companion: the companion's endpoint.
 
     Args:
-        settings: of this vehicle.
-        simulation: its links are emptied; the control channel acts on it.
-        exchange: takes what arrives, and gives what is to be sent.
+        settings: settings of this vehicle.
+        simulation: the vehicle; its links are sent from, and the control channel acts on it.
+        exchange: takes arriving datagrams, and provides datagrams to send.
 
     Raises:
         ConfigError: a port is in use.
@@ -62,7 +62,7 @@ class Connections:
         return [by_descriptor[fd] for fd in readable if fd in by_descriptor]
 
     def deliver(self, arrived: list[Arrived], endpoint: Endpoint) -> None:
-        """Hand what came on an endpoint to the autopilot."""
+        """Pass a datagram that arrived on an endpoint to the autopilot."""
         self._exchange.deliver(arrived, self._links[endpoint])
 
     def send_beacon(self, beacon: bytes) -> None:

@@ -33,12 +33,12 @@ class Truth(TypedDict):
     mode: str
     """PX4's mode names or ArduCopter's."""
     intended_mode: str
-    """The mode that its user chose last; a failsafe does not change it."""
+    """The mode that the user chose last; a failsafe does not change it."""
     failsafe: bool
     landed: bool
-    """By the autopilot's land detector."""
+    """Whether the autopilot's land detector reports landed."""
     aborted: bool
-    """The autopilot's process has ended: it neither flies nor answers."""
+    """Whether the autopilot's process has ended: it neither flies nor answers."""
     position: Vector
     velocity: Vector
     q: Quaternion
@@ -46,15 +46,15 @@ class Truth(TypedDict):
     on_ground: bool
     crashed: bool
     touchdown_speed: float | None
-    """Of the last touchdown, m/s; None before the first."""
+    """Speed of the last touchdown, m/s; None before the first."""
     battery: float
-    """0..1."""
+    """Charge, 0..1."""
     setpoints: int
     """Number of setpoints that the autopilot accepted."""
     last_setpoint: float | None
-    """Vehicle time of the last one, s; None if there was none."""
+    """Vehicle time of the last setpoint, s; None if there was none."""
     signing: dict[str, int] | None
-    """Numbers of the companion's frames that were accepted, unsigned, refused; None: no signing."""
+    """Numbers of accepted, unsigned and refused frames of the companion; None: no signing."""
 
 
 def reply(simulation: Simulation, request: bytes) -> bytes:

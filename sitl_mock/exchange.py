@@ -1,4 +1,4 @@
-"""What one vehicle receives and sends, with the faults of its companion link (pure).
+"""The datagrams that one vehicle receives and sends, with the faults of its companion link (pure).
 
 `Server` joins it to sockets, `companion.testing` joins it to an application in the same process.
 Both do the same in each slot: collect what arrived, `step`, send `outgoing` of each link.
@@ -26,10 +26,10 @@ def in_burst(elapsed_s: float, burst_s: float) -> float:
 
 
 class Exchange:
-    """Brings datagrams to the autopilot and takes those that it sends.
+    """Passes datagrams to the autopilot, and takes those that it sends.
 
     Args:
-        settings: of this vehicle.
+        settings: settings of this vehicle.
         simulation: the vehicle.
 
     Attributes:
@@ -46,7 +46,7 @@ class Exchange:
         self._bundle = settings.lockstep.enabled and settings.lockstep.bundle
 
     def step(self, arrived: list[Arrived]) -> bytes | None:
-        """Handle what arrived on the companion link, and simulate one slot.
+        """Handle the datagrams that arrived on the companion link, and simulate one slot.
 
         Returns:
             the lockstep beacon of the new slot, unsigned; None without lockstep.
@@ -56,7 +56,7 @@ class Exchange:
         return self._simulation.beacon() if self._lockstep else None
 
     def deliver(self, arrived: list[Arrived], link: Link) -> None:
-        """Hand what came on a link to the autopilot, after the faults of that link."""
+        """Pass datagrams of a link to the autopilot, after the faults of that link."""
         simulation = self._simulation
         faults = simulation.faults.link
         if link is self._companion and not self._pipe_in.is_clear(faults):
@@ -94,8 +94,8 @@ class Exchange:
     def is_repeated_answer(self, messages: list[Message]) -> bool:
         """Whether this datagram only answers an earlier beacon, which was sent twice.
 
-        How often a beacon is sent depends on the wall clock, so the faults of the link, which count
-        datagrams, must not see the second answer.
+        The number of beacons depends on the wall clock. The faults of the link count datagrams, so
+        they must not see the second answer.
         """
         now_ms = self._simulation.time_us // 1000
         return (

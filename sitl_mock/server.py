@@ -16,18 +16,19 @@ BEACON_FIRST_S = 0.05
 BEACON_AGAIN_S = 0.2
 """A later beacon is sent again after this much wall time."""
 MAX_LAG_S = 1.0
-"""In real time, a lag above this is not made up. A busy computer delays us by tenths of a second;
-we make these up, because a lost tenth would look to the companion like a slower link."""
+"""Largest lag that is made up in real time, s. A busy computer delays us by tenths of a second,
+which are made up, because to the companion a lost tenth would look like a slower link.
+"""
 
 SPIN_S = 0.0005
-"""The server polls without sleeping for this long before it sleeps."""
+"""Time of polling before the server sleeps, s."""
 
 
 class Server:
     """Runs one vehicle in real time or in lockstep.
 
     Args:
-        settings: this vehicle's own (see `MockSettings.for_vehicle`).
+        settings: settings of this vehicle (see `MockSettings.for_vehicle`).
         system_id: MAVLink system id.
         status: shows the running vehicle after each slot, None = headless.
 
@@ -200,7 +201,7 @@ class Server:
         return (vehicle_us - self._base_us) / self._settings.speed
 
     def _serve(self, endpoint: Endpoint) -> None:
-        """Read and handle all datagrams that wait on an endpoint, and send the answers."""
+        """Read and handle all waiting datagrams of an endpoint, and send the answers."""
         while (received := endpoint.receive()) is not None:
             datagram, from_partner = received
             messages = decode(datagram)

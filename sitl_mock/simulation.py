@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.autopilot.faults import FaultEffects, FaultSchedule
 from sitl_mock.autopilot.parameters import ParameterTable
-from sitl_mock.autopilot.personality import VehicleParts
+from sitl_mock.autopilot.personality import Personality, VehicleParts
 from sitl_mock.autopilot.receiver import Receiver
 from sitl_mock.autopilot.setpoints import OffboardStream
 from sitl_mock.autopilot.state import State
@@ -30,7 +30,7 @@ class Simulation:
     """One vehicle with its autopilot.
 
     Args:
-        settings: of this vehicle.
+        settings: settings of this vehicle.
         system_id: MAVLink system id.
         plant: computes the physics, see `Vehicle`.
     """
@@ -62,17 +62,9 @@ class Simulation:
         self._rate_hz = settings.airframe.physics_rate_hz
         self._next_commander_us = 0
         self.stream = OffboardStream()
-        signed = settings.signing is not None
-        self.companion, self.gcs = (
-            Link(
-                name,
-                Framer(system_id, 1, signed=signed),
-                personality.streams(name, settings),
-                link_signing(settings.signing, name, unsigned_links=personality.unsigned_links),
-            )
-            for name in ("companion", "gcs")
-        )
+        self.companion, self.gcs = _links(settings, personality, system_id)
         self.links = [self.companion] + ([self.gcs] if settings.gcs_port else [])
+        signed = settings.signing is not None
         self._beacon_framer = Framer(system_id, 1, signed=signed)
         self._rules = personality.rules(
             VehicleParts(
@@ -169,3 +161,18 @@ class Simulation:
                 message = builder()
                 if message is not None:
                     link.send(message)
+
+
+def _links(settings: MockSettings, personality: Personality, system_id: int) -> tuple[Link, Link]:
+    """Return the links to the companion and to the ground station."""
+    signing = settings.signing
+
+    def link(name: str) -> Link:
+        return Link(
+            name,
+            Framer(system_id, 1, signed=signing is not None),
+            personality.streams(name, settings),
+            link_signing(signing, name, unsigned_links=personality.unsigned_links),
+        )
+
+    return link("companion"), link("gcs")

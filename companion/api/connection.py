@@ -3,13 +3,18 @@
 import asyncio
 from collections.abc import AsyncGenerator, Coroutine, Mapping
 from contextlib import asynccontextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
+from companion.api.ctrl_c import on_ctrl_c
+from companion.api.flight_loop import FlightLoop, flight_loop
 from companion.api.program import Program, ended_by
-from companion.api.vehicle import Vehicle
+from companion.api.state import NewestState
+from companion.api.vehicle import Vehicle, leaving
 from companion.config import Config
 from companion.config.files import changed, load
+from companion.flight.context import FlightContext
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.observer import Observer, Silent, decline_landing
 from companion.flight.session import Session
@@ -30,17 +35,18 @@ async def connect(
     folder: Path | None = None,
     observer: Observer | None = None,
 ) -> AsyncGenerator[Vehicle, None]:
-    """Connect, check the vehicle, and give it to the block; record the flight meanwhile.
+    """Connect, run the preflight checks, and yield the vehicle; the flight is recorded meanwhile.
 
-    When the block ends in the air, the vehicle is handed back: the autopilot holds it.
+    The flight runs in its own thread. When the block ends in the air, the vehicle is handed back:
+    the autopilot holds it.
 
     Args:
-        config: of the flight, or its file.
-        endpoint: instead of `link.endpoint`.
-        arm: instead of `flight.arm`: whether `Vehicle.take_off` arms, or the pilot does.
-        changes: further keys by section, as `{"limits": {"max_tilt_deg": 20}}`.
+        config: configuration of the flight, or the path of its file.
+        endpoint: replaces `link.endpoint`.
+        arm: replaces `flight.arm`. True: `Vehicle.take_off` arms. False: the pilot arms.
+        changes: other keys to change, by section, such as `{"limits": {"max_tilt_deg": 20}}`.
         folder: an existing folder for the records; None: a new one in `recording.directory`.
-        observer: is told of phases and events.
+        observer: receives phases and events in the flight's thread; it must return at once.
 
     Raises:
         ConfigError: the configuration is wrong.
@@ -66,47 +72,67 @@ async def flying(
     observer: Observer | None = None,
     environment: Environment = THIS_COMPUTER,
 ) -> AsyncGenerator[Vehicle, None]:
-    """As `connect`, with a configuration as it is; without a folder nothing is recorded."""
-    program = Program()
-    session = Session(config, folder, observer or Silent(), decline_landing, program, environment)
-    program.interrupt = session.interrupt
-    flight = asyncio.create_task(_fly(session, program))
+    """Like `connect`, for a complete configuration; nothing is recorded without a folder."""
+    loop, lost = flight_loop(), False
     try:
+        session, program = await loop.start(_begin(config, folder, observer, environment))
+        loop.on_lost(partial(_end, session, program))
+        flight = loop.start(_fly(session, program))
         try:
-            vehicle = Vehicle(program, await asyncio.shield(program.connected))
-        except asyncio.CancelledError:
-            if not session.interrupt("the program was cancelled"):
-                flight.cancel()
-            raise
-        try:
-            yield vehicle
-        except BaseException as error:
-            session.note(f"the program raised {error!r}")
-            with suppress(FlightEnded):
-                await _leave(vehicle, program)
-            raise
-        await _leave(vehicle, program)
+            with on_ctrl_c(loop, session.interrupt):
+                async with _vehicle(loop, session, program, flight) as vehicle:
+                    yield vehicle
+        finally:
+            lost = True  # if the next line is cancelled
+            await asyncio.wait({flight})
+            lost = False
+        flight.result()
     finally:
-        await asyncio.wait({flight})
-    flight.result()
+        loop.close(wait=not lost)
+
+
+@asynccontextmanager
+async def _vehicle(
+    loop: FlightLoop, session: Session, program: Program, flight: asyncio.Future[None]
+) -> AsyncGenerator[Vehicle, None]:
+    """The vehicle after the preflight checks; at the end of the block the flight ends."""
+    try:
+        context, newest = await loop.start(_connected(loop, program))
+    except asyncio.CancelledError:
+        if not await loop.start(_interrupt(session, "the program was cancelled")):
+            flight.cancel()
+        raise
+    try:
+        yield Vehicle(program, context, newest, loop)
+    except BaseException as error:
+        loop.post(session.note, f"the program raised {error!r}")
+        with suppress(FlightEnded):
+            await asyncio.shield(loop.start(_leave(program)))
+        raise
+    await asyncio.shield(loop.start(_leave(program)))
 
 
 def run(main: Coroutine[Any, Any, T], *, in_lockstep: bool = False) -> T:
-    """Like `asyncio.run`, on the event loop that answers samples the fastest.
+    """Like `asyncio.run`; the garbage collector ignores all objects that exist already.
 
     Args:
         main: the program.
-        in_lockstep: in the vehicle's time, for a vehicle in lockstep (`link.lockstep`).
+        in_lockstep: run on the vehicle's time, for a vehicle in lockstep (`link.lockstep`).
     """
     return (lockstep.run if in_lockstep else loop.run)(main)
 
 
-async def _leave(vehicle: Vehicle, program: Program) -> None:
-    """End the flight, even if the program is cancelled meanwhile."""
-    if program.busy:
-        program.interrupt("the program ended before what it had asked for")
-    elif not program.over:
-        await asyncio.shield(asyncio.create_task(vehicle.leave()))
+# The coroutines below run in the flight's loop.
+
+
+async def _begin(
+    config: Config, folder: Path | None, observer: Observer | None, environment: Environment
+) -> tuple[Session, Program]:
+    program = Program()
+    told = observer or Silent()
+    session = Session(config, folder, told, decline_landing, program, environment)
+    program.interrupt = session.interrupt
+    return session, program
 
 
 async def _fly(session: Session, program: Program) -> None:
@@ -116,5 +142,30 @@ async def _fly(session: Session, program: Program) -> None:
     except Exception as error:
         program.end(error)
         raise
+    finally:
+        program.finished.set()
     program.summary = summary
     program.end(ended_by(summary.result))
+
+
+async def _connected(loop: FlightLoop, program: Program) -> tuple[FlightContext, NewestState]:
+    context = await asyncio.shield(program.connected)
+    return context, NewestState(context, loop)
+
+
+async def _interrupt(session: Session, reason: str) -> bool:
+    return session.interrupt(reason)
+
+
+async def _leave(program: Program) -> None:
+    """End the flight: hand back in the air; on the ground leave the vehicle as it is."""
+    if program.busy:
+        program.interrupt("the program ended before what it had asked for")
+    elif not program.over:
+        await program.request(leaving, last=True)
+
+
+async def _end(session: Session, program: Program) -> None:
+    """End the flight of a program that no longer exists."""
+    if not program.finished.is_set() and session.interrupt("the program ended in flight"):
+        await program.finished.wait()

@@ -5,7 +5,9 @@ from collections.abc import AsyncIterator
 from itertools import chain
 from math import inf, isfinite
 
-from companion.api.state import State, state_of
+from companion.api.flight_loop import FlightLoop
+from companion.api.program import Program
+from companion.api.state import NewestState, State
 from companion.attitude import BodyRates, Coefficients
 from companion.flight.context import FlightContext
 from companion.guidance.reference import Reference, Vector
@@ -17,34 +19,45 @@ _AXES = 3
 
 
 class Control:
-    """What a program commands while it has control; the newest command counts.
+    """The commands of a program while it has control; only the newest command is in force.
 
-    Each command must follow the one before within `deadman.target_stale_ms`. If they stop, the
-    vehicle is held and handed back. Frames are world NED and body FRD, in SI units.
+    Consecutive commands may be at most `deadman.target_stale_ms` apart. If commands stop, the
+    autopilot holds the vehicle and control ends. Frames are world NED and body FRD, in SI units.
 
     Args:
+        program: knows whether the flight has ended.
         context: of the flight.
+        newest: the state of the vehicle.
+        loop: of the flight.
         source: takes the references.
-        flown: is done when control has ended.
+        flown: future that is done when control has ended.
     """
 
     def __init__(
-        self, context: FlightContext, source: CommandedSource, flown: asyncio.Task[None]
+        self,
+        program: Program,
+        context: FlightContext,
+        newest: NewestState,
+        loop: FlightLoop,
+        source: CommandedSource,
+        flown: asyncio.Future[None],
     ) -> None:
-        self._context, self._source, self._flown = context, source, flown
-        self._clock = asyncio.get_running_loop().time
+        self._program, self._context, self._newest = program, context, newest
+        self._loop, self._source, self._flown = loop, source, flown
+        self._command: tuple[Reference, float, Vector | None] | None = None
+        self._posted = False
         self._began = self.state
 
     @property
     def state(self) -> State:
         """The newest state of the vehicle."""
-        return state_of(self._context, self._clock())
+        return self._newest.state()
 
     async def states(self, seconds: float = inf) -> AsyncIterator[State]:
-        """The state at each new attitude sample, for a time; samples that come meanwhile are left.
+        """Yield the state at each new attitude sample; skip samples while the caller works.
 
         Args:
-            seconds: after which the iteration ends.
+            seconds: time after which the iteration ends.
 
         Raises:
             FlightEnded: control has ended.
@@ -54,11 +67,11 @@ class Control:
         def wake(_: object) -> None:
             news.set()
 
-        unsubscribe = self._context.link.subscribe("ATTITUDE_QUATERNION", wake)
+        unsubscribe = self._newest.subscribe(news.set)
         self._flown.add_done_callback(wake)
-        until = self._clock() + seconds
+        until = self._loop.time() + seconds
         try:
-            while self._clock() < until:
+            while self._loop.time() < until:
                 self._require_control()
                 yield self.state
                 news.clear()
@@ -70,11 +83,11 @@ class Control:
     def accelerate(self, acceleration_ned: Vector, heading: float | None = None) -> None:
         """Command an acceleration, which the vehicle reaches with its known linear response.
 
-        Drag and wind are compensated. Neither position nor height is held: that is up to you.
+        Drag and wind are compensated. Neither position nor height is held: the caller must do that.
 
         Args:
             acceleration_ned: without gravity, m/s²; (0, 0, 0) keeps the velocity.
-            heading: rad; None: the one with which control began.
+            heading: rad; None: the heading at which control began.
 
         Raises:
             ValueError: a number is not finite or missing; the newest command still counts.
@@ -93,14 +106,15 @@ class Control:
         )
 
     def follow(self, reference: Reference, jerk_ned: Vector | None = None) -> None:
-        """Command a reference: position, velocity and acceleration as they should be now.
+        """Command a reference: the position, velocity and acceleration wanted now.
 
-        It is followed without lag, and moves on by itself until the next one comes. A reference
-        far from the vehicle makes it turn as hard as the limits allow: `Vehicle.go_to` is for that.
+        It is followed without lag, and moves on by itself until the next one comes. A reference far
+        from the vehicle makes it turn as hard as the limits allow: `Vehicle.go_to` is for that.
 
         Args:
-            reference: for now.
-            jerk_ned: rate of its acceleration, m/s³; None: by the difference from the one before.
+            reference: state that the vehicle should have now.
+            jerk_ned: derivative of the reference's acceleration, m/s³; None: computed from the last
+                two references.
 
         Raises:
             ValueError: a number is not finite or missing; the newest command still counts.
@@ -108,8 +122,17 @@ class Control:
         """
         _require_usable(reference, jerk_ned or _NOWHERE)
         self._require_control()
-        self._source.give(reference, self._clock(), jerk_ned)
-        self._context.guidance_loop.step_soon()
+        self._command = reference, self._loop.time(), jerk_ned
+        if not self._posted:  # else the flight has yet to take a command, and takes this one
+            self._posted = True
+            self._loop.post(self._give)
+
+    def _give(self) -> None:
+        """Give the newest command to guidance; this runs in the flight's loop."""
+        self._posted = False
+        if self._command is not None:
+            self._source.give(*self._command)
+            self._context.guidance_loop.step_soon()
 
     def tilt(self, north: float, east: float, heading: float | None = None) -> None:
         """Command acceleration coefficients, and hold the height at which control began.
@@ -117,7 +140,7 @@ class Control:
         Args:
             north: horizontal acceleration to the north per specific thrust.
             east: likewise to the east; sin(tilt) is √(north² + east²).
-            heading: rad; None: the one with which control began.
+            heading: rad; None: the heading at which control began.
 
         Raises:
             ValueError: a number is not finite or missing; the newest command still counts.
@@ -145,6 +168,8 @@ class Control:
         return self._began.heading if heading is None else heading
 
     def _require_control(self) -> None:
+        if self._program.ended is not None:
+            raise self._program.ended
         if self._flown.done():
             self._flown.result()
             raise FlightEnded("the program has ended its control")
@@ -154,7 +179,7 @@ def _require_usable(reference: Reference, jerk_ned: Vector) -> None:
     """Check that vectors have three components, and that all numbers are finite.
 
     Raises:
-        ValueError: one has not, or is not.
+        ValueError: a vector has another length, or a number is not finite.
     """
     vectors = [
         reference.position_ned,

@@ -20,9 +20,9 @@ class Request:
     """Phases that the program asked for.
 
     Attributes:
-        phases: returns them; they depend on the autopilot.
-        last: whether the flight ends with them.
-        done: set when the last one has ended.
+        phases: function that returns the phases for an autopilot.
+        last: whether the flight ends after these phases.
+        done: set when the last of these phases has ended.
     """
 
     phases: Callable[[FlightContext], Sequence[Phase]]
@@ -33,17 +33,21 @@ class Request:
 
 
 class Program:
-    """The plan of a flight that runs what a program requests; between requests it waits.
+    """The plan of a flight that runs the phases a program requests, and waits between requests.
 
-    In the air under our control it holds the position while it waits, and the safety monitors
-    judge.
+    While it waits in the air under our control, it holds the position and the safety monitors stay
+    active.
 
     Attributes:
-        maneuvers: none are known before the flight.
-        connected: set with the context when the checks have passed.
-        summary: of the flight, once it has ended.
-        over: whether the last request is done, or the flight has ended without it.
-        interrupt: ends the flight by the exit of its phase, for a reason in words.
+        maneuvers: empty, because they are not known before the flight.
+        connected: receives the flight's context when the preflight checks have passed.
+        summary: summary of the flight, available after it has ended.
+        over: whether the flight has no further phases: the last request is done, or the flight has
+            ended.
+        ended: exception that every later call raises; None before the end of the flight.
+        finished: set when the flight has ended and its files are written.
+        interrupt: function that ends the flight for a reason in words, by the exit of the current
+            phase.
     """
 
     def __init__(self) -> None:
@@ -55,7 +59,8 @@ class Program:
         self._waiting: deque[Request] = deque()
         self._running: Request | None = None
         self._wake = asyncio.Event()
-        self._ended: Exception | None = None
+        self.ended: Exception | None = None
+        self.finished = asyncio.Event()
 
     async def phases(self, context: FlightContext) -> AsyncGenerator[Phase, None]:
         """The phases on the ground, then the requested ones, until the last request is done."""
@@ -83,17 +88,17 @@ class Program:
         """Run phases, and wait until they have ended.
 
         Args:
-            phases: returns them for the flight's context.
-            last: whether the flight ends with them.
+            phases: function that returns the phases for the flight's context.
+            last: whether the flight ends after these phases.
 
         Cancelling this ends the flight: a waiting request is dropped, a running one interrupted.
 
         Raises:
-            FlightEnded: the flight ended before or meanwhile; the vehicle is handed back.
+            FlightEnded: the flight has ended; the vehicle is handed back.
             RuntimeError: an earlier request has not ended yet.
         """
-        if self._ended is not None:
-            raise self._ended
+        if self.ended is not None:
+            raise self.ended
         if self.busy:
             raise RuntimeError("another call of this vehicle has not ended yet: await it first")
         request = Request(phases, last)
@@ -109,12 +114,12 @@ class Program:
 
     @property
     def busy(self) -> bool:
-        """Whether a request waits or runs."""
+        """Whether a request is waiting or running."""
         return self._running is not None or bool(self._waiting)
 
     def end(self, reason: Exception) -> None:
         """Note that the flight has ended: raise `reason` where the program waits for it."""
-        self._ended, self.over = reason, True
+        self.ended, self.over = reason, True
         if not self.connected.done():
             self.connected.set_exception(reason)
         for request in (self._running, *self._waiting):

@@ -1,7 +1,9 @@
-"""What a program sees of the vehicle."""
+"""The state of the vehicle as a program sees it."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
+from companion.api.flight_loop import FlightLoop
 from companion.attitude import BodyRates, Quaternion
 from companion.attitude.representation import heading
 from companion.flight.context import FlightContext
@@ -11,17 +13,17 @@ from companion.guidance.reference import Vector
 class State(NamedTuple):
     """The vehicle at one instant.
 
-    Positions and headings are in the estimator's frame, without the jumps of its resets: a
-    reference in the same frame never jumps.
+    Positions and headings are in the estimator's frame, corrected for its resets, so they never
+    jump.
 
     Attributes:
-        time: s on the clock of the event loop.
+        time: time of the state, s on the clock of the event loop.
         position_ned: m.
         velocity_ned: m/s.
         q: attitude, body to world, w first.
         body_rates: rad/s, about body x, y, z (FRD).
         heading: tilt-yaw heading, rad.
-        height: above home, m; None where the autopilot has not told it.
+        height: height above home, m; None until the autopilot has reported it.
     """
 
     time: float
@@ -33,8 +35,73 @@ class State(NamedTuple):
     height: float | None
 
 
+class NewestState:
+    """Publishes the state at each attitude sample; made in the flight's loop, read in any thread.
+
+    Args:
+        context: context of the flight.
+        loop: loop of the flight.
+
+    Attributes:
+        newest: the newest state; None before the first one.
+    """
+
+    def __init__(self, context: FlightContext, loop: FlightLoop) -> None:
+        self.newest: State | None = None
+        self._context, self._loop = context, loop
+        self._wakes: tuple[_Wake, ...] = ()
+        context.link.subscribe("ATTITUDE_QUATERNION", self._publish)
+
+    def state(self) -> State:
+        """The newest state.
+
+        Raises:
+            RuntimeError: no position or no attitude has come yet.
+        """
+        if self.newest is None:
+            raise RuntimeError("no position or no attitude has come from the vehicle yet")
+        return self.newest
+
+    def subscribe(self, callback: Callable[[], object]) -> Callable[[], None]:
+        """Call `callback` in the program's loop after each new state; call the result to stop.
+
+        States do not queue up while the program is busy.
+        """
+        wake = _Wake(self._loop, callback)
+        self._wakes = (*self._wakes, wake)
+
+        def unsubscribe() -> None:
+            self._wakes = tuple(each for each in self._wakes if each is not wake)
+
+        return unsubscribe
+
+    def _publish(self, _: object) -> None:
+        try:
+            self.newest = state_of(self._context, self._loop.time())
+        except RuntimeError:  # no position yet
+            return
+        for wake in self._wakes:
+            wake()
+
+
+class _Wake:
+    """Calls a function in the program's loop, at most once until the program has run it."""
+
+    def __init__(self, loop: FlightLoop, callback: Callable[[], object]) -> None:
+        self._loop, self._callback, self._pending = loop, callback, False
+
+    def __call__(self) -> None:
+        if not self._pending:
+            self._pending = True
+            self._loop.tell(self._run)
+
+    def _run(self) -> None:
+        self._pending = False
+        self._callback()
+
+
 def state_of(context: FlightContext, now: float) -> State:
-    """The newest state; `now` in s on our clock.
+    """The newest state; `now` is the time on our clock, s.
 
     Raises:
         RuntimeError: no position or no attitude has come yet.

@@ -1,7 +1,7 @@
 """A vehicle that a program flies: each call runs phases of the flight and waits for their end."""
 
 import asyncio
-from collections.abc import AsyncGenerator, Callable
+from collections.abc import AsyncGenerator, Callable, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import replace
 from functools import partial
@@ -9,13 +9,20 @@ from pathlib import Path
 from typing import TypeVar, TypeVarTuple
 
 from companion.api.control import Control
+from companion.api.flight_loop import FlightLoop
 from companion.api.program import Program
-from companion.api.state import State, state_of
+from companion.api.state import NewestState, State
 from companion.config import trajectory_file
 from companion.flight.context import FlightContext
 from companion.flight.control_phases import fly_commanded, fly_maneuvers
-from companion.flight.maneuvers import require_followable
-from companion.flight.phases import hand_back_phase, landing_phases, program_phase, takeoff_phases
+from companion.flight.maneuver_checks import require_followable
+from companion.flight.phases import (
+    Phase,
+    hand_back_phase,
+    landing_phases,
+    program_phase,
+    takeoff_phases,
+)
 from companion.guidance import Maneuver, ManeuverSequence, Pose
 from companion.guidance.follow import Follow, HeldFigure, hover
 from companion.guidance.reference import Vector
@@ -30,7 +37,7 @@ T = TypeVar("T")
 Arguments = TypeVarTuple("Arguments")
 
 _BEGINS_WITHIN = 1.0
-"""Time allowed from control's beginning to the first command, s."""
+"""Longest time from the beginning of control to the first command, s."""
 
 
 class Vehicle:
@@ -38,12 +45,21 @@ class Vehicle:
 
     Every method raises `FlightEnded` once the flight has ended early: a pilot took over, a safety
     monitor ended it, or the vehicle refused. The vehicle is then handed back already.
+
+    Args:
+        program: takes the requests.
+        context: context of the flight; it is only read here.
+        newest: the state of the vehicle.
+        loop: loop of the flight.
     """
 
-    def __init__(self, program: Program, context: FlightContext) -> None:
+    def __init__(
+        self, program: Program, context: FlightContext, newest: NewestState, loop: FlightLoop
+    ) -> None:
         self._program = program
         self._context = context
-        self._clock = asyncio.get_running_loop().time
+        self._newest = newest
+        self._loop = loop
 
     @property
     def state(self) -> State:
@@ -52,7 +68,7 @@ class Vehicle:
         Raises:
             RuntimeError: no position or no attitude has come yet.
         """
-        return state_of(self._context, self._clock())
+        return self._newest.state()
 
     @property
     def summary(self) -> Summary | None:
@@ -65,11 +81,12 @@ class Vehicle:
         The height is `flight.takeoff_height_m`. The preflight checks run before each step.
 
         Raises:
-            FlightEnded: it flies already (that ends nothing), or the flight has ended early.
+            FlightEnded: the flight has ended early, or the vehicle already flies; in the second
+                case it flies on.
         """
         if self._context.loop.offboard_active or self._context.link.state.flying:
             raise FlightEnded("the vehicle flies already", Exit.LEAVE)
-        await self._program.request(
+        await self._request(
             lambda context: takeoff_phases(context.config.flight, context.link.autopilot)
         )
 
@@ -77,7 +94,7 @@ class Vehicle:
         """Hold the position and the heading for a time, s.
 
         Raises:
-            ValueError: the time is negative or no number; nothing was flown.
+            ValueError: the time is negative or not a number; nothing was flown.
         """
         if not seconds >= 0.0:
             raise ValueError(f"the time to hold must be 0 s or more, not {seconds:g}")
@@ -92,14 +109,15 @@ class Vehicle:
         acceleration: float = 2.0,
         jerk: float = 4.0,
     ) -> None:
-        """Fly a straight line to a position, rest to rest, as fast as the limits given here allow.
+        """Fly a straight line to a position, from rest to rest, within the limits given here.
 
         Args:
             position_ned: m, in the frame of `State.position_ned`.
-            heading: at the end, rad; None: as it is. The vehicle turns before it leaves.
-            speed: largest, m/s.
-            acceleration: largest, m/s².
-            jerk: largest, m/s³.
+            heading: heading of the flight, rad; None: the present one. The vehicle turns to it
+                before it leaves.
+            speed: largest speed, m/s.
+            acceleration: largest acceleration, m/s².
+            jerk: largest jerk, m/s³.
 
         Raises:
             ConfigError: the configured limits or the fence do not allow it; nothing was flown.
@@ -116,10 +134,10 @@ class Vehicle:
             await self.follow(replace(way, heading=FixedHeading(heading)))
 
     async def follow(self, trajectory: Trajectory | Path | str) -> None:
-        """Follow a trajectory from where the vehicle is; it turns to its heading first.
+        """Follow a trajectory from the present position, after a turn to its initial heading.
 
         Args:
-            trajectory: or its file, as of `flight.trajectory`.
+            trajectory: a trajectory, or the path of its file (the format of `flight.trajectory`).
 
         Raises:
             ConfigError: the file cannot be read, or the limits or the fence do not allow it;
@@ -137,7 +155,7 @@ class Vehicle:
         `deadman.target_stale_ms` or the block raises, it is handed back and the flight ends.
 
         Args:
-            name: of the one who commands, for the events.
+            name: name of the commanding program in the list of events.
 
         Raises:
             FlightEnded: control has ended before the block did.
@@ -145,16 +163,16 @@ class Vehicle:
         source = CommandedSource(name, self._context.config.deadman.target_stale, _BEGINS_WITHIN)
         work = partial(fly_commanded, source=source)
         phase = program_phase("control", f"{name} to end its control", work)
-        flown = asyncio.create_task(self._program.request(lambda _: (phase,)))
+        flown = self._request(lambda _: (phase,))
         try:
             await self._begun(source, flown)
-            yield Control(self._context, source, flown)
+            yield Control(self._program, self._context, self._newest, self._loop, source, flown)
         except BaseException as error:
             if not isinstance(error, FlightEnded):
-                source.fail(f"{name} raised {error!r}")
+                self._loop.post(source.fail, f"{name} raised {error!r}")
             raise
         finally:
-            source.end()
+            self._loop.post(source.end)
             await asyncio.wait({flown})
             if not flown.cancelled():
                 flown.exception()
@@ -162,21 +180,23 @@ class Vehicle:
 
     async def land(self) -> None:
         """Let the autopilot land where the vehicle is; after touchdown the flight ends."""
-        await self._program.request(
-            lambda context: landing_phases(context.config.flight), last=True
-        )
+        await self._request(lambda context: landing_phases(context.config.flight), last=True)
 
     async def hand_back(self) -> None:
         """Let the autopilot hold the vehicle; the flight ends."""
-        await self._program.request(lambda _: (hand_back_phase(),), last=True)
+        await self._request(lambda _: (hand_back_phase(),), last=True)
 
     async def leave(self) -> None:
         """End the flight: hand back in the air; on the ground leave the vehicle as it is."""
-        await self._program.request(
-            lambda context: (hand_back_phase(),) if context.loop.offboard_active else (), last=True
-        )
+        await self._request(leaving, last=True)
 
-    async def _begun(self, source: CommandedSource, flown: asyncio.Task[None]) -> None:
+    def _request(
+        self, phases: Callable[[FlightContext], Sequence[Phase]], *, last: bool = False
+    ) -> asyncio.Future[None]:
+        """Request phases; the future is done when they have ended."""
+        return self._loop.start(self._program.request(phases, last=last))
+
+    async def _begun(self, source: CommandedSource, flown: asyncio.Future[None]) -> None:
         """Wait until guidance flies the source.
 
         Raises:
@@ -192,7 +212,7 @@ class Vehicle:
         await beside_the_loop(self._require_followable, maneuver)
         sequence = ManeuverSequence((maneuver,))
         work = partial(fly_maneuvers, sequence=sequence)
-        await self._program.request(
+        await self._request(
             lambda _: (program_phase("maneuvers", "the maneuver to end", work, sequence.duration),)
         )
 
@@ -201,24 +221,35 @@ class Vehicle:
         north, east, down = (
             here - begin for here, begin in zip(self._pose().position_ned, origin, strict=True)
         )
-        require_followable(self._context.config, maneuver, (north, east, down))
+        require_followable(
+            self._context.config, maneuver, (north, east, down), self._context.known_drag
+        )
 
     def _require_control(self) -> None:
-        if not self._context.loop.offboard_active:
-            raise FlightEnded("the vehicle is not under our control: take off first", Exit.LEAVE)
+        self._pose()
 
     def _pose(self) -> Pose:
-        self._require_control()
+        """The held pose.
+
+        Raises:
+            FlightEnded: the vehicle is not under our control, which may end at any moment.
+        """
         pose = self._context.guidance_loop.flown.pose
-        assert pose is not None
+        if pose is None or not self._context.loop.offboard_active:
+            raise FlightEnded("the vehicle is not under our control: take off first", Exit.LEAVE)
         return pose
 
 
-async def beside_the_loop(function: Callable[[*Arguments], T], *arguments: *Arguments) -> T:
-    """Call a slow function in a thread, so that samples are answered meanwhile.
+def leaving(context: FlightContext) -> Sequence[Phase]:
+    """The phases that end the flight: hand back in the air, none on the ground."""
+    return (hand_back_phase(),) if context.loop.offboard_active else ()
 
-    In lockstep and in memory the vehicle waits for us, and a thread would only make the order of
-    things uncertain: there the function is called at once.
+
+async def beside_the_loop(function: Callable[[*Arguments], T], *arguments: *Arguments) -> T:
+    """Call a slow function in a thread, so that samples are still answered.
+
+    In lockstep and in memory the vehicle waits for us, so the function is called directly. A thread
+    would only make the order of events random.
     """
     if isinstance(asyncio.get_running_loop(), LockstepEventLoop):
         return function(*arguments)

@@ -1,4 +1,4 @@
-"""Lag compensation of one axis, roll or pitch: the rate to send so that it turns as planned."""
+"""Lag compensation of roll or pitch: computes the rate command for the planned motion."""
 
 from math import cos, sin
 
@@ -12,7 +12,7 @@ ROLL, PITCH = 0, 1
 class AxisLead:
     """Compensates the lag of one axis: sends ω + τ·ω̇ + σ·ω̈ for a planned rate ω.
 
-    The axis with the shorter dead time is sent older plans, so that a plan takes effect on both
+    The quicker axis (shorter dead time) receives older plans, so that a plan takes effect on both
     axes at the same time.
 
     Args:
@@ -44,7 +44,7 @@ class AxisLead:
 
         Args:
             dt: time between the two plans, s.
-            heading: heading of the body minus the turn predicted since the plans began, rad.
+            heading: heading of the body minus its predicted turn since the plans began, rad.
         """
         rate, slope = self._planned_rate(heading)
         self.advance()

@@ -16,7 +16,9 @@ from companion.attitude.rotation import angle_per_sine, clamp, limit_rates, shor
 from companion.attitude.types import Quaternion, Target
 
 SHORTEST_SAMPLE = 1e-4
-"""A shorter sample period counts as this, s; the rates change by a relative 1e-4·p at most."""
+"""A shorter sample period counts as this one, s; the rates then change by at most 1e-4·p
+(relative).
+"""
 LONGEST_SAMPLE = 1.0
 """A longer sample period counts as this, s."""
 
@@ -136,10 +138,10 @@ def _reachable_share(
     part: float,
     half_sine: float,
 ) -> float:
-    """Share of the line to the target that the thrust axis covers when it turns by Θ.
+    """Share of the line to the target that the thrust axis covers in a turn by Θ.
 
-    `half_sine` is sin(Θ/2); the result is at most `part`. With n(s) the thrust axis at the share
-    s of the line, n(0)·n(s) = cos Θ is a quadratic in s.
+    `half_sine` is sin(Θ/2); the result is at most `part`. With n(s) the thrust axis at the share s
+    of the line, n(0)·n(s) = cos Θ is a quadratic in s.
     """
     k = 2.0 * half_sine * half_sine  # 1 − cos Θ
     along = 2.0 * a * (x * east_left - y * north_left)

@@ -34,8 +34,8 @@ class FeedForward:
         frame: heading of ArduPilot's attitude target.
         tilt: responses of roll and pitch.
         yaw: response of yaw.
-        lag: of the slower of roll and pitch, s.
-        dead_time: of the slower of roll and pitch, s.
+        lag: lag of the slower of roll and pitch, s.
+        dead_time: dead time of the slower of roll and pitch, s.
     """
 
     def __init__(self, constants: Constants, response: RateResponse, longest_sample: float) -> None:
@@ -102,13 +102,13 @@ class FeedForward:
     def advance(
         self, target: Target, heading: float, yaw_feedback: float, dt: float
     ) -> tuple[float, float, float]:
-        """Advance the plan by `dt` seconds; return the rates that follow it in spite of lag, rad/s.
+        """Advance the plan by `dt` s; return lag-compensated body rates that follow it, rad/s.
 
         Args:
             target: an admissible target.
-            heading: heading of the body minus the turn predicted since the plans began, rad.
+            heading: heading of the body minus its predicted turn since the plans began, rad.
             yaw_feedback: feedback to add to the yaw rate, rad/s.
-            dt: s.
+            dt: time by which the plan advances, s.
         """
         still_before, turn_before = self._still, self._heading.turn_rate
         self._model.advance(target, dt)
@@ -129,9 +129,10 @@ class FeedForward:
         return self._roll.command(dt, heading), self._pitch.command(dt, heading), yaw
 
     def _append_plan(self, x: float, y: float, still_turn: float, dt: float) -> None:
-        """Append the plan of `dt` seconds later.
+        """Append the plan for the time `dt` seconds later.
 
-        `x`, `y`: planned roll and pitch rate at heading 0, rad/s. `still_turn`: yaw meanwhile, rad.
+        `x`, `y`: planned roll and pitch rate at heading 0, rad/s. `still_turn`: yaw during `dt`
+        that keeps the heading constant, rad.
         """
         model, body = self._model, self._body
         still = self.plans.tilt.newest.still + still_turn

@@ -74,7 +74,7 @@ class History(Generic[Row]):
         self._rows: list[Row] = []
 
     def start(self, time: float, row: Row, motion: Row) -> None:
-        """Start again at `row`; before it the plan moved steadily, by `motion` per second."""
+        """Start again at `row`; before it, the plan moved steadily by `motion` per second."""
         earlier = type(row)(*[a - self._span * b for a, b in zip(row, motion, strict=True)])
         self._times[:] = [time - self._span, time]
         self._rows[:] = [earlier, row]
@@ -175,9 +175,9 @@ class SampleHold:
     """Corrects the rates for samples that come earlier or later than expected.
 
     Each plan reaches ahead by the expected sample period, and the vehicle holds its rates until the
-    next sample. If that comes late or early (PX4: after 4 or 8 ms, ArduPilot: some in pairs), the
-    vehicle has turned too far or not far enough, and a step would not be straight. The next rates
-    correct this, for a delay of one period at most.
+    next sample. If the next sample is late or early (PX4: after 4 or 8 ms, ArduPilot: some in
+    pairs), the vehicle has turned too far or not far enough, and a step would not be straight. The
+    next rates correct this, for a delay of one period at most.
 
     Attributes:
         late: how much later than expected the sample came, s.

@@ -1,8 +1,8 @@
 """The tilt-yaw split of an attitude, and the body rates that move it (paper, equations 9 to 28).
 
 Every formula is arithmetic on plain floats, without arrays. In flight it takes well under a
-microsecond, and a batch compiles it unchanged. Most formulas need only a², a·x and a·y, so neither
-a square root nor a division.
+microsecond, and a batch compiles it unchanged. Most formulas need only a², a·x and a·y, and
+therefore no square root and no division.
 """
 
 from math import acos, atan, sqrt

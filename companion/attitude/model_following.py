@@ -27,7 +27,7 @@ SHORTEST_SAMPLE, LONGEST_SAMPLE = 1e-4, 0.2  # s
 
 
 class ModelFollowingPlanner:
-    """Two degrees of freedom: a planned motion is fed forward, the deviation from it is fed back.
+    """Two-degree-of-freedom control: planned motion fed forward, deviation from it fed back.
 
     `FeedForward` plans a smooth, straight motion within the limits, and the rates that make it.
 

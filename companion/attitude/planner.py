@@ -31,7 +31,7 @@ class Planner(Protocol):
         ...
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
-        """Take the attitude target (ATTITUDE_TARGET) of `age` seconds before the newest sample.
+        """Take the attitude target (ATTITUDE_TARGET) of `age` s before the newest sample.
 
         Called only for an autopilot that takes body rates along the axes of this target
         (ArduPilot). Others take them along the axes of the body.

@@ -8,7 +8,7 @@ from companion.attitude.reference import Lag
 from companion.attitude.types import Coefficients, Target
 
 _LONGEST_REFERENCE = sin(1.4)
-"""Greatest length of the reference's coefficients: an attitude with finite rates must exist."""
+"""Largest norm of the reference's coefficients; towards 1 the body rates grow without bound."""
 _SMALLEST_DAMPING = 2.7
 """Smallest 4·ζ² of the model, ζ its damping."""
 _LONGEST_STEP = 0.1
@@ -52,7 +52,7 @@ def braking_lead(gain: float, lag: float) -> float:
 
 
 def model_response(gain: float, lag: float) -> tuple[float, float]:
-    """P' (1/s) and τ' (s) with which the model of p and τ is c̈ = (p'·(c_d − c) − ċ)/τ'."""
+    """The model of p and τ as c̈ = (p'·(c_d − c) − ċ)/τ': returns p' (1/s) and τ' (s)."""
     slowed = 1.0 + gain * braking_lead(gain, lag)
     return gain / slowed, lag / slowed
 

@@ -60,7 +60,7 @@ def decompose(q: Quaternion) -> TiltYaw:
     """Split an attitude into tilt ⊗ yaw (equation 9).
 
     Raises:
-        InvalidQuaternionError: as `normalised`.
+        InvalidQuaternionError: `q` is not a unit quaternion; see `normalised`.
     """
     return TiltYaw(*split(*normalised(q)))
 
@@ -69,7 +69,7 @@ def coefficients(q: Quaternion) -> Coefficients:
     """Acceleration coefficients (−2ay, +2ax) of an attitude (equation 10); |c| = sin(tilt).
 
     Raises:
-        InvalidQuaternionError: as `normalised`.
+        InvalidQuaternionError: `q` is not a unit quaternion; see `normalised`.
     """
     _, ax, ay = tilt_products(*normalised(q))
     return Coefficients(-2.0 * ay, 2.0 * ax)
@@ -81,7 +81,7 @@ def heading(q: Quaternion) -> float:
     It equals the Euler yaw that an autopilot reports only when level.
 
     Raises:
-        InvalidQuaternionError: as `normalised`.
+        InvalidQuaternionError: `q` is not a unit quaternion; see `normalised`.
     """
     w, _, _, z = normalised(q)
     return wrap_angle(2.0 * atan2(z, w))

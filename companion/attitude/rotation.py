@@ -41,14 +41,14 @@ def body_error(q: Quaternion, goal: Quaternion) -> Quaternion:
 
 
 def first_is_negative(x: float, y: float, z: float) -> bool:
-    """Whether the first nonzero component is negative: true of either v or −v, never of both."""
+    """Whether the first nonzero component is negative: true for one of v and −v, unless v is 0."""
     return x < 0.0 or (x == 0.0 and (y < 0.0 or (y == 0.0 and z < 0.0)))
 
 
 def angle_per_sine(w: float, sine: float) -> float:
-    """θ/sin(θ/2) of a rotation with scalar part w ≥ 0 and vector part of length `sine`.
+    """The factor θ/sin(θ/2) of a rotation with scalar part w ≥ 0 and `sine` = |vector part|.
 
-    It turns the vector part of a unit quaternion into the rotation vector: Log(q) = θ/sin(θ/2)·v.
+    It scales the vector part v of a unit quaternion to the rotation vector: Log(q) = θ/sin(θ/2)·v.
     """
     if sine < _SMALL:
         return 2.0

@@ -1,4 +1,4 @@
-"""Checks and limits the body rates of a planner from another package."""
+"""Checks the body rates of a planner from another package, and limits them."""
 
 from math import isfinite
 

@@ -135,9 +135,9 @@ class TargetFrame:
         self._times[:], self._turns[:] = [0.0], [0.0]
 
     def note(self, heading: float, age: float) -> None:
-        """Take the target's heading (rad) of `age` seconds before the newest sample.
+        """Take the target's heading (rad), measured `age` seconds before the newest sample.
 
-        One older than `OLDEST` is ignored.
+        A heading older than `OLDEST` is ignored.
         """
         if not 0.0 <= age <= OLDEST:
             return
@@ -163,12 +163,12 @@ class TargetFrame:
             del times[:_DROPPED_TOGETHER], self._turns[:_DROPPED_TOGETHER]
 
     def lead(self, heading: float, plans: PlanHistory) -> float:
-        """How far the target leads the body in yaw when the rates sent now take effect, rad.
+        """Angle by which the target leads the body in yaw when the rates sent now take effect, rad.
 
         It is computed from the newest attitude target, or without one from `RateResponse.lead`.
 
         Args:
-            heading: heading of the body minus the turn predicted since the plans began, rad.
+            heading: heading of the body minus its predicted turn since the plans began, rad.
             plans: plans of tilt and heading.
         """
         reported = self.heading()

@@ -34,8 +34,9 @@ class Loops(NamedTuple):
     apply: _Apply
     """(q, targets, rates, dt, constants): fills rates (3, n)."""
     advance: Callable[[Array, Array, Array, Array, float, Constants, int], None]
-    """(q, spare, targets, rates, dt, constants, steps): q (4, n) holds the attitudes of even steps,
-    spare (4, n) those of odd steps."""
+    """(q, spare, targets, rates, dt, constants, steps): advances q in place. q (4, n) holds the
+    attitudes of even steps, spare (4, n) those of odd steps.
+    """
     record: Callable[[Array, Array, Array, float, Constants], None]
     """(q, targets, rates, dt, constants): fills q (steps + 1, 4, n) from q[0] on, and rates
     (steps, 3, n)."""
@@ -45,7 +46,7 @@ class Loops(NamedTuple):
 
 @cache
 def _compiler(any_angle: bool) -> Compiler:
-    """One for all laws: they have most of what they call in common."""
+    """Make one compiler for all laws, because they call mostly the same functions."""
     return Compiler(_ARCTANGENT if any_angle else _ALL_SERIES)
 
 
@@ -97,7 +98,7 @@ def plain_loops(law: Law) -> Loops:
 
 
 def _over_samples(apply: _Apply, turn: _Turn, made: Callable[[Any], Any], any_angle: bool) -> Loops:
-    """Wrap the loops over vehicles into loops over samples; `made` may compile them."""
+    """Make loops over samples from the loops over vehicles; `made` may compile them."""
 
     def advance(
         q: Array,

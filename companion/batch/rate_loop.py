@@ -31,11 +31,11 @@ _UNLIMITED = 1e300
 
 
 class StepFlight(NamedTuple):
-    """One vehicle's flight, a row for each attitude sample of the planner.
+    """One vehicle's flight, with one row for each attitude sample of the planner.
 
     Attributes:
         path: (samples, 2), coefficients north and east at the sample.
-        targets: (samples, 2), the target for which the sample was answered.
+        targets: (samples, 2), target coefficients of the answer to the sample.
         commanded: (samples, 3), commanded body rates, rad/s.
         q: attitude at the end.
     """

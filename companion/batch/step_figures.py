@@ -16,12 +16,12 @@ from companion.batch.loops import Array
 from companion.batch.rate_loop import StepFlight
 
 _SHORTEST, _LONGEST = log(0.02), log(2.0)
-"""Range in which the time constant is searched, logarithms of s."""
+"""Range in which the time constant is searched, as natural logarithms of s."""
 _GOLDEN = 0.5 * (sqrt(5.0) - 1.0)
 _NARROWINGS = 17
 """Steps of the golden-section search; the range left is 0.13 % of a time constant."""
 _ASKED = 1e-3
-"""Smallest target coefficient that counts as a step."""
+"""Smallest target coefficient of a step; a smaller one counts as level."""
 
 
 class StepFigures(NamedTuple):
@@ -49,7 +49,7 @@ def step_figures(flight: StepFlight, gain: float, period: float) -> StepFigures:
     """Measure a flight.
 
     Args:
-        flight: of `fly_steps`.
+        flight: flight of `fly_steps`.
         gain: p of the ideal model, 1/s.
         period: time between two samples, s.
     """
@@ -67,7 +67,7 @@ def _compiled() -> tuple[Any, Any]:
 def _measured(
     path: Array, targets: Array, commanded: Array, time_constant: float, period: float
 ) -> tuple[float, float, float, float]:
-    """The first four of `StepFigures`."""
+    """The first four figures of `StepFigures`."""
     model_north, model_east = path[0, 0], path[0, 1]
     begin_north, begin_east = model_north, model_east
     away, across, squares, fastest = 0.0, 0.0, 0.0, 0.0
@@ -91,9 +91,9 @@ def _measured(
 
 
 def _time_constants(path: Array, targets: Array, period: float) -> tuple[float, float]:
-    """The time constants that fit north and east best, s, by golden-section search; NaN: no step.
+    """Time constants of the best fits north and east, s, by golden-section search; NaN: no step.
 
-    Both searches go on together, because a processor computes their two models in the time of one.
+    Both searches run together, because a processor computes two models in the time of one.
     """
     low, high = np.full(2, _SHORTEST), np.full(2, _LONGEST)
     left, right, tried, asked = np.empty(2), np.empty(2), np.empty(2), np.zeros(2)

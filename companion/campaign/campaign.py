@@ -1,4 +1,4 @@
-"""A campaign that was read: its file, its base configuration, and its cases."""
+"""A campaign as read from its file: the file's content, the base configuration, and the cases."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -24,7 +24,7 @@ from companion.files.yaml_file import ConfigError
 from companion.testing.settings import complete_mock
 
 _OWN = (FAULT, FAULT_PHASE, FAULT_AFTER)
-"""Factors that are no keys of a configuration."""
+"""Factors that are not keys of a configuration."""
 
 
 @dataclass(frozen=True)
@@ -32,10 +32,10 @@ class Campaign:
     """A campaign.
 
     Attributes:
-        file: what its file says; every path is a key of `files`.
-        base: configuration before the sweep, with the keys of `set`.
+        file: content of the campaign file; every path in it is a key of `files`.
+        base: configuration before the sweep, changed by the keys of `set`.
         files: the text of each file that a flight reads, by its path relative to a folder.
-        name: of the file, for messages.
+        name: name of the file, for messages.
     """
 
     file: CampaignFile
@@ -56,7 +56,7 @@ class Campaign:
         """All cases, in order.
 
         Raises:
-            ConfigError: as `case`.
+            ConfigError: a configuration is refused; see `case`.
         """
         return map(self.case, self.samples())
 
@@ -96,7 +96,7 @@ class Campaign:
         return dict(self.base.mock or {})
 
     def _value(self, name: str, key: str, value: Any) -> Any:
-        """The value of a key; a factor with `times_base` multiplies that of the base."""
+        """The value of a key; a factor with `times_base` is multiplied by the base's value."""
         if not self.file.sweep[name].times_base or value is None:
             return value
         base = self._base_value(key)
@@ -149,5 +149,5 @@ def _check_flyable(config: Config) -> None:
 
 
 def _shown(name: str, value: Any) -> Value:
-    """A value as the results hold it; of a trajectory's file the name."""
+    """A value as written in the results; for a trajectory file its name."""
     return Path(value).stem if name == TRAJECTORY and value is not None else column_value(value)

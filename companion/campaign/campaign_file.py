@@ -1,4 +1,4 @@
-"""The YAML file of a campaign: what is flown, what is swept, and the limits."""
+"""The YAML file of a campaign: the flight, the swept keys, and the limits."""
 
 from typing import Annotated, Any, Literal
 
@@ -26,29 +26,31 @@ _AFTER = {
     "hand back": 0.02,
     "land": 0.3,
 }
-"""Time from the beginning of a phase to a fault, where a scenario does not say it, s."""
+"""Time from the beginning of a phase to a fault where the scenario does not set one, s."""
 TRAJECTORY, MANEUVERS = "flight.trajectory", "flight.maneuvers"
 
 
 class FaultScenario(Section):
-    """A fault of the mock vehicle that begins in a phase of the flight, and how that must end."""
+    """A fault of the mock vehicle that begins in a phase, and how the flight may end then."""
 
     inject: Annotated[tuple[dict[str, Any], ...], Field(min_length=1, max_length=10)]
     """Entries as in `mock.faults`, without `at_s` and `after_offboard_s`. They begin together."""
     phase: FaultPhase = "maneuvers"
     """Phase of the flight in which they begin. The factor fault.phase replaces it."""
     after_s: Annotated[float, Field(ge=0.0, le=3600.0)] | None = None
-    """Time from the beginning of the phase. The factor fault.after_s replaces it. null: as in the
-    table of docs/safety.md: 0 s in stream and arm, 0.8 s in takeoff, 1.3 s in offboard, 0.3 s in
-    maneuvers and land, 0.02 s in hand back."""
+    """Time from the beginning of the phase. The factor fault.after_s replaces it. null: the time in
+    the table of docs/safety.md: 0 s in stream and arm, 0.8 s in takeoff, 1.3 s in offboard, 0.3
+    s in maneuvers and land, 0.02 s in hand back.
+    """
     ends: (
         Annotated[tuple[Ending, ...], Field(min_length=1)]
         | dict[FaultPhase, Annotated[tuple[Ending, ...], Field(min_length=1)]]
     ) = ("ok",)
-    """How the flight may end, by docs/safety.md: a list for all phases, or a list for each phase.
-    ground: it never left the ground. ok: as without the fault. landed: our program landed it and
-    says why. held: the autopilot flies it, by our command or its own failsafe. pilot: the pilot has
-    it."""
+    """Permitted endings of the flight (docs/safety.md): a list for all phases, or a list for each
+    phase. ground: it never left the ground. ok: as without the fault. landed: our program landed
+    it and says why. held: the autopilot flies it, by our command or its own failsafe. pilot: the
+    pilot has it.
+    """
 
     def after(self, phase: str) -> float:
         """Time from the beginning of a phase to the fault, s."""
@@ -81,8 +83,9 @@ class CampaignFile(Section):
     """flights: whole flights of the application and the mock vehicle on one virtual clock. batch:
     attitude kinematics of many vehicles at once."""
     config: PathKey | dict[str, Any]
-    """Configuration on which every case is based, with its section `mock`: a file, relative to this
-    one, or its keys."""
+    """Base configuration of every case, including its section `mock`. Either the path of a file,
+    relative to this file, or the keys themselves.
+    """
     seed: Annotated[int, Field(ge=0, lt=2**53)] = 1
     """Seed of the samples, and of the noise and gusts of every flight."""
     samples: Annotated[int, Field(ge=1, le=10_000_000)] = 1

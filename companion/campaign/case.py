@@ -1,4 +1,4 @@
-"""One case of a campaign: its factors, and the configuration and mock vehicle they lead to."""
+"""One case of a campaign: its factors, and the resulting configuration and mock vehicle."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ class Fault:
     """A fault scenario of one flight.
 
     Attributes:
-        name: of the scenario.
+        name: name of the scenario.
         inject: entries as in `mock.faults`.
-        phase: of the flight in which they begin.
+        phase: phase of the flight in which they begin.
         after: time from the beginning of the phase, s.
         ends: documented endings; see `FaultScenario.ends`.
     """
@@ -33,9 +33,9 @@ class Case:
 
     Attributes:
         index: number in the campaign, from 0.
-        seed: of noise and gusts.
+        seed: seed of noise and gusts.
         factors: value of each swept key, as the results hold it.
-        config: of the application. `flight.trajectory` is a key of `files`.
+        config: configuration of the application. `flight.trajectory` is a key of `files`.
         mock: the complete section `mock`, the seed included.
         fault: None: a flight without a fault.
         files: the text of each file that the flight reads, by its path relative to a folder.

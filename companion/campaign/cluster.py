@@ -1,4 +1,4 @@
-"""Dask: worker processes of our own, or a cluster that exists, and what runs on them."""
+"""Dask: starts local worker processes or uses an existing cluster, and runs tasks on it."""
 
 import logging
 import os
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from distributed import Client, Future
 
 DEATHS = 3
-"""A unit that was on a worker when it died for the third time is given up."""
+"""A unit is given up when it was on a dying worker, running or waiting, for the third time."""
 _LOST = "the connection to the Dask scheduler is lost"
 _CONNECT_S = 10.0
 _CLOSE_S = 5.0
@@ -34,16 +34,16 @@ _LOCAL = {
 
 
 class ClusterError(Exception):
-    """The cluster was lost, or gave up what it should run."""
+    """The cluster was lost, or it gave up a task."""
 
 
 class Ended(NamedTuple):
     """A unit that ended.
 
     Attributes:
-        number: of the unit.
-        flown: its rows; None: it was given up.
-        reason: why it was given up.
+        number: number of the unit.
+        flown: rows of the unit; None: the unit was given up.
+        reason: why the unit was given up.
     """
 
     number: int
@@ -68,7 +68,7 @@ def local_workers() -> int:
 
 @contextmanager
 def connected(scheduler: str | None, workers: int | None) -> "Iterator[Client]":
-    """A client of a cluster whose workers have our versions.
+    """Connect to a cluster whose workers have the same versions as this process.
 
     Args:
         scheduler: address of an existing cluster; None: worker processes of our own, which end with
@@ -110,7 +110,7 @@ def connected(scheduler: str | None, workers: int | None) -> "Iterator[Client]":
 
 
 def _silence() -> None:
-    """Silence the log messages of Dask: what goes wrong is said in a sentence."""
+    """Silence the log messages of Dask; our own messages report errors in one sentence."""
     for name in ("tornado", *logging.root.manager.loggerDict):
         if name.startswith(("distributed", "tornado")):
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
@@ -169,17 +169,17 @@ def _of_dask(told: Mapping[str, Any]) -> dict[str, str]:
 
 
 def run_tasks(client: "Client", tasks: Mapping[int, tuple[Any, ...]]) -> Iterator[Ended]:
-    """Run tasks on the cluster; yields each unit as it ends, in any order.
+    """Run tasks on the cluster; yield each unit when it ends, in any order.
 
     Dask queues them, sends them, and repeats those whose worker died.
 
     Args:
-        client: of the cluster.
-        tasks: function and its arguments by the number of the unit; the function returns `Flown`.
+        client: client of the cluster.
+        tasks: unit number -> function and its arguments; the function returns `Flown`.
 
     Raises:
         ClusterError: the connection to the scheduler is lost.
-        VersionError: a worker that came later has other versions.
+        VersionError: a worker that joined later has other versions.
     """
     from distributed import as_completed  # noqa: PLC0415  an extra
 
@@ -195,7 +195,7 @@ def run_tasks(client: "Client", tasks: Mapping[int, tuple[Any, ...]]) -> Iterato
 
 
 def _ended(number: int, future: "Future") -> Ended:
-    """The unit of a future that is done.
+    """Return the result of a finished future.
 
     Raises:
         ClusterError: the connection to the scheduler is lost.

@@ -21,8 +21,8 @@ class Sample:
 
     Attributes:
         index: number of the case, from 0.
-        seed: of its noise and gusts.
-        values: value of each factor, as the file says it.
+        seed: seed of its noise and gusts.
+        values: value of each factor as written in the file.
     """
 
     index: int
@@ -31,7 +31,7 @@ class Sample:
 
 
 def number_of_cases(file: CampaignFile) -> int:
-    """The number of cases, without making them."""
+    """The number of cases, computed without building them."""
     sampled = sum(swept.sampled for swept in file.sweep.values())
     repeats = file.samples**sampled if file.sampling == "grid" and sampled else file.samples
     return repeats * prod(len(swept.grid()) for swept in file.sweep.values() if not swept.sampled)
@@ -82,7 +82,7 @@ def seed_of(campaign_seed: int, number: int) -> int:
 
 
 def _shares(file: CampaignFile, dimensions: int) -> NDArray[np.float64]:
-    """(samples, dimensions): which share of each distribution lies below each sample."""
+    """(samples, dimensions): cumulative probability of each sample in each distribution."""
     count = file.samples
     if dimensions == 0:
         return np.empty((count, 0))

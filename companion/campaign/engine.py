@@ -42,20 +42,20 @@ def run(
 ) -> Progress:
     """Run the units whose results are missing in the folder.
 
-    Each unit is written when it ends, whole or not at all. So whatever ends this function loses
-    only the units under way.
+    Each unit is written when it ends, whole or not at all. If this function is interrupted, only
+    the units that are running are lost.
 
     Args:
-        client: of the cluster.
+        client: client of the cluster.
         campaign: the campaign.
-        description: of the folder.
-        folder: of the campaign; made and locked.
+        description: description of the folder.
+        folder: folder of the campaign; it exists and is locked.
         on_unit: called after each unit.
 
     Raises:
         ClusterError: the connection to the scheduler is lost.
         OSError: the results cannot be written.
-        VersionError: a worker that came later has other versions.
+        VersionError: a worker that joined later has other versions.
     """
     units = ranges(description.cases, description.unit)
     finished = store.finished_units(folder)
@@ -84,7 +84,7 @@ def _keep(ended: Ended, unit: range, campaign: Campaign, folder: Path, progress:
 
 
 def internal_errors(folder: Path, file: CampaignFile) -> Counter[str]:
-    """How many flights of the results ended by each fault of the program itself."""
+    """The number of flights in the results that each internal error of the program ended."""
     if file.kind != "flights":
         return Counter()
     results = store.read(folder)["result"].to_pylist()
@@ -92,17 +92,17 @@ def internal_errors(folder: Path, file: CampaignFile) -> Counter[str]:
 
 
 def rows(client: "Client", kind: str, cases: Sequence[Case], case_s: float) -> list[Row]:
-    """The rows of cases that need not belong to a campaign, in order, without a folder.
+    """Run cases that need not belong to a campaign; return their rows in order, without a folder.
 
     Args:
-        client: of the cluster.
+        client: client of the cluster.
         kind: "flights" or "batch".
-        cases: to be flown.
+        cases: cases to be flown.
         case_s: time that a case takes, s; see `companion.campaign.estimate.measured`.
 
     Raises:
         ClusterError: the connection to the scheduler is lost, or a unit was given up.
-        VersionError: a worker that came later has other versions.
+        VersionError: a worker that joined later has other versions.
     """
     size = size_of_units(len(cases), case_s, number_of_workers(client))
     units = ranges(len(cases), size)

@@ -1,4 +1,4 @@
-"""How long a campaign takes, and whether that is more than its limits allow."""
+"""Estimates how long a campaign takes, and compares it with the campaign's limits."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,21 +12,23 @@ from companion.files.yaml_file import ConfigError
 MOST_CASES = {"flights": 2000, "batch": 100_000}
 """Largest number of cases by kind, where `limits.max_cases` is null."""
 NOUNS = {"flights": "flights", "batch": "vehicles"}
-"""What the cases of a kind are called."""
+"""Plural noun for the cases of each kind."""
 _MEASURED = 3
-"""Number of flights that are measured."""
+"""Number of flights whose time is measured."""
 _BATCH = 64
-"""Vehicles of the batch that is measured, all with one planner: each takes 2 s to compile."""
+"""Number of vehicles in the measured batch. They share one planner, because compiling one takes 2
+s.
+"""
 
 
 def measured(kind: str, cases: Sequence[Case]) -> float:
-    """The time that a case takes in one process here, s.
+    """Measure the time that a case takes in one process here, s.
 
     A first, short run, which imports and compiles, is not measured.
 
     Args:
         kind: "flights" or "batch".
-        cases: of the campaign; some of them are run.
+        cases: cases of the campaign; some of them are run.
     """
     if kind == "batch":
         planner = cases[0].config.planner_name
@@ -80,7 +82,7 @@ def size_in_words(campaign: Campaign, seconds: float, workers: int) -> str:
 
 
 def duration(seconds: float) -> str:
-    """A time in words, with two digits."""
+    """A time in words, rounded to two digits."""
     for unit, length in (("days", 86_400.0), ("h", 3600.0), ("min", 60.0)):
         if seconds >= 1.5 * length:
             return f"{seconds / length:.2g} {unit}"

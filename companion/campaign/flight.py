@@ -17,9 +17,9 @@ from companion.recording.measurements.summary import Summary
 from companion.testing import MockVehicle, Truth, run, session
 
 WIRE_S = 0.0005
-"""A datagram needs this long, as over UDP, s."""
+"""Delay of a datagram, as over UDP, s."""
 INTERNAL_ERROR = "internal error: "
-"""Begins the result of a case in which the program itself failed."""
+"""Prefix of the result of a case in which the program itself failed."""
 _TRUTH_EVERY = 5
 """Steps of the mock vehicle between two true positions."""
 _AFTERWARDS_S = 10.0
@@ -31,8 +31,8 @@ def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
     """Fly one case; equal cases give equal rows, to the bit.
 
     Args:
-        case: to be flown.
-        folder: for the files of a fully recorded flight; None: nothing is written.
+        case: the case to fly.
+        folder: folder for the files of a fully recorded flight; None: nothing is written.
 
     Returns:
         One row of the results: `case`, `seed`, the factors, and the outcomes. A case that raises an
@@ -53,7 +53,7 @@ class CaseFlight:
     """The flight of one case.
 
     Args:
-        case: to be flown.
+        case: the case to fly.
         place: a new folder for the files that the flight reads.
 
     Raises:
@@ -74,7 +74,7 @@ class CaseFlight:
         self._too_long = False
 
     def fly(self, folder: Path | None) -> dict[str, Value]:
-        """Fly; returns the outcomes."""
+        """Fly the case; return its outcomes."""
         vehicle, case = self._vehicle, self._case
         vehicle.after_step.append(self._note_truth)
         fault = _BeginFault(vehicle, case.fault)
@@ -134,11 +134,11 @@ class CaseFlight:
 
 
 class _BeginFault(Silent):
-    """Begins the faults of a scenario a while after a phase began.
+    """Injects the faults of a scenario at a set time after the beginning of a phase.
 
     Args:
-        vehicle: is flown.
-        fault: the scenario, or None.
+        vehicle: the mock vehicle.
+        fault: the scenario; None: no fault.
 
     Attributes:
         begun: whether the phase was reached.
@@ -162,7 +162,7 @@ class _BeginFault(Silent):
 
 
 def _ending(state: Truth, result: str) -> str:
-    """How a flight ended, as `FaultScenario.ends` names it."""
+    """Classify the end of a flight by the names of `FaultScenario.ends`."""
     if "took over: mode" in result and state["mode"] in _PILOTED:
         return "pilot" if state["armed"] else "ground"
     if state["armed"]:
@@ -173,9 +173,9 @@ def _ending(state: Truth, result: str) -> str:
 
 
 def _placed(config: Config, place: Path) -> Config:
-    """The configuration with the paths of this flight.
+    """The configuration with all paths moved into the folder of this flight.
 
-    What earlier flights learned must not change this one, so `recording.directory` is empty.
+    `recording.directory` is empty, so that nothing an earlier flight learned changes this one.
     """
     recording = config.recording.model_copy(update={"directory": place / "learned"})
     path = config.flight.trajectory

@@ -1,4 +1,4 @@
-"""The folder of a campaign: made, resumed, and kept from two processes at once."""
+"""The folder of a campaign: created, resumed, and locked against a second process."""
 
 import fcntl
 import json
@@ -31,17 +31,17 @@ _SIZE = ("max_cases", "max_hours")
 
 @dataclass(frozen=True)
 class Description:
-    """`campaign.json`.
+    """Content of `campaign.json`.
 
     Attributes:
-        name: of the campaign.
+        name: name of the campaign.
         kind: flights or batch.
-        seed: of the campaign.
+        seed: seed of the campaign.
         cases: number of cases.
         unit: number of cases in a unit.
         case_s: time that a case took in the client before the campaign began, s; None: unknown.
-        versions: of the program and what results depend on.
-        began: when the folder was made, ISO 8601, UTC.
+        versions: versions of the program and of all that results depend on.
+        began: time at which the folder was made, ISO 8601, UTC.
     """
 
     name: str
@@ -83,12 +83,12 @@ def make(folder: Path, campaign: Campaign, description: Description) -> None:
 
 
 def begun(folder: Path) -> bool:
-    """Whether the folder holds a campaign that was begun."""
+    """Whether the folder holds a campaign."""
     return (folder / _DESCRIPTION).is_file()
 
 
 def read_description(folder: Path) -> Description:
-    """The description in the folder of a campaign.
+    """Read the description in the folder of a campaign.
 
     Raises:
         ConfigError: there is none, or it is damaged.
@@ -104,7 +104,7 @@ def read_description(folder: Path) -> Description:
 
 
 def resume(folder: Path, campaign: Campaign) -> Description:
-    """Check that the folder holds this campaign, begun by this version.
+    """Check that the folder holds this campaign, started by this version of the program.
 
     Raises:
         ConfigError: it holds another campaign.
@@ -117,7 +117,7 @@ def resume(folder: Path, campaign: Campaign) -> Description:
 
 
 def require_version(folder: Path, description: Description) -> None:
-    """Refuse a folder that another version has begun.
+    """Refuse a folder that was started by another version of the program.
 
     Raises:
         VersionError: says what differs.
@@ -151,7 +151,7 @@ def _compare(folder: Path, campaign: Campaign) -> None:
 
 
 def _without_size(data: Mapping[str, Any], key: str) -> Any:
-    """A key of a campaign file, without the limits that say how large it may be."""
+    """A key of a campaign file without the limits on the campaign's size."""
     value = data.get(key)
     if key == "limits" and isinstance(value, Mapping):
         return {name: each for name, each in value.items() if name not in _SIZE}

@@ -25,7 +25,7 @@ _WITHOUT_EFFECT = (
     "recording",
     "serve",
 )
-"""Keys and sections that have no effect in a campaign, or that the campaign sets itself."""
+"""Keys and sections that a campaign ignores or sets itself."""
 _SIGNING = ("link.signing_key_file", "mock.signing")
 
 
@@ -33,9 +33,9 @@ def check_key(key: str, base: Config, where: str) -> None:
     """Check that a dotted key exists, and that a campaign can change it.
 
     Args:
-        key: dotted.
-        base: configuration whose key is meant.
-        where: the key stands in its file, for messages.
+        key: dotted key.
+        base: configuration that the key belongs to.
+        where: place of the key in its file, for messages.
 
     Raises:
         ConfigError: the message names the key, and the nearest right one.
@@ -82,7 +82,7 @@ def _check_mock_key(name: str, section: dict[str, Any], where: str) -> None:
 def with_keys(
     base: Config, mock: Mapping[str, Any], changes: Mapping[str, Any]
 ) -> tuple[Config, dict[str, Any]]:
-    """The configuration and the complete section `mock` with dotted keys changed.
+    """Change dotted keys; return the configuration and the complete section `mock`.
 
     Args:
         base: configuration before the changes.

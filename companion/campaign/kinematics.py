@@ -1,9 +1,9 @@
 """Batch kinematics: the open-loop steps of a maneuver, flown by attitude and rate loop alone.
 
 There is no position, no estimator and no link. The planner's law and the functions of the attitude
-are those of a flight, compiled. The rate loop answers as the section `vehicle` says, with dead
-time, slew limit and lag, so that this section is what the vehicle does, and not what the program
-believes. The vehicle begins level and at rest, at the heading `mock.home.heading_deg`.
+are those of a flight, compiled. The section `vehicle` gives the dead time, slew limit and lag of
+the simulated rate loop. In a flight it only gives what the program assumes. The vehicle begins
+level and at rest, at the heading `mock.home.heading_deg`.
 """
 
 import hashlib
@@ -38,10 +38,10 @@ MANEUVERS = ("steps", "corners")
 def run_cases(cases: Sequence[Case]) -> list[dict[str, Value]]:
     """Fly cases one after the other; returns a row for each, in order.
 
-    `ok` tells whether every step stayed as near to its line as the verdict on a flight demands.
+    `ok` tells whether every step stayed as close to its line as a good flight must.
 
     Raises:
-        ConfigError: as `check_case`.
+        ConfigError: a case cannot be flown in a batch; see `check_case`.
         MissingExtraError: numba is not installed.
     """
     return [_run_case(case) for case in cases]
@@ -123,14 +123,14 @@ def _outcomes(
 
 
 def _digest(flight: StepFlight) -> str:
-    """SHA-256 over every commanded body rate and the attitude at the end."""
+    """SHA-256 of all commanded body rates and of the final attitude."""
     found = hashlib.sha256(np.ascontiguousarray(flight.commanded).data)
     found.update(np.array(flight.q).data)
     return found.hexdigest()
 
 
 def rate_loop(config: Config) -> list[AxisResponse]:
-    """How roll, pitch and yaw answer commanded rates; without an identified vehicle at once."""
+    """Response of roll, pitch and yaw to commanded rates; immediate without identification."""
     return [
         AxisResponse(
             axis.lag or 0.0,
@@ -164,11 +164,12 @@ def _targets(config: Config, longest: float, heading: float) -> Array:
 
 
 class _Pattern(NamedTuple):
-    """A maneuver from its first open-loop step to the last; level between them.
+    """The part of a maneuver from its first open-loop step to the last, level between the steps.
 
     Attributes:
         samples: number of samples.
-        steps: first sample, sample after the last, and coefficients of each step and level part.
+        steps: one entry for each step or level part: first sample, sample after the last,
+            coefficients.
     """
 
     samples: int

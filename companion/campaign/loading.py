@@ -1,4 +1,4 @@
-"""Reading a campaign file, with the configuration and the trajectories that it names."""
+"""Reads a campaign file, and the configuration and the trajectories that it names."""
 
 import tempfile
 from collections.abc import Mapping
@@ -26,12 +26,12 @@ from companion.flight.flown_config import copy_trajectory
 from companion.testing.settings import complete_mock
 
 FILES = "trajectories"
-"""Folder of the trajectories, in the folder of a campaign."""
+"""Folder of the trajectory files within the folder of a campaign."""
 _OWN = (FAULT, FAULT_PHASE, FAULT_AFTER)
 
 
 def load(path: Path) -> Campaign:
-    """Read a campaign file, and check all keys that it names.
+    """Read a campaign file, and check all keys in it.
 
     The values of each case are checked by `Campaign.cases`.
 
@@ -45,7 +45,7 @@ class _Reading:
     """Reads one campaign file.
 
     Args:
-        path: of the file.
+        path: path of the campaign file.
     """
 
     def __init__(self, path: Path) -> None:
@@ -60,7 +60,7 @@ class _Reading:
         """The campaign.
 
         Raises:
-            ConfigError: as `load`.
+            ConfigError: a file cannot be read or is wrong; see `load`.
         """
         file, name = self._file, str(self._path)
         base = self._base()
@@ -94,7 +94,7 @@ class _Reading:
         return Campaign(file, base, self._files, name)
 
     def _at(self, *where: str) -> str:
-        """The line of a key, and the section in which it stands, for messages."""
+        """Line number and section of a key, for messages."""
         return f"{place_of(where, self._places, str(self._path))}: {'.'.join(where[:-1])}"
 
     def _base(self) -> Config:
@@ -106,10 +106,10 @@ class _Reading:
         return load_config(self._folder / told)
 
     def _flyable(self, base: Config) -> Config:
-        """The base as a flight in memory needs it: armed by the program, its trajectory collected.
+        """Adapt the base to a flight in memory: the program arms, its trajectory is collected.
 
         Raises:
-            ConfigError: it needs a link that only the real vehicle has.
+            ConfigError: the configuration needs a link that only a real vehicle has.
         """
         if base.link.backend != "direct":
             raise ConfigError(f"{self._path}: link.backend must be direct in a campaign")
@@ -124,7 +124,7 @@ class _Reading:
         return base if path is None else _following(base, self._collect(path))
 
     def _with_files(self, key: str, swept: Swept) -> Swept:
-        """The swept key with the paths of collected trajectories."""
+        """The swept key, with the paths of its trajectory files replaced by their copies."""
         if TRAJECTORY not in (swept.keys or (key,)):
             return swept
         known = {}
@@ -137,10 +137,10 @@ class _Reading:
         return swept.model_copy(update=known)
 
     def _collect(self, path: Path) -> Path:
-        """Take a trajectory's file and its table into the campaign; returns its name there.
+        """Copy a trajectory's file and its table into the campaign; return its name there.
 
         Raises:
-            ConfigError: it cannot be read, or holds no trajectory.
+            ConfigError: the file cannot be read, or holds no trajectory.
         """
         if path in self._collected:
             return self._collected[path]
@@ -202,7 +202,7 @@ def _following(config: Config, path: Path) -> Config:
 
 
 def as_written(campaign: Campaign) -> dict[str, Any]:
-    """The campaign file as it was resolved: with the keys of its configuration and all defaults."""
+    """The resolved text of the campaign file: configuration keys and all defaults written out."""
     data = campaign.file.model_dump(mode="json")
     if campaign.file.tune is None:
         del data["tune"]  # a section without keys would be read as an empty one

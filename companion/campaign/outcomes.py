@@ -37,14 +37,14 @@ FLOAT_OUTCOMES = (
 )
 """Outcomes of a flight that are numbers; null where they were not measured."""
 _AT_LIMIT = 0.99
-"""A rate or a thrust from this share of its limit on counts as saturated."""
+"""A rate or thrust at or above this share of its limit counts as saturated."""
 
 
 def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
-    """Tracking of the true position during the maneuvers, and by the estimate, m.
+    """Tracking error in the maneuvers, by the true and by the estimated position, m.
 
     Args:
-        summary: of the flight.
+        summary: summary of the flight.
         truth: (N, 5), vehicle time s, north, east, down m, tilt rad.
     """
     rows = summary.trace.tracking_rows()
@@ -63,7 +63,7 @@ def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
 
 
 def _level(estimated: Floats, true: Floats) -> dict[str, float]:
-    """RMS of horizontal distances, m: true and estimated from the reference, and between both.
+    """RMS of three horizontal distances, m: estimate-reference, true-reference, estimate-true.
 
     Args:
         estimated: (N, 7), as `FlightTrace.tracking`.
@@ -83,7 +83,7 @@ def _level(estimated: Floats, true: Floats) -> dict[str, float]:
 
 
 def response(summary: Summary) -> dict[str, float]:
-    """The response to acceleration steps; NaN where none was flown."""
+    """The response to acceleration steps; NaN if there were none."""
     measured = summary.response()
     if measured is None:
         return {}
@@ -99,7 +99,7 @@ def response(summary: Summary) -> dict[str, float]:
 def activity(
     setpoints: Sequence[ReceivedSetpoint], summary: Summary, config: Config
 ) -> dict[str, float]:
-    """Rates and thrust that the autopilot was sent during the maneuvers."""
+    """Rates and thrust that the autopilot received during the maneuvers."""
     marks = summary.trace.maneuvers
     if not marks:
         return {}
@@ -125,7 +125,7 @@ def activity(
 
 
 def digest(setpoints: Sequence[ReceivedSetpoint], state: Truth) -> str:
-    """SHA-256 over every setpoint that the autopilot received, and the true state at the end."""
+    """SHA-256 of all setpoints that the autopilot received, and of the final true state."""
     found = hashlib.sha256()
     for each in setpoints:
         found.update(struct.pack("<dq4d", each.time, each.answers, *each.rates, each.thrust))
@@ -150,9 +150,9 @@ def unflown(result: str) -> dict[str, Value]:
 
 
 def failed_checks(figures: Mapping[str, Any]) -> str:
-    """What the verdict on a flight finds fault with, with semicolons between.
+    """The reasons why a flight was not good, separated by semicolons.
 
-    Advice on the configuration is no fault here: a campaign sweeps wrong values on purpose.
+    Advice on the configuration does not count, because a campaign sweeps wrong values on purpose.
     """
     return "; ".join(
         dict.fromkeys(check["what"] for check in figures["verdict"]["checks"] if not check["good"])
@@ -160,6 +160,6 @@ def failed_checks(figures: Mapping[str, Any]) -> str:
 
 
 def without_nan(values: Mapping[str, float]) -> dict[str, Value]:
-    """The numbers with null where they are not finite, and the missing ones as null."""
+    """The numbers with null for missing and for non-finite values."""
     found = {name: values.get(name, nan) for name in FLOAT_OUTCOMES}
     return {name: value if isfinite(value) else None for name, value in found.items()}

@@ -1,4 +1,4 @@
-"""One case of a campaign again, with a full recording, compared with its row of the results."""
+"""Repeats one case of a campaign with full recording, and compares it with its stored row."""
 
 from itertools import islice
 from pathlib import Path
@@ -21,9 +21,9 @@ class Rerun(NamedTuple):
     """A case that was flown again.
 
     Attributes:
-        row: its row of the results.
-        folder: its recording.
-        identical: whether it is the same flight as in the results, to the bit. A case that has no
+        row: row of the results from the repeated flight.
+        folder: folder of its recording.
+        identical: whether the flight equals that of the results to the bit. A case that has no
             results yet counts as identical.
         lines: what to tell the user.
     """
@@ -35,14 +35,14 @@ class Rerun(NamedTuple):
 
 
 def rerun(place: Path, index: int) -> Rerun:
-    """Fly a case again.
+    """Fly a case a second time.
 
     Args:
         place: folder of the campaign.
         index: number of the case.
 
     Raises:
-        ConfigError: there is no such campaign or case, or it is no flight.
+        ConfigError: there is no such campaign or case, or the case is not a flight.
         OSError: the recording cannot be written.
     """
     description = folder.read_description(place)
@@ -70,7 +70,7 @@ def rerun(place: Path, index: int) -> Rerun:
 
 
 def _judged(row: dict[str, Value]) -> str:
-    """Whether the flight was good, in words."""
+    """Verdict on a flight, in words."""
     if row["ok"]:
         return "good"
     return f"not good: {row['failed_checks'] or row['result']}"
@@ -79,7 +79,7 @@ def _judged(row: dict[str, Value]) -> str:
 def _row(
     place: Path, campaign: Campaign, description: folder.Description, index: int
 ) -> dict[str, Any] | None:
-    """The row of a case in the results, or None."""
+    """The stored row of a case, or None."""
     unit = index // description.unit
     if unit not in store.finished_units(place):
         return None

@@ -1,4 +1,4 @@
-"""`companion campaign FILE`: checks it, estimates it, runs it, and says how to go on."""
+"""`companion campaign FILE`: checks, estimates and runs the campaign, and tells how to continue."""
 
 import argparse
 import shlex
@@ -42,13 +42,13 @@ if TYPE_CHECKING:
 
 DONE, FAILED = 0, 1
 _FEW = 2
-"""Up to this number of cases for each worker, how long they take is not measured before."""
+"""The time of a case is measured only with more than this number of cases for each worker."""
 _TOLD = 3
-"""Number of lost units, and of internal errors, that are told."""
+"""Largest number of lost units, and of internal errors, that are printed."""
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the campaign of a file, or go on with the one in a folder; returns the exit code.
+    """Run the campaign of a file, or continue the one in a folder; return the exit code.
 
     Raises:
         ConfigError: the file is wrong, the campaign is too large, or the folder cannot be used.
@@ -76,10 +76,10 @@ class _Run:
     """One run of a campaign.
 
     Args:
-        campaign: is run.
-        place: its folder, locked.
-        options: of the command line.
-        console: to which it is told.
+        campaign: the campaign to run.
+        place: folder of the campaign, locked.
+        options: options of the command line.
+        console: console for messages.
     """
 
     def __init__(
@@ -90,7 +90,7 @@ class _Run:
         self._noun = estimate.NOUNS[campaign.file.kind]
 
     def run(self) -> int:
-        """Run it; returns the exit code."""
+        """Run the campaign; return the exit code."""
         begun = folder.begun(self._place)
         if begun:
             folder.resume(self._place, self._campaign)
@@ -114,7 +114,7 @@ class _Run:
             return self._stopped(str(error))
 
     def _checked(self) -> tuple[int, float | None]:
-        """Check every case; returns their number, and the time that one takes, s (None: unknown).
+        """Check every case; return their number and the time for one, s (None: unknown).
 
         Raises:
             ConfigError: a case is refused, or the campaign is larger than its limits.
@@ -135,7 +135,7 @@ class _Run:
         return len(cases), case_s
 
     def _begun(self, cases: int, case_s: float | None, workers: int) -> Description:
-        """The campaign in its folder: the one that was begun there, or a new one."""
+        """Open the campaign's folder: the existing one, or a new one."""
         if folder.begun(self._place):
             return folder.resume(self._place, self._campaign)
         unit = 1 if case_s is None else size_of_units(cases, case_s, workers)
@@ -150,7 +150,7 @@ class _Run:
         return description
 
     def _shown(self, client: "Client", description: Description) -> int:
-        """Run it with a progress bar; returns the exit code."""
+        """Run the campaign with a progress bar; return the exit code."""
         with progress_bar(self._console, TextColumn("{task.description}")) as bar:
             task = bar.add_task(self._noun, total=description.cases)
 
@@ -161,7 +161,7 @@ class _Run:
         return self._finished(progress, description)
 
     def _finished(self, progress: engine.Progress, description: Description) -> int:
-        """Say how the run ended; returns the exit code."""
+        """Report how the run ended; return the exit code."""
         say = self._console.print
         for sentence in progress.lost[:_TOLD]:
             say(f"not flown: {sentence}", markup=False)
@@ -180,7 +180,7 @@ class _Run:
         return FAILED if errors else DONE
 
     def _stopped(self, why: str) -> int:
-        """Say how to go on; returns the exit code."""
+        """Tell how to continue; return the exit code."""
         if not folder.begun(self._place):
             self._console.print(f"{why}; nothing was begun", markup=False)
             return FAILED
@@ -199,7 +199,7 @@ class _Run:
 
 
 def progress_bar(console: Console, what: ProgressColumn, *more: ProgressColumn) -> Progress:
-    """A bar with numbers and times; `what` stands before it, `more` behind it."""
+    """A progress bar with numbers and times; `what` stands before it, the field `more` after it."""
     return Progress(
         what,
         BarColumn(),
@@ -214,7 +214,7 @@ def progress_bar(console: Console, what: ProgressColumn, *more: ProgressColumn) 
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """SIGTERM ends the campaign as Ctrl-C does; while it ends, neither comes through."""
+    """SIGTERM ends the campaign like Ctrl-C; further signals are ignored while it ends."""
 
     def interrupt(number: int, frame: FrameType | None) -> NoReturn:
         for each in (signal.SIGINT, signal.SIGTERM):

@@ -1,4 +1,4 @@
-"""The results of a campaign on the disk: a Parquet file for each unit, whole or not there."""
+"""Stores the results of a campaign: one Parquet file per unit, written completely or not at all."""
 
 import json
 import os
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 RESULTS = "results"
-"""Folder of the units, in the folder of a campaign."""
+"""Folder of the units within the folder of a campaign."""
 METADATA = b"companion.campaign"
 """Key of the schema's metadata; its value is JSON with `name`, `kind` and `factors`."""
 _UNITS = (
@@ -36,7 +36,7 @@ _UNITS = (
     ("_m", "m"),
     ("_s", "s"),
 )
-"""Unit by the end of a key; the first that fits."""
+"""Unit by suffix of the key; the first suffix that fits is used."""
 _OUTCOMES = {
     "flights": (
         ("ok", "bool"),
@@ -78,7 +78,7 @@ _OUTCOMES = {
 
 
 def schema(file: CampaignFile) -> "pa.Schema":
-    """The columns of the results, from the campaign's file alone."""
+    """The columns of the results, derived from the campaign's file alone."""
     import pyarrow as pa  # noqa: PLC0415  an extra
 
     factors = [(name, _type(file, name)) for name in file.sweep]
@@ -101,12 +101,12 @@ def _type(file: CampaignFile, name: str) -> str:
 
 
 def unit(name: str) -> str:
-    """The unit of a key or an outcome by its end; empty: none."""
+    """The unit of a key or an outcome, from its suffix; empty without a unit."""
     return next((unit for end, unit in _UNITS if name.endswith(end)), "")
 
 
 def table(file: CampaignFile, rows: Sequence[Mapping[str, Value]]) -> "pa.Table":
-    """Rows as a table of the campaign's columns."""
+    """Rows as a table with the campaign's columns."""
     import pyarrow as pa  # noqa: PLC0415  an extra
 
     columns = schema(file)
@@ -132,17 +132,17 @@ def write_unit(
     rows: Sequence[Mapping[str, Value]],
     timing: Mapping[str, Any],
 ) -> None:
-    """Write the rows of a unit; when this returns they are on the disk.
+    """Write the rows of a unit; when this returns, they are on the disk.
 
     Args:
-        folder: of the campaign.
-        file: of the campaign.
-        number: of the unit.
-        rows: one a case, in order.
-        timing: what must not stand in the results, as it differs from run to run.
+        folder: folder of the campaign.
+        file: content of the campaign file.
+        number: number of the unit.
+        rows: one row for each case, in order.
+        timing: figures that differ from run to run and are therefore stored apart from the results.
 
     Raises:
-        OSError: it cannot be written; no part of the unit is left.
+        OSError: a file cannot be written; no part of the unit is left.
     """
     import pyarrow.parquet as pq  # noqa: PLC0415  an extra
 
@@ -173,10 +173,10 @@ def finished_units(folder: Path) -> frozenset[int]:
 
 
 def read(folder: Path) -> "pa.Table":
-    """All results that a campaign has so far, by case.
+    """All results of a campaign so far, ordered by case.
 
     Raises:
-        ConfigError: there are none, or a file of them is damaged.
+        ConfigError: there are no results, or a file is damaged.
     """
     import pyarrow as pa  # noqa: PLC0415  an extra
 

@@ -1,4 +1,4 @@
-"""What a campaign file says of a swept key: its values, or how they are distributed."""
+"""The values of a swept key in a campaign file: a list, or a distribution."""
 
 from collections.abc import Mapping, Sequence
 from math import exp, isfinite, log
@@ -10,7 +10,7 @@ from pydantic import Field, field_validator, model_validator
 from companion.files.yaml_file import Section
 
 Value = float | int | str | bool | None
-"""A value of a factor as a row of the results holds it."""
+"""A value of a factor, as stored in a row of the results."""
 Pair = tuple[float, float]
 KeyName = Annotated[str, Field(max_length=100)]
 
@@ -23,8 +23,8 @@ class Swept(Section):
     """The values of a swept key. A list alone stands for `values`.
 
     Exactly one of `values`, `range`, `uniform`, `loguniform`, `normal` and `choice` is given.
-    `values` and `range` are a grid: each value is flown with every value of the other grids. The
-    others are sampled.
+    `values` and `range` form a grid: each value is flown with every value of the other grids. The
+    other four are sampled.
     """
 
     values: Annotated[tuple[Any, ...], Field(min_length=1, max_length=_MOST_VALUES)] | None = None
@@ -40,13 +40,13 @@ class Swept(Section):
     normal: Pair | None = None
     """Normal distribution: mean and standard deviation."""
     within: Pair | None = None
-    """Bounds of `normal`; it is truncated there."""
+    """Bounds of `normal`, which is truncated there."""
     choice: Annotated[tuple[Any, ...], Field(min_length=2, max_length=_MOST_VALUES)] | None = None
-    """One of these values by chance, each as likely."""
+    """One of these values at random, all equally likely."""
     times_base: bool = False
     """The values multiply the value of the base configuration, instead of replacing it."""
     keys: Annotated[tuple[KeyName, ...], Field(min_length=1, max_length=20)] | None = None
-    """Keys that get the value, when the factor has a name of its own or changes several keys."""
+    """Keys that receive the value, if the factor has a name of its own or changes several keys."""
 
     @model_validator(mode="before")
     @classmethod
@@ -99,7 +99,7 @@ class Swept(Section):
 
     @property
     def sampled(self) -> bool:
-        """Whether it is sampled; otherwise it is a grid."""
+        """Whether the values are sampled; otherwise they form a grid."""
         return self.kind in _SPREAD
 
     @property
@@ -125,7 +125,7 @@ class Swept(Section):
         return tuple(low + (high - low) * place / (count - 1) for place in range(count))
 
     def at(self, share: float) -> Any:
-        """The value of a distribution below which `share` (0..1) of it lies."""
+        """Quantile of the distribution at cumulative probability `share`, 0..1."""
         if self.choice is not None:
             return self.choice[min(int(share * len(self.choice)), len(self.choice) - 1)]
         if self.normal is not None:
@@ -158,7 +158,7 @@ def _normal(normal: Pair, within: Pair | None, share: float) -> float:
 
 
 def column_value(value: Any) -> Value:
-    """A value as the results hold it: a list becomes its items with commas between them."""
+    """A value as stored in the results: the items of a list are joined by commas."""
     if isinstance(value, list | tuple):
         return ",".join(str(item) for item in value)
     plain: Value = value

@@ -1,4 +1,4 @@
-"""A unit of work: some cases that one worker flies, one after the other."""
+"""A unit of work: cases that one worker flies one after the other."""
 
 from collections.abc import Callable, Sequence
 from time import perf_counter
@@ -13,17 +13,17 @@ from companion.campaign.versions import Versions, require_equal, versions
 
 Row = dict[str, Value]
 SECONDS = 2.5
-"""A unit takes at most this long, s: long against the time to send it, short if it is lost."""
+"""Largest time for a unit, s: long compared with sending it, short enough to lose."""
 _UNITS_PER_WORKER = 4
-"""At least this number of units for each worker, so that all end at about the same time."""
+"""Smallest number of units for each worker, so that all workers end at about the same time."""
 
 
 class Flown(NamedTuple):
-    """What a worker returns.
+    """The result that a worker returns for a unit.
 
     Attributes:
-        rows: one a case, in order.
-        wall_s: time that each case took, s; of a batch: one number for all.
+        rows: one row for each case, in order.
+        wall_s: wall time of each case, s; for a batch one number for all cases.
         worker: address of the worker.
     """
 
@@ -43,17 +43,17 @@ def fly_samples(campaign: Campaign, samples: Sequence[Sample], expected: Version
 
 
 def fly_cases(kind: str, cases: Sequence[Case], expected: Versions) -> Flown:
-    """Fly cases that were built by the client, as `fly_samples`."""
+    """Fly cases that the client has built; otherwise like `fly_samples`."""
     require_equal(expected, versions(), f"the worker {_worker()}")
     return _flown(kind, cases)
 
 
 def run_cases(kind: str, cases: Sequence[Case]) -> list[Row]:
-    """The rows of cases in this process, in order.
+    """Run cases in this process; return their rows in order.
 
     Args:
         kind: "flights" or "batch".
-        cases: to be flown.
+        cases: cases to be flown.
     """
     return _flown(kind, cases).rows
 
@@ -69,10 +69,10 @@ def _flown(kind: str, cases: Sequence[Case]) -> Flown:
 
 
 def check_cases(kind: str, cases: Sequence[Case]) -> None:
-    """Check that cases can be run as this kind.
+    """Check that cases can be run as this kind of campaign.
 
     Raises:
-        ConfigError: a case cannot; the message names it.
+        ConfigError: a case cannot be run; the message names it.
     """
     if kind == "batch":
         from companion.campaign.kinematics import check_case  # noqa: PLC0415  imports much

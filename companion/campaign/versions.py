@@ -15,12 +15,12 @@ _PACKAGE = "mavlink-companion"
 _PACKAGES = ("numpy", "numba", "scipy")
 _ROOTS = ("companion", "sitl_mock")
 _NOT_FLOWN = ("cli", "report", "live", "bench", "study", "replay", "mavsdk_link")
-"""Rooms of `companion` that no case uses: a change of them leaves the results as they are."""
+"""Rooms of `companion` that no case uses; changing them does not change the results."""
 _DIGITS = 12
 
 
 class VersionError(Exception):
-    """Two processes of a campaign, or a campaign and its folder, differ in their versions."""
+    """Two processes of a campaign, or a campaign and its folder, have different versions."""
 
 
 @cache
@@ -35,7 +35,7 @@ def versions() -> Versions:
 
 
 def source_digest() -> str:
-    """The first digits of a SHA-256 over the source that a case runs."""
+    """The first digits of a SHA-256 over the source code that a case runs."""
     found = hashlib.sha256()
     base = Path(__file__).parents[2]
     for path in _sources(base):
@@ -60,7 +60,7 @@ def _version(package: str) -> str:
 
 
 def difference(ours: Versions, others: Versions) -> str:
-    """What differs between two sets of versions, in words; empty where nothing does."""
+    """The differences between two sets of versions, in words; empty if they are equal."""
     names = {"source": "the source of companion", "python": "Python"}
     return ", ".join(
         f"{names.get(name, name)} {others.get(name, 'unknown')} instead of {ours[name]}"
@@ -70,12 +70,12 @@ def difference(ours: Versions, others: Versions) -> str:
 
 
 def require_equal(ours: Versions, others: Versions, who: str) -> None:
-    """Refuse another process, or a folder, whose versions differ.
+    """Refuse another process, or a folder, with different versions.
 
     Args:
-        ours: versions that are asked for.
-        others: versions found.
-        who: has the other versions; begins the message.
+        ours: required versions.
+        others: versions of the other process or folder.
+        who: name of the other process or folder; begins the message.
 
     Raises:
         VersionError: says what differs.
@@ -89,5 +89,5 @@ def require_equal(ours: Versions, others: Versions, who: str) -> None:
 
 
 def as_found(told: Any) -> Versions:
-    """Versions from JSON or from another process, each turned into a text."""
+    """Versions from JSON or from another process, all converted to text."""
     return {str(name): str(value) for name, value in told.items()} if isinstance(told, dict) else {}

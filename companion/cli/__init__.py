@@ -1,1 +1,1 @@
-"""The commands, one file each; `companion.cli.command_line` reads the command line for them."""
+"""The commands, one file each; `companion.cli.command_line` parses their options."""

@@ -10,14 +10,14 @@ from companion.cli.flying import page_about
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run a campaign, or go on with one."""
+    """Run a campaign, or continue one."""
     from companion.campaign import running  # noqa: PLC0415  no other command needs it
 
     return running.run(options)
 
 
 def report(options: argparse.Namespace) -> int:
-    """Write the page about a campaign, and its results in one table."""
+    """Write the page about a campaign, and all results in one table."""
     from companion.campaign.report import page  # noqa: PLC0415
 
     return page.run(options)
@@ -31,7 +31,7 @@ def tune(options: argparse.Namespace) -> int:
 
 
 def rerun(options: argparse.Namespace) -> int:
-    """Fly one case again, and say whether it is the same flight."""
+    """Fly one case again, and tell whether the flight is identical."""
     from companion.campaign.rerun import rerun as fly_again  # noqa: PLC0415
 
     console = Console(highlight=False, soft_wrap=True)

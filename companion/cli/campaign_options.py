@@ -11,7 +11,7 @@ _SUB_COMMANDS = (_RUN, "report", "rerun", "tune", "-h", "--help")
 
 
 def with_campaign_command(arguments: Sequence[str]) -> list[str]:
-    """The arguments with `campaign FILE` written out as `campaign run FILE`."""
+    """The arguments, with `campaign FILE` expanded to `campaign run FILE`."""
     told = list(arguments)
     place = next((n for n, word in enumerate(told) if not word.startswith("-")), len(told))
     if told[place : place + 1] == [_CAMPAIGN] and not (
@@ -27,7 +27,7 @@ def add_campaign(commands: Commands) -> None:
         _CAMPAIGN,
         help="fly many flights over swept keys, on all cores or a cluster (extra `campaign`)",
         description="`companion campaign FILE` runs a campaign: flights of the mock vehicle in "
-        "memory, over swept keys of the configuration and of the vehicle. Write the file as those "
+        "memory, over swept keys of the configuration and of the vehicle. Examples of FILE are "
         "in configs/campaigns; docs/campaigns.md explains it.",
     )
     kinds = campaign.add_subparsers(required=True, metavar="WHAT")
@@ -49,11 +49,13 @@ def _add_run(kinds: Commands) -> None:
         "--out",
         type=Path,
         metavar="FOLDER",
-        help="for the results (runs/campaigns/NAME-TIME); a campaign begun there goes on",
+        help="folder for the results (runs/campaigns/NAME-TIME); continues a campaign in it",
     )
     add_cluster_options(run)
     run.add_argument(
-        "--yes", action="store_true", help="run it however many cases it has and long it takes"
+        "--yes",
+        action="store_true",
+        help="run it regardless of its number of cases and its duration",
     )
     run.set_defaults(run="campaign.run")
 
@@ -82,7 +84,9 @@ def _add_rerun(kinds: Commands) -> None:
         "its report, and check that it is the same flight to the bit. Exit code 1: it differs.",
     )
     rerun.add_argument("folder", type=Path, metavar="FOLDER", help="the campaign's folder")
-    rerun.add_argument("case", type=int, metavar="CASE", help="number in the column `case`")
+    rerun.add_argument(
+        "case", type=int, metavar="CASE", help="number of the case (column `case` of the results)"
+    )
     rerun.set_defaults(run="campaign.rerun")
 
 
@@ -104,14 +108,21 @@ def _add_tune(kinds: Commands) -> None:
         help="search limits, gains and weights over the flights of a campaign",
         description="Search the keys in `tune.search` of the campaign's file for the smallest true "
         "error under its constraint, compare the result with the start on flights that the search "
-        "has not seen, and write it as YAML with its reasons. A search that was stopped goes on.",
+        "has not seen, and write the result as YAML with its reasons. The command continues a "
+        "search that was stopped.",
     )
     tune.add_argument("file", type=Path, metavar="FILE", help="a campaign's file with `tune:`")
     tune.add_argument(
-        "--out", type=Path, metavar="FOLDER", help="for the search (runs/campaigns/NAME-tune)"
+        "--out",
+        type=Path,
+        metavar="FOLDER",
+        help="folder for the search (runs/campaigns/NAME-tune)",
     )
     tune.add_argument(
-        "--trials", type=_workers, metavar="NUMBER", help="instead of tune.trials of the file"
+        "--trials",
+        type=_workers,
+        metavar="NUMBER",
+        help="number of trials; replaces tune.trials of the file",
     )
     add_cluster_options(tune)
     tune.set_defaults(run="campaign.tune")

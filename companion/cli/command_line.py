@@ -18,7 +18,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     """Read the command line; ends the program for `--help`, `--version` and wrong usage.
 
     Args:
-        arguments: of the command line; None: those that the program was started with.
+        arguments: arguments of the command line; None: those of this process.
 
     Returns:
         The options; `typed` holds the arguments themselves.
@@ -62,7 +62,10 @@ def _add_flights(commands: Commands) -> None:
     fly.set_defaults(run="flights.fly")
     show = commands.add_parser("demo", help="start the bundled vehicle and fly it")
     show.add_argument(
-        "--config", type=Path, metavar="FILE", help="default: the mock-px4.yaml that ships"
+        "--config",
+        type=Path,
+        metavar="FILE",
+        help="configuration (default: the shipped mock-px4.yaml)",
     )
     show.add_argument(
         "--open", action="store_true", help="open the report in the browser after the flight"
@@ -73,18 +76,19 @@ def _add_flights(commands: Commands) -> None:
             "--maneuvers",
             type=lambda text: tuple(text.split(",")),
             metavar="NAME[,NAME]",
-            help="fly these instead of flight.maneuvers: hover, steps, circle, corners",
+            help="maneuvers that replace flight.maneuvers: hover, steps, circle, corners",
         )
         command.add_argument(
             "--trajectory",
             type=Path,
             metavar="FILE",
-            help="follow it instead, such as configs/trajectories/figure8.yaml, or a CSV table",
+            help="fly only this trajectory: a YAML file such as configs/trajectories/figure8.yaml, "
+            "or a CSV table",
         )
         command.add_argument(
             "--slow-down",
             action="store_true",
-            help="slow a trajectory down that the limits do not allow, instead of refusing it",
+            help="slow down a trajectory that exceeds the limits, instead of refusing it",
         )
         shared_options.add_live(command)
         _add_flight_options(command)
@@ -94,11 +98,11 @@ def _add_doctor(commands: Commands) -> None:
     command = commands.add_parser(
         "doctor",
         help="find what would go wrong, before take-off",
-        description="Ask the vehicle that the configuration names, without arming it: version, "
-        "parameters, rates, estimator, link, who else is there; and tell what of it is unsafe or "
-        "ineffective, what to set, and where that is known from. `companion fly` makes the same "
-        "checks and refuses what is unsafe unless flight.accept names it. Exit code 1: something "
-        "unsafe was found.",
+        description="Check the vehicle of the configuration without arming it: version, "
+        "parameters, message rates, estimator, link, and other nodes. Report what is "
+        "unsafe or ineffective, what to set, and the source of each finding. "
+        "`companion fly` runs the same checks, and refuses unsafe findings unless "
+        "flight.accept names them. Exit code 1: something unsafe was found.",
     )
     shared_options.add_required_config(command)
     shared_options.add_endpoint(command)
@@ -107,18 +111,18 @@ def _add_doctor(commands: Commands) -> None:
         type=number(0.01, 3600.0),
         default=10.0,
         metavar="SECONDS",
-        help="for the vehicle to be ready, at most (10)",
+        help="longest wait until the vehicle is ready (10)",
     )
     what = command.add_mutually_exclusive_group()
     what.add_argument(
         "--fix",
         action="store_true",
-        help="set the parameters proposed, each after asking, and write an undo file before",
+        help="write an undo file, then set the proposed parameters, asking before each",
     )
     what.add_argument(
-        "--undo", type=Path, metavar="FILE", help="set back what such a file says, and no more"
+        "--undo", type=Path, metavar="FILE", help="only restore the parameters in an undo file"
     )
-    command.add_argument("--yes", action="store_true", help="of --fix: set all without asking")
+    command.add_argument("--yes", action="store_true", help="with --fix: set all without asking")
     _add_flight_options(command)
     command.set_defaults(run="doctor.doctor")
 
@@ -126,21 +130,23 @@ def _add_doctor(commands: Commands) -> None:
 def _add_identify(commands: Commands) -> None:
     command = commands.add_parser(
         "identify",
-        help="find dead time, lag and slew of the body rates and the thrust map",
+        help="measure dead time, lag and slew limit of the body rates, and the thrust map",
         description="Fly short doublets of body rates and climb, at most 15° of tilt in calm "
-        "air unless the configuration's `identify` says otherwise, fit how the vehicle answered "
-        "them, and write that as a YAML file for the configuration to include. An axis with a bad "
-        "fit keeps what the flight's configuration says of it.",
+        "air unless the configuration's `identify` differs. Fit the vehicle's response, and write "
+        "it as a YAML file for the configuration to include. An axis with a bad fit keeps the "
+        "values of the flight's configuration.",
     )
     which = command.add_mutually_exclusive_group(required=True)
-    which.add_argument("--config", type=Path, metavar="FILE", help="fly the vehicle it names")
+    which.add_argument(
+        "--config", type=Path, metavar="FILE", help="fly the vehicle of this configuration"
+    )
     which.add_argument(
         "--bundled",
         type=Path,
         metavar="FILE",
         nargs="?",
         const=Path(),  # the configuration that ships
-        help="start the bundled vehicle and fly it; default: the mock-px4.yaml that ships",
+        help="start and fly the bundled vehicle (default: the shipped mock-px4.yaml)",
     )
     which.add_argument(
         "--log",
@@ -149,22 +155,34 @@ def _add_identify(commands: Commands) -> None:
         help="identify from a recorded flight's folder or any .tlog, without flying",
     )
     command.add_argument(
-        "--out", type=Path, metavar="FILE", help="default: vehicle.yaml beside the flight's log"
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="result (default: vehicle.yaml beside the flight's log)",
     )
     command.add_argument("--force", action="store_true", help="replace FILE if it exists")
     _add_link_options(command)
     _add_flight_options(command)
     command.set_defaults(
-        run="identify.identify", trajectory=None, slow_down=False, watch=False, live=None
+        run="identify.identify",
+        trajectory=None,
+        slow_down=False,
+        watch=False,
+        live=None,
+        foxglove=None,
     )
 
 
 def _add_link_options(command: argparse.ArgumentParser) -> None:
     shared_options.add_endpoint(command)
-    command.add_argument("--arm", action="store_true", help="arm by ourselves, as flight.arm: true")
+    command.add_argument(
+        "--arm", action="store_true", help="let the program arm the vehicle, like flight.arm: true"
+    )
 
 
 def _add_flight_options(command: argparse.ArgumentParser) -> None:
     shared_options.add_set(command, "limits.max_tilt_deg=20")
-    command.add_argument("--lockstep", action="store_true", help="on the mock vehicle's clock")
-    command.add_argument("--json", action="store_true", help="end with one line of JSON")
+    command.add_argument(
+        "--lockstep", action="store_true", help="run on the mock vehicle's clock, step by step"
+    )
+    command.add_argument("--json", action="store_true", help="print the result as one line of JSON")

@@ -35,10 +35,10 @@ def show(options: argparse.Namespace) -> int:
 
 
 def _found(config: Config, name: str) -> list[Key]:
-    """The key of that name, or all of a section.
+    """The key with that name, or all keys of a section.
 
     Raises:
-        ConfigError: there is none.
+        ConfigError: there is no such key.
     """
     known = list(keys(config))
     found = [key for key in known if name in (key.section, f"{key.section}.{key.name}")]
@@ -50,7 +50,7 @@ def _found(config: Config, name: str) -> list[Key]:
 
 
 def init(options: argparse.Namespace) -> int:
-    """Write a commented starting file: a shipped one, with what it includes in it.
+    """Write a commented starting file: a shipped configuration with its includes merged.
 
     Raises:
         ConfigError: the file exists or cannot be written.
@@ -78,7 +78,7 @@ def init(options: argparse.Namespace) -> int:
 
 
 def check(options: argparse.Namespace) -> int:
-    """Check a configuration file, with what it includes and flies."""
+    """Check a configuration file, its includes, its maneuvers, and its section `mock`."""
     config = load(options.file)
     parse_endpoint(link_settings(config).endpoint)
     maneuvers = configured_maneuvers(config)

@@ -1,4 +1,4 @@
-"""`companion doctor`."""
+"""The command `companion doctor`."""
 
 import argparse
 import json
@@ -15,6 +15,7 @@ from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
 from companion.cli.terminal import read_line
 from companion.config import Config
 from companion.config.files import assigned, changed, load
+from companion.config.known_drag import of_vehicle
 from companion.control.expected_response import expected_response, hold_sentence
 from companion.files.yaml_file import ConfigError
 from companion.files.yaml_file import load as load_yaml
@@ -26,7 +27,7 @@ from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import LinkLost, LinkTimeout
 from companion.mavlink.frame_filter import Notice
 from companion.preflight.all_checks import run_checks
-from companion.preflight.evidence import Evidence
+from companion.preflight.evidence import Evidence, Identity
 from companion.preflight.finding import Finding, Key
 from companion.preflight.parameter_fixes import (
     Answer,
@@ -57,17 +58,17 @@ def doctor(options: argparse.Namespace) -> int:
         )
     undo = None if options.undo is None else load_yaml(options.undo, Undo)
     run: Callable[..., int] = lockstep.run if config.link.lockstep else link_loop.run
-    visit = _Visit(config, Console(stderr=options.json, highlight=False))
+    doctor_run = _DoctorRun(config, Console(stderr=options.json, highlight=False))
     try:
         if undo is None:
-            code = run(visit.run_checks(options.wait, fix=options.fix, unasked=options.yes))
+            code = run(doctor_run.run_checks(options.wait, fix=options.fix, unasked=options.yes))
         else:
-            code = run(visit.restore(undo, options.undo))
+            code = run(doctor_run.restore(undo, options.undo))
     except KeyboardInterrupt:
-        visit.say("Interrupted; every parameter that was set is told above.")
+        doctor_run.say("Interrupted; every parameter that was set is told above.")
         return EXIT_FLIGHT
     if options.json:
-        print(json.dumps(visit.result, allow_nan=False))
+        print(json.dumps(doctor_run.result, allow_nan=False))
     return code
 
 
@@ -79,10 +80,10 @@ def _as_told(config: Config, options: argparse.Namespace) -> Config:
     return changed(config, {"link": link}, "the command line")
 
 
-def _flown(config: Config) -> tuple[ManeuverSequence | None, list[Finding]]:
-    """What is to be flown, or why it cannot be."""
+def _maneuvers(config: Config, identity: Identity) -> tuple[ManeuverSequence | None, list[Finding]]:
+    """The maneuvers to be flown by this vehicle, or the reason why they cannot be."""
     try:
-        return configured_maneuvers(config), []
+        return configured_maneuvers(config, of_vehicle(config, identity.uid)), []
     except ConfigError as error:
         found = f"what is configured cannot be flown: {error}"
         because = "`companion fly` refuses it"
@@ -90,7 +91,7 @@ def _flown(config: Config) -> tuple[ManeuverSequence | None, list[Finding]]:
 
 
 def _response(config: Config) -> list[Finding]:
-    """The response to expect, and whether the gain is larger than the vehicle bears."""
+    """The expected response, and whether the gain is too large for the vehicle."""
     if config.planner_name not in PLANNER_NAMES:
         return []
     response = expected_response(config)
@@ -101,8 +102,8 @@ def _response(config: Config) -> list[Finding]:
     ]
 
 
-class _Visit:
-    """What one call of the command does; `result` is what `--json` prints."""
+class _DoctorRun:
+    """One run of the command; `result` is what `--json` prints."""
 
     def __init__(self, config: Config, console: Console) -> None:
         self._config, self._console = config, console
@@ -110,7 +111,7 @@ class _Visit:
         self.result: dict[str, Any] = {}
 
     async def run_checks(self, wait: float, *, fix: bool, unasked: bool) -> int:
-        """Look, tell, and fix if asked to; what is found after that decides the exit code."""
+        """Run the checks, report, and fix what was asked; the final findings give the exit code."""
         config = self._config
         async with open_session(config, self._link) as vehicle:
             self.say(f"Asking the vehicle on {config.link.endpoint} …")
@@ -121,7 +122,7 @@ class _Visit:
                 evidence = await vehicle.gather(wait)
             except (LinkTimeout, LinkLost) as error:
                 return self._told(vehicle.unanswered(error))
-            flown, refusals = _flown(config)
+            flown, refusals = _maneuvers(config, evidence.identity)
             evidence = replace(evidence, maneuvers=flown)
             findings = [*refusals, *run_checks(config, evidence), *_response(config)]
             code = self._told(findings)
@@ -133,7 +134,7 @@ class _Visit:
         return open_link(self._config, None, notice)
 
     async def restore(self, undo: Undo, path: Path) -> int:
-        """Set the parameters back to what an undo file says."""
+        """Restore the parameters that an undo file lists."""
         async with open_session(self._config, self._link) as vehicle:
             findings = await vehicle.wait_for_vehicle()
             if findings:
@@ -169,7 +170,7 @@ class _Visit:
             if undo.path.exists():
                 self.say(f"Undo with: companion doctor --config FILE --undo {undo.path}")
         evidence = replace(evidence, survey=await survey(link, link.autopilot.parameters))
-        _, refusals = _flown(config)
+        _, refusals = _maneuvers(config, evidence.identity)
         code = self._told([*refusals, *run_checks(config, evidence), *_response(config)])
         self.result["changes"] = [outcome_as_dict(outcome) for outcome in self._outcomes]
         self.result["undo"] = str(undo.path) if undo.path.exists() else None
@@ -202,7 +203,7 @@ class _Visit:
         self.say(outcome_line(outcome))
 
     def say(self, text: str) -> None:
-        """Tell a person."""
+        """Print a message for the user."""
         self._console.print(text, markup=False, soft_wrap=True)
 
 

@@ -1,7 +1,7 @@
-"""What a command's end means to the shell."""
+"""The exit codes of commands."""
 
 EXIT_OK = 0
 EXIT_FLIGHT = 1
-"""The flight failed, or nothing usable came of it."""
+"""The flight failed, or gave no usable result."""
 EXIT_USAGE = 2
 """The command line or the configuration is wrong."""

@@ -1,4 +1,4 @@
-"""`companion fly` and `companion demo`."""
+"""The commands `companion fly` and `companion demo`."""
 
 import argparse
 import webbrowser

@@ -1,4 +1,4 @@
-"""What the commands that fly have in common: what they change, where they record, how they end."""
+"""What all flying commands share: changes of the configuration, the folder, and the end."""
 
 import argparse
 import shutil
@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from companion import demo
-from companion.cli.helping import helper
+from companion.cli.helping import environment, helper
 from companion.cli.signals import fly_interruptibly
 from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
@@ -31,11 +31,12 @@ from companion.recording.report import flight_table, words_text
 
 
 def as_told(config: Config, options: argparse.Namespace, planner: str | None = None) -> Config:
-    """The configuration with what the command line says otherwise.
+    """The configuration as changed by the options of the command line.
 
     Raises:
-        ConfigError: the two do not go together, or what is to be followed cannot be.
-        MissingExtraError: it needs an extra that is not installed.
+        ConfigError: options and configuration contradict each other, or the trajectory cannot be
+            followed.
+        MissingExtraError: an extra that the configuration needs is not installed.
     """
     link: dict[str, Any] = {}
     flight: dict[str, Any] = {}
@@ -65,7 +66,7 @@ def as_told(config: Config, options: argparse.Namespace, planner: str | None = N
 
 
 def invocation(options: argparse.Namespace) -> Invocation:
-    """How this command was called."""
+    """The command line of this call, for messages."""
     program = Path(sys.argv[0])
     if program.name != "companion":  # `python -m companion`
         name = f"{sys.executable} -m companion"
@@ -81,14 +82,14 @@ def fly(
     called: Invocation | None = None,
     beside: Helper | None = None,
 ) -> Summary:
-    """Fly as configured, record it in `folder`, tell it on `console`, tables and words included.
+    """Fly as configured, record in `folder`, and print phases, tables and summary to `console`.
 
     Args:
-        config: of the flight.
-        folder: for its files.
-        console: to which it is told.
-        called: for the command that comes next; None: that is said elsewhere.
-        beside: watches a file or serves the live page meanwhile, or None.
+        config: configuration of the flight.
+        folder: folder for the flight's files.
+        console: console for messages.
+        called: this call, for the suggested next command; None: no suggestion.
+        beside: helper process that watches a file or serves the live page, or None.
 
     Raises:
         LinkError: the link could not be opened; nothing was sent.
@@ -97,7 +98,7 @@ def fly(
     """
     observer = TerminalObserver(console)
     told = observer if beside is None else Several(observer, beside)
-    session = Session(config, folder, told, observer.ask_landing)
+    session = Session(config, folder, told, observer.ask_landing, environment=environment(beside))
     flight = fly_interruptibly(session)
     if beside is not None:
         beside.changes, beside.note = session.changes, session.note
@@ -122,7 +123,7 @@ def fly(
 
 
 def page_about(folder: Path) -> str:
-    """Write the page about a flight; returns a sentence that says where it is, or why not."""
+    """Write the page about a flight; return a sentence with its place or why there is none."""
     from companion.report.page import write_report  # noqa: PLC0415  after the flight only
 
     try:
@@ -143,9 +144,9 @@ def fly_bundled(
     planner: str | None = None,
     called: Invocation | None = None,
 ) -> Summary:
-    """Start the bundled vehicle that a configuration describes (None: the one that ships), fly it.
+    """Start the bundled vehicle of a configuration (None: the shipped one), and fly it.
 
-    They are joined as `link.endpoint` says, by UDP, TCP or a serial line, on free ports.
+    `link.endpoint` selects UDP, TCP or a serial line between them; the ports are free ones.
 
     Raises:
         ConfigError: the configuration, or the vehicle's own section of it, is wrong.

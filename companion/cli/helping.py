@@ -1,15 +1,17 @@
-"""`--watch` and `--live`: the helper process beside a flight."""
+"""`--watch`, `--live` and `--foxglove`: the helper process beside a flight."""
 
 import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from rich.console import Console
 
 from companion.config import Config
 from companion.extras import require
-from companion.live.door import open_door
+from companion.flight.environment import THIS_COMPUTER, Environment
+from companion.live.door import open_door, stream_address
 from companion.live.helper import Helper, Wishes
 
 
@@ -24,30 +26,37 @@ def helper(
     *,
     follows: bool,
 ) -> Iterator[Helper | None]:
-    """The helper process that the command line asks for, while the block runs; None: none.
+    """Run the helper process that the options ask for, if any, while the block runs.
 
     Args:
-        options: of the command line; `watch` and `live` count.
-        config: of the flight.
+        options: options of the command line; `watch`, `live` and `foxglove` count.
+        config: configuration of the flight.
         path: file of the configuration, which `--watch` watches.
         read: the configuration as it was read from this file.
-        folder: of the flight, or None.
-        console: shows where the live page is.
+        folder: folder of the flight, or None.
+        console: shows where the live page and the live stream are.
         follows: whether the flight flies the maneuvers of its configuration.
 
     Raises:
-        ConfigError: the page cannot be served at this address.
-        MissingExtraError: the extra `live` is not installed.
+        ConfigError: the page or the stream cannot be served at this address.
+        MissingExtraError: an extra is not installed.
     """
-    if not options.watch and options.live is None:
+    if not options.watch and options.live is None and options.foxglove is None:
         yield None
         return
-    door = None
+    door = stream = None
     if options.live is not None:
         require("nicegui", "live", "--live")
+    if options.foxglove is not None:
+        require("foxglove", "foxglove", "--foxglove")
+        stream = stream_address(options.foxglove)
+    if options.live is not None:
         door = open_door(options.live)
-        console.print(door.words(), markup=False, highlight=False, soft_wrap=True)
-    made = Helper(Wishes(path if options.watch else None, read, door, follows, folder), config)
+    for each in (door, stream):
+        if each is not None:
+            console.print(each.words(), markup=False, highlight=False, soft_wrap=True)
+    watched = path if options.watch else None
+    made = Helper(Wishes(watched, read, door, stream, follows, folder), config)
     if door is not None:
         door.listening.close()  # the process has it
     words = "the program has ended"
@@ -56,3 +65,10 @@ def helper(
         words = "the flight is over"
     finally:
         made.close(words)
+
+
+def environment(beside: Helper | None) -> Environment:
+    """What a flight gets from this computer, with the live stream of the helper process."""
+    if beside is None or beside.feed is None:
+        return THIS_COMPUTER
+    return replace(THIS_COMPUTER, stream=beside.feed.send)

@@ -1,4 +1,4 @@
-"""`companion identify`: fly doublets, or read a flight, and write how the vehicle answers."""
+"""`companion identify`: flies doublets or reads a flight, and writes the vehicle's response."""
 
 import argparse
 import json
@@ -30,16 +30,16 @@ from companion.recording.measurements.summary import Summary
 from companion.vehicle.flight_log import read_flight_log
 
 SHIPPED = Path()
-"""Stands for the configuration that ships, where `--bundled` names none."""
+"""Stands for the shipped configuration if `--bundled` names none."""
 _MANEUVER = "identify"
 _PLANNER = "first-order"
-"""It needs no knowledge of the vehicle: that is what is looked for."""
+"""Planner for the flight: it needs no knowledge of the vehicle's response."""
 _LONGEST_NAME = 200
 _LOG, _FRAGMENT, _CONFIG = "flight.tlog", "vehicle.yaml", "config.yaml"
 
 
 def identify(options: argparse.Namespace) -> int:
-    """Fly and fit, or fit a recorded flight; write the fit if it is good."""
+    """Fly and fit, or fit a recorded flight; write the fit if it is usable."""
     console = FlightConsole(stderr=options.json, highlight=False)
     if options.log is not None:
         log = options.log / _LOG if options.log.is_dir() else options.log
@@ -69,10 +69,10 @@ def identify(options: argparse.Namespace) -> int:
 
 
 def _writable(out: Path, force: bool) -> None:
-    """Refuse what no file can be put to.
+    """Refuse an output path that cannot be written.
 
     Raises:
-        ConfigError: it cannot, and why.
+        ConfigError: the path cannot be written; the message says why.
     """
     if out.is_dir():
         raise ConfigError(f"{out} is a folder; name a file in it, such as {out / _FRAGMENT}")
@@ -94,7 +94,7 @@ def _flown(options: argparse.Namespace, console: FlightConsole) -> Summary:
 
 
 def _fitted(log: Path, out: Path, options: argparse.Namespace, console: FlightConsole) -> int:
-    """Fit what a log holds, show it, and write it to `out` if it is good."""
+    """Fit the data of a log, show the fit, and write it to `out` if it is usable."""
     with suppress(OSError):
         console.print("fitting…")
     rows = read_flight_log(log)
@@ -126,7 +126,7 @@ def _fitted(log: Path, out: Path, options: argparse.Namespace, console: FlightCo
 
 
 def _known(log: Path) -> dict[str, AxisKeys]:
-    """What the configuration of that flight, beside its log, says of each axis; perhaps nothing."""
+    """The response of each axis according to the configuration beside the log; may be empty."""
     try:
         return load(log.with_name(_CONFIG)).vehicle.axes
     except ConfigError:  # another program's log, or another version's configuration
@@ -134,16 +134,16 @@ def _known(log: Path) -> dict[str, AxisKeys]:
 
 
 def _flight_name(log: Path) -> str:
-    """The name of a flight's folder, or of a log of another program."""
+    """The name of a flight's folder, or of another program's log."""
     path = log.resolve()
     return (path.parent.name if path.name == _LOG else path.name)[:_LONGEST_NAME]
 
 
 def _replace(out: Path, text: str) -> None:
-    """Write a file whole or not at all: what flies by it must not read half of it.
+    """Write a file completely or not at all, because a flight may read it.
 
     Raises:
-        OSError: it cannot be written; its text is a whole sentence.
+        OSError: the file cannot be written; its text is a complete sentence.
     """
     try:
         write_whole(out, text)
@@ -165,7 +165,7 @@ def _how_to_include(out: Path, config: Path | None) -> str:
 
 
 def _figures(vehicle: IdentifiedVehicle) -> dict[str, Any]:
-    """What `--json` tells of each axis; null where nothing was found."""
+    """The figures of each axis for `--json`; null where there is none."""
     return {
         name: {
             "lag_ms": _in_ms(response.lag),

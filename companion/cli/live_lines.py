@@ -10,18 +10,18 @@ from companion.files.ascii_text import ascii_for
 from companion.flight.status import FlightStatus
 
 _COLUMNS = 80
-"""Width where the terminal does not tell its own."""
+"""Width of a terminal that does not report one, columns."""
 _ALARM = "\x1b[1;31m{}\x1b[0m"
 
 
 def can_redraw(file: IO[str]) -> bool:
-    """Whether lines can be rewritten there: a terminal with ANSI codes, and none are forbidden."""
+    """Whether lines can be rewritten: a terminal with ANSI codes, and NO_COLOR is not set."""
     dumb = os.environ.get("TERM", "dumb") in ("", "dumb", "unknown")
     return file.isatty() and not dumb and not os.environ.get("NO_COLOR")
 
 
 def status_lines(status: FlightStatus) -> list[str]:
-    """The three lines: what is flown, how the vehicle moves, and safety, setpoints and battery."""
+    """The three lines: maneuver; motion of the vehicle; safety, setpoints and battery."""
     return [
         f"{status.phase:<9} {_times(status)}   {_doing(status)}",
         f"{'':<9} height {_number(status.height, '.1f', 'm')}   "
@@ -40,7 +40,7 @@ def _doing(status: FlightStatus) -> str:
 
 
 def allowed_time(elapsed: float, timeout: float) -> str:
-    """How long a phase has lasted, and may last, s."""
+    """Time that a phase has lasted, and its limit, s."""
     return f"{elapsed:.0f} s" if isinf(timeout) else f"{elapsed:.0f} of at most {timeout:.0f} s"
 
 
@@ -78,12 +78,12 @@ def _number(value: float | None, digits: str, unit: str) -> str:
 
 
 class LiveLines:
-    """Lines that stay at the bottom, while other text goes above them.
+    """Status lines that stay at the bottom while other text scrolls above them.
 
     Each change is one write, so nothing flickers. It writes no more than the terminal's width.
 
     Args:
-        file: of a terminal.
+        file: the terminal.
     """
 
     def __init__(self, file: IO[str]) -> None:
@@ -96,7 +96,7 @@ class LiveLines:
         """Replace the lines.
 
         Args:
-            lines: in order.
+            lines: the new lines, from top to bottom.
             alarm: whether the last one is an alarm.
         """
         back, columns = self._back(), self._columns()
@@ -108,7 +108,7 @@ class LiveLines:
         self._write(back + "".join(f"{line}\x1b[K\n" for line in drawn) + "\x1b[J")
 
     def above(self, text: str) -> None:
-        """Write `text`, whole lines, above the lines."""
+        """Write `text`, which consists of whole lines, above the status lines."""
         kept = "".join(f"{line}\n" for line in self._lines)
         self._write(f"{self._back()}\x1b[J{text}{kept}")
 
@@ -119,7 +119,7 @@ class LiveLines:
             self._lines = []
 
     def _back(self) -> str:
-        """To the beginning of the first line, also where a narrower terminal has wrapped them."""
+        """Move to the beginning of the first line, even if a narrower terminal wrapped lines."""
         columns = self._columns()
         rows = sum(max(1, -(-len(line) // columns)) for line in self._lines)
         return f"\x1b[{rows}F" if rows else "\r"

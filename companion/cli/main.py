@@ -1,6 +1,6 @@
-"""The program's entry. Exit codes: 0 done, 1 failed or interrupted, 2 usage or configuration.
+"""The program's entry. Exit codes: 0 success, 1 failed or interrupted, 2 usage or configuration.
 
-It imports next to nothing before Ctrl-C is seen to: the rest takes the better part of a second.
+It imports almost nothing before it handles Ctrl-C, because the other imports take most of a second.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code.
 
     Args:
-        arguments: of the command line; None: those that the program was started with.
+        arguments: arguments of the command line; None: those of this process.
     """
     by_default = signal.getsignal(signal.SIGINT) is signal.default_int_handler
     if by_default:  # not where a shell ignores it, nor where a test has its own
@@ -43,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _loaded(arguments: Sequence[str] | None) -> Callable[[], int]:
-    """The command that the command line asks for, imported."""
+    """Parse the arguments, and import the command they name."""
     from companion.cli.text_streams import print_anything  # noqa: PLC0415
 
     print_anything()
@@ -57,6 +57,6 @@ def _loaded(arguments: Sequence[str] | None) -> Callable[[], int]:
 
 
 def _leave(_signal: int, _frame: FrameType | None) -> NoReturn:
-    """End at once: an exception might come up where an import swallows or prints it."""
+    """End the process at once; an exception could be swallowed or printed by an import."""
     os.write(2, b"companion: interrupted before anything was sent\n")
     os._exit(EXIT_FLIGHT)

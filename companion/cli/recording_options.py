@@ -18,24 +18,30 @@ def _add_export(commands: Commands) -> None:
     export.add_argument("folder", type=Path, metavar="FOLDER", help="the flight's folder")
     kind = export.add_mutually_exclusive_group(required=True)
     kind.add_argument("--csv", action="store_true", help="one CSV file for each channel")
-    kind.add_argument("--parquet", action="store_true", help="the same as Parquet (extra `export`)")
-    export.add_argument("--into", type=Path, metavar="FOLDER", help="default: FOLDER/export")
+    kind.add_argument(
+        "--parquet", action="store_true", help="one Parquet file for each channel (extra `export`)"
+    )
+    export.add_argument(
+        "--into", type=Path, metavar="FOLDER", help="folder for the files (default: FOLDER/export)"
+    )
     export.set_defaults(run="recordings.export")
 
 
 def _add_replay(commands: Commands) -> None:
     replay = commands.add_parser(
         "replay",
-        help="run the code again over a recorded flight",
-        description="Run the control loop and guidance again over what a flight recorded, and "
-        "compare each command. With its own configuration all commands must be those of the "
-        "flight, to the bit; with another one it shows what would have been sent.",
+        help="run the control loops again on the inputs of a recorded flight",
+        description="Run the control loop and guidance again on the recorded inputs of a flight, "
+        "and compare each setpoint. With the flight's own configuration, all setpoints must be "
+        "equal to the bit. With another one, the command shows what would have been sent.",
     )
     replay.add_argument("folder", type=Path, metavar="FOLDER", help="the flight's folder")
-    replay.add_argument("--config", type=Path, metavar="FILE", help="instead of the flight's own")
+    replay.add_argument(
+        "--config", type=Path, metavar="FILE", help="configuration that replaces the flight's own"
+    )
     add_set(replay, "planner.gain_per_s=4")
     replay.add_argument(
-        "--csv", type=Path, metavar="FILE", help="write both answers to each sample"
+        "--csv", type=Path, metavar="FILE", help="write both setpoints for each sample to this file"
     )
     replay.set_defaults(run="recordings.replay")
 
@@ -47,10 +53,12 @@ def _add_reports(commands: Commands) -> None:
     report.add_argument(
         "flight", type=Path, metavar="FOLDER", help="the flight's folder, or a .tlog of any program"
     )
-    report.add_argument("--out", type=Path, metavar="FILE", help="default: FOLDER/report.html")
+    report.add_argument(
+        "--out", type=Path, metavar="FILE", help="page (default: FOLDER/report.html)"
+    )
     report.set_defaults(run="recordings.report")
     compare = commands.add_parser(
-        "compare", help="one HTML page with several flights beside each other (extra `report`)"
+        "compare", help="one HTML page that compares flights (extra `report`)"
     )
     compare.add_argument(
         "flights", type=Path, nargs="+", metavar="FOLDER", help="folders of flights, or .tlog files"
@@ -60,6 +68,6 @@ def _add_reports(commands: Commands) -> None:
         type=Path,
         default=Path("compare.html"),
         metavar="FILE",
-        help="default: compare.html",
+        help="page (default: compare.html)",
     )
     compare.set_defaults(run="recordings.compare")

@@ -31,14 +31,14 @@ def report(options: argparse.Namespace) -> int:
 
 
 def compare(options: argparse.Namespace) -> int:
-    """Write a page that sets flights beside each other."""
+    """Write a page that compares flights."""
     from companion.report.page import write_comparison  # noqa: PLC0415  no other command needs it
 
     return _write(lambda: write_comparison(options.flights, options.out))
 
 
 def _write(make: Callable[[], Path]) -> int:
-    """Print the path of the page that `make` writes."""
+    """Call `make`, and print the path of the page that it has written."""
     try:
         print(make())
     except OSError as error:
@@ -63,7 +63,7 @@ def export(options: argparse.Namespace) -> int:
 
 
 def replay(options: argparse.Namespace) -> int:
-    """Run the code again over a recorded flight; fails if its own configuration gives others."""
+    """Replay a recorded flight; fail if its own configuration gives different setpoints."""
     from companion.replay.replay import Replay  # noqa: PLC0415  no other command needs it
     from companion.replay.report import words, write_csv  # noqa: PLC0415
 

@@ -29,7 +29,7 @@ _USAGE = (
 )
 """The command line or the configuration is wrong."""
 _FLIGHT = LinkError, OSError, VehicleStoppedError
-"""The flight failed, or what it needs did."""
+"""The flight failed, or something that it needs failed."""
 
 Command = Callable[[argparse.Namespace], int]
 
@@ -42,7 +42,7 @@ def command_of(options: argparse.Namespace) -> Command:
 
 
 def run(command: Command, options: argparse.Namespace) -> int:
-    """Run a command; returns the exit code.
+    """Run a command; return the exit code.
 
     Raises:
         KeyboardInterrupt: Ctrl-C where no flight handles it.

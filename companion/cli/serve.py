@@ -8,7 +8,7 @@ import time
 from typing import Any
 
 from companion.cli.exit_codes import EXIT_OK
-from companion.cli.helping import helper
+from companion.cli.helping import environment, helper
 from companion.cli.signals import LEAVE_AFTER
 from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
@@ -24,11 +24,11 @@ from companion.serve.report_pages import ReportPages
 from companion.serve.session import ServeSession
 
 _PAGE_AFTER_STOP = 40.0
-"""Time after a stop for which the report of a flight is still waited for, s."""
+"""Time allowed after a stop for the report of a flight, s."""
 
 
 def serve(options: argparse.Namespace) -> int:
-    """Pass everything between the vehicle and other programs, and fly their setpoints."""
+    """Relay between the vehicle and other programs, and fly the setpoints of those programs."""
     read = load(options.config)
     config = _as_told(read, options)
     console = FlightConsole(stderr=options.json, highlight=False)
@@ -40,7 +40,7 @@ def serve(options: argparse.Namespace) -> int:
 
     with helper(options, config, options.config, read, None, console, follows=False) as beside:
         told = observer if beside is None else Several(observer, beside)
-        session = ServeSession(config, note, told, directory=config.recording.directory)
+        session = ServeSession(config, note, told, environment(beside), config.recording.directory)
         pages = ReportPages()
         if config.recording.report:
             session.records.on_recorded = pages.write
@@ -58,7 +58,7 @@ def serve(options: argparse.Namespace) -> int:
 
 
 class _Events(TerminalObserver):
-    """Shows phases and events. It has no live lines: they would stay on screen between flights."""
+    """Shows phases and events, without live lines: they would stay visible between flights."""
 
     def status(self, status: FlightStatus) -> None:
         """Ignore it."""
@@ -89,11 +89,11 @@ async def _until_stopped(session: ServeSession, pages: ReportPages) -> dict[str,
 
 
 def _as_told(config: Config, options: argparse.Namespace) -> Config:
-    """The configuration with what the command line says otherwise.
+    """The configuration as changed by the options of the command line.
 
     Raises:
-        ConfigError: the two do not go together.
-        MissingExtraError: it needs an extra that is not installed.
+        ConfigError: options and configuration contradict each other.
+        MissingExtraError: an extra that the configuration needs is not installed.
     """
     told = changed(config, assigned(options.set), "--set")
     link = {"endpoint": options.endpoint} if options.endpoint else {}

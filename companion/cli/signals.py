@@ -1,4 +1,4 @@
-"""Signals in flight: each hands the vehicle back; only a second Ctrl-C leaves the flight."""
+"""Signals in flight: each one hands the vehicle back; only a second Ctrl-C leaves the flight."""
 
 import asyncio
 import signal
@@ -9,7 +9,7 @@ from companion.flight.session import Session
 from companion.recording.measurements.summary import Summary
 
 LEAVE_AFTER = 1.0
-"""A second Ctrl-C leaves only if it comes this long after the first, s: a key may bounce."""
+"""Shortest time between two Ctrl-C for the second one to leave, s; a key may bounce."""
 
 HOW_TO_LEAVE = f"Ctrl-C again, {LEAVE_AFTER:g} s later or more, leaves at once"
 
@@ -18,12 +18,12 @@ class Signals:
     """Handles the signals that arrive while a session flies.
 
     A terminal that closes sends several: the shell and the kernel each send SIGHUP, and SIGTERM may
-    follow. So repeats of these two change nothing. Only the keyboard can end a hand-back.
+    follow. So a repeated SIGHUP or SIGTERM changes nothing. Only Ctrl-C can end a hand-back.
 
     Args:
-        session: the one that flies.
+        session: the session that flies.
         give_up: ends the session while there is no flight to interrupt.
-        clock: wall clock, not vehicle time, s.
+        clock: returns wall time, not vehicle time, s.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ async def fly_interruptibly(session: Session) -> Summary:
 
     Raises:
         CancelledError: interrupted before there was a flight; nothing was sent.
-        LinkError, OSError, RealtimeError: as `Session.fly`.
+        LinkError, OSError, RealtimeError: see `Session.fly`.
     """
     flight = asyncio.ensure_future(session.fly())
     signals = Signals(session, flight.cancel)

@@ -14,20 +14,20 @@ from companion.cli.live_lines import LiveLines, allowed_time, can_redraw, status
 from companion.flight.status import FlightStatus
 
 _REPEAT = 5.0
-"""Period of the plain lines where nothing can be redrawn, s."""
+"""Period of plain status lines on output that cannot be redrawn, s."""
 
 _REDRAW = 0.2
-"""Shortest period of redrawing the state, s of wall time: in lockstep a flight is quicker."""
+"""Shortest period between redraws, s of wall time; a flight in lockstep may outrun the terminal."""
 
 _WAITING = 1000
 """Lines queued for a stalled terminal; further lines are dropped."""
 
 _PATIENCE = 2.0
-"""Longest wait for a stalled terminal at the end, s."""
+"""Longest wait at the end for a stalled terminal, s."""
 
 
 class _PrintThread:
-    """Prints in its own thread: a terminal that stalls or closes must not stop a flight."""
+    """Prints in its own thread, so that a terminal that stalls or closes cannot stop a flight."""
 
     def __init__(self) -> None:
         self._lines: queue.Queue[Callable[[], None] | None] = queue.Queue(_WAITING)
@@ -35,7 +35,7 @@ class _PrintThread:
         self._thread.start()
 
     def say(self, line: Callable[[], None]) -> bool:
-        """Queue a line; false if too many wait."""
+        """Queue a line; return false if too many are waiting."""
         try:
             self._lines.put_nowait(line)
         except queue.Full:
@@ -62,7 +62,7 @@ class _PrintThread:
 
 
 async def read_line() -> str:
-    """Read a line from the terminal while the event loop goes on."""
+    """Read a line from the terminal without blocking the event loop."""
     loop = asyncio.get_running_loop()
     answer: asyncio.Future[str] = loop.create_future()
     loop.add_reader(sys.stdin, lambda: answer.set_result(sys.stdin.readline()))
@@ -73,7 +73,7 @@ async def read_line() -> str:
 
 
 class FlightConsole(Console):
-    """A console whose reader may close the pipe; rich itself would end the program."""
+    """A console that survives a closed pipe; rich itself would end the program."""
 
     def on_broken_pipe(self) -> None:
         """Raise `BrokenPipeError` instead of ending the program, as Rich would."""
@@ -81,7 +81,7 @@ class FlightConsole(Console):
 
 
 class TerminalObserver:
-    """Shows a flight: on a terminal its state in live lines below the events, elsewhere events."""
+    """Shows a flight: events, and on a terminal live status lines below them."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -98,14 +98,14 @@ class TerminalObserver:
         self._printer.say(lambda: self._print(f"[bold]{name:<10}[/] waiting for {waits_for}", True))
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
-        """Say now and then what the phase waits for, and since when; live lines show it anyway."""
+        """Print from time to time what the phase waits for; live lines always show it."""
         if self._live is None and elapsed - self._said >= _REPEAT:
             self._said = elapsed
             text = f"{name}: {detail or 'working'} ({allowed_time(elapsed, timeout)})"
             self._printer.say(lambda: self._print(f"           {text}"))
 
     def status(self, status: FlightStatus) -> None:
-        """Redraw the live lines, if they are old; a stalled terminal gets the newest state only."""
+        """Redraw the live lines if they are old; a stalled terminal skips states."""
         self._newest = status
         now = time.monotonic()
         if self._live is None or self._asking or self._queued or now - self._drawn < _REDRAW:
@@ -123,7 +123,7 @@ class TerminalObserver:
         self._printer.close()
 
     async def ask_landing(self) -> bool:
-        """Ask whether to land; without a terminal the vehicle goes on holding."""
+        """Ask whether to land; without a terminal the vehicle continues to hold."""
         if sys.stdin is None or sys.stdin.closed or not sys.stdin.isatty():
             self._printer.say(
                 lambda: self._print("The vehicle holds. Take it over, or command a landing.")

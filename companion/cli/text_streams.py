@@ -1,4 +1,4 @@
-"""Makes standard output and error accept any character: they transliterate what they cannot encode.
+"""Makes standard output and error transliterate the characters that they cannot encode.
 
 A terminal may be ASCII or Latin-1 (`LANG=C`, `PYTHONIOENCODING`), and a file name may be any bytes.
 Neither may end a command that flies.

@@ -11,7 +11,7 @@ from companion.study import registry
 
 
 def bench_link(options: argparse.Namespace) -> int:
-    """Measure our latency beside others'."""
+    """Measure the latency of our link and of others."""
     from companion.bench import link  # noqa: PLC0415  no other command needs it
 
     figures = link.run(options.seconds, options.rate, options.json)
@@ -21,7 +21,7 @@ def bench_link(options: argparse.Namespace) -> int:
 
 
 def bench_serve(options: argparse.Namespace) -> int:
-    """Measure our latency with other programs on the link and without."""
+    """Measure the latency of our link with and without other programs on it."""
     from companion.bench import serve  # noqa: PLC0415  no other command needs it
 
     figures = serve.run(options.seconds, options.rate, options.json)
@@ -31,7 +31,7 @@ def bench_serve(options: argparse.Namespace) -> int:
 
 
 def bench_planner(options: argparse.Namespace) -> int:
-    """Measure a step of each planner."""
+    """Measure the time of one step of each planner."""
     from companion.bench import planner  # noqa: PLC0415  no other command needs it
 
     figures = planner.run(options.seconds, options.json)
@@ -41,7 +41,7 @@ def bench_planner(options: argparse.Namespace) -> int:
 
 
 def bench_flight(options: argparse.Namespace) -> int:
-    """Measure how quickly one core flies."""
+    """Measure how fast one core flies."""
     from companion.bench import flight  # noqa: PLC0415  no other command needs it
 
     figures = flight.run(options.seconds, options.json, profile=options.profile)
@@ -51,7 +51,7 @@ def bench_flight(options: argparse.Namespace) -> int:
 
 
 def study(options: argparse.Namespace) -> int:
-    """Fly the paper's experiments and ours."""
+    """Run the experiments of the paper and our own."""
     if options.json and not all(study.prints_json for study in registry.chosen(options.name)):
         raise ConfigError(
             f"--json goes with study {registry.names_with_json()}; study {options.name} writes its"

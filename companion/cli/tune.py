@@ -28,11 +28,11 @@ from companion.vehicle.flight_log import read_flight_log
 _VEHICLE, _CONFIG, _LOG = "vehicle.yaml", "config.yaml", "flight.tlog"
 _OUTPUT = "tuned.yaml"
 _SECTIONS = ("vehicle", "thrust")
-"""Sections that a vehicle file writes."""
+"""The sections in a vehicle file."""
 
 
 def tune(options: argparse.Namespace) -> int:
-    """Propose, fly the proposal on the mock vehicle, and write it."""
+    """Propose values, fly the proposal on the mock vehicle, and write it."""
     console = Console(stderr=options.json, highlight=False, soft_wrap=True)
     source: Path = options.vehicle
     vehicle = source / _VEHICLE if source.is_dir() else source
@@ -66,7 +66,7 @@ def _check_output(output: Path, force: bool) -> None:
     """Refuse a file that cannot be written, before the flights.
 
     Raises:
-        ConfigError: why.
+        ConfigError: the file cannot be written; the message says why.
     """
     if output.is_dir():
         raise ConfigError(f"{output} is a folder; name a file in it with --output")
@@ -79,10 +79,10 @@ def _check_output(output: Path, force: bool) -> None:
 
 
 def _configuration(source: Path, vehicle: Path, base: Path | None) -> tuple[Config, bool]:
-    """The configuration to tune, and whether the vehicle comes from a vehicle file.
+    """The configuration to tune, and whether the vehicle's response comes from a vehicle file.
 
     Raises:
-        ConfigError: a file cannot be read, or does not say how the vehicle responds.
+        ConfigError: a file cannot be read, or holds no response of the vehicle.
     """
     recorded = source / _CONFIG
     if base is None and source.is_dir() and recorded.exists():
@@ -102,7 +102,7 @@ def _configuration(source: Path, vehicle: Path, base: Path | None) -> tuple[Conf
 
 
 def _with_learned_drag(config: Config, source: Path) -> Config:
-    """The configuration with the drag that the flights beside a flight folder have learned."""
+    """The configuration with the drag learned by the flights in the same folder as `source`."""
     learned = newest(source.resolve().parent) if source.is_dir() else None
     if config.guidance.drag is not None or learned is None:
         return config
@@ -114,7 +114,7 @@ def _with_learned_drag(config: Config, source: Path) -> Config:
 
 
 def _second_order(log: Path) -> dict[str, float]:
-    """Keys of a rate loop of second order, if the doublets of this flight show one clearly."""
+    """Keys of a second-order rate loop, if the doublets of this flight clearly show one."""
     try:
         rows = read_flight_log(log)
     except LogError:  # nothing in it was flown by body rates
@@ -130,7 +130,7 @@ def _flyable(config: Config) -> Config:
 
 
 def _vehicle_of(config: Config) -> dict[str, Any]:
-    """The section `vehicle` of a flight without a vehicle file; its values that are not null."""
+    """The section `vehicle` of a flight without a vehicle file; only values that are not null."""
     values = config.vehicle.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
     return {"vehicle": values}
 
@@ -140,7 +140,7 @@ def _relative(vehicle: Path, output: Path) -> Path:
 
 
 def _flights(proposal: Proposal, console: Console) -> dict[str, tuple[Flown, Flown]]:
-    """Fly each course with the configuration before and with the proposal."""
+    """Fly each course with the previous configuration and with the proposal."""
     autopilot = autopilot_like(proposal.tuned)
     flights = {}
     for course in COURSES:
@@ -155,7 +155,7 @@ def _flights(proposal: Proposal, console: Console) -> dict[str, tuple[Flown, Flo
 def _figures(
     proposal: Proposal, flights: dict[str, tuple[Flown, Flown]], output: Path
 ) -> dict[str, Any]:
-    """What `--json` prints; a value that a failed flight did not measure is null."""
+    """The figures for `--json`; a value that a failed flight did not measure is null."""
     expected = {}
     for name, each in (("before", proposal.before), ("after", proposal.after)):
         found = each.margins

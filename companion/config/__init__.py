@@ -1,4 +1,4 @@
-"""The typed configuration: its sections, its files, and what follows from them for a vehicle."""
+"""The typed configuration: its sections, its files, and the values derived for a vehicle."""
 
 from companion.config.root import Config
 

@@ -16,8 +16,9 @@ class LinkConfig(Section):
     `mavsdk`)."""
     endpoint: Annotated[str, Field(max_length=300)] = "udpin://0.0.0.0:14540"
     """udpin://, udpout://, tcp://, tcpin:// with host:port, or serial://DEVICE:BAUD. udpin and
-    tcpin also take ?peer=HOST[:PORT], to hear no other. udp://:PORT of other programs is taken as
-    udpin://0.0.0.0:PORT."""
+    tcpin also take ?peer=HOST[:PORT] to accept no other peer. udp://:PORT, as other programs
+    write it, means udpin://0.0.0.0:PORT.
+    """
     target_system: Annotated[int, Field(ge=1, le=255)] = 1
     """System id of the autopilot; every other system is ignored."""
     target_component: Annotated[int, Field(ge=1, le=255)] = 1
@@ -32,13 +33,13 @@ class LinkConfig(Section):
     lockstep: StrictBool = False
     """Run on the mock vehicle's clock, step by step. Never with a real vehicle."""
     attitude_rate_hz: Annotated[float, Field(ge=20.0, le=1000.0)] = 250.0
-    """Rate requested for ATTITUDE_QUATERNION. The loop runs at the rate that arrives."""
+    """Rate requested for ATTITUDE_QUATERNION. The control loop runs at the rate that arrives."""
     min_attitude_rate_hz: Annotated[float, Field(ge=10.0, le=1000.0)] = 50.0
-    """Refuse to fly if less than this arrives."""
+    """Refuse to fly if attitudes arrive at a lower rate."""
     position_rate_hz: Annotated[float, Field(ge=5.0, le=200.0)] = 50.0
     """Rate requested for LOCAL_POSITION_NED."""
     min_position_rate_hz: Annotated[float, Field(ge=1.0, le=200.0)] = 10.0
-    """Refuse to fly if less than this arrives."""
+    """Refuse to fly if positions arrive at a lower rate."""
 
     @model_validator(mode="after")
     def _consistent(self) -> "LinkConfig":
@@ -55,7 +56,7 @@ class LinkConfig(Section):
 
 
 class RealtimeConfig(Section):
-    """Real-time settings that the system grants or refuses; the flight reports which."""
+    """Real-time settings, which the system grants or refuses; the flight reports the result."""
 
     scheduler: Literal["other", "fifo"] = "other"
     """other: the normal scheduler. fifo: SCHED_FIFO, which runs before all normal programs."""
@@ -68,7 +69,7 @@ class RealtimeConfig(Section):
     lock_memory: StrictBool = False
     """Lock the program's memory in RAM, so that a step never waits for the disk."""
     freeze_gc: StrictBool = False
-    """Switch the garbage collector off in flight. Its work is done after the flight."""
+    """Switch the garbage collector off in flight. It runs after the flight."""
     required: StrictBool = False
     """Refuse to fly unless every requested setting is granted."""
 

@@ -1,4 +1,4 @@
-"""Values that are allowed and yet most likely not meant, or not measured on this vehicle."""
+"""Values that are permitted but probably a mistake, or not measured on this vehicle."""
 
 from collections.abc import Iterator
 from math import hypot
@@ -12,18 +12,19 @@ BODY_RATE = "safety.max_body_rate_deg_s"
 _TYPICAL = {"_deg_s2": 1000.0, "_ms": 50.0}
 """Usual value of a key whose default is null, by the end of the key's name."""
 _FAR, _NEAR = 20.0, 5.0
-"""A value is doubted if it is less than 1/_FAR of the usual value, but in the other unit more than
-1/_NEAR of it."""
+"""A value is suspect if it is below 1/_FAR of the usual value, and above 1/_NEAR of it when read in
+the other unit.
+"""
 
 
 class Doubt(NamedTuple):
-    """A value to look at again.
+    """A suspect value of the configuration.
 
     Attributes:
-        key: of the configuration.
-        found: what is written, one clause.
-        because: what follows from it.
-        fix: what to do.
+        key: key of the configuration.
+        found: the present value, as a clause.
+        because: the consequence of the value.
+        fix: what the user should do.
     """
 
     key: str
@@ -32,12 +33,12 @@ class Doubt(NamedTuple):
     fix: str
 
     def sentence(self) -> str:
-        """For the user."""
+        """The message for the user."""
         return f"{self.found}: {self.because}; {self.fix}"
 
 
 def doubts(config: Config) -> Iterator[Doubt]:
-    """All doubts about a configuration."""
+    """All suspect values of a configuration."""
     yield from _units(config)
     yield from _body_rate(config)
     if config.vehicle.known and config.vehicle.identified is None and config.mock is None:
@@ -51,7 +52,7 @@ def doubts(config: Config) -> Iterator[Doubt]:
 
 
 def _body_rate(config: Config) -> Iterator[Doubt]:
-    """Whether the planner may command rates at which the safety monitor ends the flight."""
+    """Whether the planner may command rates at which a safety monitor ends the flight."""
     limits, allowed = config.limits, config.safety.max_body_rate_deg_s
     commanded = hypot(limits.max_tilt_rate_deg_s, limits.max_yaw_rate_deg_s)
     if allowed <= commanded:
@@ -64,7 +65,7 @@ def _body_rate(config: Config) -> Iterator[Doubt]:
 
 
 def _units(config: Config) -> Iterator[Doubt]:
-    """Values in radians for degrees, in seconds for milliseconds, in parts of 1 for percent."""
+    """Values that are probably radians for degrees, seconds for milliseconds, or shares for %."""
     for key in keys(config):
         if isinstance(key.value, bool) or not isinstance(key.value, int | float) or key.value <= 0:
             continue

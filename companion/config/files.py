@@ -21,7 +21,8 @@ FILES_READ: tuple[tuple[str, ...], ...] = (
     ("link", "signing_key_file"),
     ("mock", "signing", "passphrase_file"),
 )
-"""Keys that name a file to read: relative to the file that names it, as an include is."""
+"""Keys that name a file to read; the path is relative to the file with the key, as for an include.
+"""
 _DEEPEST = 4
 """Largest depth of nested includes."""
 
@@ -44,9 +45,9 @@ def load(path: Path) -> Config:
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
-    """A configuration file and all that it includes, also through others, as far as they are read.
+    """A configuration file and all readable files that it includes, directly or through others.
 
-    The last one may be missing or faulty.
+    The last file of the result may be missing or faulty.
     """
     reading = _Reading(Contents({}, {}))
     with suppress(ConfigError):
@@ -55,7 +56,7 @@ def files_of(path: Path) -> tuple[Path, ...]:
 
 
 def _read(path: Path) -> Contents:
-    """A file, its paths resolved against its own folder."""
+    """Read one file, and resolve its paths against its own folder."""
     contents = yaml_file.read(path, Config)
     for *sections, key in FILES_READ:
         values: Any = contents.keys
@@ -68,7 +69,7 @@ def _read(path: Path) -> Contents:
 
 
 def _unmark_times(merged: Contents) -> None:
-    """Drop `vehicle.identified` where a key of another file replaces one that was identified."""
+    """Drop `vehicle.identified` if another file replaces a key that was identified."""
     mark = merged.places.get(("vehicle", "identified"))
     times = {
         place.file
@@ -86,7 +87,7 @@ class _Reading:
         merged: receives their keys.
 
     Attributes:
-        files: those that were opened.
+        files: files that were opened.
     """
 
     def __init__(self, merged: Contents) -> None:
@@ -97,11 +98,11 @@ class _Reading:
         """Add the files that the last file of `chain` includes, without its own keys.
 
         Args:
-            chain: the including files, outermost first, and the file itself.
-            keys: those of the file.
+            chain: the including files, the outermost first, and at the end the file itself.
+            keys: keys of the file.
 
         Raises:
-            ConfigError: as `load`.
+            ConfigError: see `load`.
         """
         for path in _included(chain[-1], keys):
             self._add((*chain, path))
@@ -151,7 +152,7 @@ def _check_part(included: Path, part: dict[str, Any]) -> None:
 
 
 def _merge(merged: Contents, part: Contents) -> None:
-    """Let a file's keys override earlier ones, and note where each key stands."""
+    """Let the keys of a file override earlier ones, and remember the file of each key."""
     data = merged.keys
     for section, values in part.keys.items():
         data.setdefault(section, {})
@@ -172,7 +173,7 @@ def changed(config: Config, changes: Mapping[str, Mapping[str, Any]], name: str)
     Args:
         config: the configuration to change.
         changes: new values by section and key.
-        name: names the changes in error messages.
+        name: name of the changes in error messages.
 
     Raises:
         ConfigError: the result is not valid.
@@ -184,10 +185,10 @@ def changed(config: Config, changes: Mapping[str, Mapping[str, Any]], name: str)
 
 
 def assigned(texts: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Changes for `changed` from texts such as `limits.max_tilt_deg=20`, their values in YAML.
+    """Parse texts such as `limits.max_tilt_deg=20`, with values in YAML, to changes for `changed`.
 
     Raises:
-        ConfigError: one of them is no such text.
+        ConfigError: a text does not have this form.
     """
     changes: dict[str, dict[str, Any]] = {}
     for text in texts:
@@ -211,10 +212,10 @@ def assigned(texts: Sequence[str]) -> dict[str, dict[str, Any]]:
 
 
 def shipped(name: str) -> Path:
-    """A configuration that ships with the program: in the repository, or where pip put it.
+    """Path of a shipped configuration: in the repository, or where pip installed it.
 
     Raises:
-        ConfigError: it is in neither place.
+        ConfigError: the file is in neither place.
     """
     repository = Path(__file__).parents[2]
     installed = Path(sysconfig.get_path("data"), "share", "mavlink-companion")

@@ -1,4 +1,4 @@
-"""What is flown: the phases of a flight, and one section a maneuver."""
+"""The maneuvers and the phases of a flight: one section for each maneuver."""
 
 from typing import Annotated, Literal
 
@@ -75,7 +75,7 @@ class CornersConfig(Section):
     """East coefficient of each corner. North 0.4 and east 0.5 give the steps of the paper's
     figure 2."""
     duration_s: Annotated[float, Field(ge=0.3, le=3.0)] = 1.2
-    """Duration of each corner."""
+    """Duration of each corner step."""
     settle_s: Annotated[float, Field(ge=0.5, le=60.0)] = 3.0
     """Position hold at the end."""
 
@@ -101,7 +101,9 @@ class IdentifyConfig(Section):
     yaw_rate_deg_s: Annotated[float, Field(ge=15.0, le=180.0)] = 50.0
     """Yaw rate of the larger doublet; the smaller one has half the rate."""
     yaw_duration_s: Annotated[float, Field(ge=0.2, le=3.0)] = 1.2
-    """Duration of the first part of a yaw doublet. Yaw responds more slowly than roll and pitch."""
+    """Duration of the first part of a yaw doublet, longer than for roll and pitch because yaw is
+    slower.
+    """
     climb_m_s2: Annotated[float, Field(ge=0.5, le=4.0)] = 2.0
     """Vertical acceleration of the doublets that measure the thrust."""
     climb_duration_s: Annotated[float, Field(ge=0.1, le=1.0)] = 0.25

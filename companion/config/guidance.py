@@ -1,4 +1,4 @@
-"""The attitude law, and the guidance above it."""
+"""The sections of the attitude law and of guidance."""
 
 from typing import Annotated
 
@@ -17,27 +17,29 @@ GUIDANCE_NAMES = (LINEAR, "nmpc")
 
 
 def _require_known(what: str, name: str, own: tuple[str, ...], group: str) -> None:
-    """Raise `ValueError` unless the name is one of ours or of an installed plug-in."""
+    """Raise `ValueError` unless the name is ours or that of an installed plug-in."""
     if name not in own and name not in (installed := plugins.names(group)):
         raise ValueError(f"unknown {what} {name!r}; known: {', '.join((*own, *installed))}")
 
 
 class PlannerConfig(Section):
-    """The attitude law."""
+    """The attitude law (planner) and its gains."""
 
     name: Annotated[
         str, Field(max_length=50, json_schema_extra={"enum": [AUTO, *PLANNER_NAMES]})
     ] = AUTO
     """auto: model-following if `vehicle` gives the response of the rate loop, else first-order.
     first-order: Algorithm 1 of Xu & Pei (Sensors 2026, 26(9), 2727). exact: the same without its
-    discretisation error. model-following: stays linear behind the vehicle's own rate loop,
-    needs `vehicle`. quaternion, so3, euler: the paper's comparison laws. Or a planner of another
-    package, by the name of its entry point in `companion.planners`."""
+    discretisation error. model-following: stays linear behind the vehicle's own rate loop, needs
+    `vehicle`. quaternion, so3, euler: the paper's comparison laws. A planner of another package
+    is named by its entry point in `companion.planners`.
+    """
     gain_per_s: Annotated[float, Field(gt=0.0, le=20.0, json_schema_extra=ANY)] = 5.0
-    """p: the acceleration approaches its target with time constant 1/p."""
+    """Gain p: the acceleration approaches its target with the time constant 1/p."""
     yaw_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0, json_schema_extra=ANY)] = 2.0
-    """Heading approaches its target with the time constant 1/yaw_gain; quaternion, so3 and euler
-    use gain_per_s for it."""
+    """Gain of the heading: it approaches its target with the time constant 1/yaw_gain. quaternion,
+    so3 and euler use gain_per_s instead.
+    """
 
     @model_validator(mode="after")
     def _known_name(self) -> "PlannerConfig":
@@ -51,34 +53,40 @@ class GuidanceConfig(Section):
     kind: Annotated[str, Field(max_length=50, json_schema_extra={"enum": list(GUIDANCE_NAMES)})] = (
         LINEAR
     )
-    """linear, or nmpc: nonlinear model predictive control follows trajectories, in a process of
-    its own (extra `nmpc`); linear guidance flies the rest, and wherever its answer is missing. Or
-    guidance of another package, by the name of its entry point in `companion.guidance`."""
+    """linear: linear guidance. nmpc: nonlinear model predictive control follows trajectories, in
+    its own process (extra `nmpc`); linear guidance flies everything else, and takes over when
+    the solver gives no answer. Guidance of another package is named by its entry point in
+    `companion.guidance`.
+    """
     rate_hz: Annotated[float, Field(ge=10.0, le=100.0)] = 50.0
     """Rate at which guidance computes a new target."""
     position_weight_per_s4: Annotated[float, Field(ge=0.01, le=10000.0)] | None = Field(
         default=None, json_schema_extra=ANY
     )
-    """Weight of the horizontal position error against the acceleration spent on it; a larger one
-    makes a stiffer hold. The gains follow from it (LQR). null: k/T⁴. k = 2 where dead time + lag/2
-    + s/2 is at most 65 ms, 1 from 80 ms on or where unknown, between them in between. s is the time
-    in which the rate loop slews to limits.max_tilt_rate_deg_s; 0 without a known slew limit.
-    T is the delay of the attitude behind its target plus half a guidance period. That delay
-    follows from planner.gain_per_s and `vehicle`; an unknown rate loop counts as 0.12 s."""
+    """LQR weight of the horizontal position error relative to acceleration; a larger weight makes a
+    stiffer position hold. null: k/T⁴. k is 2 if dead time + lag/2 + s/2 is at most 65 ms, 1 if
+    it is at least 80 ms or unknown, and interpolated between them. s is the time the rate loop
+    needs to slew to limits.max_tilt_rate_deg_s; 0 without a known slew limit. T is the delay of
+    the attitude behind its target plus half a guidance period. That delay follows from
+    planner.gain_per_s and `vehicle`; an unknown rate loop counts as 0.12 s.
+    """
     velocity_weight_per_s2: Annotated[float, Field(ge=0.0, le=10000.0)] | None = Field(
         default=None, json_schema_extra=ANY
     )
-    """Weight of the horizontal velocity error; a larger one makes a calmer hold. null: 1/T²."""
+    """LQR weight of the horizontal velocity error; a larger weight damps the position hold more.
+    null: 1/T².
+    """
     disturbance_bandwidth_rad_s: Annotated[float, Field(gt=0.0, le=30.0)] | None = Field(
         default=None, json_schema_extra=ANY
     )
     """Bandwidth of the wind observer, which compares the vehicle's motion with its tilt.
-    null: 1.5/T; with a quick rate loop and smooth positions up to 2.4/T."""
+    null: 1.5/T; in motion, with a quick rate loop and smooth positions, up to 2.4/T."""
     position_lateness_ms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
-    """Delay of the autopilot's position beyond what its estimator assumes, for example a GPS delay
-    that is set wrong. Measure it against an independent position."""
+    """Delay of the autopilot's position beyond what its estimator assumes, for example because of a
+    wrong GPS delay parameter. Measure it against an independent position.
+    """
     max_disturbance_m_s2: Annotated[float, Field(ge=0.0, le=20.0, json_schema_extra=ANY)] = 6.0
-    """Largest acceleration by wind that the observer estimates."""
+    """Largest acceleration by wind that the observer may estimate."""
     lead: bool = True
     """Lead the targets by the known attitude response, so that the vehicle does not lag."""
     height_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0, json_schema_extra=ANY)] = 1.5
@@ -86,11 +94,13 @@ class GuidanceConfig(Section):
     climb_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0, json_schema_extra=ANY)] = 3.5
     """Vertical acceleration commanded per m/s of vertical speed error."""
     drag_per_s: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
-    """Linear drag per mass, for feedforward. null: unknown. The flight estimates it, and the
-    vehicle's next flight begins with the estimate."""
+    """Linear drag per mass, for feedforward. null: unknown. A flight estimates it, and the next
+    flight of the vehicle begins with this estimate.
+    """
     quadratic_drag_per_m: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
-    """Quadratic drag per mass, used with drag_per_s: the drag decelerates the vehicle by
-    (drag_per_s + quadratic_drag_per_m·speed)·speed."""
+    """Quadratic drag per mass, used together with drag_per_s. The deceleration is (drag_per_s +
+    quadratic_drag_per_m·speed)·speed.
+    """
 
     position_lateness = Si("position_lateness_ms")
 

@@ -1,4 +1,4 @@
-"""Which keys may change in flight: each says so itself, by a marker in its section."""
+"""The keys that may change in flight; each one is marked in its section."""
 
 from collections.abc import Iterator, Mapping
 from functools import cache
@@ -13,17 +13,17 @@ from companion.config.root import Config
 from companion.files.yaml_file import ConfigError
 
 Values = Mapping[str, Mapping[str, Any]]
-"""New values by section and key, as in a configuration file."""
+"""New values by section and key, like a configuration file."""
 
 
 class Difference(NamedTuple):
     """A key with two values.
 
     Attributes:
-        section: of the key.
-        key: its name.
-        before: its value before.
-        after: its value after.
+        section: section of the key.
+        key: name of the key.
+        before: old value.
+        after: new value.
     """
 
     section: str
@@ -33,7 +33,7 @@ class Difference(NamedTuple):
 
     @property
     def name(self) -> str:
-        """The key with its section."""
+        """Section and key, joined by a dot."""
         return f"{self.section}.{self.key}".rstrip(".")
 
     def __str__(self) -> str:
@@ -47,7 +47,7 @@ def shown(value: Any) -> str:
 
 @cache
 def changeable() -> dict[tuple[str, str], str]:
-    """The keys that may change in flight, by section and key → how far, in words."""
+    """The keys that may change in flight: section -> key -> permitted change, in words."""
     return {
         (section, key): str(extra[IN_FLIGHT])
         for section, model in sections().items()
@@ -57,7 +57,7 @@ def changeable() -> dict[tuple[str, str], str]:
 
 
 def differences(before: Config, after: Config) -> Iterator[Difference]:
-    """The keys with different values; a section without keys of its own counts as one key."""
+    """The keys with different values; a section without keys counts as one key."""
     for section in Config.model_fields:
         old, new = getattr(before, section), getattr(after, section)
         if not (isinstance(old, BaseModel) and isinstance(new, BaseModel)):
@@ -70,13 +70,13 @@ def differences(before: Config, after: Config) -> Iterator[Difference]:
 
 
 def changed_in_flight(start: Config, now: Config, values: Values, name: str) -> Config:
-    """The configuration `now` with new values.
+    """Apply new values to the configuration `now`.
 
     Args:
         start: the configuration with which the flight began.
         now: the present one.
         values: the new values.
-        name: names the change in error messages.
+        name: name of the change in error messages.
 
     Raises:
         ConfigError: a key must not change in flight, or the result is not valid.

@@ -1,19 +1,75 @@
-"""The drag known before a flight: from the configuration, or learned in the last flight.
+"""The drag known before a flight: from the configuration, or learned in an earlier flight.
 
-Until the vehicle identifies itself, it is assumed to be the one that flew last.
+The maneuvers are checked twice. Before the vehicle identifies itself, it is assumed to be the one
+that flew last (`before_connecting`). Then they are checked with its own drag (`of_vehicle`).
 """
 
 from pathlib import Path
+from typing import NamedTuple
 
 from companion.config import Config
 from companion.drag import NO_DRAG, Drag
 from companion.guidance.drag_estimate import ANY_VEHICLE, DragPrior
-from companion.recording.learned_file import newest
+from companion.recording.learned_file import LearnedFile, newest
 
 _LINEAR, _QUADRATIC = 0.2, 0.02
 """Standard deviations of a configured or learned drag, 1/s and 1/m; the flight corrects it."""
 _MOST = Drag(ANY_VEHICLE.drag.linear + ANY_VEHICLE.linear_deviation)
 """Drag that few vehicles exceed."""
+
+
+class KnownDrag(NamedTuple):
+    """Knowledge of a vehicle's drag before its flight.
+
+    Attributes:
+        drag: configured or learned drag; None: unknown.
+        source: the file of a learned drag.
+    """
+
+    drag: Drag | None = None
+    source: Path | None = None
+
+    @property
+    def least(self) -> Drag:
+        """A drag that certainly brakes the vehicle; zero if it is unknown."""
+        return self.drag or NO_DRAG
+
+    @property
+    def most(self) -> Drag:
+        """The drag that thrust must be able to overcome; a large one if it is unknown."""
+        return self.drag or _MOST
+
+    @property
+    def assumption(self) -> str:
+        """The assumption about an unconfigured drag, as the end of a sentence; else empty."""
+        if self.drag is None:
+            return f" (the drag is not known: assumed up to {_MOST.linear:g} 1/s)"
+        if self.source is not None:
+            return f" (with the drag that an earlier flight learned: {self.source})"
+        return ""
+
+
+def before_connecting(config: Config) -> KnownDrag:
+    """The configured drag, or the one of the vehicle that flew last."""
+    if config.guidance.drag is not None:
+        return KnownDrag(config.guidance.drag)
+    kept = newest(config.recording.directory)
+    return KnownDrag() if kept is None else KnownDrag(kept.drag, kept.path)
+
+
+def of_vehicle(config: Config, uid: str | None) -> KnownDrag:
+    """The configured drag, or the one that this vehicle learned.
+
+    Args:
+        config: configuration of the flight.
+        uid: hardware id (AUTOPILOT_VERSION); None: no id, so no learned drag.
+    """
+    if config.guidance.drag is not None:
+        return KnownDrag(config.guidance.drag)
+    if uid is None:
+        return KnownDrag()
+    kept, _trouble = LearnedFile(config.recording.directory, uid).load()
+    return KnownDrag() if kept is None else KnownDrag(kept.drag, kept.path)
 
 
 def prior_of(drag: Drag) -> DragPrior:
@@ -25,31 +81,3 @@ def drag_prior(config: Config) -> DragPrior:
     """The prior with which the drag estimate begins."""
     told = config.guidance.drag
     return ANY_VEHICLE if told is None else prior_of(told)
-
-
-def least_drag(config: Config) -> Drag:
-    """The drag that is known to brake the vehicle; none if it is unknown."""
-    return _known(config)[0] or NO_DRAG
-
-
-def most_drag(config: Config) -> Drag:
-    """The drag that thrust must be able to overcome; a large one if it is unknown."""
-    return _known(config)[0] or _MOST
-
-
-def assumption(config: Config) -> str:
-    """What is assumed of an unconfigured drag, as the end of a sentence; empty if configured."""
-    drag, source = _known(config)
-    if drag is None:
-        return f" (the drag is not known: assumed up to {_MOST.linear:g} 1/s)"
-    if source is not None:
-        return f" (with the drag that an earlier flight learned: {source})"
-    return ""
-
-
-def _known(config: Config) -> tuple[Drag | None, Path | None]:
-    """The configured or learned drag, and the file of a learned one."""
-    if config.guidance.drag is not None:
-        return config.guidance.drag, None
-    kept = newest(config.recording.directory)
-    return (None, None) if kept is None else (kept.drag, kept.path)

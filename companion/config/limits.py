@@ -1,4 +1,4 @@
-"""Limits of what is asked of the vehicle, and of how old data may be."""
+"""Limits of commands, and of the age of data."""
 
 from typing import Annotated, Literal
 
@@ -19,14 +19,15 @@ class LimitsConfig(Section):
     max_tilt_rate_deg_s: Annotated[float, Field(ge=1.0, le=1000.0, json_schema_extra=LOWERED)] = (
         90.0
     )
-    """Largest combined roll and pitch rate: √(roll² + pitch²)."""
+    """Largest total roll and pitch rate: √(roll² + pitch²)."""
     max_yaw_rate_deg_s: Annotated[float, Field(ge=1.0, le=1000.0, json_schema_extra=LOWERED)] = 60.0
     """Largest yaw rate."""
     rate_limit: Literal["tight", "paper"] = "tight"
     """tight: limit only where the rate would be exceeded. paper: equation 33, slower."""
     recovery_angle_deg: Annotated[float, Field(gt=0.0, le=80.0)] = 75.0
-    """Beyond this tilt the planner first rotates the thrust axis upright, the shortest way (not
-    quaternion, so3 and euler)."""
+    """Beyond this tilt the planner first rotates the vehicle towards level by the shortest way.
+    quaternion, so3 and euler do not.
+    """
     min_thrust: Share = 0.1
     """Smallest normalised thrust commanded in flight."""
     max_thrust: Share = 0.9
@@ -36,13 +37,15 @@ class LimitsConfig(Section):
     max_descent_m_s: Annotated[float, Field(ge=0.1, le=10.0, json_schema_extra=ANY)] = 1.0
     """Largest descent rate that height hold commands."""
     fence_radius_m: Annotated[float, Field(ge=0.1, le=2000.0)] = 50.0
-    """Fence: largest distance from where control began. Beyond it the vehicle lands."""
+    """Fence: largest horizontal distance from the place where control began. Beyond it the vehicle
+    lands.
+    """
     fence_ceiling_m: Annotated[float, Field(ge=0.1, le=1000.0)] = 30.0
-    """Fence: largest height above where control began."""
+    """Fence: largest height above the place where control began."""
     fence_floor_m: Annotated[float, Field(gt=0.0, le=100.0)] = 1.0
     """Fence: smallest height above home. Below it the vehicle lands."""
     min_battery_percent: Annotated[float, Field(ge=0.0, le=100.0)] = 20.0
-    """Below this battery charge the program does not arm, and lands in flight."""
+    """Smallest battery charge. Below it the program does not arm, and lands in flight."""
 
     max_tilt = Si("max_tilt_deg")
     max_tilt_rate = Si("max_tilt_rate_deg_s")
@@ -60,22 +63,26 @@ class LimitsConfig(Section):
 
 
 class DeadmanConfig(Section):
-    """How old data may be. A setpoint leaves only in answer to fresh data."""
+    """Largest age of data. A setpoint leaves only in answer to fresh data."""
 
     telemetry_stale_ms: Annotated[float, Field(ge=10.0, le=500.0)] = 100.0
-    """Largest age of an attitude sample that is answered. Without TIMESYNC the age counts from the
-    quickest sample."""
+    """Largest age of an attitude sample that is answered. Without TIMESYNC the age is relative to
+    the sample with the shortest delay.
+    """
     target_stale_ms: Annotated[float, Field(ge=20.0, le=500.0)] = 150.0
-    """Largest age of the guidance target. With an older one no sample is answered."""
+    """Largest age of the guidance target. With an older target no sample is answered."""
     position_stale_ms: Annotated[float, Field(ge=50.0, le=1000.0)] = 300.0
-    """Largest age of the position, by its arrival and by its time stamp. With an older one guidance
-    stops, and so do the setpoints."""
+    """Largest age of the position, by its arrival and by its time stamp. With an older position,
+    guidance and setpoints stop.
+    """
     silence_limit_ms: Annotated[float, Field(ge=50.0, le=1000.0)] = 500.0
-    """After this long without a setpoint the program hands back. Keep it below the autopilot's own
-    limit (PX4: COM_OF_LOSS_T, 1 s; ArduPilot: GUID_TIMEOUT, 3 s)."""
+    """After this time without a setpoint the program hands back. Keep it below the autopilot's own
+    limit (PX4: COM_OF_LOSS_T, 1 s; ArduPilot: GUID_TIMEOUT, 3 s).
+    """
     deadline_ms: Annotated[float, Field(gt=0.0, le=100.0)] = 4.0
-    """Longest time from the arrival of a sample to its setpoint (over TCP and serial: from reading
-    it). A later setpoint counts as a missed deadline."""
+    """Longest time from the arrival of a sample to its setpoint. Over TCP and serial it counts from
+    reading the sample. A later setpoint counts as a missed deadline.
+    """
 
     telemetry_stale = Si("telemetry_stale_ms")
     target_stale = Si("target_stale_ms")

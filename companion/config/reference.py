@@ -1,6 +1,6 @@
 """The reference of the configuration: every key with its default, unit, range and meaning.
 
-All of it comes from the sections themselves, so a key is described in one place.
+All text comes from the sections themselves, so that a key is described in one place.
 """
 
 import textwrap
@@ -31,7 +31,7 @@ _UNITS = {
     "_m": "m",
     "_s": "s",
 }
-"""By the end of a key; the first that fits counts."""
+"""Unit by suffix of the key; the first suffix that fits is used."""
 _BOUNDS = (
     ("minimum", "at least {:g}"),
     ("exclusiveMinimum", "more than {:g}"),
@@ -64,7 +64,7 @@ class Key(NamedTuple):
 
 
 def sections() -> dict[str, type[BaseModel]]:
-    """The sections of the file, in its order."""
+    """The sections of the file, in the file's order."""
     kinds = {name: field.annotation for name, field in Config.model_fields.items()}
     return {
         name: kind
@@ -104,7 +104,7 @@ def differences(config: Config) -> Iterator[Key]:
 
 
 def as_yaml(described: Iterable[Key]) -> str:
-    """Keys as commented YAML, which a configuration may consist of."""
+    """Keys as commented YAML that is a valid configuration."""
     models, lines, section = sections(), list[str](), ""
     for key in described:
         if key.section != section:
@@ -120,7 +120,7 @@ def as_yaml(described: Iterable[Key]) -> str:
 
 
 def as_markdown(described: Iterable[Key]) -> str:
-    """Keys as tables, one a section."""
+    """Keys as Markdown tables, one for each section."""
     models, lines, section = sections(), list[str](), ""
     for key in described:
         if key.section != section:

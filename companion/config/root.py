@@ -1,6 +1,6 @@
 """The typed configuration: all sections, and the rules between them.
 
-The defaults fly the bundled vehicle.
+The defaults are right for the bundled vehicle.
 """
 
 from collections.abc import Mapping
@@ -29,17 +29,17 @@ from companion.guidance.thrust import FOR_TILT, ThrustCurve, largest_tilt
 
 FileName = Annotated[str, Field(max_length=1000)]
 MOST_INCLUDED = 32
-"""Largest number of included files, nested ones counted."""
+"""Largest number of included files, including nested ones."""
 
 FORMER_KEYS = {
     "flight.programme": "is now called `flight.maneuvers`",
     "nmpc": "was removed with the acados solver: delete this section; guidance.kind: nmpc needs"
     " no key of its own, only the extra `nmpc`",
 }
-"""Keys that were renamed or removed → what to do instead; see `Section.former_keys`."""
+"""Keys that were renamed or removed, with what to do instead; see `Section.former_keys`."""
 
 _TILT_SHARE = 0.75
-"""Share of max_tilt_deg that a doublet may use; the rest is for wind and overshoot."""
+"""Share of max_tilt_deg that a doublet may use; wind and overshoot need the rest."""
 
 
 class Config(Section):
@@ -65,7 +65,7 @@ class Config(Section):
     recording: RecordingConfig = RecordingConfig()
     serve: ServeConfig = ServeConfig()
     mock: dict[str, Any] | None = None
-    """Section of the mock vehicle, read by `python -m sitl_mock`."""
+    """Section for the mock vehicle; `python -m sitl_mock` reads it."""
     include: FileName | Annotated[tuple[FileName, ...], Field(max_length=MOST_INCLUDED)] = Field(
         default=(), exclude=True
     )
@@ -74,7 +74,7 @@ class Config(Section):
 
     @property
     def planner_name(self) -> str:
-        """Name of the planner that flies; `auto` is resolved."""
+        """Name of the planner that flies, with `auto` resolved."""
         if self.planner.name != AUTO:
             return self.planner.name
         return MODEL_FOLLOWING if self.vehicle.known else FIRST_ORDER
@@ -88,7 +88,7 @@ class Config(Section):
 
 
 def _contradictions(config: Config) -> list[tuple[bool, str]]:
-    """Rules between sections: (whether it is broken, message)."""
+    """Rules between sections: pairs of (rule is broken, message)."""
     limits, thrust, flown = config.limits, config.thrust, config.flight.maneuvers
     tilt = limits.max_tilt
     return [
@@ -121,7 +121,7 @@ def _contradictions(config: Config) -> list[tuple[bool, str]]:
 
 
 def _thrust_contradictions(config: Config) -> list[tuple[bool, str]]:
-    """As `_contradictions`: whether the thrust can hold the height at the largest tilt."""
+    """Like `_contradictions`: whether thrust can hold the height at the largest tilt."""
     limits, thrust = config.limits, config.thrust
     curve = ThrustCurve(thrust.curve_factor)
     hover = curve.share(thrust.hover_thrust)
@@ -143,7 +143,7 @@ def _thrust_contradictions(config: Config) -> list[tuple[bool, str]]:
 
 
 def _identify_contradictions(config: Config) -> list[tuple[bool, str]]:
-    """As `_contradictions`, for the maneuver `identify`."""
+    """Like `_contradictions`, for the maneuver `identify`."""
     limits, identify = config.limits, config.identify
     return [
         (

@@ -1,8 +1,8 @@
-"""The safety ladder's section of the configuration: limits, and what each breach leads to.
+"""The safety section of the configuration: limits, and the action on each breach.
 
-Some actions cannot be changed and are not here: the deadman's, and the end of a flight when
-somebody else has the vehicle (pilot, failsafe) or it is disarmed. The action of a breach that means
-that our control cannot be trusted cannot be `warn`.
+Two actions are fixed and have no key: on stale setpoints (deadman), and when a pilot or a failsafe
+has the vehicle or it is disarmed. If a breach means that our control cannot be trusted, its action
+cannot be `warn`.
 """
 
 from typing import Annotated, Literal
@@ -14,19 +14,19 @@ from companion.files.yaml_file import Section
 from companion.guidance.fence import inside
 
 Ending = Literal["hand_back", "land"]
-"""hand_back: the autopilot holds, and the program leaves it so. land: it lands."""
+"""hand_back: the autopilot holds, and the program leaves it there. land: the autopilot lands."""
 Any = Literal["warn", "hold", "hand_back", "land"]
-"""warn: report it. hold: end the maneuver and hold in offboard. Or as `Ending`."""
+"""warn: report the breach. hold: end the maneuver and hold in offboard. Or an `Ending`."""
 Metres = Annotated[float, Field(ge=-2000.0, le=2000.0)]
 Latitude = Annotated[float, Field(ge=-85.0, le=85.0)]
 Longitude = Annotated[float, Field(ge=-180.0, le=180.0)]
 MonitoredShare = Annotated[float, Field(ge=0.0, le=0.9)]
-"""Below 1: a share of everything would never be exceeded."""
+"""A share below 1; a share of 1 could never be exceeded."""
 MOST_CORNERS = 200
 
 
 class SafetyConfig(Section):
-    """Limits of the safety monitors, beside `limits` and `deadman`, and the action of each."""
+    """Limits of the other safety monitors (see `limits`, `deadman`), and all monitors' actions."""
 
     hold_s: Annotated[float, Field(gt=0.0, le=60.0)] = 3.0
     """If a hold does not clear its cause within this time, the vehicle lands."""
@@ -51,42 +51,45 @@ class SafetyConfig(Section):
     position_action: Ending = "land"
     """Action if GPS is lost, or the estimator reports no attitude, velocity or position for 5 s."""
     max_reset_m: Annotated[float, Field(ge=0.01, le=20.0)] = 1.0
-    """Largest sum of position jumps of the estimator in a flight. References move along."""
+    """Largest sum of the estimator's position jumps in a flight. References move with each jump."""
     max_reset_deg: Annotated[float, Field(gt=0.0, le=120.0)] = 45.0
-    """Largest sum of heading jumps; half of it for the thrust axis."""
+    """Largest sum of the estimator's heading jumps in a flight; half of it for jumps of the thrust
+    axis.
+    """
     max_resets: Annotated[int, Field(ge=0, le=30)] = 3
     """Largest number of estimator resets within 30 s."""
     reset_action: Ending = "land"
-    """Action on more or larger resets."""
+    """Action if the estimator resets more often or by more."""
     tilt_margin_deg: Annotated[float, Field(ge=1.0, le=60.0)] = 20.0
     """Tilt beyond limits.max_tilt_deg that is tolerated for a moment."""
     max_body_rate_deg_s: Annotated[float, Field(ge=10.0, le=1800.0)] = 400.0
     """Largest body rate; a faster rotation counts as loss of control."""
     envelope_action: Ending = "hand_back"
-    """Action beyond that tilt or that body rate."""
+    """Action if tilt or body rate exceeds its limit."""
     max_speed_m_s: Annotated[float, Field(ge=0.1, le=60.0)] = 15.0
     """Largest speed in any direction."""
     speed_action: Any = "hold"
-    """Action if it is faster for 0.3 s."""
+    """Action if the vehicle is faster for 0.3 s."""
     max_tracking_error_m: Annotated[float, Field(ge=0.05, le=100.0)] = 5.0
-    """Largest distance from the reference. After open-loop steps it counts once the vehicle is
-    back."""
+    """Largest distance from the reference. After open-loop steps the monitor waits until the
+    vehicle has returned.
+    """
     tracking_action: Any = "hold"
-    """Action if it is farther for 1 s."""
+    """Action if the distance is larger for 1 s."""
     thrust_action: Any = "hold"
     """Action if thrust stays at limits.min_thrust or limits.max_thrust for 2 s."""
     max_loss: MonitoredShare = 0.4
     """Largest share of lost frames over a second."""
     max_round_trip_ms: Annotated[float, Field(ge=1.0, le=2000.0)] = 150.0
-    """Longest round trip of the link."""
+    """Largest round-trip time of the link."""
     link_action: Any = "warn"
-    """Action if more frames are lost for 2 s, or the round trip is longer for 5 s."""
+    """Action if the loss is larger for 2 s, or the round trip for 5 s."""
     max_missed: MonitoredShare = 0.25
     """Largest share of setpoints that miss deadman.deadline_ms, over a second."""
     max_starved: MonitoredShare = 0.5
-    """CPU starvation: largest share of a second by which our own timer may be late."""
+    """CPU starvation: largest share of a second by which our timer may be late."""
     computer_action: Any = "hand_back"
-    """Action if either is exceeded for 1.5 s."""
+    """Action if max_missed or max_starved is exceeded for 1.5 s."""
 
     max_reset_angle = Si("max_reset_deg")
     tilt_margin = Si("tilt_margin_deg")

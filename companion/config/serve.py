@@ -1,4 +1,4 @@
-"""Other programs on our link: where they connect, and what they may do."""
+"""Other programs on our link: their endpoints and permissions."""
 
 from typing import Annotated
 
@@ -18,22 +18,26 @@ class ServeConfig(Section):
         "udpout://127.0.0.1:14550",
         "udpin://127.0.0.1:14551",
     )
-    """Where clients connect, in the notation of link.endpoint. udpin and tcpin take any number of
-    clients. The defaults reach a ground station on this computer, and take programs at 14551."""
+    """Endpoints for clients, in the notation of link.endpoint. udpin and tcpin take any number of
+    clients. The defaults send to a ground station on this computer, and accept programs at port
+    14551.
+    """
     trusted: Annotated[tuple[_Name, ...], Field(max_length=100)] = ()
     """IP addresses and serial devices that may command without signing. Clients on this computer
-    always may; all others only read."""
+    always may; all others can only read.
+    """
     control: StrictBool = True
     """Fly the setpoints of clients (extra `serve`). false: pass them on as everything else."""
     setpoint_timeout_ms: Annotated[float, Field(ge=100.0, le=2000.0)] = 500.0
-    """A client whose newest setpoint is older has stopped: the vehicle is held."""
+    """Longest time between setpoints of a client. After it the vehicle is held."""
     hold_s: Annotated[float, Field(ge=0.0, le=600.0)] = 5.0
-    """How long the vehicle is held for a client that has stopped, before it is handed back."""
+    """Time for which the vehicle is held after a client's setpoints stop, before it is handed back.
+    """
     max_speed_m_s: Annotated[float, Field(ge=0.1, le=30.0)] = 5.0
     """Largest horizontal speed towards a commanded position. Commanded velocities may be larger."""
     max_acceleration_m_s2: Annotated[float, Field(ge=0.1, le=15.0)] = 3.0
     """Largest horizontal acceleration after a jump of the commanded position or velocity."""
     max_jerk_m_s3: Annotated[float, Field(ge=1.0, le=100.0)] = 8.0
-    """Largest jerk of the same motion: how fast the vehicle tilts is this divided by gravity."""
+    """Largest jerk of the same motion. Divided by gravity it is the tilt rate in rad/s."""
 
     setpoint_timeout = Si("setpoint_timeout_ms")

@@ -31,7 +31,7 @@ _COLUMNS_TOLD = 10
 
 
 class _Shape(Protocol):
-    """A section that describes a trajectory; files that it names are relative to `folder`."""
+    """A section that describes a trajectory; paths in it are relative to `folder`."""
 
     def trajectory(self, folder: Path) -> Trajectory: ...
 
@@ -45,21 +45,24 @@ class CsvShape(Section):
     file: Path
     """The CSV file, relative to this one."""
     frame: Literal["enu", "nwu", "ned"] | None = None
-    """In which it is given. enu: x east, y north, z up (ROS). nwu: x north, y west, z up. ned: x
-    north, y east, z down. null: as a comment before the table's header says (`# frame: ned`), else
-    enu. The trajectory begins where the vehicle is, wherever the file does."""
+    """Frame of the table. enu: x east, y north, z up (ROS). nwu: x north, y west, z up. ned: x
+    north, y east, z down. null: the frame that a comment before the header names
+    (`# frame: ned`), else enu. The trajectory begins at the vehicle, wherever the file begins.
+    """
     heading: Literal["file", "fixed", "along"] = "file"
-    """file: its yaw or quaternion, if it has one. fixed: as at the start. along: along the path."""
+    """file: the table's yaw or quaternion, if it has one. fixed: the heading at the start. along:
+    along the path.
+    """
     cutoff_hz: Annotated[float, Field(ge=0.5, le=50.0)] = 5.0
-    """What is quicker is taken for noise or rounding, and smoothed."""
+    """Cutoff of the smoothing filter; faster changes are taken as noise or rounding."""
     acceleration_m_s2: Acceleration = 3.0
-    """With which speed is gathered or lost where the file begins or ends in motion."""
+    """Acceleration from and to rest where the table begins or ends in motion."""
 
     def read(self, folder: Path) -> "LoadedTrajectory":
-        """What it describes, and how the table was understood.
+        """The trajectory of this section, with notes on how a table was read.
 
         Raises:
-            TrajectoryError: no such trajectory can be made; the message names the file.
+            TrajectoryError: the trajectory cannot be made; the message names the file.
         """
         path = folder / self.file
         table = read_csv(path)
@@ -74,7 +77,7 @@ class CsvShape(Section):
         return LoadedTrajectory(trajectory, _understood(path, frame, table.unused))
 
     def _frame(self, named: str | None, path: Path) -> Frame | None:
-        """The frame that this file or the table says; None if neither does."""
+        """The frame that this file or the table names; None if neither does."""
         if named is not None and named not in {frame.value for frame in Frame}:
             known = ", ".join(frame.value for frame in Frame)
             raise TrajectoryError(f"{path}: its frame {named!r:.40} is not one of {known}")
@@ -91,8 +94,8 @@ class LoadedTrajectory(NamedTuple):
     """A trajectory from a file.
 
     Attributes:
-        trajectory: to be flown.
-        notes: how a table was understood, a sentence each.
+        trajectory: trajectory to be flown.
+        notes: how a table was read; one sentence each.
     """
 
     trajectory: Trajectory
@@ -107,7 +110,7 @@ _AXES = {
 
 
 def _understood(path: Path, frame: Frame | None, unused: tuple[str, ...]) -> tuple[str, ...]:
-    """The frame of a table, said plainly where it is only assumed, and the columns not read."""
+    """The frame of a table, with a remark if it is assumed, and the columns that are not read."""
     axes = f"{path.name} is read in s, m and rad with {_AXES[frame or Frame.ENU]}"
     if frame is None:
         axes += (
@@ -119,7 +122,7 @@ def _understood(path: Path, frame: Frame | None, unused: tuple[str, ...]) -> tup
 
 
 class TrajectoryFile(Section):
-    """One trajectory; the top level of the YAML file. Exactly one of the shapes."""
+    """A trajectory file (top level of the YAML). It must contain exactly one of the shapes."""
 
     hover: HoverShape | None = None
     line: LineShape | None = None
@@ -137,10 +140,10 @@ class TrajectoryFile(Section):
         return self
 
     def read(self, folder: Path) -> LoadedTrajectory:
-        """What it describes; files that it names are relative to `folder`.
+        """The trajectory of the file; paths in it are relative to `folder`.
 
         Raises:
-            TrajectoryError: no such trajectory can be made.
+            TrajectoryError: the trajectory cannot be made.
         """
         if self.csv is not None:
             return self.csv.read(folder)
@@ -155,20 +158,20 @@ def is_table(path: Path) -> bool:
 
 
 def load(path: Path) -> Trajectory:
-    """The trajectory of `read`.
+    """Load the trajectory of a file; see `read`.
 
     Raises:
-        ConfigError: as `read`.
+        ConfigError: see `read`.
     """
     return read(path).trajectory
 
 
 def read(path: Path) -> LoadedTrajectory:
-    """Read a trajectory: a YAML file of one shape, or a CSV file with the defaults of `csv`.
+    """Read a trajectory: a YAML file with one shape, or a CSV file with default settings.
 
     Raises:
-        ConfigError: it cannot be read, holds an unknown key or a bad value, or describes what
-            cannot be made.
+        ConfigError: the file cannot be read, holds an unknown key or a bad value, or describes an
+            impossible trajectory.
     """
     try:
         with computable():

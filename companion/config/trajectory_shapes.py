@@ -1,4 +1,4 @@
-"""The trajectories of known form, as sections of a YAML file."""
+"""The built-in trajectory shapes, as sections of a YAML file."""
 
 from math import radians
 from pathlib import Path
@@ -63,12 +63,13 @@ class LineShape(Section):
 
 
 class _Rounds(Section):
-    """Keys of all shapes that are flown in laps."""
+    """Keys of all shapes with laps."""
 
     laps: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
     """Number of laps, acceleration and braking included."""
     acceleration_m_s2: Acceleration = 3.0
-    """Largest acceleration and braking along the path; exceeded if the laps are too few for it."""
+    """Largest acceleration and braking along the path; exceeded if the laps are too short for it.
+    """
     direction_deg: Degrees = 0.0
     """Direction from the start in which the figure lies, clockwise from north."""
     heading: FixedOrAlong = "fixed"
@@ -84,7 +85,7 @@ class CircleShape(_Rounds):
     """A circle, anticlockwise from above; it begins and ends where the vehicle is."""
 
     radius_m: Metres
-    """Radius; the centre lies from the start in the direction direction_deg."""
+    """Radius; the centre lies in direction_deg from the start."""
     speed_m_s: Speed
     """Speed along the path after acceleration."""
 
@@ -110,7 +111,7 @@ class FigureEightShape(_Rounds):
     half_width_m: Metres
     """Distance from the middle to a tip."""
     peak_speed_m_s: Speed
-    """Speed at the fastest place: gerono, in the middle; bernoulli, at the tips."""
+    """Speed at the fastest point: the middle for gerono, the tips for bernoulli."""
     shape: Literal["gerono", "bernoulli"] = "gerono"
     """gerono: (A sin φ, A sin φ cos φ). bernoulli: the same over 1 + cos² φ, with rounder loops.
     φ increases at a constant rate."""

@@ -1,4 +1,4 @@
-"""The one place where the units of the YAML keys become SI units."""
+"""The only place that converts the units of YAML keys to SI."""
 
 from collections.abc import Callable
 from math import radians
@@ -13,7 +13,7 @@ def seconds(milliseconds: float) -> float:
 
 
 def share(percent: float) -> float:
-    """Percent as a share, by the division with which the vehicle's own percent is converted."""
+    """Percent as a share, divided in the same way as the vehicle's own percentages."""
     return percent / 100.0
 
 
@@ -33,7 +33,7 @@ def converted(value: float | None, convert: Conversion) -> float | None:
 
 
 class Si(property):
-    """A number of a section in SI units, beside the key that the user writes.
+    """A value of a section in SI units, beside the key that the user writes.
 
     `max_tilt = Si("max_tilt_deg")` is read as `limits.max_tilt`, in rad. It is a property, so that
     pydantic does not take it for a key.
@@ -48,5 +48,5 @@ class Si(property):
     @overload
     def __get__(self, section: Any, owner: type | None = None, /) -> float: ...
     def __get__(self, section: Any, owner: type | None = None, /) -> Self | float:
-        """The number of that section, in rad, rad/s, s or as a share."""
+        """The value of that section, in rad, rad/s, s or as a share."""
         return self if section is None else float(super().__get__(section, owner))

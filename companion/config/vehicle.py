@@ -1,4 +1,4 @@
-"""The vehicle: how its rate loop answers, and which thrust it hovers at."""
+"""The vehicle: response of its rate loop, and hover thrust."""
 
 from math import radians
 from typing import Annotated, NamedTuple
@@ -15,7 +15,7 @@ AccelerationLimit = Annotated[float, Field(gt=0.0, le=100_000.0)]
 
 
 class AxisKeys(NamedTuple):
-    """How one axis of the rate loop answers; None: not known, or no limit, or of first order."""
+    """Response of one axis of the rate loop; None: unknown, no limit, or first order."""
 
     lag_ms: float | None
     dead_time_ms: float | None
@@ -38,17 +38,18 @@ class AxisKeys(NamedTuple):
         return converted(self.acceleration_limit_deg_s2, radians)
 
     def but(self, *keys: float | None) -> "AxisKeys":
-        """These, but for the `keys` that are not None; an axis with a lag has its own damping."""
+        """A copy with the given keys that are not None; without the damping if a lag is given."""
         mine = self if keys[0] is None else self._replace(damping=None)
         return AxisKeys(*(a if b is None else b for a, b in zip(mine, keys, strict=True)))
 
 
 class VehicleConfig(Section):
-    """Response of the vehicle's rate loop, which `model-following` plans with."""
+    """Response of the vehicle's rate loop, from which `model-following` plans."""
 
     identified: Annotated[str, Field(min_length=1, max_length=200)] | None = None
-    """Flight in which `companion identify` measured the times below; it writes this key. null: they
-    are those of another vehicle, or estimated, and the doctor says so."""
+    """Flight in which `companion identify` measured the times below; it writes this key. null: the
+    times are estimated or from another vehicle, and `companion doctor` warns.
+    """
     lag_ms: Milliseconds | None = None
     """Time constant of the roll rate after its dead time. For a second-order response it is
     2·damping/frequency."""
@@ -79,12 +80,12 @@ class VehicleConfig(Section):
 
     @property
     def known(self) -> bool:
-        """Whether `model-following` can plan with it."""
+        """Whether the response is known, so that `model-following` can plan with it."""
         return self.lag_ms is not None and self.dead_time_ms is not None
 
     @property
     def axes(self) -> "dict[str, AxisKeys]":
-        """What is known of roll, pitch and yaw, by name; what is null of the last two is roll's."""
+        """The known response of each axis, by name; a null of pitch or yaw means that of roll."""
         roll = AxisKeys(
             self.lag_ms, self.dead_time_ms, self.acceleration_limit_deg_s2, self.damping
         )
@@ -100,7 +101,7 @@ class VehicleConfig(Section):
 
     @property
     def response(self) -> dict[str, float]:
-        """The options of `make_planner`, in SI units; keys that are null are left out."""
+        """The response as options of `make_planner`, in SI units, without keys that are null."""
         options = {
             "lag": converted(self.lag_ms, seconds),
             "dead_time": converted(self.dead_time_ms, seconds),
@@ -125,11 +126,10 @@ class ThrustConfig(Section):
     """Normalised thrust at which the vehicle hovers (PX4: MPC_THR_HOVER, ArduPilot:
     MOT_THST_HOVER)."""
     correction_limit: Annotated[float, Field(ge=0.0, le=2.0)] = 0.8
-    """Largest correction of hover_thrust in flight: with 0.8 up to 1.8 times, down to 1/1.8."""
+    """Largest correction of hover_thrust in flight: 0.8 permits a factor from 1/1.8 to 1.8."""
     correction_time_s: Annotated[float, Field(ge=0.2, le=60.0)] = 1.5
-    """Time constant with which the correction follows a slow change. An initial error is
-    corrected at
-    once."""
+    """Time constant of the correction after a slow change. An initial error is corrected at once.
+    """
     curve_factor: Share = 0.0
     """f in thrust = f·u² + (1 − f)·u. 0 where the autopilot linearises the thrust itself (PX4:
     THR_MDL_FAC, ArduPilot: MOT_THST_EXPO)."""

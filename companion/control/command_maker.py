@@ -13,13 +13,13 @@ from companion.guidance.linear import Guidance
 
 
 class CommandMaker:
-    """Asks linear guidance, or predictive control, and limits the tilt to what the thrust can hold.
+    """Asks linear or predictive control for a command; limits the tilt to what thrust can hold.
 
     Args:
         guidance: makes targets of references.
-        flown: gives the reference.
-        estimate: gives the state of the vehicle, and takes the commanded vertical thrust.
-        learning: gives the largest tilt.
+        flown: provides the reference.
+        estimate: provides the state of the vehicle, and takes the commanded vertical thrust.
+        learning: provides the largest tilt.
         period: period of guidance, s.
 
     Attributes:
@@ -62,7 +62,7 @@ class CommandMaker:
     ) -> tuple[Reference, GuidanceCommand | None]:
         """The reference at `now`, and the command that follows it.
 
-        The command is None if guidance of another package made a value that is not finite.
+        The command is None if guidance of another package returned a value that is not finite.
 
         Args:
             now: s of event-loop time.

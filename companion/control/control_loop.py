@@ -52,7 +52,7 @@ class ControlLoop:
         planner: runs the planner.
         record: counters, latest times, and reasons of unanswered samples.
         ask_mode: called once after each gap, to request the mode.
-        is_same_vehicle: called at each sample; returns whether it is of the vehicle that was
+        is_same_vehicle: called at each sample; returns whether it comes from the vehicle that was
             checked before the flight.
     """
 

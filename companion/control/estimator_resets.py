@@ -22,15 +22,15 @@ from companion.guidance.reference import Vector, rotated
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
 _LONGEST = 0.1
-"""Attitudes further apart than this are not compared, s: the rates between them are unknown."""
+"""Longest time between two compared attitudes, s; the rates between them are unknown."""
 _LONGEST_STEP = 0.025
-"""Between attitudes further apart than this, the rates are too uncertain for a correction, s."""
+"""Longest time between two attitudes for a correction, s; beyond it the rates are too uncertain."""
 _ANGLE = radians(4.0)
 """Smallest attitude jump that is recognised, rad; smaller ones count as noise."""
 _DISTANCE = 0.2
 """Smallest position jump that is recognised, m; smaller ones count as noise."""
 _LONGEST_POSITIONS = 0.5
-"""Positions further apart than this are not compared, s."""
+"""Longest time between two compared positions, s."""
 _ACCELERATION_CHANGE = 10.0
 """Largest change of the acceleration between two positions, m/s²."""
 _ONE_RESET = 0.5

@@ -11,7 +11,7 @@ from companion.control.inner_loop import LARGEST_PRODUCT, sensible_gain, tilt_re
 from companion.guidance import InnerResponse
 
 _NOTICEABLE = 0.99
-"""A change is reported if it reduces the time constant to less than this share."""
+"""A change is reported if it reduces the time constant to less than this share of it."""
 
 _GAIN, _RATE = "planner.gain_per_s", "limits.max_tilt_rate_deg_s"
 _LAG, _DEAD_TIME = "the vehicle's lag", "the vehicle's dead time"
@@ -24,8 +24,8 @@ class ExpectedResponse:
     Attributes:
         coefficient: coefficient at which the step ends.
         time_constant: time until 63 % of the step is covered, s.
-        otherwise: time constant (s) if one cause of delay changes, by the name of this cause:
-            with twice the gain, or without the rate limit, the lag or the dead time.
+        otherwise: name of a cause of delay -> time constant (s) if this cause changes: with twice
+            the gain, or without the rate limit, the lag or the dead time.
         gain: p, 1/s.
         quickest_gain: the largest sensible gain, 1/s; None if lag and dead time are not known.
     """
@@ -47,7 +47,7 @@ class ExpectedResponse:
         return self.quickest_gain is not None and self.gain > self.quickest_gain
 
     def sentence(self) -> str:
-        """The time constant, its main limit, and the effect of each change, for the user."""
+        """A message for the user: time constant, its main limit, and the effect of each change."""
         changes = ", ".join(
             f"{time:.2f} s {'with twice' if name == _GAIN else 'without'} {name}"
             for name, time in self.otherwise.items()
@@ -61,14 +61,14 @@ class ExpectedResponse:
         )
 
     def gain_sentence(self) -> str:
-        """The largest sensible gain, for the user."""
+        """A message for the user about the largest sensible gain."""
         if self.quickest_gain is None:
             return "the quickest sensible gain is not known before `companion identify`"
         return _gain_sentence(self.gain, self.quickest_gain)
 
 
 def gain_warning(config: Config) -> str | None:
-    """For the user, if one of our planners has a gain above the largest sensible one."""
+    """A warning for the user if one of our planners has more than the largest sensible gain."""
     gain, quickest = config.planner.gain_per_s, sensible_gain(config)
     if config.planner_name not in PLANNER_NAMES or gain <= quickest:
         return None
@@ -105,7 +105,7 @@ def expected_response(config: Config) -> ExpectedResponse:
 
 
 def _without_the_vehicle(config: Config, response: InnerResponse, speed: float) -> dict[str, float]:
-    """Time constants (s) without lag and without dead time; empty if these are not known."""
+    """Time constants (s) without lag and without dead time; empty if these are unknown."""
     if not config.vehicle.known:
         return {}
     step = 2.0 * config.steps.coefficient
@@ -124,7 +124,7 @@ def _largest_speed(config: Config) -> float:
 
 
 def expectations(config: Config) -> list[str]:
-    """Expected response, largest sensible gain and gains of the position hold, for the user."""
+    """Messages for the user: expected response, largest sensible gain, position-hold gains."""
     if config.planner_name not in PLANNER_NAMES:
         return [hold_sentence(config)]
     response = expected_response(config)
@@ -132,7 +132,7 @@ def expectations(config: Config) -> list[str]:
 
 
 def hold_sentence(config: Config) -> str:
-    """The gains of the position hold, and the weights from which they follow, for the user."""
+    """A message for the user: the gains of the position hold, and the weights they follow from."""
     gains, weights, delay = hold_gains(config), hold_weights(config), attitude_delay(config)
     return (
         f"the hold has gains of {gains.position:.1f} 1/s² on position, {gains.velocity:.1f} 1/s on "

@@ -1,4 +1,4 @@
-"""What guidance flies now: nothing, a held pose, or a source of references."""
+"""The source that guidance flies now: none, a held pose, or a source of references."""
 
 from math import dist
 
@@ -10,7 +10,7 @@ from companion.guidance.reference import ReferenceAt
 from companion.guidance.source import ManeuverSource, Source
 
 _REJOINED = 1.0
-"""After open-loop commands, the vehicle has returned when it is this close to its reference, m."""
+"""Distance from the reference at which the vehicle counts as returned after open loop, m."""
 
 
 class FlownSource:
@@ -48,7 +48,7 @@ class FlownSource:
         return 0.0 if self._braking is None else max(0.0, self._braking.ends - now)
 
     def finished(self, now: float) -> bool:
-        """Whether the source has no more to fly."""
+        """Whether the source has reached its end."""
         return self.source is not None and self.source.finished(now)
 
     def reference(self, now: float, motion: VehicleMotion, heading: float) -> ReferenceAt:

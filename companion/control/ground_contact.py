@@ -7,7 +7,7 @@ from companion.vehicle.state import GROUND_HEIGHT, VehicleState
 _STILL = 0.5
 """Largest estimated vertical speed of a vehicle on the ground, m/s."""
 _LIFTED = 1.0
-"""A vehicle that climbed higher since the take-off command has left the ground, m."""
+"""A climb by more than this since the take-off command means that the vehicle has lifted off, m."""
 _SPEED_LASTS = 0.5
 """An older vertical speed is ignored, s."""
 _SETTLED = 0.5
@@ -15,7 +15,7 @@ _SETTLED = 0.5
 
 
 class GroundContact:
-    """Compares the landed flag (EXTENDED_SYS_STATE) with height, vertical speed and commands sent.
+    """Compares the landed flag (EXTENDED_SYS_STATE) with height, vertical speed and sent commands.
 
     One wrong "on ground" in flight must not stop the motors. A vehicle whose flag and height
     disagree counts neither as standing nor as flying.
@@ -68,7 +68,7 @@ class GroundContact:
 
     @property
     def touched_down(self) -> bool:
-        """Whether it has landed: the flag is set for 0.5 s and the vertical speed is small."""
+        """Whether the vehicle has landed: flag set for 0.5 s and small vertical speed."""
         since = self._landed_since
         if not self._state.landed or since is None or self._clock() - since < _SETTLED:
             return False
@@ -84,7 +84,7 @@ class GroundContact:
         return height is not None and start is not None and height - start > _LIFTED
 
     def _vertical_speed(self) -> float:
-        """Vertical speed, positive down, m/s; 0 if it is not received any more."""
+        """Vertical speed, positive down, m/s; 0 if it is no longer received."""
         position = self._state.position
         if position is None or self._clock() - position.received > _SPEED_LASTS:
             return 0.0

@@ -15,10 +15,10 @@ class GuidanceCommand(NamedTuple):
         made_at: when guidance made the command, s of event-loop time.
         idle: zero rates and zero thrust, on the ground.
         is_step: whether this is an open-loop step whose response is measured.
-        body_rates: body rates to send, within the limits, instead of the planner's, rad/s; None:
-            the planner's are sent.
-        thrust: thrust to send, within the limits, instead of that for `acceleration_down`, 0..1;
-            None: that for `acceleration_down` is sent.
+        body_rates: body rates that replace the planner's, within the limits, rad/s; None: the
+            planner's are sent.
+        thrust: thrust that replaces the one computed from `acceleration_down`, within the limits,
+            0..1; None: the computed thrust is sent.
         turn: sum of the heading resets when the command was made, rad.
         later: the target `period` after `made_at`; the target moves there on a straight line and
             then stays. None: the target is constant.

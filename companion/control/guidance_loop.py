@@ -19,6 +19,7 @@ from companion.control.tracking_record import TrackingRecord
 from companion.guidance import GRAVITY, GuidanceInput, HoverThrust, Pose, Reference, VehicleMotion
 from companion.guidance.braking import Assumed, brake
 from companion.guidance.linear import Guidance
+from companion.guidance.reference import Horizontal
 from companion.guidance.source import Source
 from companion.recording.trace import FlightTrace
 from companion.vehicle.records import AttitudeSample, LocalPosition
@@ -27,7 +28,7 @@ _LEVEL = Target(0.0, 0.0, 0.0)
 
 
 class GuidanceLoop:
-    """Writes a new `GuidanceCommand` to the control loop at a steady rate, while position is fresh.
+    """Writes a new `GuidanceCommand` to the control loop at a steady rate while position is fresh.
 
     On the ground the command is idle until a take-off is commanded. After that, without a pose, it
     damps the motion; `hold_here` stops and holds a pose; `follow` flies a source from it. If
@@ -37,8 +38,9 @@ class GuidanceLoop:
     Attributes:
         flown: the held pose and the source that is flown from it.
         given_up: why the source was given up, or None.
-        bound_to_hold: whether no source may be flown any more; set by `give_up`.
+        bound_to_hold: True after `give_up`: from then on no source may be flown.
         motion: motion of the vehicle at the last step, without resets, or None.
+        acceleration: its horizontal acceleration then, m/s², NED.
         off_course: distance from the reference at the last step, m; see
             `FlownSource.tracking_error`.
         estimate: estimates the motion.
@@ -70,6 +72,7 @@ class GuidanceLoop:
         self.given_up: str | None = None
         self.bound_to_hold = False
         self.motion: VehicleMotion | None = None
+        self.acceleration: Horizontal = (0.0, 0.0)
         self.off_course: float | None = None
         self.estimate = estimate
         self.learning = HoverLearning(hover_thrust, state)
@@ -153,7 +156,7 @@ class GuidanceLoop:
 
     @property
     def finished(self) -> bool:
-        """Whether the source has no more to fly."""
+        """Whether the source has reached its end."""
         return self.flown.finished(self._clock())
 
     async def run(self) -> None:
@@ -198,7 +201,7 @@ class GuidanceLoop:
     def _step(
         self, now: float, position: LocalPosition | None, *, standing: bool, may_idle: bool
     ) -> StepOutput | None:
-        """Make one command; return what it was computed from, or None."""
+        """Make one command; return the data it was computed from, or None."""
         if position is None:
             self.learning.pause()
             return None
@@ -215,7 +218,7 @@ class GuidanceLoop:
         self.estimate.turn_to(self._loop.resets.turn)
         self.estimate.note_position(position, offboard_active=self._loop.offboard_active)
         inputs = self.maker.guidance_input(now)
-        self.motion = inputs.now
+        self.motion, self.acceleration = inputs.now, inputs.acceleration
         self._give_up_if_tilted(now, inputs.now)
         reference = self._write_command(now, inputs)
         self.off_course = self.flown.tracking_error(reference, inputs.now)

@@ -1,4 +1,4 @@
-"""Gains of the position hold and of its observer, from what is known of the rate loop."""
+"""Gains of the position hold and of its observer, computed from the response of the rate loop."""
 
 from math import inf
 
@@ -32,14 +32,14 @@ _POSITION_TIME = 0.1
 _POSITION_PULL = 4.0, 8.0
 """Gain from the position error to the observed velocity, with a slow and a quick rate loop, 1/s. It
 is needed because the velocities of PX4 and ArduPilot are off by 0.05 m/s for seconds (measured)."""
-_SMOOTH_PULL = 5.0
-"""Increase of that gain with a quick rate loop and smooth positions, 1/s: recorded errors of both
+_TRUSTED_PULL = 5.0
+"""Increase of that gain with a quick rate loop and trusted positions, 1/s: recorded errors of both
 estimators then move the vehicle 5 to 25 % less."""
 _CORRECTS_WITHIN = 0.65
 """Time constant of the position corrections of PX4's and ArduPilot's estimators (measured), s."""
 _CORRECTION_WINDOW = 0.1, 0.04
-"""Time constant of the two low-pass filters on the position correction, with a normal and a quick
-observer, s."""
+"""Time constant of the two low-pass filters on the position correction in motion, with a normal and
+a quick observer, s."""
 _LARGEST_CORRECTION = 0.2
 """Largest anticipated correction, m: the noise of a bad GPS must not move the vehicle."""
 
@@ -62,7 +62,7 @@ def hold_weights(config: Config) -> Weights:
 
 
 def _quickness(late: float, quick_and_slow: tuple[float, float]) -> float:
-    """1 for rate loops that are at most `quick` s late; 0 from `slow` s on, linear between."""
+    """Interpolates: 1 for a rate loop that is at most `quick` s late, 0 from `slow` s on."""
     quick, slow = quick_and_slow
     return min(max(0.0, (slow - late) / (slow - quick)), 1.0)
 
@@ -70,8 +70,8 @@ def _quickness(late: float, quick_and_slow: tuple[float, float]) -> float:
 def _hold_quickness(config: Config) -> float:
     """1 if the rate loop allows a stiff hold, 0 if not.
 
-    A rate loop that slews slowly is late in large motions only: a stiff hold would swing on after
-    them for good, as on the ArduPilot mock at 200 °/s.
+    A rate loop that slews slowly is late only in large motions. After one, a stiff hold would
+    oscillate without end, as on the ArduPilot mock at 200 °/s.
     """
     limits = config.vehicle.axes["roll"], config.vehicle.axes["pitch"]
     slews = [axis.acceleration_limit for axis in limits if axis.acceleration_limit is not None]
@@ -99,7 +99,7 @@ def observer_quickness(config: Config) -> float:
 def _gain_quickness(config: Config) -> float:
     """1 if the planner's gain is low enough for a quick observer, whose noise it multiplies.
 
-    At 90 °/s the mock ArduPilot swung without end with a gain of 7.5 and a quick observer.
+    At 90 °/s the mock ArduPilot oscillated without end with a gain of 7.5 and a quick observer.
     """
     return _quickness(config.planner.gain_per_s, _GAIN_RANGE)
 
@@ -113,7 +113,7 @@ def observer_settings(config: Config) -> ObserverSettings:
         slow + quickness * (quick - slow),
         config.guidance.max_disturbance_m_s2,
         _SHARPENING * observer_quickness(config),
-        quickness * _SMOOTH_PULL,
+        quickness * _TRUSTED_PULL,
     )
 
 
@@ -137,8 +137,8 @@ def disturbance_bandwidth(config: Config) -> float:
 def attitude_delay(config: Config) -> float:
     """The delay T of `hold_weights`, s; a usual rate loop is assumed if none is identified.
 
-    A gain above the largest sensible one counts as that one: it hardly makes the attitude quicker,
-    and a stiffer hold would swing.
+    A gain above the largest sensible one is replaced by it: more gain hardly makes the attitude
+    quicker, and a stiffer hold would oscillate.
     """
     excess = 1.0 / sensible_gain(config) - 1.0 / config.planner.gain_per_s
     delay = feedback_delay(config) + max(0.0, excess)
@@ -162,5 +162,5 @@ def hold_gains(config: Config) -> ChainGains:
 
 
 def flies_identify(config: Config) -> bool:
-    """Whether the flight identifies the vehicle, which wants a hold with low gains."""
+    """Whether the flight identifies the vehicle; the hold then has low gains."""
     return "identify" in config.flight.maneuvers

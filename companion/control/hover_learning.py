@@ -12,7 +12,7 @@ _CLEAR = 1.0
 """Height above home from which there is neither ground contact nor ground effect, m."""
 
 _THRUST_STALE = 0.3
-"""An older ATTITUDE_TARGET does not give the present thrust, s; it comes at 10 Hz."""
+"""Largest age of an ATTITUDE_TARGET that gives the present thrust, s; it comes at 10 Hz."""
 
 _MISMATCH = 0.15
 """A larger relative error of the configured hover thrust is reported."""

@@ -13,7 +13,7 @@ _KEPT_GAPS = 32
 
 
 class Unanswered(Enum):
-    """Why a sample is unanswered. The value names the reason in `summary.json` and in reports."""
+    """Why a sample is unanswered. The value is the reason's name in `summary.json` and reports."""
 
     ANOTHER_VEHICLE = "another_vehicle"
     NOT_NEWER = "not_newer"
@@ -95,7 +95,7 @@ class LoopRecord:
         gap_from: `last_answer`, or inf before the first answer and after a confirmed gap.
         gaps: when the latest gaps ended. A gap is a time longer than `Deadlines.telemetry_stale`
             without a setpoint, while offboard is active or requested.
-        held: how long each setpoint was held until the next one; gaps are left out.
+        held: time from each setpoint to the next one, without gaps.
     """
 
     samples: int = 0
@@ -137,10 +137,10 @@ class LoopRecord:
 
     @property
     def stale(self) -> int:
-        """Number of unanswered samples because sample or command was too old or out of order."""
+        """Number of samples unanswered because sample or command was too old or out of order."""
         return sum(n for reason, n in self.unanswered.items() if not reason.is_refusal)
 
     @property
     def refused(self) -> int:
-        """Number of unanswered samples because no valid setpoint could be computed or sent."""
+        """Number of samples unanswered because no valid setpoint could be computed or sent."""
         return sum(n for reason, n in self.unanswered.items() if reason.is_refusal)

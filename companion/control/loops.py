@@ -1,4 +1,4 @@
-"""Builds both loops from the configuration: the control loop, and guidance, which commands it."""
+"""Builds both loops from the configuration: the control loop and the guidance loop."""
 
 from collections.abc import Callable
 
@@ -23,17 +23,17 @@ def make_loops(
     clock: Callable[[], float],
     clock_ns: Callable[[], int],
 ) -> tuple[ControlLoop, GuidanceLoop]:
-    """The control loop, and the guidance loop that writes its commands.
+    """Make the control loop, and the guidance loop that writes its commands.
 
     Args:
-        config: of the flight.
+        config: configuration of the flight.
         send: sends setpoints.
         state: telemetry of the vehicle.
-        ground: whether it stands on the ground.
+        ground: tells whether the vehicle stands on the ground.
         vehicle_clock: the vehicle's clock.
-        trace: takes what the loops record.
+        trace: receives the records of both loops.
         clock: returns event-loop time, s.
-        clock_ns: returns the time that latencies are measured by, ns.
+        clock_ns: clock for latencies, ns.
 
     Raises:
         ConfigError: a plug-in cannot be loaded.

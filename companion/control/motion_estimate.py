@@ -106,7 +106,7 @@ class MotionEstimate:
             position.vehicle_time, VehicleMotion(position.position_ned, position.velocity_ned)
         )
         known = self._known(slope, measured)
-        self._observer.observe(position.vehicle_time, measured, known, self._correction.smoothness)
+        self._observer.observe(position.vehicle_time, measured, known, self._correction.trust)
         if offboard_active and before is not None:
             self._learn_drag(before, position, slope)
 
@@ -139,7 +139,7 @@ class MotionEstimate:
         )
 
     def vehicle(self, now: float, inputs: GuidanceInput) -> Vehicle:
-        """`inputs` with attitude and rates at `now`, s of event-loop time."""
+        """Attitude and rates at `now`, s of event-loop time, with `inputs`, for the solver."""
         north, east = inputs.disturbance
         return Vehicle(
             now,
@@ -185,7 +185,7 @@ class MotionEstimate:
         )
 
     def _known(self, slope: Horizontal, motion: VehicleMotion) -> Horizontal:
-        """Horizontal acceleration due to thrust and drag, m/s²."""
+        """Horizontal acceleration due to thrust and drag, m/s², without the disturbance."""
         north, east, _ = motion.velocity_ned
         slowed = self.drag.drag.deceleration(motion.velocity_ned)
         more_north, more_east = self._axis_drag.deceleration(north, east)

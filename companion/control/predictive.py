@@ -86,7 +86,7 @@ class Predictive:
     def instead_of(
         self, linear: LinearCommand, turn: float, vehicle: Vehicle, following: Following | None
     ) -> LinearCommand:
-        """The command of predictive control while it flies a trajectory, else `linear`.
+        """The command of predictive control while it follows a trajectory, else `linear`.
 
         Predictive control works in the estimator's frame, with heading resets. Its target is
         constant for a period, which its model takes into account.

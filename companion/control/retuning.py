@@ -18,7 +18,7 @@ from companion.guidance import LinearGuidance, LinearSettings, ObserverSettings
 
 
 class Tuning(NamedTuple):
-    """What the loops take from a configuration, of that which may change in flight.
+    """The values of a configuration that may change in flight, in the form the loops use.
 
     Attributes:
         guidance: settings of linear guidance.
@@ -36,10 +36,10 @@ class Tuning(NamedTuple):
 
 
 def tuning(config: Config) -> Tuning:
-    """The values of a configuration that may change in flight, as the loops take them.
+    """Compute from a configuration the values that may change in flight.
 
     Raises:
-        ValueError: gains cannot be computed from them.
+        ValueError: gains cannot be computed from the configuration.
     """
     return Tuning(
         linear_settings(config),
@@ -51,7 +51,7 @@ def tuning(config: Config) -> Tuning:
 
 
 class Retuning:
-    """Gives the values of a configuration to the loops of a flight.
+    """Applies the values of a configuration to the loops of a flight.
 
     Only the keys that may change in flight have an effect; see `companion.config.in_flight`.
 
@@ -76,7 +76,7 @@ class Retuning:
         """Use these values from the next sample and the next step on.
 
         Raises:
-            TypeError: planner or guidance is of another package and cannot change.
+            TypeError: planner or guidance comes from another package and cannot change.
         """
         guidance_loop = self._guidance_loop
         guidance = guidance_loop.maker.guidance
@@ -89,7 +89,7 @@ class Retuning:
 
 
 def fixed_because(config: Config) -> str | None:
-    """Why nothing may change in flight with this configuration, as a sentence; None: it may."""
+    """Why this configuration permits no change in flight, as a sentence; None: it does."""
     if config.guidance.kind != LINEAR:
         return f"guidance.kind {config.guidance.kind} keeps the values with which the flight began"
     if config.planner_name not in PLANNER_NAMES:
@@ -98,15 +98,15 @@ def fixed_because(config: Config) -> str | None:
 
 
 def between(before: Config, after: Config, share: float) -> Config:
-    """A configuration on the way from one to another, in the keys that differ.
+    """A configuration between two others; only keys that differ are interpolated.
 
-    Positive values move by the same factor in equal times, others by the same amount. A value that
-    follows from others (null) counts as what it comes to.
+    Positive values are interpolated geometrically, others linearly. A value that is null is
+    replaced by the value derived for it.
 
     Args:
-        before: where the way begins; its differences from `after` may change in flight.
-        after: where it ends.
-        share: from 0 to 1.
+        before: configuration at share 0; only keys that may change in flight differ from `after`.
+        after: configuration at share 1.
+        share: 0..1.
     """
     if share >= 1.0:
         return after
@@ -126,7 +126,7 @@ def between(before: Config, after: Config, share: float) -> Config:
 
 
 def value_in_effect(config: Config, difference: Difference, value: float | None) -> float:
-    """The value, or what null comes to in `config`."""
+    """The value, or for null the value derived in `config`."""
     if value is not None:
         return value
     comes_to = {

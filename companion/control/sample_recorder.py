@@ -13,21 +13,21 @@ from companion.vehicle.records import AttitudeSample, AttitudeTarget
 
 
 class SampleRecorder:
-    """Records what the control loop made of each sample, if the flight is recorded.
+    """Records each sample and the loop's answer to it, if the flight is recorded.
 
     The loop calls `begin`, sets `checked`, calls `answer` if it sends a setpoint, and then `end`.
 
     Args:
-        recorder: of the flight, or None.
-        planner: gives what the planner was asked; calls back with each new ATTITUDE_TARGET.
-        limits: of the body rates.
+        recorder: recorder of the flight, or None.
+        planner: provides the planner's input; calls back with each new ATTITUDE_TARGET.
+        limits: limits of the body rates.
         thrust_limits: smallest and largest thrust that is sent, 0..1.
         clock: returns event-loop time, s.
 
     Attributes:
         on: whether the flight is recorded.
-        checked: when the age of the sample was checked before sending, s of event-loop time; NaN:
-            it was not.
+        checked: time of the check of the sample's age before sending, s of event-loop time; NaN:
+            not checked.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class SampleRecorder:
         self._rows = SampleRows(limits, self._thrust_limits)
 
     def begin(self) -> None:
-        """Begin a sample: nothing is checked or sent yet."""
+        """Begin a new sample, which is not yet checked or answered."""
         self.checked, self._answer = nan, None
 
     def answer(
@@ -61,10 +61,10 @@ class SampleRecorder:
         """Note the setpoint that was sent; it is recorded at `end`.
 
         Args:
-            command: of guidance.
-            rates: rad/s.
-            thrust: 0..1.
-            latency_ns: from the sample's arrival, ns.
+            command: command of guidance.
+            rates: body rates, rad/s.
+            thrust: thrust, 0..1.
+            latency_ns: time since the sample's arrival, ns.
         """
         planned = not command.idle and command.body_rates is None
         asked, plan = (self._planner.asked, self._planner.planned) if planned else (None, None)
@@ -85,7 +85,7 @@ class SampleRecorder:
         self._recorder.add(sample.received, self._rows.sample, entry)
 
     def action(self, name: str) -> None:
-        """Record what a phase tells the loop to do."""
+        """Record a call by which a phase controls the loop."""
         if self._recorder is not None:
             self._recorder.action(self._clock(), name)
 

@@ -1,7 +1,7 @@
-"""What the control loop records of a sample: values in, messages of `flight.mcap` out.
+"""Converts the control loop's record of a sample to messages of `flight.mcap`.
 
-The loop hands over what it has at hand. The functions here run in the recorder's thread and take
-the numbers out of it, in the order of the columns in
+The loop passes its objects unchanged. The functions here run in the recorder's thread, and take the
+numbers from these objects in the order of the columns in
 `companion.recording.mcap_file.loop_channels`.
 """
 
@@ -38,12 +38,12 @@ class LoopFlags(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """A setpoint that was sent, and what it was made from.
+    """A setpoint that was sent, and its inputs.
 
     Attributes:
-        rates: rad/s.
-        thrust: 0..1.
-        latency_ns: from the sample's arrival, ns.
+        rates: body rates, rad/s.
+        thrust: thrust, 0..1.
+        latency_ns: time since the sample's arrival, ns.
         asked: attitude and target as the planner saw them; None: body rates of guidance, or idle.
         planned: the plan in effect at the sample, or None.
         is_step: see `GuidanceCommand`.
@@ -65,9 +65,9 @@ class SampleEntry(NamedTuple):
     Attributes:
         sample: the sample.
         reason: why it is unanswered, or None.
-        flags: before it was answered.
-        checked: when its age was checked before sending, s on our clock; NaN: it was not.
-        answer: what was sent, or None.
+        flags: state of the loop before the answer.
+        checked: time of the check of its age before sending, s on our clock; NaN: not checked.
+        answer: setpoint that was sent, or None.
     """
 
     sample: AttitudeSample
@@ -78,10 +78,10 @@ class SampleEntry(NamedTuple):
 
 
 class SampleRows:
-    """Writes the channels of numbers that the control loop records.
+    """Writes the numeric channels of the control loop.
 
     Args:
-        limits: of the body rates.
+        limits: limits of the body rates.
         thrust_limits: smallest and largest thrust that is sent, 0..1.
     """
 

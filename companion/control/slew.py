@@ -1,4 +1,4 @@
-"""Leads the values of the loops from one configuration to another in small steps."""
+"""Moves the values of the loops from one configuration to another in small steps."""
 
 from companion.config import Config
 from companion.control.retuning import Tuning, between, tuning
@@ -6,17 +6,17 @@ from companion.control.retuning import Tuning, between, tuning
 SLEW = 0.7
 """Time over which a change takes effect, s."""
 _PERIOD = 0.035
-"""Shortest time between two steps of a change, s; each computes the gains again."""
+"""Shortest time between two steps of a change, s; each step computes the gains again."""
 
 
 class Slew:
-    """The way from the present values to the wanted ones. Times are s on one clock.
+    """Interpolates from the present configuration to the wanted one. Times are s on one clock.
 
     Attributes:
         settled: the newest configuration that was fully in effect.
 
     Args:
-        config: with the present values, which are wanted, too.
+        config: the present configuration, which is also the wanted one at first.
     """
 
     def __init__(self, config: Config) -> None:
@@ -25,12 +25,12 @@ class Slew:
         self._stepped = 0.0
 
     def jump(self, wanted: Config) -> None:
-        """Be at the wanted values at once: no loop flies, or one that begins takes them."""
+        """Take the wanted values at once, while no loop flies or before one begins."""
         self._now = self._wanted = self.settled = wanted
         self._began = None
 
     def begin(self, wanted: Config, now: float) -> None:
-        """Begin the way from the present values."""
+        """Begin to move from the present values to the wanted ones."""
         self._from, self._wanted, self._began = self._now, wanted, now
 
     def stop(self) -> None:
@@ -38,10 +38,10 @@ class Slew:
         self._began = None
 
     def step(self, now: float) -> Tuning | None:
-        """The values from now on; None: they stay as they are.
+        """The values to use from now on; None: no change.
 
         Raises:
-            ValueError: gains cannot be computed from them.
+            ValueError: gains cannot be computed from the new values.
         """
         if self._began is None or now - self._stepped < _PERIOD:
             return None

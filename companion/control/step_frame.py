@@ -1,13 +1,13 @@
 """The frame of open-loop steps, in which the estimator's heading corrections are left out.
 
-A step shall be a straight line in the world. An estimator corrects its heading most when the
+A step should be a straight line in the world. An estimator corrects its heading most when the
 vehicle accelerates after a hover: by 1.3° within the first step on ArduCopter's simulator, which
 bends that line by 0.015. The body rates show that the vehicle did not turn. So while steps are
 flown, the planner sees an attitude without the heading changes that body rates do not explain.
 
-In closed loop, guidance computes each acceleration in the estimator's frame. Its horizontal target
-is rotated with the attitude, so the acceleration stays as guidance asked, and the turn decays. The
-heading target is not rotated: it would jump by the turn where steps begin and end.
+In closed loop, guidance computes each acceleration in the estimator's frame. The horizontal target
+is rotated together with the attitude, so the acceleration stays as commanded by guidance, and the
+turn decays. The heading target is not rotated: it would jump by the turn where steps begin and end.
 """
 
 from math import exp, radians
@@ -26,7 +26,7 @@ class StepFrame:
     """Converts between the estimator's frame and the frame in which open-loop steps are straight.
 
     Attributes:
-        turn: heading in the estimator's frame minus heading in this frame, rad.
+        turn: heading in the estimator's frame minus heading in the frame of steps, rad.
     """
 
     def __init__(self) -> None:

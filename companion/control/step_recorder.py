@@ -7,10 +7,10 @@ from companion.recording.recorder import FlightRecorder
 
 
 class StepRecorder:
-    """Records what each step of guidance read and made, if the flight is recorded.
+    """Records the inputs and outputs of each guidance step, if the flight is recorded.
 
     Args:
-        recorder: of the flight, or None.
+        recorder: recorder of the flight, or None.
         state: telemetry that the steps read.
         vehicle_clock: the vehicle's clock.
     """
@@ -45,6 +45,6 @@ class StepRecorder:
         self._recorder.add(now, self._rows.step, StepEntry(read, made, command))
 
     def action(self, now: float, name: str) -> None:
-        """Record what a phase tells guidance to do at `now`, s of event-loop time."""
+        """Record a call by which a phase controls guidance at `now`, s of event-loop time."""
         if self._recorder is not None:
             self._recorder.action(now, name, self._vehicle_clock.offset)

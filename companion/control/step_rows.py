@@ -1,4 +1,4 @@
-"""What guidance records of a step: values in, messages of `flight.mcap` out.
+"""Converts guidance's record of a step to messages of `flight.mcap`.
 
 As in `companion.control.sample_rows`, the functions run in the recorder's thread.
 """
@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from companion.attitude import Quaternion, Target
 from companion.control.guidance_command import GuidanceCommand
+from companion.control.scene_rows import SceneRows
 from companion.guidance import GuidanceInput, Reference
 from companion.guidance.reference import Vector
 from companion.recording.mcap_file import cdr
@@ -19,12 +20,12 @@ from companion.vehicle.records import AttitudeTargetThrust, Battery, LocalPositi
 _NO_VECTOR = (nan, nan, nan)
 _NO_TARGET = Target(nan, nan, nan, nan)
 _HALF_ROOT = sqrt(0.5)
-_DRAWN_EACH = 2
-"""Each second step of guidance is drawn in 3D."""
+_DRAWN_EACH, _SCENE_EACH = 2, 5
+"""Steps of guidance for each recorded pose, and for each drawing of the vehicle."""
 
 
 class StepFlags(NamedTuple):
-    """What a step of guidance found.
+    """State of the vehicle at a guidance step.
 
     Attributes:
         fresh: whether the position is fresh.
@@ -46,11 +47,11 @@ class StepInput(NamedTuple):
         time: when the step began, s on our clock.
         position: the newest position.
         clock_offset: vehicle time minus our time, s.
-        battery: of the vehicle.
-        autopilot_thrust: in ATTITUDE_TARGET.
-        height: above home, m.
+        battery: battery of the vehicle.
+        autopilot_thrust: thrust in ATTITUDE_TARGET.
+        height: height above home, m.
         armed: whether the vehicle is armed.
-        flags: what the step found.
+        flags: state of the vehicle at the step.
     """
 
     time: float
@@ -64,12 +65,12 @@ class StepInput(NamedTuple):
 
 
 class StepOutput(NamedTuple):
-    """What a step of guidance computed.
+    """The result of a guidance step.
 
     Attributes:
         measured_at: the step's time on the vehicle's clock, s.
         q: newest attitude.
-        inputs: motion, wind and drag.
+        inputs: motion, wind and drag at the step.
         reference: reference of the step.
         error: distance from the reference, m, or None.
     """
@@ -82,12 +83,12 @@ class StepOutput(NamedTuple):
 
 
 class StepEntry(NamedTuple):
-    """A step of guidance.
+    """Record of a guidance step.
 
     Attributes:
-        read: what it read.
-        made: what it computed; None: nothing, without a fresh position or on the ground.
-        command: what it left with the control loop; None: no new command.
+        read: its inputs.
+        made: its result; None without a fresh position or on the ground.
+        command: the command for the control loop; None: no new command.
     """
 
     read: StepInput
@@ -96,20 +97,22 @@ class StepEntry(NamedTuple):
 
 
 class StepRows:
-    """Writes the channels that guidance records, and the vehicle as 3D viewers draw it (ENU)."""
+    """Writes the channels of guidance, and the vehicle as 3D viewers draw it (ENU)."""
 
     def __init__(self) -> None:
         self._transform = cdr.PoseEncoder("world", "vehicle")
         self._pose = cdr.PoseEncoder("world")
+        self._scene = SceneRows()
         self._count = 0
 
     def step(self, writer: McapWriter, time_ns: int, entry: StepEntry) -> None:
-        """Write what a step read and computed, and its command."""
+        """Write the inputs, the result and the command of a step."""
         read, made, command = entry
         writer.message("/guidance_input", time_ns, INPUT.packing.pack(CDR, *_input(read)))
         if command is not None:
             data = TARGET.packing.pack(CDR, *_target(command))
             writer.message("/target", time_ns, data)
+            self._scene.commanded(command)
         if made is not None:
             data = GUIDANCE.packing.pack(
                 CDR, read.time, *_guidance(made), read.flags.offboard_active
@@ -118,6 +121,10 @@ class StepRows:
             self._count += 1
             if self._count % _DRAWN_EACH == 0:
                 self._draw(writer, time_ns, made)
+            if self._count % _SCENE_EACH == 0:
+                here = _east_north_up(made.inputs.now.position_ned)
+                there = _east_north_up(made.reference.position_ned)
+                self._scene.draw(writer, time_ns, made.q, here, there)
 
     def _draw(self, writer: McapWriter, time_ns: int, made: StepOutput) -> None:
         pose = (*_east_north_up(made.inputs.now.position_ned), *_enu_from_flu(made.q))

@@ -1,4 +1,4 @@
-"""What guidance reads of the vehicle."""
+"""The telemetry that guidance reads."""
 
 from typing import Protocol
 
@@ -35,7 +35,7 @@ class Telemetry(Protocol):
 
 
 class Ground(Protocol):
-    """Whether the vehicle stands on the ground, as `GroundContact` tells it."""
+    """Whether the vehicle stands on the ground; implemented by `GroundContact`."""
 
     @property
     def standing(self) -> bool:
@@ -49,7 +49,7 @@ class Ground(Protocol):
 
 
 class Clock(Protocol):
-    """The vehicle's clock, as `VehicleClock` tells it."""
+    """The vehicle's clock; implemented by `VehicleClock`."""
 
     @property
     def offset(self) -> float | None:
@@ -67,14 +67,14 @@ class FreshPosition:
     Args:
         state: telemetry of the vehicle.
         vehicle_clock: the vehicle's clock.
-        stale: an older position is not used, s.
+        stale: largest age of a position that is used, s.
     """
 
     def __init__(self, state: Telemetry, vehicle_clock: Clock, stale: float) -> None:
         self._state, self._vehicle_clock, self._stale = state, vehicle_clock, stale
 
     def at(self, now: float) -> LocalPosition | None:
-        """The newest position; None if at `now` (s) it arrived or was measured too long ago."""
+        """The newest position; None if its arrival or measurement is too old at `now`, s."""
         position = self._state.position
         if position is None or now - position.received > self._stale:
             return None

@@ -8,7 +8,7 @@ class Ticker:
     """Waits until the next period begins, or until `soon` is called.
 
     Args:
-        period: s.
+        period: period, s.
         clock: returns event-loop time, s.
     """
 
@@ -19,7 +19,7 @@ class Ticker:
         self._waiting: asyncio.Future[None] | None = None
 
     def soon(self) -> None:
-        """End the wait of `tick` at once; the next period begins then."""
+        """End the wait of `tick` at once; the next period then begins."""
         self._soon = True
         if self._waiting is not None:
             _wake(self._waiting)

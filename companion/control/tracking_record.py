@@ -11,7 +11,7 @@ from companion.recording.trace import FlightTrace
 
 
 class FlownPart(NamedTuple):
-    """What is flown now: a maneuver, or a source that another program commands.
+    """The maneuver that is flown now, or the source that another program commands.
 
     Attributes:
         name: name to show to the user.
@@ -27,7 +27,7 @@ class FlownPart(NamedTuple):
 
 
 def flown_part(flown: FlownSource, now: float) -> FlownPart | None:
-    """What is flown at `now` (s of event-loop time); None: a pose is held, or nothing."""
+    """The flown part at `now` (s of event-loop time); None: a pose is held, or nothing is flown."""
     source, begun_at = flown.source, flown.begun_at
     if source is None or begun_at is None or source.finished(now):
         return None

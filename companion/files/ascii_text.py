@@ -1,4 +1,4 @@
-"""A readable ASCII form of any text, for what takes no other characters."""
+"""A readable ASCII form of any text, for outputs that accept only ASCII."""
 
 import unicodedata
 
@@ -51,15 +51,15 @@ def ascii_for(text: str) -> str:
 
 
 def _one(char: str) -> str:
-    """ASCII for one character that is not ASCII."""
+    """ASCII for one non-ASCII character."""
     if char in _WORDS:
         return _WORDS[char]
     kept = [one for one in unicodedata.normalize("NFKD", char) if not unicodedata.combining(one)]
-    return "".join(one if one.isascii() else _WORDS.get(one) or _named(one) for one in kept)
+    return "".join(one if one.isascii() else _WORDS.get(one) or _ascii_name(one) for one in kept)
 
 
-def _named(char: str) -> str:
-    """A Greek letter by its name, a part of a frame as a plus; `?` for what has no ASCII."""
+def _ascii_name(char: str) -> str:
+    """The name of a Greek letter, a plus for a part of a frame, `?` if there is no ASCII form."""
     name = unicodedata.name(char, "")
     if name.startswith("GREEK "):
         letter = name.split(" WITH ")[0].rsplit(" ", 1)[-1].lower()

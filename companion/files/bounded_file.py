@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 class FileRefusedError(Exception):
-    """A file cannot be used; the message completes a sentence that begins with its name."""
+    """A file cannot be used; the message continues a sentence that begins with the file's name."""
 
 
 def read_text(path: Path, most: int) -> str:
@@ -15,7 +15,7 @@ def read_text(path: Path, most: int) -> str:
     Devices and pipes are refused: they may block or never end.
 
     Args:
-        path: of the file.
+        path: path of the file.
         most: largest size, bytes.
 
     Raises:

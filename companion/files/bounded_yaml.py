@@ -1,8 +1,8 @@
-"""YAML as plain values, read within bounds: no file may cost much time or memory.
+"""YAML as plain values, read within bounds, so that no file costs much time or memory.
 
 Numbers and words mean what YAML 1.2 says (its core schema): 010 is ten, 1:30 and a date are texts,
-and so are yes, no, on and off. Tags and aliases are refused: no file of ours needs them, and a few
-lines of aliases stand for gigabytes.
+and so are yes, no, on and off. Tags and aliases are refused. Our files do not need them, and a few
+lines of aliases can expand to gigabytes.
 """
 
 import re
@@ -18,11 +18,11 @@ MOST_NODES = 6000
 DEEPEST = 20
 """Largest nesting depth of lists and mappings."""
 LONGEST_TEXT = 4096
-"""Most characters of a value."""
+"""Largest number of characters of a value."""
 LONGEST_KEY = 100
-"""Most characters of a key."""
+"""Largest number of characters of a key."""
 LONGEST_NUMBER = 40
-"""Most characters of a number."""
+"""Largest number of characters of a number."""
 
 _WORDS = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL")),
@@ -51,14 +51,14 @@ class YamlError(Exception):
 
 
 Where = tuple[str | int, ...]
-"""The keys and positions in lists that lead to a value."""
+"""Path to a value: keys, and positions in lists."""
 
 
 class Document(NamedTuple):
     """A YAML document.
 
     Attributes:
-        root: its value.
+        root: value of the document.
         lines: the line on which each key and each item of a list stands, from 1.
     """
 
@@ -67,10 +67,10 @@ class Document(NamedTuple):
 
 
 def parse(text: str) -> Any:
-    """The value of `read`.
+    """Parse a YAML text; return its value.
 
     Raises:
-        YamlError: as `read`.
+        YamlError: the text cannot be read; see `read`.
     """
     return read(text).root
 
@@ -97,7 +97,7 @@ def read(text: str) -> Document:
 
 
 def _explained(error: yaml.MarkedYAMLError, text: str) -> str:
-    """The fault and its remedy, for the commonest mistakes."""
+    """The fault and its remedy, for the most common mistakes."""
     problem = str(error.problem)
     lines, mark = text.splitlines(), error.problem_mark
     line = lines[mark.line] if mark and mark.line < len(lines) else ""
@@ -109,12 +109,12 @@ def _explained(error: yaml.MarkedYAMLError, text: str) -> str:
 
 
 def dump(data: dict[str, Any]) -> str:
-    """YAML of plain values that `parse` reads as they were."""
+    """YAML text of plain values that `parse` converts back to the same values."""
     return yaml.dump(data, Dumper=_Dumper, sort_keys=False)
 
 
 def dump_value(value: Any) -> str:
-    """YAML of one value on one line, as it stands behind a key."""
+    """YAML of one value on one line, as it stands after a key."""
     text = yaml.dump([value], Dumper=_Dumper, default_flow_style=True, width=inf)
     return str(text).strip()[1:-1]
 
@@ -138,7 +138,7 @@ class _Builder:
 
     Attributes:
         root: the document so far.
-        lines: of its keys and items.
+        lines: line numbers of its keys and items.
     """
 
     def __init__(self) -> None:

@@ -10,10 +10,10 @@ LONGEST = 5.0
 
 
 def write_in_time(path: Path, text: str) -> str | None:
-    """Write a file as `write_whole` does, but do not wait for a disk that hangs.
+    """Write a file like `write_whole`, but do not wait for a disk that hangs.
 
     Returns:
-        None once it is on the disk; else why it is not, in words.
+        None if the file is on the disk; else the reason why not, in words.
     """
     outcome: list[str | None] = [f"the disk did not answer for {LONGEST:g} s"]
 
@@ -32,17 +32,17 @@ def write_in_time(path: Path, text: str) -> str | None:
 
 
 def write_whole(path: Path, text: str, mode: int = 0o666) -> None:
-    """Replace a file, or make it; its text and its name are on the disk when this returns.
+    """Write or replace a file; when this returns, its text and its name are on the disk.
 
     The text goes to a temporary file in the same folder, which then takes the file's name.
 
     Args:
-        path: of the file; its folder exists.
-        text: all of it, written in UTF-8.
+        path: path of the file; its folder exists.
+        text: the complete text; it is written in UTF-8.
         mode: permissions of the file, less the process's umask.
 
     Raises:
-        OSError: it cannot be written. No temporary file is left.
+        OSError: the file cannot be written. No temporary file is left.
     """
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:

@@ -12,7 +12,8 @@ from pydantic import BaseModel
 _LONGEST_TOLD = 60
 _PLACES_TOLD = 3
 _ALIKE, _ELSEWHERE_ALIKE = 0.5, 0.75
-"""Least likeness of a key beside the unknown one, and of one in another section."""
+"""Smallest similarity to an unknown key for a suggestion: in the same section, and in another one.
+"""
 
 _NUMBER_AND_UNIT = re.compile(r"([-+]?[0-9]+(?:[.,][0-9]+)?(?:[eE][-+]?[0-9]+)?)\s*(\D*)")
 
@@ -26,8 +27,9 @@ _SLIPS: tuple[tuple[str, str, Callable[[float], float]], ...] = (
     ("_percent", "parts of 1", lambda value: 100.0 * value),
     ("", "%", lambda value: 0.01 * value),
 )
-"""By the end of a key, the unit that its own is mistaken for, and the conversion to its own; the
-first that fits."""
+"""Suffix of a key, the unit often mistaken for its unit, and the conversion; the first suffix that
+fits is used.
+"""
 _BOUNDS: dict[str, Callable[[float, float], bool]] = {
     "ge": lambda value, bound: value >= bound,
     "gt": lambda value, bound: value > bound,
@@ -37,7 +39,7 @@ _BOUNDS: dict[str, Callable[[float, float], bool]] = {
 
 
 def shortened(value: Any) -> str:
-    """A value as an error message shows it."""
+    """A value as shown in an error message."""
     text = repr(value)
     return text if len(text) <= _LONGEST_TOLD else f"{text[:_LONGEST_TOLD]}..."
 
@@ -72,12 +74,12 @@ def other_unit(key: str, value: float) -> tuple[str, float]:
 
 
 def explained(detail: Any, model: type[BaseModel], former: Mapping[str, str]) -> str:
-    """One sentence.
+    """The error message, as one sentence.
 
     Args:
-        detail: an error of pydantic.
-        model: of the file's top level.
-        former: keys that were renamed or removed → what became of them.
+        detail: error reported by pydantic.
+        model: model of the file's top level.
+        former: renamed or removed key -> what replaces it.
     """
     location, value = detail["loc"], detail["input"]
     where = ".".join(str(part) for part in location)
@@ -94,7 +96,7 @@ def explained(detail: Any, model: type[BaseModel], former: Mapping[str, str]) ->
 
 
 def _remedy(detail: Any, key: str) -> str | None:
-    """What to write instead of a value of the wrong type."""
+    """A suggestion to replace a value of the wrong type."""
     kind, value = detail["type"], detail["input"]
     if kind == "value_error" and "must be a number" in detail["msg"]:
         return f"must be a number: {_number_in(key, value)} (got {shortened(value)})"
@@ -113,7 +115,7 @@ def _remedy(detail: Any, key: str) -> str | None:
 
 
 def _number_in(key: str, text: str) -> str:
-    """What to write instead of a text."""
+    """A suggestion to replace a text by a number."""
     found = _NUMBER_AND_UNIT.fullmatch(text.strip())
     if found is None:
         return "write digits, with a point for decimals"
@@ -159,12 +161,12 @@ def _unknown(location: tuple[int | str, ...], value: Any, model: type[BaseModel]
 
 
 def owners(name: str, model: type[BaseModel]) -> str:
-    """The dotted keys of this name as alternatives; empty if no section has it."""
+    """The dotted keys with this name, as alternatives; empty if no section has one."""
     return _either([".".join((*place, key)) for place, key in _keys(model) if key == name])
 
 
 def _either(places: list[str]) -> str:
-    """Some dotted keys as alternatives."""
+    """Some dotted keys, joined as alternatives."""
     return " or ".join(f"`{place}`" for place in places[:_PLACES_TOLD])
 
 
@@ -190,7 +192,7 @@ def _keys(model: type[BaseModel]) -> Iterator[tuple[tuple[str, ...], str]]:
 
 
 def _model_at(location: tuple[int | str, ...], model: type[BaseModel]) -> type[BaseModel]:
-    """The model that the last key of a location is refused by."""
+    """The model that refused the last key of a location."""
     for part in location[:-1]:
         if str(part) not in model.model_fields:
             continue  # a name that the user gave, or a position in a list

@@ -1,4 +1,4 @@
-"""Reading YAML into a typed model, with errors that say what, where and how to mend it."""
+"""Reads YAML into a typed model; an error says what is wrong, where, and how to mend it."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -29,9 +29,8 @@ class Section(BaseModel):
     """A section of the configuration: immutable; unknown keys are refused; every key is described.
 
     Attributes:
-        former_keys: keys that were renamed or removed, dotted, as the file writes them
-            (`section.key`) → what became of them, as the end of a sentence that begins with the
-            key. Only the table of the file's top level is used.
+        former_keys: renamed or removed key (`section.key`) -> what replaces it, as the end of a
+            sentence that begins with the key. Only the table of the top-level model is used.
     """
 
     former_keys: ClassVar[Mapping[str, str]] = {}
@@ -63,7 +62,7 @@ class Section(BaseModel):
     @field_validator("*", mode="before")
     @classmethod
     def _no_impossible_path(cls, value: Any, field: ValidationInfo) -> Any:
-        """Refuse empty paths (they would name the folder itself) and null characters."""
+        """Refuse empty paths, which would name the folder itself, and null characters."""
         kinds = kinds_in(cls.model_fields[str(field.field_name)].annotation)
         if isinstance(value, str) and Path in kinds and not is_path(value):
             raise ValueError("must name a file or a folder")
@@ -79,11 +78,11 @@ class UnreadableFileError(ConfigError):
 
 
 class Place(NamedTuple):
-    """Where a key stands.
+    """The place of a key.
 
     Attributes:
-        file: its name.
-        line: from 1; None where unknown.
+        file: name of the file.
+        line: line number, from 1; None: unknown.
     """
 
     file: str
@@ -94,7 +93,7 @@ class Place(NamedTuple):
 
 
 class Contents(NamedTuple):
-    """A YAML file that was read and not yet checked against a model.
+    """A YAML file that was read but not yet checked against a model.
 
     Attributes:
         keys: keys and values.
@@ -116,11 +115,11 @@ def load(path: Path, model: type[Model]) -> Model:
 
 
 def read(path: Path, model: type[Section]) -> Contents:
-    """A YAML file, not yet checked against `model`.
+    """Read a YAML file without checking it against `model`.
 
     Raises:
-        UnreadableFileError: the file is missing, no regular one, too large, or not UTF-8.
-        ConfigError: it is not YAML, or holds no keys.
+        UnreadableFileError: the file is missing, not regular, too large, or not UTF-8.
+        ConfigError: the file is not YAML, or holds no keys.
     """
     try:
         text = read_text(path, MOST_BYTES)
@@ -130,10 +129,10 @@ def read(path: Path, model: type[Section]) -> Contents:
 
 
 def parse(text: str, name: str, model: type[Model]) -> Model:
-    """Check YAML text; `name` stands for it in errors.
+    """Parse and check YAML text; errors call it `name`.
 
     Raises:
-        ConfigError: as `load`.
+        ConfigError: see `load`.
     """
     contents = _contents(text, name, model)
     return validated(contents.keys, name, model, contents.places)
@@ -154,7 +153,7 @@ def _contents(text: str, name: str, model: type[Section]) -> Contents:
 
 
 def _filled(key: Any, value: Any, model: type[Section]) -> Any:
-    """The value, or an empty section if a section's name stands without keys."""
+    """The value, or an empty section if only a section's name is given."""
     field = model.model_fields.get(key)
     if value is not None or field is None:
         return value
@@ -170,13 +169,13 @@ def validated(
     model: type[Model],
     places: Mapping[Where, Place] | None = None,
 ) -> Model:
-    """Check data already read; `name` stands for it in errors.
+    """Check data that was already read; errors call it `name`.
 
     Args:
         data: keys and values.
-        name: of the file.
-        model: to check against.
-        places: where the keys stand.
+        name: name of the file.
+        model: model to check against.
+        places: places of the keys.
 
     Raises:
         ConfigError: an unknown key or a bad value.
@@ -203,6 +202,6 @@ def validated(
 
 
 def place_of(where: Where, places: Mapping[Where, Place], name: str) -> Place:
-    """The place of a key, or of what it is part of; without a line if neither is known."""
+    """The place of a key or of the part that holds it; without a line if neither is known."""
     ends = range(len(where), 0, -1)
     return next((places[where[:end]] for end in ends if where[:end] in places), Place(name))

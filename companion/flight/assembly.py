@@ -61,7 +61,7 @@ def link_settings(config: Config) -> LinkSettings:
 def open_link(
     config: Config, tap: Tap | None, notice: Notice, opener: OpenTransport = open_transport
 ) -> Link:
-    """The link of `link.backend`, still closed; the other arguments as in `Link`.
+    """Make the link of `link.backend`, not yet open; see `Link` for the other arguments.
 
     Raises:
         SigningError: the key cannot be used.
@@ -120,7 +120,7 @@ class Assembled:
             self.context.guidance_loop.maker.predictive.close()
 
     def predictive_figures(self) -> PredictiveFigures | None:
-        """The figures of predictive control; None where it did not fly."""
+        """The figures of predictive control; None if it did not fly."""
         predictive = self.context.guidance_loop.maker.predictive
         if predictive is None:
             return None
@@ -152,9 +152,10 @@ def assemble(
     environment: Environment = THIS_COMPUTER,
     changes: Changes | None = None,
 ) -> Assembled:
-    """Assemble a flight by `plan` over an open link.
+    """Assemble a flight with the phases of `plan` over an open link.
 
-    Its records are written to `folder`; with None, nothing is written or remembered.
+    Its records are written to `folder`; None: nothing is written, and nothing is kept for later
+    flights.
     """
     clock: Callable[[], float] = asyncio.get_running_loop().time
     record, real_time = recorder.file, environment.realtime and not config.link.lockstep
@@ -199,12 +200,7 @@ def assemble(
     remembered = None if folder is None else folder.parent
     memory = VehicleMemory(remembered, guidance_loop.estimate.drag, drag_is_set, flight.note)
     preflight.on_identity = memory.load
-    for part in context.maneuvers.parts:
-        if isinstance(part, Follow):
-            for text in part.notes:
-                flight.note(text)
-            if config.guidance.kind == "nmpc":
-                guidance_loop.maker.predictive = predictive(config, part, flight.note)
+    _prepare_trajectories(context, flight.note)
     changes = changes or Changes(config)
     if record is not None:
         record.metadata("configuration", flat(changes.flown.model_dump(mode="json")))
@@ -213,19 +209,42 @@ def assemble(
         memory.on_begin = partial(_record_drag, record, clock)
     dead_time_watch = DeadTimeWatch(trace, rate_loops(config), flight.note)
 
-    def phase() -> PhaseNow:
-        running = flight.phase
-        entered = recorder.phases[-1][0] if recorder.phases else flight.began
-        return PhaseNow(running.name, running.timeout, running.monitored, entered)
+    reporter = _reporter(flight, context, ladder, trace, recorder, real_time=real_time)
+    return Assembled(flight, context, trace, dead_time_watch, memory, ladder, reporter, changes)
 
-    reporter = StatusReporter(
+
+def _prepare_trajectories(context: FlightContext, note: Callable[[str], None]) -> None:
+    """Report how trajectory files were read, and start the solver that follows them, if any."""
+    for part in context.maneuvers.parts:
+        if isinstance(part, Follow):
+            for text in part.notes:
+                note(text)
+            if context.config.guidance.kind == "nmpc":
+                context.guidance_loop.maker.predictive = predictive(context.config, part, note)
+
+
+def _reporter(
+    flight: Flight,
+    context: FlightContext,
+    ladder: SafetyLadder,
+    trace: FlightTrace,
+    recorder: EventRecorder,
+    *,
+    real_time: bool,
+) -> StatusReporter:
+    """The reporter of the flight's state; it shows the state only if an observer uses it."""
+
+    def phase() -> PhaseNow:
+        now, entered = flight.phase, recorder.phases[-1][0] if recorder.phases else flight.began
+        return PhaseNow(now.name, now.timeout, now.monitored, entered)
+
+    return StatusReporter(
         context,
         ladder,
         trace,
         flight.began,
         phase,
         recorder.status if recorder.wants_status else None,
-        clock,
+        asyncio.get_running_loop().time,
         real_time=real_time,
     )
-    return Assembled(flight, context, trace, dead_time_watch, memory, ladder, reporter, changes)

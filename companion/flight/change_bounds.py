@@ -1,4 +1,4 @@
-"""Bounds of a change in flight, beside the types and ranges of the keys."""
+"""Bounds of a change in flight, in addition to the types and ranges of the keys."""
 
 from math import inf
 
@@ -9,18 +9,18 @@ from companion.control.retuning import value_in_effect
 from companion.files.yaml_file import ConfigError
 
 LARGEST_FACTOR = 3.0
-"""A change may multiply or divide a value by this at most."""
+"""Largest factor by which a change may multiply or divide a value."""
 _LEAST = {"limits.max_tilt_deg": 5.0, "limits.max_tilt_rate_deg_s": 20.0}
-"""With less tilt or tilt rate the vehicle cannot hold its position in wind."""
+"""Smallest values in flight; with less tilt or tilt rate the vehicle cannot hold against wind."""
 _NEVER_ZERO = frozenset(
     {"planner.yaw_gain_per_s", "guidance.height_gain_per_s", "guidance.climb_gain_per_s"}
 )
-"""Gains without which nothing controls yaw or height."""
+"""Gains that must not be 0, because yaw or height would be uncontrolled."""
 _BANDWIDTH = "guidance.disturbance_bandwidth_rad_s"
 _WITHOUT_EFFECT = frozenset(
     {"guidance.position_weight_per_s4", "guidance.velocity_weight_per_s2", _BANDWIDTH}
 )
-"""`identify` flies with its own weights and bandwidth."""
+"""Keys without effect in `identify`, which has its own weights and bandwidth."""
 
 
 def require_moderate(before: Config, after: Config, name: str) -> None:
@@ -29,12 +29,12 @@ def require_moderate(before: Config, after: Config, name: str) -> None:
     Args:
         before: the configuration now.
         after: the wanted one; it differs in keys that may change in flight.
-        name: names the change in error messages.
+        name: name of the change in error messages.
 
     Raises:
-        ConfigError: a value changes by more than `LARGEST_FACTOR`, becomes too small to control
-            the vehicle, or cannot change in this flight.
-        ValueError: no weights follow from the configuration.
+        ConfigError: a value changes by more than `LARGEST_FACTOR`, becomes too small to control the
+            vehicle, or cannot change in this flight.
+        ValueError: weights cannot be computed from the configuration.
     """
     for each in differences(before, after):
         if (each.section, each.key) not in changeable():
@@ -45,7 +45,7 @@ def require_moderate(before: Config, after: Config, name: str) -> None:
 
 
 def _why_not(before: Config, after: Config, change: Difference) -> str | None:
-    """Why a key must not change so, as a sentence; None: it may."""
+    """Why this change is not permitted, as a sentence; None: it is."""
     key = change.name
     if key in _WITHOUT_EFFECT and flies_identify(before):
         return f"{key} has no effect while the maneuver `identify` is flown"

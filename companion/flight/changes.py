@@ -1,4 +1,4 @@
-"""Changes of gains, weights and limits in flight: checked, slewed, undone, recorded."""
+"""Changes of gains, weights and limits in flight: they are checked, slewed, undone and recorded."""
 
 import asyncio
 from collections.abc import Callable, Iterator
@@ -20,20 +20,20 @@ from companion.recording.recorder import FlightRecorder
 from companion.safety.actions import internal
 
 _MOST = 200
-"""Number of changes that can be undone; older ones are kept."""
+"""Number of changes that can be undone; older ones stay in force."""
 
 
 class ChangeRefusedError(Exception):
-    """A change is not made; the message is a sentence for the user."""
+    """A change was refused; the message is a sentence for the user."""
 
 
 class Change(NamedTuple):
     """A change that was made.
 
     Attributes:
-        time: when it began, s on our clock.
+        time: time when it began, s on our clock.
         by: who made it, such as "the live page".
-        keys: what it changed.
+        keys: changed keys.
     """
 
     time: float
@@ -44,13 +44,13 @@ class Change(NamedTuple):
         return f"changed by {self.by}: {', '.join(map(str, self.keys))}"
 
     def as_dict(self, began: float) -> dict[str, Any]:
-        """For JSON; its time counts from `began`, s on our clock."""
+        """The change for JSON; its time counts from `began`, s on our clock."""
         keys = {each.name: [each.before, each.after] for each in self.keys}
         return {"time_s": round(self.time - began, 3), "by": self.by, "keys": keys}
 
 
 class Changes:
-    """The values that may change in flight: with which the flight began, and as they are now.
+    """The values that may change in flight: those at the start of the flight, and the present ones.
 
     A change passes the checks that the configuration passed at the start. It takes effect in small
     steps on the event loop, between samples. Monitors, fence and deadman keep their limits.
@@ -58,8 +58,8 @@ class Changes:
     Attributes:
         wanted: the configuration after the newest change.
         made: all changes, in order.
-        flown: the configuration in the record of the flight: as it was when the flight began.
-        note: shows a change while no flight goes on.
+        flown: configuration in the record of the flight: the one at its start.
+        note: shows a change while there is no flight.
         on_change: called with `wanted` after each change.
 
     Args:
@@ -96,18 +96,18 @@ class Changes:
         return tuple(self.made[self._made_before :])
 
     def begin_flight(self) -> Config:
-        """A flight begins: returns the configuration that it begins with, for its record."""
+        """Begin a flight; return the configuration at its start, for its record."""
         self.flown, self._made_before = self.wanted, len(self.made)
         return self.flown
 
     def change(self, values: Values, by: str) -> str:
-        """Begin to change to these values; returns what changes, in words.
+        """Begin to change to these values; return the change in words.
 
-        While another change still takes effect, both together must not be too large.
+        If another change is still under way, both together must not be too large.
 
         Raises:
-            ChangeRefusedError: a key must not change in flight, a value is not valid, or the
-                change is too large. Nothing has changed.
+            ChangeRefusedError: a key must not change in flight, a value is not valid, or the change
+                is too large. Nothing is changed.
         """
         try:
             wanted = changed_in_flight(self._start, self.wanted, values, by)
@@ -124,10 +124,10 @@ class Changes:
         return told
 
     def undo(self, by: str) -> str:
-        """Begin to go back to the values before the newest change; returns what changes, in words.
+        """Begin to return to the values before the newest change; return the change in words.
 
         Raises:
-            ChangeRefusedError: nothing was changed.
+            ChangeRefusedError: there is nothing to undo, or the change is refused.
         """
         if not self._earlier:
             raise ChangeRefusedError(f"{by}: there is no change to undo")
@@ -138,11 +138,11 @@ class Changes:
 
     @contextmanager
     def limited_by(self, refuses: Callable[[Config, Config], str | None]) -> Iterator[None]:
-        """Ask `refuses` about each change and each undo while the block runs.
+        """Let `refuses` judge each change and each undo while the block runs.
 
         Args:
-            refuses: called with the configuration now and the wanted one; returns why the change
-                is refused, as a sentence, or None.
+            refuses: called with the present configuration and the wanted one; returns why the
+                change is refused, as a sentence, or None.
         """
         self._refuses = refuses
         try:
@@ -154,10 +154,10 @@ class Changes:
     def applied_by(
         self, retuning: Retuning, note: Callable[[str], None], record: FlightRecorder | None
     ) -> Iterator[None]:
-        """Let changes take effect in these loops while the block runs, those before it at once.
+        """Apply changes to these loops while the block runs; earlier changes are applied at once.
 
         Args:
-            retuning: of the loops.
+            retuning: applies values to the loops.
             note: shows a change, and records it in words.
             record: records the values for a replay, or None.
         """
@@ -177,7 +177,7 @@ class Changes:
             self.note = outside
 
     def step(self, now: float) -> None:
-        """Go on with a change that is under way; the guidance loop calls this at each step."""
+        """Continue a change that is under way; the guidance loop calls this at each step."""
         if self._retuning is None:
             return
         try:
@@ -189,10 +189,10 @@ class Changes:
             self.note(internal(error))
 
     def _begin(self, wanted: Config, by: str) -> str:
-        """Begin the way from the present values to `wanted`.
+        """Begin to move from the present values to `wanted`.
 
         Raises:
-            ChangeRefusedError: these loops cannot change, or nothing differs.
+            ChangeRefusedError: these loops cannot change, or the values are equal.
         """
         fixed = fixed_because(self._start)
         if fixed is not None:
@@ -220,7 +220,7 @@ class Changes:
         return str(change)
 
     def _record_change(self, before: Config, *, at_once: bool) -> None:
-        """Record for a replay what changes now."""
+        """Record the present change for a replay."""
         if self._record is not None:
             values: dict[str, dict[str, Any]] = {}
             for each in differences(before, self.wanted):

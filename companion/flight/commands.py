@@ -1,6 +1,7 @@
-"""Commands to a vehicle that a pilot or another station may take at any moment.
+"""Commands to a vehicle that a pilot or another station may take over at any moment.
 
-Every command of a flight goes through `command_if_ours`, which checks first whose vehicle it is.
+Every command of a flight goes through `command_if_ours`, which first checks who controls the
+vehicle.
 """
 
 import asyncio
@@ -17,13 +18,13 @@ _TRIES = 4
 _SHOWS = 3.0
 """Longest time from a command to its effect, s; a take-off takes longer than a mode change."""
 _ENTERED = 1.0
-"""A mode that was accepted and does not show within this time was left again, s."""
+"""An accepted mode that is not reported within this time was left again, s."""
 _OFFBOARD = frozenset({Role.OFFBOARD})
 
 Done = Callable[[], bool]
 """Returns whether the vehicle does what was commanded; may raise `FlightEnded` instead."""
 Ours = Callable[[], None]
-"""Raises `FlightEnded` where the vehicle is not ours to command, for example `in_roles`."""
+"""Raises `FlightEnded` if we must not command the vehicle; for example `in_roles`."""
 
 
 def roles_of(link: Link) -> frozenset[Role]:
@@ -59,14 +60,14 @@ def in_roles(link: Link, allowed: Set[Role]) -> Ours:
 
 
 async def command_if_ours(context: FlightContext, command: Command, ours: Ours, done: Done) -> None:
-    """Send a command until it is answered; before each try, check whose vehicle it is.
+    """Send a command until it is answered; before each try, check who controls the vehicle.
 
     A command is never repeated blindly. The vehicle may have obeyed the first one whose answer was
     lost, and a pilot may have taken over since.
 
     Args:
-        context: of the flight.
-        command: to send.
+        context: context of the flight.
+        command: command to send.
         ours: called before each try; if it raises, nothing is sent.
         done: see `Done`; called before a repetition.
 
@@ -98,10 +99,11 @@ async def command_if_ours(context: FlightContext, command: Command, ours: Ours, 
 
 
 async def change_mode(context: FlightContext, command: Command, ours: Ours, done: Done) -> None:
-    """Send a mode command as `command_if_ours` does, and wait until the mode shows.
+    """Send a mode command like `command_if_ours`, and wait until the mode is reported.
 
     Raises:
-        FlightEnded: also if the mode was accepted and somebody left it again at once.
+        FlightEnded: somebody else has the vehicle, or left the accepted mode at once.
+        CommandRefused, CommandTimeout: see `command_if_ours`.
     """
     await command_if_ours(context, command, ours, done)
     accepted = asyncio.get_running_loop().time()
@@ -126,12 +128,12 @@ async def leave_offboard(
 ) -> None:
     """Ask a vehicle that stands disarmed in offboard to hold, because it could not be armed again.
 
-    When PX4 disarms, it returns to the last mode that its user chose. After a landing that began
-    in OFFBOARD, that is OFFBOARD, where its pre-arm checks fail without setpoints (measured). They
+    When PX4 disarms, it returns to the last mode that its user chose. After a landing that began in
+    OFFBOARD, that is OFFBOARD, where its pre-arm checks fail without setpoints (measured). They
     also fail in AUTO.LAND. Other modes and armed vehicles are left alone.
 
     Args:
-        context: of the flight.
+        context: context of the flight.
         cannot_arm_in: roles of the modes to leave.
 
     Raises:

@@ -3,10 +3,11 @@
 import asyncio
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from companion.config import Config
+from companion.config.known_drag import KnownDrag
 from companion.control.control_loop import ControlLoop
 from companion.control.ground_contact import GroundContact
 from companion.control.guidance_loop import GuidanceLoop
@@ -20,7 +21,7 @@ from companion.vehicle.link import Link
 from companion.vehicle.records import LocalPosition
 
 SLOWEST_HEARTBEAT = 3.0
-"""An older mode is unknown, s; applies until the checks have measured the heartbeat rate."""
+"""Largest age of a known mode, s, until the checks have measured the heartbeat rate."""
 
 _POLL = 0.02
 """Period with which a condition is checked, s; telemetry is slower."""
@@ -37,13 +38,14 @@ class FlightContext:
     """The parts of one flight, and the state that its phases share.
 
     Attributes:
-        detail: what the running phase waits for now, shown to the user.
+        known_drag: knowledge of the vehicle's drag when the checks ended.
+        detail: what the running phase waits for, shown to the user.
         rate_hz: rate of setpoints over the maneuvers, Hz.
-        heartbeat_limit: an older mode is unknown, s; the checks set it from the heartbeat rate.
+        heartbeat_limit: largest age of a known mode, s; the checks set it from the heartbeat rate.
         mode_at_checks: the mode when the checks ended; another one before arming is a takeover.
         arm_sent: whether we commanded arming.
-        fence_centre: of an earlier flight, where the vehicle has not been disarmed since; None: the
-            fence is centred where control begins.
+        fence_centre: centre of the fence in an earlier flight, if the vehicle has not been disarmed
+            since; None: the fence is centred where control begins.
         note: records and shows an event.
     """
 
@@ -56,6 +58,7 @@ class FlightContext:
     ground: GroundContact
     preflight: PreflightChecks
     same_vehicle: SameVehicle
+    known_drag: KnownDrag = field(default_factory=KnownDrag)
     detail: str = ""
     rate_hz: float = 0.0
     heartbeat_limit: float = SLOWEST_HEARTBEAT
@@ -65,7 +68,7 @@ class FlightContext:
     note: Callable[[str], None] = lambda _: None
 
     def release(self) -> None:
-        """Stop answering samples: from here on no setpoint is sent."""
+        """Stop answering samples; no setpoint is sent after this."""
         self.loop.on = False
         self.loop.offboard_active = self.loop.taking_over = False
         self.guidance_loop.stand_by()
@@ -80,8 +83,9 @@ class FlightContext:
     async def fresh_heartbeat(self) -> None:
         """Wait for a heartbeat that left the vehicle after this call.
 
-        After a stall of ours, frames from the backlog look new. So we request a heartbeat: the one
-        after the answer is fresh. Without an answer, one that comes after `_BACKLOG` is fresh.
+        After a stall of our process, frames from the backlog look new. So we request a heartbeat.
+        The heartbeat after the answer is fresh; without an answer, a heartbeat after `_BACKLOG` is
+        fresh.
         """
         loop = asyncio.get_running_loop()
         since = loop.time() + _BACKLOG

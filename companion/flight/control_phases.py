@@ -28,12 +28,12 @@ _OURS = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
 
 
 async def maneuvers(context: FlightContext) -> None:
-    """Fly the flight's maneuvers to their end, or until they are given up."""
+    """Fly the flight's maneuvers to their end, or until guidance gives them up."""
     await fly_maneuvers(context, context.maneuvers)
 
 
 async def fly_maneuvers(context: FlightContext, sequence: ManeuverSequence) -> None:
-    """Fly `sequence` to its end, or until it is given up."""
+    """Fly `sequence` to its end, or until guidance gives it up."""
     now = asyncio.get_running_loop().time
     began = now()
 
@@ -47,7 +47,7 @@ async def fly_maneuvers(context: FlightContext, sequence: ManeuverSequence) -> N
 
 
 async def fly_commanded(context: FlightContext, source: Source) -> None:
-    """Fly what another program commands until it ends its control, then hold here."""
+    """Fly the commands of another program until it ends its control, then hold the position."""
     await _fly(context, source, lambda: f"commanded by {source.name}")
     context.guidance_loop.hold_here()
 

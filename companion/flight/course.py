@@ -1,4 +1,4 @@
-"""What a flight that is over says of its course: phases, where it ended, what to set."""
+"""What the report of a finished flight says of its course: phases, its end, advice on keys."""
 
 import asyncio
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from companion.recording.trace import ManeuverMark
 
 
 def advice(assembled: Assembled, dead_times: DeadTimes) -> tuple[str, ...]:
-    """What differs from the configuration and which key to set, one sentence each."""
+    """Advice: what differs from the configuration and which key to set, one sentence each."""
     guidance_loop = assembled.context.guidance_loop
     warnings = (
         guidance_loop.learning.mismatch_warning(),
@@ -42,13 +42,13 @@ def course_of(
     result: str,
     advised: tuple[str, ...],
 ) -> Course:
-    """The course of a flight that is over.
+    """The course of a finished flight.
 
     Args:
-        assembled: what has flown.
-        phases: when each began, s on our clock, and its name.
-        result: of the flight.
-        advised: its `advice`.
+        assembled: the flight.
+        phases: begin (s on our clock) and name of each phase.
+        result: result of the flight.
+        advised: advice of the flight; see `advice`.
     """
     flight, context, reporter = assembled.flight, assembled.context, assembled.reporter
     state, began, config = context.link.state, flight.began, context.config
@@ -94,7 +94,7 @@ def _early_end(
     breaches: dict[str, str],
     result: str,
 ) -> EarlyEnd:
-    """`time` and `takeoff` in s since the flight began."""
+    """The end of a flight that ended early; `time` and `takeoff` in s since the flight began."""
     name, into = None, None
     if phase == "maneuvers":
         for mark in marks:  # a hold may have ended the maneuver before the flight ended

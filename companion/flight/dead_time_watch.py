@@ -1,4 +1,4 @@
-"""Measures the dead time of the body rates during the flight and over all of it."""
+"""Measures the dead time of the body rates, repeatedly in flight and once over the whole flight."""
 
 from collections import deque
 from collections.abc import Callable
@@ -15,13 +15,13 @@ from companion.recording.trace import FlightTrace
 from companion.safety.actions import internal
 
 _PERIOD = 2.0
-"""Time between two measurements, s; each is of one axis, in turn."""
+"""Time between two measurements, s; the axes take turns."""
 _PERIODS = 4
-"""Each measurement is over this number of periods; the first one is a period shorter."""
+"""Length of a measurement in these periods; the first one is a period shorter."""
 _UNSURE = 1.5
-"""The rows of the newest time, s, are not used: the autopilot may have left offboard already."""
+"""Rows newer than this are not used, s: the autopilot may already have left offboard."""
 _LONGEST = 75_000
-"""The measurement at the end takes this many of the newest rows at most: 5 min at 250 Hz."""
+"""Largest number of rows for the measurement after the flight: 5 min at 250 Hz."""
 _AXES = ("roll", "pitch", "yaw")
 _COMMANDED, _MEASURED, _AGE = 2, 6, 9
 """Columns of `FlightTrace.rates`: first commanded rate, first measured rate, sample age."""
@@ -31,10 +31,10 @@ class RateLoop(NamedTuple):
     """Configured response of one axis to body rates; None where not configured.
 
     Attributes:
-        lag: s.
-        dead_time: s.
-        acceleration_limit: rad/s².
-        damping: of a second-order lag; None: first order.
+        lag: lag, s.
+        dead_time: dead time, s.
+        acceleration_limit: slew limit, rad/s².
+        damping: damping ratio of a second-order lag; None: first order.
     """
 
     lag: float | None = None
@@ -55,14 +55,14 @@ def rate_loops(config: Config) -> tuple[RateLoop, RateLoop, RateLoop]:
 class DeadTimeWatch:
     """Correlates commanded and measured rates, and warns once if the configuration is wrong.
 
-    It measures right after an answer has left, when the pause until the next sample is longest. A
+    It measures right after a setpoint was sent, when the time until the next sample is longest. A
     measurement takes 1 ms (2 to 3 ms with an acceleration limit); in a thread it could delay a
     sample by 5 ms.
 
     Args:
         trace: the flight's rows.
-        rate_loops: of roll, pitch and yaw.
-        note: takes the warning.
+        rate_loops: responses of roll, pitch and yaw.
+        note: called with the warning.
     """
 
     def __init__(

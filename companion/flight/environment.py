@@ -1,10 +1,11 @@
-"""What a flight gets from the computer that it runs on; tests give it something else."""
+"""What a flight takes from its computer; tests replace it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter_ns
 
 from companion.mavlink.transport.opening import OpenTransport, open_transport
+from companion.recording.mcap_file.batch import SendBatch
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,13 +16,16 @@ class Environment:
 
     Attributes:
         open_transport: opens the link's transport.
-        clock_ns: measures latencies; transports stamp arrivals by the same clock, ns.
+        clock_ns: clock for latencies and for the arrival stamps of transports, ns.
         realtime: whether the section `realtime` is requested from the operating system.
+        stream: takes the messages that the flight records, in batches, in the recording thread;
+            None: nothing does.
     """
 
     open_transport: OpenTransport = open_transport
     clock_ns: Callable[[], int] = perf_counter_ns
     realtime: bool = True
+    stream: SendBatch | None = None
 
 
 THIS_COMPUTER = Environment()

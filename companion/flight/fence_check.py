@@ -1,8 +1,8 @@
-"""Checks before the flight that a maneuver stays so far inside the fence that no monitor stops it.
+"""Checks before the flight that a maneuver keeps a distance to the fence that triggers no monitor.
 
 `Fence.stop_breach` judges each moment of the reference with the monitor's formula. `MARGIN` allows
-for the tracking error. So the monitor does not stop an accepted reference that is followed within
-the margin.
+for the tracking error. A vehicle that follows an accepted reference within this margin triggers no
+monitor.
 """
 
 from dataclasses import dataclass, replace
@@ -30,8 +30,9 @@ class FenceCheck:
 
     Attributes:
         fence: the fence that the monitors watch in flight.
-        height: where control begins, above home, m.
-        origin: where control begins, or None; without it a fence on the map is not checked.
+        height: height above home where control begins, m.
+        origin: geographic position where control begins, or None; then a fence on the map is not
+            checked.
     """
 
     fence: Fence
@@ -39,11 +40,12 @@ class FenceCheck:
     origin: Place | None = None
 
     def __call__(self, motion: Motion) -> Violation | None:
-        """The worst violation, or None; slowing down helps only if the braking distance is it."""
+        """The worst violation, or None; says whether a slower motion would avoid it."""
         worst = self._worst(motion)
         if worst is None:
             return None
-        still = replace(motion, velocity=np.zeros_like(motion.velocity))
+        nothing = np.zeros_like(motion.velocity)
+        still = replace(motion, velocity=nothing, acceleration=nothing)
         place = self._worst(still)
         time, found = worst if place is None else place
         begins = self._begins(motion if place is None else still, time)
@@ -53,7 +55,9 @@ class FenceCheck:
 
     def _worst(self, motion: Motion) -> tuple[float, Breach] | None:
         """The worst breach and its time, s."""
-        columns = self.fence.stop(_columns(motion.position), _columns(motion.velocity))
+        columns = self.fence.stop(
+            _columns(motion.position), _columns(motion.velocity), _level(motion.acceleration)
+        )
         stops = np.stack(columns, axis=1)
         broken = [
             (motion.times[k], found)
@@ -82,7 +86,9 @@ class FenceCheck:
             fence = Fence(
                 fence.radius, fence.ceiling, fence.floor, (), (), fence.deceleration, fence.reaction
             )
-        return fence.stop_breach(offset, velocity, self.height - offset[2], self.origin, MARGIN)
+        north, east, _ = _vector(motion.acceleration[k])
+        height = self.height - offset[2]
+        return fence.stop_breach(offset, velocity, height, self.origin, MARGIN, (north, east))
 
     def _begins(self, motion: Motion, worst: float) -> float:
         """Time of the first breach, s."""
@@ -115,6 +121,10 @@ def _remedy(brakes: bool) -> str:
 
 def _columns(vectors: Floats) -> tuple[Floats, Floats, Floats]:
     return vectors[:, 0], vectors[:, 1], vectors[:, 2]
+
+
+def _level(vectors: Floats) -> tuple[Floats, Floats]:
+    return vectors[:, 0], vectors[:, 1]
 
 
 def _vector(row: Floats) -> Vector:

@@ -19,22 +19,22 @@ AskLanding = Callable[[], Coroutine[Any, Any, bool]]
 
 _WATCH_PERIOD, _TELL_PERIOD = 0.02, 1.0
 _ATTEMPTS = 5
-"""Number of times the checks run, when another vehicle may have come meanwhile."""
+"""Number of times the checks run if another vehicle may have come meanwhile."""
 
 
 class Flight:
     """Runs the phases in order; the first failure ends the flight and selects the exit.
 
     Attributes:
-        began: when, s on our clock.
+        began: time when the flight began, s on our clock.
         phase: the running phase.
         failed_in: the phase that failed, or None.
-        events: each as (time in s since the flight began, text).
+        events: (time since the flight began, s; text) of each event.
 
     Args:
-        context: of the flight.
-        plan: tells the phases.
-        watch: judges while the phases run.
+        context: context of the flight.
+        plan: provides the phases.
+        watch: runs the safety monitors beside the phases.
         observer: receives phases and events.
         ask_landing: asks the user, after an interrupt when the vehicle holds, whether to land.
     """
@@ -87,9 +87,9 @@ class Flight:
             self._end.set_result(ended)
 
     def fail(self, error: Exception) -> None:
-        """End the flight after an exception beside the phases.
+        """End the flight after an exception outside the phases.
 
-        An exit that is under way continues without our stream, which may have caused the fault.
+        An exit that is under way continues without our setpoints, which may have caused the fault.
         """
         reason = internal(error)
         if self.failed_in is None:
@@ -100,7 +100,7 @@ class Flight:
             self.note(reason)
 
     def interrupt(self, reason: str) -> None:
-        """End the flight for the user: hold if we fly, else exit as the phase requires.
+        """End the flight for the user: hold if we fly, else leave by the exit of the phase.
 
         An exit that is under way continues. While the user is asked whether to land, an interrupt
         answers no.

@@ -1,4 +1,4 @@
-"""The files of one flight: its configuration, `.tlog` and `.mcap`, and its summary."""
+"""The files of one flight: configuration, `.tlog`, `.mcap`, and summary."""
 
 import asyncio
 import time
@@ -26,19 +26,19 @@ from companion.recording.tlog import TlogWriter
 class FlightFiles:
     """Records one flight. Use it as a context manager around the flight, inside the event loop.
 
-    `config.yaml` is written at the beginning, `flight.tlog` and `flight.mcap` meanwhile, the
-    summary by `save`.
+    `config.yaml` is written at the beginning, `flight.tlog` and `flight.mcap` during the flight,
+    and the summary by `save`.
 
     Args:
-        config: of the flight.
-        folder: an existing one for the files; None: nothing is written.
-        environment: of the flight.
-        note: takes a failure of the recording.
+        config: configuration of the flight.
+        folder: existing folder for the files; None: nothing is written.
+        environment: environment of the flight.
+        note: called with a failure of the recording.
         follows: whether the maneuvers of the configuration are flown.
 
     Attributes:
-        folder: as the argument.
-        tap: writes frames down, or None if they are not recorded.
+        folder: folder of the files, or None.
+        tap: records frames; None if they are not recorded.
         mcap: records the flight, or None.
 
     Raises:
@@ -56,6 +56,7 @@ class FlightFiles:
     ) -> None:
         self._config, self.folder, self._note = config, folder, note
         self._counted: dict[str, int] = {}
+        self._ended = 0.0
         self._failed = self._opened = False
         self.tap: TlogWriter | None = None
         self.mcap: FlightRecorder | None = None
@@ -73,7 +74,12 @@ class FlightFiles:
 
             self.tap = TlogWriter(folder / "flight.tlog", epoch, on_failure)
             self.mcap = FlightRecorder(
-                folder / "flight.mcap", epoch, loop.time, on_failure, on_bad_entry
+                folder / "flight.mcap",
+                epoch,
+                loop.time,
+                on_failure,
+                on_bad_entry,
+                environment.stream,
             )
 
     def open(self) -> None:
@@ -105,13 +111,13 @@ class FlightFiles:
                 file.close()
 
     def _tell_failure(self, text: str) -> None:
-        """Tell once that the recording has stopped: a full disk stops both files."""
+        """Report once that the recording has stopped; a full disk stops both files."""
         if not self._failed:
             self._failed = True
             self._note(text)
 
     def recorder(self, observer: Observer) -> EventRecorder:
-        """Passes phases and events on, and records them; in the `.tlog` as STATUSTEXT of ours."""
+        """An observer that passes on and records phases and events; STATUSTEXT in the `.tlog`."""
         clock, texts = asyncio.get_running_loop().time, TextFrames(self._config.link.source_system)
 
         def write(words: str) -> None:
@@ -124,7 +130,7 @@ class FlightFiles:
         return EventRecorder(observer, clock, write, self.mcap)
 
     def begin_counting(self, stats: LinkStats) -> None:
-        """Count the link's frames from now on, where the link was open before the flight."""
+        """Count the link's frames from now on, if the link was already open."""
         self._counted = _counters(stats)
 
     def summary(
@@ -135,14 +141,14 @@ class FlightFiles:
         result: str,
         grants: tuple[realtime.Grant, ...],
     ) -> Summary:
-        """The summary of a flight that is over, while its log is still open.
+        """The summary of a finished flight whose log is still open.
 
         Args:
-            stats: of its link.
-            assembled: what has flown.
-            recorder: has kept the phases.
+            stats: counters of its link.
+            assembled: the flight.
+            recorder: has recorded the phases.
             result: "ok", or the reason why it ended early.
-            grants: real-time settings that were requested.
+            grants: which requested real-time settings were granted.
         """
         flight, trace = assembled.flight, assembled.trace
         dead_times = assembled.dead_time_watch.over_the_flight()
@@ -153,6 +159,7 @@ class FlightFiles:
             flight.events.append((asyncio.get_running_loop().time() - flight.began, text))
             recorder.write(text)
         assembled.memory.save()
+        self._ended = asyncio.get_running_loop().time() - flight.began
         return Summary(
             result=result,
             phase=(flight.failed_in or flight.phase).name,
@@ -174,10 +181,14 @@ class FlightFiles:
     def save(self, summary: Summary) -> Summary:
         """Write `summary.json`, once the log is closed; return the summary.
 
-        If it cannot be written, or the disk does not answer in time, that is noted.
+        A write that fails or takes too long is noted as an event.
         """
         dropped = sum(file.dropped for file in (self.tap, self.mcap) if file is not None)
-        whole = replace(summary, link={**summary.link, "not_recorded": dropped})
+        events = list(summary.events)
+        failures = [file.failure for file in (self.tap, self.mcap) if file and file.failure]
+        if failures and not any(text in failures for _, text in events):
+            events.append((self._ended, failures[0]))  # it was found when the files were closed
+        whole = replace(summary, link={**summary.link, "not_recorded": dropped}, events=events)
         folder = self.folder
         if folder is None:
             return whole

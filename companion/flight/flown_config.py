@@ -1,4 +1,4 @@
-"""The configuration of a flight in the flight's own folder, with what it flies: it flies again."""
+"""Writes the configuration and trajectory of a flight to its folder, to fly it again."""
 
 import json
 import platform
@@ -17,20 +17,20 @@ from companion.flight.plan import ConfiguredPlan, Plan
 
 _NAME = "config.yaml"
 _TRAJECTORY = "trajectory"
-"""Folder of the copy of the trajectory's file, and of the table that it names."""
+"""Folder for the copies of the trajectory's file and of the table it names."""
 _TABLE = "table.csv"
 
 
 def record(config: Config, folder: Path, *, follows: bool = True) -> None:
     """Write `config.yaml` to the folder of a flight, and copy the trajectory's file there.
 
-    The keys of included files stand in it. Other files that it names stay where they are, a signing
-    key among them, and are named by their whole path.
+    The file contains the keys of included files. Other files, such as a signing key, are not
+    copied; they are named by their absolute path.
 
     Args:
-        config: of the flight; its trajectory can be read.
-        folder: of the flight.
-        follows: whether the maneuvers of the configuration are flown, its trajectory among them.
+        config: configuration of the flight; its trajectory can be read.
+        folder: folder of the flight.
+        follows: whether the maneuvers of the configuration are flown, including its trajectory.
 
     Raises:
         OSError: a file cannot be read or written.
@@ -47,7 +47,7 @@ def record(config: Config, folder: Path, *, follows: bool = True) -> None:
 
 
 def description(config: Config, plan: Plan, *, real_time: bool) -> dict[str, str]:
-    """The metadata "flight" of a recorded flight, except when it began."""
+    """The metadata "flight" of a recorded flight, without the time when it began."""
     limits, deadman = config.limits, config.deadman
     seed = None if config.mock is None else config.mock.get("seed")
     return {
@@ -69,7 +69,7 @@ def description(config: Config, plan: Plan, *, real_time: bool) -> dict[str, str
 
 
 def flat(section: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
-    """The keys of a configuration as `section.key`, and their values as JSON."""
+    """Flatten a configuration: `section.key` -> value as JSON."""
     found: dict[str, str] = {}
     for key, value in section.items():
         if isinstance(value, dict):
@@ -92,7 +92,7 @@ def copy_trajectory(path: Path, folder: Path) -> str:
     """Copy a trajectory's file, and the table that it names, to a new folder.
 
     Returns:
-        the name of the copy.
+        The name of the copy.
 
     Raises:
         ConfigError: the file holds no trajectory.

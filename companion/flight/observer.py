@@ -1,4 +1,4 @@
-"""Who is told about a flight, and the log of the vehicle's state changes."""
+"""Observers of a flight, and the log of the vehicle's state changes."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -10,7 +10,7 @@ from companion.vehicle.state import VehicleState
 
 
 class Observer(Protocol):
-    """Receives what happens, in order; every method must return at once."""
+    """Receives the events of a flight in order; every method must return at once."""
 
     def phase(self, name: str, waits_for: str) -> None:
         """A phase began."""
@@ -46,10 +46,10 @@ class Silent:
 
 
 class Several:
-    """Passes all on to several observers, in order.
+    """Passes everything to several observers, in order.
 
     Args:
-        observers: who is told.
+        observers: the observers.
     """
 
     def __init__(self, *observers: Observer) -> None:
@@ -77,23 +77,24 @@ class Several:
 
 
 async def decline_landing() -> bool:
-    """Answer no when asked whether to land: where nobody can be asked, the vehicle holds on."""
+    """Answer no to the question whether to land, where nobody can answer; the vehicle holds."""
     return False
 
 
 class EventRecorder:
-    """An observer that keeps the phases, writes phases and events down, and passes all on.
+    """An observer that records phases and events, and passes everything to another observer.
 
-    An observer that raises is told nothing more: it must not cost control of the vehicle.
+    After the other observer has raised an exception, it receives nothing more, because a fault in
+    it must not cost control of the vehicle.
 
     Attributes:
-        phases: (when it began, s on our clock, name) of each phase.
-        write: writes words down at the present time.
+        phases: (begin in s on our clock, name) of each phase.
+        write: function that records a text with the present time.
         file: `flight.mcap`; None: the flight is not recorded.
 
     Args:
-        observer: to which all is passed on.
-        clock: ours, s.
+        observer: the other observer.
+        clock: our clock, s.
         write: see above.
         file: see above.
     """
@@ -112,7 +113,7 @@ class EventRecorder:
         self._clock = clock
 
     def phase(self, name: str, waits_for: str) -> None:
-        """Keep, write and pass on."""
+        """Keep, record and pass on."""
         self.phases.append((self._clock(), name))
         self.write(f"phase: {name}")
         if self.file is not None:
@@ -125,15 +126,15 @@ class EventRecorder:
 
     @property
     def wants_status(self) -> bool:
-        """Whether the observer does something with the status, which takes time to put together."""
+        """Whether the observer uses the status, which takes time to compute."""
         return type(self._observer).status is not Silent.status
 
     def status(self, status: FlightStatus) -> None:
-        """Pass on; the caller notes what the observer raises, and asks no more."""
+        """Pass on; the caller notes an exception of the observer, and passes no more."""
         self._observer.status(status)
 
     def event(self, time: float, text: str) -> None:
-        """Write and pass on."""
+        """Record and pass on."""
         self.write(text)
         self._tell(lambda observer: observer.event(time, text))
 
@@ -146,11 +147,11 @@ class EventRecorder:
 
 
 class StateLogger:
-    """Notes each change of mode, arming state and STATUSTEXT as an event.
+    """Records each change of mode and arming state, and each STATUSTEXT, as an event.
 
     Args:
-        state: of the vehicle.
-        note: takes each change as a sentence.
+        state: telemetry of the vehicle.
+        note: called with each change as a sentence.
     """
 
     def __init__(self, state: VehicleState, note: Callable[[str], None]) -> None:

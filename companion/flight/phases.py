@@ -16,7 +16,7 @@ _STANDING = frozenset({Role.READY})
 _AIRBORNE = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD})
 _UNDER_CONTROL = frozenset({Role.OFFBOARD})
 _GRACE = 10.0
-"""Time allowed beyond the duration of maneuvers, s."""
+"""Time that the maneuvers may take beyond their duration, s."""
 _SHORT = 10.0
 """Timeout for commands that the autopilot carries out at once or not at all, s."""
 _TAKE_OVER = 15.0
@@ -34,13 +34,13 @@ class Phase:
         name: shown to the user.
         waits_for: the condition it waits for, shown to the user.
         work: the coroutine of the phase.
-        timeout: after this time the phase has failed, s; infinite for one without end.
+        timeout: time after which the phase has failed, s; may be infinite.
         on_failure: the exit if the phase fails.
-        on_failure_landed: the exit while the vehicle still stands on the ground, if it differs.
+        on_failure_landed: the exit if the vehicle still stands on the ground; None: `on_failure`.
         modes: roles of the allowed modes; any other mode is a takeover, and an unknown mode counts
             like one. Empty: any mode.
-        monitored: whether the safety monitors may end it. An exit is not monitored, because the
-            breach that caused it would end it too.
+        monitored: whether the safety monitors may end the phase. An exit is not monitored, because
+            the breach that caused it would end it too.
     """
 
     name: str
@@ -60,7 +60,7 @@ class Phase:
 
 
 def ground_phases(config: FlightConfig) -> tuple[Phase, ...]:
-    """The phases in which the vehicle is asked for nothing but telemetry, in order."""
+    """The phases before any command to the vehicle, in order; they only request telemetry."""
     return (
         # A second longer than the link waits, because the link's error message says more.
         Phase("connect", "a heartbeat", preflight_phases.connect, config.connect_timeout_s + 1.0),
@@ -71,7 +71,7 @@ def ground_phases(config: FlightConfig) -> tuple[Phase, ...]:
 def flight_phases(
     config: FlightConfig, maneuver_duration: float, autopilot: Autopilot
 ) -> tuple[Phase, ...]:
-    """The phases from there on, in the autopilot's order; `maneuver_duration` in s."""
+    """The phases after the ground phases, in the autopilot's order; `maneuver_duration` in s."""
     maneuvers = Phase(
         "maneuvers",
         "the maneuver to end",
@@ -120,7 +120,7 @@ def takeover_phases(config: FlightConfig) -> tuple[Phase, ...]:
 
 
 def takeoff_for_client_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, ...]:
-    """The phases that let a vehicle take off which somebody else armed, and take it over."""
+    """The phases that take off a vehicle which somebody else armed, and take it over."""
     checks = _look_over(config, "to take off", takeover.look_over_standing, _STANDING)
     (takeoff_phase,) = (
         phase for phase in takeoff_phases(config, autopilot) if phase.name == "takeoff"
@@ -135,7 +135,7 @@ def _look_over(config: FlightConfig, ready: str, work: Work, modes: frozenset[Ro
 
 
 def _take_over_held() -> Phase:
-    """The takeover of a vehicle that holds in the air; if it fails, the autopilot holds on."""
+    """The takeover of a vehicle that holds in the air; if it fails, the autopilot keeps holding."""
     return Phase(
         "offboard",
         "the autopilot to obey our rates",
@@ -150,13 +150,13 @@ def _take_over_held() -> Phase:
 def program_phase(name: str, waits_for: str, work: Work, duration: float = inf) -> Phase:
     """A phase that a user's program asked for while the autopilot obeys our rates.
 
-    If it fails, the vehicle is handed back and holds: only the program or the pilot lands it.
+    If it fails, the vehicle is handed back and holds. Only the program or the pilot lands it.
 
     Args:
         name: shown to the user.
         waits_for: shown to the user.
         work: the coroutine of the phase.
-        duration: expected, s.
+        duration: expected duration, s.
     """
     return Phase(
         name,
@@ -186,7 +186,7 @@ def exit_phases(config: FlightConfig, exit_: Exit) -> tuple[Phase, ...]:
 
 
 def hand_back_phase() -> Phase:
-    """The autopilot holds by itself, and our setpoints stop."""
+    """The phase in which the autopilot holds by itself and our setpoints stop."""
     return Phase(
         "hand back",
         "the autopilot to hold",
@@ -208,7 +208,7 @@ def _land(config: FlightConfig) -> Phase:
 
 
 def _undo_arming() -> Phase:
-    """A refused disarming means that the vehicle flies, so the exit of this phase is to land."""
+    """The exit that disarms; its own exit is to land, as a refusal means that the vehicle flies."""
     return Phase("disarm", "the motors to stop", preflight_phases.undo_arming, _SHORT, Exit.LAND)
 
 

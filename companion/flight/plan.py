@@ -22,7 +22,7 @@ from companion.guidance.source import Source
 
 
 class Plan(Protocol):
-    """Tells the phases one by one; each is asked for when the one before has ended."""
+    """Returns the phases one by one; each is requested when the previous one has ended."""
 
     @property
     def maneuvers(self) -> ManeuverSequence:
@@ -30,15 +30,15 @@ class Plan(Protocol):
         ...
 
     def phases(self, context: FlightContext) -> AsyncGenerator[Phase, None]:
-        """The phases of the flight; asked for again when the checks must be repeated."""
+        """The phases of the flight; requested again when the checks must be repeated."""
         ...
 
 
 class ConfiguredPlan:
-    """From the ground through `flight.maneuvers` and back.
+    """The plan of `companion fly`: from the ground through `flight.maneuvers` and back.
 
     Args:
-        config: of the flight.
+        config: configuration of the flight.
 
     Raises:
         ConfigError: a maneuver cannot be flown within the limits and the fence.
@@ -58,14 +58,14 @@ class ConfiguredPlan:
 
 
 class TakeoverPlan:
-    """Takes over a vehicle that its autopilot holds in the air, flies a source, and hands it back.
+    """Takes over a vehicle that its autopilot holds in the air, flies a source, hands it back.
 
-    Nothing is armed. If the checks or the takeover fail, or the source does, the autopilot is asked
+    The program does not arm. If the checks, the takeover or the source fail, the autopilot is asked
     to hold.
 
     Args:
-        source: of the references; it decides when control ends.
-        from_ground: the vehicle stands armed; the autopilot is asked to take off first, to
+        source: source of references; it decides when control ends.
+        from_ground: True: the vehicle stands armed, and the autopilot first takes off to
             `flight.takeoff_height_m`.
     """
 
@@ -74,7 +74,7 @@ class TakeoverPlan:
         self._source, self._from_ground = source, from_ground
 
     async def phases(self, context: FlightContext) -> AsyncGenerator[Phase, None]:
-        """The checks, perhaps the take-off, the takeover, control, and the hand-back."""
+        """The phases: checks, take-off if needed, takeover, control, and hand-back."""
         config = context.config.flight
         connect, *_ = ground_phases(config)
         yield connect

@@ -1,4 +1,4 @@
-"""The preflight checks of a flight, repeated before each step towards the air."""
+"""The preflight checks of a flight, repeated before each step that leads into the air."""
 
 import asyncio
 from collections.abc import Callable, Mapping
@@ -18,9 +18,9 @@ from companion.vehicle.parameter_rules import CheckResult
 from companion.vehicle.streams import StreamRate
 
 _COUNTED_FOR = 1.0
-"""Telemetry rates are counted over this time, s, while the parameters are read."""
+"""Time over which telemetry rates are counted while the parameters are read, s."""
 _LASTS = 1.0
-"""Counted rates and read parameters are valid for this time, s."""
+"""Time for which counted rates and read parameters stay valid, s."""
 
 
 class PreflightChecks:
@@ -28,17 +28,17 @@ class PreflightChecks:
 
     A pilot may arm minutes after the checks passed. So the same checks run in the phase `checks`,
     before we arm, after anybody armed, before take-off, and before the takeover. The status is
-    always the newest; rates and parameters are taken again unless they are less than a second old.
+    always the newest. Rates and parameters are measured again if they are more than a second old.
 
     Attributes:
-        note: takes each finding that does not block the flight, once.
+        note: called once with each finding that does not block the flight.
         on_identity: called with the vehicle's identity once it is known.
 
     Args:
-        config: of the flight.
-        link: to the vehicle.
-        same_vehicle: whether it still is the checked vehicle.
-        maneuvers: a copy of those to be flown, used by the checks alone.
+        config: configuration of the flight.
+        link: link to the vehicle.
+        same_vehicle: detects a replaced vehicle.
+        maneuvers: copy of the maneuvers of the flight, used only by the checks.
     """
 
     def __init__(
@@ -55,11 +55,11 @@ class PreflightChecks:
         self._noted: set[str] = set()
 
     async def ask_for_telemetry(self) -> None:
-        """Request the telemetry that a flight needs, and report rates that are not granted.
+        """Request the telemetry that a flight needs, and report rates that the autopilot refuses.
 
         Raises:
             CommandTimeout: the autopilot did not answer.
-            LinkLost: the connection dropped meanwhile.
+            LinkLost: the connection was lost.
         """
         self._evidence = None  # the old evidence may belong to another vehicle
         wanted = wanted_rates(self._config, self._link)
@@ -71,12 +71,12 @@ class PreflightChecks:
                 )
 
     async def require(self, stage: Stage) -> Evidence:
-        """Check the vehicle for `stage`; returns the evidence.
+        """Check the vehicle for `stage`; return the evidence.
 
         Raises:
-            ChecksVoid: it may be another vehicle than was checked.
+            ChecksVoid: the vehicle may have been replaced by another one.
             FlightEnded: a finding blocks the flight.
-            LinkLost: the connection dropped meanwhile.
+            LinkLost: the connection was lost.
         """
         before = evidence = self._evidence
         if evidence is None or self._clock() - self._gathered_at > _LASTS:

@@ -1,5 +1,6 @@
-"""The phases on the ground, one coroutine each, and how arming is undone."""
+"""The phases on the ground, one coroutine each, and the exit that disarms."""
 
+from companion.config.known_drag import before_connecting, of_vehicle
 from companion.control.expected_response import gain_warning
 from companion.files.yaml_file import ConfigError
 from companion.flight.commands import (
@@ -10,7 +11,7 @@ from companion.flight.commands import (
     require_role,
 )
 from companion.flight.context import SLOWEST_HEARTBEAT, FlightContext
-from companion.flight.maneuvers import require_inside
+from companion.flight.maneuver_checks import require_inside, require_still_flyable
 from companion.guidance.fence import Place
 from companion.preflight import vehicle_checks
 from companion.preflight.evidence import Evidence, Stage
@@ -47,13 +48,14 @@ async def checks(context: FlightContext) -> None:
     if warning is not None:
         context.note(warning)
     note_heartbeat_rate(context, evidence)
-    _require_inside_map(context)
+    context.known_drag = of_vehicle(context.config, evidence.identity.uid)
+    _require_flyable_by_vehicle(context)
     report_offboard_loss(context, evidence.survey.values)
     context.mode_at_checks = context.link.state.mode
 
 
 def note_heartbeat_rate(context: FlightContext, evidence: Evidence) -> None:
-    """Set from the counted heartbeats how old the mode may be."""
+    """Set the largest age of a known mode from the counted heartbeats."""
     heartbeats = evidence.streams.get("HEARTBEAT")  # not requested from PX4, whose rate is fixed
     if heartbeats is not None and heartbeats.achieved > 0.0:
         limit = max(_SHORTEST_HEARTBEAT_LIMIT, _HEARTBEATS_MISSED / heartbeats.achieved)
@@ -139,14 +141,20 @@ def _untouched(context: FlightContext) -> None:
         )
 
 
-def _require_inside_map(context: FlightContext) -> None:
-    """Raise `FlightEnded` if a maneuver leaves a fence given in latitude and longitude."""
+def _require_flyable_by_vehicle(context: FlightContext) -> None:
+    """Check the maneuvers again, with this vehicle's drag and a fence in latitude and longitude.
+
+    Raises:
+        FlightEnded: a maneuver leaves the fence or exceeds a limit.
+    """
+    config, maneuvers, drag = context.config, context.maneuvers, context.known_drag
     told = context.link.state.global_position
-    if not context.config.safety.fence_polygon_deg or told is None:
-        return  # the checks refuse a vehicle without a position
     try:
-        place = Place(told.latitude_deg, told.longitude_deg)
-        require_inside(context.config, context.maneuvers.parts, place)
+        if drag != before_connecting(config):
+            require_still_flyable(config, maneuvers, drag)
+        if config.safety.fence_polygon_deg and told is not None:
+            place = Place(told.latitude_deg, told.longitude_deg)
+            require_inside(config, maneuvers.parts, place, drag)
     except ConfigError as error:
         raise FlightEnded(str(error)) from error
 
@@ -166,7 +174,7 @@ def _refuse(finding: Finding) -> None:
 
 
 def report_offboard_loss(context: FlightContext, values: Values) -> None:
-    """Report what the autopilot does when our setpoints stop."""
+    """Report the autopilot's reaction to the loss of our setpoints."""
     autopilot = context.link.autopilot
     failsafe = autopilot.offboard_loss_failsafe
     seconds = values.get(failsafe.parameter)

@@ -21,20 +21,20 @@ from companion.vehicle.link import Link
 
 
 class Session:
-    """Flies once. Signal handlers of the event loop may call `interrupt`, `leave` and `note`.
+    """One flight. Signal handlers of the event loop may call `interrupt`, `leave` and `note`.
 
     They end the flight, but not the session, so that the recorded data are always written.
 
     Args:
-        config: of the flight.
+        config: configuration of the flight.
         folder: an existing folder for this flight's files; None: nothing is recorded.
         observer: receives phases and events.
         ask_landing: asks the user, after an interrupt when the vehicle holds, whether to land.
-        plan: of the flight; None: as configured.
-        environment: what the flight gets from the computer.
+        plan: plan of the flight; None: the configured one.
+        environment: clocks and transports of this computer, or their replacement in tests.
 
     Attributes:
-        changes: of the values that may change in flight.
+        changes: changes of values in flight.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class Session:
         self._early_notes: list[str] = []
 
     def interrupt(self, reason: str) -> bool:
-        """Hand the vehicle back; False if there is no flight to interrupt yet."""
+        """Hand the vehicle back; return False if there is no flight to interrupt yet."""
         if self._assembled is None:
             return False
         self._assembled.flight.interrupt(reason)
@@ -77,9 +77,9 @@ class Session:
             self._assembled.flight.note(text)
 
     async def fly(self) -> Summary:
-        """Fly, and write the folder: `config.yaml`, `flight.tlog`, `flight.mcap`, `summary.json`.
+        """Fly, and write `config.yaml`, `flight.tlog`, `flight.mcap`, `summary.json` to the folder.
 
-        `companion fly --config FOLDER/config.yaml` flies the same again, from any working folder.
+        `companion fly --config FOLDER/config.yaml` repeats the flight from any working folder.
 
         Raises:
             ConfigError: a maneuver cannot be flown; nothing was sent.

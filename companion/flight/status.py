@@ -1,4 +1,4 @@
-"""The state of a flight for the screen and its record, taken ten times a second."""
+"""The state of a flight for the screen and for the record, ten times a second."""
 
 import asyncio
 from collections import deque
@@ -19,33 +19,34 @@ from companion.vehicle.records import Battery
 
 _PERIOD = 0.1
 _WINDOW = 1.0
-"""The rate of setpoints is counted over this time, s."""
+"""Time over which the rate of setpoints is counted, s."""
 
 
 class FlightStatus(NamedTuple):
     """The state of a flight at one time; None: unknown, or does not apply.
 
     Attributes:
-        time: s since the flight began.
-        airborne: s since the vehicle left the ground.
-        phase: its name.
+        time: time since the flight began, s.
+        airborne: time since the vehicle left the ground, s.
+        phase: name of the phase.
         detail: what the phase waits for.
         elapsed: time in this phase, s.
-        timeout: of this phase, s; may be infinite.
+        timeout: timeout of this phase, s; may be infinite.
         maneuver: name of the maneuver that is flown.
         maneuver_elapsed: time in this maneuver, s.
-        maneuver_duration: of this maneuver, s; None: another program ends it.
-        height: above home, m.
-        speed: m/s.
-        tilt: rad.
+        maneuver_duration: duration of this maneuver, s; None: another program ends it.
+        height: height above home, m.
+        speed: speed, m/s.
+        tilt: tilt, rad.
         error: distance from the reference, m.
-        rate: setpoints a second, Hz.
-        latency: sample in → setpoint out of the last answer, s; None in lockstep.
+        rate: rate of setpoints, Hz.
+        latency: time from the last answered sample to its setpoint, s; None in lockstep.
         missed: deadlines missed so far; None in lockstep.
-        battery: of the vehicle.
-        monitored: whether the safety monitors judge now.
+        battery: battery of the vehicle.
+        monitored: whether the safety monitors are active.
         alarms: names of the safety monitors whose alarm is raised.
-        view: attitude, target, motion, reference and more, for a picture; see `flight.view`.
+        view: values for a picture, such as attitude, target, motion and reference; see
+            `flight.view`.
     """
 
     time: float
@@ -75,8 +76,8 @@ class PhaseNow(NamedTuple):
 
     Attributes:
         name: shown to the user.
-        timeout: s.
-        monitored: whether the safety monitors judge in it.
+        timeout: timeout, s.
+        monitored: whether the safety monitors are active in it.
         entered: when it began, s on our clock.
     """
 
@@ -90,19 +91,19 @@ class StatusReporter:
     """Records the motion in all phases, and shows the state of the flight.
 
     Attributes:
-        takeoff: when the vehicle left the ground, s on our clock; None: it has not.
-        battery_at_takeoff: share that was left then, or None.
-        real_time: see below.
+        takeoff: time when the vehicle left the ground, s on our clock; None: it has not.
+        battery_at_takeoff: remaining charge at that time, 0..1, or None.
+        real_time: as the argument.
 
     Args:
-        context: of the flight.
-        ladder: of the safety monitors.
-        trace: takes the motion.
+        context: context of the flight.
+        ladder: the safety monitors.
+        trace: receives the motion.
         began: when the flight began, s on our clock.
         phase: returns the running phase.
-        show: takes the state; it must return at once. None: nobody looks at it.
-        clock: ours, s.
-        real_time: whether latencies mean anything: not where the vehicle waits for us.
+        show: called with the state; it must return at once. None: the state is not shown.
+        clock: our clock, s.
+        real_time: whether latencies are meaningful; they are not if the vehicle waits for us.
     """
 
     def __init__(
@@ -126,7 +127,7 @@ class StatusReporter:
         self._rows = StatusRows(context, trace.recorder, clock)
 
     async def run(self) -> None:
-        """Record and show until cancelled; steps that came too late are left out."""
+        """Record and show until cancelled; missed steps are not repeated."""
         due = self._clock()
         while True:
             self.record()
@@ -156,7 +157,7 @@ class StatusReporter:
         self._trace.add_motion(now, (now - self._began, *known))
 
     def status(self) -> FlightStatus:
-        """The state now."""
+        """The present state."""
         now, context, phase = self._clock(), self._context, self._phase()
         record = context.loop.record
         flown = flown_part(context.guidance_loop.flown, now)
@@ -184,7 +185,7 @@ class StatusReporter:
         )
 
     def _rate(self, now: float, record: LoopRecord) -> float | None:
-        """Setpoints a second over the last second, Hz; None while none is sent."""
+        """Setpoints in the last second, Hz; None while none are sent."""
         counted = self._counted
         counted.append((now, record.setpoints))
         while len(counted) > 2 and now - counted[1][0] >= _WINDOW:

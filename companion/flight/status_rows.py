@@ -1,4 +1,4 @@
-"""Records the thrust estimator, the resources of this program, and the counters of the link."""
+"""Records the thrust estimator, the program's resources, the counters of the link, the fence."""
 
 import resource
 from collections.abc import Callable
@@ -7,6 +7,7 @@ from time import process_time
 from typing import Protocol
 
 from companion.flight.context import FlightContext
+from companion.flight.fence_rows import FenceRows
 from companion.recording.mcap_file.channels import RESOURCES, THRUST
 from companion.recording.recorder import FlightRecorder
 
@@ -29,11 +30,11 @@ class Recording(Protocol):
 
 
 class StatusRows:
-    """Records ten times a second the thrust, once a second resources and link.
+    """Records thrust ten times a second, and resources and link once a second.
 
     Args:
-        context: of the flight.
-        recorder: of the flight, or None.
+        context: context of the flight.
+        recorder: recorder of the flight, or None.
         clock: our clock, s.
     """
 
@@ -41,14 +42,16 @@ class StatusRows:
         self, context: FlightContext, recorder: FlightRecorder | None, clock: Callable[[], float]
     ) -> None:
         self._context, self._recorder, self._clock = context, recorder, clock
+        self._fence = None if recorder is None else FenceRows(context, recorder)
         self._due = self._measured_at = clock()
         self._processor_s = process_time()
 
     def record(self, now: float) -> None:
         """Record what is due at `now`, s on our clock."""
         recorder = self._recorder
-        if recorder is None:
+        if recorder is None or self._fence is None:
             return
+        self._fence.record(now)
         recorder.row(now, THRUST, self._thrust(now))
         if now >= self._due:
             self._due = now + _RESOURCES_PERIOD
@@ -69,7 +72,7 @@ class StatusRows:
         )
 
     def _resources(self, now: float, recorder: Recording) -> tuple[float, ...]:
-        """Processor time counts the whole program, in a test also the mock vehicle."""
+        """Record this process's use of the processor; in a test it includes the mock vehicle."""
         processor_s, before = process_time(), self._processor_s
         elapsed, self._measured_at = now - self._measured_at, now
         self._processor_s = processor_s

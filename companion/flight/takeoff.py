@@ -16,7 +16,7 @@ _BELOW = 0.5
 """A climb may end this far below the commanded height, m."""
 
 _ABOVE = 3.0
-"""A climb further above the commanded height has failed, m; PX4 overshoots by some tenths."""
+"""A climb has failed this far above the commanded height, m; PX4 overshoots by some tenths."""
 
 _ARRIVAL_TIME = 2.0
 """Time allowed to reach altitude after the mode shows hold, s; then the climb was stopped."""
@@ -65,7 +65,7 @@ class _Climb:
         self._held_at: float | None = None
 
     def over(self) -> bool:
-        """Whether the height is reached; raises `FlightEnded` if somebody stopped the climb."""
+        """Whether the height is reached; raise `FlightEnded` if somebody stopped the climb."""
         context, state = self._context, self._context.link.state
         if not context.armed():
             raise FlightEnded("the vehicle disarmed in the take-off, not by us", Exit.RELEASE)

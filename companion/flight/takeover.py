@@ -1,4 +1,4 @@
-"""The phases before a takeover: a vehicle that somebody else armed, in the air or on the ground."""
+"""The phases before a takeover: somebody else armed the vehicle, which flies or stands."""
 
 import asyncio
 from collections.abc import Callable
@@ -14,22 +14,22 @@ _ARMED_SHOWS = 1.5
 
 
 async def look_over(context: FlightContext) -> None:
-    """Check a vehicle that flies already; nothing but telemetry is asked of it.
+    """Check a vehicle that already flies; only request telemetry.
 
     Raises:
-        FlightEnded: it does not fly, or a finding blocks the takeover.
+        FlightEnded: the vehicle does not fly, or a finding blocks the takeover.
     """
     await _look_over(context, Stage.AIRBORNE, _require_flying)
     context.ground.note_flying()
 
 
 async def look_over_standing(context: FlightContext) -> None:
-    """Check a vehicle that somebody else armed on the ground; only telemetry is asked of it.
+    """Check a vehicle that somebody else armed on the ground; only request telemetry.
 
-    It may have been armed since the newest heartbeat.
+    The newest heartbeat may be older than the arming.
 
     Raises:
-        FlightEnded: it does not stand armed, or a finding blocks the take-off.
+        FlightEnded: the vehicle does not stand armed, or a finding blocks the take-off.
     """
     with suppress(TimeoutError):
         async with asyncio.timeout(_ARMED_SHOWS):
@@ -41,7 +41,7 @@ async def look_over_standing(context: FlightContext) -> None:
 async def _look_over(
     context: FlightContext, stage: Stage, require: Callable[[FlightContext], None]
 ) -> None:
-    """Run the checks of a stage; `require` raises unless the vehicle is in it, before and after."""
+    """Run the checks of a stage; call `require` before and after, which raises in a wrong state."""
     context.same_vehicle.begin()
     context.same_vehicle.commit()
     context.heartbeat_limit = SLOWEST_HEARTBEAT

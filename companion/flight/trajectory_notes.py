@@ -1,4 +1,4 @@
-"""What a user is told of a trajectory: its size, and what was slowed down of it and why."""
+"""Messages to the user about a trajectory: its size, what was slowed down, and why."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ _PARTS_TOLD = 4
 
 
 def overview(trajectory: Trajectory) -> str:
-    """How long it lasts, how fast it is, and how far it leads, in one sentence."""
+    """One sentence: duration, largest speed and extent of the trajectory."""
     motion = sampled(trajectory)
     fastest = float(np.linalg.norm(motion.velocity, axis=1).max())
     lows, highs = motion.position.min(axis=0), motion.position.max(axis=0)
@@ -21,7 +21,7 @@ def overview(trajectory: Trajectory) -> str:
 
 
 def slowing(before: Trajectory, found: SlowDown) -> tuple[str, ...]:
-    """What was slowed down, where, by which limit, and what is left; nothing if nothing was."""
+    """What was slowed down, where, by which limit, and the speed left; empty if nothing was."""
     if not found.parts:
         return ()
     after = found.trajectory

@@ -1,4 +1,4 @@
-"""The vehicle's identity: is it still the checked one, and what did its earlier flights learn?"""
+"""The vehicle's identity: is it still the checked one, and what did earlier flights learn?"""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +12,7 @@ from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.link import Link
 
 LONGEST_SILENCE = 2.0
-"""A present vehicle sends a frame within this time, s, even on the worst link that is flown."""
+"""A connected vehicle sends a frame within this time, s, even on the worst permitted link."""
 _LONGEST_UPDATE = 0.1
 """A longer interval between two updates is our own stall and does not count as silence, s."""
 
@@ -24,12 +24,12 @@ class ChecksVoid(FlightEnded):
 class SameVehicle:
     """Detects that another vehicle, or a restarted one, may have replaced the checked one.
 
-    Two vehicles may share system and component ids. So each of these voids the checks: a new peer
-    on the link, a restarted clock, another hardware id, and a long silence.
+    Two vehicles may have the same system and component ids. So the checks are void after a new peer
+    on the link, a restarted clock, another hardware id, or a long silence.
 
     Args:
-        link: to the vehicle.
-        clock: ours, s.
+        link: link to the vehicle.
+        clock: our clock, s.
     """
 
     def __init__(self, link: Link, clock: Callable[[], float]) -> None:
@@ -43,7 +43,7 @@ class SameVehicle:
         self._silent_for = self._silence = 0.0
 
     def begin(self) -> None:
-        """Start to watch: from now on every frame must come from one vehicle."""
+        """Begin to watch: from now on, every frame must come from one vehicle."""
         self._begun, self._committed = True, False
         self._uid = self._other_uid = None
         self._peers, self._restarts = self._link.stats.peers, self._link.clock.restarts
@@ -53,7 +53,7 @@ class SameVehicle:
     def commit(self) -> None:
         """Note that the vehicle is being armed: from now on a replacement ends the flight.
 
-        From then on the watch and the safety monitors judge silence.
+        Silence is then a matter of the watch and the safety monitors.
         """
         self._committed, self._silence = True, 0.0
 
@@ -90,8 +90,8 @@ class SameVehicle:
         """Require the same vehicle.
 
         Raises:
-            ChecksVoid: it may be another one, and nothing was armed yet.
-            FlightEnded: it may be another one; control is released.
+            ChecksVoid: it may be another vehicle, and nothing is armed yet.
+            FlightEnded: it may be another vehicle; control is released.
         """
         if self.same or (reason := self._reason()) is None:
             return
@@ -100,7 +100,7 @@ class SameVehicle:
         raise ChecksVoid(reason)
 
     def _reason(self) -> str | None:
-        """The sign of a replacement; None during a silence, after which it may be the same."""
+        """The sign of a replacement; None in a silence after which the vehicle may be the same."""
         if self._peers != self._link.stats.peers:
             return "the vehicle is heard from another address or connection than before"
         if self._restarts != self._link.clock.restarts:
@@ -118,13 +118,13 @@ class VehicleMemory:
     A configured drag takes precedence. A vehicle without a hardware id is not remembered.
 
     Args:
-        directory: of the flights; None: nothing is remembered.
-        estimate: of the drag.
+        directory: folder of the flights; None: nothing is remembered.
+        estimate: the drag estimate.
         configured: whether the configuration sets the drag.
-        note: takes messages for the user.
+        note: called with messages for the user.
 
     Attributes:
-        on_begin: called with the drag from which the estimate starts; None: of any vehicle.
+        on_begin: called with the initial drag of the estimate; None: the drag of any vehicle.
     """
 
     def __init__(

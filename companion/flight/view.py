@@ -1,4 +1,4 @@
-"""What a flight looks like at one time: for the live page, in the columns of `flight.mcap`."""
+"""The values of a flight at one time for the live page, named as in `flight.mcap`."""
 
 from math import isfinite, sqrt
 from typing import Any

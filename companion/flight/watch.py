@@ -17,23 +17,25 @@ from companion.vehicle.link import Link
 from companion.vehicle.records import outdated
 
 _STATUS_PERIOD = 0.45
-"""PX4 sends CURRENT_MODE every 0.5 s; one that comes earlier than this reports a change, s."""
+"""Time since the last CURRENT_MODE below which a new one reports a change, s; PX4 sends one every
+0.5 s.
+"""
 _QUESTION_PERIOD = 0.15
 """Shortest time between two requests for a heartbeat, s."""
 _COUNTED = 0.1
-"""`set_rates` counts arriving messages for this long, s; nothing waits for it."""
+"""Time over which `set_rates` counts messages, s; nothing waits for it."""
 
 
 class RateRequester:
-    """Requests a telemetry rate again that has become too low: another station may have lowered it.
+    """Requests telemetry again whose rate became too low, perhaps because of another station.
 
     It sends SET_MESSAGE_INTERVAL at most once a flight for each message, and does not block.
 
     Attributes:
-        note: takes requests and their errors as messages.
+        note: called with messages about requests and their errors.
 
     Args:
-        link: to the vehicle.
+        link: link to the vehicle.
         section: the configured rates.
     """
 
@@ -68,7 +70,7 @@ class Watch:
     """Detects what the control loop cannot: silence, takeovers and breaches of the monitors.
 
     Args:
-        context: of the flight.
+        context: context of the flight.
         ladder: judges the snapshots while the autopilot obeys us.
         rate_requester: requests telemetry rates that have become too low.
         clock: our clock, s.
@@ -90,10 +92,10 @@ class Watch:
         self._question: asyncio.Task[None] | None = None
 
     def judge(self, phase: Phase) -> None:
-        """Judge once.
+        """Check the vehicle's identity, its mode and heartbeat, and the safety monitors once.
 
         Raises:
-            FlightEnded: the phase must end; says why and how to exit.
+            FlightEnded: the phase must end; contains the reason and the exit.
         """
         now = self._clock()
         self._context.snapshot_builder.listen(now)
@@ -108,13 +110,13 @@ class Watch:
             self._judge_heartbeat()
 
     def on_current_mode(self, phase: Phase) -> None:
-        """Judge a CURRENT_MODE, which comes twice a second and at once after a status change.
+        """Check a CURRENT_MODE, which comes twice a second and at once after a status change.
 
-        An early one may mean that the vehicle disarmed or is in a failsafe. Only a heartbeat tells,
-        so one is requested, at most every `_QUESTION_PERIOD`.
+        An early one may mean that the vehicle disarmed or is in a failsafe. Only a heartbeat can
+        confirm this, so one is requested, at most every `_QUESTION_PERIOD`.
 
         Raises:
-            FlightEnded: as `judge`.
+            FlightEnded: the phase must end; see `judge`.
         """
         now = self._clock()
         early, self._status_at = now - self._status_at < _STATUS_PERIOD, now
@@ -130,7 +132,7 @@ class Watch:
         self._question = asyncio.create_task(self._confirm())
 
     async def _confirm(self) -> None:
-        """Wait for a fresh heartbeat: one from the backlog may carry an old mode."""
+        """Wait for a fresh heartbeat, because one from the backlog may carry an old mode."""
         await self._context.fresh_heartbeat()
         loop, state = self._context.loop, self._context.link.state
         roles = roles_of(self._context.link)

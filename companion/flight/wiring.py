@@ -12,7 +12,7 @@ from companion.vehicle.records import AttitudeSample
 
 @contextmanager
 def connected(link: Link, assembled: Assembled) -> Iterator[None]:
-    """Connect link and changes to the flight while the block runs: samples, errors, the mode.
+    """Connect the link and the changes to the flight while the block runs: samples, errors, mode.
 
     Only one flight at a time may be connected to a link.
     """

@@ -1,4 +1,4 @@
-"""The way on which a moving vehicle comes to rest, where it is then held."""
+"""Braking of a moving vehicle to the place where it then holds."""
 
 from math import hypot, sqrt
 from typing import NamedTuple
@@ -13,11 +13,11 @@ _JERK = 8.0
 _AT_REST = 0.1
 """A slower vehicle is at rest, m/s."""
 _NOTICED = 0.1
-"""The monitor of the fence and guidance notice a breach within this time, s."""
+"""Time within which the fence's monitor and guidance notice a breach, s."""
 
 
 class Assumed(NamedTuple):
-    """What the monitor of the fence assumes of braking, so what it must achieve.
+    """What the fence's monitor assumes of braking; braking must achieve it.
 
     Attributes:
         reaction: `safety.reaction_s`, s.
@@ -31,11 +31,11 @@ class Assumed(NamedTuple):
 def braking_time(speed: float, acceleration: float, assumed: Assumed) -> float:
     """Time in which the vehicle brakes from a speed, s; 0 for a vehicle at rest.
 
-    It is long enough for a smooth stop, and so short that the vehicle stops where the monitor of
-    the fence assumes it at the latest.
+    It is as long as a smooth stop needs, but the vehicle stops no further than the fence's monitor
+    assumes.
 
     Args:
-        speed: horizontal, m/s.
+        speed: horizontal speed, m/s.
         acceleration: largest horizontal acceleration, m/s².
         assumed: what the monitor of the fence assumes.
     """
@@ -54,9 +54,9 @@ class Braking(NamedTuple):
 
     Attributes:
         begun_at: when the vehicle begins to brake, s.
-        motion: its motion then.
+        motion: motion of the vehicle at that time.
         heading: the heading to keep, rad.
-        duration: time of braking, s; see `braking_time`.
+        duration: duration of braking, s; see `braking_time`.
     """
 
     begun_at: float
@@ -66,12 +66,12 @@ class Braking(NamedTuple):
 
     @property
     def ends(self) -> float:
-        """When the vehicle is at rest, s."""
+        """Time at which the vehicle is at rest, s."""
         return self.begun_at + self.duration
 
     @property
     def stop(self) -> Vector:
-        """Where the vehicle stops, m NED."""
+        """Place where the vehicle stops, m NED."""
         return self.at(self.ends).position_ned
 
     def at(self, time: float) -> Reference:
@@ -98,8 +98,8 @@ def brake(
     """The braking that begins now.
 
     Args:
-        now: s.
-        motion: of the vehicle.
+        now: present time, s.
+        motion: motion of the vehicle.
         heading: the heading to keep, rad.
         acceleration: largest horizontal acceleration, m/s².
         assumed: what the monitor of the fence assumes.

@@ -34,7 +34,7 @@ class _Doublet(NamedTuple):
         return 4.0 * self.step + (0.0 if self.body_rates is None else _REST)
 
     def at(self, time: float, hold: Reference) -> Reference:
-        """The reference `time` seconds after the doublet began; `hold` is that of position hold."""
+        """The reference `time` s after the beginning; `hold` is the reference of position hold."""
         if self.body_rates is None:
             return self._climbing(time, hold)
         sign = self._sign(time)

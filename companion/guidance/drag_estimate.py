@@ -19,7 +19,7 @@ _WIND_CHANGE = 0.2
 _CLAMP = 3.0
 """An innovation is clamped to this many standard deviations, since a bump is no sign of drag."""
 _LARGEST_INCREASE = 2.0
-"""The linear drag is estimated at most this much above that of the prior, 1/s."""
+"""Largest estimated linear drag above that of the prior, 1/s."""
 _LARGEST_QUADRATIC = 0.3
 """Largest estimate of the quadratic drag, 1/m."""
 _AXIS_DEVIATION, _LARGEST_AXIS = 0.03, 0.1
@@ -99,9 +99,9 @@ class DragEstimate:
 
         Args:
             dt: duration of the measurement, s.
-            velocity: during the measurement, m/s, NED.
+            velocity: mean velocity during the measurement, m/s, NED.
             left: measured acceleration less the acceleration by thrust, m/s², NED.
-            heading: of the vehicle, rad.
+            heading: heading of the vehicle, rad.
         """
         speed = hypot(*velocity)
         if not (isfinite(dt) and isfinite(speed) and isfinite(hypot(*left))) or dt <= 0.0:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from math import cos, hypot, inf, radians
+from math import cos, hypot, inf, pi, radians, sin
 from typing import Any, NamedTuple
 
 from companion.guidance.reference import Vector
@@ -12,7 +12,7 @@ Corner = tuple[float, float]
 """(north, east) in m, or (latitude, longitude) in degrees."""
 
 Components = tuple[Any, Any, Any]
-"""A `Vector`, or one whose components are arrays."""
+"""A `Vector`, or a vector whose components are arrays."""
 
 EARTH_RADIUS = 6_371_000.0
 """Mean radius, m; over the size of a fence the earth counts as flat."""
@@ -100,22 +100,34 @@ class Fence:
             return Breach("limits.fence_floor_m", "below", where, self.floor - height)
         return None
 
-    def stop(self, offset: Components, velocity: Components) -> Components:
+    def stop(
+        self, offset: Components, velocity: Components, acceleration: tuple[Any, Any] = (0.0, 0.0)
+    ) -> Components:
         """Where the vehicle stops if it brakes now, m NED from where control began.
 
-        The stopping distance is v·t + v²/(2a), for the horizontal and for the vertical speed v.
+        For the horizontal and for the vertical velocity v the way is v·t + v²/(2b), with the
+        reaction time t and the deceleration b. A horizontal acceleration a that makes the vehicle
+        faster lasts for the reaction time: the way is v·t + a·t²/2 + (v + a·t)²/(2b). One that
+        brakes does not count, since it may end at any moment.
 
         Args:
             offset: position of the vehicle relative to where control began, m NED; numbers, or
                 arrays of them.
             velocity: m/s NED; numbers, or arrays of them.
+            acceleration: north and east, m/s²; numbers, or arrays of them.
         """
-        north, east, down = velocity
-        level = self._distance_per_speed((north * north + east * east) ** 0.5)
+        (north, east, down), reaction, twice = velocity, self.reaction, 2.0 * self.deceleration
+        gain_north, gain_east = reaction * acceleration[0], reaction * acceleration[1]
+        # The square of the speed after the reaction time, minus the square of the present speed.
+        gained = gain_north * (2.0 * north + gain_north) + gain_east * (2.0 * east + gain_east)
+        counts = (gained > 0.0) * 1.0
+        gain_north, gain_east = counts * gain_north, counts * gain_east
+        later_north, later_east = north + gain_north, east + gain_east
+        braking = (later_north * later_north + later_east * later_east) ** 0.5 / twice
         return (
-            offset[0] + level * north,
-            offset[1] + level * east,
-            offset[2] + self._distance_per_speed(abs(down)) * down,
+            offset[0] + reaction * (north + 0.5 * gain_north) + braking * later_north,
+            offset[1] + reaction * (east + 0.5 * gain_east) + braking * later_east,
+            offset[2] + (reaction + abs(down) / twice) * down,
         )
 
     def stop_breach(
@@ -125,18 +137,15 @@ class Fence:
         height: float | None,
         origin: Place | None,
         margin: float = 0.0,
+        acceleration: tuple[float, float] = (0.0, 0.0),
     ) -> Breach | None:
         """The breach of the fence at the place of `stop`; None: the vehicle stops inside.
 
         The arguments are those of `breach` and `stop`.
         """
-        stop = self.stop(offset, velocity)
+        stop = self.stop(offset, velocity, acceleration)
         sunk = stop[2] - offset[2]
         return self.breach(stop, None if height is None else height - sunk, origin, margin)
-
-    def _distance_per_speed(self, speed: Any) -> Any:
-        """Stopping distance divided by the speed, s."""
-        return self.reaction + speed / (2.0 * self.deceleration)
 
 
 def inside(north: float, east: float, polygon: Sequence[Corner]) -> bool:
@@ -165,6 +174,12 @@ def distance_inside(north: float, east: float, polygon: Sequence[Corner]) -> flo
 
 
 @lru_cache(maxsize=4)
+def circle_corners(radius: float, number: int) -> tuple[Corner, ...]:
+    """A circle about the origin as a polygon of so many corners, m north and east."""
+    angles = [2.0 * pi * corner / number for corner in range(number)]
+    return tuple((radius * cos(angle), radius * sin(angle)) for angle in angles)
+
+
 def local_polygon(places: tuple[Corner, ...], origin: Place) -> tuple[Corner, ...]:
     """Convert corners from (latitude, longitude) in degrees to m north and east of `origin`."""
     narrower = cos(radians(origin.latitude))

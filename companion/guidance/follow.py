@@ -65,7 +65,7 @@ class Follow:
     Attributes:
         trajectory: the trajectory to follow.
         yaw_rate: largest yaw rate in the turn before the trajectory, rad/s.
-        notes: how its file was understood and how it is flown, one sentence each.
+        notes: how its file was read and how it is flown, one sentence each.
     """
 
     trajectory: Trajectory

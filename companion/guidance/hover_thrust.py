@@ -9,7 +9,7 @@ from companion.guidance.thrust import BatterySag, ThrustCurve, cos_tilt_ahead, s
 from companion.guidance.thrust_filter import SHORTEST, ThrustFilter
 
 _LONGEST_WINDOW = 0.5
-"""Velocities further apart than this are not learned from, s: the thrust between is uncertain."""
+"""Longest time between two velocities that are used, s; the thrust between them is uncertain."""
 
 _PLAUSIBLE = (0.3 * GRAVITY, 2.5 * GRAVITY)
 """Range of measured specific thrust, m/s²; outside it (free fall, a bump) nothing is learned."""
@@ -151,7 +151,7 @@ class HoverThrust:
         self._battery.note(time, voltage)
 
     def on_ground(self) -> None:
-        """On the ground: learn nothing, and take the next voltage in the air as the first."""
+        """Called on the ground: stop learning; the next voltage in the air is the first one."""
         self.pause()
         self._battery.reset()
 

@@ -49,8 +49,8 @@ class GuidanceInput(NamedTuple):
     Attributes:
         now: present motion.
         acts: motion predicted for the time when the present command takes effect.
-        thrust: horizontal acceleration by the present thrust, m/s².
-        disturbance: horizontal acceleration by wind and bias, m/s².
+        thrust: horizontal acceleration due to the present thrust, m/s², NED.
+        disturbance: horizontal acceleration due to wind and bias, m/s², NED.
         drag: drag of the vehicle.
         thrust_limits: smallest and largest specific thrust available, m/s².
         axis_drag: difference of the drag along the body's axes.
@@ -63,6 +63,15 @@ class GuidanceInput(NamedTuple):
     drag: Drag
     thrust_limits: tuple[float, float]
     axis_drag: AxisDrag = ROUND
+
+    @property
+    def acceleration(self) -> Horizontal:
+        """Present horizontal acceleration by thrust, wind and drag, m/s², NED."""
+        north, east = self.deceleration(self.now.velocity_ned)
+        return (
+            self.thrust[0] + self.disturbance[0] - north,
+            self.thrust[1] + self.disturbance[1] - east,
+        )
 
     def deceleration(self, velocity: Vector) -> Horizontal:
         """Horizontal deceleration by drag, m/s², at a velocity in m/s, NED."""
@@ -90,7 +99,7 @@ class Guidance(Protocol):
 
     @property
     def acts_after(self) -> float:
-        """Mean delay from computing a command until the vehicle responds to its feedback, s.
+        """Mean delay from computing a command until its feedback takes effect, s.
 
         `GuidanceInput.acts` is predicted for this time.
         """
@@ -119,7 +128,7 @@ class LinearGuidance:
 
     @property
     def acts_after(self) -> float:
-        """Mean delay from computing a command until the vehicle responds to its feedback, s."""
+        """Mean delay from computing a command until its feedback takes effect, s."""
         return self._settings.tilt.dead_time + 0.5 * self._settings.period
 
     def command(
@@ -177,7 +186,7 @@ class LinearGuidance:
     def _coefficients(
         self, reference: Reference, more: Horizontal, down: float, inputs: GuidanceInput
     ) -> Coefficients:
-        """Coefficients for the reference's acceleration, its drag, and `more` (m/s²)."""
+        """Coefficients for the reference's acceleration, its drag, and `more` (feedback, m/s²)."""
         slowed = inputs.deceleration(reference.velocity_ned)
         north, east = limited(
             reference.acceleration_ned[0] + slowed[0] + more[0],

@@ -15,7 +15,7 @@ observer is unstable at low position rates, and a gap in the positions makes a f
 
 
 class ObserverGains(NamedTuple):
-    """How one measurement corrects the observer.
+    """How a measurement corrects the observer.
 
     The position is corrected per position error. Velocity and disturbance are corrected per error
     of the velocity, to which `ObserverSettings.pull` adds the position error.
@@ -40,8 +40,8 @@ class ObserverSettings:
         position_time: time constant with which the position follows the measured one, s.
         position_pull: correction of the velocity per position error, 1/s.
         largest: largest disturbance, m/s².
-        sharpening: relative increase of the bandwidth with smooth positions.
-        smooth_pull: increase of `position_pull` with smooth positions, 1/s.
+        sharpening: relative increase of the bandwidth with trusted positions.
+        trusted_pull: increase of `position_pull` with trusted positions, 1/s.
     """
 
     bandwidth: float
@@ -49,20 +49,20 @@ class ObserverSettings:
     position_pull: float
     largest: float
     sharpening: float = 0.0
-    smooth_pull: float = 0.0
+    trusted_pull: float = 0.0
 
-    def pull(self, dt: float, smoothness: float) -> float:
+    def pull(self, dt: float, trust: float) -> float:
         """Correction of the velocity per position error, 1/s; arguments as in `gains`."""
-        return min(self.position_pull + smoothness * self.smooth_pull, _LARGEST_STEP / dt)
+        return min(self.position_pull + trust * self.trusted_pull, _LARGEST_STEP / dt)
 
-    def gains(self, dt: float, smoothness: float = 0.0) -> ObserverGains:
+    def gains(self, dt: float, trust: float = 0.0) -> ObserverGains:
         """The gains for measurements `dt` seconds apart.
 
         Args:
             dt: s.
-            smoothness: 1 if the positions are smooth, 0 if they are noisy.
+            trust: trust in the positions, 0 to 1 (`PositionCorrection.trust`).
         """
-        bandwidth = (1.0 + smoothness * self.sharpening) * self.bandwidth
+        bandwidth = (1.0 + trust * self.sharpening) * self.bandwidth
         position = 1.0 if self.position_time <= 0.0 else 1.0 - exp(-dt / self.position_time)
         return ObserverGains(
             position,
@@ -98,7 +98,7 @@ class MotionObserver:
         self.disturbance = (0.0, 0.0)
 
     def observe(
-        self, time: float, measured: VehicleMotion, known: Horizontal, smoothness: float = 0.0
+        self, time: float, measured: VehicleMotion, known: Horizontal, trust: float = 0.0
     ) -> None:
         """Take a measured position and velocity.
 
@@ -106,7 +106,7 @@ class MotionObserver:
             time: vehicle time of the measurement, s.
             measured: measured motion, NED.
             known: horizontal acceleration by thrust and drag since the last measurement, m/s².
-            smoothness: 1 if the positions are smooth, 0 if they are noisy.
+            trust: trust in the positions, 0 to 1 (`PositionCorrection.trust`).
         """
         motion, dt = self._motion, time - self._time
         self._time = time
@@ -114,7 +114,7 @@ class MotionObserver:
             self._motion = measured
             return
         settings, disturbance = self._settings, self.disturbance
-        gains, pull = settings.gains(dt, smoothness), settings.pull(dt, smoothness)
+        gains, pull = settings.gains(dt, trust), settings.pull(dt, trust)
         position, velocity = list(measured.position_ned), list(measured.velocity_ned)
         found = [0.0, 0.0]
         for axis in (0, 1):
@@ -182,7 +182,7 @@ class SlopeHistory:
         self.newest: Horizontal = (0.0, 0.0)
 
     def add(self, time: float, slope: Horizontal) -> None:
-        """Add the slope of an attitude; if it is not newer than the last, the history restarts.
+        """Add the slope of an attitude; one that is not newer than the last restarts the history.
 
         Args:
             time: vehicle time, s.
@@ -207,7 +207,7 @@ class SlopeHistory:
         self.newest = slope
 
     def forget(self) -> None:
-        """Forget all attitudes: a jump of the heading has changed where north is."""
+        """Forget all attitudes, because a heading jump has changed the direction of north."""
         self._times.clear()
         self._sums.clear()
 

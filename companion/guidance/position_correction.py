@@ -16,6 +16,9 @@ _SMOOTH, _NOISY = 0.2, 0.6
 0.1 m/s on PX4 and ArduPilot; white noise of 3 mm at 50 Hz makes 0.5 m/s."""
 _NOISE_TIME = 1.0
 """Time constant with which the noise of r is estimated, s."""
+_MOVING = 2.0
+"""Speed from which the positions are trusted fully, m/s. Below it their errors are small and mostly
+noise: a real PX4 then hovers with half the body rates and the same true position error."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,8 +27,8 @@ class CorrectionSettings:
 
     Attributes:
         ahead: time constant of the estimator's correction, s: 1/(the estimator's position gain).
-        window: time constant of the two low-pass filters on the correction with smooth positions,
-            s, positive.
+        window: time constant of the two low-pass filters on the correction in motion with smooth
+            positions, s, positive; at rest it is twice that.
         largest: largest anticipated correction, m.
         lateness: delay of the estimator's position that remains after its corrections, s.
     """
@@ -62,11 +65,16 @@ class PositionCorrection:
         self._filtered: Horizontal = (0.0, 0.0)
         self._correction: Horizontal = (0.0, 0.0)
         self._noise = 0.0
+        self._moving = 0.0
 
     @property
-    def smoothness(self) -> float:
-        """1 if the positions are smooth, 0 if they are noisy or rounded, else between."""
-        return min(max(0.0, (_NOISY - sqrt(self._noise)) / (_NOISY - _SMOOTH)), 1.0)
+    def trust(self) -> float:
+        """How far the positions are trusted: 1 if they are smooth and the vehicle moves.
+
+        0 if they are noisy or rounded, or if the vehicle is at rest.
+        """
+        smoothness = min(max(0.0, (_NOISY - sqrt(self._noise)) / (_NOISY - _SMOOTH)), 1.0)
+        return smoothness * self._moving
 
     def corrected(self, time: float, measured: VehicleMotion) -> VehicleMotion:
         """A measured motion with its position corrected.
@@ -78,6 +86,7 @@ class PositionCorrection:
         settings = self._settings
         before, dt = self._before, time - self._time
         self._time, self._before = time, measured
+        self._moving = min(hypot(measured.velocity_ned[0], measured.velocity_ned[1]) / _MOVING, 1.0)
         if before is None or not 0.0 < dt < _LONGEST:
             self._raw = self._filtered = self._correction = (0.0, 0.0)
         else:
@@ -115,5 +124,6 @@ class PositionCorrection:
         change = hypot(raw[0] - self._raw[0], raw[1] - self._raw[1])
         kept = exp(-dt / _NOISE_TIME)
         self._noise = change * change + kept * (self._noise - change * change)
-        shortest = self._settings.window
-        return min(shortest + _WINDOW_PER_NOISE * sqrt(self._noise), max(shortest, _LONGEST_WINDOW))
+        shortest, longest = self._settings.window, max(self._settings.window, _LONGEST_WINDOW)
+        window = min(shortest + _WINDOW_PER_NOISE * sqrt(self._noise), longest)
+        return (2.0 - self._moving) * window

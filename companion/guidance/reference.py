@@ -59,12 +59,15 @@ class Reference(NamedTuple):
 
     @property
     def holds_position(self) -> bool:
-        """Whether the vehicle should be at the horizontal position, not only at the height."""
+        """Whether the vehicle should hold the horizontal position, not only the height."""
         return self.closed_loop and not self.drifting
 
     @property
     def height_is_steady(self) -> bool:
-        """Whether the thrust changes no faster than the rotors follow: not in a doublet."""
+        """Whether the thrust changes slowly enough for the rotors.
+
+        False in a doublet, and if another program commands body rates or thrust.
+        """
         return not self.thrust_steps and self.body_rates is None and self.thrust is None
 
 
@@ -93,13 +96,13 @@ def rotated(north: float, east: float, angle: float) -> Horizontal:
 def change_rate(
     old: Sequence[float], new: Sequence[float], since: float, most: float
 ) -> tuple[float, ...] | None:
-    """How fast a commanded vector changes; None where it has jumped.
+    """Rate of change of a commanded vector; None if it has jumped.
 
     Args:
-        old: its components in the command before.
-        new: the same now.
+        old: its components in the previous command.
+        new: its components now.
         since: time between the two, s.
-        most: the largest rate of change that is no jump.
+        most: largest rate of change that does not count as a jump.
     """
     rate = tuple((b - a) / since for a, b in zip(old, new, strict=True))
     return rate if hypot(*rate) <= most else None

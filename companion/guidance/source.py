@@ -15,11 +15,11 @@ from companion.guidance.reference import (
 
 _NO_JERK = (0.0, 0.0, 0.0)
 _SHORTEST = 0.01
-"""Shortest time over which references tell their jerk, s: half a period of guidance."""
+"""Shortest time from which the jerk is computed, s: half a period of guidance."""
 
 
 class Source(Protocol):
-    """Gives guidance its reference: maneuvers, another program's setpoints, or a user's coroutine.
+    """Provides guidance with references: from maneuvers, another program, or a user's coroutine.
 
     Times are event-loop times, s. Positions are m NED, in the frame without estimator resets.
     """
@@ -31,7 +31,7 @@ class Source(Protocol):
 
     @property
     def failure(self) -> str | None:
-        """Why the source cannot continue although it is not finished; None: it can."""
+        """Why an unfinished source cannot continue; None: it can."""
         ...
 
     def begin(self, now: float, pose: Pose) -> None:
@@ -39,7 +39,7 @@ class Source(Protocol):
         ...
 
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
-        """The reference as a function of time; guidance asks once in each of its periods.
+        """The reference as a function of time; guidance calls this once in each period.
 
         Args:
             now: time of this step of guidance.
@@ -48,7 +48,7 @@ class Source(Protocol):
         ...
 
     def finished(self, now: float) -> bool:
-        """Whether the source has no more to fly; its last reference stays in force."""
+        """Whether the source has reached its end; its last reference stays in force."""
         ...
 
 
@@ -143,9 +143,10 @@ class CommandedSource:
         self._newest, self._given_at = reference, now
 
     def _difference(self, reference: Reference, now: float) -> Vector:
-        """Jerk from an earlier reference to this one, m/s³; 0 where it cannot be told.
+        """Jerk between an earlier reference and this one, m/s³; 0 if it cannot be computed.
 
-        Two references within a moment do not tell it, so it is told over `_SHORTEST` at least.
+        Two references close together give no usable difference, so they must be at least
+        `_SHORTEST` apart.
         """
         before, since = self._base, now - self._base_at
         if before is not None and since < _SHORTEST:
@@ -173,7 +174,7 @@ class CommandedSource:
         return lambda _: held
 
     def _hold(self, motion: VehicleMotion) -> Reference:
-        """Hold the pose at which the source began, or after references the present position."""
+        """Hold the pose where the source began; after references, hold the present position."""
         if self._newest is None and self.pose is not None:
             return Reference(self.pose.position_ned, heading=self.pose.heading)
         heading = 0.0 if self._newest is None else self._newest.heading
@@ -187,7 +188,7 @@ class CommandedSource:
 
     @property
     def failure(self) -> str | None:
-        """Why control must end: the reason given to `fail`, or that references have stopped."""
+        """Why control must end: the reason given to `fail`, or that references stopped."""
         return self._failure
 
     def fail(self, reason: str) -> None:
@@ -200,7 +201,7 @@ class CommandedSource:
 
 
 def _kind(reference: Reference) -> tuple[bool, bool, bool]:
-    """What is commanded: the acceleration of another kind of reference means something else."""
+    """The kind of command. Accelerations of references of different kinds are not comparable."""
     return reference.closed_loop, reference.drifting, reference.holds_height
 
 

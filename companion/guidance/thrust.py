@@ -16,8 +16,8 @@ _MIN_COSINE = 0.5
 def specific_thrust(acceleration_down: float, cos_tilt: float) -> float:
     """T = (g − a_D)/cos(tilt) in m/s², for the present tilt.
 
-    Beyond 60° of tilt the thrust falls, to none at 90°: upside down it would push the vehicle to
-    the ground.
+    Beyond 60° of tilt the thrust decreases, to 0 at 90°, because upside down it would push the
+    vehicle to the ground.
     """
     wanted = max(0.0, GRAVITY - acceleration_down)
     if cos_tilt < _MIN_COSINE:

@@ -5,13 +5,13 @@ from math import copysign
 from companion.guidance.reference import GRAVITY
 
 SHORTEST = 0.1
-"""Shortest time between two velocities that are differenced, s; a longer one reduces the noise."""
+"""Shortest time between two velocities for an acceleration, s; a longer one has less noise."""
 
 _FIRST_DEVIATION = 0.4
 """Relative standard deviation of the configured hover thrust."""
 
 _GATE = 3.0
-"""An innovation of more standard deviations than this is rejected (PX4: HTE_ACC_GATE)."""
+"""An innovation above this number of standard deviations is rejected (PX4: HTE_ACC_GATE)."""
 
 _NOISE = 0.2
 """Usual variance of a measured specific thrust, (m/s²)²; `time_constant` holds at this value."""

@@ -26,7 +26,7 @@ _FIRST_ORDER_SHARE = 0.63
 _REACH = 3.5
 """Half width of the filter, in its standard deviations."""
 _EXPLAINED = 0.985
-"""Smallest R² of a correlation that is used: with less, gusts or another axis distort the delay."""
+"""Smallest R² of a correlation that is used; below it, gusts or another axis distort the delay."""
 _EXCITED = 0.005
 """Smallest root mean square of the filtered commands, rad/s."""
 

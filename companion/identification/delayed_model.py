@@ -150,7 +150,7 @@ class DelayedModel:
         self._slewed: tuple[float, list[Knots]] = (nan, [])
 
     def projection(self, unknown: Floats) -> tuple[Floats, Floats]:
-        """The best weights (gain, offset, initial states), and what they leave over, (m,)."""
+        """The best weights (gain, offset, initial states), and their residual, (m,)."""
         moved = self.response(unknown)
         if self.gain is None:
             columns = np.column_stack((moved, self._offset_columns(unknown)))

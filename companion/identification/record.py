@@ -10,8 +10,7 @@ Floats = NDArray[np.float64]
 LONGEST_DEAD_TIME = 0.5
 """Longest dead time that can be found, s."""
 _LONGEST_HOLD = 0.5
-"""A pause between two commands that is longer, s, ends a stretch: autopilots end offboard
-after 1 s."""
+"""Longest time between two commands of a stretch, s: autopilots end offboard after 1 s."""
 
 _MOST_ROWS = 16_000
 """Largest number of commands and samples in a fit: half a minute of both at 250 Hz."""

@@ -24,8 +24,8 @@ class FitQuality:
         dead_time_error: standard error of the dead time by noise, s.
         lag_error: standard error of the lag by noise, s.
         span: largest command minus smallest command, rad/s.
-        excited: number of samples at which the model differs from the command by 2 % of the span or
-            more; only these contain information on lag and dead time.
+        excited: number of samples at which the model differs from the command by at least 2 % of
+            the span; only these contain information on lag and dead time.
     """
 
     explained: float

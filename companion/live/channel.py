@@ -1,4 +1,4 @@
-"""The channel between a flight and its helper process: whole messages, never blocking."""
+"""The channels between a flight and its helper process: whole messages, never blocking."""
 
 import json
 import socket
@@ -7,17 +7,17 @@ from math import inf
 from typing import Any
 
 _LARGEST = 200_000
-"""Largest message, bytes; the system's buffer holds at least one."""
+"""Largest message, bytes; the system's buffer holds at least one of this size."""
 
 Message = dict[str, Any]
 
 
 class Channel:
-    """One end. Messages that the other end does not read in time are dropped and counted.
+    """One end of the channel. Messages that the other end does not read in time are dropped.
 
     Attributes:
         dropped: messages that were not sent because the buffer was full.
-        open: whether the other end was there at the last attempt.
+        open: whether the other end existed at the last attempt.
 
     Args:
         end: a non-blocking or blocking SEQPACKET socket.
@@ -30,17 +30,17 @@ class Channel:
 
     @staticmethod
     def pair() -> "tuple[Channel, socket.socket]":
-        """Our end, and the socket for the other process."""
+        """Make our end, and the socket for the other process."""
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         ours.setblocking(False)
         return Channel(ours), theirs
 
     def fileno(self) -> int:
-        """For `add_reader`."""
+        """File descriptor, for `add_reader`."""
         return self._end.fileno()
 
     def send(self, message: Message) -> bool:
-        """Send a message, or drop it; returns whether it was sent."""
+        """Send a message or drop it; return whether it was sent."""
         if not self.open:
             return False
         data = json.dumps(message, default=str).encode()
@@ -56,10 +56,10 @@ class Channel:
         return True
 
     def receive(self) -> Message | None:
-        """The next message, or None if the other end is gone.
+        """The next message; None if the other end is closed.
 
         Raises:
-            BlockingIOError: the socket is non-blocking and no message waits.
+            BlockingIOError: the socket is non-blocking and there is no message.
         """
         try:
             data = self._end.recv(_LARGEST)
@@ -74,7 +74,7 @@ class Channel:
         return message if isinstance(message, dict) else {}
 
     def waiting(self, most: float = inf) -> Iterator[Message | None]:
-        """The messages that wait now, at most `most` of them; a last None: the other end is gone.
+        """At most `most` messages that have arrived; a last None: the other end is closed.
 
         The socket must not block.
         """
@@ -95,5 +95,51 @@ class Channel:
         self._end.close()
 
 
+class Feed:
+    """Sends records of the flight to the helper process. Its methods may run in any thread.
+
+    Attributes:
+        dropped: datagrams that the process did not read in time.
+
+    Args:
+        end: a SEQPACKET socket.
+    """
+
+    def __init__(self, end: socket.socket) -> None:
+        self.dropped = 0
+        self._end = end
+
+    @staticmethod
+    def pair() -> "tuple[Feed, socket.socket]":
+        """Make our end, and the socket for the other process."""
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        return Feed(ours), theirs
+
+    def send(self, datagram: bytes) -> None:
+        """Send a datagram, or drop it."""
+        try:
+            self._end.send(datagram, socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL)
+        except OSError:  # the buffer is full, or the process is gone
+            self.dropped += 1
+
+    def close(self) -> None:
+        """Close our end."""
+        self._end.close()
+
+
+def datagrams(end: socket.socket, most: int) -> Iterator[bytes]:
+    """At most `most` datagrams that have arrived at a non-blocking socket; b"": it was closed."""
+    for _ in range(most):
+        try:
+            datagram = end.recv(_LARGEST)
+        except BlockingIOError:
+            return
+        except OSError:
+            datagram = b""
+        yield datagram
+        if not datagram:
+            return
+
+
 class NoAnswerError(Exception):
-    """The flight has not answered a request in time; the message is a sentence for the user."""
+    """The flight did not answer a request in time; the message is a sentence for the user."""

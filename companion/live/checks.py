@@ -1,51 +1,54 @@
-"""The checks of a change that take long: made in the helper process, before the flight's own."""
+"""The slow checks of a change; the helper process makes them before the flight's own checks."""
 
 from typing import Any
 
 from companion.config import Config
 from companion.config.in_flight import Values, changed_in_flight
+from companion.config.known_drag import before_connecting
 from companion.control.retuning import fixed_because
 from companion.files.yaml_file import ConfigError
 from companion.flight.change_bounds import require_moderate
-from companion.flight.maneuvers import configured_maneuvers, require_still_flyable
+from companion.flight.maneuver_checks import require_still_flyable
+from companion.flight.maneuvers import configured_maneuvers
 from companion.guidance import ManeuverSequence
 from companion.tuning import stability
 
 _LEAST_GAIN_DB, _LEAST_PHASE_DEG = 4.0, 20.0
-"""Margins that a change must keep; a loop that began with less must keep what it had."""
+"""Smallest stability margins after a change; a loop that began with less must not lose any."""
 _ROUNDING = 1e-3
 """Relative error of computed margins that is ignored."""
 
 
 class ChangeChecks:
-    """Knows the configuration of the flight, and checks what somebody wants to change.
+    """Holds the configuration of the flight, and checks requested changes.
 
     Attributes:
         start: the configuration with which the flight began.
         now: the configuration after the newest change.
 
     Args:
-        start: see above.
+        start: configuration with which the flight began.
         follows: whether the flight flies the maneuvers of its configuration.
     """
 
     def __init__(self, start: Config, *, follows: bool) -> None:
         self.start = self.now = start
+        self._drag = before_connecting(start)
         self._flown: ManeuverSequence | None = None
         self._unknown: ConfigError | None = None
         try:
-            self._flown = configured_maneuvers(start) if follows else None
+            self._flown = configured_maneuvers(start, self._drag) if follows else None
         except ConfigError as error:  # a file has changed since the flight read it
             self._unknown = error
 
     @staticmethod
     def of(message: dict[str, Any]) -> "ChangeChecks":
-        """From the first message of the flight."""
+        """Make the checks from the first message of the flight."""
         start = Config.model_validate(message["config"])
         return ChangeChecks(start, follows=bool(message["follows"]))
 
     def note(self, message: dict[str, Any]) -> None:
-        """Take the message that the configuration has changed."""
+        """Take a message of a changed configuration."""
         self.now = Config.model_validate(message["config"])
 
     def check(self, values: Values, name: str) -> None:
@@ -69,14 +72,14 @@ class ChangeChecks:
                 f"{name}: the maneuvers of this flight are not known: {self._unknown}"
             )
         if self._flown is not None:
-            require_still_flyable(wanted, self._flown)
+            require_still_flyable(wanted, self._flown, self._drag)
 
 
 def _require_margins(start: Config, wanted: Config, name: str) -> None:
-    """Check the stability margins of the control loop, computed for the believed vehicle.
+    """Check the stability margins of the control loop, computed for the configured vehicle.
 
     Raises:
-        ConfigError: the loop is unstable, or has less margin than it needs.
+        ConfigError: the loop is unstable, or its margin is too small.
     """
     before, after = stability(start), stability(wanted)
     if not after.stable:

@@ -1,4 +1,4 @@
-"""Where the live page is served: address, port and token."""
+"""Addresses of the live page and the live stream: IP address, port and token."""
 
 import secrets
 import socket
@@ -9,19 +9,20 @@ from typing import NamedTuple
 from companion.files.yaml_file import ConfigError
 
 PORT = 8090
+STREAM_PORT = 8765
+"""Port of the live stream; Foxglove and Lichtblick propose this one."""
 _GIVES_WAY = 8.0
-"""Time allowed for the page of an ended flight to leave its port, s."""
+"""Time allowed for the process of an ended flight to release its port, s."""
 
 
 class Door(NamedTuple):
-    """A listening socket, and who may come in.
+    """A listening socket, and the token that admits users.
 
     Attributes:
-        host: IP address that it listens at.
-        port: its number.
-        token: must be given by those who change something, and by those who watch from another
-            computer.
-        listening: the socket.
+        host: IP address of the socket.
+        port: number of the port.
+        token: required to change something, and to watch from another computer.
+        listening: the listening socket.
     """
 
     host: str
@@ -30,9 +31,8 @@ class Door(NamedTuple):
     listening: socket.socket
 
     def words(self) -> str:
-        """Where the page is, for the user."""
-        shown = self.host if ip_address(self.host) not in _ANY else socket.gethostname()
-        shown = f"[{shown}]" if ":" in shown else shown
+        """Address of the page, for the user."""
+        shown = _shown(self.host)
         if ip_address(self.host).is_loopback:
             return (
                 f"Live page: http://{shown}:{self.port}/  token to change values there: "
@@ -41,40 +41,87 @@ class Door(NamedTuple):
         return f"Live page: http://{shown}:{self.port}/?token={self.token}"
 
 
+class StreamAddress(NamedTuple):
+    """Address of the live stream.
+
+    Attributes:
+        host: IP address.
+        port: number of the port.
+    """
+
+    host: str
+    port: int
+
+    def words(self) -> str:
+        """Address of the stream, for the user."""
+        return (
+            f"Live stream: ws://{_shown(self.host)}:{self.port}/  in Foxglove or Lichtblick: "
+            "open connection, Foxglove WebSocket"
+        )
+
+
 _ANY = (ip_address("0.0.0.0"), ip_address("::"))
 
 
+def _shown(host: str) -> str:
+    name = host if ip_address(host) not in _ANY else socket.gethostname()
+    return f"[{name}]" if ":" in name else name
+
+
 def open_door(address: str) -> Door:
-    """Listen at [HOST][:PORT]; by default at port 8090 of this computer only.
+    """Listen at [HOST][:PORT]; the default is port 8090, for this computer only.
 
     Raises:
-        ConfigError: this is no address, or the port is in use.
+        ConfigError: the address is not valid, or the port is in use.
     """
-    host, port = _parts(address)
+    host, listening = _listening(address, "--live", PORT)
+    return Door(host, listening.getsockname()[1], secrets.token_urlsafe(9), listening)
+
+
+def stream_address(address: str) -> StreamAddress:
+    """Find a free port at [HOST][:PORT]; the default is port 8765, for this computer only.
+
+    The library of the live stream opens the port itself, later.
+
+    Raises:
+        ConfigError: the address is not valid, or the port is in use.
+    """
+    host, listening = _listening(address, "--foxglove", STREAM_PORT)
+    with listening:
+        return StreamAddress(host, listening.getsockname()[1])
+
+
+def _listening(address: str, option: str, usual: int) -> tuple[str, socket.socket]:
+    """Listen at the address given to an option; return host and socket.
+
+    Raises:
+        ConfigError: the address is not valid, or the port is in use.
+    """
+    host, port = _parts(address, option, usual)
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listening = socket.socket(family, socket.SOCK_STREAM)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         _bind(listening, host, port)
+        listening.listen(50)
     except OSError as error:
         listening.close()
         raise ConfigError(
-            f"--live: cannot listen at port {port} of {host}: {error.strerror}; name another "
-            f"one, as --live {port + 1}"
+            f"{option}: cannot listen at port {port} of {host}: {error.strerror}; name another "
+            f"one, as {option} {port + 1}"
         ) from error
-    listening.listen(50)
-    return Door(host, listening.getsockname()[1], secrets.token_urlsafe(9), listening)
+    return host, listening
 
 
-def _parts(address: str) -> tuple[str, int]:
+def _parts(address: str, option: str, usual: int) -> tuple[str, int]:
     """Host and port of an address.
 
     Raises:
-        ConfigError: this is no address.
+        ConfigError: the address is not valid.
     """
     host, colon, port = address.rpartition(":")
     if not colon and not address.isdigit():
-        host, port = address, str(PORT)
+        host, port = address, str(usual)
     host = host.strip("[]") or "127.0.0.1"
     host = "127.0.0.1" if host == "localhost" else host
     try:
@@ -82,18 +129,18 @@ def _parts(address: str) -> tuple[str, int]:
         ip_address(host)
     except ValueError as error:
         raise ConfigError(
-            f"--live {address}: write an IP address, a port, or both, as 0.0.0.0:{PORT}"
+            f"{option} {address}: write an IP address, a port, or both, as 0.0.0.0:{usual}"
         ) from error
     if not 0 <= number <= 65535:
-        raise ConfigError(f"--live {address}: a port is at most 65535")
+        raise ConfigError(f"{option} {address}: a port is at most 65535")
     return host, number
 
 
 def _bind(listening: socket.socket, host: str, port: int) -> None:
-    """Bind; the page of an ended flight gives way.
+    """Bind the socket; the page or the stream of an ended flight first releases the port.
 
     Raises:
-        OSError: the port is in use by something else.
+        OSError: another program uses the port.
     """
     deadline, leaving = time.monotonic() + _GIVES_WAY, False
     while True:
@@ -109,12 +156,12 @@ def _bind(listening: socket.socket, host: str, port: int) -> None:
 
 
 def leave_address(port: int) -> str:
-    """Name of the local socket at which a page is asked to leave its port."""
+    """Name of the local socket through which a page or stream is asked to release its port."""
     return f"\0companion-live-{port}"
 
 
 def ask_to_leave(port: int) -> bool:
-    """Ask the page at a port to leave; returns whether one is there whose flight has ended."""
+    """Ask for the release of a port; return whether a flight that has ended was served there."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as asking:
         asking.settimeout(1.0)
         try:

@@ -1,4 +1,4 @@
-"""The flight's side of the helper process: tells it what happens, and makes the changes it asks."""
+"""The flight's side of the helper process: sends events, and makes requested changes."""
 
 import asyncio
 import json
@@ -12,44 +12,47 @@ from typing import Any, NamedTuple, TypeVar
 from companion.config import Config
 from companion.flight.changes import ChangeRefusedError, Changes
 from companion.flight.status import FlightStatus
-from companion.live.channel import Channel, Message
-from companion.live.door import Door
+from companion.live.channel import Channel, Feed, Message
+from companion.live.door import Door, StreamAddress
 from companion.realtime import schedule_as_usual
 
 T = TypeVar("T")
 
 _MOST_A_TURN = 10
-"""Messages handled in one turn of the event loop: samples come between the turns."""
+"""Largest number of messages handled in one turn of the event loop; samples come between turns."""
 
 
 class Wishes(NamedTuple):
-    """What the helper process is to do.
+    """The tasks of the helper process.
 
     Attributes:
         watch: file whose edits are applied, or None.
-        read: the configuration as it was read from this file for the flight.
-        door: of the live page, or None.
+        read: configuration that was read from this file for the flight.
+        door: listening socket of the live page, or None.
+        stream: address of the live stream, or None.
         follows: whether the flight flies the maneuvers of its configuration.
-        folder: of the flight; takes `live.log` and saved values; None: there is none.
+        folder: folder of the flight, for `live.log` and saved values; None: there is none.
     """
 
     watch: Path | None
     read: Config
     door: Door | None
+    stream: StreamAddress | None
     follows: bool
     folder: Path | None
 
 
 class Helper:
-    """An observer that passes all on to the helper process. Its methods return at once.
+    """An observer that passes everything to the helper process. Its methods return at once.
 
     Args:
-        wishes: what the process is to do.
-        config: of the flight.
+        wishes: tasks of the process.
+        config: configuration of the flight.
 
     Attributes:
-        changes: are made when the process asks for them; set before the flight begins.
-        note: takes what the process has to say.
+        changes: makes the changes that the process requests; set before the flight begins.
+        note: called with messages of the process.
+        feed: sends the records for the live stream; None: there is none.
 
     Raises:
         OSError: the process cannot be started.
@@ -58,21 +61,26 @@ class Helper:
     def __init__(self, wishes: Wishes, config: Config) -> None:
         self.changes = Changes(config)
         self.note: Callable[[str], None] = lambda _: None
-        self._what = "the live page" if wishes.door is not None else "the watch of the file"
+        self._what = _what(wishes)
         self._channel, theirs = Channel.pair()
-        descriptors = [theirs.fileno()]
-        if wishes.door is not None:
-            descriptors.append(wishes.door.listening.fileno())
-        self._process = _started(descriptors, theirs, wishes.folder)
+        self.feed: Feed | None = None
+        fed: socket.socket | None = None
+        if wishes.stream is not None:
+            self.feed, fed = Feed.pair()
+        served = None if wishes.door is None else wishes.door.listening
+        self._process = _started((theirs, served, fed), wishes.folder)
+        theirs.close()
+        if fed is not None:
+            fed.close()
         self._send("start", **_first(wishes, config))
 
     @property
     def dropped(self) -> int:
-        """Messages that the process did not take in time."""
+        """Number of messages that the process did not read in time."""
         return self._channel.dropped
 
     async def serve_beside(self, work: Coroutine[Any, Any, T]) -> T:
-        """Run `work`, and serve the process meanwhile."""
+        """Run `work`, and serve the process at the same time."""
         loop = asyncio.get_running_loop()
         self.changes.on_change = self._tell_change
         loop.add_reader(self._channel.fileno(), self._on_readable)
@@ -82,16 +90,18 @@ class Helper:
             loop.remove_reader(self._channel.fileno())
 
     def close(self, words: str) -> None:
-        """Tell how the flight ended; the live page stays for those who have it open."""
+        """Tell the process how the flight ended; the live page stays while a browser shows it."""
         self._send("end", text=words)
         self._channel.close()
+        if self.feed is not None:
+            self.feed.close()
 
     def phase(self, name: str, waits_for: str) -> None:
         """Pass a phase on."""
         self._send("phase", name=name, waits_for=waits_for)
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
-        """Ignore it: the status says the same."""
+        """Ignore it: the status contains the same."""
 
     def status(self, status: FlightStatus) -> None:
         """Pass the state of the flight on."""
@@ -116,6 +126,7 @@ class Helper:
             alarms=list(status.alarms),
             monitored=status.monitored,
             dropped=self._channel.dropped,
+            stream_dropped=0 if self.feed is None else self.feed.dropped,
             **status.view,
         )
 
@@ -134,7 +145,7 @@ class Helper:
         self._send("config", config=_plain(config), can_undo=self.changes.can_undo, text=made)
 
     def _on_readable(self) -> None:
-        """Handle what the process asks for."""
+        """Handle the requests of the process."""
         for message in self._channel.waiting(_MOST_A_TURN):
             if message is None:
                 asyncio.get_running_loop().remove_reader(self._channel.fileno())
@@ -158,19 +169,27 @@ class Helper:
             self._send("answer", id=message.get("id"), refusal=None, text=told)
 
 
+def _what(wishes: Wishes) -> str:
+    """The parts that end with the process, in words."""
+    if wishes.door is not None:
+        return "the live page"
+    return "the watch of the file" if wishes.stream is None else "the live stream"
+
+
 def _started(
-    descriptors: list[int], theirs: socket.socket, folder: Path | None
+    sockets: tuple[socket.socket | None, ...], folder: Path | None
 ) -> "subprocess.Popen[bytes]":
-    """Start the process. It outlives a Ctrl-C, and a flight whose page somebody has open."""
+    """Start the process. It survives Ctrl-C, and the flight's end while its page is open."""
+    descriptors = [-1 if each is None else each.fileno() for each in sockets]
     command = [sys.executable, "-m", "companion.live.helper_process", *map(str, descriptors)]
     log = Path("/dev/null") if folder is None else folder / "live.log"
-    with log.open("ab") as words, theirs:
+    with log.open("ab") as words:
         process = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,
             stdout=words,
             stderr=words,
-            pass_fds=descriptors,
+            pass_fds=[each for each in descriptors if each >= 0],
             start_new_session=True,
         )
     schedule_as_usual(process.pid)  # it must not compute with the flight's real-time priority
@@ -178,7 +197,7 @@ def _started(
 
 
 def _first(wishes: Wishes, config: Config) -> Message:
-    door = wishes.door
+    door, stream = wishes.door, wishes.stream
     return {
         "config": _plain(config),
         "read": _plain(wishes.read),
@@ -188,6 +207,8 @@ def _first(wishes: Wishes, config: Config) -> Message:
         "token": None if door is None else door.token,
         "host": None if door is None else door.host,
         "port": None if door is None else door.port,
+        "stream_host": None if stream is None else stream.host,
+        "stream_port": None if stream is None else stream.port,
     }
 
 

@@ -1,9 +1,10 @@
-"""The helper process: watches the edited file, and serves the live page if that is asked for."""
+"""The helper process: watches the edited file, serves the live page and the live stream."""
 
 import asyncio
 import os
 import socket
 import sys
+from collections.abc import Awaitable
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -17,11 +18,11 @@ from companion.live.checks import ChangeChecks
 from companion.live.watched_file import WatchedFile
 
 _LOOK_PERIOD = 0.06
-"""The watched file is looked at this often, s; three looks make an edit."""
+"""Period of checks of the watched file, s; an edit needs three of them."""
 _ANSWER = 3.0
 """Time allowed for the flight to answer, s."""
 _NICE = 5
-"""The process gives way to the flight."""
+"""Niceness of the process, so that it yields to the flight."""
 
 
 class Relay:
@@ -29,12 +30,12 @@ class Relay:
 
     Attributes:
         first: the first message of the flight.
-        checks: of changes.
+        checks: checks of changes.
         over: set when the flight has ended.
 
     Args:
-        channel: to the flight.
-        first: see above.
+        channel: channel to the flight.
+        first: first message of the flight.
     """
 
     def __init__(self, channel: Channel, first: Message) -> None:
@@ -48,40 +49,40 @@ class Relay:
         asyncio.get_running_loop().add_reader(channel.fileno(), self._on_readable)
 
     def listen(self, take: Any) -> None:
-        """Call `take` with each message of the flight from now on."""
+        """Call `take` with each further message of the flight."""
         self._listeners.append(take)
 
     async def change(self, values: Values, by: str) -> str:
-        """Check new values and have the flight change to them; returns what changes, in words.
+        """Check new values and request them from the flight; return the change in words.
 
-        One change waits for the other: each is checked together with those before it.
+        Changes are made one after the other, each checked together with the earlier ones.
 
         Raises:
             ConfigError: the values cannot be used.
             ChangeRefusedError: the flight refuses them, or has ended.
-            NoAnswerError: the flight has not answered in time; it may have changed.
+            NoAnswerError: the flight did not answer in time; the change may be in force.
         """
         async with self._one_at_a_time:
             await asyncio.to_thread(self.checks.check, values, by)
             return await self._ask({"kind": "change", "values": values, "by": by})
 
     async def undo(self, by: str) -> str:
-        """Have the flight go back to the values before the newest change; returns them in words.
+        """Request from the flight the values before the newest change; return them in words.
 
-        Their margins were checked when they were flown first.
+        Their margins are not checked again.
 
         Raises:
-            ChangeRefusedError, NoAnswerError: as `change`.
+            ChangeRefusedError, NoAnswerError: see `change`.
         """
         async with self._one_at_a_time:
             return await self._ask({"kind": "undo", "by": by})
 
     async def _ask(self, message: Message) -> str:
-        """Send a request and wait for the answer, in words.
+        """Send a request and wait for the answer in words.
 
         Raises:
-            ChangeRefusedError: the flight refuses it, or has ended.
-            NoAnswerError: the flight has not answered in time; it may have done it.
+            ChangeRefusedError: the flight refuses the request, or has ended.
+            NoAnswerError: the flight did not answer in time; the request may be in force.
         """
         number = next(self._ids)
         answer = self._asked[number] = asyncio.get_running_loop().create_future()
@@ -102,7 +103,7 @@ class Relay:
         return str(told.get("text"))
 
     def note(self, text: str) -> None:
-        """Have the flight record and show a sentence."""
+        """Let the flight record and show a sentence."""
         self._channel.send({"kind": "note", "text": text})
 
     def _on_readable(self) -> None:
@@ -144,26 +145,41 @@ async def watch(relay: Relay, path: Path) -> None:
         await asyncio.sleep(_LOOK_PERIOD)
 
 
-async def _help(descriptor: int, listening: int | None) -> None:
+async def _help(descriptor: int, listening: int, feed: int) -> None:
+    """Do all that is asked for; the arguments are descriptors, -1: there is none.
+
+    Args:
+        descriptor: channel to the flight.
+        listening: the page is served here.
+        feed: what the flight records arrives here, for the stream.
+    """
     channel = Channel(socket.socket(fileno=descriptor))
     first = channel.receive()
     if first is None:
         return
     os.set_blocking(descriptor, False)
-    relay, tasks = Relay(channel, first), []
-    if first["watch"] is not None:
-        tasks.append(asyncio.create_task(watch(relay, Path(first["watch"]))))
-    if listening is None:
-        await relay.over.wait()
-    else:
+    relay = Relay(channel, first)
+    serving: list[Awaitable[None]] = [_until_over(relay)]
+    if feed >= 0:
+        from companion.live.foxglove_stream import serve_stream  # noqa: PLC0415  needs the extra
+
+        serving.append(serve_stream(relay, socket.socket(fileno=feed)))
+    if listening >= 0:
         from companion.live.page.server import serve_page  # noqa: PLC0415  needs the extra
 
-        await serve_page(relay, socket.socket(fileno=listening))
-    for task in tasks:
-        task.cancel()
+        serving.append(serve_page(relay, socket.socket(fileno=listening)))
+    await asyncio.gather(*serving)
+
+
+async def _until_over(relay: Relay) -> None:
+    """Watch the file, if that is asked for, until the flight ends."""
+    path = relay.first["watch"]
+    watching = None if path is None else asyncio.create_task(watch(relay, Path(path)))
+    await relay.over.wait()
+    if watching is not None:
+        watching.cancel()
 
 
 if __name__ == "__main__":
     os.nice(_NICE)
-    _channel, *_listening = map(int, sys.argv[1:])
-    asyncio.run(_help(_channel, _listening[0] if _listening else None))
+    asyncio.run(_help(*map(int, sys.argv[1:])))

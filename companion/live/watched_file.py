@@ -1,4 +1,4 @@
-"""A configuration file that somebody edits while it flies."""
+"""A configuration file that a user edits during the flight."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -12,18 +12,18 @@ from companion.files.yaml_file import ConfigError
 _LONGEST = 400
 """Largest length of an explanation, characters."""
 _SETTLED = 3
-"""A file that does not change over this many looks is whole; editors remove it for a moment."""
+"""Number of unchanged checks after which a file counts as complete; editors remove it briefly."""
 
 Signature = tuple[tuple[int, int, int] | None, ...]
-"""Inode, size and time of the file and of all that it includes; None: it is not there."""
+"""Inode, size and time of the file and of all its includes; None: the file does not exist."""
 
 
 class Edit:
-    """What an edit of the file asks for.
+    """The result of an edit.
 
     Attributes:
-        values: the values that it changes.
-        refusal: why it cannot be used, one sentence; None: it can.
+        values: the changed values.
+        refusal: why the edit cannot be used, one sentence; None: it can.
     """
 
     def __init__(self, values: Values, refusal: str | None = None) -> None:
@@ -31,14 +31,14 @@ class Edit:
 
 
 class WatchedFile:
-    """Looks at a file again and again, and tells what an edit changes.
+    """Checks a file repeatedly, and finds what an edit changes.
 
-    An edit counts from the last accepted contents on. So a bad edit has no effect, also later.
+    Each edit is compared with the last accepted contents, so a bad edit never has an effect.
 
     Args:
-        path: of the file.
-        read: the configuration as it was read from this file for the flight. If the file has
-            changed since, that is its first edit.
+        path: path of the file.
+        read: configuration that was read from this file for the flight. A later change of the file
+            is its first edit.
         check: raises ConfigError if the values cannot be used; called with the name of the file.
     """
 
@@ -51,7 +51,7 @@ class WatchedFile:
         self._looks = 0
 
     def look(self) -> Edit | None:
-        """What a new edit asks for; None: there is none, or the file is being written."""
+        """The newest edit; None: there is none, or the file is being written."""
         signature = self._signature()
         if signature != self._seen:
             self._seen, self._looks = signature, 0
@@ -63,7 +63,7 @@ class WatchedFile:
         return self._edit()
 
     def accept(self) -> None:
-        """The newest edit is applied: later edits count from it on."""
+        """Accept the newest edit: later edits are compared with it."""
         self._accepted = self._offered
 
     def _edit(self) -> Edit | None:
@@ -85,7 +85,7 @@ class WatchedFile:
 
 
 def _values(before: Config, after: Config) -> dict[str, dict[str, Any]]:
-    """The values that differ, by section and key; how a file includes others does not count."""
+    """The values that differ, by section and key; the structure of includes does not matter."""
     values: dict[str, dict[str, Any]] = {}
     for each in differences(before, after):
         if each.section != "include":

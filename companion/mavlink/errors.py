@@ -6,7 +6,7 @@ class LinkError(Exception):
 
 
 class EndpointError(LinkError):
-    """The endpoint cannot be understood or opened; the message says what to do."""
+    """The endpoint is not valid or cannot be opened; the message tells what to do."""
 
 
 class LinkTimeout(LinkError):  # noqa: N818 - "timeout" already says that it is an error
@@ -77,7 +77,7 @@ class UnknownParameter(ParameterError):  # noqa: N818
 
 
 class UnansweredParameter(UnknownParameter):
-    """The autopilot did not answer: it has no parameter of that name, or frames were lost."""
+    """The autopilot did not answer: the parameter does not exist, or frames were lost."""
 
 
 class ParameterRefused(ParameterError):  # noqa: N818

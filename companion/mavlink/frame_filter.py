@@ -1,4 +1,4 @@
-"""Which frames come from the vehicle, by their system and component ids and by their signature."""
+"""Selects the vehicle's frames, by their system and component ids and their signature."""
 
 from collections.abc import Callable
 
@@ -8,7 +8,7 @@ from companion.mavlink.stamps import SignatureResult
 from companion.mavlink.stats import LinkStats
 
 Notice = Callable[[str], None]
-"""Takes a sentence about the link, to show to the user."""
+"""Called with a sentence about the link for the user."""
 
 _REFUSED = {
     SignatureResult.UNSIGNED: "the vehicle does not sign its frames, so they are refused; give it "

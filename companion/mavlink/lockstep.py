@@ -20,8 +20,9 @@ T = TypeVar("T")
 Arguments = TypeVarTuple("Arguments")
 
 PATIENCE_S = 2.0
-"""If nothing is received or sent for this wall time, s, the vehicle counts as gone, and the virtual
-time advances without it."""
+"""Wall time without traffic after which the vehicle counts as gone, s; virtual time then advances
+without it.
+"""
 
 _SPIN_S = 0.0005
 """Wall time of polling for the next beacon before the process sleeps, s."""
@@ -30,7 +31,7 @@ _TIMERS_IN_ORDER = 1_000_000
 _TIMER_SPACING_S = 1e-12  # a million of them are a microsecond, below any step
 
 _MAX_ITERATIONS = 200
-"""The loop counts as settled after this many iterations: a task that never rests must not block."""
+"""The loop counts as settled after this many iterations, so that a busy task cannot block it."""
 
 
 class LockstepClock(Protocol):
@@ -80,7 +81,7 @@ class _VehicleClock:
         return max(0.0, self._waiting_since + PATIENCE_S - time.monotonic())
 
     def advance_alone(self) -> None:
-        """Advance time without the vehicle, which sent no beacon in time: timeouts must end."""
+        """Advance time although the vehicle sent no beacon in time, so that timeouts can expire."""
         self._offset += PATIENCE_S
         self.start_waiting()
 
@@ -157,8 +158,8 @@ class _SteppingSelector(SettlingSelector):
 class LockstepEventLoop(LinkEventLoop):
     """An event loop in vehicle time: only `advance` changes `time()`.
 
-    Before the first beacon it runs on wall time. If nothing has been received for `PATIENCE_S` of
-    wall time, its time advances by that. So the usual timeouts end if the vehicle is gone.
+    Before the first beacon it runs on wall time. If nothing is received for `PATIENCE_S` of wall
+    time, its time advances by that amount, so that timeouts expire if the vehicle is gone.
 
     Args:
         clock: clock to use instead of the one described above; needs `selector` too.

@@ -43,7 +43,7 @@ class CurrentModeMessage:
         self.intended_custom_mode = intended_custom_mode
 
     def get_type(self) -> str:
-        """Name of the message, as pymavlink's messages give it."""
+        """Name of the message, like pymavlink's `get_type`."""
         return self.msgname
 
 
@@ -67,7 +67,8 @@ _ORDERED: dict[int, Callable[[tuple[Any, ...]], tuple[Any, ...]]] = {
     if len(kind.orders) > 1 and set(kind.lengths) == {1} and "s" not in kind.unpacker.format
 }
 """Puts the values of a payload in the order of the constructor, for messages that hold neither
-arrays nor texts: most of what comes often."""
+arrays nor texts: most of what comes often.
+"""
 
 
 def message_id(name: str) -> int:
@@ -85,7 +86,7 @@ def message_id(name: str) -> int:
 
 
 def decode(number: int, payload: bytes) -> Message:
-    """Build pymavlink's message object from a frame's payload (checksum already checked)."""
+    """Build pymavlink's message object from a payload whose checksum was already checked."""
     kind = _CLASSES[number]
     size = kind.unpacker.size
     flat = kind.unpacker.unpack(payload[:size].ljust(size, b"\0"))

@@ -52,7 +52,7 @@ class Outbox:
         return sent
 
     def latch(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> None:
-        """Keep a setpoint as the answer of this lockstep step; a later one replaces it.
+        """Keep a setpoint as the answer of this lockstep step; a later one in the step replaces it.
 
         Raises:
             InvalidSetpoint: A value must not reach the vehicle; nothing was kept.

@@ -1,4 +1,4 @@
-"""Which sender is the peer: who may send, what makes a sender the peer, and for how long."""
+"""Which sender is the peer: who may become it, by which frames, and for how long."""
 
 import asyncio
 import ipaddress
@@ -146,7 +146,7 @@ class PeerRule:
             )
 
     def ignore(self, who: str) -> None:
-        """Tell the user that `who` sends but is not among the peers that the endpoint names."""
+        """Tell the user that `who` sends, but is not one of the peers that the endpoint names."""
         self._notice(
             f"{PEER_NOTICE}frames from {who} are ignored, as the endpoint names another peer; "
             f"if {who} is the vehicle, correct ?peer="

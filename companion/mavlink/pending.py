@@ -9,7 +9,7 @@ T = TypeVar("T")
 
 
 class Pending(Generic[T]):
-    """A queue of answers, from a callback of the link to the task that waits for them.
+    """A queue of answers: callbacks of the link fill it, and one task waits for it.
 
     Use as a context manager.
     """
@@ -48,7 +48,7 @@ class Pending(Generic[T]):
 
 
 class PendingRegistry:
-    """All queues of a link at which a task waits."""
+    """All queues of a link on which a task waits."""
 
     def __init__(self) -> None:
         # A dict has a fixed order, which keeps flights repeatable; a set has none.

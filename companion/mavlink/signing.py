@@ -31,7 +31,7 @@ _REQUESTS_KEPT = 16
 PERIOD_S = 10.0
 """Time between two writes of the stamps, s. The guide demands one a minute."""
 _RESERVE = 15 * TICKS_PER_S
-"""How far ahead of the newest stamps the file is written while the link is open, ticks.
+"""How far the stamps in the file are ahead of the newest stamps while the link is open, ticks.
 
 It is longer than a period. If this program is killed, the stamps that it sends later are still
 newer, and no older frame is accepted again. In that case the vehicle's frames are also refused
@@ -42,7 +42,7 @@ _LAST_WRITE_S = 2.0
 
 
 def key_from_hex(text: str) -> bytes:
-    """The key that 64 hexadecimal digits spell.
+    """Convert 64 hexadecimal digits to a key.
 
     Raises:
         SigningError: The text is not 64 hexadecimal digits.
@@ -53,7 +53,7 @@ def key_from_hex(text: str) -> bytes:
 
 
 def key_from_passphrase_file(path: Path) -> bytes:
-    """The key from a passphrase, as ground stations make it: SHA-256 of the file's first line.
+    """Make a key from a passphrase as ground stations do: SHA-256 of the file's first line.
 
     Raises:
         SigningError: The file cannot be read or its first line is empty.

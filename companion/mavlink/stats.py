@@ -16,25 +16,26 @@ class LinkStats:
     """Counters of one link. All but the last four count frames.
 
     Attributes:
-        frames: Accepted from the vehicle.
-        lost: Missing in the vehicle's sequence numbers.
-        repeated: Received twice or late.
-        bad_crc: Bytes that begin like a frame and have a wrong checksum.
+        frames: Frames accepted from the vehicle.
+        lost: Frames missing in the vehicle's sequence numbers.
+        repeated: Frames received twice or late.
+        bad_crc: Frames with a wrong checksum.
         unknown: Frames of messages that the dialect does not know.
-        bad_signature: Unsigned, wrongly signed or replayed while signing is on.
+        bad_signature: Frames unsigned, wrongly signed or replayed while signing is on.
         ignored_foreign: Frames of other systems or components than the vehicle's.
         unclaimed: Frames with the vehicle's ids, from a sender that is not the peer (`PeerRule`).
         non_finite: Messages refused for a NaN or infinity.
         outdated: Positions refused because one with the same or a later time stamp had come.
         stamped_ahead: Positions refused because they were stamped ahead of the vehicle's clock.
         malformed: Messages that could not be decoded or whose values are impossible.
-        sent: Passed to the kernel.
+        sent: Frames passed to the kernel.
         forwarded: Frames of other nodes that were passed to the kernel unchanged.
-        not_sent: Could not be sent (no peer, buffer full, connection down) and were dropped.
-        reconnects: How often the connection was opened again.
-        peers: How often the peer changed to another address or port, or to another TCP client. A
-            peer that returns at the same address and port does not count. A serial port or TCP
-            connection that this program opens again counts only in `reconnects`.
+        not_sent: Frames dropped because they could not be sent (no peer, buffer full, connection
+            down).
+        reconnects: Number of times that the connection was opened again.
+        peers: Number of times that the peer changed to another address or port, or another TCP
+            client. A peer that returns at the same address and port does not count. A serial port
+            or TCP connection that this program opens again counts only in `reconnects`.
         by_message: Accepted frames for each message id.
         foreign_sources: (system, component) of frames that are ignored.
     """
@@ -67,7 +68,7 @@ class SequenceTracker:
         self._last: int | None = None
 
     def missing(self, sequence: int) -> int:
-        """Number of frames missing before this one; −1 if it came twice or up to 127 late."""
+        """Number of frames missing before this one; −1 if it is repeated or up to 127 late."""
         if self._last is None:
             self._last = sequence
             return 0

@@ -70,7 +70,7 @@ class TextAssembler:
             self._finish(now)
 
     def since(self, start: float) -> tuple[str, ...]:
-        """All texts that came at the event-loop time `start` (s) or later."""
+        """All texts that arrived at the event-loop time `start` (s) or later."""
         return tuple(entry.text for entry in self.texts if entry.time >= start)
 
     def _finish(self, now: float) -> None:

@@ -118,7 +118,7 @@ def translation(
         velocity: (3,), NED, m/s.
         thrust: specific thrust, m/s².
         axis: (3,), coefficients north and east, and cos(tilt).
-        heading: of the body's forward axis, rad.
+        heading: heading of the body's forward axis, rad.
         constants: symbols that begin with `Conditions`.
         settings: settings, which contain gravity.
     """

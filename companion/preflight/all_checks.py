@@ -1,4 +1,4 @@
-"""All preflight checks in their order, and which findings forbid a flight."""
+"""All preflight checks in order, and the rule for findings that forbid a flight."""
 
 from collections.abc import Callable, Iterable, Iterator
 
@@ -45,11 +45,11 @@ ONCE: tuple[Check, ...] = (
     configuration_checks.doubtful,
     configuration_checks.accepted,
 )
-"""Checks that a flight runs once only: their result depends on nothing but the configuration."""
+"""Checks that a flight runs only once, because they depend only on the configuration."""
 
 
 def run_checks(config: Config, evidence: Evidence, *, again: bool = False) -> list[Finding]:
-    """Run all checks and return every finding, safe ones too; `again` skips those marked `ONCE`."""
+    """Run all checks; return every finding, including safe ones; `again` skips those in `ONCE`."""
     return [
         finding
         for check in CHECKS
@@ -71,7 +71,7 @@ def not_accepted(config: Config, findings: Iterable[Finding]) -> list[Finding]:
 
 
 def overall_result(config: Config, findings: Iterable[Finding]) -> CheckResult:
-    """The worst result that would stop `companion fly`, else safe."""
+    """The worst result that would stop `companion fly`; safe if there is none."""
     findings = tuple(findings)
     results = {finding.result for finding in findings}
     if CheckResult.NOT_CONNECTED in results:
@@ -82,5 +82,5 @@ def overall_result(config: Config, findings: Iterable[Finding]) -> CheckResult:
 
 
 def unsafe(findings: Iterable[Finding]) -> list[Finding]:
-    """The findings by which somebody may be hurt or the vehicle lost."""
+    """The findings that may hurt somebody or lose the vehicle."""
     return [finding for finding in findings if finding.result is CheckResult.UNSAFE]

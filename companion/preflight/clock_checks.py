@@ -16,7 +16,7 @@ _SAMPLES_NEEDED = 10
 
 
 def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Age of a sample at arrival, if TIMESYNC makes it known."""
+    """Age of a sample at arrival, if TIMESYNC can measure it."""
     seconds, stale = evidence.samples.age, config.deadman.telemetry_stale
     if seconds is None:
         if evidence.link.other_clock:
@@ -42,7 +42,7 @@ def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def clocks(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether the vehicle's clock runs steadily: the control law uses it."""
+    """Whether the vehicle's clock runs steadily, as the control law needs it."""
     samples, source = evidence.samples, "ATTITUDE_QUATERNION time_boot_ms"
     if samples.clock_change:
         yield Finding(
@@ -68,7 +68,7 @@ def clocks(config: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def _clock_rate(config: Config, evidence: Evidence, rate: float, source: str) -> Finding:
-    """Whether the rate is within what we follow; a pause at either end falsifies it."""
+    """Whether the clock's rate is within what we can follow; a pause at either end falsifies it."""
     behind = 1.0 - rate - MOST_DRIFT
     stale_after = config.deadman.telemetry_stale / behind if behind > 0.0 else inf
     unsure = evidence.samples.longest_pause / max(evidence.window, 1e-3)

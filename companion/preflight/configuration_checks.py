@@ -1,4 +1,4 @@
-"""Checks of our own configuration, whatever the vehicle."""
+"""Checks of our configuration that do not depend on the vehicle."""
 
 import json
 from collections.abc import Iterator
@@ -37,7 +37,7 @@ def planner(config: Config, _: Evidence) -> Iterator[Finding]:
 def dead_time(config: Config, _: Evidence) -> Iterator[Finding]:
     """Whether the newest flight with this planner and gain measured the configured dead time.
 
-    With another gain the response to the same vehicle differs, and a hold that swings measures a
+    With another gain the response of the same vehicle differs, and an oscillating hold gives a
     wrong dead time.
     """
     if not config.vehicle.known:
@@ -72,7 +72,7 @@ def dead_time(config: Config, _: Evidence) -> Iterator[Finding]:
 
 
 def doubtful(config: Config, _: Evidence) -> Iterator[Finding]:
-    """Values that are most likely not meant, or not measured on this vehicle."""
+    """Values that are probably a mistake, or not measured on this vehicle."""
     for doubt in doubts(config):
         key = doubt.key if doubt.key in (Key.IDENTIFIED, Key.BODY_RATE) else Key.UNITS
         yield Finding(key, INEFFECTIVE, doubt.found, doubt.because, doubt.fix, doubt.key)
@@ -98,7 +98,7 @@ def accepted(config: Config, _: Evidence) -> Iterator[Finding]:
 
 
 def _newest_dead_times(config: Config) -> tuple[Path | None, dict[str, float]]:
-    """The folder of the newest flight of its kind that measured any, and its dead times in s."""
+    """The newest flight with this planner and gain with dead times: folder, dead times in s."""
     kind = config.planner_name, config.planner.gain_per_s
     for summary in sorted(config.recording.directory.glob("*/summary.json"), reverse=True):
         try:

@@ -15,11 +15,11 @@ from companion.vehicle.streams import StreamRate
 _ABOUT_POSITION = frozenset(
     {"LOCAL_POSITION_NED", "GLOBAL_POSITION_INT", "HOME_POSITION", "ODOMETRY"}
 )
-"""Autopilots send these only once their estimator has a position."""
+"""Messages that autopilots send only when their estimator has a position."""
 
 
 class Stage(Enum):
-    """What the vehicle is about to do; the value completes "ready …"."""
+    """The next step of the vehicle; the value completes "ready …"."""
 
     GROUND = "to be armed"
     """The vehicle stands on the ground, disarmed."""
@@ -33,9 +33,9 @@ class Identity(NamedTuple):
     """AUTOPILOT_VERSION; `None` where it was not received.
 
     Attributes:
-        version: Of the flight software, as in 4.7.0-dev.
+        version: Version of the flight software, such as 4.7.0-dev.
         capabilities: MAV_PROTOCOL_CAPABILITY.
-        uid: Of the hardware.
+        uid: Hardware id.
     """
 
     version: str | None = None
@@ -44,18 +44,18 @@ class Identity(NamedTuple):
 
 
 class LinkQuality(NamedTuple):
-    """The link while we listened.
+    """Quality of the link while we listened.
 
     Attributes:
-        frames: Accepted.
-        lost: Missing in the vehicle's running numbers.
-        damaged: With a wrong checksum.
+        frames: Number of accepted frames.
+        lost: Number of frames missing in the vehicle's sequence numbers.
+        damaged: Number of frames with a wrong checksum.
         not_finite: Messages refused for a NaN or infinity.
-        reconnects: How often the connection was opened again.
+        reconnects: Number of times that the connection was opened again.
         round_trip: Shortest recent TIMESYNC round trip, s; `None` if none was answered.
-        jitter: By how much the round trips differed, s.
+        jitter: Range of the round trips, s.
         other_clock: Whether TIMESYNC uses another clock than the samples' stamps.
-        notices: Reasons why the two sides do not understand each other.
+        notices: Messages of the link about signatures and the peer.
     """
 
     frames: int
@@ -75,17 +75,17 @@ class LinkQuality(NamedTuple):
 
 
 class SampleTimes(NamedTuple):
-    """The attitude samples received, by both clocks.
+    """Times of the attitude samples received, by both clocks.
 
     Attributes:
         heard: Number of samples.
-        longest_pause: Between two of them by our clock, s.
-        not_newer: Stamped no later than the one before.
+        longest_pause: Longest time between two samples by our clock, s.
+        not_newer: Number of samples stamped no later than the one before.
         clock_rate: Vehicle seconds per second of ours; `None` for too few samples.
-        age: Median of their ages at arrival, s; `None` where it is not known (`VehicleClock`).
-        clock_change: How the vehicle's clock jumped or restarted meanwhile; empty: not at all.
-        unusable: Samples that are no unit quaternion, or hold a number that is not finite.
-        rate: Hz, lowered for bursts (`HeldRates`); `None` for too few samples.
+        age: Median of their ages at arrival, s; `None`: unknown (`VehicleClock`).
+        clock_change: Description of a jump or restart of the vehicle's clock; empty: none.
+        unusable: Number of samples that are not a unit quaternion or not finite.
+        rate: Effective rate, Hz, lowered by bursts (`HeldRates`); `None` for too few samples.
     """
 
     heard: int = 0
@@ -103,8 +103,8 @@ class OtherNodes(NamedTuple):
 
     Attributes:
         sources: (system, component) of every node that was heard.
-        companions: Those whose heartbeat has the type onboard controller.
-        steering: Those that sent setpoints.
+        companions: Nodes whose heartbeat has the type onboard controller.
+        steering: Nodes that sent setpoints.
         echo: Whether ATTITUDE_TARGET shows rates or thrust although the vehicle is disarmed.
     """
 
@@ -119,20 +119,20 @@ class Evidence:
     """All evidence of one session.
 
     Attributes:
-        autopilot: Which autopilot it is.
+        autopilot: The kind of autopilot.
         state: The vehicle's newest telemetry.
-        survey: The parameters that matter.
+        survey: The parameters that matter to a flight.
         streams: Rates requested, granted and counted, by message.
         received: Number of each of these messages since the link was opened.
-        window: Time over which was counted, s.
-        link: How good the link is.
-        samples: The attitude samples' times.
+        window: Time over which messages were counted, s.
+        link: Quality of the link.
+        samples: Times of the attitude samples.
         other_nodes: Other nodes on the link.
-        resets: Number of estimator resets meanwhile.
+        resets: Number of estimator resets.
         identity: The autopilot's version and hardware.
-        stage: What the vehicle is about to do.
-        words: The autopilot's texts meanwhile with severity warning or worse.
-        maneuvers: The planned maneuvers; `None`: none are planned.
+        stage: The next step of the vehicle.
+        words: The autopilot's texts of severity warning or worse.
+        maneuvers: The planned maneuvers; `None`: no maneuvers.
     """
 
     autopilot: Autopilot
@@ -159,12 +159,12 @@ class Evidence:
 
     @property
     def booting(self) -> bool:
-        """Whether no estimator status came yet: until then ArduPilot sends no other telemetry."""
+        """Whether no estimator status came yet; until then ArduPilot sends no other telemetry."""
         return self.state.readiness.estimator_flags is None
 
     @property
     def awaited(self) -> tuple[str, ...]:
-        """Messages that the vehicle is not ready to send yet."""
+        """Messages that the vehicle cannot send yet."""
         if not self.awaits_position:
             return ()
         return tuple(

@@ -1,4 +1,4 @@
-"""Findings of the preflight checks: what was found, what follows, what to do, and the source.
+"""Findings of the preflight checks: fact, consequence, remedy, and source.
 
 A finding about a parameter has its name as key. All other keys are listed here.
 """
@@ -59,10 +59,10 @@ class Change(NamedTuple):
     """A parameter to set.
 
     Attributes:
-        parameter: Its name, as this autopilot knows it.
-        old: Value that it has.
-        new: Value that it should have.
-        reboot: Whether it takes effect only after the autopilot restarts.
+        parameter: Name of the parameter in this autopilot.
+        old: Present value.
+        new: Proposed value.
+        reboot: Whether the change takes effect only after the autopilot restarts.
     """
 
     parameter: str
@@ -73,15 +73,15 @@ class Change(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What one check found.
+    """Result of one check.
 
     Attributes:
         key: A `Key`, or a parameter's (newest) name.
-        verdict: How much it matters.
-        found: What was found, one clause.
-        because: What follows from it, or what the parameter decides; may be empty.
-        fix: What to do about it; empty where nothing can or must be done.
-        source: How this is known: a MAVLink message, a reference, a measurement.
+        verdict: Severity of the finding.
+        found: The fact, as a clause.
+        because: The consequence, or the effect of the parameter; may be empty.
+        fix: What the user should do; empty if there is nothing to do.
+        source: Source of the fact: a MAVLink message, a reference, a measurement.
         change: The parameter to set, if that fixes it.
     """
 
@@ -94,7 +94,7 @@ class Finding:
     change: Change | None = None
 
     def sentence(self) -> str:
-        """The finding without its source, for people."""
+        """The finding without its source, for the user."""
         because = f": {self.because}" if self.because else ""
         fix = f"; {self.fix}" if self.fix else ""
         return f"{self.found}{because}{fix}"

@@ -13,17 +13,18 @@ from companion.vehicle.streams import StreamRate
 SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 
 _REACHED = 0.7
-"""PX4 sends 197 Hz of 250 requested (measured); a lower share is a fault."""
+"""Smallest share of the requested rate; PX4 sends 197 Hz of 250 requested (measured)."""
 _COUNTABLE = 5.0
-"""Fewest messages that must be due while we listen, to judge a rate by counting."""
+"""Smallest number of expected messages while we listen to judge a rate by counting."""
 _SENT_ON_CHANGE = {"CURRENT_MODE": 2.0}
-"""Messages sent on change, and otherwise only at this rate, Hz, whatever is requested (PX4)."""
+"""Messages sent on change, and otherwise only at this rate, Hz, whatever rate is requested (PX4).
+"""
 _MANY_LOST = 0.2
 _SOME_DAMAGED = 0.01
 
 
 def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether the requested telemetry arrives at its rate."""
+    """Whether the requested telemetry arrives at the requested rates."""
     link = config.link
     least = {
         "ATTITUDE_QUATERNION": ("min_attitude_rate_hz", link.min_attitude_rate_hz),
@@ -69,7 +70,7 @@ def _even_rate(name: str, rate: StreamRate, evidence: Evidence) -> float:
 
 
 def _trouble(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, str] | None:
-    """What is wrong with a message's rate, and how to fix it."""
+    """The fault of a message's rate, and its remedy."""
     asked, achieved = rate.asked, rate.achieved
     if rate.refusal:
         return f"{name} is refused ({rate.refusal})", "a newer version of the autopilot may send it"
@@ -183,14 +184,14 @@ def delays(config: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def signing(_: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether both sides sign with the same key, or neither; and who claims to be the peer."""
+    """Whether both sides sign with the same key or not at all, and who claims to be the peer."""
     yield from signing_findings(evidence.link.notices)
 
 
 def signing_findings(
     notices: Iterable[str], result: CheckResult = INEFFECTIVE
 ) -> Iterator[Finding]:
-    """Notices of the link about signatures and the peer, as findings with this `result`."""
+    """Convert notices of the link about signatures and the peer to findings with this `result`."""
     for notice in notices:
         of_peer = notice.startswith(PEER_NOTICE)
         found, _semicolon, fix = notice.removeprefix(PEER_NOTICE).partition("; ")

@@ -1,4 +1,4 @@
-"""Listens to the link for a while: sample times, other nodes on it, jumps of the estimate."""
+"""Listens to the link for a while: sample times, other nodes, jumps of the estimate."""
 
 from collections.abc import Callable
 from math import isfinite
@@ -24,16 +24,18 @@ _SETPOINTS = frozenset(
     }
 )
 _STILL = 0.05
-"""Disarmed autopilots report rates below 0.02 rad/s and no thrust (recorded from both)."""
+"""Largest body rate and thrust in ATTITUDE_TARGET of a disarmed autopilot (recorded: 0.02 rad/s,
+0).
+"""
 _ENOUGH = 10
-"""Samples needed to measure the rate of a clock."""
+"""Smallest number of samples to measure the rate of a clock."""
 
 
 class LinkListener:
     """Listens while its `with` block runs.
 
     Args:
-        link: Link to listen on. Its `on_foreign` is replaced meanwhile.
+        link: Link to listen on. The block replaces its `on_foreign`.
         clock: Our clock, s.
     """
 

@@ -5,7 +5,7 @@ from math import exp, hypot
 from typing import NamedTuple
 
 from companion.config import Config
-from companion.config.known_drag import least_drag
+from companion.config.known_drag import of_vehicle
 from companion.drag import Drag
 from companion.guidance import ManeuverSequence, Pose, Reference
 from companion.guidance.fence import Fence
@@ -54,7 +54,8 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
     held = evidence.survey.values.get(failsafe.parameter)
     if maneuvers is None or held is None or not 0.0 <= held <= LONGEST_HELD:
         return  # an unknown or longer time is unsafe, whatever is flown
-    worst = worst_reach(config, maneuvers, held, brakes=failsafe.brakes)
+    drag = of_vehicle(config, evidence.identity.uid).least
+    worst = worst_reach(config, maneuvers, held, drag, brakes=failsafe.brakes)
     carried = (
         f"should our setpoints end, the last rates are held for {held:g} s "
         f"({failsafe.parameter}), and can carry the vehicle {worst.away:.0f} m away, "
@@ -77,8 +78,10 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
     )
 
 
-def worst_reach(config: Config, maneuvers: ManeuverSequence, held: float, *, brakes: bool) -> Worst:
-    """The largest reach over the maneuvers; `held` and `brakes` as of `LossFailsafe`."""
+def worst_reach(
+    config: Config, maneuvers: ManeuverSequence, held: float, drag: Drag, *, brakes: bool
+) -> Worst:
+    """The largest reach over the maneuvers; `held`, `drag` and `brakes` as of `LossFailsafe`."""
     limits, safety = config.limits, config.safety
     fence = Fence(
         limits.fence_radius_m,
@@ -89,7 +92,6 @@ def worst_reach(config: Config, maneuvers: ManeuverSequence, held: float, *, bra
         safety.braking_m_s2,
         safety.reaction_s,
     )
-    drag = least_drag(config)
     max_tilt_rate = limits.max_tilt_rate
     loss, worst = LossFailsafe(held, brakes, drag, max_tilt_rate, fence), Worst()
     before: MotionAtLoss | None = None

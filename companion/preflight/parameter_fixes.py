@@ -1,4 +1,4 @@
-"""Setting parameters: each asked for, written to an undo file before it is set, and read back."""
+"""Sets parameters: asks for each, writes the old value to an undo file, sets it, reads it back."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Iterable
@@ -24,7 +24,7 @@ LARGEST = 3.5e38
 
 
 class Undo(Section):
-    """What to restore, and on which vehicle."""
+    """Contents of an undo file: the old values and their vehicle."""
 
     autopilot: Word
     """Autopilot of the vehicle, by name."""
@@ -33,9 +33,9 @@ class Undo(Section):
     uid: Word | None
     """Hardware id of AUTOPILOT_VERSION; null: not received."""
     time: Word
-    """When the first of them was set, UTC."""
+    """Time when the first parameter was set, UTC."""
     parameters: dict[Word, Annotated[float, Field(ge=-LARGEST, le=LARGEST)]]
-    """Old value of each, in the order in which they were set."""
+    """Old value of each parameter, in the order in which they were set."""
 
     def meant_for(self, link: Link, identity: Identity) -> bool:
         """Whether this is the vehicle whose parameters were changed."""
@@ -45,11 +45,11 @@ class Undo(Section):
 
 
 class UndoFile:
-    """The undo file: takes each parameter's old value before that parameter is set.
+    """The undo file: stores each parameter's old value before that parameter is set.
 
     Args:
-        directory: Where to create it.
-        link: To the vehicle.
+        directory: Folder for the file.
+        link: Link to the vehicle.
         identity: The vehicle's AUTOPILOT_VERSION.
     """
 
@@ -65,10 +65,10 @@ class UndoFile:
         )
 
     def add(self, parameter: str, old: float) -> None:
-        """Add an old value, unless there is one. The file is whole and on disk when this returns.
+        """Add an old value, unless the parameter has one; when this returns, it is on the disk.
 
         Raises:
-            ConfigError: it cannot be written, so nothing must be set.
+            ConfigError: the file cannot be written, so no parameter must be set.
         """
         grown = dict(self._undo.parameters)
         grown.setdefault(parameter, old)
@@ -96,7 +96,7 @@ def _unused(directory: Path, name: str) -> Path:
 _SINGLE = 1e-6
 """Relative resolution of a single-precision parameter."""
 _KNOWN_FOR = 3.0
-"""Largest age of a heartbeat that still tells whether the vehicle is armed, s."""
+"""Largest age of a heartbeat that tells whether the vehicle is armed, s."""
 
 
 class Answer(Enum):
@@ -115,8 +115,8 @@ class Outcome(NamedTuple):
     """The outcome of a change.
 
     Attributes:
-        change: Which change.
-        refusal: Why it was not made; empty if it was.
+        change: The change.
+        refusal: Why it was not made; empty if it was made.
     """
 
     change: Change
@@ -124,7 +124,7 @@ class Outcome(NamedTuple):
 
 
 class VehicleArmedError(LinkError):
-    """No parameter is set on a vehicle that may fly."""
+    """The vehicle may fly, so no parameter is set."""
 
 
 async def apply_fixes(
@@ -137,16 +137,16 @@ async def apply_fixes(
     """Propose each change, and make those that the user accepts.
 
     Args:
-        link: To the vehicle.
-        findings: Those without a change are skipped.
+        link: Link to the vehicle.
+        findings: The findings; those without a change are skipped.
         ask: Asks the user before each change, until the answer is ALL.
-        undo: Takes the old value before it is overwritten.
+        undo: Stores the old value before it is overwritten.
         told: Called with the outcome of each accepted change.
 
     Raises:
         VehicleArmedError: The vehicle is armed, or that is unknown; no more was set.
         ConfigError: The undo file cannot be written; no more was set.
-        LinkLost: The connection dropped meanwhile.
+        LinkLost: The connection was lost.
     """
     answer = Answer.NO
     for finding in findings:
@@ -168,7 +168,7 @@ async def restore(link: Link, undo: Undo, told: Callable[[Outcome], None]) -> No
     """Restore the values of the undo file, the last change first.
 
     Raises:
-        VehicleArmedError, LinkLost: As `apply_fixes`.
+        VehicleArmedError, LinkLost: See `apply_fixes`.
     """
     for parameter, old in reversed(undo.parameters.items()):
         require_disarmed(link)
@@ -184,7 +184,7 @@ def require_disarmed(link: Link) -> None:
     """Raise unless the vehicle is known to be disarmed.
 
     Raises:
-        VehicleArmedError: It is armed, or its last heartbeat is too old to tell.
+        VehicleArmedError: The vehicle is armed, or its last heartbeat is too old.
     """
     heartbeat, now = link.state.heartbeat, asyncio.get_running_loop().time()
     if heartbeat is None or now - heartbeat.received > _KNOWN_FOR:

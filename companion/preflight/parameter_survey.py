@@ -1,4 +1,4 @@
-"""Reads the parameters that matter from a vehicle."""
+"""Reads the parameters that matter to a flight from a vehicle."""
 
 import asyncio
 from collections.abc import Iterable, Mapping
@@ -10,12 +10,13 @@ from companion.vehicle.link import Link
 from companion.vehicle.parameter_rules import ParameterRule, Values
 
 _AT_ONCE = 8
-"""Parameter requests under way at once. ArduPilot queues 20 and drops the rest; at 57600 baud eight
-take 30 ms."""
+"""Number of parameter requests under way at a time. ArduPilot queues 20 and drops the rest; at
+57600 baud eight take 30 ms.
+"""
 
 
 class RetryPolicy(NamedTuple):
-    """How often and at which interval one parameter is requested.
+    """How often and at which interval a parameter is requested.
 
     Attributes:
         timeout_s: Time until a request is repeated, s.
@@ -27,18 +28,21 @@ class RetryPolicy(NamedTuple):
 
 
 _AT_FIRST = RetryPolicy(0.5, 3)
-"""Older PX4 does not answer for a parameter that it lacks: each of those costs 1.5 s."""
+"""First round. Old versions of PX4 do not answer for a parameter that they lack; each of these
+costs 1.5 s.
+"""
 _ONCE_MORE = RetryPolicy(0.75, 6)
-"""If each direction loses one frame in five, 5 % of the parameters get no answer to the first three
-requests, and 0.01 % get none after these six more."""
+"""Second round. If each direction loses one frame in five, 5 % of the parameters get no answer to
+the first three requests, and 0.01 % get none after six more.
+"""
 
 
 class Survey(NamedTuple):
-    """The parameters that were read; those that the autopilot lacks are left out.
+    """The parameters that were read, without those that the autopilot lacks.
 
     Attributes:
         values: Values by newest name.
-        names: This autopilot's own name of each, by newest name.
+        names: Name of each in this autopilot, by newest name.
         untold: Newest names of parameters that got no answer, neither a value nor an error.
         lossy: Whether the link lost frames during the survey, in either direction.
     """
@@ -57,22 +61,22 @@ async def survey(
     at_first: RetryPolicy = _AT_FIRST,
     once_more: RetryPolicy = _ONCE_MORE,
 ) -> Survey:
-    """Read the rules' parameters, several at a time; where the link loses frames, ask again.
+    """Read the rules' parameters, several at a time; ask again if the link loses frames.
 
     An old name is requested only if the new one got no answer. A parameter without any answer is
     requested once more, after all others and for longer, but only if frames were lost: on a good
     link this autopilot does not have it, and the request only costs time.
 
     Args:
-        link: To the vehicle.
-        rules: Of its autopilot.
-        before: An earlier survey of the same vehicle. What it did not answer then is not requested
-            again: on a link that loses frames each costs seconds.
-        at_first: For the first round of requests.
-        once_more: For the second.
+        link: Link to the vehicle.
+        rules: Rules of its autopilot.
+        before: An earlier survey of the same vehicle. Parameters without an answer in it are not
+            requested again, because each costs seconds on a link that loses frames.
+        at_first: Policy of the first round of requests.
+        once_more: Policy of the second round.
 
     Raises:
-        LinkLost: The connection dropped meanwhile.
+        LinkLost: The connection was lost.
     """
     rules, questions = tuple(rules), _Questions(link)
     untold: frozenset[str] = frozenset()
@@ -95,10 +99,10 @@ async def survey(
 
 
 class _Questions:
-    """The requests to one vehicle and its answers.
+    """The requests to a vehicle, and its answers.
 
     Attributes:
-        values, names: As in `Survey`.
+        values, names: See `Survey`.
     """
 
     def __init__(self, link: Link) -> None:
@@ -134,7 +138,7 @@ class _Questions:
         ]
 
     async def ask(self, rules: Iterable[ParameterRule], policy: RetryPolicy) -> None:
-        """Request all of them. Raises `LinkLost`."""
+        """Request all of these parameters. Raises `LinkLost`."""
         await asyncio.gather(*(self._ask_under_each_name(rule, policy) for rule in rules))
 
     async def _ask_under_each_name(self, rule: ParameterRule, policy: RetryPolicy) -> None:

@@ -1,4 +1,4 @@
-"""What the autopilot's parameters say about this flight, as findings."""
+"""Findings about the autopilot's parameters."""
 
 from collections.abc import Iterator
 
@@ -66,7 +66,7 @@ def _missing(rule: ParameterRule, autopilot: str) -> Finding:
 
 
 def _untold(evidence: Evidence) -> Iterator[Finding]:
-    """Parameters not received: lost on a bad link; on a good one this version lacks them."""
+    """Findings about parameters without an answer: lost on a bad link, else absent here."""
     survey = evidence.survey
     lossy = survey.lossy or evidence.link.loss > SOME_LOST
     rules = [rule for rule in evidence.autopilot.parameters if not rule.vital]
@@ -97,7 +97,7 @@ def _untold(evidence: Evidence) -> Iterator[Finding]:
 
 
 def _hidden(rule: ParameterRule, survey: Survey) -> bool:
-    """Whether the parameter, or its counterpart in another version, may exist unread."""
+    """Whether the parameter may exist unread, perhaps under another version's name."""
     places = {rule.name, rule.instead}
     return places.isdisjoint(survey.values) and not places.isdisjoint(survey.untold)
 

@@ -1,4 +1,4 @@
-"""The findings of `companion doctor`, as tables for people and as JSON for programs."""
+"""The findings of `companion doctor`: tables for the terminal, JSON for programs."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -30,7 +30,7 @@ _RESULTS = {
 
 
 def tables(config: Config, findings: Sequence[Finding]) -> RenderableType:
-    """A table for each result that occurred, the worst first, and a summary line."""
+    """One table for each result that occurred, the worst first, and a summary line."""
     parts: list[RenderableType] = []
     for result, (title, style) in _TITLES.items():
         of_it = [finding for finding in findings if finding.result is result]
@@ -73,7 +73,7 @@ def _last_line(config: Config, findings: Sequence[Finding]) -> Text:
 
 
 def outcome_line(outcome: Outcome) -> str:
-    """The outcome of a change, for people."""
+    """The outcome of a change, in one line."""
     change = outcome.change
     if outcome.refusal:
         return f"not set: {outcome.refusal}"
@@ -82,7 +82,7 @@ def outcome_line(outcome: Outcome) -> str:
 
 
 def as_dict(config: Config, findings: Sequence[Finding]) -> dict[str, Any]:
-    """For JSON."""
+    """The findings as JSON."""
     counts = {
         result.value: sum(finding.result is result for finding in findings) for result in _TITLES
     }
@@ -94,7 +94,7 @@ def as_dict(config: Config, findings: Sequence[Finding]) -> dict[str, Any]:
 
 
 def outcome_as_dict(outcome: Outcome) -> dict[str, Any]:
-    """For JSON."""
+    """The outcome of a change as JSON."""
     return {**outcome.change._asdict(), "refusal": outcome.refusal or None}
 
 

@@ -1,4 +1,4 @@
-"""One preflight session: connect, wait for the vehicle to be ready, listen, and judge.
+"""One preflight session: connect, wait for readiness, listen, and judge.
 
 It only reads, and requests message rates. Nothing here arms the vehicle or sends a setpoint.
 """
@@ -25,10 +25,10 @@ from companion.vehicle.parameter_rules import CheckResult
 from companion.vehicle.streams import StreamRate
 
 _LISTENING = 3.0
-"""Time to listen, s: enough to count messages at 2 Hz."""
+"""Time for listening, s; enough to count messages at 2 Hz."""
 _POLL = 0.05
 _WARNING = 4
-"""MAV_SEVERITY: this and below is a warning or worse."""
+"""MAV_SEVERITY of a warning; a lower number is worse."""
 _RELEASES = {0: "-dev", 64: "-alpha", 128: "-beta", 192: "-rc", 255: ""}
 """FIRMWARE_VERSION_TYPE, the lowest byte of `flight_sw_version`."""
 
@@ -52,19 +52,19 @@ async def gather(
     notices: Sequence[str] = (),
     known: Survey | None = None,
 ) -> Evidence:
-    """Listen for `seconds`, and read the parameters meanwhile.
+    """Listen for `seconds`, and read the parameters at the same time.
 
     Args:
-        link: To a vehicle whose heartbeat was received.
+        link: Link to a vehicle whose heartbeat was received.
         granted: The message rates that were requested.
-        seconds: Time to count messages, s.
-        stage: What the vehicle is about to do.
+        seconds: Time for counting messages, s.
+        stage: The next step of the vehicle.
         thorough: Also run the pre-arm checks, so that the autopilot says what forbids arming.
-        notices: What the link reports about itself; read at the end.
+        notices: Notices of the link; they are read at the end.
         known: The same vehicle's parameters, if they were read before.
 
     Raises:
-        LinkLost: The connection dropped meanwhile.
+        LinkLost: The connection was lost.
     """
     loop = asyncio.get_running_loop()
     before, began = replace(link.stats), loop.time()
@@ -139,9 +139,9 @@ class PreflightSession:
     """Checks one vehicle over an open link.
 
     Args:
-        config: Of the flight that is checked for.
-        link: To the vehicle.
-        notices: What the link reports about itself.
+        config: Configuration of the flight.
+        link: Link to the vehicle.
+        notices: Notices of the link.
     """
 
     def __init__(self, config: Config, link: Link, notices: Sequence[str]) -> None:
@@ -149,7 +149,7 @@ class PreflightSession:
         self.link = link
 
     async def wait_for_vehicle(self) -> list[Finding]:
-        """Wait for the heartbeat; return findings only if no further check is possible."""
+        """Wait for the heartbeat; return findings only if further checks are impossible."""
         try:
             await self.link.wait_connected(self._config.flight.connect_timeout_s)
         except LinkTimeout as error:
@@ -177,11 +177,11 @@ class PreflightSession:
         return [*hints, silence, *amiss]
 
     async def gather(self, ready_within: float) -> Evidence:
-        """Ask for telemetry, wait up to `ready_within` s for readiness, listen.
+        """Request telemetry, wait up to `ready_within` s for readiness, and listen.
 
         Raises:
-            CommandTimeout: It does not answer commands; see `unanswered`.
-            LinkLost: The connection dropped meanwhile; see `unanswered`.
+            CommandTimeout: The vehicle does not answer commands; see `unanswered`.
+            LinkLost: The connection was lost; see `unanswered`.
         """
         link = self.link
         granted = await link.set_rates(wanted_rates(self._config, link), window_s=0.1)
@@ -200,15 +200,15 @@ class PreflightSession:
 async def open_session(
     config: Config, link_to: Callable[[Notice], Link]
 ) -> AsyncIterator[PreflightSession]:
-    """Open the link. Until the session asks something, only heartbeats and clock requests leave.
+    """Open the link. Until the session requests something, we send only heartbeats and TIMESYNC.
 
     Args:
-        config: Of the flight that is checked for.
-        link_to: Makes the link from what takes its notices.
+        config: Configuration of the flight.
+        link_to: Makes the link; its argument is called with the link's notices.
 
     Raises:
         EndpointError: the endpoint cannot be opened.
-        LinkTimeout: lockstep is asked for, and the vehicle is not in lockstep.
+        LinkTimeout: the configuration demands lockstep, and the vehicle is not in lockstep.
     """
     notices: list[str] = []
     async with link_to(notices.append) as link:

@@ -14,11 +14,11 @@ SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.IN
 NOT_READY = CheckResult.NOT_READY
 
 _FEW_UNUSABLE = 0.01
-"""Largest share of unusable attitude samples that single damaged messages explain."""
+"""Largest share of unusable attitude samples that damaged messages can explain."""
 
 
 def armed(state: VehicleState) -> Finding:
-    """Whether the vehicle is armed already."""
+    """Whether the vehicle is already armed."""
     if state.armed:
         return Finding(
             Key.ARMED,
@@ -71,7 +71,7 @@ def motors(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def power(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether the battery allows a flight: see `battery`."""
+    """Whether the battery allows a flight; see `battery`."""
     if evidence.booting and evidence.state.battery is None:
         yield Finding(Key.BATTERY, NOT_READY, "the vehicle has not told its battery's charge yet")
     else:
@@ -92,7 +92,7 @@ def failsafe(state: VehicleState) -> Iterator[Finding]:
 
 
 def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether the autopilot is ready, and if not, why, in its own words."""
+    """Whether the autopilot is ready; if not, its own reasons."""
     state, stage = evidence.state, evidence.stage
     yield from failsafe(state)
     ready = state.readiness

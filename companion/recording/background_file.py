@@ -1,8 +1,8 @@
-"""A file that a thread of its own writes: who hands items over never waits for the disk.
+"""A file written by its own thread, so that the caller never waits for the disk.
 
-The thread looks every 50 ms for new items: to wake it for each of them would cost the control loop
-more than all the rest of recording. It writes them in slices, with a pause after each, in which the
-control loop can run. Twice a second it waits until the disk has what was written.
+The thread checks every 50 ms for new items, because waking it for each item would cost the control
+loop more than the rest of the recording. It writes them in slices, with a pause after each, in
+which the control loop can run. Twice a second it waits until the written data are on the disk.
 """
 
 import threading
@@ -20,46 +20,46 @@ Item_contra = TypeVar("Item_contra", contravariant=True)
 
 _PERIOD = 0.05
 _SLICE = 20
-"""Items of a slice, if few wait."""
+"""Number of items in a slice, if few are waiting."""
 _MOST_SLICES = 50
-"""A backlog is written in at most this many slices, however long it is."""
+"""Largest number of slices in which a backlog is written."""
 _PAUSE = 0.001
 """Pause after a slice, s."""
 _LONGEST_CLOSE = 5.0
-"""Time allowed to write out what waits when the file is closed, s."""
+"""Time allowed to write the remaining items when the file is closed, s."""
 _SYNC_PERIOD = 0.5
-"""After a power cut this much is missing, s, and the time that the disk takes."""
+"""Period of syncs, s; a power cut loses this much, plus the time that the disk takes."""
 
 
 class ItemFile(Protocol[Item_contra]):
     """A file of one format, used by one thread."""
 
     def write(self, items: Sequence[Item_contra]) -> None:
-        """Write items. Raises OSError: the disk is full, or failed."""
+        """Write items. Raises OSError if the disk is full or has failed."""
         ...
 
     def sync(self) -> None:
-        """Wait until the disk has all items. Raises OSError: as `write`."""
+        """Wait until all items are on the disk. Raises OSError like `write`."""
         ...
 
     def close(self, *, complete: bool) -> None:
-        """Close the file, and complete it first, if it could be written. Raises OSError."""
+        """Complete the file if it is intact, and close it. Raises OSError."""
         ...
 
 
 class BackgroundFile(ABC, Generic[T]):
-    """Hands items to a file in a thread of its own; never delays, never raises in a flight.
+    """Writes items to a file in its own thread; it never delays or ends a flight.
 
-    Items are taken from the beginning, and written once the file is open.
+    Items are accepted at once, and written when the file is open.
 
     Attributes:
-        path: where the file is.
+        path: path of the file.
         dropped: items that were not written because too many waited, or the disk was full.
-        failure: why writing ended early (a full disk, say), or None.
+        failure: why writing ended early, for example a full disk; None: it did not.
 
     Args:
-        path: see above.
-        most_waiting: further items are dropped.
+        path: path of the file.
+        most_waiting: largest number of waiting items; further ones are dropped.
         on_failure: called once, from the writing thread, when the file cannot be written any more.
     """
 
@@ -81,7 +81,7 @@ class BackgroundFile(ABC, Generic[T]):
 
     @abstractmethod
     def _make_file(self) -> ItemFile[T]:
-        """Create the file. Raises OSError: it cannot be created."""
+        """Create the file. Raises OSError if that is impossible."""
 
     def open(self) -> None:
         """Create the file, and begin to write.
@@ -120,9 +120,9 @@ class BackgroundFile(ABC, Generic[T]):
         self.close()
 
     def close(self) -> None:
-        """Write out what waits and close the file.
+        """Write the waiting items and close the file.
 
-        If the disk does not answer for 5 s, that is a failure: the thread is left behind.
+        If the disk does not answer for 5 s, this counts as a failure, and the thread is abandoned.
         """
         self._closing.set()
         if self._thread is not None:
@@ -139,7 +139,7 @@ class BackgroundFile(ABC, Generic[T]):
         self._guarded(lambda: file.close(complete=self.failure is None))
 
     def _write_waiting(self, file: ItemFile[T]) -> None:
-        """Write what waits now; what comes meanwhile waits for the next time."""
+        """Write the items that are waiting now; items that arrive later wait for the next call."""
         left = len(self._waiting)
         size = max(_SLICE, -(-left // _MOST_SLICES))
         while left > 0:

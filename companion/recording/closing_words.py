@@ -1,4 +1,4 @@
-"""What a flight's end says in words: what flew, whether it was good, and what to do next."""
+"""The summary in words at the end of a flight: what flew, whether it was good, what to do next."""
 
 import shlex
 from collections.abc import Sequence
@@ -12,12 +12,12 @@ _INTERRUPTED = ("interrupted by ", "left at once by the user")
 
 
 class Invocation(NamedTuple):
-    """How the program was called, for the command that comes next.
+    """The command line of this call, for the suggested next command.
 
     Attributes:
-        program: as a shell finds it.
-        arguments: of the command that flew.
-        config: the configuration's file; None: of the bundled vehicle.
+        program: name or path by which a shell finds the program.
+        arguments: arguments of the command that flew.
+        config: configuration file; None: that of the bundled vehicle.
     """
 
     program: str
@@ -26,13 +26,13 @@ class Invocation(NamedTuple):
 
 
 class ClosingWords(NamedTuple):
-    """The words, one a line.
+    """The summary in words.
 
     Attributes:
-        headline: what flew and whether it was good.
+        headline: what flew, and whether it was good.
         lines: the reasons.
         next_command: a command line, or None.
-        good: as `is_good`.
+        good: whether the flight was good; see `is_good`.
         flown: whether the maneuvers were flown to their end.
     """
 
@@ -44,11 +44,11 @@ class ClosingWords(NamedTuple):
 
 
 def closing_words(figures: Figures, called: Invocation | None) -> ClosingWords:
-    """The words for the figures of a flight.
+    """The summary in words for the figures of a flight.
 
     Args:
-        figures: as `Summary.as_dict` makes them.
-        called: None: what comes next is said elsewhere.
+        figures: result of `Summary.as_dict`.
+        called: this call; None: no next command is suggested.
     """
     flown, good = figures["result"] == "ok", is_good(figures)
     headline, lines = _headline_and_reasons(figures) if flown else _ended_early(figures)
@@ -112,7 +112,7 @@ def _ended_early(figures: Figures) -> tuple[str, list[str]]:
 
 
 def _gain_warning(figures: Figures) -> list[str]:
-    """What does not make a flight bad: the gain is above the largest sensible one."""
+    """A warning that does not make a flight bad: the gain is above the largest sensible one."""
     warning = figures.get("gain_warning")
     return [] if warning is None else [warning]
 

@@ -1,7 +1,7 @@
 """Exports a recorded flight as CSV or Parquet: one file for each channel of numbers.
 
-Besides the channels there are three tables that join them, as the figures after a flight use them:
-`tracking`, `rates` and `response` (see `FlightTrace`).
+Three more tables join several channels, as the figures after a flight use them: `tracking`, `rates`
+and `response` (see `FlightTrace`).
 """
 
 from collections.abc import Iterator
@@ -41,9 +41,9 @@ def tables(record: FlightRecord) -> Iterator[Table]:
 
 
 def export_csv(record: FlightRecord, folder: Path) -> dict[Path, int]:
-    """Write each table as `NAME.csv` into an existing folder; returns the files and their rows.
+    """Write each table as `NAME.csv` into an existing folder; return the files and their rows.
 
-    Numbers have the digits that give the same number again when they are read.
+    Numbers have enough digits to be read back exactly.
 
     Raises:
         OSError: a file cannot be written.
@@ -60,7 +60,7 @@ def export_csv(record: FlightRecord, folder: Path) -> dict[Path, int]:
 
 
 def export_parquet(record: FlightRecord, folder: Path) -> dict[Path, int]:
-    """Write each table as `NAME.parquet` into an existing folder; returns the files and their rows.
+    """Write each table as `NAME.parquet` into an existing folder; return the files and their rows.
 
     Raises:
         MissingExtraError: pyarrow is missing.

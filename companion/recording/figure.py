@@ -26,9 +26,9 @@ Floats = NDArray[np.float64]
 _MEASURED, _IDEAL, _NEAREST, _TARGET = "#0072b2", "#d55e00", "#009e73", "#999999"
 _STYLES = ("-", "--", ":")
 _WIDTH, _HEIGHT, _HISTORY_HEIGHT = 13.5, 4.4, 7.6
-"""Of the picture, of its upper panels and of its history, inches."""
+"""Width of the picture, height of its upper panels and of its history, inches."""
 _LARGEST = 1e9
-"""No time in s and no distance in m of a flight is larger."""
+"""Times in s and distances in m above this are invalid."""
 _FOR_LEGEND = 0.2
 """Room above the curves, as a share of their height."""
 
@@ -38,7 +38,7 @@ class FigureError(Exception):
 
 
 def draw_flight(folder: Path, out: Path) -> None:
-    """Draw the flight recorded in `folder` into the file `out` (its ending says which kind).
+    """Draw the flight recorded in `folder` into the file `out`, whose suffix selects the format.
 
     Raises:
         MissingExtraError: matplotlib is missing.
@@ -84,7 +84,7 @@ def _record(folder: Path) -> FlightRecord:
 
 
 def _panels(record: FlightRecord, trace: FlightTrace) -> "list[Callable[[Axes], None]]":
-    """What draws each of the upper panels."""
+    """Functions that draw the upper panels."""
     response = _rows(record, "response", trace.response)
     tracking = _rows(record, "tracking", trace.tracking)
     panels: list[Callable[[Axes], None]] = []
@@ -101,7 +101,7 @@ def _rows(record: FlightRecord, name: str, series: Series) -> Floats | None:
     """The rows of a series; None if it has none.
 
     Raises:
-        FigureError: a number is so large that no flight writes it.
+        FigureError: a number is too large to be valid.
     """
     rows = series.rows()
     # NaN stands for what there was not; nothing else is that large.
@@ -133,7 +133,7 @@ def _marks(record: FlightRecord) -> Marks:
 
 
 def _draw_steps(axes: "Axes", runs: list[StepRun], gain: float) -> None:
-    """The first doublet: along its own direction, with the ideal and the nearest linear answer."""
+    """The first doublet along its own direction, with the ideal and the best linear response."""
     run, model = runs[0], nearest_second_order(runs)
     along = run.target[0] / np.hypot(*run.target[0])
     time = run.time - run.time[0]
@@ -171,14 +171,14 @@ def _draw_plane(axes: "Axes", runs: list[StepRun]) -> None:
 
 
 def _direction(run: StepRun) -> str:
-    """Where the first step of a doublet points, in words."""
+    """Direction of the first step of a doublet, in words."""
     north, east = np.sign(np.round(run.target[0], 6))
     words = {-1.0: "south", 1.0: "north"}.get(north), {-1.0: "west", 1.0: "east"}.get(east)
     return "-".join(word for word in words if word)
 
 
 def _draw_ground(axes: "Axes", tracking: Floats) -> None:
-    """The ground track beside its reference; open-loop steps have none."""
+    """The ground track and its reference, without open-loop steps, which have no reference."""
     if not np.isnan(tracking[:, 1]).all():
         axes.plot(tracking[:, 2], tracking[:, 1], "--", color=_IDEAL, label="reference")
     axes.plot(tracking[:, 5], tracking[:, 4], color=_MEASURED, label="flown")

@@ -1,4 +1,4 @@
-"""The one reader of a recorded flight, also of one that was cut off: `flight.mcap` in its folder.
+"""Reads a recorded flight, also an interrupted one: `flight.mcap` in its folder.
 
     record = read_flight(Path("flights/2026-11-22T15-00-00Z"))
     guidance = record.rows("guidance")       # a structured array, one named field per column
@@ -40,15 +40,15 @@ _LONGEST_CONFIGURATION = 1 << 20
 
 
 class RecordError(Exception):
-    """A folder holds no record of a flight that can be read; the message says what and where."""
+    """A folder holds no readable record of a flight; the message says what is wrong and where."""
 
 
 @contextmanager
 def as_recorded(folder: Path) -> Iterator[None]:
-    """While the block reads the record in `folder`: values that no flight records are an error.
+    """While the block reads the record in `folder`, turn invalid values into an error.
 
     Raises:
-        RecordError: the block met such a value.
+        RecordError: the block read such a value.
     """
     try:
         yield
@@ -61,13 +61,13 @@ class FlightRecord:
     """A recorded flight.
 
     Attributes:
-        folder: of the flight.
-        content: of `flight.mcap`, as messages.
-        complete: whether the recording was closed. False: the power went, the process was killed,
-            or the disk was full; then up to the last second is missing.
+        folder: folder of the flight.
+        content: messages of `flight.mcap`.
+        complete: whether the recording was closed. False: power failed, the process was killed, or
+            the disk was full; up to a second may then be missing at the end.
         damage: why reading ended before the end of the file, or None.
-        began: when the flight began, s on our clock.
-        epoch: s since 1970 at which our clock read 0; 0 if our clock is the vehicle's.
+        began: time when the flight began, s on our clock.
+        epoch: Unix time at which our clock read 0, s; 0 if our clock is the vehicle's.
         metadata: "flight" (versions, start, seed and so on) and others, by name.
     """
 
@@ -84,7 +84,7 @@ class FlightRecord:
 
         Raises:
             KeyError: there is no such channel.
-            RecordError: a message is not as a flight records it.
+            RecordError: a message is not valid.
         """
         if name not in self._rows:
             channel = _BY_NAME[name]
@@ -95,28 +95,28 @@ class FlightRecord:
 
     @cached_property
     def _rows(self) -> dict[str, Row]:
-        """The rows that were asked for."""
+        """The rows of one channel."""
         return {}
 
     def since_start(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Times on our clock (s) as s since the flight began."""
+        """Convert times on our clock (s) to s since the flight began."""
         return times - self.began
 
     @cached_property
     def duration(self) -> float:
-        """From the beginning of the flight to the last row or event, s."""
+        """Time from the beginning of the flight to the last row or event, s."""
         newest = [messages[-1][0] for messages in self.content.messages.values() if messages]
         return max(newest, default=0) * 1e-9 - self.epoch - self.began if newest else 0.0
 
     @cached_property
     def phases(self) -> tuple[Phase, ...]:
-        """The phases that began, in order."""
+        """The phases of the flight, in order."""
         found = self._words("/phase", 1, 2)
         return tuple(Phase(time - self.began, *words) for (time,), words in found)
 
     @cached_property
     def maneuvers(self) -> tuple[ManeuverMark, ...]:
-        """When each maneuver began, and the last one ended (name None). `time` is on our clock."""
+        """Beginning of each maneuver and end of the last one (name None); `time` on our clock."""
         found = self._words("/maneuver", 2, 1)
         return tuple(
             ManeuverMark(time, vehicle_time, name or None)
@@ -135,7 +135,7 @@ class FlightRecord:
 
     @cached_property
     def alarms(self) -> tuple[AlarmChange, ...]:
-        """What the safety monitors said, in order."""
+        """The alarms of the safety monitors, in order."""
         found = self._words("/alarm", 2, 3)
         return tuple(
             AlarmChange(time - self.began, raised != 0.0, *words) for (time, raised), words in found
@@ -146,7 +146,7 @@ class FlightRecord:
         """The changes of values in flight, in order.
 
         Raises:
-            RecordError: one is not as a flight records it.
+            RecordError: a change is not valid.
         """
         found = self._words("/change", 2, 1)
         with as_recorded(self.folder):
@@ -157,10 +157,10 @@ class FlightRecord:
 
     @cached_property
     def configuration(self) -> dict[str, Any]:
-        """The resolved configuration by section, as in the flight's `config.yaml`; all keys.
+        """The complete configuration by section, as in the flight's `config.yaml`.
 
         Raises:
-            RecordError: it is missing or damaged.
+            RecordError: the configuration is missing or damaged.
         """
         try:
             text = read_text(self.folder / "config.yaml", _LONGEST_CONFIGURATION)
@@ -182,10 +182,10 @@ class FlightRecord:
 def read_flight(folder: Path) -> FlightRecord:
     """Read the record in the folder of a flight.
 
-    Of a flight that was killed before it recorded anything, the record is empty.
+    The record is empty if the flight was killed before it recorded anything.
 
     Raises:
-        RecordError: there is none, or it cannot be read.
+        RecordError: there is no record, or it cannot be read.
     """
     path = folder / FILE
     killed_at_start = (folder / "config.yaml").is_file()

@@ -7,10 +7,10 @@ from companion.files.yaml_file import ConfigError
 
 
 def flight_folder(directory: Path) -> Path:
-    """A new folder for one flight, named by its start in UTC.
+    """Make a folder for one flight, named by its start in UTC.
 
     Raises:
-        ConfigError: it cannot be made.
+        ConfigError: the folder cannot be made.
     """
     base = directory / datetime.now(UTC).strftime("%Y-%m-%dT%H-%M-%SZ")
     for number in range(1, 100):

@@ -1,4 +1,4 @@
-"""Error, speed, tilt and height of a flight over time, marked with what was flown, as panels."""
+"""Panels of a flight over time: error, speed, tilt and height, with maneuvers and phases marked."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,29 +16,29 @@ Floats = NDArray[np.float64]
 HEIGHTS = (1.0, 1.0, 1.0, 1.4)
 """Relative heights of the panels, from top to bottom."""
 _MARGIN = 0.02
-"""After the end, as a share of the flight."""
+"""Margin after the end, as a share of the flight."""
 _FOR_NAMES = 1.5
-"""Room above the height for the names of the phases."""
+"""Factor on the height axis, which leaves space for the names of the phases."""
 _LARGEST = 1e9
-"""No time of a flight is larger, s."""
+"""Times above this are invalid, s."""
 _LINE, _PHASE, _END = "#0072b2", "#666666", "#cc0000"
 _SHADES = ("#f0e6c8", "#d5e8f0")
-"""Of the maneuvers, one after the other."""
+"""Colours of the maneuvers, used in turn."""
 _LONGEST_REASON = 110
-"""Largest number of characters of the reason that are drawn; the rest is left out."""
+"""Largest number of characters of the reason that are drawn."""
 _APART = 0.022
-"""Names of phases that begin closer together are joined, as a share of the flight."""
+"""Names of phases that begin closer together than this share of the flight are joined."""
 _COLUMNS = (
     ("tracking error", "m", 5),
     ("speed", "m/s", 3),
     ("tilt", "°", 4),
     ("height", "m", 2),
 )
-"""What each panel shows: its name, unit and column of `FlightTrace.motion`."""
+"""Name, unit and column of `FlightTrace.motion` of each panel."""
 
 
 class Span(NamedTuple):
-    """A maneuver, from `begin` to `end` in s since the flight began, and what is written there."""
+    """A maneuver with its label, from `begin` to `end` in s since the flight began."""
 
     begin: float
     end: float
@@ -47,13 +47,13 @@ class Span(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Marks:
-    """What is marked in the panels; times in s since the flight began.
+    """The marks in the panels; times in s since the flight began.
 
     Attributes:
-        phases: when each began, and its name.
-        maneuvers: in order.
-        end: when the flight ended early, or None.
-        reason: why.
+        phases: beginning and name of each phase.
+        maneuvers: the maneuvers, in order.
+        end: time when the flight ended early, or None.
+        reason: reason of the early end.
     """
 
     phases: Sequence[tuple[float, str]] = ()
@@ -63,10 +63,10 @@ class Marks:
 
 
 def marks_of(summary: Any) -> Marks:
-    """The marks in a `summary.json`; none where an older version wrote it.
+    """The marks in a `summary.json`; empty for one of an older version.
 
     Raises:
-        ValueError: it is not as a flight writes it.
+        ValueError: the summary is not valid.
         TypeError, KeyError, AttributeError: the same.
     """
     if "phases" not in summary:
@@ -114,7 +114,7 @@ def draw_history(panels: Sequence["Axes"], motion: Floats, marks: Marks) -> None
 
 
 def _name_maneuvers(axes: "Axes", marks: Marks) -> None:
-    """Above the first panel: the maneuvers, and where and why the flight ended early."""
+    """Write above the first panel: the maneuvers, and the place and reason of an early end."""
     for span in marks.maneuvers:
         axes.text(
             0.5 * (span.begin + span.end),
@@ -135,7 +135,7 @@ def _name_maneuvers(axes: "Axes", marks: Marks) -> None:
 
 
 def _name_phases(axes: "Axes", marks: Marks, length: float) -> None:
-    """In the last panel: the phases; those that begin together share a line."""
+    """Write in the last panel: the phases; those that begin close together share a line."""
     groups: list[tuple[float, list[str]]] = []
     for begin, name in marks.phases:
         if groups and begin - groups[-1][0] < _APART * length:
@@ -157,7 +157,7 @@ def _name_phases(axes: "Axes", marks: Marks, length: float) -> None:
 
 
 def _plain(text: str) -> str:
-    """Without the sign that would begin a formula."""
+    """The text without the character that begins a formula."""
     return text.replace("$", r"\$")
 
 

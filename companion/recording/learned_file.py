@@ -1,4 +1,4 @@
-"""Drag that flights learned, kept for the next flight: one small file per vehicle."""
+"""Drag that flights have learned, stored for the next flight: one small file for each vehicle."""
 
 import json
 from math import isfinite
@@ -11,18 +11,18 @@ from companion.files.write_whole import write_whole
 
 _MOST_BYTES = 10_000
 _MOST_FILES = 1000
-"""Most files of vehicles in a directory; with more, none is read."""
+"""Largest number of vehicle files in a folder; with more, none is read."""
 _MOST_LINEAR, _MOST_QUADRATIC = 10.0, 1.0
-"""As `guidance.drag_per_s` and `guidance.quadratic_drag_per_m` allow, 1/s and 1/m."""
+"""Upper bounds of `guidance.drag_per_s` and `guidance.quadratic_drag_per_m`, 1/s and 1/m."""
 
 
 class Learned(NamedTuple):
     """Learned values of a vehicle.
 
     Attributes:
-        drag: of the vehicle.
+        drag: drag of the vehicle.
         top_speed: largest speed at which it was learned, m/s.
-        path: of the file.
+        path: path of the file.
     """
 
     drag: Drag
@@ -31,7 +31,7 @@ class Learned(NamedTuple):
 
 
 class LearnedFile:
-    """`learned-UID.json` in the directory of the flights.
+    """The file `learned-UID.json` in the folder of the flights.
 
     Args:
         directory: `recording.directory`.
@@ -55,10 +55,10 @@ class LearnedFile:
             )
 
     def save(self, drag: Drag, top_speed: float) -> None:
-        """Replace the file as a whole.
+        """Replace the file atomically.
 
         Raises:
-            OSError: it cannot be written; the old one is as it was.
+            OSError: the file cannot be written; the old one is unchanged.
         """
         text = json.dumps(
             {
@@ -71,7 +71,7 @@ class LearnedFile:
 
 
 def newest(directory: Path) -> Learned | None:
-    """Learned values of the vehicle that flew last; None where there are none. Never raises."""
+    """Learned values of the vehicle that flew last; None if there are none. Never raises."""
     try:
         paths = sorted(directory.glob("learned-*.json"), key=lambda path: -path.stat().st_mtime)
         return _parsed(paths[0]) if 0 < len(paths) <= _MOST_FILES else None

@@ -1,7 +1,6 @@
-"""Records a flight into `flight.mcap`, in a thread of its own.
+"""Records a flight into `flight.mcap`, in its own thread.
 
-The control loop hands over an encoder and plain values. Making and writing the messages is the work
-of the thread.
+The control loop passes an encoder and plain values. The thread encodes and writes the messages.
 """
 
 import json
@@ -12,6 +11,7 @@ from typing import Any, NamedTuple
 
 from companion.recording.background_file import BackgroundFile
 from companion.recording.mcap_file import cdr
+from companion.recording.mcap_file.batch import SendBatch
 from companion.recording.mcap_file.fields import CDR, Channel
 from companion.recording.mcap_file.loop_channels import ACTION, ACTIONS
 from companion.recording.mcap_file.writer import McapWriter
@@ -20,16 +20,17 @@ _MOST_WAITING = 50_000
 _INFORMATION, _WARNING = 2, 3
 
 Encoder = Callable[[McapWriter, int, Any], None]
-"""Writes the messages of one entry; gets the file, the time in ns since 1970, and the values."""
+"""Writes the messages of an entry; called with the file, the time in ns since 1970, and the values.
+"""
 
 
 class Entry(NamedTuple):
-    """What the thread makes messages of.
+    """One entry, from which the thread makes messages.
 
     Attributes:
-        time: s on our clock.
+        time: time on our clock, s.
         encoder: makes the messages.
-        values: for the encoder; nothing in them changes any more.
+        values: arguments of the encoder; they must not change any more.
     """
 
     time: float
@@ -38,14 +39,15 @@ class Entry(NamedTuple):
 
 
 class FlightRecorder(BackgroundFile[Entry]):
-    """Records a flight; never delays it, and never raises in the middle of it.
+    """Records a flight; it never delays the flight or raises an exception in it.
 
     Args:
         path: file that `open` creates.
-        epoch: s since 1970 at which the flight's clock read 0.
-        clock: the flight's, s.
+        epoch: Unix time at which the flight's clock read 0, s.
+        clock: clock of the flight, s.
         on_failure: called once, from the writing thread, when the file cannot be written any more.
         on_bad_entry: called once, from the writing thread, when an entry cannot be recorded.
+        stream: takes the messages also, in batches, in the writing thread; None: nothing does.
     """
 
     def __init__(
@@ -55,23 +57,25 @@ class FlightRecorder(BackgroundFile[Entry]):
         clock: Callable[[], float],
         on_failure: Callable[[str], None] | None = None,
         on_bad_entry: Callable[[str], None] | None = None,
+        stream: SendBatch | None = None,
     ) -> None:
         self._epoch, self._clock = epoch, clock
-        self._on_bad_entry = on_bad_entry
+        self._on_bad_entry, self._stream = on_bad_entry, stream
         super().__init__(path, _MOST_WAITING, on_failure)
 
     def _make_file(self) -> "_McapEntries":
-        return _McapEntries(self.path, self._epoch, self._drop)
+        writer = McapWriter(self.path, self._stream)
+        return _McapEntries(writer, self._epoch, self._drop)
 
     def _drop(self, error: Exception) -> None:
-        """Count an entry that cannot be recorded; tell the first one."""
+        """Count an entry that cannot be recorded; report the first one."""
         self.dropped += 1
         told, self._on_bad_entry = self._on_bad_entry, None
         if told is not None:
             told(f"{self.path}: an entry was not recorded: {error!r}; the recording goes on")
 
     def add(self, time: float, encoder: Encoder, values: Any) -> None:
-        """Record an entry of `time` (s on our clock)."""
+        """Record an entry at `time`, s on our clock."""
         self.put(Entry(time, encoder, values))
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
@@ -79,7 +83,7 @@ class FlightRecorder(BackgroundFile[Entry]):
         self.add(self._clock(), _metadata, (name, values))
 
     def begin(self, began: float, values: Mapping[str, str]) -> None:
-        """Record when the flight began (s on our clock), and more about it as metadata."""
+        """Record the beginning of the flight (s on our clock), and further values as metadata."""
         times = {"began_s": repr(began), "epoch_s": repr(self._epoch)}
         self.metadata("flight", {**times, **values})
 
@@ -89,11 +93,11 @@ class FlightRecorder(BackgroundFile[Entry]):
         self.add(now, _words, ("/phase", (now,), (name, waits_for)))
 
     def maneuver(self, time: float, vehicle_time: float, name: str | None) -> None:
-        """Record that a maneuver begins, or (None) the last one ends; see `ManeuverMark`."""
+        """Record the beginning of a maneuver or the end of the last one (None): `ManeuverMark`."""
         self.add(time, _words, ("/maneuver", (time, vehicle_time), (name or "",)))
 
     def alarm(self, raised: bool, monitor: str, reason: str, action: str) -> None:
-        """Record that the alarm of a safety monitor is raised now, or is over."""
+        """Record that the alarm of a safety monitor is raised or ended now."""
         now = self._clock()
         self.add(now, _words, ("/alarm", (now, float(raised)), (monitor, reason, action)))
 
@@ -104,28 +108,28 @@ class FlightRecorder(BackgroundFile[Entry]):
         clock_offset: float | None = None,
         drag: tuple[float, float] = (nan, nan),
     ) -> None:
-        """Record what a phase tells guidance to do; the arguments are the columns of ACTION."""
+        """Record a command of a phase to guidance; the arguments are the columns of ACTION."""
         offset = nan if clock_offset is None else clock_offset
         self.row(time, ACTION, (time, offset, *drag, ACTIONS.index(name)))
 
     def change(self, values: Mapping[str, Mapping[str, Any]], *, at_once: bool) -> None:
-        """Record that values of the configuration change now, by section and key.
+        """Record that values of the configuration change now.
 
         Args:
-            values: the new ones.
-            at_once: whether they are not slewed.
+            values: new values, by section and key.
+            at_once: whether the values change at once, without slewing.
         """
         now = self._clock()
         self.add(now, _words, ("/change", (now, float(at_once)), (json.dumps(values),)))
 
     def event(self, text: str) -> None:
-        """Record an event of now, in words."""
+        """Record an event at the present time."""
         source, colon, _ = text.partition(": ")
         source = source if colon and source in ("safety", "autopilot", "phase") else "flight"
         self.add(self._clock(), _log, (text, source))
 
     def row(self, time: float, channel: Channel, values: Sequence[float]) -> None:
-        """Record a message of a channel of numbers: the float64 columns, then the uint8 columns."""
+        """Record a message of a numeric channel: the float64 columns, then the uint8 columns."""
         self.add(time, _row, (channel, values))
 
 
@@ -133,13 +137,13 @@ class _McapEntries:
     """Writes entries to a `.mcap`.
 
     Args:
-        path: of the file.
+        writer: writer of the file.
         epoch: see `FlightRecorder`.
         drop: called with the reason why an entry cannot be recorded.
     """
 
-    def __init__(self, path: Path, epoch: float, drop: Callable[[Exception], None]) -> None:
-        self._writer, self._drop = McapWriter(path), drop
+    def __init__(self, writer: McapWriter, epoch: float, drop: Callable[[Exception], None]) -> None:
+        self._writer, self._drop = writer, drop
         self._epoch_ns = round(epoch * 1e9)
 
     def write(self, items: Sequence[Entry]) -> None:
@@ -151,6 +155,7 @@ class _McapEntries:
                 raise
             except Exception as error:  # one bad entry must not end the record of the flight
                 self._drop(error)
+        writer.stream()
 
     def sync(self) -> None:
         self._writer.flush()

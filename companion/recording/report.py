@@ -30,7 +30,7 @@ def flight_table(summary: Summary) -> RenderableType:
 
 
 def words_text(words: ClosingWords) -> Text:
-    """The closing words as they are shown."""
+    """The closing words as coloured text."""
     style = "green" if words.good else "yellow" if words.flown else "red"
     text = Text(words.headline, style=f"bold {style}")
     for line in words.lines:
@@ -103,7 +103,7 @@ def _milliseconds(value: float | None) -> str:
 
 
 def _tracking(summary: Summary) -> RenderableType:
-    """Level and height errors of each maneuver."""
+    """Level and height errors of the maneuvers."""
     table = _table("Tracking by maneuver", "level RMS", "largest", "height RMS", "largest")
     for flown in summary.maneuvers():
         level = (
@@ -120,7 +120,7 @@ def _tracking(summary: Summary) -> RenderableType:
 
 
 def _predictive_words(figures: PredictiveFigures) -> Text:
-    """Counts and times of predictive control."""
+    """Counts and times of predictive control, in words."""
     told = figures.as_dict()
     words = f"predictive control: {figures.flown} answers flown"
     if figures.flown:
@@ -155,7 +155,7 @@ def _loop_words(summary: Summary) -> Text:
 
 
 def _pure(value: float) -> str:
-    """A coefficient has no unit."""
+    """A coefficient, which has no unit, as text."""
     return f"{value:.4f}"
 
 

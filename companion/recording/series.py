@@ -1,8 +1,8 @@
-"""Rows of numbers recorded in flight: the newest in memory, all of them on the disk.
+"""Rows of numbers recorded in flight: the newest ones in memory, all of them on the disk.
 
-Memory does not grow with the flight. A thread of its own writes the files in large chunks: the
-control loop only hands over full chunks, and never waits for the disk. A flight without a folder
-has no such thread: its rows stay in memory.
+Memory does not grow with the flight. A separate thread writes the files in large chunks; the
+control loop only passes full chunks, and never waits for the disk. A flight without a folder has no
+such thread, and its rows stay in memory.
 """
 
 import errno
@@ -22,17 +22,17 @@ from numpy.typing import NDArray
 
 _CHUNK_ROWS = 1024
 _MOST_WAITING = 64
-"""Most chunks that wait for a slow disk; further ones are lost, and counted."""
+"""Largest number of chunks that wait for a slow disk; further ones are lost and counted."""
 
 _LONGEST_WAIT = 5.0
 """Time allowed for the disk to take all chunks, s."""
 
 
 class SpooledFile:
-    """A temporary file of doubles, made at the first write and deleted with its owner.
+    """A temporary file of doubles, created at the first write and deleted with its owner.
 
     Args:
-        folder: where it is; None: in memory.
+        folder: folder of the file; None: in memory.
     """
 
     def __init__(self, folder: Path | None) -> None:
@@ -40,10 +40,10 @@ class SpooledFile:
         self._file: IO[bytes] | None = None
 
     def append(self, chunk: bytes) -> None:
-        """Write at the end.
+        """Append a chunk.
 
         Raises:
-            OSError: not all of it could be written.
+            OSError: the chunk could not be written completely.
         """
         if self._file is None:
             # Closed when this object goes.
@@ -56,7 +56,7 @@ class SpooledFile:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     def read(self, width: int) -> NDArray[np.float64]:
-        """All rows of `width` doubles in one array; a row that is not whole is left out."""
+        """All rows of `width` doubles in one array, without an incomplete last row."""
         if self._file is None:
             return np.empty(0)
         self._file.seek(0)
@@ -71,7 +71,7 @@ class Spool:
     """Writes chunks to their files, in a thread that starts with the first chunk.
 
     Args:
-        folder: where the files are; None: in memory, without a thread.
+        folder: folder of the files; None: in memory, without a thread.
     """
 
     def __init__(self, folder: Path | None = None) -> None:
@@ -86,7 +86,7 @@ class Spool:
         return self._failures[0] if self._failures else None
 
     def put(self, file: SpooledFile, chunk: bytes) -> bool:
-        """Take a chunk; false if it cannot be kept."""
+        """Take a chunk; return false if it cannot be kept."""
         if self.folder is None:
             file.append(chunk)
             return True
@@ -101,7 +101,7 @@ class Spool:
         return True
 
     def flush(self) -> bool:
-        """Wait until all chunks are written; false if the disk does not answer for 5 s."""
+        """Wait until all chunks are written; return false if the disk does not answer for 5 s."""
         if self._begun and not self._stuck:
             written = threading.Event()
             self._queue.put(written)
@@ -124,11 +124,11 @@ def _write(queue: "SimpleQueue[_Work]", failures: list[str]) -> None:
 
 
 class Series:
-    """Rows of one kind, appended in flight; `fromlist` takes half the time that `extend` does.
+    """Rows of one kind, appended in flight; `fromlist` takes half as long as `extend`.
 
     Args:
         columns: their names.
-        spool: writes what is not kept in memory.
+        spool: writes the rows that are not kept in memory.
         kept: number of newest rows that are always in memory.
 
     Attributes:
@@ -159,7 +159,8 @@ class Series:
     def rows(self, since: int = 0) -> NDArray[np.float64]:
         """(N, columns), the rows from number `since` on; lost rows are left out.
 
-        In flight ask only for rows that are still in memory: others wait for the disk.
+        In flight, request only rows that are still in memory; for others this call waits for the
+        disk.
         """
         wanted = max(0, len(self) - since) * len(self.columns)
         parts: list[array[float]] = [self._chunk]

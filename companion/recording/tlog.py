@@ -1,4 +1,4 @@
-"""The flight's MAVLink, both directions, as a `.tlog`: MAVProxy, QGroundControl and others read it.
+"""Writes the flight's MAVLink frames, sent and received, as a `.tlog`, a common format.
 
 A record is the time in microseconds since 1970, 8 bytes big endian, then the frame as it was on the
 wire.
@@ -15,11 +15,11 @@ _MOST_WAITING = 20_000
 _STAMP = struct.Struct(">Q")
 
 Record = tuple[float, bytes]
-"""When the frame was seen, s on the flight's clock, and the frame."""
+"""Time when the frame was seen, s on the flight's clock, and the frame."""
 
 
 class TlogWriter(BackgroundFile[Record]):
-    """Writes frames to a file; never delays, never raises in the middle of a flight.
+    """Writes frames to a file; it never delays the flight or raises an exception in it.
 
     Args:
         path: file that `open` creates.
@@ -37,7 +37,7 @@ class TlogWriter(BackgroundFile[Record]):
         return _TlogFile(self.path, self._epoch)
 
     def __call__(self, time: float, frame: bytes) -> None:
-        """Take one frame, seen at `time` on the flight's clock (s)."""
+        """Take a frame that was seen at `time`, s on the flight's clock."""
         self.put((time, frame))
 
 

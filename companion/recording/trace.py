@@ -1,4 +1,4 @@
-"""Record of control, sample by sample, for the measurements after the flight."""
+"""Record of the control loop for the measurements after the flight."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -13,7 +13,7 @@ from companion.recording.recorder import FlightRecorder
 from companion.recording.series import Series, Spool
 
 _KEPT_RATES = 10_240
-"""Number of newest rates that are read in flight: 10 s at 1000 Hz."""
+"""Number of the newest rates kept for reading in flight: 10 s at 1000 Hz."""
 
 _RESPONSE = ("vehicle_time_s", "q_w", "q_x", "q_y", "q_z", "target_north", "target_east")
 _TRACKING = (
@@ -36,9 +36,9 @@ class ManeuverMark(NamedTuple):
     """The beginning of a maneuver, or the end of the last one.
 
     Attributes:
-        time: s on our clock.
-        vehicle_time: s.
-        name: None: from here on no maneuver is flown.
+        time: time on our clock, s.
+        vehicle_time: time on the vehicle's clock, s.
+        name: name of the maneuver; None: the last one has ended.
     """
 
     time: float
@@ -50,22 +50,22 @@ class FlightTrace:
     """All rows of one flight.
 
     Args:
-        folder: where older rows wait on the disk; None: they stay in memory. They are gone with
-            the trace.
-        recorder: see below.
+        folder: folder for older rows on the disk; None: they stay in memory. The rows are deleted
+            with the trace.
+        recorder: see the attribute.
 
     Attributes:
         recorder: writes `flight.mcap`; None: the flight is not recorded.
-        response: (vehicle time s, w, x, y, z, target north, target east), of steps only.
+        response: (vehicle time s, w, x, y, z, target north, target east), only during steps.
         tracking: (vehicle time s, reference north, east, down, measured north, east, down).
-        rates: (vehicle time s, when it was received on our clock s, commanded roll, pitch, yaw
-            rad/s, thrust 0..1, measured roll, pitch, yaw rad/s, age of the sample s or NaN), while
-            offboard control is active by its heartbeats.
-        latencies_ns: sample in → setpoint out inside this process, ns.
+        rates: (vehicle time s, arrival on our clock s, commanded roll, pitch, yaw rad/s, thrust
+            0..1, measured roll, pitch, yaw rad/s, age of the sample s or NaN), while offboard
+            control is active by its heartbeats.
+        latencies_ns: latencies from sample to setpoint inside this process, ns.
         newest_latency_ns: the newest of them; 0 before the first.
         motion: (time since the flight began s, vehicle time s, height over home m, speed m/s, tilt
             °, distance from the reference m), ten times a second in all phases; NaN: unknown.
-        maneuvers: when each maneuver began and the last one ended.
+        maneuvers: beginning of each maneuver, and end of the last one.
     """
 
     def __init__(self, folder: Path | None = None, recorder: FlightRecorder | None = None) -> None:
@@ -80,7 +80,7 @@ class FlightTrace:
         self.maneuvers: list[ManeuverMark] = []
 
     def add_response(self, vehicle_time: float, q: Quaternion, target: Target) -> None:
-        """Record an attitude sample that was answered during a step."""
+        """Record an attitude sample and its target during a step."""
         self.response.add([vehicle_time, *q, target.north, target.east])
 
     def add_tracking(
@@ -101,11 +101,11 @@ class FlightTrace:
         measured: BodyRates,
         age: float,
     ) -> None:
-        """Record the answer to a sample, its measured rates, and its age (NaN: unknown)."""
+        """Record the setpoint for a sample, the measured rates, and the age (NaN: unknown)."""
         self.rates.add([vehicle_time, received, *commanded, thrust, *measured, age])
 
     def add_latency(self, nanoseconds: int) -> None:
-        """Record the latency of one answer."""
+        """Record the latency of a setpoint."""
         self.newest_latency_ns = nanoseconds
         self.latencies_ns.add([nanoseconds])
 
@@ -117,13 +117,13 @@ class FlightTrace:
             self.recorder.row(time, MOTION, numbers)
 
     def begin_maneuver(self, time: float, vehicle_time: float, name: str | None) -> None:
-        """Record that a maneuver begins (None: that the last one ends), as `ManeuverMark`."""
+        """Record the beginning of a maneuver (None: end of the last one); see `ManeuverMark`."""
         self.maneuvers.append(ManeuverMark(time, vehicle_time, name))
         if self.recorder is not None:
             self.recorder.maneuver(time, vehicle_time, name)
 
     def lost_rows_warning(self) -> str | None:
-        """Warning for the user if rows were lost; None if none were."""
+        """A warning for the user if rows were lost; None: none were."""
         lost = sum(each.lost for each in (self.response, self.tracking, self.rates))
         if lost == 0:
             return None
@@ -131,13 +131,13 @@ class FlightTrace:
         return f"{lost} rows of the flight's figures were lost: {why}"
 
     def response_rows(self) -> NDArray[np.float64]:
-        """(N, 7), as `response`."""
+        """(N, 7), rows of `response`."""
         return self.response.rows()
 
     def tracking_rows(self) -> NDArray[np.float64]:
-        """(N, 7), as `tracking`."""
+        """(N, 7), rows of `tracking`."""
         return self.tracking.rows()
 
     def rates_rows(self, since: int = 0) -> NDArray[np.float64]:
-        """(N, 10), as `rates`, from row `since` of all that were noted on."""
+        """(N, 10), rows of `rates`, from row number `since` on."""
         return self.rates.rows(since)

@@ -1,4 +1,4 @@
-"""What to do after a flight that ended early: by the safety monitor or the phase that ended it."""
+"""Advice after a flight that ended early, by the monitor or the phase that ended it."""
 
 from collections.abc import Mapping
 
@@ -29,7 +29,7 @@ BY_MONITOR: Mapping[str, str] = {
     "deadlines": "end other programs on this computer, or set realtime.scheduler: fifo",
     "starvation": "end other programs on this computer, or set realtime.scheduler: fifo",
 }
-"""By name of the monitor."""
+"""Advice by the name of the monitor."""
 
 BY_PHASE: Mapping[str, str] = {
     "connect": "check power, cable and link.endpoint; nothing else may use the same port",
@@ -43,11 +43,11 @@ BY_PHASE: Mapping[str, str] = {
     "land": "read the events before it; the pilot may have taken over",
     "disarm": "disarm by the pilot's switch",
 }
-"""By name of the phase."""
+"""Advice by the name of the phase."""
 
 
 def what_to_do(monitor: str | None, phase: str) -> str:
-    """One sentence for the user, without a full stop."""
+    """Advice as one sentence without a full stop."""
     if monitor is not None and monitor in BY_MONITOR:
         return BY_MONITOR[monitor]
     return BY_PHASE.get(phase, "read the events before it")

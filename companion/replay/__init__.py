@@ -1,1 +1,1 @@
-"""Runs the code of a flight again over what the flight recorded."""
+"""Runs the code of a flight again with the inputs that the flight recorded."""

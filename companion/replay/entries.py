@@ -1,4 +1,4 @@
-"""What entered the loops of a recorded flight, in order: samples, steps of guidance, actions."""
+"""The inputs of the loops of a recorded flight, in order: samples, guidance steps, actions."""
 
 from collections.abc import Iterator
 
@@ -30,10 +30,10 @@ Entry = RecordedSample | RecordedStep | RecordedAction | ValuesChange | Attitude
 
 
 def entries(record: FlightRecord) -> Iterator[Entry]:
-    """All entries of a flight, in the order in which the program took them.
+    """All inputs of a flight, in the order in which the program took them.
 
     Raises:
-        RecordError: one is not as a flight records it.
+        RecordError: an entry is not valid.
     """
     with as_recorded(record.folder):
         yield from _in_order(_Messages(record))

@@ -1,4 +1,4 @@
-"""What a flight recorded of its loops, as values: rows of `flight.mcap` in, records out."""
+"""Converts rows of `flight.mcap` to the inputs and outputs of the loops."""
 
 from math import isnan
 from typing import Any, NamedTuple
@@ -20,7 +20,7 @@ from companion.vehicle.records import (
 )
 
 Row = dict[str, Any]
-"""One message: the value of each column of its channel, by name."""
+"""One message: value by column name."""
 
 _TARGET = "north", "east", "heading_rad", "heading_rate_rad_s"
 _MISFITS = (None, Misfit.NOT_NEWER, Misfit.AHEAD)
@@ -34,14 +34,14 @@ class Setpoint(NamedTuple):
 
 
 class RecordedSample(NamedTuple):
-    """A sample, and what the flight made of it.
+    """A sample, and the flight's answer to it.
 
     Attributes:
         sample: the sample; its time of arrival for latencies is 0.
-        flags: the state of the control loop when it arrived.
-        checked: when its age was checked before sending, s; NaN: it was not.
-        reason: why it is unanswered, of `REASONS`.
-        setpoint: what was sent, or None.
+        flags: state of the control loop at its arrival.
+        checked: time of the check of its age before sending, s; NaN: not checked.
+        reason: why it is unanswered; one of `REASONS`.
+        setpoint: setpoint that was sent, or None.
     """
 
     sample: AttitudeSample
@@ -55,8 +55,8 @@ class RecordedStep(NamedTuple):
     """A step of guidance.
 
     Attributes:
-        read: what it read.
-        command: what it left with the control loop, or None.
+        read: its inputs.
+        command: its command to the control loop, or None.
         reference: its reference, or None.
     """
 
@@ -66,13 +66,13 @@ class RecordedStep(NamedTuple):
 
 
 class RecordedAction(NamedTuple):
-    """What a phase told guidance to do.
+    """A command of a phase to guidance.
 
     Attributes:
-        time: s on our clock.
-        name: of `ACTIONS`.
+        time: time on our clock, s.
+        name: one of `ACTIONS`.
         clock_offset: vehicle time minus our time, s, or None.
-        drag: of an earlier flight, or None.
+        drag: drag learned in an earlier flight, or None.
     """
 
     time: float
@@ -82,7 +82,7 @@ class RecordedAction(NamedTuple):
 
 
 def recorded_sample(row: Row, sent: Row | None) -> RecordedSample:
-    """The sample of a row of `SAMPLE`; `sent`: the row of its `SETPOINT`, or None."""
+    """The sample of a row of `SAMPLE`; `sent` is the row of its `SETPOINT`, or None."""
     sample = AttitudeSample(
         int(row["time_boot_ms"]),
         row["vehicle_time_s"],
@@ -100,7 +100,7 @@ def recorded_sample(row: Row, sent: Row | None) -> RecordedSample:
 
 
 def recorded_step(row: Row, target: Row | None, made: Row | None) -> RecordedStep:
-    """The step of a row of `INPUT`, with its rows of `TARGET` and `GUIDANCE`, or None."""
+    """The step of a row of `INPUT`; its rows of `TARGET` and `GUIDANCE` may each be None."""
     position = None
     if not isnan(row["position_received_s"]):
         position = LocalPosition(

@@ -1,8 +1,8 @@
-"""Replays a recorded flight: the same loops, fed with what entered them, command by command.
+"""Replays a recorded flight: the same loops with the recorded inputs, in the same order.
 
-Guidance flies the maneuvers of the configuration again. Where another program commanded the flight,
-or predictive control flew, the recorded commands of guidance are used, and only the control loop is
-replayed: what came from another process is not in the record. Changes in flight are made again.
+Guidance flies the maneuvers of the configuration again. If another program or predictive control
+commanded the flight, the record lacks what came from the other process. Then the recorded commands
+of guidance are used, and only the control loop is replayed. Changes in flight are repeated.
 """
 
 from math import isnan
@@ -31,15 +31,15 @@ from companion.replay.vehicle import ReplayedVehicle
 
 
 class ReplayedSample(NamedTuple):
-    """One sample in both.
+    """One sample in the flight and in the replay.
 
     Attributes:
-        received: when it arrived, s on our clock.
-        vehicle_time: its stamp, s.
-        recorded: what the flight sent, or None.
-        replayed: what the replay sends, or None.
-        recorded_reason: why the flight did not answer, of `REASONS`.
-        replayed_reason: why the replay does not.
+        received: its arrival, s on our clock.
+        vehicle_time: its time stamp, s.
+        recorded: setpoint of the flight, or None.
+        replayed: setpoint of the replay, or None.
+        recorded_reason: why the flight did not answer; one of `REASONS`.
+        replayed_reason: why the replay did not answer.
     """
 
     received: float
@@ -51,16 +51,16 @@ class ReplayedSample(NamedTuple):
 
     @property
     def same(self) -> bool:
-        """Whether both sent the same numbers, to the bit, or nothing for the same reason."""
+        """Whether both sent the same setpoint to the bit, or none for the same reason."""
         return self.recorded == self.replayed and self.recorded_reason == self.replayed_reason
 
 
 class Replay:
-    """Replays a flight with a configuration: its own, or another one.
+    """Replays a flight with its own configuration or another one.
 
     Args:
-        record: of the flight.
-        config: to replay with.
+        record: record of the flight.
+        config: configuration for the replay.
 
     Attributes:
         follows_record: whether the commands of guidance are taken from the record.
@@ -99,7 +99,7 @@ class Replay:
             self._source = ManeuverSource(configured_maneuvers(config))
 
     def run(self) -> list[ReplayedSample]:
-        """Replay all of it; returns every sample that reached the control loop."""
+        """Replay the whole flight; return every sample that reached the control loop."""
         samples = []
         for entry in entries(self._record):
             if isinstance(entry, RecordedSample):
@@ -167,7 +167,7 @@ class Replay:
                 guidance.give_up()
 
     def _change(self, entry: ValuesChange) -> None:
-        """Begin a change of values, where the loops can change."""
+        """Begin a change of values, if the loops can change."""
         if fixed_because(self._wanted) is not None:
             return
         self._wanted = changed(self._wanted, entry.values, "the record")
@@ -189,7 +189,7 @@ class Replay:
 
 
 class _RecordedSource:
-    """Gives guidance the recorded references, whose commands are replaced by the recorded ones."""
+    """Gives guidance the recorded references; the recorded commands then replace its own."""
 
     name = "the record"
     failure: str | None = None
@@ -198,7 +198,7 @@ class _RecordedSource:
         self.held: Reference | None = None
 
     def begin(self, now: float, pose: Pose) -> None:
-        """Do nothing: the references come one by one."""
+        """Do nothing, because the references come one by one."""
 
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
         """The recorded reference of this step."""
@@ -206,5 +206,5 @@ class _RecordedSource:
         return lambda _: held
 
     def finished(self, now: float) -> bool:
-        """Never: the record tells when another source follows."""
+        """Always false: the record tells when another source follows."""
         return False

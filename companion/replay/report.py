@@ -1,4 +1,4 @@
-"""What a replay found, in words and as a table."""
+"""The result of a replay, in words and as a table."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -19,11 +19,11 @@ _COLUMNS = (
 
 
 def words(samples: Sequence[ReplayedSample], began: float, *, follows_record: bool) -> list[str]:
-    """What is the same and what differs, in sentences.
+    """What is equal and what differs, in sentences.
 
     Args:
-        samples: of the replay.
-        began: when the flight began, s on our clock.
+        samples: result of the replay.
+        began: beginning of the flight, s on our clock.
         follows_record: see `Replay`.
     """
     recorded = sum(each.recorded is not None for each in samples)
@@ -71,7 +71,7 @@ def _largest(both: Sequence[ReplayedSample], began: float) -> str:
 
 
 def _reasons(different: Sequence[ReplayedSample]) -> list[str]:
-    """What was answered in one of the two only, or unanswered for another reason."""
+    """Differences in answering: only one of both answered, or the reasons differ."""
     changes = Counter(
         (each.recorded_reason, each.replayed_reason)
         for each in different
@@ -85,7 +85,7 @@ def _reasons(different: Sequence[ReplayedSample]) -> list[str]:
 
 
 def write_csv(samples: Sequence[ReplayedSample], path: Path) -> None:
-    """Write both answers to each sample; an empty field: nothing was sent.
+    """Write both answers to each sample; an empty field means that nothing was sent.
 
     Raises:
         OSError: the file cannot be written.

@@ -1,4 +1,4 @@
-"""The vehicle of a replay: what guidance read of it, step by step."""
+"""The vehicle of a replay: the recorded inputs of guidance, step by step."""
 
 from companion.control.step_rows import StepInput
 from companion.vehicle.records import (
@@ -29,7 +29,7 @@ class ReplayedVehicle:
         self.offset: float | None = None
 
     def take(self, read: StepInput) -> None:
-        """Take what the next step of guidance reads.
+        """Take the inputs of the next guidance step.
 
         A position that was stale in the flight is left out, so that it is stale in the replay.
         """

@@ -1,4 +1,4 @@
-"""How the vehicle obeyed: coefficients, steps, body rates, thrust and latency."""
+"""Plots of the vehicle's response: coefficients, steps, body rates, thrust and latency."""
 
 from collections.abc import Iterator, Sequence
 
@@ -22,17 +22,17 @@ from companion.report.plots import (
 )
 
 _STEPS_SHOWN = 6
-"""Most doublets in one plot."""
+"""Largest number of doublets in one plot."""
 
 
 def control_plots(flight: FlightData) -> Iterator[Plot]:
-    """The plots of control for one flight; one without curves is left out."""
+    """The plots of control for one flight, without plots that have no curves."""
     found = [_step_response(flight), _plane(flight), *_coefficients(flight), *_rates(flight)]
     yield from (plot for plot in (*found, _thrust(flight), _latency(flight)) if plot.traces)
 
 
 def compared_steps(flights: Sequence[FlightData]) -> Iterator[Plot]:
-    """The first doublet of each flight beside its nearest linear model; nothing without steps."""
+    """The first doublet of each flight and its best linear model; empty without steps."""
     traces = []
     for number, flight in enumerate(flights):
         if flight.runs:
@@ -60,7 +60,7 @@ def _along(run: StepRun) -> Floats:
 
 
 def _step_response(flight: FlightData) -> Plot:
-    """The first doublet along its own direction, with the ideal and the nearest linear model."""
+    """The first doublet along its own direction, with the ideal and the best linear model."""
     if not flight.runs:
         return Plot("", "", [])
     run, model = flight.runs[0], nearest_second_order(flight.runs)

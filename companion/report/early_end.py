@@ -1,14 +1,14 @@
-"""Where and why a flight ended early, and the limit that it crossed, for the plots."""
+"""The early end of a flight for the plots: time, reason, and the limit that was crossed."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import cos, pi, sin
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from companion.config import Config
+from companion.guidance.fence import circle_corners
 from companion.recording.flight_record import FlightRecord
 
 Floats = NDArray[np.float64]
@@ -21,9 +21,9 @@ class CrossedLimit:
     """The limit whose monitor ended the flight.
 
     Attributes:
-        curve: which curve it bounds: "speed", "tilt", "error", "rate", "thrust", "latency",
-            "height" or "track".
-        key: of the configuration.
+        curve: name of the curve that it bounds: "speed", "tilt", "error", "rate", "thrust",
+            "latency", "height" or "track".
+        key: configuration key of the limit.
         levels: values that the curve must not cross, in the curve's unit.
         outline: (N, 2) north and east, m: the fence around the track; empty for other curves.
     """
@@ -39,9 +39,9 @@ class EarlyEnd:
     """The early end of a flight.
 
     Attributes:
-        time: s since the flight began.
-        reason: as the user saw it.
-        limit: that was crossed; None where no plot shows one.
+        time: time since the flight began, s.
+        reason: reason as shown to the user.
+        limit: limit that was crossed; None if no plot shows it.
     """
 
     time: float
@@ -49,19 +49,19 @@ class EarlyEnd:
     limit: CrossedLimit | None = None
 
     def sentence(self) -> str:
-        """When and why, for the user."""
+        """Time and reason, for the user."""
         return f"The flight ended early at {self.time:.1f} s: {self.reason.rstrip('.')}."
 
 
 def early_end(
     figures: Mapping[str, Any], record: FlightRecord, config: Config | None
 ) -> EarlyEnd | None:
-    """How a flight ended early; None if it was flown to its end.
+    """The early end of a flight; None if it was flown to its end.
 
     Args:
-        figures: as `Summary.as_dict` makes them.
-        record: of the flight.
-        config: as flown; None: not known.
+        figures: result of `Summary.as_dict`.
+        record: record of the flight.
+        config: configuration of the flight; None: unknown.
     """
     end = figures["early_end"]
     if end is None:
@@ -75,7 +75,7 @@ def early_end(
 
 
 def _levels(config: Config) -> dict[str, CrossedLimit]:
-    """The limits that are levels, by their monitor."""
+    """The limits that are constant levels, by monitor."""
     limits, safety = config.limits, config.safety
     tilt, rate = limits.max_tilt_deg + safety.tilt_margin_deg, safety.max_body_rate_deg_s
     return {
@@ -93,7 +93,7 @@ def _levels(config: Config) -> dict[str, CrossedLimit]:
 
 
 def _fence(config: Config, reason: str, record: FlightRecord) -> CrossedLimit | None:
-    """The side of the fence that `reason` names, about the place where control began."""
+    """The side of the fence that `reason` names, relative to where control began."""
     guidance, limits = record.rows("guidance"), config.limits
     flown = guidance[guidance["offboard_active"] == 1]
     if len(flown) == 0:
@@ -110,15 +110,11 @@ def _fence(config: Config, reason: str, record: FlightRecord) -> CrossedLimit | 
             (at_start + limits.fence_ceiling_m if ceiling else limits.fence_floor_m,),
         )
     if "fence_radius_m" in reason:
-        key, corners = "limits.fence_radius_m", _circle(limits.fence_radius_m)
+        key = "limits.fence_radius_m"
+        corners = circle_corners(limits.fence_radius_m, _CORNERS_OF_CIRCLE)
     elif config.safety.fence_polygon_m:
-        key, corners = "safety.fence_polygon_m", list(config.safety.fence_polygon_m)
+        key, corners = "safety.fence_polygon_m", config.safety.fence_polygon_m
     else:
         return None
     around = [(north + corner[0], east + corner[1]) for corner in (*corners, corners[0])]
     return CrossedLimit("track", key, outline=tuple(around))
-
-
-def _circle(radius: float) -> list[tuple[float, float]]:
-    turns = (2.0 * pi * number / _CORNERS_OF_CIRCLE for number in range(_CORNERS_OF_CIRCLE))
-    return [(radius * cos(turn), radius * sin(turn)) for turn in turns]

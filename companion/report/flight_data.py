@@ -1,4 +1,4 @@
-"""What a page shows of one flight, read from its folder."""
+"""The data of one flight for a page, read from its folder."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -27,7 +27,7 @@ class Curve(NamedTuple):
     """Values over time.
 
     Attributes:
-        time: (N,), s since the flight began.
+        time: (N,), time since the flight began, s.
         values: (N, columns).
     """
 
@@ -39,7 +39,7 @@ class Span(NamedTuple):
     """A phase, a maneuver or a mode.
 
     Attributes:
-        begin, end: s since the flight began.
+        begin, end: time since the flight began, s.
         name: shown to the user.
     """
 
@@ -53,21 +53,21 @@ class FlightData:
     """One flight, from its own record or from a `.tlog`.
 
     Attributes:
-        name: of the folder or of the log.
-        curves: by name; a curve is missing where nothing was recorded. Their columns:
-            "position", "reference": north, east, height, m. "error": tracking error, m.
-            "motion": height in m, speed in m/s, tilt in °. "coefficients", "target": north, east.
-            "commanded", "measured": roll, pitch, yaw rate, °/s. "thrust": sent, learned at hover.
-            "latency": from a sample's arrival to its setpoint, ms.
-        figures: as `Summary.as_dict` makes them; None for a `.tlog`.
-        provisional: whether the flight wrote no summary, so that the figures are from its record.
-        phases: in order.
-        maneuvers: in order.
-        events: in order.
-        differences: keys of the configuration that are not the default; None where unknown.
+        name: name of the folder or of the log.
+        curves: curves by name, without those that were not recorded. Columns: "position",
+            "reference": north, east, height, m. "error": tracking error, m. "motion": height in m,
+            speed in m/s, tilt in °. "coefficients", "target": north, east. "commanded", "measured":
+            roll, pitch, yaw rate, °/s. "thrust": sent, learned at hover. "latency": from a sample's
+            arrival to its setpoint, ms.
+        figures: result of `Summary.as_dict`; None for a `.tlog`.
+        provisional: whether the flight wrote no summary, so that the figures come from its record.
+        phases: the phases, in order.
+        maneuvers: the maneuvers, in order.
+        events: the events, in order.
+        differences: keys of the configuration that are not the default; None: unknown.
         runs: the open-loop steps, in vehicle time.
-        gain: p of the planner, 1/s; NaN where unknown.
-        end: where and why the flight ended early; None: it did not, or it is not known.
+        gain: p of the planner, 1/s; NaN: unknown.
+        end: the early end of the flight; None: none, or unknown.
     """
 
     name: str
@@ -108,7 +108,7 @@ def recorded(folder: Path) -> FlightData:
 
 
 def spans(begins: list[tuple[float, str]], end: float) -> tuple[Span, ...]:
-    """Spans that follow each other; the last one ends at `end`."""
+    """Consecutive spans; the last one ends at `end`."""
     bounds = [*begins, (end, "")]
     return tuple(Span(time, until, name) for (time, name), (until, _) in pairwise(bounds))
 
@@ -119,7 +119,7 @@ def _maneuvers(record: FlightRecord) -> tuple[Span, ...]:
 
 
 def _configuration(folder: Path) -> Config | None:
-    """As flown; None where an older program wrote it, or it was not written whole."""
+    """The configuration of the flight; None if an older program wrote it, or it is incomplete."""
     try:
         return load(folder / "config.yaml")
     except ConfigError:
@@ -158,7 +158,7 @@ def _place(rows: Row, whose: str) -> Floats:
 
 
 def _held(guidance: Row) -> Floats:
-    """The reference; NaN where the vehicle need not be there, as in open loop."""
+    """The reference; NaN where there is none, as in open loop."""
     reference = _place(guidance, "reference")
     reference[guidance["holds_position"] == 0, :2] = np.nan
     reference[guidance["holds_height"] == 0, 2] = np.nan

@@ -13,7 +13,7 @@ from companion.report.plots import Plot
 
 
 def require_extra() -> None:
-    """Make sure that the extra `report` is installed.
+    """Check that the extra `report` is installed.
 
     Raises:
         MissingExtraError: a package is missing; the message says how to install it.
@@ -26,11 +26,11 @@ def rendered(package: str, template: str, title: str, plots: Sequence[Plot], **s
     """The text of a page.
 
     Args:
-        package: whose folder holds the template; it may extend `base.html.j2` of this package, and
+        package: package with the template, which may extend `base.html.j2` of this package, and
             import from `parts.html.j2`.
-        template: name of the file.
-        title: of the page.
-        plots: drawn where the template shows them.
+        template: name of the template's file.
+        title: title of the page.
+        plots: plots that the template shows.
         shown: further values for the template.
     """
     import jinja2  # noqa: PLC0415  an extra
@@ -53,7 +53,7 @@ def rendered(package: str, template: str, title: str, plots: Sequence[Plot], **s
 
 
 def _packed(data: bytes) -> str:
-    """Data for a script element, as base64 of gzip, which browsers unpack since 2023."""
+    """Data for a script element: base64 of gzip, which browsers since 2023 can unpack."""
     return b64encode(compress(data, mtime=0)).decode("ascii")
 
 
@@ -62,5 +62,5 @@ def _plain(plot: Plot) -> dict[str, Any]:
 
 
 def _script_safe(data: Any) -> str:
-    """JSON inside a script element: no `<`, with which a tag could begin."""
+    """JSON for a script element, without `<`, which could begin a tag."""
     return json.dumps(data, allow_nan=False).replace("<", "\\u003c")

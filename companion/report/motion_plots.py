@@ -1,4 +1,4 @@
-"""Where the vehicle flew: track, height, tracking error, speed and tilt."""
+"""Plots of the motion: track, height, tracking error, speed and tilt."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -23,11 +23,11 @@ from companion.report.plots import (
 
 _NORTH, _EAST, _HEIGHT = range(3)
 _EYE = {"x": 1.3, "y": -1.7, "z": 1.0}
-"""From the south-east and above, so far away that the titles of the axes are in the picture."""
+"""Position of the camera: from the south-east and above, far enough to show the axis titles."""
 
 
 def motion_plots(flights: Sequence[FlightData]) -> Iterator[Plot]:
-    """The plots of the motion; one without curves is left out."""
+    """The plots of the motion, without plots that have no curves."""
     found = (_plan(flights), _space(flights), _height(flights), _error(flights), _speed(flights))
     yield from (plot for plot in found if plot.traces)
 
@@ -59,7 +59,7 @@ def _plan(flights: Sequence[FlightData]) -> Plot:
 
 
 def _place_of_end(flights: Sequence[FlightData]) -> list[dict[str, Any]]:
-    """A cross where a single flight ended early."""
+    """A cross at the place where a single flight ended early."""
     flight = flights[0]
     if len(flights) > 1 or flight.end is None or "position" not in flight.curves:
         return []
@@ -72,7 +72,7 @@ def _place_of_end(flights: Sequence[FlightData]) -> list[dict[str, Any]]:
 
 
 def _space(flights: Sequence[FlightData]) -> Plot:
-    """The track in three dimensions, of a single flight with its reference."""
+    """The track in three dimensions; for a single flight with its reference."""
     traces = []
     for number, flight in enumerate(flights):
         colour = _colour(flights, number)
@@ -122,8 +122,8 @@ def _error(flights: Sequence[FlightData]) -> Plot:
 def _largest_error(flights: Sequence[FlightData]) -> float | None:
     """The largest error in the maneuvers that have a reference throughout, m.
 
-    None where the plot shall show all: of several flights, of an early end, and where there is no
-    larger error elsewhere.
+    None if the plot should show all errors: for several flights, after an early end, and if no
+    error elsewhere is larger.
     """
     flight = flights[0]
     if len(flights) > 1 or flight.end is not None or "error" not in flight.curves:

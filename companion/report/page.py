@@ -1,4 +1,4 @@
-"""Makes the page of one flight, or of several beside each other: one HTML file, no network."""
+"""Makes the page of one flight or of several: one HTML file that needs no network."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -54,10 +54,10 @@ def write_report(path: Path, out: Path | None = None) -> Path:
 
 
 def write_comparison(paths: Sequence[Path], out: Path) -> Path:
-    """Write a page that sets several flights beside each other; return its path.
+    """Write a page that compares several flights; return its path.
 
     Raises:
-        MissingExtraError, RecordError, LogError, OSError: as `write_report`.
+        MissingExtraError, RecordError, LogError, OSError: see `write_report`.
     """
     require_extra()
     flights = [read(path) for path in paths]
@@ -71,7 +71,7 @@ def write_comparison(paths: Sequence[Path], out: Path) -> Path:
 
 @contextmanager
 def _of_this_version(path: Path) -> Iterator[None]:
-    """Turn the errors of figures that this version does not write into one for the user.
+    """Turn errors caused by figures of another version into an error for the user.
 
     Raises:
         RecordError: a figure is missing or of another type.
@@ -107,6 +107,6 @@ def _page(
 
 
 def _verdicts(flights: Sequence[FlightData]) -> list[tuple[str, ClosingWords]]:
-    """The words about each flight of which a summary is known, by its name."""
+    """The closing words of each flight that has a summary, by flight name."""
     known = [(flight.name, flight.figures) for flight in flights if flight.figures is not None]
     return [(name, closing_words(figures, None)) for name, figures in known]

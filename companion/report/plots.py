@@ -1,6 +1,6 @@
-"""Plots for Plotly as plain data: lines, thinned, and shaded maneuvers.
+"""Plots for Plotly as plain data: thinned lines and shaded maneuvers.
 
-The colours can be told apart by the colour-blind.
+Colour-blind readers can distinguish the colours.
 """
 
 from collections.abc import Sequence
@@ -14,13 +14,13 @@ from companion.report.flight_data import Curve, FlightData, Floats, Span
 
 MEASURED, REFERENCE, IDEAL, NEAREST = "#0072b2", "#d55e00", "#999999", "#009e73"
 CROSSED = "#c1121f"
-"""Of an early end, and of the limit that was crossed."""
+"""Colour of an early end, and of the limit that was crossed."""
 FLIGHTS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """One colour for each flight of a comparison."""
 _MOST_POINTS = 2000
-"""Most points of a line: more than a wide screen has pixels."""
+"""Largest number of points in a line; a wide screen has fewer pixels."""
 _SHADES = ("rgba(230,159,0,0.13)", "rgba(86,180,233,0.13)")
-"""Of the maneuvers, in turn."""
+"""Colours of the maneuvers, used in turn."""
 _DIGITS = 5
 
 
@@ -30,10 +30,10 @@ class Plot:
 
     Attributes:
         title: shown above it.
-        note: what to look for, one sentence.
+        note: one sentence on what to look for.
         traces: Plotly's traces.
         layout: Plotly's layout; the page adds fonts and colours.
-        height: px.
+        height: height, px.
     """
 
     title: str
@@ -44,7 +44,7 @@ class Plot:
 
 
 def line(name: str, x: Floats, y: Floats, colour: str, **more: Any) -> dict[str, Any]:
-    """A line through all of the points; `over_time` thins them first."""
+    """A line through all points; `over_time` thins them before."""
     dash = more.pop("dash", "solid")
     return {
         "type": "scatter",
@@ -58,13 +58,13 @@ def line(name: str, x: Floats, y: Floats, colour: str, **more: Any) -> dict[str,
 
 
 def over_time(name: str, curve: Curve, column: int, colour: str, **more: Any) -> dict[str, Any]:
-    """A column of a curve over time, thinned: the extremes stay."""
+    """A column of a curve over time, thinned so that extremes are kept."""
     kept = thinned(curve.values[:, column])
     return line(name, curve.time[kept], curve.values[kept, column], colour, **more)
 
 
 def thinned(values: Floats) -> Any:
-    """Indices (M,) of the points to draw: of each of many equal parts its smallest and largest."""
+    """Indices (M,) of the points to draw: smallest and largest of each of many equal parts."""
     count = len(values)
     if count <= _MOST_POINTS:
         return np.arange(count)
@@ -80,18 +80,18 @@ def thinned(values: Floats) -> Any:
 
 
 def evenly(count: int) -> Any:
-    """Indices (M,) of at most so many points of a track that a page stays small."""
+    """Indices (M,) of evenly chosen points of a track, few enough for a small page."""
     return np.unique(np.linspace(0, count - 1, min(count, _MOST_POINTS)).astype(int))
 
 
 def numbers(values: Floats) -> list[float | None]:
-    """Rounded numbers for JSON; null where a value is not finite."""
+    """Rounded numbers for JSON; null for values that are not finite."""
     rounded = [float(f"{value:.{_DIGITS}g}") for value in values.tolist()]
     return [value if np.isfinite(value) else None for value in rounded]
 
 
 def axes(**titles: str) -> dict[str, Any]:
-    """The titles of axes, such as `x="time, s"`; `y2` is the second vertical axis."""
+    """Axis titles for the layout, such as `x="time, s"`; `y2` is the second vertical axis."""
     return {
         f"{axis[0]}axis{axis[1:]}": {"title": {"text": title}} for axis, title in titles.items()
     }
@@ -120,13 +120,13 @@ def time_axis(flights: Sequence[FlightData], **titles: str) -> dict[str, Any]:
 
 
 def end_mark(end: EarlyEnd, *, above: bool = False) -> dict[str, list[dict[str, Any]]]:
-    """A line and a label at an early end, as part of a layout; the label at the foot or above."""
+    """A line and a label at an early end, for a layout; the label is at the bottom or above."""
     label = {**_end_label(end), "y": 1.0 if above else 0.0}
     return {"shapes": [_upright(end.time)], "annotations": [label]}
 
 
 def limit_lines(flights: Sequence[FlightData], curve: str, **more: Any) -> list[dict[str, Any]]:
-    """Lines at the limit that ended a single flight early, if `curve` is what it bounds."""
+    """Lines at the limit that ended a single flight early, if it bounds `curve`."""
     end = flights[0].end if len(flights) == 1 else None
     if end is None or end.limit is None or end.limit.curve != curve:
         return []
@@ -164,7 +164,7 @@ def _shade(span: Span, number: int) -> dict[str, Any]:
 
 
 def _name_above(span: Span) -> dict[str, Any]:
-    """The name of a maneuver; the page leaves it out where it is wider than the maneuver."""
+    """The name of a maneuver; the page hides it if it is wider than the maneuver."""
     return {
         "x": 0.5 * (span.begin + span.end),
         "y": 1.0,
@@ -191,7 +191,7 @@ def _upright(time: float) -> dict[str, Any]:
 
 
 def _end_label(end: EarlyEnd) -> dict[str, Any]:
-    """When the flight ended, beside the line; why, when pointed at."""
+    """Time of an early end as a label beside the line, with the reason as a tooltip."""
     return {
         "x": end.time,
         "yref": "paper",

@@ -1,4 +1,4 @@
-"""The tables of the page: maneuvers, figures, configuration, and flights beside each other."""
+"""The tables of the page: maneuvers, figures, configuration, and comparisons."""
 
 import json
 import re
@@ -27,7 +27,7 @@ class Table(NamedTuple):
 
 
 def flight_tables(flight: FlightData) -> list[Table]:
-    """The tables about one flight; one without rows is left out."""
+    """The tables about one flight, without empty ones."""
     figures = flight.figures
     tables = [] if figures is None else [_maneuvers(figures), _figures(figures)]
     return [table for table in tables if table.rows]
@@ -43,7 +43,7 @@ def configuration(flight: FlightData) -> Table:
 
 
 def beside_each_other(flights: Sequence[FlightData]) -> list[Table]:
-    """The figures and the configurations of several flights, one column a flight."""
+    """The figures and configurations of several flights, one column for each flight."""
     names = tuple(flight.name for flight in flights)
     known = [
         {**dict(_tracking(flight.figures)), **dict(_rows(flight.figures))} if flight.figures else {}
@@ -76,7 +76,7 @@ def beside_each_other(flights: Sequence[FlightData]) -> list[Table]:
 
 
 def _compared(key: Key) -> tuple[str, str]:
-    """Value and default of a key; of an endpoint without the port, for `demo` takes a free one."""
+    """Value and default of a key; for an endpoint without its port, which `demo` varies."""
     value, default = _value(key.value), _value(key.default)
     if key.name != "endpoint":
         return value, default

@@ -7,12 +7,12 @@ from companion.report.flight_data import FlightData, Span
 from companion.report.plots import IDEAL, MEASURED, REFERENCE, Plot, axes, end_mark
 
 _COLOURS = {2: MEASURED, 3: "#e69f00", 4: REFERENCE}
-"""Of an event, by its level."""
+"""Colour of an event, by its level."""
 _LANES = ("events", "maneuvers", "phases")
 
 
 def timeline(flight: FlightData) -> Iterator[Plot]:
-    """The timeline; nothing without phases."""
+    """The timeline of a flight; empty without phases."""
     if not flight.phases:
         return
     lanes = {"phases": flight.phases, "maneuvers": flight.maneuvers}

@@ -1,4 +1,4 @@
-"""What a page shows of a `.tlog`, of this program or of another one."""
+"""The data of a `.tlog` for a page, written by this program or another one."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -21,11 +21,11 @@ _NAMES = frozenset(
 _INFORMATION, _WARNING, _ERROR = 2, 3, 4
 """Levels of `Event`."""
 _MAV_ERROR, _MAV_WARNING = 3, 4
-"""MAV_SEVERITY."""
+"""Levels of MAV_SEVERITY."""
 
 
 def logged(path: Path) -> FlightData:
-    """The flight in a `.tlog`. Times are since the first attitude or position of the autopilot.
+    """The flight in a `.tlog`. Times are relative to the autopilot's first attitude or position.
 
     Raises:
         LogError: the file cannot be read, is not a `.tlog`, or has no telemetry of an autopilot.
@@ -45,11 +45,11 @@ def logged(path: Path) -> FlightData:
 
 
 class _Reader:
-    """Takes the messages in the order of the log.
+    """Collects the messages in the order of the log.
 
     Attributes:
         vehicle: system and component of the autopilot, from its first heartbeat.
-        began: the first stamp of attitude or position, s since boot.
+        began: first time stamp of attitude or position, s since boot.
         events: the autopilot's texts.
     """
 
@@ -119,7 +119,7 @@ class _Reader:
         return spans(self._modes, self._now)
 
     def curves(self) -> dict[str, Curve]:
-        """Attitude and position, as in `FlightData.curves`."""
+        """Attitude and position; see `FlightData.curves`."""
         positions, tilts = _rows(self._positions, 5), _rows(self._tilts, 2)
         tilt = (
             np.interp(positions[:, 0], *tilts.T) if len(tilts) else np.full(len(positions), np.nan)
@@ -138,7 +138,7 @@ def _rows(rows: Iterable[tuple[float, ...]], columns: int) -> Floats:
 
 
 def _control(path: Path, began: float) -> dict[str, Curve]:
-    """Rates and thrust of a log with setpoints that the autopilot obeyed; else nothing."""
+    """Rates and thrust of a log with setpoints that the autopilot obeyed; else empty."""
     try:
         log = read_flight_log(path)
     except LogError:

@@ -4,7 +4,7 @@ from enum import Enum
 
 
 class Action(Enum):
-    """The actions by rising severity; the value is the word in YAML."""
+    """The actions by rising severity; the value is the word used in YAML."""
 
     WARN = "warn"
     """Report the breach once and fly on."""
@@ -42,7 +42,7 @@ EXITS = {
 
 
 class FlightEnded(Exception):  # noqa: N818 - it is how every flight that stops early ends
-    """Ends the flight before its maneuvers do.
+    """Raised to end the flight before the end of its maneuvers.
 
     Attributes:
         reason: why the flight ended, shown to the user.

@@ -27,7 +27,7 @@ def failsafe(snapshot: Snapshot, _: bool) -> str | None:
 
 
 def battery(least: float) -> Judge:
-    """The battery's remaining charge is below `least` (0..1), or is not reported any more."""
+    """The battery's remaining charge is below `least` (0..1), or is no longer reported."""
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
         newest = snapshot.autopilot.battery
@@ -46,12 +46,12 @@ def battery(least: float) -> Judge:
 
 
 def gps(snapshot: Snapshot, _: bool) -> str | None:
-    """A vehicle that had a 3D GPS fix has lost it, or does not report GPS any more."""
+    """A vehicle that had a 3D GPS fix has lost it, or no longer reports GPS."""
     return gps_fault(snapshot.autopilot.gps, snapshot.now) if snapshot.had_gps else None
 
 
 def estimator_flags(snapshot: Snapshot, _: bool) -> str | None:
-    """ESTIMATOR_STATUS lost flags that were set when control began, or is not received any more."""
+    """ESTIMATOR_STATUS lost flags that were set when control began, or is no longer received."""
     estimator, good = snapshot.autopilot.estimator, snapshot.good_flags
     if estimator is None:
         return None
@@ -66,7 +66,7 @@ def estimator_flags(snapshot: Snapshot, _: bool) -> str | None:
 
 
 def estimator_reset(snapshot: Snapshot, _: bool) -> str | None:
-    """The estimator was reset; the references moved with the estimate, so this only warns."""
+    """The estimator was reset. References move with the estimate, so this is only a warning."""
     found = snapshot.resets
     if found.recent == 0:
         return None

@@ -33,9 +33,9 @@ class SafetyLadder:
         hold_time: time allowed for a hold to end its breach, s.
 
     Attributes:
-        note: called with a message when an alarm is raised or over.
-        on_change: called then with whether it is raised, the name of the monitor, the reason and
-            the action.
+        note: called with a message when an alarm is raised or ended.
+        on_change: called at the same time with: whether it is raised, the name of the monitor, the
+            reason, the action.
         breaches: dict from the description of each breach so far to its monitor's name.
     """
 
@@ -50,7 +50,7 @@ class SafetyLadder:
 
     @property
     def raised(self) -> tuple[str, ...]:
-        """The names of the monitors whose alarm is raised now."""
+        """The names of the monitors with a raised alarm."""
         return tuple(alarm.monitor.name for alarm in self._alarms if alarm.reason is not None)
 
     def step(self, snapshot: Snapshot) -> Verdict | None:
@@ -67,7 +67,7 @@ class SafetyLadder:
         return None
 
     def _after_hold(self, now: float, held_at: float) -> Verdict | None:
-        """The verdict when the hold has ended its breach, or `hold_time` is over; else None."""
+        """The verdict after the hold has ended its breach or `hold_time` is over; else None."""
         breaches = [a for a in self._alarms if a.reason and a.monitor.action is Action.HOLD]
         if not breaches:
             return Verdict(Action.LAND, self._held_for)
@@ -77,7 +77,7 @@ class SafetyLadder:
         return _verdict(worst, worst.monitor.then)
 
     def _report(self, alarm: Alarm) -> bool:
-        """Report that an alarm was raised or is over; return whether it was raised."""
+        """Report that an alarm was raised or ended; return whether it was raised."""
         name = alarm.monitor.name
         if alarm.reason is None:
             self.note(f"safety: {name} is over")

@@ -5,16 +5,16 @@ from companion.safety.monitor import Judge, released, released_minimum
 from companion.safety.snapshot import Control, Snapshot
 
 _HEARD = 0.3
-"""If no frame came for this long, s, a takeover would not be noticed either."""
+"""Without a frame for this time, s, a takeover would not be noticed either."""
 
 _STALL_SHARE = 0.5
-"""If the timer stood still for a larger share of the silence, this computer caused it."""
+"""If the timer stood still for more than this share of the silence, this computer caused it."""
 
 
 def silence(limit: float, *, heard: bool) -> Judge:
     """No setpoint was sent for longer than `limit` s.
 
-    `heard`: judge only while frames come from the vehicle; else only while none come.
+    `heard`: True: judge only while frames come from the vehicle. False: only while none come.
     """
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:

@@ -7,20 +7,21 @@ from companion.safety.actions import Action
 from companion.safety.snapshot import Snapshot
 
 Judge = Callable[[Snapshot, bool], str | None]
-"""Returns the breach in words, or None. The flag says whether the alarm is raised already. A judge
-with a limit then uses `released`, so that the alarm does not toggle at the limit."""
+"""Returns the breach in words, or None. The flag tells whether the alarm is already raised; a judge
+with a limit then uses `released`, so that the alarm does not toggle at the limit.
+"""
 
 HYSTERESIS = 0.9
-"""A raised alarm is over only below this share of its limit."""
+"""A raised alarm ends only below this share of its limit."""
 
 
 def released(limit: float, raised: bool) -> float:
-    """The largest value that is no breach of an upper `limit`, with hysteresis."""
+    """The largest value within an upper `limit`, with hysteresis for a raised alarm."""
     return HYSTERESIS * limit if raised else limit
 
 
 def released_minimum(limit: float, raised: bool) -> float:
-    """The smallest value that is no breach of a lower `limit`, with hysteresis."""
+    """The smallest value within a lower `limit`, with hysteresis for a raised alarm."""
     return limit * (1.0 / HYSTERESIS) if raised else limit
 
 
@@ -33,7 +34,7 @@ class Monitor:
         judge: see `Judge`; it has no clock and no memory.
         action: action that a breach causes.
         lasts: time that a breach must last before the alarm is raised, s.
-        calm: time without the breach before the alarm is over, s.
+        calm: time without the breach before the alarm ends, s.
         then: action that follows if a hold does not end the breach.
         mutes: whether setpoints stop at once, because their data cannot be trusted.
     """

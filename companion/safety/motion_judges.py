@@ -1,7 +1,8 @@
 """Judges of the motion: tilt, body rates, speed, tracking error, thrust, and the fence.
 
 The judge `braking` warns before the vehicle leaves the fence. It judges where the vehicle would
-stop after the reaction time, with the deceleration that it certainly reaches (`Fence.stop`).
+stop with the deceleration that it certainly reaches, if it still accelerates for the reaction time
+(`Fence.stop`).
 """
 
 from math import degrees, hypot
@@ -62,7 +63,7 @@ def tracking(limit: float) -> Judge:
 
 
 def thrust(lowest: float, highest: float) -> Judge:
-    """The thrust is at one of its limits (0..1), so the height is not held any more."""
+    """The thrust is at one of its limits (0..1), so the height is no longer held."""
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
         sent = snapshot.motion.thrust
@@ -95,7 +96,9 @@ def braking(fence: Fence) -> Judge:
         offset, velocity, height = motion.offset, motion.velocity, motion.height
         if offset is None or fence.breach(offset, height, motion.origin) is not None:
             return None
-        found = fence.stop_breach(offset, velocity, height, motion.origin)
+        found = fence.stop_breach(
+            offset, velocity, height, motion.origin, acceleration=motion.acceleration
+        )
         return None if found is None else f"about to stop {found}"
 
     return judge

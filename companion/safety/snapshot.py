@@ -6,7 +6,7 @@ from typing import NamedTuple
 from companion.attitude import Quaternion
 from companion.control.loop_record import Unanswered
 from companion.guidance.fence import Place
-from companion.guidance.reference import Vector
+from companion.guidance.reference import Horizontal, Vector
 from companion.vehicle.records import Battery, Estimator, Gps
 
 
@@ -33,6 +33,7 @@ class Motion(NamedTuple):
         off_course: distance from the reference, m; None without a reference.
         thrust: thrust last sent, 0..1, or None.
         origin: place where control began, or None if it is unknown.
+        acceleration: horizontal acceleration, m/s², NED.
     """
 
     q: Quaternion | None = None
@@ -43,10 +44,11 @@ class Motion(NamedTuple):
     off_course: float | None = None
     thrust: float | None = None
     origin: Place | None = None
+    acceleration: Horizontal = (0.0, 0.0)
 
 
 class Control(NamedTuple):
-    """When data last arrived and a setpoint was last sent, and why none is sent now.
+    """When data last arrived and a setpoint was last sent, and why none is sent at present.
 
     Times are in s of event-loop time. A sample is answered when a setpoint is sent for it.
 
@@ -55,10 +57,10 @@ class Control(NamedTuple):
         sampled: arrival of the last attitude sample.
         reason: why the newest sample is unanswered, or None.
         commanded: when guidance made its last command.
-        placed: arrival of the last position that was newer than those before.
+        placed: arrival of the last position that was newer than all before.
         heard: arrival of the last frame of any kind from the vehicle.
         position_fresh: whether the newest position is fresh.
-        clock_change: how the vehicle's clock jumped or restarted since control began, or None.
+        clock_change: jump or restart of the vehicle's clock since control began, in words, or None.
         stood_still: time for which this program stood still since the last answer, s.
     """
 

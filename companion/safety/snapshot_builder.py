@@ -19,21 +19,22 @@ _WINDOW = 1.0
 _EARLY = 0.9
 """Share of the window that must be filled before shares and rates are known."""
 _LATE = 0.03
-"""A longer interval between two calls of `listen` is a stall, s; the timer's period is 0.02 s."""
+"""An interval between two calls of `listen` above this is a stall, s; the timer's period is 0.02 s.
+"""
 _PLACE_LASTS = 1.0
-"""An older GLOBAL_POSITION_INT is not used as the place where control begins, s."""
+"""Largest age of a GLOBAL_POSITION_INT for the place where control begins, s."""
 _GAPS_WITHIN = 5.0
-"""Gaps in the setpoints are counted over this time, s."""
+"""Time over which gaps in the setpoints are counted, s."""
 _RESETS_WITHIN = 30.0
-"""Estimator resets are counted over this time, s."""
+"""Time over which estimator resets are counted, s."""
 
 
 class FenceCentre(NamedTuple):
-    """Where the fence is centred.
+    """Centre of the fence.
 
     Attributes:
-        position_ned: m, in the autopilot's frame.
-        place: its latitude and longitude; None: they are not known.
+        position_ned: position in the autopilot's frame, m NED.
+        place: latitude and longitude; None: unknown.
     """
 
     position_ned: Vector
@@ -41,7 +42,7 @@ class FenceCentre(NamedTuple):
 
 
 class _Counters(NamedTuple):
-    """Counters at one call of `listen`; `late` is how late that call came, s."""
+    """Counters at one call of `listen`; `late` is the delay of that call, s."""
 
     now: float
     frames: int
@@ -60,7 +61,7 @@ class SnapshotBuilder:
         link: link to the vehicle.
         loop: the control loop, which answers the samples.
         guidance_loop: makes the commands for the control loop.
-        real_time: whether deadlines count; in lockstep the vehicle waits, and they do not.
+        real_time: whether deadlines count; in lockstep they do not, because the vehicle waits.
     """
 
     def __init__(
@@ -84,7 +85,7 @@ class SnapshotBuilder:
 
         Args:
             now: s of event-loop time.
-            centre: of the fence; None: the present position.
+            centre: centre of the fence; None: the present position.
         """
         state, resets = self._link.state, self._loop.resets
         motion = self._guidance_loop.motion
@@ -101,7 +102,7 @@ class SnapshotBuilder:
 
     @property
     def fence_centre(self) -> FenceCentre | None:
-        """Where the fence is centred, or None before control began."""
+        """Centre of the fence, or None before control began."""
         if self._start is None:
             return None
         back = _minus((0.0, 0.0, 0.0), self._loop.resets.shift)
@@ -189,6 +190,7 @@ class SnapshotBuilder:
             guidance_loop.off_course,
             None if idle else loop.record.thrust,
             self._origin,
+            guidance_loop.acceleration,
         )
 
     def _health(self, now: float) -> Health:

@@ -10,17 +10,17 @@ from companion.safety.actions import Action
 from companion.safety.monitor import Monitor
 
 _BACKLOG = 0.2
-"""After a stall, queued telemetry is read within this time, s; until then it looks old."""
+"""Time after a stall in which queued telemetry is read, s; until then it looks old."""
 _GAPS = 2
-"""Number of gaps in the setpoints that are allowed within 5 s."""
+"""Largest number of gaps in the setpoints within 5 s."""
 _RELEASE, _HAND_BACK, _HOLD, _LAND = Action.RELEASE, Action.HAND_BACK, Action.HOLD, Action.LAND
 
 
 def monitors(config: Config) -> tuple[Monitor, ...]:
     """The monitors of a flight, the more severe ones first.
 
-    A takeover by the pilot and an unknown mode are not in this table: `companion.flight.watch`
-    judges them, and releases control.
+    The table does not contain a takeover by the pilot or an unknown mode: `companion.flight.watch`
+    detects both, and releases control.
     """
     return (*_fixed(config), *_autopilot(config), *_motion(config), *_link(config))
 

@@ -15,10 +15,10 @@ from companion.serve.network.routing import Channel
 
 _HEARTBEAT_PERIOD = 1.0
 _TEXT_BYTES = 50
-"""Bytes of a text that one STATUSTEXT carries; longer texts come in pieces."""
+"""Number of bytes of text in one STATUSTEXT; longer texts come in pieces."""
 _LONGEST_TEXT = 200
 _SAME_TEXT = 5.0
-"""The same text is told to the same client at most this often, s."""
+"""Shortest time between two equal texts to the same client, s."""
 _AUTOPILOT_INVALID, _STATE_ACTIVE, _VERSION = 8, 4, 3
 _COMMANDS = dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT
 
@@ -26,12 +26,13 @@ WARNING, NOTICE = dialect.MAV_SEVERITY_WARNING, dialect.MAV_SEVERITY_NOTICE
 
 
 class Component:
-    """Speaks to the clients as the companion computer, and answers those who command it.
+    """Sends to the clients as the companion computer, and answers their commands to it.
 
     Args:
-        settings: our ids, and the key with which our frames are signed.
-        network: to the clients.
-        to_vehicle: sends a message over the link, so that a pilot behind the autopilot reads it.
+        settings: our ids and our signing key.
+        network: network of the clients.
+        to_vehicle: sends a message over the link, for a pilot whose ground station is connected to
+            the autopilot.
     """
 
     def __init__(
@@ -51,14 +52,14 @@ class Component:
             await asyncio.sleep(_HEARTBEAT_PERIOD)
 
     def tell(self, text: str, severity: int = NOTICE) -> None:
-        """Tell everybody what a pilot must know: all clients, and who listens to the autopilot."""
+        """Send a text to all clients, and over the link to stations connected to the autopilot."""
         if self._not_sent_lately(None, text):
             for piece in self._pieces(text, severity):
                 self._network.send(self._frame(piece))
                 self._to_vehicle(piece)
 
     def answer(self, client: Client, text: str, severity: int = WARNING) -> None:
-        """Tell one client, for example why it is refused."""
+        """Send a text to one client, for example the reason of a refusal."""
         if self._not_sent_lately(client, text):
             for piece in self._pieces(text, severity):
                 self._network.send_to(client, self._frame(piece))
@@ -73,10 +74,11 @@ class Component:
         """Answer a client's command with a MAV_RESULT.
 
         Args:
-            client: who sent it.
+            client: sender of the command.
             frame: COMMAND_LONG, COMMAND_INT or SET_MODE.
-            result: of it.
-            by: who answers; clients take the answer only of the component that they commanded.
+            result: result of the command.
+            by: component that answers; clients accept only an answer from the component they
+                commanded.
         """
         command = decode(frame.message_id, frame.payload)
         message = dialect.MAVLink_command_ack_message(
@@ -88,7 +90,7 @@ class Component:
         self._network.send_to(client, self._frame(message, by))
 
     def on_own(self, client: Channel, frame: Frame) -> None:
-        """Answer what is addressed to us alone: we carry out no commands."""
+        """Answer a command addressed only to us; we carry out none."""
         if frame.message_id in _COMMANDS and isinstance(client, Client):
             self.acknowledge(client, frame, dialect.MAV_RESULT_UNSUPPORTED, self._own)
 
@@ -101,7 +103,7 @@ class Component:
         return True
 
     def _pieces(self, text: str, severity: int) -> list[Message]:
-        """STATUSTEXTs of one text; a long one is numbered, and a short last piece ends it."""
+        """STATUSTEXTs of one text; pieces of a long text are numbered, and a short one ends it."""
         words = text.encode("ascii", "replace")[:_LONGEST_TEXT]
         if len(words) <= _TEXT_BYTES:
             return [dialect.MAVLink_statustext_message(severity, words)]

@@ -1,4 +1,4 @@
-"""Control by clients: whose setpoints are flown, and who asks for control."""
+"""Control by clients: which client's setpoints are flown, and requests for control."""
 
 import asyncio
 import gc
@@ -31,21 +31,21 @@ from companion.vehicle.link import Link
 
 _ENDS = "the vehicle is held, and control ends"
 _TRY_AGAIN = 2.0
-"""After a takeover has failed, setpoints alone do not begin another one for this long, s."""
+"""After a failed takeover, time in which setpoints alone do not begin another one, s."""
 
 
 class ServedControl:
-    """Flies the setpoints of one client at a time; nothing of them is forwarded.
+    """Flies the setpoints of one client at a time; these setpoints are not forwarded.
 
     Args:
-        config: of the vehicle and of `serve`.
-        link: to the vehicle, open.
-        component: answers clients and tells pilots.
-        keeper: knows where the vehicle is.
-        observer: is told of phases and events of each flight.
-        environment: of the flights.
+        config: configuration of the vehicle and of `serve`.
+        link: open link to the vehicle.
+        component: sends answers to clients and texts to pilots.
+        keeper: keeps track of the vehicle's position.
+        observer: receives phases and events of each flight.
+        environment: environment of the flights.
         records: makes their records.
-        changes: of the values that may change in flight.
+        changes: changes of values in flight.
     """
 
     def __init__(
@@ -79,11 +79,11 @@ class ServedControl:
 
     @property
     def tracking_error(self) -> float | None:
-        """Distance of the vehicle from its reference, m; None where it is not known."""
+        """Distance of the vehicle from its reference, m; None: unknown."""
         return None if self._flight is None else self._flight.tracking_error
 
     def intercept(self, client: Client, frame: Frame) -> bool:
-        """Whether a client's frame ends here: its setpoints, and its wish for control."""
+        """Whether a client's frame is not forwarded: its setpoints and requests for control."""
         if frame.message_id in SETPOINTS:
             self._take_setpoint(client, frame)
             return True
@@ -109,7 +109,7 @@ class ServedControl:
         return False
 
     async def close(self, reason: str) -> None:
-        """Hand the vehicle back, if a client has it, and wait until that is done and recorded."""
+        """Hand the vehicle back if a client has it; wait until that is done and recorded."""
         if self._flight is not None:
             self._flight.interrupt(reason)
         if self._unfinished:
@@ -121,7 +121,7 @@ class ServedControl:
             self._task.cancel()
 
     def needed_rates(self) -> dict[str, float]:
-        """Telemetry that control needs, Hz by message name; the autopilot must be known."""
+        """Rates that control needs, Hz by message name; the autopilot must be known."""
         link = self._config.link
         return {
             **self._link.autopilot.wanted_rates,
@@ -157,10 +157,10 @@ class ServedControl:
             self._component.answer(client, f"setpoint refused: {refusal}")
 
     def _fly_request(self, owner: Program, request: Request, now: float) -> str | None:
-        """Give a request to the flight, or begin one; returns why it is not flown, or None.
+        """Pass a request to the flight, or begin one; return why it is not flown, or None.
 
         Raises:
-            UnplannableError: there is no motion to it; the request before still counts.
+            UnplannableError: no motion leads to it; the previous request stays in force.
         """
         flight = self._flight
         if flight is not None and not flight.ends and self.ownership.owner == owner:
@@ -190,7 +190,7 @@ class ServedControl:
         return refusal is None
 
     def _take_wish(self, client: Client, frame: Frame) -> None:
-        """Answer a command that asks for control: by a takeover, or by a refusal."""
+        """Answer a command that requests control: by a takeover or a refusal."""
         now, owner = self._clock(), self._programs.asking(client, frame)
         refusal, standing = self.ownership.ask(owner, now), not self._link.state.flying
         if refusal is None and self._flight is not None and self._flight.ends:
@@ -230,7 +230,7 @@ class ServedControl:
         task.add_done_callback(self._unfinished.discard)
 
     async def _fly(self, flight: ServedFlight, asked: Asked | None) -> None:
-        """Fly; when the next flight may begin, write the rest of the record."""
+        """Fly; complete the record while the next flight may already begin."""
         begun = False
         try:
             begun = await flight.run(asked)

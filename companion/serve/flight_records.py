@@ -1,4 +1,4 @@
-"""The records of the flights under clients' control, each in a folder of its own."""
+"""The records of the flights under clients' control, each in its own folder."""
 
 import asyncio
 import shutil
@@ -26,14 +26,14 @@ class FlightRecords:
     The link stays open between flights and has one tap, which is this object.
 
     Args:
-        directory: in which each flight makes its own folder; None: nothing is recorded.
-        environment: of the flights.
-        note: takes events as sentences.
+        directory: folder for the flights' folders; None: nothing is recorded.
+        environment: environment of the flights.
+        note: called with events as sentences.
 
     Attributes:
         grants: real-time settings that were requested.
-        on_recorded: called with the folder of each flight once its record is whole, in a thread
-            beside the event loop, except on a virtual clock; returns a sentence to tell, or None.
+        on_recorded: called with the folder of each flight when its record is complete; returns a
+            sentence for the clients, or None. It runs in a thread, except on a virtual clock.
     """
 
     def __init__(
@@ -54,10 +54,10 @@ class FlightRecords:
             self._tap(time, frame)
 
     def new(self, config: Config) -> FlightFiles:
-        """The open record of a new flight; if it cannot be made, the flight has none.
+        """The open record of a new flight; if it cannot be created, the flight has none.
 
         Args:
-            config: with which the flight begins.
+            config: configuration at the beginning of the flight.
         """
         folder = None
         if self._directory is not None:
@@ -82,9 +82,9 @@ class FlightRecords:
                 self._tap = None
 
     async def keep(self, record: FlightFiles, summary: Summary) -> None:
-        """Write the summary of a flight that is over; its log is closed.
+        """Write the summary of a finished flight, whose log is closed.
 
-        The next flight may begin meanwhile: it has a record of its own.
+        The next flight may already have begun, with its own record.
         """
         await self._beside(record.save, summary)
         if record.folder is not None:
@@ -94,7 +94,7 @@ class FlightRecords:
                 self._note(told)
 
     async def discard(self, record: FlightFiles) -> None:
-        """Remove the record of a takeover that failed: nothing was flown."""
+        """Remove the record of a failed takeover, in which nothing was flown."""
         await self._beside(_remove, record.folder)
 
     def _record(self, config: Config, folder: Path | None) -> FlightFiles:
@@ -106,7 +106,7 @@ class FlightRecords:
         return FlightFiles(config, folder, self._environment, note, follows=False)
 
     async def _beside(self, work: Callable[[Argument], Result], argument: Argument) -> Result:
-        """Call `work` in a thread, so that a slow disk stops nothing."""
+        """Call `work` in a thread, so that a slow disk blocks nothing."""
         if not self._environment.realtime:  # a virtual clock knows no threads
             return work(argument)
         return await asyncio.to_thread(work, argument)

@@ -1,4 +1,4 @@
-"""The fence of served flights stays where it is until the vehicle is disarmed."""
+"""Keeps the fence of served flights in place until the vehicle is disarmed."""
 
 from companion.config import Config
 from companion.safety.snapshot_builder import FenceCentre
@@ -9,14 +9,14 @@ from companion.vehicle.link import Link
 class KeptFence:
     """Keeps the centre of the fence from one flight to the next.
 
-    Otherwise a client that lets go and asks for control again would take the fence along.
+    Otherwise a client could move the fence by releasing control and requesting it again.
 
     Args:
-        config: of the vehicle.
-        link: to the vehicle.
+        config: configuration of the vehicle.
+        link: link to the vehicle.
 
     Attributes:
-        centre: of the first flight since the vehicle was armed; None: there was none.
+        centre: centre of the fence in the first flight since the vehicle was armed; None: none yet.
     """
 
     def __init__(self, config: Config, link: Link) -> None:
@@ -25,15 +25,15 @@ class KeptFence:
         link.subscribe("HEARTBEAT", self._forget_if_disarmed)
 
     def keep(self, centre: FenceCentre | None) -> None:
-        """Note the centre of a flight that has ended; that of an earlier one stays.
+        """Keep the centre of a flight that has ended; an earlier flight's centre takes precedence.
 
-        A vehicle that is disarmed by then keeps none.
+        Nothing is kept if the vehicle is disarmed.
         """
         if self.centre is None and self._state.armed is not False:
             self.centre = centre
 
     def refusal(self) -> str | None:
-        """Why control must not begin where the vehicle is now: outside the fence; else None."""
+        """Why control must not begin at the present position, outside the fence; else None."""
         position = self._state.position
         if self.centre is None or position is None:
             return None

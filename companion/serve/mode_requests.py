@@ -1,4 +1,4 @@
-"""Which messages of clients ask for our mode, steer in it, or would starve our control. Pure."""
+"""Clients' messages that request our mode, steer in it, or would starve our control. Pure."""
 
 from math import isfinite
 
@@ -25,14 +25,14 @@ _CUSTOM_MODE = 1
 _MAIN_MODE = 0xFF << 16
 """PX4's main mode within a custom mode. OFFBOARD has no sub mode, and PX4 ignores one."""
 _MESSAGES = frozenset({_COMMAND_LONG, _COMMAND_INT, _SET_MODE, _REQUEST_DATA_STREAM})
-"""All messages that are looked at here."""
+"""All messages that this module examines."""
 
 
 def asks_for_control(frame: Frame, autopilot: Autopilot) -> bool:
     """Whether a frame commands the mode in which the autopilot obeys setpoints.
 
-    Only where that mode is entered by a command (PX4's OFFBOARD). Whatever PX4 takes for that
-    command counts: it reads modes as bytes, and knows NAV_GUIDED_ENABLE for it.
+    This applies only to a mode entered by a command (PX4's OFFBOARD). Every form that PX4 accepts
+    counts: it reads modes as bytes, and also accepts NAV_GUIDED_ENABLE.
     """
     if frame.message_id not in _MESSAGES or autopilot.control_entry is not ControlEntry.BY_COMMAND:
         return False
@@ -55,11 +55,11 @@ def asks_for_control(frame: Frame, autopilot: Autopilot) -> bool:
 
 
 def steers_in_our_mode(frame: Frame, autopilot: Autopilot) -> bool:
-    """Whether a frame lets the autopilot fly elsewhere without leaving the mode of our setpoints.
+    """Whether a frame makes the autopilot fly elsewhere without leaving the mode of our setpoints.
 
-    ArduPilot in GUIDED flies to DO_REPOSITION and to single mission items as it does to setpoints,
-    and after DO_PAUSE_CONTINUE it obeys none until that is undone. So such a frame would fight the
-    client in control. PX4 leaves OFFBOARD for them.
+    In GUIDED, ArduPilot flies to DO_REPOSITION and to single mission items as to setpoints, and
+    after DO_PAUSE_CONTINUE it ignores setpoints until the pause ends. So such a frame would fight
+    the client in control. PX4 leaves OFFBOARD for these commands.
     """
     if autopilot.control_entry is not ControlEntry.BY_FIRST_SETPOINT:
         return False
@@ -72,7 +72,7 @@ def steers_in_our_mode(frame: Frame, autopilot: Autopilot) -> bool:
 
 
 def leaves_control(frame: Frame) -> bool:
-    """Whether a frame commands a mode, a landing or a return: its sender gives control up."""
+    """Whether a frame commands a mode, a landing or a return: its sender gives up control."""
     if frame.message_id == _SET_MODE:
         return True
     if frame.message_id not in (_COMMAND_LONG, _COMMAND_INT):
@@ -81,10 +81,10 @@ def leaves_control(frame: Frame) -> bool:
 
 
 def starves_control(frame: Frame, needed: dict[str, float]) -> bool:
-    """Whether a frame would make telemetry rarer than control needs it.
+    """Whether a frame would reduce telemetry below the rates that control needs.
 
     Args:
-        frame: of a client.
+        frame: frame of a client.
         needed: rates by message name, Hz.
     """
     if frame.message_id == _REQUEST_DATA_STREAM:

@@ -1,4 +1,4 @@
-"""The limits of clients' motions, and the changes that they do not allow in flight."""
+"""The limits of clients' motions, and the changes that these do not permit in flight."""
 
 from math import atan2, degrees
 
@@ -10,7 +10,7 @@ from companion.serve.setpoints.motion import CommandedMotion, MotionLimits
 _MOTION_LIMITS = frozenset(
     {"limits.max_climb_m_s", "limits.max_descent_m_s", "limits.max_yaw_rate_deg_s"}
 )
-"""Limits of `CommandedMotion`, which takes them at the takeover."""
+"""Limits that `CommandedMotion` takes at the takeover."""
 
 
 def commanded_motion(config: Config) -> CommandedMotion:
@@ -30,10 +30,10 @@ def commanded_motion(config: Config) -> CommandedMotion:
 
 
 def change_refusal(before: Config, after: Config) -> str | None:
-    """Why a change is refused while a client is in control: its motions are planned already.
+    """Why a change is refused while a client is in control, whose motions are already planned.
 
-    Their limits are those at the takeover. With lower ones in the loops, the reference would run
-    away from the vehicle.
+    The motions use the limits at the takeover. With lower limits in the loops, the vehicle could
+    not keep up with the reference.
     """
     names = {each.name for each in differences(before, after)} & _MOTION_LIMITS
     if names:

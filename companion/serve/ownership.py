@@ -6,11 +6,11 @@ from enum import Enum
 from math import inf
 
 _MOST_CLIENTS = 64
-"""Clients whose newest setpoint is remembered."""
+"""Number of clients whose newest setpoint is remembered."""
 
 
 class Control(Enum):
-    """What the vehicle does for its owner."""
+    """How the vehicle is controlled for its owner."""
 
     FREE = "no client is in control"
     LIVE = "the owner's setpoints are flown"
@@ -23,8 +23,8 @@ class _Stream:
     """The setpoints of one client.
 
     Attributes:
-        newest: when the newest came, s.
-        before: when the one before it came, s.
+        newest: arrival of the newest setpoint, s.
+        before: arrival of the previous one, s.
     """
 
     newest: float = -inf
@@ -32,7 +32,7 @@ class _Stream:
 
 
 class Ownership:
-    """Keeps one owner, and tells everybody else why they are refused.
+    """Keeps one owner, and gives all others the reason why they are refused.
 
     Args:
         timeout: a client without a setpoint for this long is silent, s.
@@ -48,7 +48,7 @@ class Ownership:
         self._streams: dict[Hashable, _Stream] = {}
 
     def setpoint(self, client: Hashable, now: float) -> str | None:
-        """Note a setpoint; returns why it is not flown, or None.
+        """Note a setpoint; return why it is not flown, or None.
 
         A setpoint of another client takes over from a silent owner.
         """
@@ -64,18 +64,18 @@ class Ownership:
         return None
 
     def withdraw(self, client: Hashable, owner: Hashable | None) -> None:
-        """Take back the setpoint that was noted last: it cannot be flown.
+        """Withdraw the setpoint that was noted last, because it cannot be flown.
 
         Args:
-            client: who sent it.
-            owner: the client in control before it.
+            client: sender of the setpoint.
+            owner: client in control before the setpoint.
         """
         self.owner = owner
         stream = self._streams[client]
         stream.newest = stream.before
 
     def ask(self, client: Hashable, now: float) -> str | None:
-        """Give control to a client that asks for it; returns why not, or None."""
+        """Give control to a client that requests it; return the reason of a refusal, or None."""
         owner = self.owner
         if owner is not None and owner != client and self._is_live(owner, now):
             return f"{_name(owner)} is in control"
@@ -85,21 +85,21 @@ class Ownership:
         return None
 
     def streams(self, client: Hashable, now: float) -> bool:
-        """Whether a client sends a stream: one setpoint alone is none."""
+        """Whether a client sends a stream, which takes more than one setpoint."""
         stream = self._streams.get(client, _Stream())
         return self._is_live(client, now) and stream.newest - stream.before <= self._timeout
 
     def begin(self, now: float) -> None:
-        """Control begins: an owner that fell silent in the takeover is held for from now on."""
+        """Note the beginning of control; the hold of an owner that is already silent starts now."""
         stream = self._streams.setdefault(self.owner, _Stream())
         stream.newest = max(stream.newest, now - self._timeout)
 
     def release(self) -> None:
-        """Nobody is in control any more: the owner let go, or the vehicle left our mode."""
+        """End the ownership: the owner has released control, or the vehicle has left our mode."""
         self.owner = None
 
     def control(self, now: float) -> Control:
-        """What the vehicle does for its owner now."""
+        """How the vehicle is controlled for its owner now."""
         if self.owner is None:
             return Control.FREE
         silent = now - self._streams.get(self.owner, _Stream()).newest - self._timeout

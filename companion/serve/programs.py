@@ -8,11 +8,11 @@ from companion.serve.network.client import Client
 from companion.serve.setpoints.request import Request
 
 _MOST = 32
-"""Programs whose newest request is kept."""
+"""Number of programs whose newest request is kept."""
 
 
 class Program(NamedTuple):
-    """One program of a client, told apart by its address behind the connection."""
+    """One program of a client, identified by its address behind the connection."""
 
     client: Client
     address: Address
@@ -22,13 +22,13 @@ class Program(NamedTuple):
 
 
 class Programs:
-    """Keeps the newest request of each program that was not refused."""
+    """Keeps the newest request of each program, unless it was refused."""
 
     def __init__(self) -> None:
         self._newest: dict[Program, Request] = {}  # in the order of their newest requests
 
     def keep(self, program: Program, request: Request) -> None:
-        """Keep a program's newest request; those of the longest silent ones are forgotten."""
+        """Keep a program's newest request; drop those of programs silent for longest."""
         self._newest.pop(program, None)
         self._newest[program] = request
         while len(self._newest) > _MOST:
@@ -38,15 +38,15 @@ class Programs:
         """The newest request of a program.
 
         Raises:
-            KeyError: it has sent none, or has been silent for long.
+            KeyError: the program has sent none, or was forgotten.
         """
         return self._newest[program]
 
     def asking(self, client: Client, frame: Frame) -> Program:
         """The program that sent a command.
 
-        A program may send commands and setpoints under two component ids. Then the one of the same
-        client counts whose setpoint is the newest.
+        A program may use different component ids for commands and setpoints. Then it is the program
+        of the same client with the newest setpoint.
         """
         program = Program(client, source_of(frame))
         if program in self._newest:

@@ -1,4 +1,4 @@
-"""The report pages of served flights, each written by a process of its own."""
+"""The report pages of served flights, each written by a separate process."""
 
 import os
 import subprocess
@@ -11,16 +11,16 @@ from pathlib import Path
 from companion.realtime import schedule_as_usual
 
 _LONGEST = 120.0
-"""Time allowed for one page, s; a small computer needs some ten seconds."""
+"""Time allowed for one page, s; a small computer needs about ten seconds."""
 _LOOK_PERIOD = 1.0
-"""Period of asking whether to go on waiting for the process, s."""
+"""Period with which the wait for the process can be ended, s."""
 _NICE = 19
-"""The process gives way to everything else: the next flight may have begun."""
+"""Niceness of the process, so that it yields to everything else; the next flight may have begun."""
 _INTERRUPTED = "interrupted"
 
 
 class ReportPages:
-    """Writes pages, one after the other. `write` is called in threads beside the event loop."""
+    """Writes pages one after the other. `write` is called in threads outside the event loop."""
 
     def __init__(self) -> None:
         self._turn = threading.Lock()
@@ -28,7 +28,7 @@ class ReportPages:
         self._left = False
 
     def write(self, folder: Path) -> str:
-        """Write `report.html` about the flight in `folder`; returns where it is, or why not."""
+        """Write `report.html` about the flight in `folder`; return its path or fault, in words."""
         with self._turn:
             try:
                 return f"Report: {self._written(folder)}"
@@ -36,17 +36,17 @@ class ReportPages:
                 return f"No report: {error}; `companion report {folder}` tries again"
 
     def leave(self) -> None:
-        """Write no page any more: the program is to end."""
+        """Write no further page, because the program ends."""
         self._left = True
         if self._process is not None:
             self._process.kill()
 
     def _written(self, folder: Path) -> str:
-        """The path of the page, once the process has written it.
+        """Return the path of the page when the process has written it.
 
         Raises:
             OSError: the process cannot be started.
-            RuntimeError: it wrote no page; the message says why.
+            RuntimeError: the process wrote no page; the message says why.
         """
         if self._left:
             raise RuntimeError(_INTERRUPTED)
@@ -65,11 +65,11 @@ class ReportPages:
         return out.strip()
 
     def _output(self, process: "subprocess.Popen[str]") -> tuple[str, str]:
-        """What the process printed, once it has ended.
+        """Return the output of the process when it has ended.
 
         Raises:
-            RuntimeError: it was not waited for any longer. It is killed, but its end is not waited
-                for, because on a disk that hangs no process ends.
+            RuntimeError: the wait was ended. The process is killed without waiting for its end,
+                because no process ends on a disk that hangs.
         """
         deadline = time.monotonic() + _LONGEST
         while True:
@@ -84,7 +84,7 @@ class ReportPages:
 
 
 def _give_way(pid: int) -> None:
-    """Take the flight's real-time priority from a process, and all but the lowest of its own."""
+    """Give a process the normal scheduler and the lowest priority instead of the flight's."""
     schedule_as_usual(pid)
     with suppress(ProcessLookupError):  # it has ended already
         os.setpriority(os.PRIO_PROCESS, pid, _NICE)

@@ -1,4 +1,4 @@
-"""One flight under a client's control: the takeover, the answers meanwhile, and its end."""
+"""One flight under a client's control: the takeover, the answers to the client, and the end."""
 
 import asyncio
 from collections.abc import Coroutine
@@ -33,13 +33,13 @@ IN_PROGRESS = dialect.MAV_RESULT_IN_PROGRESS
 REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
 
 _PROGRESS_PERIOD = 0.4
-"""A client that asked for control is told so often that the takeover goes on, s."""
+"""Period of progress messages to a client that requested control, s."""
 _LOOK_PERIOD = 0.05
 _VALUES_PERIOD = 0.5
 
 
 class Asked(NamedTuple):
-    """A command that asks for control, and waits for its answer."""
+    """A command that requests control, and is not yet answered."""
 
     client: Client
     frame: Frame
@@ -49,18 +49,18 @@ class ServedFlight:
     """Takes over, flies the requests of the owner, and hands back.
 
     Attributes:
-        let_go: whether the owner has commanded another mode.
+        let_go: whether the owner has commanded another mode and so released control.
 
     Args:
-        name: of the owner.
-        config: of the vehicle and of `serve`.
-        link: to the vehicle, open.
-        component: answers clients and tells pilots.
-        ownership: says whose requests are flown, and for how long.
-        observer: is told of phases and events.
-        environment: of the flight.
+        name: name of the owner.
+        config: configuration of the vehicle and of `serve`.
+        link: open link to the vehicle.
+        component: sends answers to clients and texts to pilots.
+        ownership: determines whose requests are flown, and for how long.
+        observer: receives phases and events.
+        environment: environment of the flight.
         records: makes the record of the flight.
-        changes: of the values that may change in flight.
+        changes: changes of values in flight.
         fence_centre: see `FlightContext`.
         from_ground: whether the vehicle stands armed, and takes off first.
     """
@@ -114,27 +114,27 @@ class ServedFlight:
 
     @property
     def ends(self) -> bool:
-        """Whether no request is flown any more: a monitor holds the vehicle, or the exit flies."""
+        """Whether requests are no longer flown: a monitor holds the vehicle, or an exit runs."""
         begun, flown = self._source.pose is not None, self._assembled.context.guidance_loop.flown
         given_up = begun and flown.source is not self._source
         return given_up or self._assembled.flight.failed_in is not None
 
     @property
     def fence_centre(self) -> FenceCentre | None:
-        """Where the fence is centred, if control has begun."""
+        """Centre of the fence, if control has begun."""
         begun = self._source.pose is not None
         return self._assembled.context.snapshot_builder.fence_centre if begun else None
 
     @property
     def tracking_error(self) -> float | None:
-        """Distance from the reference, m; None where it is not known."""
+        """Distance from the reference, m; None: unknown."""
         return self._assembled.context.guidance_loop.off_course
 
     def give(self, request: Request) -> None:
         """Fly a request, at once if control has begun.
 
         Raises:
-            UnplannableError: there is no motion to it; the request before still counts.
+            UnplannableError: no motion leads to it; the previous request stays in force.
         """
         self._source.give(request, self._clock())
         self._assembled.context.guidance_loop.step_soon()
@@ -144,7 +144,7 @@ class ServedFlight:
         self._assembled.flight.interrupt(reason)
 
     async def run(self, asked: Asked | None) -> bool:
-        """Fly; returns whether control had begun."""
+        """Fly; return whether control had begun."""
         limited = self._changes.limited_by(change_refusal)
         with self._records.recording(self._record), limited:
             result = "left at once"
@@ -160,14 +160,14 @@ class ServedFlight:
         return self._source.pose is not None
 
     async def save(self) -> None:
-        """Write the rest of the record; of a failed takeover, remove it."""
+        """Complete the record; remove it after a failed takeover."""
         if self._summary is None or self._source.pose is None:
             await self._records.discard(self._record)
         else:
             await self._records.keep(self._record, self._summary)
 
     async def _fly(self, asked: Asked | None) -> str:
-        """Fly, tell clients meanwhile; returns the result."""
+        """Fly and inform clients; return the result."""
         beside = [self._follow_up(asked), self._send_values(), self._assembled.reporter.run()]
         tasks = [asyncio.create_task(self._guarded(work)) for work in beside]
         try:
@@ -178,14 +178,14 @@ class ServedFlight:
                 await cancel(task)
 
     async def _guarded(self, work: Coroutine[Any, Any, None]) -> None:
-        """Run what goes on beside the flight; a fault in it does not end the flight."""
+        """Run a task beside the flight; a fault in it does not end the flight."""
         try:
             await work
         except Exception as error:
             self._assembled.flight.note(internal(error))
 
     def _tell_alarm(self, text: str) -> None:
-        """Tell the clients, too, what a safety monitor says."""
+        """Send the text of a safety monitor to the clients."""
         self._note_alarm(text)
         self._component.tell(text, WARNING)
 
@@ -199,7 +199,7 @@ class ServedFlight:
         self._answer(asked, REJECTED)
 
     async def _follow_up(self, asked: Asked | None) -> None:
-        """Tell the client that the takeover goes on, then its end, then each silence."""
+        """Inform the client of the progress of the takeover, its end, and each silence."""
         while self._source.pose is None:
             self._answer(asked, IN_PROGRESS)
             await asyncio.sleep(_PROGRESS_PERIOD)
@@ -214,7 +214,7 @@ class ServedFlight:
             await asyncio.sleep(_LOOK_PERIOD)
 
     async def _send_values(self) -> None:
-        """Send the tracking error and the latency of answers to clients."""
+        """Send the tracking error and the latency of setpoints to clients."""
         while True:
             await asyncio.sleep(_VALUES_PERIOD)
             if not self.in_control:

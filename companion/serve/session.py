@@ -14,6 +14,7 @@ from companion.flight.context import cancel
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.observer import Observer, Silent, StateLogger
 from companion.mavlink.framing import Frame
+from companion.mavlink.peer import HEARTBEAT
 from companion.realtime import Wishes
 from companion.serve.component import Component
 from companion.serve.flight_records import FlightRecords
@@ -33,23 +34,23 @@ Note = Callable[[str], None]
 
 
 class ServeSession:
-    """Passes everything between the vehicle and the clients, and flies their setpoints.
+    """Forwards frames between the vehicle and the clients, and flies the clients' setpoints.
 
     Signal handlers of the event loop may call `stop` and `leave`.
 
     Args:
-        config: of the vehicle, its section `serve` above all.
-        note: takes events as sentences.
-        observer: is told of the phases and events of each flight under a client's control.
-        environment: what the link and the flights get from the computer.
-        directory: in which each flight under a client's control is recorded in its own folder;
-            None: nothing is recorded.
+        config: configuration of the vehicle, with the section `serve`.
+        note: called with events as sentences.
+        observer: receives phases and events of each flight under a client's control.
+        environment: clocks and transports of this computer, or their replacement in tests.
+        directory: folder for the folders of flights under a client's control; None: nothing is
+            recorded.
 
     Attributes:
-        changes: of the values that may change in flight; they last from one flight to the next.
-        network: of the clients, once it is open.
-        control: by clients' setpoints, if `serve.control` says so, once it is open.
-        records: of the flights under a client's control.
+        changes: changes of values in flight; they stay in force for the next flight.
+        network: network of the clients, once it is open.
+        control: control by clients' setpoints, once it is open, if `serve.control` is true.
+        records: records of the flights under a client's control.
     """
 
     def __init__(
@@ -80,7 +81,7 @@ class ServeSession:
         self._stop.set()
 
     async def run(self) -> dict[str, Any]:
-        """Serve until `stop`; returns the counters.
+        """Serve until `stop`; return the counters.
 
         Raises:
             EndpointError: the link or an endpoint of `serve.clients` could not be opened.
@@ -142,7 +143,7 @@ class ServeSession:
 
 
 class _Gate:
-    """Refuses what a client may not send, and passes its setpoints to control."""
+    """Refuses frames that a client may not send, and passes its setpoints to control."""
 
     def __init__(
         self,
@@ -156,11 +157,12 @@ class _Gate:
         self._routing, self._system = routing, system
 
     def intercept(self, client: Channel, frame: Frame) -> bool:
-        """Whether a frame ends here."""
+        """Whether a frame is not forwarded."""
         assert isinstance(client, Client)
         refusal = self._permission.refusal(client, frame)
         if refusal is not None:
-            self._component.answer(client, refusal)
+            if frame.message_id != HEARTBEAT:  # every client sends it, and means no command
+                self._component.answer(client, refusal)
             return True
         if self._control is None:
             return False
@@ -173,13 +175,13 @@ class _Gate:
         return self._control.intercept(client, frame)
 
     def on_own(self, client: Channel, frame: Frame) -> None:
-        """Take what is addressed to our component alone: setpoints are flown, too."""
+        """Take a frame addressed only to our component; setpoints are flown too."""
         if frame.message_id not in SETPOINTS or not self.intercept(client, frame):
             self._component.on_own(client, frame)
 
 
 def _counters(link: Link, network: Network) -> dict[str, Any]:
-    """What was passed on, for `serve --json`."""
+    """The counters for `serve --json`."""
     stats = asdict(link.stats)
     return {
         "routing": asdict(network.routing.stats),

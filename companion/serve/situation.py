@@ -1,4 +1,4 @@
-"""What setpoints relative to the vehicle need to know: its position, its yaw, the local origin."""
+"""The vehicle's position, yaw and local origin, for setpoints relative to the vehicle."""
 
 import asyncio
 from collections.abc import Callable, Mapping
@@ -16,18 +16,18 @@ from companion.vehicle.link import Link
 
 _CHECK_PERIOD = 1.0
 _COUNTED = 0.1
-"""What arrives is counted for this long after a request, s; nothing waits for it."""
+"""Time over which messages are counted after a request, s; nothing waits for it."""
 _STALE = 0.5
-"""An older position or attitude is none, s."""
+"""Largest age of a position or attitude that is used, s."""
 _MOST_APART = 0.3
-"""Local and global positions further apart than this are not paired, s."""
+"""Largest time between a local and a global position of a pair, s."""
 
 
 class SituationKeeper:
-    """Keeps the newest, from the link and the network.
+    """Keeps the newest situation, from the link and the network.
 
     Args:
-        link: to the vehicle.
+        link: link to the vehicle.
         network: keeps the newest attitude.
     """
 
@@ -37,7 +37,7 @@ class SituationKeeper:
         link.subscribe("GLOBAL_POSITION_INT", self._on_global_position)
 
     def situation(self) -> Situation | None:
-        """The situation now, or None while position or attitude are not known."""
+        """The present situation; None while position or attitude is unknown."""
         position, now = self._link.state.position, self._network.now()
         decoded = decode_attitude(self._network.attitude) if self._network.attitude else None
         if position is None or decoded is None:
@@ -53,7 +53,7 @@ class SituationKeeper:
         return Situation(position.position_ned, yaw, self._origin.origin)
 
     def takeoff_refusal(self, request: Request) -> str | None:
-        """Why the vehicle does not take off for a client that asks for control on the ground."""
+        """Why the vehicle does not take off for a client that requests control on the ground."""
         situation = self.situation()
         if not self._link.state.landed or situation is None:
             return "take off first: it is not known whether the vehicle stands on the ground"
@@ -62,7 +62,7 @@ class SituationKeeper:
         return "command a height of 1 m or more above the ground, or take off first"
 
     async def keep_telemetry(self, wanted: Callable[[], Mapping[str, float]]) -> None:
-        """Ask for telemetry while no attitude comes, until cancelled: ArduPilot is silent before.
+        """Request telemetry until cancelled while no attitude comes; ArduPilot sends none unasked.
 
         Args:
             wanted: rates by message name, Hz; called once the autopilot is known.

@@ -23,18 +23,18 @@ _FLOWN = frozenset({Control.LIVE, Control.HOLDING})
 class ServedSource:
     """Flies the requests of the client in control; stops and holds while it is silent.
 
-    Requests are in the autopilot's frame, references in the one without estimator resets.
+    Requests are in the autopilot's frame, references in the frame without estimator resets.
 
     Attributes:
         name: shown to the user.
-        pose: where control began, or None before.
-        failure: None: a silent client is handed back without a failure.
+        pose: pose where control began, or None before.
+        failure: always None; a silent client does not count as a failure.
 
     Args:
-        name: see there.
+        name: name of the client.
         motion: follows commanded motions.
-        ownership: says whether the client is live.
-        heading_now: the vehicle's heading without resets, rad.
+        ownership: tells whether the client is active.
+        heading_now: returns the vehicle's heading without resets, rad.
     """
 
     failure: str | None = None
@@ -70,7 +70,7 @@ class ServedSource:
         """Fly a request from now on; before `begin`, keep it.
 
         Raises:
-            UnplannableError: there is no motion to it; the request before still counts.
+            UnplannableError: no motion leads to it; the previous request stays in force.
         """
         if self.pose is None:
             self._waiting = request
@@ -102,7 +102,7 @@ class ServedSource:
         return self._ownership.control(now) not in _FLOWN
 
     def _leave_direct(self, now: float) -> None:
-        """Let motions continue where the vehicle is after attitudes or rates."""
+        """Continue with motions at the vehicle's position after attitudes or rates."""
         if self._direct is not None:
             self._direct = None
             position, velocity = self._vehicle

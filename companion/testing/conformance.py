@@ -1,4 +1,4 @@
-"""Checks for planners and guidance of other packages, to be called from their own tests."""
+"""Checks for planners and guidance of other packages, for use in those packages' tests."""
 
 import random
 from collections.abc import Sequence
@@ -35,14 +35,14 @@ _WORST = 1.5
 
 
 def check_planner(planner: str | Law | type[Planner], seed: int = 0) -> None:
-    """Check that a planner may fly: finite, within limits, q and −q alike, and it converges.
+    """Check that a planner may fly: finite, limited, equal for q and −q, and converging.
 
     Args:
         planner: a law, a class of planners, or the name of one, installed plug-ins included.
-        seed: of the attitudes and targets.
+        seed: seed of the attitudes and targets.
 
     Raises:
-        AssertionError: it may not fly; says for which attitude and target.
+        AssertionError: it may not fly; the message gives attitude and target.
         PluginError: there is no planner of that name.
     """
     if isinstance(planner, str) and planner in plugins.names(plugins.PLANNERS):
@@ -72,7 +72,7 @@ def check_guidance(name: str) -> None:
     """Check installed guidance by flights on both mock vehicles: a hover and a circle.
 
     Args:
-        name: of its entry point in `companion.guidance`.
+        name: name of its entry point in `companion.guidance`.
 
     Raises:
         AssertionError: a flight ended early, or strayed too far from its reference.
@@ -93,7 +93,8 @@ def check_guidance(name: str) -> None:
 
 
 _BOOT_S = 0.5
-"""The autopilots need 4 to 42 s before they can be armed; here nothing depends on that."""
+"""Boot time of the mock autopilots here, s; real ones need 4 to 42 s, which does not matter here.
+"""
 _SAFE = {"ardupilot": {"GUID_OPTIONS": 8, "ATC_ANGLE_BOOST": 0, "GUID_TIMEOUT": 1.0}}
 """Parameters without which the preflight checks refuse the vehicle."""
 

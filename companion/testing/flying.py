@@ -28,17 +28,17 @@ Configuration = Config | Path | str | Mapping[str, Mapping[str, Any]]
 
 
 class UnseenError(RuntimeError):
-    """A task or callback failed, and nothing in the program took its error."""
+    """A task or callback of the program failed, and the program did not handle the error."""
 
 
 def run(vehicle: MockVehicle, main: Coroutine[Any, Any, T]) -> T:
-    """Run a coroutine on the vehicle's clock, as `asyncio.run` does on the wall's.
+    """Run a coroutine on the vehicle's clock, like `asyncio.run` on the wall clock.
 
-    Inside, `Link(settings, opener=open_wire)` opens the companion link, with `settings.lockstep` as
-    the vehicle has it.
+    Inside it, `Link(settings, opener=open_wire)` opens the companion link; `settings.lockstep` must
+    match the vehicle.
 
     Raises:
-        UnseenError: a task or callback failed unseen.
+        UnseenError: a task or callback failed, and the error was not handled.
     """
     unseen: list[dict[str, Any]] = []
 
@@ -56,7 +56,7 @@ def run(vehicle: MockVehicle, main: Coroutine[Any, Any, T]) -> T:
 
 @contextmanager
 def _without_collections() -> Iterator[None]:
-    """Leave reference cycles until the end: to look for them costs 7 % of a flight's time."""
+    """Disable the garbage collector until the end, because it costs 7 % of a flight's time."""
     collecting = gc.isenabled()
     gc.disable()
     try:
@@ -71,7 +71,7 @@ def _loop_time_ns() -> int:
 
 
 environment = Environment(open_wire, _loop_time_ns, realtime=False)
-"""What a flight inside `run` gets from the computer: its latencies are 0, for no time passes."""
+"""Environment of a flight inside `run`; its latencies are 0, because no time passes."""
 
 
 def session(
@@ -83,7 +83,7 @@ def session(
 ) -> Session:
     """A session to be flown inside `run`; the arguments are those of `fly`.
 
-    `link.endpoint` and `realtime` have no effect, and `link.lockstep` is as the vehicle has it.
+    `link.endpoint` and `realtime` have no effect, and `link.lockstep` is set to match the vehicle.
     `Session.interrupt` and `Session.leave` are Ctrl-C and a second Ctrl-C.
 
     Raises:
@@ -104,21 +104,21 @@ def fly(
     observer: Observer | None = None,
     ask_landing: AskLanding | None = None,
 ) -> Summary:
-    """Fly once, as `companion fly` does, in vehicle time.
+    """Fly once in vehicle time, like `companion fly`.
 
     Args:
-        config: what to fly.
-        vehicle: is flown; it stays as the flight leaves it.
-        folder: for the files of the flight; None: nothing is written.
+        config: configuration of the flight.
+        vehicle: the vehicle that is flown; it keeps its state after the flight.
+        folder: folder for the files of the flight; None: nothing is written.
         observer: receives phases and events as they happen.
         ask_landing: asks the user after an interrupt whether to land; by default the answer is no.
 
     Returns:
-        what `companion fly --json` prints, as an object.
+        The content of `companion fly --json`, as an object.
 
     Raises:
         ConfigError: the configuration is wrong.
-        UnseenError: a part of the program failed unseen.
+        UnseenError: a task or callback failed, and the error was not handled.
     """
     return run(vehicle, session(config, vehicle, folder, observer, ask_landing).fly())
 
@@ -130,17 +130,17 @@ async def connect(
     folder: Path | None = None,
     observer: Observer | None = None,
 ) -> AsyncGenerator[Vehicle, None]:
-    """As `companion.connect`, to a mock vehicle in memory, inside `run`.
+    """Like `companion.connect`, for a mock vehicle in memory, inside `run`.
 
     Args:
-        config: of the flight.
-        vehicle: the one that `run` was given.
-        folder: an existing one for the files of the flight; None: nothing is written.
+        config: configuration of the flight.
+        vehicle: vehicle that was passed to `run`.
+        folder: existing folder for the files of the flight; None: nothing is written.
         observer: receives phases and events as they happen.
 
     Raises:
         ConfigError: the configuration is wrong.
-        FlightEnded: as `companion.connect`.
+        FlightEnded: see `companion.connect`.
     """
     whole = in_memory(known(config), vehicle)
     async with flying(whole, folder, observer, environment) as connected:
@@ -148,10 +148,10 @@ async def connect(
 
 
 def in_memory(config: Config, vehicle: MockVehicle) -> Config:
-    """The configuration for a vehicle in memory: in lockstep as the vehicle is.
+    """The configuration for a vehicle in memory; lockstep is set to match the vehicle.
 
     Raises:
-        ConfigError: its link cannot reach a vehicle in memory.
+        ConfigError: the configured link cannot reach a vehicle in memory.
     """
     if config.link.backend != "direct":
         raise ConfigError(f"link.backend {config.link.backend} cannot reach a vehicle in memory")
@@ -164,7 +164,7 @@ def known(config: Configuration) -> Config:
     """The configuration that a test names.
 
     Raises:
-        ConfigError: it is wrong.
+        ConfigError: the configuration is wrong.
     """
     if isinstance(config, Config):
         return config

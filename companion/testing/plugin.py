@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 @pytest.fixture
 def mock_vehicle() -> "Callable[..., MockVehicle]":
-    """Makes mock vehicles: `mock_vehicle("px4", wind={"speed_m_s": 4.0})`, see `MockVehicle`."""
+    """Make mock vehicles: `mock_vehicle("px4", wind={"speed_m_s": 4.0})`; see `MockVehicle`."""
 
     def make(*arguments: Any, **settings: Any) -> "MockVehicle":
         from companion.testing import MockVehicle  # noqa: PLC0415  only tests that fly pay for it

@@ -1,4 +1,4 @@
-"""`companion serve` in memory, on the vehicle's clock, and programs that are its clients."""
+"""`companion serve` in memory on the vehicle's clock, and client programs."""
 
 import asyncio
 from collections.abc import AsyncGenerator, Callable
@@ -23,17 +23,17 @@ async def serving(
     folder: Path | None = None,
     note: Callable[[str], None] = lambda _: None,
 ) -> AsyncGenerator[ServeSession, None]:
-    """`companion serve` between a mock vehicle and programs of the test, inside `run`.
+    """Run `companion serve` between a mock vehicle and client programs, inside `run`.
 
-    `serve.clients`, `link.endpoint` and `realtime` have no effect, and `link.lockstep` is as the
-    vehicle has it. Clients connect by `Program(...).connect(session)`.
+    `serve.clients`, `link.endpoint` and `realtime` have no effect, and `link.lockstep` is set to
+    match the vehicle. Clients connect by `Program(...).connect(session)`.
 
     Args:
-        config: of the vehicle and of `serve`.
-        vehicle: the one that `run` was given.
-        folder: in which each flight under a client's control is recorded in a folder of its own;
-            None: nothing is recorded.
-        note: takes events as sentences.
+        config: configuration of the vehicle and of `serve`.
+        vehicle: vehicle that was passed to `run`.
+        folder: folder for the folders of flights under a client's control; None: nothing is
+            recorded.
+        note: called with events as sentences.
 
     Raises:
         ConfigError: the configuration is wrong.
@@ -56,13 +56,13 @@ class Program(Client):
     """A program that speaks MAVLink to `companion serve`, without a socket.
 
     Args:
-        name: under which the user reads of it.
-        ids: its system and component.
-        host: IP address from which it seems to come; one beyond loopback may only read.
+        name: name in messages.
+        ids: system and component of the program.
+        host: IP address that the program seems to have; a program outside loopback may only read.
 
     Attributes:
-        heard: the messages that it has received, as pymavlink decodes them, oldest first.
-        packer: pymavlink's, with the program's ids and its running number.
+        heard: received messages, decoded by pymavlink, oldest first.
+        packer: encoder of pymavlink with the program's ids and sequence number.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class Program(Client):
         self._parser.robust_parsing = True
 
     def connect(self, session: ServeSession) -> "Program":
-        """Connect to a session; returns the program."""
+        """Connect to a session; return the program."""
         assert session.network is not None
         self._session = session
         session.network.attach(self)
@@ -96,7 +96,7 @@ class Program(Client):
         self._session.network.received(self, frames)
 
     def of(self, name: str) -> list[Message]:
-        """The messages of one type that were heard, such as `COMMAND_ACK`."""
+        """The received messages of one type, such as `COMMAND_ACK`."""
         return [each for each in self.heard if each.get_type() == name]
 
     async def hears(self, name: str, seconds: float = 30.0) -> Message:

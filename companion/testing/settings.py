@@ -1,4 +1,4 @@
-"""The section `mock` of a configuration, checked and completed by the mock vehicle's own rules."""
+"""Lets the mock vehicle check and complete the section `mock` of a configuration."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -25,11 +25,11 @@ def complete_mock(section: Mapping[str, Any]) -> dict[str, Any]:
 def mock_with(section: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """The complete section `mock` with some keys changed.
 
-    A key replaces exactly what it names. So `wind.speed_m_s` leaves the gusts as they are, and
-    `airframe: unlike-axes` with `airframe.mass_kg` is that airframe with another mass.
+    A key replaces only what it names: `wind.speed_m_s` leaves the gusts unchanged, and `airframe:
+    unlike-axes` with `airframe.mass_kg` is that airframe with another mass.
 
     Args:
-        section: before the changes.
+        section: section before the changes.
         changes: new values by dotted key, without `mock.` in front.
 
     Raises:

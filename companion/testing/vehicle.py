@@ -1,4 +1,4 @@
-"""A mock vehicle in memory: its true state, its faults, its pilot, and what it received."""
+"""A mock vehicle in memory: true state, faults, pilot, and received setpoints."""
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -15,7 +15,7 @@ from sitl_mock.settings import load_settings
 from sitl_mock.simulation import Simulation
 
 Relay = Callable[[bytes], Iterable[bytes]]
-"""Takes a datagram and returns what arrives instead of it."""
+"""Takes a datagram and returns the datagrams that arrive in its place."""
 
 _STATION = 255, 190
 """MAVLink ids of a ground station."""
@@ -23,7 +23,7 @@ _COMMAND_PARAMETERS = 7
 
 
 def _plant(compiled: bool) -> type[Plant]:
-    """Return what computes the physics."""
+    """The class that computes the physics, compiled or in plain Python."""
     if not compiled:
         return PythonPlant
     require("numba", "study", "a compiled mock vehicle")
@@ -36,9 +36,9 @@ class ReceivedSetpoint(NamedTuple):
     """A SET_ATTITUDE_TARGET that reached the autopilot.
 
     Attributes:
-        time: vehicle time at which it was handled, s.
-        answers: its `time_boot_ms`, the stamp of the sample that it answers, ms.
-        rates: about body x, y, z (FRD), rad/s.
+        time: vehicle time when it was handled, s.
+        answers: its `time_boot_ms`, the time stamp of the answered sample, ms.
+        rates: body rates about x, y, z (FRD), rad/s.
         thrust: 0..1.
     """
 
@@ -49,29 +49,30 @@ class ReceivedSetpoint(NamedTuple):
 
 
 class MockVehicle:
-    """A multirotor with its autopilot, without sockets. It lives between flights, too.
+    """A multirotor with its autopilot, without sockets. It also lives between flights.
 
     Args:
-        autopilot: "px4" or "ardupilot"; None: as `config` says, otherwise PX4.
+        autopilot: "px4" or "ardupilot"; None: that of `config`, by default PX4.
         config: a YAML file whose section `mock` is read.
         lockstep: whether the application answers each step before the next one, as with
             `link.lockstep`; a mapping sets more keys of `mock.lockstep`. Without lockstep the
-            application meets samples as over UDP: it answers each one when it arrives, and its
-            timers run between the vehicle's steps.
-        delay_s: each datagram needs this long, s; without lockstep only.
-        compiled: whether the physics are compiled by numba. The flight is the same to the bit. It
-            pays from 2 minutes of flights in a process on: a process needs 0.6 s to load them, and
-            the first process on a computer 10 s to compile them.
+            application receives samples as over UDP: it answers each one on arrival, and its timers
+            run between the vehicle's steps.
+        delay_s: delay of each datagram, s; only without lockstep.
+        compiled: whether the physics are compiled by numba. The flight is the same to the bit.
+            Compiling is worth it from 2 minutes of flight in a process: loading takes 0.6 s in each
+            process, and the first process on a computer compiles for 10 s.
         settings: keys of the section `mock`, such as `wind`, `faults`, `parameters` or `seed`.
             `gcs_port` has no effect.
 
     Attributes:
         in_lockstep: whether `lockstep` was asked for.
-        delay_s: as the argument.
-        setpoints: those that reached the autopilot, oldest first. Clear it to save memory.
+        delay_s: delay of each datagram, s.
+        setpoints: setpoints that reached the autopilot, oldest first. Clear the list to save
+            memory.
         after_step: called after each step; `at` and `when` add to it.
-        to_companion: changes what the vehicle sends; None: all arrives as sent.
-        from_companion: changes what the vehicle receives; None: all arrives as sent.
+        to_companion: changes datagrams that the vehicle sends; None: they arrive unchanged.
+        from_companion: changes datagrams that the vehicle receives; None: they arrive unchanged.
 
     Raises:
         MissingExtraError: `compiled` is asked for, and numba is not installed.
@@ -115,7 +116,7 @@ class MockVehicle:
         return self._simulation.time_us / 1e6
 
     def state(self) -> Truth:
-        """The true state now."""
+        """The present true state."""
         return truth(self._simulation)
 
     # --- what happens to it
@@ -123,7 +124,7 @@ class MockVehicle:
     def inject(self, fault: Mapping[str, Any]) -> None:
         """Inject a fault, given as an entry of `mock.faults`.
 
-        It begins in the next step, or as its `at_s` or `after_offboard_s` says.
+        It begins in the next step, or at its `at_s` or `after_offboard_s`.
 
         Raises:
             sitl_mock.config.section.ConfigError: there is no such fault.
@@ -149,11 +150,11 @@ class MockVehicle:
         self.receive(bytes(frame))
 
     def at(self, time: float, action: Callable[[], object]) -> None:
-        """Do `action` once vehicle time has reached `time`, s."""
+        """Call `action` once when vehicle time has reached `time`, s."""
         self.when(lambda: self.time >= time, action)
 
     def when(self, condition: Callable[[], bool], action: Callable[[], object]) -> None:
-        """Do `action` once, after the first step at which `condition` holds."""
+        """Call `action` once after the first step at which `condition` holds."""
 
         def look() -> None:
             if condition():
@@ -165,16 +166,16 @@ class MockVehicle:
     # --- time without an application
 
     def run(self, seconds: float) -> None:
-        """Let time pass while no application is connected, s."""
+        """Let time pass without an application, s."""
         end = self.time + seconds
         while self.time < end:
             self.step()
 
     def until(self, condition: Callable[[Truth], bool], seconds: float = 60.0) -> Truth:
-        """Let time pass, without an application, until `condition` holds; returns that state.
+        """Let time pass without an application until `condition` holds; return that state.
 
         Raises:
-            AssertionError: it does not hold within `seconds` of vehicle time.
+            AssertionError: the condition does not hold within `seconds` of vehicle time.
         """
         end = self.time + seconds
         while not condition(state := self.state()):
@@ -191,7 +192,7 @@ class MockVehicle:
         return self._simulation.next_us / 1e6
 
     def set_clock(self, clock_ns: Callable[[], int]) -> None:
-        """Set the vehicle time told by TIMESYNC, ns: between two steps it goes on."""
+        """Set the vehicle time that TIMESYNC reports, ns; between two steps it advances."""
         simulation = self._simulation
 
         def told() -> int:
@@ -215,7 +216,7 @@ class MockVehicle:
         return self._relayed(self._exchange.outgoing(self._simulation.companion))
 
     def begin(self) -> list[bytes]:
-        """Boot; returns what the vehicle sends then. Later calls do nothing.
+        """Boot; return the first datagrams of the vehicle. Later calls do nothing.
 
         In lockstep that is the first beacon.
         """
@@ -229,7 +230,7 @@ class MockVehicle:
         return self.sent()
 
     def step(self) -> list[bytes]:
-        """Simulate one step; returns what the vehicle sends in it."""
+        """Simulate one step; return the datagrams that the vehicle sends in it."""
         self._begun = True
         arrived, self._arrived = self._arrived, []
         beacon = self._exchange.step(arrived)
@@ -239,7 +240,7 @@ class MockVehicle:
         return self._relayed(datagrams)
 
     def take_slip(self) -> float:
-        """Time that the vehicle's clock lost since the last call by a fault, s."""
+        """Time that a fault has taken from the vehicle's clock since the last call, s."""
         return self._simulation.effects.take_slip()
 
     def _relayed(self, datagrams: list[bytes]) -> list[bytes]:

@@ -1,4 +1,4 @@
-"""An asyncio event loop whose time is a mock vehicle's: nothing sleeps, nothing is polled."""
+"""An asyncio event loop on a mock vehicle's time, without sleeping or polling."""
 
 import asyncio
 from collections.abc import Callable
@@ -15,7 +15,7 @@ class VirtualClock:
     """The time of one loop, s.
 
     Args:
-        now: at which it begins.
+        now: initial time, s.
     """
 
     def __init__(self, now: float) -> None:
@@ -31,7 +31,7 @@ class VirtualClock:
         return round(self.now * 1e9)
 
     def advance(self, vehicle_time: float) -> bool:
-        """Set the time by a lockstep beacon, s; false for a repeated one."""
+        """Set the time by a lockstep beacon, s; return false for a repeated one."""
         if self._beacon is not None and vehicle_time <= self._beacon:
             return False
         self._beacon = self.now = vehicle_time
@@ -39,19 +39,19 @@ class VirtualClock:
 
 
 class World(Protocol):
-    """What moves the clock when the application has nothing left to do."""
+    """Moves the clock when the application has nothing left to do."""
 
     def deliver_due(self) -> None:
-        """Deliver what arrives at the present time."""
+        """Deliver the datagrams that arrive at the present time."""
         ...
 
     def advance(self, until: float) -> None:
-        """Go on to the next event, or to the time `until`, s, if that is earlier."""
+        """Advance to the next event, but at most to the time `until`, s."""
         ...
 
 
 class _VirtualSelector(SettlingSelector):
-    """Lets the vehicle go on, instead of waiting, until the application has something to do.
+    """Lets the vehicle advance, instead of waiting, until the application has something to do.
 
     Attributes:
         scheduled: number of callbacks and timers that were scheduled so far.
@@ -78,11 +78,11 @@ class VirtualEventLoop(LockstepEventLoop):
     """An event loop on a virtual clock. File descriptors are not watched.
 
     Args:
-        clock: its time.
-        world: moves it.
+        clock: clock of the loop.
+        world: moves the clock.
 
     Attributes:
-        clock: as the argument.
+        clock: clock of the loop.
         world: as the argument.
     """
 
@@ -101,7 +101,7 @@ class VirtualEventLoop(LockstepEventLoop):
         *args: *Arguments,
         context: Context | None = None,
     ) -> asyncio.Handle:
-        """As in every loop; the vehicle then waits until the callback has run."""
+        """Schedule a callback; the vehicle waits until it has run."""
         self._virtual.scheduled += 1
         return super().call_soon(callback, *args, context=context)
 
@@ -111,7 +111,7 @@ class VirtualEventLoop(LockstepEventLoop):
         *args: *Arguments,
         context: Context | None = None,
     ) -> asyncio.Handle:
-        """As `call_soon`, from another thread."""
+        """Schedule a callback from another thread; see `call_soon`."""
         self._virtual.scheduled += 1
         return super().call_soon_threadsafe(callback, *args, context=context)
 
@@ -122,6 +122,6 @@ class VirtualEventLoop(LockstepEventLoop):
         *args: *Arguments,
         context: Context | None = None,
     ) -> asyncio.TimerHandle:
-        """As in every loop; the vehicle then goes on to this timer at most."""
+        """Schedule a timer; the vehicle advances at most to this time."""
         self._virtual.scheduled += 1
         return super().call_at(when, callback, *args, context=context)

@@ -1,7 +1,7 @@
 """Joins a mock vehicle and an application in memory.
 
-The application's end is a transport that behaves as a listening UDP socket: it talks to nobody
-before it was addressed by a valid frame (`PeerRule`), and it forgets a peer that falls silent.
+The application's end is a transport that behaves like a listening UDP socket: it sends nothing
+before it has received a valid frame (`PeerRule`), and it forgets a silent peer.
 """
 
 import asyncio
@@ -23,8 +23,8 @@ class MemoryTransport:
     """The application's end of the wire.
 
     Args:
-        receiver: takes what arrives.
-        take: takes what is sent.
+        receiver: takes arriving datagrams.
+        take: takes sent datagrams.
     """
 
     reconnects = False
@@ -45,14 +45,14 @@ class MemoryTransport:
             self._connected = self._heard = True
 
     def send(self, frame: bytes) -> bool:
-        """Send one datagram now; false if there is no peer."""
+        """Send one datagram now; return false without a peer."""
         if not self._connected:
             return False
         self._take(frame)
         return True
 
     def close(self) -> None:
-        """Close it: what is on its way to the application is lost."""
+        """Close the transport; datagrams on their way to the application are lost."""
         self.is_open = False
         self._timer.cancel()
 
@@ -64,11 +64,11 @@ class MemoryTransport:
 
 
 class Wire:
-    """The vehicle, the transport that is open to it, and the clock that both share.
+    """Joins a vehicle, the open transport to it, and their common clock.
 
     Args:
-        vehicle: at one end.
-        clock: moved by the vehicle.
+        vehicle: the vehicle.
+        clock: clock that the vehicle moves.
     """
 
     def __init__(self, vehicle: MockVehicle, clock: VirtualClock) -> None:
@@ -79,7 +79,7 @@ class Wire:
         """Open the application's end.
 
         Raises:
-            EndpointError: it is open already.
+            EndpointError: it is already open.
         """
         if self._transport is not None and self._transport.is_open:
             raise EndpointError("the mock vehicle has one companion link, which is open already")
@@ -96,13 +96,13 @@ class Wire:
 
 
 class LockstepWire(Wire):
-    """The vehicle makes a step when the application has settled; its beacon moves the clock."""
+    """In lockstep: the vehicle steps when the application has settled; a beacon moves the clock."""
 
     def deliver_due(self) -> None:
         """Nothing arrives between two steps."""
 
     def advance(self, until: float) -> None:
-        """Let the vehicle make a step. The application's timers wait for it."""
+        """Let the vehicle make a step; the application's timers wait for it."""
         datagrams = self._vehicle.begin() or self._vehicle.step()
         for datagram in datagrams:  # the beacon comes last, and moves the clock to this time
             self._deliver(datagram, self._vehicle.time)
@@ -111,7 +111,7 @@ class LockstepWire(Wire):
 
 
 class FreeWire(Wire):
-    """Both sides run freely on the clock; datagrams need `MockVehicle.delay_s`."""
+    """Without lockstep: both sides run freely on the clock; `MockVehicle.delay_s` applies."""
 
     def __init__(self, vehicle: MockVehicle, clock: VirtualClock) -> None:
         super().__init__(vehicle, clock)
@@ -127,7 +127,7 @@ class FreeWire(Wire):
         self._reached_application()
 
     def advance(self, until: float) -> None:
-        """Go on until something reaches the application, at most to `until`."""
+        """Advance until something reaches the application, but at most to `until`."""
         clock, under_way = self._clock, self._under_way
         step_at = self._next_step_at()
         while True:
@@ -147,7 +147,7 @@ class FreeWire(Wire):
         return in_burst(self._vehicle.next_step_at, self._burst) + self._slipped
 
     def _reached_application(self) -> bool:
-        """Deliver what is due; returns whether some of it went to the application."""
+        """Deliver what is due; return whether the application received something."""
         under_way, now, reached = self._under_way, self._clock.now, False
         while under_way and under_way[0][0] <= now:
             _, to_application, datagram = under_way.popleft()

@@ -1,4 +1,4 @@
-"""What to expect of a configuration: margins, tracking error, rates and settling."""
+"""What to expect of a configuration: margins, tracking error, rates and settling time."""
 
 from dataclasses import dataclass
 from math import hypot, pi, sqrt
@@ -15,27 +15,28 @@ from companion.tuning.margins import Margins, frequencies, margins, smaller
 Floats = NDArray[np.float64]
 
 _SETTLED = 0.05
-"""The response to a gust has settled below this share of its peak."""
+"""Share of its peak below which the response to a gust has settled."""
 _LONGEST = 10.0
 _STEP = 0.01
-"""How long the response to a gust is computed, and the time between its points, s."""
+"""Time between computed points of the response to a gust, s."""
 
 
 @dataclass(frozen=True, slots=True)
 class Disturbances:
-    """What disturbs the vehicle, on each horizontal axis; the densities are one-sided.
+    """Disturbances of the vehicle on each horizontal axis; densities are one-sided.
 
     Attributes:
-        gust: standard deviation of the wind's speed, m/s; drag makes an acceleration of it.
+        gust: standard deviation of the wind speed, m/s; drag turns it into an acceleration.
         gust_time: correlation time of the gusts, s.
-        velocity_error: slow error of the estimated velocity on a path, m/s, standard deviation.
-        push: slow error of the predicted acceleration on a path, m/s², standard deviation.
+        velocity_error: standard deviation of the slow error of the estimated velocity on a path,
+            m/s.
+        push: standard deviation of the slow error of the predicted acceleration on a path, m/s².
         path_time: correlation time of these two, s.
         wander: density of the velocity error in hover, m/s/√Hz.
         shake: density of the acceleration that tilt and drag do not explain, m/s²/√Hz.
         position_noise: noise of a single position, m.
         velocity_noise: noise of a single velocity, m/s.
-        source: from where the last four are known, for the user.
+        source: source of the last four values, for the user.
     """
 
     gust: float = 0.5
@@ -54,10 +55,10 @@ class Errors(NamedTuple):
     """Expected standard deviations, horizontal.
 
     Attributes:
-        gusts: position error by gusts, m.
+        gusts: position error due to gusts, m.
         path: position error on a path at 5 m/s, m.
-        noise: position error by the noise of the estimate, m.
-        rate: roll and pitch rate commanded because of all of them, rad/s.
+        noise: position error due to the noise of the estimate, m.
+        rate: commanded roll and pitch rate due to all of them, rad/s.
     """
 
     gusts: float
@@ -67,13 +68,13 @@ class Errors(NamedTuple):
 
     @property
     def position(self) -> float:
-        """Position error by all of them, m."""
+        """Position error due to gusts, path and noise, m."""
         return hypot(self.gusts, self.path, self.noise)
 
 
 @dataclass(frozen=True, slots=True)
 class Expectation:
-    """What to expect of a configuration.
+    """The expected behaviour of a configuration.
 
     Attributes:
         whole: margins of the whole loop, opened at the commanded body rate.
@@ -91,15 +92,15 @@ class Expectation:
 
     @property
     def margins(self) -> Margins:
-        """The smaller margins of both openings."""
+        """The smaller margins of the two ways to open the loop."""
         return smaller(self.whole, self.outer)
 
 
 def stability(config: Config, error: ModelError = EXACT) -> Margins:
-    """The smaller margins of both openings of the loop.
+    """The smaller margins of the two ways to open the loop.
 
     Raises:
-        ConfigError: as `control_loop`.
+        ConfigError: see `control_loop`.
     """
     s = frequencies()
     loop = control_loop(config, s, error)
@@ -110,8 +111,8 @@ def expected_errors(loop: Loop, disturbances: Disturbances, period: float) -> Er
     """The expected errors of a loop.
 
     Args:
-        loop: at `frequencies`.
-        disturbances: what disturbs.
+        loop: loop at `frequencies`.
+        disturbances: disturbances of the vehicle.
         period: time between two positions, s.
     """
     omega, told = loop.s.imag, disturbances
@@ -144,10 +145,10 @@ def _slow(omega: Floats, deviation: float, time: float) -> Floats:
 
 
 def expectation(config: Config, disturbances: Disturbances) -> Expectation:
-    """What to expect of a configuration.
+    """The expected behaviour of a configuration.
 
     Raises:
-        ConfigError: as `control_loop`.
+        ConfigError: see `control_loop`.
     """
     s = frequencies()
     loop = control_loop(config, s)

@@ -13,7 +13,7 @@ Complex = NDArray[np.complex128]
 
 
 class Feedback(NamedTuple):
-    """Responses of the commanded coefficient to what is measured, up to the sign.
+    """Responses of the commanded coefficient to the measurements, with the opposite sign.
 
     The command is −(tilt·c + velocity·v + position·x), before it is held for a guidance period.
 
@@ -91,8 +91,8 @@ def _states(
     To the known acceleration, the measured position and the measured velocity, from
     z·x = (I − K·C)·(A·x + B·a) + K·y.
     """
-    # As smooth as PX4's estimate.
-    gains, pull = observer.gains(period, smoothness=1.0), observer.pull(period, smoothness=1.0)
+    # The largest trust, in motion, leaves the smallest margins.
+    gains, pull = observer.gains(period, trust=1.0), observer.pull(period, trust=1.0)
     a = np.array([[1.0, period, 0.5 * period**2], [0.0, 1.0, period], [0.0, 0.0, 1.0]])
     b = np.array([0.5 * period**2, period, 0.0])
     c = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])

@@ -15,7 +15,7 @@ from companion.testing import MockVehicle, fly
 GUSTS: Mapping[str, float] = {"speed_m_s": 3.0, "gust_m_s": 1.0}
 """Wind of the flights in gusts, m/s: mean and standard deviation."""
 _MAX_TILT, _MAX_TILT_RATE, _MAX_THRUST = 54.0, 135.0, 0.95
-"""Limits that the figure-eight needs at least, °, °/s and normalised thrust."""
+"""Smallest limits for the figure-eight: °, °/s and normalised thrust."""
 _FENCE = 50.0
 _WIRE_S = 0.0005
 _TRUTH_EVERY = 5
@@ -29,11 +29,11 @@ _QUICK = {
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """What is flown.
+    """A trajectory in some wind.
 
     Attributes:
-        name: for the user.
-        trajectory: file in `configs/trajectories`.
+        name: name for the user.
+        trajectory: name of a file in `configs/trajectories`.
         wind: section `wind` of the mock vehicle.
     """
 
@@ -51,13 +51,13 @@ COURSES = (CIRCLE, EIGHT, CIRCLE_IN_GUSTS, EIGHT_IN_GUSTS)
 
 @dataclass(frozen=True, slots=True)
 class Flown:
-    """How a course was tracked; NaN if the flight failed.
+    """Tracking of a course; NaN if the flight failed.
 
     Attributes:
-        result: "ok", or why the flight ended.
-        reported: horizontal distance of the estimated position from the reference, m, RMS.
-        true: the same of the true position.
-        estimate: distance between true and estimated position, m, RMS: no setting reduces it.
+        result: "ok", or why the flight ended early.
+        reported: RMS of the horizontal distance between estimated position and reference, m.
+        true: the same for the true position.
+        estimate: RMS of the distance between true and estimated position, m; no setting reduces it.
         rate: commanded roll and pitch rate, rad/s, RMS.
         rate_limited: share of the setpoints at the rate limit.
     """
@@ -76,7 +76,7 @@ class Flown:
 
 
 def autopilot_like(config: Config) -> str:
-    """The personality of the mock vehicle that is nearest: ArduPilot limits the slew."""
+    """The most similar personality of the mock vehicle: ArduPilot for a slew limit, else PX4."""
     slews = [axis.acceleration_limit for axis in config.vehicle.axes.values()]
     return "px4" if slews[0] is None else "ardupilot"
 
@@ -88,9 +88,9 @@ def flown(config: Config, course: Course, autopilot: str, seed: int = 3) -> Flow
 
     Args:
         config: the configuration.
-        course: what is flown.
+        course: course to fly.
         autopilot: personality of the mock vehicle: "px4" or "ardupilot".
-        seed: of the noise and the gusts.
+        seed: seed of the noise and the gusts.
 
     Raises:
         ConfigError: the configuration cannot be flown on the mock vehicle.

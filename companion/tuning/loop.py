@@ -1,6 +1,6 @@
 """The whole control loop on one horizontal axis as a linear model, built from the configuration.
 
-Planner, rate loop, tilt, motion and guidance, as they are near hover and while no limit is reached.
+It contains planner, rate loop, tilt, motion and guidance near hover, within all limits.
 `tests/tuning/test_loop.py` compares it with the program's own code.
 """
 
@@ -26,12 +26,12 @@ from companion.tuning.feedback import Complex, guidance_feedback, hold_element
 POSITION_LATENESS = 0.010
 """Delay of the autopilot's position that its time stamp does not show, s."""
 _USUAL_LAG, _USUAL_DEAD_TIME = 0.07, 0.05
-"""Rate loop of a heavy vehicle, s, as `hold_settings` assumes it if none is identified."""
+"""Lag and dead time of a heavy vehicle's rate loop, s, if none is identified (`hold_settings`)."""
 
 
 @dataclass(frozen=True, slots=True)
 class ModelError:
-    """How the real rate loop differs from what the configuration says of it.
+    """Difference between the real rate loop and the configured one.
 
     Attributes:
         slower: factor on lag and dead time.
@@ -49,12 +49,13 @@ EXACT = ModelError()
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """Frequency responses of the loop, each (n,), and what is needed of its parts.
+    """Frequency responses of the loop and of its parts, each (n,).
 
     Attributes:
         s: frequencies, rad/s.
-        whole: loop gain, opened at the commanded body rate: all feedback is in it.
-        outer: loop gain, opened at the commanded acceleration: the attitude loop stays closed.
+        whole: loop gain with the loop opened at the commanded body rate; includes all feedback.
+        outer: loop gain with the loop opened at the commanded acceleration; the attitude loop stays
+            closed.
         rates: coefficient per commanded body rate, s.
         command: coefficient per coefficient that guidance commands, without feedback.
         velocity: command of guidance per m/s of measured velocity.
@@ -88,7 +89,7 @@ class Loop:
         return GRAVITY * tilt / (self.s * (self.s + self.drag)), tilt / self.rates
 
     def _tilt(self, asked: Complex) -> Complex:
-        """Closed-loop coefficient if guidance is disturbed by `asked`."""
+        """Closed-loop coefficient if `asked` is added to guidance's command."""
         return -self.command * asked / (1.0 + self.whole)
 
 
@@ -96,12 +97,12 @@ def control_loop(config: Config, s: Complex, error: ModelError = EXACT) -> Loop:
     """The loop at the frequencies `s`.
 
     Args:
-        config: gains, weights and the believed vehicle.
+        config: gains, weights and the assumed vehicle.
         s: (n,), rad/s, none of them 0.
-        error: how the real rate loop differs.
+        error: difference of the real rate loop.
 
     Raises:
-        ConfigError: the configured planner or guidance is not one that this model knows.
+        ConfigError: the model does not support the configured planner or guidance.
     """
     if config.planner_name not in PLANNER_NAMES or config.guidance.kind != LINEAR:
         raise ConfigError(
@@ -136,7 +137,7 @@ def control_loop(config: Config, s: Complex, error: ModelError = EXACT) -> Loop:
 
 
 def _believed(config: Config) -> AxisResponse:
-    """The slower of roll and pitch, as configured; a usual one if nothing is."""
+    """The configured response of the slower of roll and pitch; a usual one if there is none."""
     if not config.vehicle.known:
         return AxisResponse(_USUAL_LAG, _USUAL_DEAD_TIME)
     lag, dead_time = slower_tilt(config)
@@ -146,7 +147,7 @@ def _believed(config: Config) -> AxisResponse:
 
 
 def _planner(config: Config, s: Complex) -> tuple[Complex, float]:
-    """Body rate per target coefficient, and per measured coefficient (1/s), up to the sign.
+    """Body rate per target coefficient, and, with the opposite sign, per measured coefficient, 1/s.
 
     `model-following` sends the rates that compensate the lag of its model of the motion, and feeds
     back the difference from this model, one dead time later. All other planners feed back p times

@@ -8,14 +8,14 @@ import numpy as np
 from companion.tuning.feedback import Complex
 
 _OFFSET = 1e-2
-"""Real part of the frequencies, 1/s: the integrators of the loop lie to the left of them."""
+"""Real part of the frequencies, 1/s, so that the integrators of the loop lie to their left."""
 _UP_TO = 150.0
-"""Highest frequency, rad/s: that of guidance's sampling is half as high again."""
+"""Highest frequency, rad/s; guidance at 50 Hz has its Nyquist frequency at 157 rad/s."""
 _POINTS = 120
 
 
 def frequencies() -> Complex:
-    """Frequencies (n,) for margins and errors, rad/s, from 0 upwards, densest around 10 rad/s."""
+    """Frequencies (n,) for margins and errors, rad/s, rising from 0, densest around 10 rad/s."""
     low = np.geomspace(1e-3, 0.05, 12)[:-1]
     high = np.geomspace(0.05, _UP_TO, _POINTS)
     s: Complex = _OFFSET + 1j * np.concatenate([[0.0], low, high])
@@ -26,9 +26,9 @@ class Margins(NamedTuple):
     """Margins of one loop.
 
     Attributes:
-        gain_db: by how much the gain may rise, or fall if that is less, dB.
-        phase_deg: by how much the phase may fall, degrees.
-        delay: dead time that may be added, s.
+        gain_db: gain margin, the smaller of rise and fall, dB.
+        phase_deg: phase margin, degrees.
+        delay: delay margin, s.
         stable: whether the closed loop is stable; the other values mean nothing if not.
     """
 
@@ -38,7 +38,7 @@ class Margins(NamedTuple):
     stable: bool
 
     def sentence(self) -> str:
-        """For the user."""
+        """A sentence for the user."""
         if not self.stable:
             return "unstable"
         delay = 1e3 * self.delay
@@ -46,12 +46,12 @@ class Margins(NamedTuple):
 
 
 def margins(s: Complex, loop_gain: Complex) -> Margins:
-    """The margins of a loop that is stable when it is opened.
+    """The margins of a loop that is stable when opened.
 
     The closed loop is stable if 1 + L does not encircle 0. L is real at the first frequency.
 
     Args:
-        s: as `frequencies`.
+        s: (n,), result of `frequencies`.
         loop_gain: (n,), loop gain L at `s`.
     """
     omega, size = s.imag, np.abs(loop_gain)

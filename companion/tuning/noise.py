@@ -1,4 +1,4 @@
-"""What disturbed a recorded flight: errors of the estimate and gusts, from its telemetry."""
+"""What disturbed a recorded flight: estimator errors and gusts, from its telemetry."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -15,26 +15,27 @@ from companion.vehicle.registry import AUTOPILOTS
 Floats = NDArray[np.float64]
 
 _BAND = 0.15, 1.5
-"""Frequencies at which the hold answers disturbances, Hz."""
+"""Frequencies at which the hold responds to disturbances, Hz."""
 _WHITE = 0.6
-"""Share of half the telemetry rate above which only the noise of single messages is left."""
+"""Share of half the telemetry rate above which only the noise of single messages remains."""
 _SEGMENT = 8.0
-"""Duration of one piece of the record whose spectrum is computed, s."""
+"""Duration of one segment of the record for a spectrum, s."""
 _LEAST_HEIGHT = 1.0
 """Samples closer to the ground than this are left out, m."""
 _AUTOPILOTS = {autopilot.mav_autopilot for autopilot in AUTOPILOTS}
 
 
 def measured_disturbances(log: Path, drag: float, usual: Disturbances) -> Disturbances:
-    """The disturbances in a `.tlog`, in the air.
+    """The disturbances in the air in a `.tlog`.
 
-    The velocity explains most of the change of the position: the rest is `wander`. Tilt and drag
-    explain most of the change of the velocity: the rest is `shake`, gusts included.
+    `wander` is the change of the position that the velocity does not explain. `shake` is the change
+    of the velocity that tilt and drag do not explain, including gusts.
 
     Args:
         log: a `.tlog` of this or another program.
         drag: linear drag of the vehicle, 1/s.
-        usual: its gusts are kept, and all of it if the flight is too short.
+        usual: usual disturbances; gusts are taken from it, and everything if the flight is too
+            short.
 
     Raises:
         LogError: the file cannot be read or is not a `.tlog`.
@@ -63,7 +64,7 @@ def measured_disturbances(log: Path, drag: float, usual: Disturbances) -> Distur
 
 
 def _telemetry(log: Path) -> tuple[Floats, Floats]:
-    """Motion (n, 5): time, north, east, velocities; slopes (m, 3): time, north, east."""
+    """Motion (n, 5): time, north, east, velocities; and slopes (m, 3): time, north, east."""
     vehicle: tuple[int, int] | None = None
     motion: list[tuple[float, ...]] = []
     slopes: list[tuple[float, ...]] = []
@@ -96,7 +97,7 @@ def _integral(time: Floats, slopes: Floats) -> Floats:
 
 
 def _densities(time: Floats, rest: Floats) -> tuple[float, float]:
-    """Density in the band per √Hz, and the noise of one measurement whose difference `rest` is.
+    """Density in the band per √Hz, and noise of one measurement; `rest` is a difference of two.
 
     Args:
         time: (n,), s.

@@ -12,7 +12,7 @@ from companion.tuning.margins import Margins
 from companion.tuning.search import Aims, Design, errors_to_bear, searched
 
 _ANALYSED = ("hover",)
-"""Maneuvers of the analysed configuration: `identify` is flown with low gains of its own."""
+"""Maneuvers of the analysed configuration, because `identify` has its own, low gains."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,15 +20,15 @@ class Proposal:
     """A proposed configuration, and what it changes.
 
     Attributes:
-        untuned: the configuration before.
-        tuned: the configuration with the proposal.
+        untuned: configuration before.
+        tuned: configuration with the proposal.
         design: the proposed values.
         vehicle: proposed keys of the section `vehicle`; may be empty.
-        before: what to expect of `untuned`.
-        after: what to expect of `tuned`.
+        before: expectation of `untuned`.
+        after: expectation of `tuned`.
         with_errors: margins of `tuned` if the vehicle's times differ from the identified ones.
-        disturbances: what disturbs the vehicle.
-        aims: what the proposal keeps.
+        disturbances: disturbances of the vehicle.
+        aims: requirements that the proposal keeps.
     """
 
     untuned: Config
@@ -43,9 +43,9 @@ class Proposal:
 
     @property
     def changes(self) -> dict[str, dict[str, float]]:
-        """The proposed keys by section, as `companion.config.files.changed` takes them.
+        """The proposed keys by section, in the form for `companion.config.files.changed`.
 
-        A known drag is among them: the feedforward needs it, and the analysis counted on it.
+        They include a known drag, because the analysis assumes its feedforward.
         """
         design, drag = self.design, self.tuned.guidance.drag
         known = {}
@@ -74,14 +74,14 @@ def propose(
 
     Args:
         config: the configuration to tune; `vehicle` must be identified.
-        disturbances: what disturbs the vehicle; None: the usual ones.
+        disturbances: disturbances of the vehicle; None: the usual ones.
         aims: margins to keep; None: the default ones.
-        vehicle: keys of the section `vehicle` that describe the vehicle better than `config` does,
-            as `companion.identification.second_order_keys` finds them; they are proposed, too.
+        vehicle: keys of the section `vehicle` that describe the vehicle better than `config`, from
+            `companion.identification.second_order_keys`; they are proposed too.
 
     Raises:
-        ConfigError: lag and dead time are not known, the planner or guidance is not one of ours, or
-            no values keep the margins.
+        ConfigError: lag and dead time are unknown, planner or guidance is not ours, or no values
+            keep the margins.
     """
     if not config.vehicle.known:
         raise ConfigError(

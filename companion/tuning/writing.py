@@ -14,7 +14,7 @@ from companion.tuning.proposal import Proposal
 from companion.tuning.search import largest_gain, slewing_delay
 
 Flights = Mapping[str, tuple[Flown, Flown]]
-"""Flights with the configuration before and with the proposal, by the name of the course."""
+"""Flights before and with the proposal, by the name of the course."""
 
 
 def proposal_text(
@@ -23,10 +23,10 @@ def proposal_text(
     """The file's text: what was analysed, what to expect, and the keys with their reasons.
 
     Args:
-        proposal: what is proposed.
+        proposal: the proposal.
         vehicle: vehicle file to include, relative to the file; or the section `vehicle` itself.
         flights: flights on the mock vehicle; empty if none was flown.
-        where: from what the vehicle is known, for the reader.
+        where: source of the knowledge of the vehicle, for the reader.
     """
     lines = [f"# Proposed by `companion tune` for {where}.", "#"]
     lines += [f"# {line}".rstrip() for line in summary_lines(proposal, flights)]
@@ -46,7 +46,7 @@ def proposal_text(
 
 
 def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
-    """What to expect before and after, and what the proposal costs, for the user."""
+    """Expectation before and after, and the cost of the proposal, for the user."""
     before, after, aims = proposal.before, proposal.after, proposal.aims
     limit = degrees(proposal.tuned.limits.max_tilt_rate)
     lines = [
@@ -101,7 +101,7 @@ def _flight_line(name: str, before: Flown, after: Flown) -> str:
 
 
 def _reasons(proposal: Proposal) -> dict[str, str]:
-    """Why each key has its value."""
+    """The reason for each value."""
     untuned, tuned, design = proposal.untuned, proposal.tuned, proposal.design
     limit, weights = largest_gain(untuned), hold_weights(untuned)
     capped = design.gain > 0.97 * limit

@@ -13,9 +13,9 @@ from companion.vehicle.parameter_rules import ParameterRule
 
 
 class Role(Enum):
-    """What a mode means to a flight, whatever the autopilot calls it.
+    """Meaning of a mode for a flight, independent of the autopilot's name for it.
 
-    A mode without a role belongs to the pilot or to a failsafe.
+    Modes without a role belong to the pilot or to a failsafe.
     """
 
     TAKEOFF = "take-off"
@@ -55,7 +55,7 @@ class OffboardLossFailsafe(NamedTuple):
 
     Attributes:
         parameter: Name of the parameter that sets how long it holds the last rates, s.
-        then: What it does after that, in words.
+        then: What it does after that time, in words.
         brakes: Whether it then brakes the vehicle to a stop.
     """
 
@@ -76,7 +76,7 @@ FLIGHT_RATES: Mapping[str, float] = MappingProxyType(
         "GLOBAL_POSITION_INT": 5.0,
     }
 )
-"""Messages that a flight needs from every autopilot, with the rate to request, Hz."""
+"""Messages that a flight needs from every autopilot, with the requested rate, Hz."""
 
 
 class Autopilot(Protocol):

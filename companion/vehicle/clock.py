@@ -22,9 +22,9 @@ from companion.vehicle.clock_jumps import (
 )
 
 _SETTLES_FOR = 2.0
-"""Time after the first sample in which queued samples may make the offset wrong, s."""
+"""Time after the first sample in which queued samples may falsify the offset, s."""
 _CERTAINLY_BACK = 0.5
-"""A TIMESYNC time further behind the newest stamp than this, s, means that the clock went back."""
+"""A TIMESYNC time this far behind the newest stamp, s, means that the clock was set back."""
 _TIMESYNC_LAG = 0.012
 """Largest lag of TIMESYNC behind the samples' stamps in the simulators, s (measured)."""
 _UNKNOWN_AFTER = 3.0
@@ -34,7 +34,7 @@ _UNKNOWN_AFTER = 3.0
 class VehicleClock:
     """One vehicle's clock, estimated from every attitude sample and TIMESYNC exchange.
 
-    If the clock jumps, the vehicle times that are returned here go on without the jump.
+    If the clock jumps, the vehicle times returned here continue without the jump.
 
     Args:
         lockstep: Whether the event loop runs on the vehicle's clock, so that ages are known without
@@ -43,9 +43,9 @@ class VehicleClock:
     Attributes:
         rate: Rate of the vehicle's clock.
         delay: Delay of the quickest sample, measured by TIMESYNC.
-        timeline: Rises whenever the clock jumped, wrapped, stood still or restarted.
-        restarts: Rises whenever the autopilot restarted: its time since boot went back by seconds
-            and goes on from there.
+        timeline: Counts jumps, wraps, standstills and restarts of the clock.
+        restarts: Counts restarts of the autopilot, after which its time since boot continues from a
+            smaller value.
         last_change: The newest of these changes in words.
         outliers: Number of single samples dropped because they were stamped far ahead.
         on_event: Called with a sentence for the user.
@@ -173,7 +173,7 @@ class VehicleClock:
             self.on_event("the age of telemetry is known by TIMESYNC")
 
     def _judge_misfit(self, time_boot_ms: int, stamp: Stamp, quickest: float) -> Misfit | None:
-        """Why `stamp` does not fit the clock; None if it fits, also after a change of the clock."""
+        """Why `stamp` does not fit the clock; None if it fits, also after an accepted change."""
         if self._began == inf:
             self._began = self._received = stamp.received
             self._quickest = 0.0 if self._lockstep else stamp.ahead
@@ -225,7 +225,7 @@ class VehicleClock:
             self._accept_jump(-late, time_boot_ms, restarted=False)
 
     def _drop_misfits(self) -> None:
-        """Drop the misfits as outliers: the clock goes on as before them, or changes again."""
+        """Drop the misfits as outliers: the clock continues as before, or changes again."""
         ahead = sum(stamp.time > self._newest for stamp in self._misfits.stamps)
         if ahead and not self._told_outlier:
             self._told_outlier = True

@@ -13,19 +13,20 @@ MOST_DRIFT = 0.02
 """Largest difference in rate between the two clocks, s per s. Crystals differ by less than 0.0002,
 a simulator that is slower than real time by 0.006 (measured)."""
 _UNSURE = 0.005
-"""Error of a measured rate, s per s."""
+"""Uncertainty of a measured rate, s per s."""
 _NO_DRIFT = 0.005
-"""If the offset rises by this (s) more than drift explains, earlier samples were late: the rate is
-measured anew. Otherwise a backlog of 68 ms at the start (measured on PX4) would give a rate of
-1.4 %, and samples would seem up to 79 ms old for 40 s."""
+"""If the offset rises by this (s) more than drift explains, the earlier samples were late, and the
+measurement of the rate restarts. Otherwise a backlog of 68 ms at the start (measured on PX4)
+would give a rate of 1.4 %, and samples would seem up to 79 ms old for 40 s.
+"""
 _PERIOD = 1.0
 _LEAST, _MOST = 5, 20
 """Shortest and longest time over which a rate is measured, s."""
 
 LIFETIME = 20.0
-"""Time for which an exchange counts, s; there is one each second."""
+"""Time for which a TIMESYNC exchange is used, s; there is one each second."""
 _LONGEST = 10.0
-"""Longest plausible delay of a sample, s; a greater difference means another clock."""
+"""Largest plausible delay of a sample, s; a greater difference means another clock."""
 _TOLERATED = 0.05
 """Tolerated lag of TIMESYNC behind the samples' stamps, s; in the simulators up to 0.012."""
 
@@ -37,7 +38,7 @@ class ClockRate:
         fixed: Whether the vehicle and the loop have the same clock.
 
     Attributes:
-        rate: How much faster than the loop's clock the vehicle's runs, s per s.
+        rate: Rate of the vehicle's clock minus that of the loop's clock, s per s.
         slowest: The lowest rate that is possible now, s per s.
         due: Event-loop time at which the next offset should be noted, s.
     """
@@ -60,13 +61,13 @@ class ClockRate:
         return 2.0 * self._unsure * seconds
 
     def note(self, now: float, offset: float) -> None:
-        """Take the quickest sample's offset, vehicle time minus event-loop time, once a second.
+        """Take the quickest sample's offset (vehicle time minus event-loop time) once a second.
 
         Two points far apart suffice, since each is the best of a second's samples.
 
         Args:
             now: Event-loop time, s.
-            offset: s.
+            offset: The offset, s.
         """
         if self._noted:
             then, before = self._noted[-1]

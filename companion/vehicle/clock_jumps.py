@@ -6,13 +6,13 @@ from typing import NamedTuple
 JUMP = 0.05
 """A stamp further ahead than this, s, is not drift; the simulators' clocks slip by up to 0.016."""
 TOGETHER = 0.1
-"""Samples whose offsets differ by less than this, s, may be of one clock."""
+"""Largest difference of offsets of samples that may belong to one clock, s."""
 _CONFIRMED_BY = 3
 """Number of misfits in a row that shows a jump of the clock; fewer are outliers."""
 _CONFIRMED_FOR = 0.04
 """Time that the misfits in a row must span to show a jump of the clock, s."""
 REBOOTED = 2.0
-"""If the clock goes back by more than this, s, the autopilot restarted; by less, it jumped."""
+"""The autopilot restarted if its clock went back by more than this, s; otherwise it jumped."""
 _WRAP = 2**32 / 1000.0
 """Time after which time_boot_ms, a uint32, wraps: 49.7 days in s."""
 _NEAR_WRAP = 600.0

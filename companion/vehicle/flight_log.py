@@ -20,7 +20,7 @@ _STANDARD_GRAVITY = 9.80665
 _RECENT = 500
 """Number of newest samples whose time stamp a setpoint may carry."""
 _ONE_CLOCK = 1.0
-"""If stamps of accelerometer and attitude differ by more than this, s, their clocks differ."""
+"""Stamps of accelerometer and attitude that differ by more than this, s, are of two clocks."""
 _NAMES = {
     "HEARTBEAT",
     "SET_ATTITUDE_TARGET",

@@ -1,8 +1,9 @@
-"""The effective rate of the setpoints, from how long the vehicle holds each of them."""
+"""The effective rate of setpoints, from the time for which the vehicle holds each of them."""
 
 _UNEVEN = 2.0
-"""Largest ratio of the time-weighted mean interval Σg²/Σg to the mean interval at which the
-effective rate still is the mean rate; with a larger ratio it is lower."""
+"""Largest ratio of the time-weighted mean interval Σg²/Σg to the mean interval for which the
+effective rate equals the mean rate. With a larger ratio it is lower.
+"""
 
 
 class HeldRates:

@@ -1,4 +1,4 @@
-"""Checks the bytes that arrive, and passes their frames to the control loop and to the router.
+"""Checks arriving bytes, and passes their frames to the control loop and to the router.
 
 Every frame takes the same way, whatever the transport: scan, filter, control loop, count,
 subscribers. In lockstep, frames also wait for the beacon that closes their step, and samples for
@@ -80,7 +80,7 @@ class Inbox:
         self.connect(streaming=False)
 
     def connect(self, *, streaming: bool) -> None:
-        """Forget an incomplete frame: the next bytes come over another connection."""
+        """Forget an incomplete frame, because the next bytes come over another connection."""
         self._scanner = FrameScanner(
             CRC_EXTRA, streaming=streaming, stats=self._stats, keep_unknown=True
         )
@@ -215,7 +215,7 @@ class Inbox:
             self._router.guard(self.on_attitude, sample)
 
     def _process(self) -> None:
-        """In lockstep: pass on the frames of a step, in order, after its beacon set the clock."""
+        """In lockstep: pass on the frames of a step in order, after its beacon set the clock."""
         held, self._held = self._held, []
         for frame, received_ns in held:
             self._pass_on(frame, received_ns)

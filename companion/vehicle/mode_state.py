@@ -27,7 +27,7 @@ class ModeState:
         current_mode: See `CurrentMode`. The property `mode` takes the newer of the two messages.
         heartbeat_is_newest: Whether HEARTBEAT is newer than CURRENT_MODE; `armed` is then as new as
             `mode`.
-        armings: How often a heartbeat showed that the vehicle had become armed.
+        armings: Number of times that a heartbeat showed a newly armed vehicle.
         autopilot: How to command the vehicle; known from its first heartbeat.
         unsupported: The error to raise if this program cannot fly the autopilot.
     """

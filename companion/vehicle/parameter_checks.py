@@ -12,7 +12,7 @@ LONGEST_HELD = 2.0
 (measured on PX4); twice that tilt is not recoverable."""
 
 _SAME_HOVER = 1.4
-"""If two hover thrusts differ by more than this factor, one of them is wrong."""
+"""Largest plausible ratio of two hover thrusts; above it, one of them is wrong."""
 
 _SAME_LIMIT = 1.15
 """Acceleration limits that differ by less than this factor have the same effect."""
@@ -154,7 +154,7 @@ def acceleration_limit(unit: float, axis: str) -> Check:
     """A check that the planner assumes the autopilot's acceleration limit of an axis.
 
     Args:
-        unit: the parameter's unit, °/s².
+        unit: the parameter's unit in °/s².
         axis: `roll`, `pitch` or `yaw`.
     """
     prefix = "" if axis == "roll" else f"{axis}_"

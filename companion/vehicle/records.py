@@ -8,7 +8,7 @@ from companion.vehicle.clock_jumps import Misfit
 Vector = tuple[float, float, float]
 
 _LASTS = 5.0
-"""Telemetry older than this counts as unknown, s; it should come at 1 Hz or faster."""
+"""Largest age of known telemetry, s; it should come at 1 Hz or faster."""
 
 
 def outdated(received: float, now: float) -> bool:
@@ -181,7 +181,7 @@ class Gps(NamedTuple):
 
 
 def gps_fault(gps: Gps | None, now: float) -> str | None:
-    """What is wrong with a GPS that had a 3D fix, at event-loop time `now` (s); `None`: nothing."""
+    """Fault of a GPS that had a 3D fix, at event-loop time `now` (s), or `None`."""
     if gps is None or outdated(gps.received, now):
         return "GPS is not reported any more"
     return "GPS position lost" if gps.fix_type < GPS_FIX_3D else None

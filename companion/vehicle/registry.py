@@ -18,7 +18,7 @@ BY_NUMBER = {autopilot.mav_autopilot: autopilot for autopilot in AUTOPILOTS}
 AUTOPILOT_NAMES = " or ".join(
     f"{autopilot.name} ({autopilot.mav_autopilot})" for autopilot in AUTOPILOTS
 )
-"""Names to show to users, with the MAV_AUTOPILOT numbers."""
+"""Names for users, with the MAV_AUTOPILOT numbers."""
 
 MULTIROTORS = frozenset({2, 3, 13, 14, 15, 29, 35})
 """MAV_TYPE of multirotors: quadrotor, coaxial, hexa-, octo-, tri-, dodeca- and decarotor."""

@@ -101,7 +101,7 @@ class VehicleState(ModeState, _Values):
         router.subscribe_raw("ODOMETRY", self._on_odometry)
 
     def forget(self) -> None:
-        """Forget everything but the newest heartbeat: the rest may be of another vehicle."""
+        """Forget everything but the newest heartbeat; the rest may belong to another vehicle."""
         self.current_mode, self.armings = None, 0
         fresh = _Values()
         for field in fields(_Values):
@@ -124,7 +124,7 @@ class VehicleState(ModeState, _Values):
 
     @property
     def battery_silent(self) -> bool:
-        """Whether the battery was reported before and is not any more."""
+        """Whether the battery was reported before and is no longer reported."""
         return self.battery is not None and outdated(self.battery.received, self._clock())
 
     @property
@@ -148,7 +148,7 @@ class VehicleState(ModeState, _Values):
 
     @property
     def gps_fault(self) -> str | None:
-        """What is wrong with a GPS that has had a 3D fix, in words; `None`: nothing."""
+        """Fault of a GPS that has had a 3D fix, in words; `None`: no fault."""
         return gps_fault(self.gps, self._clock()) if self.gps_was_good else None
 
     def _on_extended_sys_state(self, message: Message) -> None:

@@ -61,10 +61,10 @@ class Boot:
     """Tracks the boot over the time since the start.
 
     Args:
-        state: for the time.
+        state: state of the autopilot, for the time.
         notifier: sends the texts and messages of the boot.
         ready_us: vehicle time at which the position estimate is good.
-        elevation: of home above sea level, m.
+        elevation: elevation of home above sea level, m.
     """
 
     def __init__(

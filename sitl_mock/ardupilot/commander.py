@@ -24,13 +24,13 @@ YAW_ALIGNED_M = 2.8
 
 
 class ArduPilotCommander:
-    """ArduCopter's `Commander`.
+    """The `Commander` of ArduCopter.
 
     Args:
         state: the autopilot's state.
         parameters: its parameters.
-        vehicle: for the battery.
-        control: begins every mode entered.
+        vehicle: the vehicle, for its battery.
+        control: begins each mode that is entered.
         guided: the task of GUIDED.
         stream: counts the accepted setpoints.
         notifier: sends texts and messages.

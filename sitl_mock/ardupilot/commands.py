@@ -45,7 +45,7 @@ _GROUPS: dict[int, tuple[int, ...]] = {
 
 
 class ArduPilotCommands(Commands):
-    """ArduCopter's `Commands`.
+    """The `Commands` of ArduCopter.
 
     Args:
         state: the autopilot's state.

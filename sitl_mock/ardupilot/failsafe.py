@@ -10,9 +10,9 @@ from sitl_mock.link.framing import Message
 from sitl_mock.physics.vehicle import Vehicle
 
 _GCS_ACTIONS = {1: Mode.RTL, 3: Mode.RTL, 4: Mode.RTL, 5: Mode.LAND, 7: Mode.BRAKE}
-"""FS_GCS_ENABLE -> mode."""
+"""Mode for each value of FS_GCS_ENABLE."""
 _BATTERY_ACTIONS = {1: Mode.LAND, 2: Mode.RTL, 3: Mode.RTL, 4: Mode.RTL}
-"""BATT_FS_LOW_ACT and BATT_FS_CRT_ACT -> mode."""
+"""Mode for each value of BATT_FS_LOW_ACT and BATT_FS_CRT_ACT."""
 _PILOT_CONTINUES = 16
 """Bit of FS_OPTIONS: the loss of the ground station has no effect in a pilot's mode."""
 
@@ -118,7 +118,7 @@ class ArduPilotFailsafe:
         return now - self._voltage_low_since_us >= self._parameters["BATT_LOW_TIMER"] * 1e6
 
     def _watch_position(self) -> None:
-        """Land if the position is lost in a mode that needs it, if FS_EKF_ACTION says so."""
+        """Land if the position is lost in a mode that needs it and FS_EKF_ACTION demands it."""
         state = self._state
         lost = state.armed and not state.position_valid
         began = lost and not self._position_lost and state.mode in NEEDS_POSITION

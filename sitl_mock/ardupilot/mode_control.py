@@ -19,7 +19,7 @@ _STILL = ActuatorCommand(False, 0.0, 0.0, 0.0, 0.0)
 
 
 class ArduPilotModeControl:
-    """ArduCopter's `ModeControl`.
+    """The `ModeControl` of ArduCopter.
 
     Args:
         state: the autopilot's state; the echoes of the targets are written here.

@@ -33,9 +33,9 @@ from sitl_mock.config.settings import VehicleSettings
 from sitl_mock.link.link import Link, StreamSchedule
 
 LANDED_AFTER_US = 1_000_000
-"""Contact with low thrust for this time is a landing."""
+"""A contact with low thrust for this time, us, is a landing."""
 POSITION_TIMEOUT_US = 10_000_000
-"""Time for which the position stays valid without GPS; not measured."""
+"""Time for which the position stays valid without GPS, us; not measured."""
 DEFAULT_LOOP_HZ = 400.0
 _HOME = (dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, dialect.MAVLINK_MSG_ID_HOME_POSITION)
 _BOOT_RATES = {dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0, dialect.MAVLINK_MSG_ID_TIMESYNC: 0.1}
@@ -71,7 +71,7 @@ _SUPPORTED = frozenset(
 
 
 class ArduPilot:
-    """The ArduPilot personality, a Copter."""
+    """The ArduPilot personality (ArduCopter)."""
 
     events: Mapping[EventKind, Event] = ARDUPILOT_EVENTS
     boot_mode = Mode.STABILIZE

@@ -33,11 +33,11 @@ class Return:
         self._parameters = parameters
         self.leg = Leg.CLIMB
         self.height = 0.0
-        """Of the flight home, m above the local origin."""
+        """Height of the flight home, m above the local origin."""
         self._waiting_since_us = 0
 
     def begin(self) -> None:
-        """Choose the height: RTL_ALT, lower near home (RTL_CONE_SLOPE), never below the present."""
+        """Choose the height: RTL_ALT, less near home (RTL_CONE_SLOPE), at least the present one."""
         state, parameters = self._state, self._parameters
         height = -state.estimate.position_ned[2]
         cone = parameters["RTL_CONE_SLOPE"] * self._distance()

@@ -17,7 +17,7 @@ from sitl_mock.physics.vehicle import Vehicle
 _SENSORS_PRESENT = 1399979055
 _SENSORS_ENABLED = 1382128687
 _SENSORS_HEALTHY = 1467063343
-"""Recorded while disarmed, without height or position control."""
+"""Health bits of SYS_STATUS, recorded disarmed and without height or position control."""
 _HEIGHT_CONTROL = dialect.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL
 _POSITION_CONTROL = dialect.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
 _LOGGING = dialect.MAV_SYS_STATUS_LOGGING
@@ -37,9 +37,9 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
 
     Args:
         state: the autopilot's state.
-        origin: of the local frame.
+        origin: origin of the local frame.
         identity: content of AUTOPILOT_VERSION.
-        vehicle: for the battery.
+        vehicle: the vehicle, for its battery.
         initialised: whether the boot is complete.
         origin_set: whether the estimator has an origin.
     """

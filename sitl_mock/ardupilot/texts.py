@@ -34,7 +34,7 @@ class ArduPilotAnnouncer:
     """Sends the texts of events, and other texts, on every link with a client.
 
     Args:
-        links: where to.
+        links: links to send on.
     """
 
     def __init__(self, links: Iterable[Link]) -> None:

@@ -41,7 +41,7 @@ class EventKind(Enum):
 
 
 class Event(NamedTuple):
-    """How an autopilot announces an event: STATUSTEXT, and EVENT where it has an id.
+    """How an autopilot announces an event: by STATUSTEXT, and by EVENT if it has an id.
 
     ``text`` may have one ``{}`` for a detail; ``severity`` is MAV_SEVERITY; ``event_id`` 0 = text
     only; ``arguments`` are the packed arguments of EVENT; ``internal`` is the severity in the

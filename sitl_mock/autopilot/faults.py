@@ -36,10 +36,10 @@ class _Entry:
 
 
 class FaultSchedule:
-    """The faults injected so far, and those active now.
+    """The faults injected so far, and those that are active now.
 
     Args:
-        faults: of the configuration.
+        faults: faults of the configuration.
     """
 
     def __init__(self, faults: tuple[LinkFault | VehicleFault, ...]) -> None:
@@ -64,7 +64,7 @@ class FaultSchedule:
 
         Args:
             now_us: vehicle time.
-            offboard_us: when setpoints first controlled the vehicle, None if not yet.
+            offboard_us: vehicle time when setpoints first controlled the vehicle; None: not yet.
         """
         if not self._entries:
             return [], []
@@ -108,10 +108,10 @@ class FaultEffects:
 
     Args:
         state: the autopilot's state.
-        vehicle: for faults of estimate and battery.
-        commander: for faults of arming and mode.
+        vehicle: receives faults of estimate and battery.
+        commander: receives faults of arming and mode.
         control: its held position and heading follow an estimator reset.
-        links: for faults of messages.
+        links: receive faults of messages.
     """
 
     def __init__(
@@ -123,7 +123,7 @@ class FaultEffects:
         links: list[Link],
     ) -> None:
         self.offboard_us: int | None = None
-        """When setpoints first controlled the vehicle, vehicle time."""
+        """Vehicle time when setpoints first controlled the vehicle, us."""
         self.clock_frozen = False
         self._state = state
         self._vehicle = vehicle

@@ -18,7 +18,7 @@ _MOST_ITEMS = 1000
 
 
 class _Upload(NamedTuple):
-    """A plan that is being uploaded, by whom, and its items so far."""
+    """A plan that is being uploaded: its sender, and its items so far."""
 
     mission_type: int
     size: int
@@ -27,7 +27,7 @@ class _Upload(NamedTuple):
 
 
 class MissionProtocol:
-    """Keeps one plan of each type and passes it on as it came."""
+    """Keeps one plan of each type, and returns it unchanged."""
 
     def __init__(self) -> None:
         self.plans: dict[int, list[Message]] = {kind: [] for kind in _TYPES}
@@ -95,7 +95,7 @@ class MissionProtocol:
 
 
 def _to(message: Message) -> tuple[int, int]:
-    """The sender of a message, as the target of the answer."""
+    """The address of a message's sender, as the target of the answer."""
     return message.get_srcSystem(), message.get_srcComponent()
 
 

@@ -29,8 +29,8 @@ class MotionTelemetry:
 
     Args:
         state: the autopilot's state.
-        vehicle: for the rotors and the reset counter.
-        origin: of the local frame.
+        vehicle: the vehicle, for rotors and reset counter.
+        origin: origin of the local frame.
     """
 
     def __init__(self, state: State, vehicle: Vehicle, origin: Origin) -> None:
@@ -39,7 +39,7 @@ class MotionTelemetry:
         self._origin = origin
 
     airspeed = NAN
-    """In VFR_HUD; there is no airspeed sensor."""
+    """Airspeed in VFR_HUD; there is no airspeed sensor."""
 
     def builders(self) -> dict[int, Builder]:
         """Return message id -> builder."""

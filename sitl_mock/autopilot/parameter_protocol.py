@@ -25,7 +25,7 @@ class ParameterProtocol:
 
     Args:
         parameters: the table that is read and changed.
-        encoding: of the autopilot.
+        encoding: encoding of the autopilot.
     """
 
     def __init__(self, parameters: ParameterTable, encoding: Encoding) -> None:

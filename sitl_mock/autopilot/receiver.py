@@ -32,7 +32,7 @@ class Receiver:
         state: the autopilot's state.
         rules: the autopilot's behaviour.
         personality: decodes custom modes.
-        system_id: of this vehicle.
+        system_id: system id of this vehicle.
     """
 
     def __init__(

@@ -24,7 +24,7 @@ class SystemTelemetry:
 
     Args:
         state: the autopilot's state.
-        origin: of the local frame.
+        origin: origin of the local frame.
         identity: content of AUTOPILOT_VERSION.
     """
 

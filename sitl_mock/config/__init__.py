@@ -1,1 +1,1 @@
-"""What can be set: typed sections, and the reading of their YAML."""
+"""The configuration of the mock vehicle: typed sections, and reading their YAML."""

@@ -92,7 +92,7 @@ class BatteryConfig(Section):
     full_cell_v: Positive = 4.2
     """Open-circuit voltage of a full cell."""
     empty_cell_v: Positive = 3.6
-    """Open-circuit voltage of an empty cell; it is linear in the charge."""
+    """Open-circuit voltage of an empty cell; the voltage is linear in the charge."""
     resistance_ohm: NonNegative = 0.005
     """Internal resistance of the pack."""
     idle_current_a: NonNegative = 0.5

@@ -59,7 +59,7 @@ def _is_host(text: str) -> bool:
 
 
 def for_vehicle(text: str, index: int) -> str:
-    """Return the endpoint of the vehicle with this index: the next port, a path with its number."""
+    """The endpoint of the vehicle with this index: the next port, or a path with its number."""
     if index == 0:
         return text
     match parse_endpoint(text):

@@ -25,11 +25,11 @@ class Timed(Section):
     """Start and duration of a fault, in vehicle time; without a start it begins at once."""
 
     at_s: NonNegative | None = None
-    """Begin this long after boot."""
+    """Time after boot when the fault begins."""
     after_offboard_s: NonNegative | None = None
-    """Begin this long after setpoints first controlled the armed vehicle."""
+    """Time from the first setpoint that controls the armed vehicle to the fault."""
     duration_s: Positive | None = None
-    """End after this time; without it, the fault does not end."""
+    """Duration of the fault; without it, the fault does not end."""
 
     @model_validator(mode="after")
     def _one_start(self) -> Self:

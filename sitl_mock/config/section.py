@@ -24,7 +24,7 @@ class Section(BaseModel):
 
 
 def preset(words: Mapping[str, object], value: object, what: str) -> object:
-    """Return the preset that a word names; return anything but a word as it is.
+    """Return the preset that a word names; return any other value unchanged.
 
     Args:
         words: preset by word.

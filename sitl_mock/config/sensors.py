@@ -1,4 +1,4 @@
-"""Errors of what the autopilot measures and estimates."""
+"""Errors of the autopilot's measurements and estimates."""
 
 from typing import Annotated
 
@@ -56,7 +56,7 @@ class EkfConfig(Section):
     height_noise_m: NonNegative = 0.038
     """Slow noise of the height, as of a barometer; the height follows it within 2 s."""
     height_noise_time_s: Positive = 4.0
-    """Correlation time of that noise."""
+    """Correlation time of the slow noise of the height."""
     position_gains: Gains = (0.0774, 0.0494)
     """Gains of the position, m per m and m per m/s."""
     velocity_gains: Gains = (0.0316, 0.0411)
@@ -64,7 +64,7 @@ class EkfConfig(Section):
     acceleration_gains: Gains = (0.0056, 0.0102)
     """Gains of the acceleration error, m/s^2 per m and m/s^2 per m/s."""
     predictor_ms: Positive = 250.0
-    """Time constant of the output predictor: a correction reaches the output with it."""
+    """Time constant with which the output predictor applies a correction."""
 
 
 EKFS: dict[str, EkfConfig | None] = {
@@ -101,7 +101,7 @@ class SensorConfig(Section):
     """Errors of the autopilot's estimate: white noise (standard deviations) and delays."""
 
     ekf: EkfConfig | None = None
-    """Errors of the navigation filter, in addition: px4, ardupilot, none, or keys of its own."""
+    """Navigation filter whose errors are added: px4, ardupilot, none, or keys of its own."""
     attitude_noise_deg: NonNegative = 0.02
     rate_noise_rad_s: NonNegative = 0.002
     position_noise_m: NonNegative = 0.01

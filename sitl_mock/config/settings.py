@@ -35,7 +35,7 @@ class LockstepConfig(Section):
     enabled: bool = False
     period_ms: Annotated[int, Field(ge=1, le=100)] = 4
     bundle: bool = True
-    """Send the frames of a step in one datagram, as PX4 does not. The beacon is separate."""
+    """Send the frames of a step in one datagram; PX4 does not. The beacon is separate."""
     patience_s: Positive = 2.0
     """After this wall time without an answer the vehicle continues in real time."""
 
@@ -48,7 +48,8 @@ class SigningConfig(Section):
     path is relative to the file that names it."""
     accept_unsigned: bool | None = None
     """Accept unsigned frames; frames with a wrong signature are never accepted. Null: as the
-    autopilot does. ArduPilot accepts them on the companion link (its SERIAL0), PX4 on no link."""
+    autopilot does: ArduPilot accepts them on the companion link (its SERIAL0), PX4 on no link.
+    """
     link_id: Annotated[int, Field(ge=0, le=254)] = 0
     """Link id of the companion link in signatures; the ground station link has the next."""
 
@@ -71,10 +72,12 @@ class VehicleSettings(Section):
     speed: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
     """Vehicle seconds per wall second; lockstep ignores it."""
     inner_loop_hz: Literal[100, 250, 800] = 250
-    """Limits the telemetry rates of PX4; ArduPilot uses SCHED_LOOP_RATE instead. 100 (PX4's
-    IMU_INTEG_RATE allows it) was not recorded; it is the quickest to simulate."""
+    """Inner loop rate. It limits the telemetry rates of PX4; ArduPilot uses SCHED_LOOP_RATE
+    instead. 100 (PX4's IMU_INTEG_RATE allows it) was not recorded; it is the quickest to
+    simulate.
+    """
     exact_rates: bool | None = None
-    """Send at every slot; PX4's loop skips some at the full rate. Null: only in lockstep."""
+    """Send at every slot. PX4's loop skips some slots at the full rate. Null: only in lockstep."""
     burst_ms: NonNegative = 0.0
     """In real time the vehicle runs in bursts with this period of vehicle time, as ArduPilot's
     simulator does (its default is 5.6); 0 = no bursts."""

@@ -66,8 +66,8 @@ class Document(NamedTuple):
     """A YAML document.
 
     Attributes:
-        value: as plain Python values.
-        node: the same as YAML nodes, which know their lines.
+        value: the document as plain Python values.
+        node: the document as YAML nodes with line numbers.
     """
 
     value: Any
@@ -113,7 +113,7 @@ def load_yaml(path: Path) -> Document:
 
 
 def explain_yaml(error: Exception) -> str:
-    """Return what is wrong with a file that cannot be read as YAML, on one line."""
+    """Return the fault of a file that cannot be read as YAML, on one line."""
     mark = getattr(error, "problem_mark", None)
     if mark is not None and "'\\t'" in str(getattr(error, "problem", "")):
         return (

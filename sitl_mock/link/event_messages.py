@@ -60,7 +60,7 @@ class EventRequest:
 
 
 def event_request(unknown: Any) -> EventRequest | None:
-    """Decode a message unknown to pymavlink; None if it is no valid REQUEST_EVENT."""
+    """Decode a message unknown to pymavlink; None if it is not a valid REQUEST_EVENT."""
     frame = bytes(unknown.get_msgbuf())
     if frame[0] != 0xFD or int.from_bytes(frame[7:10], "little") != REQUEST_EVENT.message_id:
         return None

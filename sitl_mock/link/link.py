@@ -28,7 +28,7 @@ class Link:
     """One link, without its socket: `Connections` sends the frames in ``outbox``.
 
     Args:
-        name: for logs and faults, e.g. ``companion`` or ``gcs``.
+        name: name for logs and faults, e.g. ``companion`` or ``gcs``.
         framer: packs frames.
         streams: schedules telemetry.
         signing: signs and verifies frames; None = no signing.

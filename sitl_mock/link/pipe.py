@@ -12,7 +12,7 @@ class DatagramPipe:
 
     Args:
         direction: ``to_companion`` or ``from_companion``.
-        seed: of the random numbers of this direction.
+        seed: seed of the random numbers of this direction.
     """
 
     def __init__(self, direction: str, seed: int) -> None:

@@ -13,7 +13,7 @@ class SerialEndpoint:
     """A UART without a baud rate. Frames are dropped while the other end is closed.
 
     Args:
-        path: of a symbolic link to the device; None = no link.
+        path: path of a symbolic link to the device; None = no link.
 
     Raises:
         ConfigError: the link cannot be created, or the system has no free pseudo-terminal.
@@ -45,7 +45,7 @@ class SerialEndpoint:
 
     @property
     def readable(self) -> list[int]:
-        """Our end while the other is open; after a hang-up it would always be readable."""
+        """Our end, while the other end is open; after a hang-up it would always be readable."""
         return [self._master] if self._attached() else []
 
     def receive(self) -> tuple[bytes, bool] | None:

@@ -71,8 +71,8 @@ class Signing:
 
     Args:
         key: 32 bytes.
-        link_id: of this link in our signatures, 0..255.
-        accept_unsigned: accept frames without a signature, too.
+        link_id: id of this link in our signatures, 0..255.
+        accept_unsigned: whether to accept frames without a signature.
         clock: Unix time in s.
     """
 

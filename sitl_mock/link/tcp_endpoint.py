@@ -11,7 +11,7 @@ class TcpEndpoint:
 
     Args:
         host: address to listen on.
-        port: to listen on.
+        port: port to listen on.
 
     Raises:
         ConfigError: the port is in use, or the address is not local.

@@ -15,8 +15,8 @@ class UdpEndpoint:
     It receives from other senders, but does not send to them.
 
     Args:
-        local_port: to bind.
-        remote_port: to send to at first; None = send nothing before something is received.
+        local_port: port to bind.
+        remote_port: first destination port; None = send nothing before something is received.
         option: command-line option of the port, for the error message.
 
     Raises:

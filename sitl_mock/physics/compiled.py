@@ -1,8 +1,8 @@
 """The vehicle's steps compiled by numba: the same source, and results that are equal to the bit.
 
-It pays for whole flights in one process. Importing this module takes half a second. Compiling takes
-ten seconds, once for each version of the source on a computer. A compiled step costs a tenth of one
-in Python.
+This is worth its cost for whole flights in one process. Importing this module takes half a second.
+Compiling takes ten seconds, once for each version of the source on a computer. A compiled step
+costs a tenth of one in Python.
 """
 
 import os
@@ -71,7 +71,7 @@ def _compiled(function: Callable[..., T]) -> Callable[..., T]:
 
 
 def _in_memory(kind: Any) -> tuple[Any, Any]:
-    """Return what loads and stores a value of a numba type in an array of bytes, in compiled code.
+    """Return compiled functions that load and store a value of a numba type in an array of bytes.
 
     To pass a law or a state between Python and compiled code costs as much as 20 steps.
     """

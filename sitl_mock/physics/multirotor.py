@@ -1,4 +1,4 @@
-"""A multirotor in the air under rate control, as the studies fly it: without ground and sensors."""
+"""A multirotor in the air under rate control, without ground and sensors, for the studies."""
 
 from sitl_mock.config.airframe import AirframeConfig
 from sitl_mock.config.rate_loop import RateLoopConfig
@@ -26,7 +26,7 @@ class Multirotor:
         airframe: body and rotors.
         rate_loop: the body-rate controller.
         q: attitude at the start.
-        specific_thrust: of all rotors at the start, m/s^2.
+        specific_thrust: specific thrust of all rotors at the start, m/s^2.
 
     Attributes:
         law: constants.

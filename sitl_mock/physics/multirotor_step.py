@@ -114,9 +114,9 @@ def drive(
     Args:
         law: constants.
         rings: the latest setpoints; they are changed.
-        actuation: before the step.
-        body: before the step.
-        step: its number.
+        actuation: state of controller and rotors before the step.
+        body: motion before the step.
+        step: number of the step.
         setpoint: body rates, rad/s, FRD; NaN holds the present rate. Infinity holds it too, but
             if the rate loop shapes its setpoints, the rate then grows without limit.
         throttle: collective; NaN or <= 0 stops the rotors, values above 1 mean 1.

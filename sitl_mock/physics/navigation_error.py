@@ -15,7 +15,7 @@ Errors = tuple[complex, complex, complex]
 TrailRow = tuple[*Motion, *Vector, *Vector]
 """The true motion after a step: motion, position (NED, m), mean acceleration (NED, m/s^2)."""
 Trail = list[TrailRow]
-"""The rows of the latest steps, written in a circle; an array if the steps are compiled."""
+"""The rows of the latest steps in a ring buffer; an array if the steps are compiled."""
 
 
 class NavigationError(NamedTuple):

@@ -28,7 +28,7 @@ _SLOW = 0.5
 _COMPASS_S = 20.0
 """Time constant with which the heading follows the compass in a calm, s."""
 _SHOWN = 0.15
-"""Rate at which an acceleration of 1 m/s^2 shows the true heading, 1/s; it grows as the square."""
+"""Rate at which an acceleration of 1 m/s^2 corrects the heading, 1/s; it grows with its square."""
 
 
 class NavigationFilter:
@@ -37,7 +37,7 @@ class NavigationFilter:
     Args:
         config: noise, delays and gains.
         start: the true motion at time 0.
-        seed: of the noise.
+        seed: seed of the noise.
 
     Attributes:
         law: constants between two fixes.
@@ -114,7 +114,7 @@ class NavigationFilter:
         )
 
     def _turned(self, speed: complex, pull: complex) -> float:
-        """Return the next heading error, apart from the compass's: noise that follows turns."""
+        """Return the next heading error without the compass's part: noise that depends on turns."""
         config, decay, state = self._config, self._yaw_decay, self.state
         spread = radians(config.yaw_error_deg) * sqrt(1.0 - decay**2)
         turn_rate = (speed.conjugate() * pull).imag / max(abs(speed) ** 2, _SLOW**2)

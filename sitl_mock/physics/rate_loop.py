@@ -14,7 +14,7 @@ IDLE: Axes = ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
 Delays = tuple[int, int, int]
 """Delays of roll, pitch and yaw, steps."""
 Ring = list[Vector]
-"""The latest setpoints, written in a circle; an array if the steps are compiled."""
+"""The latest setpoints in a ring buffer; an array if the steps are compiled."""
 
 
 class AxisLaw(NamedTuple):
@@ -54,8 +54,8 @@ def axis_step(
 
     Args:
         law: the axis's constants.
-        state: before the step.
-        setpoint: of the body rate, rad/s.
+        state: state before the step.
+        setpoint: setpoint of the body rate, rad/s.
         rate: present body rate, rad/s.
         acceleration: present angular acceleration, rad/s^2.
         saturated: the rotors could not give the last torque; the integral must not grow then.
@@ -110,7 +110,7 @@ def rate_step(
 
     Args:
         law: constants.
-        axes: before the step.
+        axes: axes before the step.
         setpoint: body rates, rad/s, FRD, already delayed.
         rates: present body rates, rad/s.
         accelerations: present angular accelerations, rad/s^2.
@@ -140,7 +140,7 @@ def delayed(ring: Ring, delays: Delays, step: int, setpoint: Vector) -> Vector:
 
     Args:
         ring: the latest setpoints, longer than any delay. It is changed.
-        delays: of roll, pitch and yaw, steps.
+        delays: delays of roll, pitch and yaw, steps.
         step: number of the step; each call has the next one.
         setpoint: body rates, rad/s.
     """

@@ -61,7 +61,7 @@ def sqrt_controller(angle: float, gain: float, acceleration: float) -> float:
     Small angles: proportional. Larger ones: the rate from which `acceleration` stops in time.
 
     Args:
-        angle: to close, rad.
+        angle: angle to close, rad.
         gain: rate per angle, 1/s.
         acceleration: limit, rad/s^2.
     """
@@ -85,7 +85,7 @@ class ShapingLaw(NamedTuple):
 def shaping_law(axes: tuple[AxisShaping, AxisShaping, AxisShaping] | None, dt: float) -> ShapingLaw:
     """Return the shaping of roll, pitch and yaw for steps of `dt` seconds.
 
-    Without axes it is a law of the same type that is never used, for the compiler's sake.
+    Without axes it is an unused law of the same type, which the compiler needs.
     """
     if axes is None:
         return ShapingLaw((0.0, 0.0, 0.0), ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0)), (0, 0, 0), dt)
@@ -112,7 +112,7 @@ def shape(law: ShapingLaw, shaped: Shaped, goals: Vector, q: Quaternion) -> tupl
 
     Args:
         law: constants.
-        shaped: before the step; if it is not active, the attitude target starts at `q`.
+        shaped: state before the step; if it is not active, the attitude target starts at `q`.
         goals: body rates, rad/s, already delayed; NaN holds the shaped rate, infinity grows
             without limit.
         q: present attitude.

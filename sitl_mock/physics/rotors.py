@@ -117,7 +117,7 @@ def rotor_step(law: RotorLaw, thrusts: Four, throttles: Four, sag: float) -> tup
 
     Args:
         law: the rotors.
-        thrusts: of each rotor before the step, N.
+        thrusts: thrusts of each rotor before the step, N.
         throttles: 0..1 each.
         sag: thrust factor of the battery voltage.
 

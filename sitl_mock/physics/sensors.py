@@ -22,7 +22,7 @@ NO_ERROR = NavigationError((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 _NO_TRACK = TrackState((0j, 0j, 0j), (0j, 0j), (0j, 0j))
 _NO_FILTER = FilterState(_NO_TRACK, _NO_TRACK, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0j, 0j)
 _DRAWN_TOGETHER = 16
-"""Estimates for which noise is drawn at a time; even, because normal numbers come in pairs."""
+"""Number of estimates for which noise is drawn at a time; even, as normal numbers come in pairs."""
 
 
 class Estimate(NamedTuple):
@@ -49,7 +49,7 @@ class SensorLaw(NamedTuple):
 
 
 class SensorState(NamedTuple):
-    """What only fixes and estimator resets change."""
+    """The part of the estimator's state that only fixes and resets change."""
 
     filter: FilterState
     yaw: Quaternion  # rotation of the estimate by all resets
@@ -127,18 +127,19 @@ def estimate(
 
 
 class Estimator:
-    """Keeps what the estimate needs; one seeded generator draws its white noise.
+    """Holds the state of the estimator; one seeded generator draws its white noise.
 
-    Only `draw` draws white noise, and always the same number of draws. So the noise depends on
-    the seed and the number of calls; that of the navigation filter on the seed and the time.
+    Only `draw` draws white noise, and always the same number of draws. So the noise depends on the
+    seed and the number of calls; the noise of the navigation filter depends on the seed and the
+    time.
 
     Args:
         config: noise, delays and filter.
         start: the true motion at time 0.
         gravity: m/s^2.
         dt: length of a step, s.
-        seed: of all noise.
-        make_noise: as `white_noise`, but it may return the numbers in another container.
+        seed: seed of all noise.
+        make_noise: like `white_noise`, but it may return the numbers in another container.
 
     Attributes:
         law: constants of `estimate`.

@@ -60,8 +60,8 @@ class Vehicle:
         wind: steady wind and gusts.
         battery: capacity and voltages.
         sensors: errors of the estimate.
-        seed: of all noise.
-        heading: at the start, rad clockwise from north.
+        seed: seed of all noise.
+        heading: heading at the start, rad clockwise from north.
         plant: computes steps and estimates: `PythonPlant`, or `compiled.CompiledPlant`.
 
     Attributes:
@@ -70,7 +70,7 @@ class Vehicle:
         on_ground: whether the vehicle stands.
         crashed: whether a touchdown was a crash.
         estimator: errors of the estimate.
-        plant: as the argument.
+        plant: the argument `plant`.
     """
 
     def __init__(

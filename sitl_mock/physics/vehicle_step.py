@@ -51,7 +51,7 @@ class VehicleState(NamedTuple):
 
 
 class Air(NamedTuple):
-    """What changes slowly; it is constant during the steps of one call."""
+    """Slowly changing conditions, constant during the steps of one call."""
 
     thrust_factor: float
     """Factor of the battery voltage on the thrust of every rotor."""
@@ -67,7 +67,7 @@ class VehicleLaw(NamedTuple):
 
 
 def trail_row(body: Kinematics, position: Vector) -> TrailRow:
-    """Return what the estimator needs of a step."""
+    """Return the data of a step that the estimator needs."""
     motion, acceleration, _ = body
     return motion + position + acceleration
 
@@ -87,10 +87,10 @@ def advance(
         law: constants.
         rings: the latest setpoints; they are changed.
         trail: the latest rows of `trail_row`, one for each step. It is changed.
-        state: before the steps.
-        command: for all of them.
-        air: for all of them.
-        count: how many.
+        state: state before the steps.
+        command: command for all steps.
+        air: conditions for all steps.
+        count: number of steps.
     """
     steps, body, actuation, position, on_ground, crashed, touchdown_speed = state
     multirotor, ground = law
@@ -132,11 +132,11 @@ def advance(
 
 
 Outcome = tuple[bool, bool, float]
-"""What is asked for after all steps: on the ground, crashed, total thrust of the rotors (N)."""
+"""Result of all steps: on the ground, crashed, total thrust of the rotors (N)."""
 
 
 def outcome(state: VehicleState) -> Outcome:
-    """Return what is asked for after all steps."""
+    """Return the result of all steps."""
     _, (first, second, third, fourth), _, _ = state.actuation
     return state.on_ground, state.crashed, first + second + third + fourth
 
@@ -146,11 +146,11 @@ class Plant(Protocol):
 
     Args:
         law: constants.
-        state: at the start.
+        state: state at the start.
         trail_length: steps whose motion is kept.
 
     Attributes:
-        law: as the argument.
+        law: the argument `law`.
     """
 
     law: VehicleLaw

@@ -23,12 +23,12 @@ STATUS_PERIOD_US = 500_000
 
 
 class Px4Commander:
-    """PX4's `Commander`.
+    """The `Commander` of PX4.
 
     Args:
         state: the autopilot's state.
         parameters: its parameters.
-        control: begins every mode entered.
+        control: begins each mode that is entered.
         stream: the offboard setpoints.
         announce: sends texts and events.
         checks: finds what forbids arming.
@@ -99,9 +99,9 @@ class Px4Commander:
         that cannot run.
 
         Args:
-            mode: requested.
-            takeoff_z: where TAKEOFF ends, m down; None = MIS_TAKEOFF_ALT above home.
-            hold: where LOITER goes, NED; None = here.
+            mode: requested mode.
+            takeoff_z: down position where TAKEOFF ends, m; None = MIS_TAKEOFF_ALT above home.
+            hold: position of LOITER, m NED; None = here.
         """
         state = self._state
         if state.armed and not self._can_run(mode):
@@ -144,11 +144,11 @@ class Px4Commander:
 
     @property
     def under_setpoints(self) -> bool:
-        """Whether it is armed in OFFBOARD."""
+        """Whether the vehicle is armed in OFFBOARD."""
         return self._state.armed and self._state.mode is Mode.OFFBOARD
 
     def announce_problem(self) -> None:
-        """AnnounceEvent what forbids arming now, if anything does."""
+        """Announce what forbids arming now, if anything does."""
         problem = self._problem()
         if problem is not None:
             self._announce(EventKind.PREFLIGHT_FAIL, problem)

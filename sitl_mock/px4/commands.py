@@ -22,13 +22,13 @@ _CHANGE_MODE = 1
 
 
 class Px4Commands(Commands):
-    """PX4's `Commands`.
+    """The `Commands` of PX4.
 
     Args:
         state: the autopilot's state.
         commander: changes arming and modes.
         builders: message id -> builder, for requests.
-        origin: of the local frame.
+        origin: origin of the local frame.
     """
 
     def __init__(

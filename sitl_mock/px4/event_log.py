@@ -25,9 +25,9 @@ _KEPT = 20
 """Number of events that can be requested again."""
 _SEQUENCE_PERIOD_US = 3_000_000
 _RESET = 1
-"""MAV_EVENT_CURRENT_SEQUENCE_FLAGS: the sequence restarts; sent before the first event."""
+"""MAV_EVENT_CURRENT_SEQUENCE_FLAGS: the sequence restarts; set before the first event."""
 _UNAVAILABLE = 0
-"""MAV_EVENT_ERROR_REASON."""
+"""Value of MAV_EVENT_ERROR_REASON: the event is not available."""
 _CHUNK = 50
 
 
@@ -40,8 +40,8 @@ class EventLog:
     """Sends events on all links.
 
     Args:
-        state: for the time.
-        links: where to.
+        state: state of the autopilot, for the time.
+        links: links to send on.
     """
 
     def __init__(self, state: State, links: list[Link]) -> None:
@@ -60,7 +60,7 @@ class EventLog:
             event_id: see `px4_events.event_id`.
             severity: MAV_SEVERITY for the user; 8 = for programs only.
             internal: MAV_SEVERITY for the vehicle's log; None = the same.
-            arguments: packed.
+            arguments: packed arguments.
         """
         first = not self._sent
         self._latest = (self._latest + 1) & 0xFFFF
@@ -120,8 +120,8 @@ class Announcer:
     """Announces events on all links.
 
     Args:
-        personality: texts and ids.
-        links: where to.
+        personality: provides texts and ids.
+        links: links to send on.
         events: sends the events.
     """
 
@@ -132,12 +132,12 @@ class Announcer:
         self._text_id = 0
 
     def __call__(self, kind: EventKind, detail: str, arguments: bytes = b"") -> None:
-        """AnnounceEvent an event.
+        """Announce an event.
 
         Args:
-            kind: what happened.
-            detail: for the placeholder of its text.
-            arguments: packed, instead of the constant ones of the event.
+            kind: kind of the event.
+            detail: text for the placeholder of its text.
+            arguments: packed arguments that replace the constant ones of the event.
         """
         event = self._personality.events[kind]
         if event.event_id:

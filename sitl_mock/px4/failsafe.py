@@ -27,7 +27,7 @@ _EXCEPT_AUTO, _EXCEPT_OFFBOARD = 2, 4
 _GCS_MARGIN_US = 2_000_000
 """The loss of the ground station is detected this long after COM_DL_LOSS_T (measured)."""
 _ACTED = -1
-"""Instead of the time of a loss: its failsafe has already acted."""
+"""Stands for the time of a loss whose failsafe has already acted."""
 _COMPANION_MARGIN_US = 1_500_000
 """The loss of the companion is announced this long after COM_OBC_LOSS_T (measured)."""
 _WARNINGS = {

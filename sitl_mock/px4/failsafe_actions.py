@@ -71,7 +71,7 @@ class AnnounceEvent(Protocol):
     """Sends texts and events."""
 
     def __call__(self, kind: EventKind, detail: str, arguments: bytes = b"", /) -> None:
-        """AnnounceEvent an event, with a detail for its text and packed arguments."""
+        """Announce an event, with a detail for its text and packed arguments."""
 
 
 class EnterMode(Protocol):
@@ -107,7 +107,7 @@ class FailsafeActions:
         self._stop = stop
         self._announced: tuple[Cause, Action] | None = None
         self.cause: Cause | None = None
-        """Of the active failsafe, None if none is active."""
+        """Cause of the active failsafe, None if none is active."""
 
     def clear(self) -> None:
         """End the active failsafe."""
@@ -123,8 +123,8 @@ class FailsafeActions:
         """Execute an action unless a more severe cause is active; announce it if it is new.
 
         Args:
-            cause: of the failsafe.
-            action: to execute now.
+            cause: cause of the failsafe.
+            action: action to execute now.
             then: action after COM_FAIL_ACT_T, None if ``action`` is the last.
         """
         if self.cause is not None and self.cause.severity > cause.severity:

@@ -23,11 +23,11 @@ _PERIOD_US = 2_000_000
 """Minimum time between two reports."""
 
 _SUMMARY = struct.Struct("<BIIII")
-"""Chunk; components with errors, with warnings; modes that can be armed, that can run."""
+"""Fields: chunk; components with errors, with warnings; modes that can be armed, that can run."""
 _FAILURE = struct.Struct("<IB")
-"""Affected modes, component."""
+"""Fields: affected modes, component."""
 _HEALTH = struct.Struct("<BIII")
-"""Chunk; components present, with errors, with warnings."""
+"""Fields: chunk; components present, with errors, with warnings."""
 
 
 class _Check(NamedTuple):

@@ -26,7 +26,7 @@ _STILL = ActuatorCommand(False, 0.0, 0.0, 0.0, 0.0)
 
 
 class Px4ModeControl:
-    """PX4's `ModeControl`.
+    """The `ModeControl` of PX4.
 
     Args:
         state: the autopilot's state; the echoes of the targets are written here.

@@ -31,7 +31,7 @@ class _Stream:
         self.interval_us = interval_us
         self.due_us = due_us
         self.sent_us: int | None = None
-        """The latest slot in which it was sent."""
+        """The latest slot in which the message was sent, us."""
         self.status_us = -1
 
 

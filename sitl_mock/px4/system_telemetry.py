@@ -25,10 +25,10 @@ class Px4SystemTelemetry(SystemTelemetry):
 
     Args:
         state: the autopilot's state.
-        origin: of the local frame.
+        origin: origin of the local frame.
         identity: content of AUTOPILOT_VERSION.
-        vehicle: for the battery.
-        stream: says which setpoints OFFBOARD has.
+        vehicle: the vehicle, for its battery.
+        stream: the offboard setpoints.
     """
 
     def __init__(

@@ -187,3 +187,19 @@ def test_the_lead_is_derived_where_acceleration_is_limited():
     assert RateResponse(tilt, tilt, yaw, 0.04).lead == 0.04
     assert RateResponse(tilt, tilt, yaw, 0.0).lead == 0.0
     assert RateResponse(AxisResponse(0.047, 0.04), yaw=AxisResponse(0.37, 0.1)).lead == 0.0
+
+
+def test_an_older_report_is_completed_by_the_rates_sent_since_it_was_measured():
+    axis = AxisResponse(LAG, 0.008, inf)
+    frame = TargetFrame(RateResponse(axis, axis, axis))
+    frame.note(1.0, 0.0)
+    for _ in range(30):
+        frame.advance(0.5, 0.1, 0.004)
+    frame.note(2.0, 0.04)  # after it was measured, ten samples turned the target
+    assert frame.heading() == pytest.approx(2.0 + 0.4 * 0.04)
+    frame.note(3.0, OLDEST)  # the oldest that is used; nothing is known of before
+    assert frame.heading() == pytest.approx(3.0 + 0.4 * 0.12)
+    frame.note(4.0, OLDEST + 1e-3)
+    assert frame.heading() == pytest.approx(3.0 + 0.4 * 0.12)
+    frame.note(4.0, -1e-3)
+    assert frame.heading() == pytest.approx(3.0 + 0.4 * 0.12)

@@ -205,3 +205,36 @@ def test_level_and_on_target_nothing_is_asked():
     for name in LAW_NAMES:
         rates = make_planner(name).rates(LEVEL, Target(0.0, 0.0, 0.0), 0.01)
         assert tuple(rates) == pytest.approx((0.0, 0.0, 0.0), abs=1e-15)
+
+
+def test_a_law_uses_other_gains_and_limits_from_the_next_sample_on():
+    planner = make_planner("first-order", gain=4.0, limits=Limits(max_tilt=0.6))
+    target = Target(0.5, 0.0, 0.0)
+    before = planner.rates(LEVEL, target, 0.004)
+    narrow = make_planner("first-order", gain=2.0, limits=Limits(max_tilt=0.2))
+    planner.retune(narrow.constants)
+    found = planner.rates(LEVEL, target, 0.004)
+    assert found == narrow.rates(LEVEL, target, 0.004) != before
+
+
+@pytest.mark.parametrize("axis", ["roll", "pitch", "yaw"])
+def test_each_axis_of_model_following_has_its_own_response(axis):
+    own = {"lag": 0.03, "dead_time": 0.02, "acceleration": 9.0}
+    options = {"lag": 0.05, "dead_time": 0.04, "acceleration": 20.0}
+    prefix = "" if axis == "roll" else f"{axis}_"
+    planner = make_planner(
+        "model-following", 5.0, **options | {f"{prefix}{key}": own[key] for key in own}
+    )
+    forward = planner._forward
+    axes = dict(zip(("roll", "pitch", "yaw"), (*forward.tilt, forward.yaw), strict=True))
+    found = {name: (each.lag, each.dead_time, each.acceleration) for name, each in axes.items()}
+    theirs = own if axis == "roll" else options  # pitch and yaw follow roll
+    expected = {name: tuple((own if name == axis else theirs).values()) for name in axes}
+    assert found == expected
+
+
+def test_the_yaw_rate_of_model_following_stays_within_its_limit():
+    planner = make_planner("model-following", 5.0, 4.0, Limits(max_yaw_rate=0.3), lag=0.05)
+    planner.reset(LEVEL)
+    found = [planner.rates(LEVEL, Target(0.0, 0.0, 2.0), 0.01).yaw for _ in range(50)]
+    assert max(found) == pytest.approx(0.3)

@@ -7,7 +7,12 @@ from scipy.integrate import solve_ivp
 from companion.attitude import Coefficients, Limits, Target
 from companion.attitude.kinematics import into_body
 from companion.attitude.limits import make_constants
-from companion.attitude.reference_model import ReferenceModel, rates_along
+from companion.attitude.reference_model import (
+    ReferenceModel,
+    braking_lead,
+    model_response,
+    rates_along,
+)
 from tests.attitude.independent import attitudes, coefficients_of, headings_of, held, rate_between
 
 W_M = np.pi / 2
@@ -166,3 +171,18 @@ def test_its_rates_move_the_attitude_along_it():
         got = (coefficients_of(ahead) - coefficients_of(behind))[0] / (2.0 * h)
         assert got == pytest.approx(speed, abs=1e-8)
         assert headings_of(ahead)[0] == pytest.approx(headings_of(behind)[0], abs=1e-12)
+
+
+@pytest.mark.parametrize(("gain", "lag"), [(5.0, 0.05), (6.0, 0.12), (3.0, 0.4)])
+def test_the_response_of_the_model_is_its_differential_equation_divided(gain, lag):
+    """τ·c̈ + ċ = p·(c_d − c − κ·ċ), solved for c̈ = (p'·(c_d − c) − ċ)/τ'."""
+    slope, error = 0.7, 0.2
+    found_gain, found_lag = model_response(gain, lag)
+    ahead = braking_lead(gain, lag)
+    expected = (gain * (error - ahead * slope) - slope) / lag
+    assert (found_gain * error - slope) / found_lag == pytest.approx(expected)
+
+
+def test_the_model_brakes_ahead_only_where_it_would_overshoot():
+    assert braking_lead(5.0, 0.05) == 0.0
+    assert braking_lead(6.0, 0.12) == pytest.approx((2.7 * 0.12 / 6.0) ** 0.5 - 1.0 / 6.0)

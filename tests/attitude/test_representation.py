@@ -109,3 +109,7 @@ def test_wrap_angle(angle):
     wrapped = wrap_angle(angle)
     assert -math.pi < wrapped <= math.pi
     assert math.cos(wrapped - angle) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_coefficients_of_length_one_lie_on_the_horizon():
+    assert coefficients(attitude(Coefficients(0.0, -1.0), 0.4)) == pytest.approx((0.0, -1.0))

@@ -14,6 +14,7 @@ from companion.attitude.rotation import (
     euler_angles,
     short_way,
     turned,
+    turned_about_vertical,
 )
 from tests.attitude.independent import attitudes, held, wrapped
 
@@ -96,3 +97,19 @@ def test_the_short_way_is_the_same_direction_at_most_half_a_turn_off():
         brought = short_way(angle)
         assert -math.pi < brought <= math.pi
         assert math.cos(brought - angle) == pytest.approx(1.0, abs=1e-14)
+
+
+def test_a_turn_returns_a_unit_quaternion_along_one_that_is_slightly_off():
+    q = (0.5, -0.5, 0.5, 0.5)
+    found = turned(tuple(1.0008 * part for part in q), (0.4, -0.3, 0.2), 0.01)
+    assert found == pytest.approx(turned(q, (0.4, -0.3, 0.2), 0.01), abs=2e-6)
+
+
+@pytest.mark.parametrize("angle", [0.7, -2.9])
+def test_a_turn_about_the_vertical_turns_the_world_axes(angle):
+    """Clockwise from above is positive about the world's down axis."""
+    expected = scalars(Rotation.from_rotvec([0.0, 0.0, angle]) * ROTATIONS)
+    for q, there in zip(scalars(ROTATIONS), expected, strict=True):
+        found = turned_about_vertical(q, angle)
+        alike = math.copysign(1.0, sum(a * b for a, b in zip(found, there, strict=True)))
+        assert [alike * part for part in found] == pytest.approx(there, abs=1e-12)

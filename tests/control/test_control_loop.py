@@ -378,6 +378,21 @@ def test_after_them_the_planner_begins_anew():
     assert (planner.asked, planner.resets) == (11, 2)
 
 
+@pytest.mark.parametrize(
+    ("q", "resets"),
+    [
+        ((math.cos(0.1), math.sin(0.1), 0.0, 0.0), 2),  # the thrust axis jumps by 0.2 rad
+        ((math.cos(0.1), 0.0, 0.0, math.sin(0.1)), 1),  # the heading does: no planner sees it
+    ],
+)
+def test_after_a_jump_of_the_thrust_axis_the_planner_begins_anew(q, resets):
+    planner = CountingPlanner()
+    bench = Bench(planner=planner)
+    bench.run(10)
+    bench.run(5, q=q)
+    assert (planner.asked, planner.resets) == (15, resets)
+
+
 def test_the_step_after_a_gap_is_as_long_as_the_one_before_it():
     planner = CountingPlanner()
     bench = Bench(planner=planner)

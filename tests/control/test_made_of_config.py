@@ -8,6 +8,7 @@ import pytest
 from companion.attitude import BodyRates, Limits, Target
 from companion.attitude.limits import make_constants
 from companion.config import Config
+from companion.control.estimator_resets import EstimatorResets
 from companion.control.hold_settings import hold_weights
 from companion.control.hover_learning import HoverLearning
 from companion.control.inner_loop import hover_thrust, law_constants, plugin, thrust_limits
@@ -15,7 +16,8 @@ from companion.control.loop_record import Deadlines
 from companion.control.loops import make_loops
 from companion.control.motion_estimate import MotionEstimate
 from companion.control.outer_loop import linear_settings, predictive_settings
-from companion.control.retuning import Retuning, between, tuning
+from companion.control.planner_runner import PlannerRunner
+from companion.control.retuning import Retuning, between, fixed_because, tuning
 from companion.control.slew import Slew
 from companion.control.telemetry import FreshPosition
 from companion.drag import AxisDrag, Drag
@@ -90,6 +92,25 @@ def test_a_change_of_values_reaches_both_loops():
     others = SimpleNamespace(maker=SimpleNamespace(guidance="another package's"))
     with pytest.raises(TypeError, match="str cannot be retuned"):
         Retuning(SimpleNamespace(), others).apply(values)
+
+
+def test_a_planner_of_another_package_keeps_its_gains():
+    runner = PlannerRunner(SimpleNamespace(), EstimatorResets())
+    with pytest.raises(TypeError, match="SimpleNamespace cannot be retuned"):
+        runner.retune(tuning(CONFIG).constants)
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "name", "words"),
+    [
+        ("guidance", "kind", "nmpc", "guidance.kind nmpc keeps"),
+        ("planner", "name", "theirs", "planner.name theirs keeps"),
+    ],
+)
+def test_what_may_not_change_in_flight_says_why(section, key, name, words):
+    assert fixed_because(CONFIG) is None
+    changed = getattr(CONFIG, section).model_copy(update={key: name})
+    assert words in fixed_because(CONFIG.model_copy(update={section: changed}))
 
 
 def with_gains(**gains):

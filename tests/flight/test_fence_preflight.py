@@ -5,10 +5,12 @@ import pytest
 import yaml
 
 from companion.config import Config
+from companion.config.known_drag import before_connecting
 from companion.drag import Drag
 from companion.files.yaml_file import ConfigError, parse
 from companion.flight.fence_check import MARGIN, FenceCheck
-from companion.flight.maneuvers import configured_maneuvers, require_inside
+from companion.flight.maneuver_checks import require_inside
+from companion.flight.maneuvers import configured_maneuvers
 from companion.guidance import Pose
 from companion.guidance.fence import Fence, Place, distance_inside
 from companion.guidance.predicted import predicted
@@ -123,11 +125,11 @@ def test_a_polygon_on_the_map_is_judged_as_soon_as_the_place_is_known():
     )
     parts = configured_maneuvers(round_).parts
     with pytest.raises(ConfigError, match=r"leaves the fence, by .* safety\.fence_polygon_deg"):
-        require_inside(round_, parts, here)
+        require_inside(round_, parts, here, before_connecting(round_))
     small = config_of(
         ROUND, circle={"radius_m": 3.0, "speed_m_s": 1.0}, safety={"fence_polygon_deg": corners}
     )
-    require_inside(small, configured_maneuvers(small).parts, here)
+    require_inside(small, configured_maneuvers(small).parts, here, before_connecting(small))
 
 
 @pytest.mark.parametrize(
@@ -170,7 +172,12 @@ def test_what_is_accepted_never_makes_the_monitor_speak(seed):
         off = rng.normal(size=3)
         off *= 0.999 * (MARGIN - 0.13) / np.linalg.norm(off)
         place = tuple((np.array(moment.offset) + off).tolist())
-        now = Now(offset=place, velocity=moment.velocity, height=5.0 - place[2])
+        now = Now(
+            offset=place,
+            velocity=moment.velocity,
+            height=5.0 - place[2],
+            acceleration=moment.acceleration[:2],
+        )
         assert judge(Snapshot(0.0, motion=now), False) is None
 
 
@@ -186,11 +193,11 @@ def test_the_worst_moment_is_found_among_all():
     fence = Fence(9.0, 5.0, 1.0, (), (), 2.5, 0.3)
     for _ in range(200):
         place, speed = rng.uniform(-6, 6, (20, 3)), rng.uniform(-3, 3, (20, 3))
-        none = np.zeros((20, 3))
-        motion = Motion(np.arange(20.0), place, speed, none, none, none[:, 0])
+        change, none = rng.uniform(-3, 3, (20, 3)), np.zeros((20, 3))
+        motion = Motion(np.arange(20.0), place, speed, change, none, none[:, 0])
         each = [
-            fence.stop_breach(tuple(p), tuple(v), 5.0 - p[2], None, MARGIN)
-            for p, v in zip(place.tolist(), speed.tolist(), strict=True)
+            fence.stop_breach(tuple(p), tuple(v), 5.0 - p[2], None, MARGIN, (a[0], a[1]))
+            for p, v, a in zip(place.tolist(), speed.tolist(), change.tolist(), strict=True)
         ]
         found = FenceCheck(fence, 5.0)(motion)
         assert (found is None) is all(one is None for one in each)

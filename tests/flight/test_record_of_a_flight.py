@@ -165,3 +165,18 @@ def test_a_fault_in_what_is_shown_does_not_end_the_flight(tmp_path):
     summary = fly(config, QuickVehicle(), tmp_path, Broken())
     assert summary.result == "ok"
     assert any("ZeroDivisionError('the screen')" in text for _, text in summary.events)
+
+
+def test_a_failure_of_the_recording_at_its_close_is_an_event(tmp_path, monkeypatch):
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("companion.recording.recorder._McapEntries.close", full)
+    config = merged(QUICK_FLIGHT, {"hover": {"duration_s": 1.0}})
+    summary = fly(config, QuickVehicle(), tmp_path)
+    written = json.loads((tmp_path / "summary.json").read_text())
+    for texts in (
+        [text for _, text in summary.events],
+        [each["text"] for each in written["events"]],
+    ):
+        assert [text for text in texts if "recording stopped: No space left" in text] == texts[-1:]

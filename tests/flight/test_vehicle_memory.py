@@ -72,6 +72,21 @@ def test_a_trajectory_is_judged_by_what_was_learned(tmp_path):
         )
 
 
+def test_another_vehicles_drag_counts_only_until_this_one_is_known(tmp_path):
+    steep = {
+        "flight": {"maneuvers": ["circle"]},
+        "circle": {"radius_m": 5.0, "speed_m_s": 5.0},
+        "guidance": {"drag_per_s": None},
+        "limits": {"max_tilt_deg": 30.0},
+        "recording": {"directory": str(tmp_path)},
+    }
+    LearnedFile(tmp_path, "aa").save(Drag(0.2), 5.0)  # 28° are enough
+    with mock_vehicle(tmp_path, seed=3) as mock:
+        flown = fly(mock, tmp_path / "log", **steep)
+    assert flown.phase == "checks"
+    assert "the drag is not known: assumed up to 0.7 1/s" in flown.result
+
+
 def test_it_is_the_vehicles_own(tmp_path):
     LearnedFile(tmp_path, "aa").save(Drag(0.8, 0.02), 5.0)
     memory, estimate, notes = remembered(tmp_path)

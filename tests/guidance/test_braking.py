@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.guidance import VehicleMotion
-from companion.guidance.braking import Assumed, Braking, braking_time
+from companion.guidance.braking import Assumed, Braking, brake, braking_time
 
 HERE, BEGUN, HEADING = (3.0, -2.0, -5.0), 100.0, 0.7
 SPEEDS = st.floats(-10.0, 10.0)
@@ -51,3 +51,11 @@ def test_a_vehicle_at_rest_is_held_where_it_is():
     assert duration == 0.0
     braking = Braking(BEGUN, VehicleMotion(HERE, (0.05, 0.0, 0.0)), HEADING, duration)
     assert braking.at(BEGUN + 1.0).position_ned == HERE
+
+
+@pytest.mark.parametrize("velocity", [(3.0, 4.0, -2.0), (5.0, 0.0, 1.0), (0.0, -5.0, 0.0)])
+def test_the_braking_that_begins_now_is_as_long_as_the_horizontal_speed_needs(velocity):
+    motion, assumed = VehicleMotion((1.0, 2.0, -9.0), velocity), Assumed(0.3, 2.5)
+    found = brake(7.0, motion, 0.4, 6.0, assumed)
+    assert found == Braking(7.0, motion, 0.4, braking_time(5.0, 6.0, assumed))
+    assert found.duration > 0.0

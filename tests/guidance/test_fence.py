@@ -3,6 +3,7 @@
 from dataclasses import replace
 from math import cos, inf, radians
 
+import numpy as np
 import pytest
 
 from companion.guidance.fence import (
@@ -94,6 +95,20 @@ def test_it_stops_after_the_reaction_and_the_braking():
     stop = FENCE.stop((1.0, 2.0, -5.0), (3.0, -4.0, 2.0))
     assert stop == pytest.approx((1.0 + 0.6 * 8.75, 2.0 - 0.8 * 8.75, -3.0))
     assert FENCE.stop((0.0, 0.0, 0.0), (0.0, 0.0, -2.0)) == pytest.approx((0.0, 0.0, -2.0))
+
+
+def test_an_acceleration_lasts_for_the_reaction_time_and_one_that_brakes_does_not_count():
+    fence = Fence(9.0, 5.0, 1.0, (), (), 2.5, 0.3)
+    still, way = (0.0, 0.0, 0.0), (2.0, 0.0, 0.0)
+    faster = fence.stop(still, way, (4.0, 0.0))
+    assert faster[0] == pytest.approx(2.0 * 0.3 + 4.0 * 0.09 / 2.0 + 3.2**2 / 5.0)
+    assert fence.stop(still, way, (-4.0, 0.0)) == fence.stop(still, way)
+    north, east, _ = fence.stop(still, way, (0.0, 5.0))
+    assert (north > 0.0, east > 0.0) == (True, True)
+    places = np.zeros(2), np.zeros(2), np.zeros(2)
+    ways = np.array([2.0, 2.0]), np.zeros(2), np.zeros(2)
+    several = fence.stop(places, ways, (np.array([4.0, -4.0]), np.zeros(2)))
+    assert several[0].tolist() == pytest.approx([faster[0], fence.stop(still, way)[0]])
 
 
 def test_where_it_would_stop_is_judged_with_its_height_there():

@@ -75,3 +75,11 @@ def test_a_heading_that_jumps_by_a_whole_turn_is_not_a_turn():
 def test_without_a_gain_only_the_rate_is_asked():
     asked, rate = InnerResponse(0.0, 0.3, 0.1, True).heading_target(lambda t: 0.5 * t, 1.0)
     assert (asked, rate) == pytest.approx((0.55, 0.5))
+
+
+def test_the_time_of_a_step_contains_the_dead_time():
+    """A planner that follows its model answers a step as without dead time, that much later."""
+    first_order = InnerResponse(5.0, 0.0, 0.0, follows_model=True).step_time(0.1, np.inf)
+    assert first_order == pytest.approx(0.2, abs=2e-3)
+    late = InnerResponse(5.0, 0.0, 0.08, follows_model=True).step_time(0.1, np.inf)
+    assert late == pytest.approx(first_order + 0.08, abs=2e-3)

@@ -1,7 +1,8 @@
 """The correction against an estimator that follows its GPS too slowly, integrated independently."""
 
-from math import cos, hypot, isfinite, sin
+from math import cos, hypot, isfinite, sin, sqrt
 from random import Random
+from statistics import mean
 
 import pytest
 from hypothesis import given
@@ -78,24 +79,30 @@ def test_a_gap_and_a_reset_begin_anew():
     assert correction.corrected(5.0 + 2.0 * DT, away) == away
 
 
-def noisy(metres, seconds=20.0, seed=3):
-    """The correction at rest, and the errors it adds (m), with white noise of the position."""
+def noisy(metres, speed, seconds=20.0, seed=3):
+    """The correction at a speed (m/s), and the errors it adds (m), with white position noise."""
     quick = CorrectionSettings(ahead=0.65, window=0.04, largest=0.2, lateness=0.0)
     correction, random, added = PositionCorrection(quick), Random(seed), []
     for n in range(round(seconds / DT)):
-        north = random.gauss(0.0, metres)
-        found = correction.corrected(n * DT, VehicleMotion((north, 0.0, 0.0), (0.0, 0.0, 0.0)))
+        north = speed * n * DT + random.gauss(0.0, metres)
+        found = correction.corrected(n * DT, VehicleMotion((north, 0.0, 0.0), (speed, 0.0, 0.0)))
         added.append(abs(found.position_ned[0] - north))
     return correction, added
 
 
 def test_noise_of_the_positions_lengthens_the_filters():
-    smooth, little = noisy(1e-4)
-    assert smooth.smoothness == 1.0
+    smooth, little = noisy(1e-4, speed=3.0)
+    assert smooth.trust == 1.0
     assert max(little) <= 2e-3
-    rough, added = noisy(0.02)
-    assert rough.smoothness == 0.0
+    rough, added = noisy(0.02, speed=3.0)
+    assert rough.trust == 0.0
     assert max(added[50:]) <= 0.12  # unfiltered: 0.65 s · √2·0.02 m / 0.02 s, about 0.9 m rms
+
+
+def test_at_rest_the_positions_are_trusted_less_and_filtered_more():
+    assert [noisy(1e-4, speed)[0].trust for speed in (0.0, 1.0, 2.0)] == [0.0, 0.5, 1.0]
+    added = {speed: sqrt(mean(a * a for a in noisy(0.003, speed)[1])) for speed in (0.0, 3.0)}
+    assert added[0.0] <= 0.6 * added[3.0]
 
 
 @given(st.lists(st.tuples(st.floats(-1.0, 1.0), pairs, pairs), min_size=1, max_size=30))

@@ -70,7 +70,7 @@ def _flight(seconds: float, *, page: bool) -> tuple[list[float], list[float]]:
         helper, observer = None, Silent()
         if page:
             door = open_door("127.0.0.1:0")
-            helper = observer = Helper(Wishes(None, config, door, True, folder), config)
+            helper = observer = Helper(Wishes(None, config, door, None, True, folder), config)
             stack.callback(helper.close, "over")
             door.listening.close()
             tab = stack.enter_context(chromium())()

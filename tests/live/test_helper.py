@@ -40,7 +40,7 @@ def test_a_message_that_is_too_large_is_dropped():
 def test_edits_of_the_file_reach_the_flight(tmp_path):
     path = tmp_path / "flown.yaml"
     path.write_text("planner: {gain_per_s: 5.0}\n")
-    helper = Helper(Wishes(path, load(path), None, True, None), load(path))
+    helper = Helper(Wishes(path, load(path), None, None, True, None), load(path))
     notes = []
     helper.note = helper.changes.note = notes.append
 

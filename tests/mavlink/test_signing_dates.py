@@ -233,6 +233,7 @@ def test_streams_of_another_vehicle_with_the_same_key_stay():
         b'{"date": 0, "sent": 9999999999999999, "streams": {}}',
         b'{"date": 0, "sent": 0, "streams": {"1/1": [3]}}',
     ],
+    ids=lambda text: repr(text[-20:]),
 )
 def test_a_damaged_file_is_told_and_replaced(text):
     file = StampFile(KEY)

@@ -8,10 +8,12 @@ Exit code 1 if a room has fewer than 85 % of its mutants killed.
 import argparse
 import contextlib
 import os
+import random
 import shutil
 import subprocess
 import sys
 import tomllib
+from fnmatch import fnmatch
 from pathlib import Path
 
 from tests.mutants.report import WANTED, Mutant, print_room
@@ -42,6 +44,9 @@ _NOT_MUTATED = [r"^\s*raise \w+\("]
 _NOT_RUN = ["--ignore-glob=*/test_add_a_*.py"]
 """Tests that read the code itself: mutants stand in it beside the functions."""
 
+_NONE = "companion.none"
+"""A pattern that fits no mutant: mutmut makes the mutants and the tests' times, and then fails."""
+
 _PATIENCE_S = 3.0
 """Added to a test's own time; fifteen times the sum is an endless loop, also on a busy computer."""
 
@@ -52,6 +57,8 @@ def main() -> int:
     parser.add_argument("rooms", nargs="*", metavar="ROOM", help=f"of {', '.join(ROOMS)}; all")
     parser.add_argument("--only", default="*", help="module and function: 'rotation.*'")
     parser.add_argument("--again", action="store_true", help="what the last run has not killed")
+    parser.add_argument("--sample", type=int, help="try only so many mutants, drawn at random")
+    parser.add_argument("--seed", type=int, default=0, help="of the draw")
     parser.add_argument("--limit", type=float, default=1.0, help="CPU s of a quick test")
     parser.add_argument("--children", type=int, default=os.cpu_count(), help="processes")
     options = parser.parse_args()
@@ -69,6 +76,10 @@ def main() -> int:
             chosen = [mutant.name for mutant in _mutants(folder) if not mutant.killed]
         else:
             _prepare(folder, room, options.limit)
+            if options.sample:
+                _mutmut(folder, "run", "--max-children", "1", _NONE, may_fail=True)  # makes them
+                names = sorted(m.name for m in _mutants(folder) if fnmatch(m.name, chosen[0]))
+                chosen = random.Random(options.seed).sample(names, min(options.sample, len(names)))
         _mutmut(folder, "run", "--max-children", str(options.children), *chosen)
         mutants = [mutant for mutant in _mutants(folder) if mutant.status != "not checked"]
         _find_changes(folder, mutants)
@@ -112,11 +123,12 @@ def _toml(strings: list[str]) -> str:
     return "[" + ", ".join(f'"{string}"' for string in escaped) + "]"
 
 
-def _mutmut(folder: Path, *arguments: str) -> None:
+def _mutmut(folder: Path, *arguments: str, may_fail: bool = False) -> None:
     """Run it; what it draws on a terminal goes to a file."""
     with (folder / "mutmut.log").open("w") as log:
         command = [sys.executable, "-m", "mutmut", *arguments]
-        if subprocess.run(command, cwd=folder, stdout=log, stderr=log, check=False).returncode:
+        failed = subprocess.run(command, cwd=folder, stdout=log, stderr=log, check=False).returncode
+        if failed and not may_fail:
             raise SystemExit(f"mutmut failed: {log.name}")
 
 

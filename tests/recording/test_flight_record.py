@@ -9,9 +9,10 @@ from zstandard import ZstdError
 from companion.control.loop_record import Unanswered
 from companion.recording.flight_record import RecordError, read_flight
 from companion.recording.mcap_file import cdr, reader, writer
-from companion.recording.mcap_file.channels import CHANNELS, RESOURCES
+from companion.recording.mcap_file.channels import CHANNELS, RESOURCES, WORDS
 from companion.recording.mcap_file.loop_channels import ACTION, REASONS, SETPOINT
-from companion.recording.mcap_file.writer import WORDS, McapWriter
+from companion.recording.mcap_file.scene import Entity, scene_message
+from companion.recording.mcap_file.writer import McapWriter
 from companion.recording.measurements.recorded_summary import derived_summary, summary_of
 from companion.replay.entries import entries
 
@@ -51,6 +52,8 @@ def write(folder):
     for topic in ("/pose", "/reference"):
         pose = cdr.PoseEncoder("world").message(second, (1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0))
         writer.message(topic, second, pose)
+    for topic in ("/scene", "/paths", "/fence"):
+        writer.message(topic, second, scene_message(second, (Entity(topic, "world"),)))
     writer.close()
     return folder / "flight.mcap"
 
@@ -89,6 +92,7 @@ def test_what_is_written_is_read_again_by_both_readers(tmp_path):
     assert official["/tf"][0][1].child_frame_id == "vehicle"
     assert official["/tf"][0][1].translation.z == 3.0
     assert official["/pose"][0][1].pose.orientation.w == 1.0
+    assert official["/fence"][0][1].entities[0].id == "/fence"
     assert official["/phase"][0][1].waits_for == "a heartbeat é"
 
 

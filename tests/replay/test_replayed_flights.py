@@ -2,6 +2,9 @@
 
 import csv
 import json
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +15,7 @@ from pymavlink import mavutil
 from companion.cli.main import main
 from companion.config.files import changed, load
 from companion.recording.flight_record import read_flight
-from companion.recording.mcap_file.channels import CHANNELS
-from companion.recording.mcap_file.writer import WORDS
+from companion.recording.mcap_file.channels import CHANNELS, WORDS
 from companion.recording.measurements.recorded_summary import derived_summary, summary_of
 from companion.replay.replay import Replay
 from tests.flight.fly import fly, mock_vehicle
@@ -70,6 +72,45 @@ def test_a_replay_gives_the_commands_of_the_flight_to_the_bit(tmp_path, autopilo
     samples = replayed(tmp_path)
     assert [each for each in samples if not each.same] == []
     assert sum(each.recorded is not None for each in samples) == summary.counts.setpoints > 1000
+
+
+_GRAPHS = ("degrees(SET_ATTITUDE_TARGET.body_roll_rate)", "LOCAL_POSITION_NED.z*-1")
+_GRAPHER = """
+import json, sys
+import matplotlib
+matplotlib.use("Agg")
+from MAVProxy.modules.lib.grapher import MavGraph
+from pymavlink import mavutil
+
+log = mavutil.mavlink_connection(sys.argv[1], notimestamps=False, zero_time_base=False)
+modes = log.flightmode_list()
+graph = MavGraph()
+graph.add_mav(log)
+for expression in sys.argv[2:]:
+    graph.add_field(expression)
+graph.process([], modes, 0)
+print(json.dumps({"modes": [mode for mode, *_ in modes], "curves": graph.y}))
+"""
+"""What MAVExplorer does when it loads a log and draws graphs, without its windows (wxPython)."""
+
+
+@pytest.mark.parametrize(("autopilot", "mode"), [("px4", "OFFBOARD"), ("ardupilot", "GUIDED")])
+def test_mavexplorer_and_mavlogdump_read_the_log(tmp_path, autopilot, mode):
+    summary = flown(tmp_path, autopilot)
+    tlog, python = tmp_path / "flight.tlog", sys.executable
+    command = [python, "-c", _GRAPHER, tlog, *_GRAPHS]
+    graphed = json.loads(subprocess.check_output(command, text=True).splitlines()[-1])
+    assert mode in graphed["modes"]
+    rates, heights = graphed["curves"]
+    assert len(rates) == summary.counts.setpoints
+    assert 10.0 < max(rates) < 180.0
+    assert max(heights) == pytest.approx(2.0, abs=0.4)
+
+    mavlogdump = Path(python).with_name("mavlogdump.py")
+    command = [python, mavlogdump, "--types", "SET_ATTITUDE_TARGET", "--format", "json", tlog]
+    dumped = subprocess.check_output(command, text=True).splitlines()
+    thrust = [json.loads(line)["data"]["thrust"] for line in dumped]
+    assert thrust == pytest.approx(read_flight(tmp_path).rows("setpoint")["thrust"], abs=1e-6)
 
 
 def test_a_replay_of_a_flight_with_faults_is_that_flight_too(tmp_path):

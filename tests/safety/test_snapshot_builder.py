@@ -54,6 +54,7 @@ class Flight:
         self.course = SimpleNamespace(position_ned=(5.0, -6.0, -7.0), velocity=(1.0, 2.0, 0.5))
         self.guidance = SimpleNamespace(
             motion=Motions(self.course.position_ned, self.course.velocity),
+            acceleration=(0.0, 0.0),
             off_course=0.9,
             fresh_position=lambda: "fresh",
         )
@@ -101,6 +102,7 @@ def test_the_autopilots_words_are_passed_on(flight):
 
 def test_motion_is_seen_from_where_control_began(flight):
     flight.guidance.motion = Motions((7.0, -9.0, -3.0), (1.0, 2.0, 0.5))
+    flight.guidance.acceleration = (0.3, -0.4)
     assert flight.snapshot().motion == Motion(
         q=Q,
         body_rates=(0.1, 0.2, 0.3),
@@ -110,6 +112,7 @@ def test_motion_is_seen_from_where_control_began(flight):
         off_course=0.9,
         thrust=0.45,
         origin=Place(47.0, 8.0),
+        acceleration=(0.3, -0.4),
     )
 
 

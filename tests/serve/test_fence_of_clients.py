@@ -68,8 +68,13 @@ def test_a_client_that_asks_again_does_not_take_the_fence_along(autopilot):
                 await asyncio.sleep(0.5)
             await begin_control(session, script, autopilot, to(6.0))
             script.heard.clear()
-            farthest = [0.0]
-            vehicle.after_step.append(lambda: farthest.append(distance()))
+            controlled, landing = [0.0], [0.0]
+
+            def note():
+                flown = landing if vehicle.state()["mode"] == "LAND" else controlled
+                flown.append(distance())
+
+            vehicle.after_step.append(note)
             async with asyncio.timeout(20.0):
                 while session.control.in_control:
                     await stream(0.1, to(5000.0), 0.05)
@@ -82,7 +87,10 @@ def test_a_client_that_asks_again_does_not_take_the_fence_along(autopilot):
             said = " ".join(script.texts())
             assert "safety: braking: about to stop" in said, said
             assert "the vehicle is held, and control ends" in said
-            assert max(farthest) < RADIUS + 2.0, "it was on its way when the landing began"
+            # After a run-up of 3 m; without the acceleration it was up to 1.3 m outside.
+            assert max(controlled) < RADIUS + 0.2
+            # The autopilot takes over a vehicle that still brakes, and swings before it descends.
+            assert max(landing) < RADIUS + 0.8
 
     testing.run(vehicle, whole())
 

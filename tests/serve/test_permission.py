@@ -40,7 +40,6 @@ def ftp(opcode):
 
 ARM = command(dialect.MAV_CMD_COMPONENT_ARM_DISARM)
 READING = [
-    dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3),
     dialect.MAVLink_param_request_list_message(1, 1),
     dialect.MAVLink_mission_request_list_message(1, 1),
     dialect.MAVLink_mission_ack_message(1, 1, 0),
@@ -51,6 +50,7 @@ READING = [
 ]
 COMMANDING = [
     ARM,
+    dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3),
     command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL),
     dialect.MAVLink_param_set_message(1, 1, b"X", 1.0, 9),
     dialect.MAVLink_system_time_message(1_700_000_000_000_000, 1000),

@@ -8,7 +8,13 @@ from companion.batch import can_compile
 from companion.config.files import changed, load, shipped
 from companion.testing import MockVehicle
 from companion.tuning import flights, propose
-from companion.tuning.flights import CIRCLE_IN_GUSTS, COURSES, autopilot_like, flown
+from companion.tuning.flights import (
+    CIRCLE_IN_GUSTS,
+    COURSES,
+    EIGHT_IN_GUSTS,
+    autopilot_like,
+    flown,
+)
 
 
 @pytest.fixture(autouse=True)
@@ -37,6 +43,19 @@ def test_in_gusts_the_error_is_much_smaller():
     assert after.ok, after
     assert after.reported <= 0.75 * before.reported
     assert after.rate_limited < 0.02
+
+
+def test_what_an_identified_ardupilot_gets_does_not_swing_in_gusts():
+    """Without margins while the rate loop slews, such a proposal swung by more than 1 m."""
+    vehicle = {"lag_ms": 23.0, "dead_time_ms": 14.9, "acceleration_limit_deg_s2": 1112.0}
+    drag = {"drag_per_s": 0.25, "quadratic_drag_per_m": 0.028}
+    mock = load(shipped("mock-ardupilot.yaml"))
+    config = changed(mock, {"vehicle": vehicle, "guidance": drag}, "as `identify` writes it")
+    before = flown(config, EIGHT_IN_GUSTS, "ardupilot", seed=5)
+    after = flown(propose(config).tuned, EIGHT_IN_GUSTS, "ardupilot", seed=5)
+    assert before.ok, before
+    assert after.ok, after
+    assert after.reported <= 0.85 * before.reported
 
 
 def test_the_mock_vehicle_is_like_the_identified_one():

@@ -61,9 +61,10 @@ def test_a_rate_loop_of_second_order_is_proposed_too_and_keeps_the_margins():
     assert yaml.safe_load(whole)["vehicle"] == {"lag_ms": 74.0}
 
 
-def test_a_vehicle_that_slews_slowly_gets_a_lower_gain():
+def test_a_vehicle_that_slews_slowly_gets_a_lower_gain_and_weight():
     quick, slow = (propose(vehicle(20.0, 15.0, slew)).design for slew in (None, 500.0))
-    assert slow.gain < 0.7 * quick.gain
+    assert slow.gain < 0.9 * quick.gain
+    assert slow.position < 0.3 * quick.position
     assert slow.position < quick.position
 
 

@@ -167,6 +167,7 @@ def test_a_log_that_breaks_off_is_read_to_its_last_whole_record(tmp_path):
         (b"time,roll,pitch\n0.0,1.0,2.0\n", "not a .tlog"),
         (b"\0\0", "not a .tlog"),
     ],
+    ids=["empty", "a table", "zeros"],
 )
 def test_what_is_not_a_tlog_is_refused(tmp_path, content, words):
     path = tmp_path / "flight.csv"

@@ -1,6 +1,6 @@
 """What each family's rules find: nothing on a good vehicle, and each mistake by itself."""
 
-from math import inf, nan, radians
+from math import degrees, inf, nan, radians
 
 import pytest
 
@@ -216,6 +216,26 @@ def test_motors_that_may_stop_at_a_tilt_that_was_not_told_are_not_safe(
 ):
     values = {name: v for name, v in GOOD_PX4.items() if name not in unread}
     findings = judge(PX4_PARAMETERS, values | {"CBRK_FLIGHTTERM": termination}, PX4_SETUP)
+    (found,) = (finding for finding in findings if finding.rule.name == "CBRK_FLIGHTTERM")
+    assert found.result is verdict
+
+
+@pytest.mark.parametrize(
+    ("roll", "pitch", "verdict"),
+    [
+        (0.0, 0.0, CheckResult.SAFE),  # the failure detector is off
+        (0.0, 15.1, CheckResult.SAFE),
+        (15.1, 15.1, CheckResult.SAFE),
+        (15.1, 14.9, UNSAFE),
+        (14.9, 0.0, UNSAFE),
+    ],
+)
+def test_motors_may_stop_only_15_degrees_beyond_the_largest_tilt(roll, pitch, verdict):
+    """Each angle is that beyond the largest tilt; 0 switches it off."""
+    tilt = degrees(PX4_SETUP.max_tilt)
+    angles = [angle and tilt + angle for angle in (roll, pitch)]
+    changes = {"CBRK_FLIGHTTERM": 0.0, "FD_FAIL_R": angles[0], "FD_FAIL_P": angles[1]}
+    findings = judge(PX4_PARAMETERS, GOOD_PX4 | changes, PX4_SETUP)
     (found,) = (finding for finding in findings if finding.rule.name == "CBRK_FLIGHTTERM")
     assert found.result is verdict
 

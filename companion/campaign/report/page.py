@@ -29,8 +29,9 @@ if TYPE_CHECKING:
 PARQUET, CSV = "results.parquet", "results.csv"
 _DONE = 0
 _GRID_LIKE, _FEW_SAMPLES = 12, 60
-"""A factor whose number of values lies between these was sampled, but not often enough to tell
-factors apart."""
+"""A factor with a number of values between these was sampled, but too rarely to separate its
+influence from that of other factors.
+"""
 
 
 def run(options: argparse.Namespace) -> int:
@@ -81,11 +82,11 @@ def write_tables(table: "pa.Table", folder: Path) -> None:
 
 
 def page_text(results: Results, campaign: Campaign) -> str:
-    """The page.
+    """The HTML of the page.
 
     Args:
-        results: of the campaign.
-        campaign: as it stands in the folder.
+        results: results of the campaign.
+        campaign: the campaign as stored in the folder.
     """
     found = {
         name: each
@@ -119,13 +120,13 @@ def page_text(results: Results, campaign: Campaign) -> str:
 
 
 def headline(results: Results) -> str:
-    """What was flown, and the success rate with its interval, in a sentence."""
+    """One sentence: what was flown, and the success rate with its interval."""
     share = share_of(results.good)
     return f"{results.name}: {share.chosen} of {share.of} {results.noun} good: {share}"
 
 
 def missing(results: Results) -> list[str]:
-    """What is missing of a campaign that is not finished."""
+    """What an unfinished campaign still lacks."""
     left = results.planned - results.count
     if not left:
         return []
@@ -136,7 +137,7 @@ def missing(results: Results) -> list[str]:
 
 
 def what_to_look_at(results: Results, found: dict[str, list[Influence]]) -> Iterator[str]:
-    """What was flown, and what a reader should look at first."""
+    """A summary: what was flown, and which results deserve attention first."""
     yield f"Swept: {', '.join(results.factors) or 'nothing but noise and gusts'}."
     columns = results.columns
     if crashed := results.true_cases("crashed"):
@@ -192,7 +193,7 @@ def _most_influential(results: Results, found: dict[str, list[Influence]]) -> It
 
 
 def _few_samples(results: Results) -> Iterator[str]:
-    """A warning if the sampled factors had few different values."""
+    """A warning if the sampled factors took few different values."""
     drawn = [
         len(np.unique(column))
         for name in results.factors
@@ -207,6 +208,6 @@ def _few_samples(results: Results) -> Iterator[str]:
 
 
 def _order(results: Results, found: dict[str, list[Influence]]) -> list[str]:
-    """The factors, the most influential first."""
+    """The factors ordered by influence, the largest first."""
     listed = [each.factor for name in ("ok", results.error) for each in found.get(name, ())]
     return list(dict.fromkeys([*listed, *results.factors]))

@@ -26,7 +26,7 @@ _BINS = 40
 
 
 def success(results: Results, order: Sequence[str]) -> Iterator[Plot]:
-    """Success rate by level, a plot for each of the most influential factors."""
+    """Success rate by level: one plot for each of the most influential factors."""
     for name in order[:_MOST_FACTORS]:
         found = levels(results.columns[name])
         shares = [share_of(results.good[level.cases]) for level in found]
@@ -85,7 +85,7 @@ def sensitivity(influences: dict[str, list[Influence]]) -> Iterator[Plot]:
 
 
 def pareto(results: Results) -> Iterator[Plot]:
-    """Error against rate use, coloured by thrust use; the front is marked."""
+    """Error against rate use, coloured by thrust use; the Pareto front is marked."""
     columns = results.columns
     names = [results.error, RATES, *([THRUST] if results.measured(THRUST) else [])]
     points, titles = [], []
@@ -150,7 +150,7 @@ def _scale(values: Floats, every: Floats, *, shown: bool) -> dict[str, Any]:
 
 
 def distributions(results: Results) -> Iterator[Plot]:
-    """Histograms of the outcomes, good cases and others."""
+    """Histograms of the outcomes: good cases, and others."""
     for name in _DISTRIBUTIONS:
         if not results.measured(name):
             continue

@@ -1,4 +1,4 @@
-"""What a campaign has found so far, as columns of NumPy."""
+"""The results of a campaign so far, as NumPy columns."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ Column = NDArray[Any]
 NOUNS = {"flights": "flights", "batch": "vehicles"}
 TRUE_ERROR = "position_rms_m"
 ERRORS = (TRUE_ERROR, "model_deviation_max")
-"""Outcomes that may be the campaign's error: the first one that was measured."""
+"""Outcomes that may serve as the campaign's error; the first one that was measured is used."""
 RATES, THRUST = "rate_rms_rad_s", "thrust_rms"
 LABELS = {
     "position_rms_m": "true position error, RMS",
@@ -42,11 +42,11 @@ LABELS = {
     "max_tilt_rad": "largest true tilt",
     "flight_s": "flight time",
 }
-"""What an outcome is, for the reader."""
+"""Name of each outcome on the page."""
 
 
 def label(name: str) -> str:
-    """An outcome or a factor with its unit, for the reader."""
+    """Name and unit of an outcome or a factor on the page."""
     told = LABELS.get(name, name)
     return f"{told}, {unit(name)}" if unit(name) else told
 
@@ -56,12 +56,12 @@ class Results:
     """The cases of a campaign that have been flown.
 
     Attributes:
-        folder: of the campaign.
-        name: of the campaign.
+        folder: folder of the campaign.
+        name: name of the campaign.
         kind: flights or batch.
         planned: number of its cases.
-        factors: what is known of each swept key, by name.
-        table: as `store.read` returns it.
+        factors: metadata of each swept key, by name.
+        table: all rows, as returned by `store.read`.
     """
 
     folder: Path
@@ -73,10 +73,10 @@ class Results:
 
     @classmethod
     def read(cls, folder: Path) -> "Results":
-        """The results in a folder.
+        """Read the results in a folder.
 
         Raises:
-            ConfigError: it holds no campaign, or no results yet.
+            ConfigError: the folder holds no campaign, or no results yet.
         """
         planned = read_description(folder).cases
         table = store.read(folder)
@@ -104,17 +104,17 @@ class Results:
 
     @cached_property
     def good(self) -> NDArray[np.bool_]:
-        """(cases,) whether each was good."""
+        """(cases,): whether each case was good."""
         return np.array(self.columns["ok"], dtype=bool)
 
     @property
     def noun(self) -> str:
-        """What the cases are called."""
+        """Plural noun for the cases, such as `flights`."""
         return NOUNS[self.kind]
 
     @property
     def error(self) -> str:
-        """Name of the error that the campaign is about."""
+        """Name of the outcome that serves as the campaign's error."""
         return next((name for name in ERRORS if self.measured(name)), ERRORS[-1])
 
     def measured(self, name: str) -> bool:
@@ -123,5 +123,5 @@ class Results:
         return column is not None and column.dtype == float and bool(np.isfinite(column).any())
 
     def true_cases(self, name: str) -> int:
-        """Number of cases in which a column of yes, no and null says yes."""
+        """Number of cases in which a boolean column is true; null counts as false."""
         return sum(value is True for value in self.columns.get(name, ()))

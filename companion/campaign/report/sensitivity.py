@@ -1,9 +1,9 @@
-"""Which factor an outcome depends on, from the cases as they are, with SALib.
+"""Which factor an outcome depends on, estimated from the flown cases with SALib.
 
 The first-order Sobol index of a factor is the share of the outcome's variance that would vanish if
 the factor were known. It is estimated from given samples: the cases are divided into classes of the
-factor, and the variance between the classes is compared with the whole. What two factors do only
-together is in no first-order index.
+factor, and the variance between the classes is compared with the whole. The joint effect of two
+factors is in no first-order index.
 """
 
 from typing import NamedTuple
@@ -13,9 +13,9 @@ import numpy as np
 from companion.campaign.report.results import Column, Floats, Results
 
 FEWEST = 100
-"""Cases below which the indices are not worth reading."""
+"""Smallest number of cases for useful indices."""
 _MOST = 5000
-"""At most this many cases are used, evenly chosen."""
+"""Largest number of cases used; more are thinned out evenly."""
 _SEED = 1
 
 
@@ -23,7 +23,7 @@ class Influence(NamedTuple):
     """The first-order Sobol index of a factor on an outcome.
 
     Attributes:
-        factor: its name.
+        factor: name of the factor.
         share: the index, 0..1.
         confidence: half width of its 95 % interval, by bootstrap; NaN where it cannot be found.
     """
@@ -34,10 +34,10 @@ class Influence(NamedTuple):
 
 
 def influences(results: Results, outcome: str) -> list[Influence]:
-    """The factors by their influence on an outcome, the largest first; empty for too few cases.
+    """The factors by their influence on an outcome, the largest first; empty with too few cases.
 
     Args:
-        results: of the campaign.
+        results: results of the campaign.
         outcome: a column of numbers, or `ok`.
     """
     values = np.array(results.columns[outcome], dtype=float)

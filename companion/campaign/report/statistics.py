@@ -19,8 +19,8 @@ class Share(NamedTuple):
     """A share of cases with its Wilson interval, which covers the true share in 95 % of campaigns.
 
     Attributes:
-        chosen: cases that count.
-        of: all cases.
+        chosen: number of cases that count.
+        of: number of all cases.
         share: chosen / of; NaN for no case.
         low: lower end of the interval.
         high: upper end.
@@ -55,11 +55,11 @@ def share_of(chosen: NDArray[np.bool_]) -> Share:
 
 
 class Level(NamedTuple):
-    """Cases in which a factor has one value, or lies in one range.
+    """The cases in which a factor has one value, or lies in one range.
 
     Attributes:
         name: the value, or the range.
-        cases: (cases,), which ones.
+        cases: (cases,), whether each case belongs to it.
     """
 
     name: str
@@ -111,7 +111,7 @@ def worst(results: Results, count: int) -> list[int]:
 
 
 def pareto_front(goals: Floats) -> NDArray[np.bool_]:
-    """(n,), which of (n, goals) are not worse in every goal than another; small is good."""
+    """(n,): which of the (n, goals) points are Pareto-optimal; smaller is better in every goal."""
     front = np.ones(len(goals), dtype=bool)
     for number, own in enumerate(goals):
         as_good = np.all(goals <= own, axis=1)
@@ -121,11 +121,11 @@ def pareto_front(goals: Floats) -> NDArray[np.bool_]:
 
 
 class Choice(NamedTuple):
-    """Cases with the same values of the keys that the user chooses; the others are its weather.
+    """The cases with equal values of the keys that a user can choose; all other factors vary.
 
     Attributes:
-        name: the values.
-        cases: (cases,), which ones.
+        name: the equal values.
+        cases: (cases,), whether each case belongs to it.
     """
 
     name: str
@@ -133,10 +133,9 @@ class Choice(NamedTuple):
 
 
 def choices(results: Results, most: int = 300) -> list[Choice]:
-    """The choices that a campaign compares; each case by itself where a chosen key is sampled.
+    """The choices that a campaign compares; if a chosen key is sampled, each case is a choice.
 
-    Keys of the mock vehicle, faults and what is flown are no choice: a result is the median over
-    them.
+    Keys of the mock vehicle, faults and maneuvers are no choices: a result is the median over them.
     """
     chosen = [name for name in results.factors if _is_choice(name)]
     keys = [tuple(_key(results.columns[name][row]) for name in chosen) for row in _rows(results)]

@@ -23,7 +23,7 @@ _MOST_FACTORS = 12
 
 
 def worst_cases(results: Results) -> Table:
-    """The worst cases, each with the command that flies it again with full recording."""
+    """The worst cases, each with the command that repeats it with full recording."""
     columns = results.columns
     shown = [name for name in ("result", "failed_checks") if name in columns]
     rows = [
@@ -51,7 +51,7 @@ def _values(results: Results, row: int) -> str:
 
 
 def configuration(campaign: Campaign) -> Table:
-    """What every case had: all limits, and the keys that are not the default; no swept keys."""
+    """What all cases share: all limits, and the keys that are not the default; no swept keys."""
     swept = {key for name, each in campaign.file.sweep.items() for key in each.keys or (name,)}
     rows = [
         (f"{key.section}.{key.name}", json.dumps(key.value), json.dumps(key.default), key.unit)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Values = Mapping[str, Any]
 """Value of each searched key."""
 _UNSEEN = 1_000_003
-"""Added to the campaign's seed for the cases that the search does not see."""
+"""Offset of the campaign's seed for the cases that the search does not see."""
 
 
 _SPREAD = 0.15
@@ -34,8 +34,8 @@ class Start(NamedTuple):
     """A candidate with which the search starts.
 
     Attributes:
-        name: where its values come from.
-        values: of the searched keys; a missing one is drawn by the search.
+        name: source of its values.
+        values: values of the searched keys; the search draws a missing one.
     """
 
     name: str
@@ -46,7 +46,8 @@ def section_of(campaign: Campaign) -> Tune:
     """The section `tune` of a campaign.
 
     Raises:
-        ConfigError: there is none, the campaign is a batch, or a searched key is also swept.
+        ConfigError: the section is missing, the campaign is a batch, or a searched key is also
+            swept.
     """
     tune = campaign.file.tune
     if tune is None:
@@ -60,7 +61,7 @@ def section_of(campaign: Campaign) -> Tune:
 
 
 def cases(campaign: Campaign, values: Values) -> list[Case]:
-    """The cases of a campaign, flown with a candidate.
+    """The cases of a campaign with the values of a candidate.
 
     Raises:
         ConfigError: a value is refused.
@@ -71,13 +72,13 @@ def cases(campaign: Campaign, values: Values) -> list[Case]:
 
 
 def unseen(campaign: Campaign, samples: int) -> Campaign:
-    """The campaign with samples, noise and gusts that the search does not see."""
+    """The campaign with other samples, noise and gusts than those of the search."""
     told = {"seed": campaign.file.seed + _UNSEEN, "samples": samples}
     return replace(campaign, file=campaign.file.model_copy(update=told))
 
 
 def suggested(trial: "Trial", search: Mapping[str, Swept]) -> dict[str, Any]:
-    """The values that the search tries next, three digits each."""
+    """The values that the search tries next, rounded to three digits."""
     found: dict[str, Any] = {}
     for key, swept in search.items():
         if swept.choice is not None:
@@ -90,13 +91,13 @@ def suggested(trial: "Trial", search: Mapping[str, Swept]) -> dict[str, Any]:
 
 
 def starts(campaign: Campaign, tune: Tune, learned: Config | None = None) -> Iterator[Start]:
-    """The configuration as it is, and what `companion tune` proposes.
+    """The starts: the present configuration, and the proposal of `companion tune`.
 
     Args:
-        campaign: its base is the configuration as it is.
-        tune: its section `tune`.
-        learned: the configuration after a first flight of the vehicle, which is a start, too, and
-            for which `companion tune` then proposes; None: it proposes for the one as it is.
+        campaign: its base is the present configuration.
+        tune: section `tune` of the campaign.
+        learned: the configuration after a first flight of the vehicle. It becomes another start,
+            and the input of `companion tune`. None: the input is the present configuration.
     """
     yield Start("the configuration", within(_present(campaign.base, tune.search), tune.search))
     known, present = learned or campaign.base, _present(learned or campaign.base, tune.search)
@@ -115,7 +116,7 @@ def starts(campaign: Campaign, tune: Tune, learned: Config | None = None) -> Ite
 
 
 def near(start: Start, search: Mapping[str, Swept], count: int, seed: int) -> Iterator[Start]:
-    """Candidates around a start: each value moved by a normal share of its range.
+    """Candidates around a start: each value is moved by a normally distributed share of its range.
 
     The optimum is more often near a reasonable start than anywhere in the ranges.
     """
@@ -140,7 +141,7 @@ def _analysed(config: Config) -> Config:
 
 
 def _present(config: Config, keys: Collection[str]) -> dict[str, Any]:
-    """The values in force; where a key is null, the one that the program derives."""
+    """The present values; where a key is null, the value that the program derives."""
     weights, drag = hold_weights(config), drag_prior(config).drag
     derived = {
         "guidance.position_weight_per_s4": weights.position,
@@ -155,7 +156,7 @@ def _present(config: Config, keys: Collection[str]) -> dict[str, Any]:
 
 
 def set_values(config: Config, keys: Iterable[str]) -> dict[str, Any]:
-    """The values of some dotted keys; those that are null are left out."""
+    """The values of some dotted keys, without those that are null."""
     found = {}
     for key in keys:
         section, _, name = key.partition(".")
@@ -166,7 +167,7 @@ def set_values(config: Config, keys: Iterable[str]) -> dict[str, Any]:
 
 
 def within(values: Values, search: Mapping[str, Swept]) -> dict[str, Any]:
-    """The searched ones of some values, moved into the ranges of the search."""
+    """The given values of searched keys, clamped to the ranges of the search."""
     found: dict[str, Any] = {}
     for key, value in values.items():
         swept = search.get(key)

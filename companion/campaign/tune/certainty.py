@@ -1,4 +1,4 @@
-"""How sure a result is: the comparison with the start on cases that the search has not seen."""
+"""How certain a result is: it is compared with the start on cases that the search has not seen."""
 
 from typing import NamedTuple
 
@@ -23,14 +23,14 @@ class Interval(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """Two configurations on the same cases, in the same noise and gusts.
+    """Two configurations compared on the same cases, with the same noise and gusts.
 
     Attributes:
-        before: RMS of the true error with the start, m.
-        after: RMS with the result, m.
+        before: RMS of the true error of the start, m.
+        after: RMS of the true error of the result, m.
         ratio: after / before.
-        known: RMS of the estimated error on the same flights, with the start and the result, m.
-        estimate: RMS of the error of the estimate itself on them, m.
+        known: RMS of the estimated error of the start and of the result, on the same flights, m.
+        estimate: RMS of the position estimate's own error, for the start and for the result, m.
         better: number of samples in which the result is better.
         samples: number of samples.
     """
@@ -51,8 +51,8 @@ def compared(before: Score, after: Score, samples: int) -> Comparison | None:
     flight that ended early has no error and is left out.
 
     Args:
-        before: of the start.
-        after: of the result.
+        before: score of the start.
+        after: score of the result.
         samples: number of samples that the cases belong to, in order.
 
     Returns:

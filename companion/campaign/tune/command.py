@@ -1,4 +1,4 @@
-"""`companion campaign tune`: searches, checks the result on unseen cases, and writes it."""
+"""`companion campaign tune`: searches, checks the result on unseen cases, and writes the result."""
 
 import argparse
 import shlex
@@ -33,7 +33,7 @@ RESULT = "tuned.yaml"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Search, or continue a search; returns the exit code.
+    """Begin or continue a search; return the exit code.
 
     Args:
         options: `file`, `out`, `trials`, `scheduler` and `workers` of the command line.
@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
             with interruptible(), connected(options.scheduler, options.workers) as client:
                 wait_for_workers(client)
                 console.print(f"Dask's dashboard: {client.dashboard_link}")
-                fly = _flyer(client, campaign)
+                fly = _fly_on(client, campaign)
                 found = _searched(campaign, place, fly, options.trials or tune.trials, console)
                 return _concluded(campaign, place, fly, found, console)
         except VersionError as error:
@@ -70,15 +70,15 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _begin(place: Path, campaign: Campaign) -> None:
-    """Make the folder of the search, or check that it holds this one."""
+    """Make the folder of the search, or check that it holds this search."""
     if folder.begun(place):
         folder.resume(place, campaign)
     else:
         folder.make(place, campaign, folder.describe(campaign, 1, None))
 
 
-def _flyer(client: "Client", campaign: Campaign) -> Fly:
-    """Flies cases on the cluster."""
+def _fly_on(client: "Client", campaign: Campaign) -> Fly:
+    """A function that flies cases on the cluster."""
     kind = campaign.file.kind
     case_s = estimate.measured(kind, list(campaign.cases())[:1])
 
@@ -110,7 +110,7 @@ def _progress(console: Console, trials: int) -> Iterator[Callable[[Found], None]
 
 
 def _concluded(campaign: Campaign, place: Path, fly: Fly, found: Found, console: Console) -> int:
-    """Check the best candidate on unseen cases, write it, and say what came of it."""
+    """Check the best candidate on unseen cases, write it, and report the outcome."""
     tune = section_of(campaign)
     if found.best is None:
         console.print(

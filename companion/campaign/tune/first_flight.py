@@ -1,4 +1,4 @@
-"""What a first flight teaches of the campaign's vehicle: from there the search can start."""
+"""First flights of the campaign's vehicle: they measure values with which the search starts."""
 
 import tempfile
 from dataclasses import replace
@@ -26,11 +26,12 @@ _DAMPING = "vehicle.damping"
 
 
 def learned(campaign: Campaign) -> Config:
-    """The campaign's configuration with what two flights of its first case's vehicle teach.
+    """The campaign's configuration, completed by two flights of the first case's vehicle.
 
-    `companion identify` is flown for lag and dead time, and the case itself for the drag. A rate
-    loop of second order is used only if the search may set `vehicle.damping`: lag and dead time
-    mean something else with it. What a flight could not teach stays as it was.
+    A flight of `companion identify` measures lag and dead time; the flight of the case itself
+    measures the drag. A second-order rate loop is used only if the search may set
+    `vehicle.damping`, because it changes the meaning of lag and dead time. Values that were not
+    measured stay unchanged.
     """
     tune, case, config = campaign.file.tune, next(campaign.cases()), campaign.base
     damped = tune is not None and _DAMPING in tune.search
@@ -38,7 +39,7 @@ def learned(campaign: Campaign) -> Config:
 
 
 def _identified(config: Config, case: Case, *, damped: bool) -> Config:
-    """The configuration with the times of the rate loop that `companion identify` finds."""
+    """The configuration with the rate-loop times measured by `companion identify`."""
     planner = case.config.planner.model_copy(update={"name": FIRST_ORDER})
     flight = case.config.flight.model_copy(update={"maneuvers": ("identify",), "trajectory": None})
     doublets = case.config.model_copy(update={"planner": planner, "flight": flight})
@@ -58,7 +59,7 @@ def _identified(config: Config, case: Case, *, damped: bool) -> Config:
 
 
 def _with_drag(config: Config, case: Case) -> Config:
-    """The configuration with the drag that a flight of the case learns."""
+    """The configuration with the drag measured in a flight of the case."""
     with tempfile.TemporaryDirectory(prefix="companion-drag-") as place:
         # A recorded flight keeps what it learned beside its folder.
         CaseFlight(replace(case, fault=None), Path(place)).fly(Path(place) / "flight")

@@ -1,4 +1,4 @@
-"""How good a candidate is on some cases."""
+"""Scores of a candidate on some cases."""
 
 from collections.abc import Mapping, Sequence
 from math import inf, isfinite
@@ -21,7 +21,8 @@ class Score(NamedTuple):
     Attributes:
         true: RMS of the true horizontal distance from the reference in each case, m; infinite where
             a case was not flown to its end.
-        estimated: the same of the estimated position: what the program could know of its error.
+        estimated: the same distance by the estimated position, which is all that the program knows
+            in flight.
         estimate: RMS of the horizontal distance between true and estimated position, m.
         inside: whether each case stayed inside the envelope.
     """
@@ -42,13 +43,13 @@ class Score(NamedTuple):
         return sum(self.inside) / len(self.inside)
 
     def first(self, count: int) -> "Score":
-        """The score on the first cases alone."""
+        """The score on the first `count` cases alone."""
         return Score(
             self.true[:count], self.estimated[:count], self.estimate[:count], self.inside[:count]
         )
 
     def and_then(self, rest: "Score") -> "Score":
-        """The score on these cases and on further ones."""
+        """The score on these cases and those of `rest` together."""
         return Score(
             self.true + rest.true,
             self.estimated + rest.estimated,
@@ -74,10 +75,10 @@ class Score(NamedTuple):
 
 
 def scored(rows: Sequence[Row], envelope: float | None) -> Score:
-    """The score of rows of results.
+    """The score computed from rows of results.
 
     Args:
-        rows: one a case.
+        rows: one row for each case.
         envelope: largest true distance from the reference inside the envelope, m; None: any.
     """
     return Score(

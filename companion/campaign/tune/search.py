@@ -1,4 +1,4 @@
-"""The search over candidates with Optuna; it can be interrupted at any time and continued."""
+"""The search over candidates with Optuna; it can be interrupted and continued at any time."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from optuna.trial import FrozenTrial
 
 Fly = Callable[[Sequence[Case]], Sequence[Row]]
-"""Flies cases; returns a row for each, in order."""
+"""Flies cases; returns one row for each, in the same order."""
 
 STORAGE = "tune.db"
 """Optuna's storage in the folder of the search."""
@@ -40,9 +40,9 @@ _FIRST_SHARE = 4
 """A candidate flies the first 1/4 of its cases, at least `_FEWEST`, before the others."""
 _FEWEST = 2
 _HOPELESS = 1.3
-"""A candidate is not flown further when its error is so many times that of the best one."""
+"""A candidate is abandoned when its error exceeds that of the best one by this factor."""
 _UNFLOWN = 10.0
-"""Error that stands for a flight that ended early, m: worse than any that was flown."""
+"""Error assigned to a flight that ended early, m; larger than that of any complete flight."""
 _VALUES, _SCORE, _MISSED, _WHOLE = "values", "score", "missed", "whole"
 
 
@@ -51,9 +51,9 @@ class Candidate:
     """A candidate that has flown all its cases.
 
     Attributes:
-        number: of the trial.
-        values: of the searched keys.
-        score: on the cases of the search.
+        number: number of the trial.
+        values: values of the searched keys.
+        score: score on the cases of the search.
     """
 
     number: int
@@ -63,11 +63,11 @@ class Candidate:
 
 @dataclass
 class Found:
-    """What a search has found so far.
+    """The results of a search so far.
 
     Attributes:
-        tried: number of candidates, those that were not flown to the end included.
-        stopped_early: number of candidates that were not flown to the end.
+        tried: number of all candidates, including those that were abandoned.
+        stopped_early: number of candidates that were abandoned.
         best: the candidate with the smallest error inside the envelope; None: none stayed inside.
         near: the best tenth of the candidates, the best one first.
     """
@@ -79,14 +79,15 @@ class Found:
 
 
 class Search:
-    """A search in a folder.
+    """A search that keeps its state in a folder.
 
     Args:
         campaign: gives the cases and the section `tune`.
-        tune: its section `tune`.
-        folder: for the storage.
+        tune: section `tune` of the campaign.
+        folder: folder for the storage.
         fly: flies cases.
-        learn: flies the vehicle for a new search, and returns what it teaches.
+        learn: flies the vehicle before a new search, and returns the configuration with what was
+            measured.
     """
 
     def __init__(
@@ -111,7 +112,7 @@ class Search:
         self._begin(learn)
 
     def run(self, trials: int, on_trial: Callable[[Found], None] = lambda _: None) -> Found:
-        """Try candidates until there are `trials` of them, those of earlier runs included."""
+        """Try candidates until there are `trials` of them, including those of earlier runs."""
         while len(self._ended()) < trials:
             on_trial(self.found())
             # Each trial has its own seed, so an interruption does not change the candidates.
@@ -120,7 +121,7 @@ class Search:
         return self.found()
 
     def found(self) -> Found:
-        """What was found so far."""
+        """The results so far."""
         whole = [each for each in self._ended() if each.user_attrs.get(_WHOLE)]
         good = sorted(
             (self._candidate(each) for each in whole if not self._missed(each)),
@@ -143,7 +144,7 @@ class Search:
         )
 
     def _begin(self, learn: Callable[[Campaign], Config | None]) -> None:
-        """Let a new search begin with the starts."""
+        """Enqueue the starts of a new search."""
         if not self._study.trials:
             begin = list(starts(self._campaign, self._tune, learn(self._campaign)))
             seed, search = self._campaign.file.seed, self._tune.search
@@ -154,12 +155,12 @@ class Search:
         self._study.enqueue_trial(dict(start.values), user_attrs={"start": start.name})
 
     def _interrupted(self) -> "Trial | None":
-        """The candidate whose flights were interrupted, to be tried again."""
+        """The candidate whose flights were interrupted; it is tried again."""
         running = self._study.get_trials(states=(self._optuna.trial.TrialState.RUNNING,))
         return self._optuna.trial.Trial(self._study, running[0]._trial_id) if running else None
 
     def _ended(self) -> "list[FrozenTrial]":
-        """The trials that came to an end, pruned or not."""
+        """The trials that have ended, including pruned ones."""
         states = self._optuna.trial.TrialState
         ended = states.COMPLETE, states.PRUNED
         return list(self._study.get_trials(deepcopy=False, states=ended))
@@ -185,18 +186,18 @@ class Search:
         self._study.tell(trial, _finite(score))
 
     def _stop(self, trial: "Trial", error: float, missed: float) -> None:
-        """End a candidate before all its cases were flown."""
+        """End a candidate before all of its cases were flown."""
         self._note_missed(trial, missed)
         trial.report(error, 0)
         self._study.tell(trial, state=self._optuna.trial.TrialState.PRUNED)
 
     def _note_missed(self, trial: "Trial", missed: float) -> None:
-        """Tell the sampler by how much the constraint is missed; up to 0 it is kept."""
+        """Tell the sampler the violation of the constraint; 0 or less is no violation."""
         trial.set_user_attr(_MISSED, missed)
         trial.set_constraint(_MISSED, missed)
 
     def _missed_share(self, score: Score, of: int) -> float:
-        """By how much the share inside the envelope is missed, if the rest of `of` cases stay."""
+        """Shortfall of the share inside the envelope, if the rest of `of` cases stay inside."""
         outside = sum(not each for each in score.inside)
         return self._tune.inside_share - (of - outside) / of
 
@@ -213,5 +214,5 @@ class Search:
 
 
 def _finite(score: Score) -> float:
-    """The RMS error for Optuna, m: a flight that ended early counts as `_UNFLOWN`."""
+    """The RMS error for Optuna, m; `_UNFLOWN` for a flight that ended early."""
     return pooled(np.minimum(score.true, _UNFLOWN))

@@ -9,19 +9,20 @@ from companion.files.yaml_file import Section
 
 
 class Tune(Section):
-    """What `companion campaign tune` searches. Running the campaign ignores it."""
+    """The search of `companion campaign tune`. Running the campaign ignores this section."""
 
     search: Annotated[dict[str, Swept], Field(min_length=1, max_length=30)]
-    """Searched keys of the application, dotted, each with uniform, loguniform or choice."""
+    """Searched keys of the application: dotted, each with uniform, loguniform or choice."""
     trials: Annotated[int, Field(ge=1, le=100_000)] = 100
     """Number of candidates that are tried."""
     envelope_m: Annotated[float, Field(gt=0.0, le=1000.0)] | None = 1.0
-    """Largest true distance from the reference that a flight inside the envelope has. null: such a
-    flight must only be flown to its end."""
+    """Largest true distance from the reference for a flight to count as inside the envelope. null:
+    every flight that reaches its end counts as inside.
+    """
     inside_share: Annotated[float, Field(gt=0.0, le=1.0)] = 0.999
     """Share of the flights that must stay inside the envelope."""
     check_samples: Annotated[int, Field(ge=2, le=10_000)] = 8
-    """Samples that the search does not see. On them the result is compared with the start."""
+    """Samples that the search does not see; on them the result is compared with the start."""
 
     @field_validator("search")
     @classmethod

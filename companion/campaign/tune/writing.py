@@ -16,15 +16,15 @@ _AT_EDGE = 0.02
 
 
 class Result(NamedTuple):
-    """What a search has come to.
+    """The result of a search.
 
     Attributes:
-        campaign: with the section `tune`.
-        found: what the search has found.
+        campaign: the campaign, with its section `tune`.
+        found: results of the search.
         best: the candidate that is proposed.
-        before: score of the configuration as it was, on the unseen cases.
+        before: score of the unchanged configuration, on the unseen cases.
         after: score of the proposal, on the unseen cases.
-        comparison: of the two; None where a case was not flown to its end.
+        comparison: comparison of the two; None if a case was not flown to its end.
     """
 
     campaign: Campaign
@@ -36,7 +36,7 @@ class Result(NamedTuple):
 
 
 def summary_lines(result: Result) -> list[str]:
-    """What was searched, what was found, and how sure it is."""
+    """What was searched, what was found, and how certain it is."""
     found, best, tune = result.found, result.best, result.campaign.file.tune
     assert tune is not None
     cases = len(best.score.true)
@@ -87,11 +87,11 @@ def _certainty(result: Result) -> Iterator[str]:
 
 
 def result_text(result: Result, present: Mapping[str, Any]) -> str:
-    """The text of the file.
+    """The text of the result file.
 
     Args:
-        result: of the search.
-        present: values of the searched keys as they were; a key that was not set is missing.
+        result: result of the search.
+        present: values of the searched keys before the search; a key that was not set is missing.
     """
     tune = result.campaign.file.tune
     assert tune is not None
@@ -110,7 +110,7 @@ def result_text(result: Result, present: Mapping[str, Any]) -> str:
 
 
 def _reason(key: str, swept: Swept, result: Result, before: Any) -> str:
-    """Why a key has its value."""
+    """The reason for the value of a key."""
     was = "not set before" if before is None else f"before {_shown(before)}"
     near = [each.values[key] for each in result.found.near if key in each.values]
     pair = swept.uniform or swept.loguniform

@@ -45,7 +45,7 @@ _RANGES = {
     "yaw": (1e4, "rad"),
     "quaternion": (2.0, "for a component"),
 }
-"""Largest magnitude of each quantity, and its unit as messages show it."""
+"""Largest magnitude of each quantity, and its unit in messages."""
 
 _LENGTH_ERROR = 0.1
 """Largest error of a quaternion's length. Files hold rounded numbers."""
@@ -56,7 +56,7 @@ class Table:
     """The samples of a file, in the file's own frame.
 
     Attributes:
-        times: (m,), s, increasing from 0.
+        times: (m,), time of each sample, s, increasing from 0.
         position: (m, 3), m.
         derivatives: velocity in m/s, then acceleration in m/s², (m, 3) each, if the file has them.
         yaw: tilt-yaw heading (m,), rad, unwrapped; None if the file has neither yaw nor quaternion.
@@ -77,8 +77,8 @@ def read_csv(path: Path) -> Table:
 
     Raises:
         TrajectoryError: the file cannot be read or is too large, a column is missing, a value is
-            not a number or is out of range, a step in time is out of range, or the number of
-            samples is.
+            not a number or is out of range, or a time step or the number of samples is out of
+            range.
     """
     try:
         text = read_text(path, _MOST_BYTES)
@@ -97,7 +97,7 @@ def table(lines: Iterable[str], name: str) -> Table:
         name: the file's name, for error messages.
 
     Raises:
-        TrajectoryError: as `read_csv`, except that no file is read.
+        TrajectoryError: the table is wrong; see `read_csv`.
     """
     frames: list[str] = []
     rows = list(itertools.islice(rows_of(csv.reader(lines), frames), _MOST + 2))

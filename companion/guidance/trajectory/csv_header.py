@@ -21,16 +21,16 @@ _SPELLINGS: dict[str, _Spellings] = {
     "yaw": (("yaw",), ("psi",), ("heading",)),
     "quaternion": (("q_w", "q_x", "q_y", "q_z"), ("qw", "qx", "qy", "qz")),
 }
-"""Column names of each quantity, in lower case. The first complete set of names is used."""
+"""Column names of each quantity, in lower case. The first complete set is used."""
 
 _UNIT = re.compile(r"(.*?)(?:_| ?[\[(])(m_s2|m/s\^?2|m/s²|m_s|m/s|rad|m|s)[\])]?")
-"""A column name with its unit behind it."""
+"""A column name followed by its unit."""
 _OTHER_UNIT = re.compile(r"(.*?)(?:_| ?[\[(])(deg|°|ms|us|ns|cm|mm|ft)[\])]?")
 """A column name followed by a unit that is refused."""
 _FRAME = re.compile(r"#\s*frame\s*[:=]\s*(\S+)\s*")
 
 _SHOWN = 60
-"""Most characters of the file that a message quotes."""
+"""Largest number of characters that a message quotes from the file."""
 
 
 def rows_of(reader: Any, frames: list[str]) -> Iterator[tuple[int, list[str]]]:
@@ -58,7 +58,7 @@ def without_unit(column: str) -> str:
 
 
 def columns_of(header: list[str], named: list[str], name: str) -> dict[str, tuple[str, ...]]:
-    """The columns of each quantity that the file has.
+    """The columns of the file for each quantity.
 
     Args:
         header: names of the columns, without their units.
@@ -66,7 +66,7 @@ def columns_of(header: list[str], named: list[str], name: str) -> dict[str, tupl
         name: the file's name, for error messages.
 
     Raises:
-        TrajectoryError: time or position is missing, or the header is none.
+        TrajectoryError: time or position is missing, or the first line is not a header.
     """
     _require_header(named, name)
     groups = {}
@@ -109,7 +109,7 @@ def _is_number(text: str) -> bool:
 
 
 def _missing(group: str, header: list[str]) -> str:
-    """Which columns of a quantity the header lacks, and which it has."""
+    """A message with the missing and the present columns of a quantity."""
     spellings = _SPELLINGS[group]
     known = " or ".join(",".join(names) for names in spellings)
     nearest = max(spellings, key=lambda names: sum(column in header for column in names))

@@ -11,7 +11,7 @@ from companion.guidance.trajectory.sample import TrajectoryError, Vector
 
 
 class CurvePoint(NamedTuple):
-    """A point of a curve and its derivatives by the phase, m per unit of phase to the k-th."""
+    """A point of a curve, m, and its derivatives: the k-th in m per unit of phase to the k-th."""
 
     position: Vector
     first: Vector
@@ -37,7 +37,7 @@ PATH_STEP = 0.25
 """Longest path between two checks, m."""
 
 MOST_CHECKS = 80_000
-"""Most checks of one trajectory, about a second of work."""
+"""Largest number of checks of one trajectory; they take about a second."""
 
 _CHECKS_PER_LAP = 720
 """Checks of one lap. They miss an extreme of the k-th harmonic by at most 0.001 k² %."""
@@ -104,11 +104,11 @@ class Straight:
 
 @dataclass(frozen=True, slots=True)
 class Helix:
-    """Rounds about a centre `radius` north of the start, setting off eastwards; phase 2π a round.
+    """Rounds about a centre `radius` north of the start, first eastwards; phase 2π per round.
 
     Attributes:
         radius: m.
-        rise: upwards in each round, m; 0 makes a circle.
+        rise: climb in each round, m; 0 makes a circle.
     """
 
     radius: float
@@ -132,7 +132,7 @@ class Helix:
 
 @dataclass(frozen=True, slots=True)
 class GeronoEight:
-    """Lemniscate of Gerono, (A sin φ, A sin φ cos φ): north-south, begun in the middle.
+    """Lemniscate of Gerono, (A sin φ, A sin φ cos φ): along north-south, from its middle.
 
     Attributes:
         half_width: A, m.
@@ -193,7 +193,7 @@ class Turned:
     """A figure turned about the vertical through its start.
 
     Attributes:
-        figure: what is turned.
+        figure: the figure that is turned.
         angle: clockwise seen from above, rad.
     """
 

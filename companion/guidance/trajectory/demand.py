@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """A trajectory at (m,) times; vectors are (m, 3), NED, from where it begins."""
+    """A motion at (m,) times; vectors are (m, 3), NED, relative to its start."""
 
     times: Floats
     position: Floats
@@ -25,7 +25,7 @@ class Motion:
     heading_rate: Floats
 
     def retimed(self, times: Floats, progress: Progress) -> "Motion":
-        """The motion at other times (m,), with the progress there: numbers or (m,) each."""
+        """The motion at other times (m,); the progress at these times is a number or (m,) each."""
         velocity, acceleration, jerk = derivatives(
             progress, _columns(self.velocity), _columns(self.acceleration), _columns(self.jerk)
         )
@@ -44,11 +44,11 @@ class Motion:
 
 
 def sampled(trajectory: Trajectory, times: Sequence[float] | None = None) -> Motion:
-    """The motion at some times, or at the check times.
+    """The motion at some times; by default at the check times.
 
     Raises:
-        TrajectoryError: it is too long to be checked.
-        FloatingPointError: it is not a finite number somewhere; see `computable`.
+        TrajectoryError: the trajectory is too long to be checked.
+        FloatingPointError: a value is not finite; see `computable`.
     """
     times = trajectory.check_times() if times is None else times
     samples = [trajectory.at(time) for time in times]
@@ -67,15 +67,15 @@ def sampled(trajectory: Trajectory, times: Sequence[float] | None = None) -> Mot
 class Demand:
     """Demand of a motion on the rotors, each (m,).
 
-    The rotors have to give f = a + d − g, d the deceleration by drag; the body's vertical axis
-    points along it, and turns with the part of ḟ = jerk + ḋ that is across f. Differential
-    flatness, as in Faessler, Franchi & Scaramuzza, RA-L 2018, for drag that is the same along all
-    axes.
+    The rotors must produce the specific thrust f = a + d − g, where d is the deceleration by drag.
+    The body's vertical axis points along f. It turns with the part of ḟ = jerk + ḋ that is
+    perpendicular to f. Differential flatness, as in Faessler, Franchi & Scaramuzza, RA-L 2018, for
+    drag that is the same along all axes.
 
     Attributes:
-        tilt: of f from the vertical, rad.
+        tilt: angle between f and the vertical, rad.
         tilt_rate: the roll-pitch rate, rad/s.
-        thrust: specific, the length of f, m/s².
+        thrust: specific thrust, the length of f, m/s².
     """
 
     tilt: Floats
@@ -87,8 +87,8 @@ def demand(motion: Motion, drag: Drag, gravity: float) -> Demand:
     """Thrust, tilt and rates that a motion needs.
 
     Args:
-        motion: in still air.
-        drag: of the vehicle.
+        motion: motion in still air.
+        drag: drag of the vehicle.
         gravity: m/s².
     """
     velocity, acceleration = _columns(motion.velocity), _columns(motion.acceleration)

@@ -1,4 +1,4 @@
-"""Trajectories made from others: flown more slowly, or after a turn on the spot."""
+"""Trajectories made from others: flown more slowly, or preceded by a turn on the spot."""
 
 from dataclasses import dataclass
 from math import remainder, tau
@@ -13,13 +13,13 @@ from companion.guidance.trajectory.timed_curve import require_duration
 
 @dataclass(frozen=True, slots=True)
 class Slowed:
-    """A trajectory flown more slowly, all along or in parts; its path is the same.
+    """A trajectory flown more slowly, completely or in parts, along the same path.
 
     Attributes:
         trajectory: the original trajectory.
         law: the original time as a function of the slowed time.
         moments: times of the original trajectory at which to check it, s. If empty, its own check
-            times are used: they suffice where it is slowed down evenly.
+            times are used, which is enough if it is slowed down evenly.
     """
 
     trajectory: Trajectory
@@ -38,7 +38,7 @@ class Slowed:
 
     @property
     def holds_heading(self) -> bool:
-        """Whether the trajectory keeps the heading at its start."""
+        """Whether the trajectory keeps the initial heading."""
         return self.trajectory.holds_heading
 
     def check_times(self) -> list[float]:
@@ -102,7 +102,7 @@ class TurnedFirst:
         return False
 
     def check_times(self) -> list[float]:
-        """Check times of the trajectory, s; the turn is on the spot and within its limit."""
+        """Check times of the trajectory, s; the turn on the spot needs no check."""
         return [0.0, *(self.turn.duration + time for time in self.trajectory.check_times())]
 
     def at(self, time: float) -> Sample:
@@ -116,12 +116,12 @@ class TurnedFirst:
 
 
 def turned_first(trajectory: Trajectory, heading: float, yaw_rate: float) -> Trajectory:
-    """The trajectory with a turn before it, the short way from `heading` to its own.
+    """The trajectory, preceded by a turn the short way from `heading` to its initial heading.
 
     Args:
-        trajectory: returned as it is if it holds its heading or already has this one.
-        heading: of the vehicle at the start, rad.
-        yaw_rate: largest in the turn, rad/s.
+        trajectory: returned unchanged if it holds its heading or already begins with `heading`.
+        heading: heading of the vehicle at the start, rad.
+        yaw_rate: largest yaw rate in the turn, rad/s.
     """
     if trajectory.holds_heading:
         return trajectory

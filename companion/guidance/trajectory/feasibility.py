@@ -12,7 +12,7 @@ from companion.guidance.trajectory.demand import Floats, Motion, demand, sampled
 from companion.guidance.trajectory.sample import Trajectory, computable
 
 _ROUNDING = 1e-9
-"""Share by which a limit may be exceeded, for rounding. Some trajectories just meet a limit."""
+"""Tolerance of limits for rounding, as a share. Some trajectories just meet a limit."""
 
 _DEGREES = 180.0 / pi
 
@@ -24,9 +24,9 @@ class Violation(NamedTuple):
     """A limit that a trajectory breaks; its text is for the user.
 
     Attributes:
-        limit: the key of the configuration that sets it.
-        begins: when it is first broken, s.
-        time: when it is broken most, s.
+        limit: configuration key of the limit.
+        begins: time when it is first broken, s.
+        time: time when it is broken most, s.
         text: the message for the user.
         remedy: what to do about it, as the end of a sentence.
         slowing_helps: whether the trajectory keeps the limit if it is flown slowly enough.
@@ -45,20 +45,20 @@ class Violation(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Envelope:
-    """Limits of a trajectory; `None` is no limit. Lengths count from the start.
+    """Limits of a trajectory; `None` is no limit. Positions are relative to the start.
 
     Attributes:
-        max_tilt: of the thrust from the vertical, rad.
-        max_tilt_rate: roll-pitch rate, rad/s.
-        max_yaw_rate: of the heading, rad/s.
-        min_thrust: specific, m/s².
-        max_thrust: specific, m/s².
-        max_climb: upward speed, m/s.
-        max_descent: downward speed, m/s.
-        max_speed: m/s.
-        fence: checks the positions, and where the vehicle would stop.
-        drag: against still air.
-        gravity: m/s².
+        max_tilt: largest tilt of the thrust from the vertical, rad.
+        max_tilt_rate: largest roll-pitch rate, rad/s.
+        max_yaw_rate: largest heading rate, rad/s.
+        min_thrust: smallest specific thrust, m/s².
+        max_thrust: largest specific thrust, m/s².
+        max_climb: largest upward speed, m/s.
+        max_descent: largest downward speed, m/s.
+        max_speed: largest speed, m/s.
+        fence: fence for the positions and for the places where the vehicle would stop.
+        drag: drag in still air.
+        gravity: gravity, m/s².
     """
 
     max_tilt: float | None = None
@@ -101,9 +101,9 @@ def violations(trajectory: Trajectory, envelope: Envelope) -> tuple[Violation, .
 
 
 def excess(motion: Motion, envelope: Envelope) -> dict[str, Floats]:
-    """Excess over each limit at each time, (m,), as a share of it; negative where it is kept.
+    """Excess over each limit at each time, (m,), as a share of the limit; negative if it is kept.
 
-    The fence is missing here: it is checked for a motion as a whole.
+    The fence is not included, because it is checked for a whole motion.
     """
     return {
         need.limit: _excess(need) / max(abs(need.allowed), _ROUNDING) - _ROUNDING
@@ -113,13 +113,13 @@ def excess(motion: Motion, envelope: Envelope) -> dict[str, Floats]:
 
 
 def judge(motion: Motion, envelope: Envelope) -> tuple[Violation, ...]:
-    """All limits that a motion breaks, in the order of time."""
+    """All limits that a motion breaks, in order of time."""
     with computable():
         return broken_limits(motion, envelope)
 
 
 def broken_limits(motion: Motion, envelope: Envelope) -> tuple[Violation, ...]:
-    """As `judge`, within `computable`."""
+    """Like `judge`, for a caller that is already within `computable`."""
     found = [_violation(motion.times, need) for need in _needs(motion, envelope)]
     if envelope.fence is not None:
         found.append(envelope.fence(motion))
@@ -145,7 +145,7 @@ def _needs(motion: Motion, envelope: Envelope) -> Iterator[_Need]:
 
 
 def _excess(need: _Need) -> Floats:
-    """(m,), excess over the limit in its unit; negative where it is kept."""
+    """(m,), excess over the limit in the limit's unit; negative if the limit is kept."""
     allowed = need.allowed or 0.0
     return allowed - need.needed if need.least else need.needed - allowed
 

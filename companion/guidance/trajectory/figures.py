@@ -16,8 +16,9 @@ from companion.guidance.trajectory.time_laws import STEEPEST, Cruise, LimitedJer
 from companion.guidance.trajectory.timed_curve import HeldHeading, TangentHeading, TimedCurve
 
 _LARGEST_RAMP = 0.5
-"""Longest ramp, as a share of the time for all laps at the steady rate. A ramp then covers a
-quarter of the path at most, and the fastest place of each figure lies between the ramps."""
+"""Longest ramp, as a share of the time for all laps at the steady rate. With it, a ramp covers at
+most a quarter of the path, and the fastest place of each figure lies between the ramps.
+"""
 
 _RAMP_ACCELERATION = 1.0
 """Mean acceleration on a ramp of `steady_circle`, m/s²."""
@@ -53,14 +54,14 @@ class Hover:
 def line(
     to: Vector, speed: float, acceleration: float, jerk: float, along: bool = False
 ) -> TimedCurve:
-    """A straight line, rest to rest, as fast as three limits allow.
+    """A straight line from rest to rest, as fast as three limits allow.
 
     Args:
-        to: the end, (north, east, down) of the start, m.
-        speed: largest, m/s.
-        acceleration: largest, m/s².
-        jerk: largest, m/s³.
-        along: face along it, instead of holding the heading.
+        to: end point, (north, east, down) from the start, m.
+        speed: largest speed, m/s.
+        acceleration: largest acceleration, m/s².
+        jerk: largest jerk, m/s³.
+        along: face along the line instead of holding the heading.
 
     Raises:
         TrajectoryError: the line has no length, a limit is not positive, or the line is vertical
@@ -111,7 +112,7 @@ def steady_circle(radius: float, speed: float, laps: float, longest: float) -> T
     The speed rises and falls as a raised cosine, with a mean acceleration of 1 m/s².
 
     Args:
-        radius: m.
+        radius: radius, m.
         speed: speed between the ramps, m/s.
         laps: number of laps; both ramps are part of them.
         longest: longest duration that a check allows, s.
@@ -126,7 +127,7 @@ def helix(radius: float, rise: float, laps: Laps) -> TimedCurve:
     """A circle that climbs by `rise` metres in each lap, or sinks if `rise` is negative.
 
     Raises:
-        TrajectoryError: as `circle`.
+        TrajectoryError: see `circle`.
     """
     return _rounds("helix", radius, Helix(radius, rise), laps, TangentHeading(pi / 2.0, -1.0))
 
@@ -138,16 +139,16 @@ def gerono_eight(half_width: float, laps: Laps) -> TimedCurve:
     the middle.
 
     Raises:
-        TrajectoryError: as `circle`, or the number of laps is not whole.
+        TrajectoryError: see `circle`; also if the number of laps is not whole.
     """
     return _eight("gerono eight", half_width, GeronoEight(half_width), laps)
 
 
 def bernoulli_eight(half_width: float, laps: Laps) -> TimedCurve:
-    """A lemniscate of Bernoulli. Its phase advances at a steady rate: it is fastest at the tips.
+    """A lemniscate of Bernoulli. Its phase advances steadily, so it is fastest at the tips.
 
     Raises:
-        TrajectoryError: as `gerono_eight`.
+        TrajectoryError: see `gerono_eight`.
     """
     return _eight("bernoulli eight", half_width, BernoulliEight(half_width), laps)
 

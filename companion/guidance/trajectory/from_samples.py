@@ -25,7 +25,7 @@ from companion.guidance.trajectory.timed_curve import (
 )
 
 _AT_REST = 0.1
-"""Samples that begin or end slower than this count as at rest there, m/s."""
+"""Samples slower than this at their beginning or end count as at rest there, m/s."""
 
 _CHECKS_PER_PIECE = 16
 """Checks of each piece of the spline. A piece lasts half a period of the cutoff frequency."""
@@ -38,9 +38,9 @@ _LARGEST_RAMP = 0.5
 
 
 class _Quantity(NamedTuple):
-    """A derivative in a file, and its allowed RMS error: floor + share × its RMS.
+    """A derivative in a file, and its permitted RMS error: floor + share · RMS of the derivative.
 
-    Published accelerations may jump where the spline is smooth.
+    The tolerance is needed because published accelerations may jump where the spline is smooth.
 
     Attributes:
         name: name in messages.
@@ -182,7 +182,7 @@ def _root_mean_square(values: Floats) -> float:
 def _heading(
     spline: SepticSpline, table: Table, options: SampleOptions, resting: tuple[bool, bool]
 ) -> Heading:
-    """The heading that the options ask for."""
+    """The heading that the options request."""
     if options.heading is HeadingFrom.ALONG:
         return tangent_heading(spline, resting)
     if options.heading is HeadingFrom.FIXED or table.yaw is None:

@@ -130,7 +130,7 @@ def _add(
 
 
 def _solved(equations: _Equations, states: Floats, mask: NDArray[np.bool_]) -> Floats:
-    """The states (k, 4, n) of smallest cost among those that agree with `states` at `mask`."""
+    """The states (k, 4, n) of smallest cost that equal `states` where `mask` is true."""
     met = np.where(mask[:, :, None], states, 0.0)
     diagonal, upper, right = equations
     right = right - diagonal @ met

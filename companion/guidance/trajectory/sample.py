@@ -28,10 +28,10 @@ class TrajectoryError(ValueError):
 
 
 class Sample(NamedTuple):
-    """Where the vehicle should be at one instant, relative to where the trajectory begins.
+    """The wanted state of the vehicle at one instant, relative to the start of the trajectory.
 
     Attributes:
-        position: m; (0, 0, 0) is where it begins.
+        position: m; (0, 0, 0) at the start.
         velocity: m/s.
         acceleration: m/s².
         jerk: m/s³.
@@ -53,7 +53,7 @@ class Trajectory(Protocol):
 
     @property
     def name(self) -> str:
-        """What the user calls it."""
+        """Name for messages."""
         ...
 
     @property
@@ -63,7 +63,7 @@ class Trajectory(Protocol):
 
     @property
     def holds_heading(self) -> bool:
-        """Whether the vehicle keeps its heading. The samples' `heading` is then 0."""
+        """Whether the vehicle keeps its heading; the samples' `heading` is then 0."""
         ...
 
     def at(self, time: float) -> Sample:

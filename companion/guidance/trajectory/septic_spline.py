@@ -30,7 +30,7 @@ def _from_ends() -> Floats:
 
 
 FROM_ENDS = _from_ends()
-"""Matrix (8, 8) from end states to coefficients. Its entries are multiples of 1/6, so exact."""
+"""Matrix (8, 8) from end states to coefficients. Its entries are multiples of 1/6 and exact."""
 
 
 class SepticSpline:
@@ -71,7 +71,7 @@ class SepticSpline:
         return [_horner(piece, u) for piece in self._pieces[which]]
 
     def along(self, times: Floats) -> Floats:
-        """The same as `at` at (m,) times at once; (m, n, 4)."""
+        """Like `at`, at (m,) times at once; (m, n, 4)."""
         knots, pieces = self._arrays
         which = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(pieces) - 1)
         u = (times - knots[which])[:, None]

@@ -1,4 +1,4 @@
-"""A slower time law: stretches the time of a trajectory by a factor that changes smoothly."""
+"""A slower time law: stretches a trajectory's time by a factor that changes smoothly."""
 
 from bisect import bisect_right
 from dataclasses import dataclass, field
@@ -26,7 +26,7 @@ class _Piece(NamedTuple):
     d: Number
 
     def factor(self, u: Number) -> Number:
-        """The slowness w at u: by which factor time is stretched."""
+        """The slowness w at u: the factor by which time is stretched."""
         return self.a + u * (self.b + u * (self.c + u * self.d))
 
     def slope(self, u: Number) -> Number:
@@ -108,7 +108,7 @@ class SlowerTime:
         return self._progress(piece, u, which)
 
     def of(self, moments: Floats) -> tuple[Floats, Progress]:
-        """Stretched times (m,) at original times (m,), and the progress there, (m,) each."""
+        """Stretched times and progress (m,) at the original times `moments` (m,), s."""
         count = len(self.coefficients) - 3
         which = np.clip((moments / self._width).astype(int), 0, count - 1)
         c = np.array(self.coefficients)

@@ -1,6 +1,6 @@
 """A trajectory slowed down where it breaks limits.
 
-The path stays; only its timing changes.
+The path stays the same; only its timing changes.
 
 1. For each moment, find the factor by which the whole trajectory would have to be slowed down for
    this moment to keep all limits.
@@ -24,16 +24,16 @@ from companion.guidance.trajectory.sample import LONGEST, Trajectory, Trajectory
 from companion.guidance.trajectory.slower_time import SlowerTime
 
 _SLOWEST = 64.0
-"""The largest factor tried."""
+"""Largest slowing factor that is tried."""
 _PRECISION = 1e-3
 """Relative precision of a factor."""
 _HALVINGS = 16
-"""Bisection steps in the search for a moment's factor."""
+"""Number of bisection steps in the search for the factor of one moment."""
 _WIDTHS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
 """Widths of the slowness' pieces to try, s. A ramp takes at least four pieces."""
 _FEWEST_PIECES = 4
 _ROUNDS = 60
-"""How often the slowness is raised before the search gives up."""
+"""Largest number of times that the slowness is raised before the search gives up."""
 _LEAST_RAISE, _LARGEST_RAISE = 0.004, 0.1
 _MOST_MOMENTS = 20_000
 """Largest number of moments for slowing down in parts. The search then takes some seconds."""
@@ -44,9 +44,9 @@ _SHORTEST_STEP = 0.006
 _MOMENTS_A_PIECE = 8.0
 """Fewest moments in each piece of the slowness; fewer could miss the extreme of a ramp."""
 _GAP = 3.0
-"""Ratio of a gap between check times to the usual gap from which moments are filled in."""
+"""A gap between check times is filled in if it is this many times as long as the usual gap."""
 _WORTH = 0.98
-"""Slowing down in parts must last less than this share of slowing down evenly."""
+"""Slowing down in parts is used if it takes less than this share of the time of slowing evenly."""
 _NOTICEABLE = 1.02
 """Smallest factor that counts as slowing down."""
 _NEAR_SLOWEST = 0.9
@@ -89,7 +89,7 @@ class SlowDown(NamedTuple):
 
 
 def slow_down(trajectory: Trajectory, envelope: Envelope) -> SlowDown:
-    """The trajectory as it is if it keeps all limits, else slowed down until it does.
+    """The trajectory unchanged if it keeps all limits, else slowed down until it does.
 
     Raises:
         TrajectoryError: the trajectory breaks a limit at any speed.
@@ -143,7 +143,7 @@ def _even_factor(
 
 
 def _moments(times: Floats) -> Floats:
-    """The check times, and more in the laps that were left out because they are alike."""
+    """The check times, and more in the laps that they omit because all laps are alike."""
     gaps = np.diff(times)
     usual = float(np.median(gaps[gaps > 0.0])) if gaps.size else 1.0
     length = float(times[-1])
@@ -169,7 +169,7 @@ def _best_law(motion: Motion, length: float, envelope: Envelope) -> SlowerTime |
 
 
 def _needed_factors(motion: Motion, envelope: Envelope) -> Floats:
-    """For each moment (m,), the single factor with which it keeps the limits."""
+    """For each moment (m,), the factor of slowing the whole trajectory that satisfies it."""
     low, high = np.zeros_like(motion.times), np.full_like(motion.times, np.log(_SLOWEST))
     high[_over(motion, envelope) <= 0.0] = 0.0
     for _ in range(_HALVINGS):
@@ -214,14 +214,14 @@ def _law(
 
 
 def _over_four(values: Floats, beyond: float) -> Floats:
-    """The largest of the four pieces (n,) that each coefficient (n + 3,) touches."""
+    """Largest value among the four pieces (n,) that each coefficient (n + 3,) affects."""
     padded = np.concatenate(([beyond] * 3, values, [beyond] * 3))
     largest: Floats = np.max([padded[k : k + values.size + 3] for k in range(4)], axis=0)
     return largest
 
 
 def _parts(motion: Motion, law: SlowerTime, envelope: Envelope) -> Iterator[SlowedPart]:
-    """The parts that a slowness slows down, each with the limit that asks for it."""
+    """The parts that a slowness slows down, each with the limit that requires it."""
     times, progress = law.of(motion.times)
     factors = 1.0 / np.asarray(progress.first)
     slow = np.concatenate(([False], factors > _NOTICEABLE, [False]))

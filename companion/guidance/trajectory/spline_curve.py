@@ -24,10 +24,10 @@ _HEADING_STEP = 0.01
 """Sample period of the direction of flight, s."""
 
 _SLOW = 0.1
-"""Below this share of the largest horizontal speed the direction of flight is not used."""
+"""Share of the largest horizontal speed below which the direction of flight is not used."""
 
 _STANDING = 0.01
-"""Nor below this speed, m/s."""
+"""Speed below which the direction of flight is not used, m/s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +36,8 @@ class SplineCurve:
 
     Attributes:
         spline: three times continuously differentiable.
-        checks_per_piece: fewest checks in each piece; an extreme between two is missed by less than
-            0.3 %.
+        checks_per_piece: smallest number of checks in each piece; an extreme between two checks is
+            missed by less than 0.3 %.
         longest_step: largest phase between two checks; a heading may need a short one.
     """
 
@@ -127,11 +127,11 @@ def tangent_heading(spline: SepticSpline, resting: tuple[bool, bool]) -> SplineH
     """Heading along a spline of north, east and down, interpolated where the spline is slow.
 
     Args:
-        spline: of the positions, m.
-        resting: whether it is at rest at its beginning, and at its end.
+        spline: spline of the positions, m.
+        resting: whether the spline is at rest at its beginning, and at its end.
 
     Raises:
-        TrajectoryError: it never moves horizontally.
+        TrajectoryError: the spline never moves horizontally.
     """
     count = int(np.ceil((spline.end - spline.begin) / _HEADING_STEP)) + 1
     times = np.linspace(spline.begin, spline.end, count)

@@ -15,7 +15,7 @@ class Progress(NamedTuple):
     """The phase of a curve at one time, and its derivatives by time.
 
     Attributes:
-        phase: in the curve's unit.
+        phase: phase in the curve's unit.
         first, second, third: per s, s², s³.
     """
 
@@ -26,7 +26,7 @@ class Progress(NamedTuple):
 
 
 Triple = tuple[Any, Any, Any]
-"""A vector of numbers, or of arrays that hold it at many times."""
+"""A vector of numbers, or of arrays with the values at many times."""
 
 
 def derivatives(
@@ -35,7 +35,7 @@ def derivatives(
     """Velocity, acceleration and jerk along a curve, by the chain rule.
 
     Args:
-        progress: along the curve.
+        progress: progress along the curve.
         first: derivative of the curve by its phase.
         second: its second derivative.
         third: its third derivative.
@@ -74,7 +74,7 @@ class TimeLaw(Protocol):
     """Progress along a curve over time."""
 
     def pieces(self) -> Sequence[Piece]:
-        """Its smooth parts, in order, from 0 to the duration."""
+        """The smooth parts of the law, in order, from 0 to the duration."""
         ...
 
     @property
@@ -123,12 +123,12 @@ class Cruise:
     With both ramps 0 the rate is steady from the start, for curves that rest at their ends.
 
     Attributes:
-        length: of the whole phase.
-        rate: steady, per s.
-        gathering: how long the rate rises, s.
-        losing: how long the rate falls, s.
-        ramp: how the rate rises and, mirrored, falls: (rate, duration of the ramp in s, time in
-            s) → progress. The mean rate of a ramp is half the steady rate.
+        length: phase at the end.
+        rate: steady rate, per s.
+        gathering: time in which the rate rises, s.
+        losing: time in which the rate falls, s.
+        ramp: how the rate rises and, mirrored, falls: (rate, duration of the ramp in s, time in s)
+            → progress. The mean rate of a ramp is half the steady rate.
     """
 
     length: float
@@ -167,7 +167,7 @@ class Cruise:
 
 
 _CRUISING = 3
-"""Which of the seven pieces of constant jerk has neither jerk nor acceleration."""
+"""Index of the piece at constant speed among the seven pieces of constant jerk."""
 
 
 class LimitedJerk:
@@ -178,16 +178,16 @@ class LimitedJerk:
     """
 
     def __init__(self, length: float, speed: float, acceleration: float, jerk: float) -> None:
-        """Compute the pieces.
+        """Compute the seven pieces.
 
         Args:
-            length: how far, m.
-            speed: never exceeded, m/s; reached if `length` allows.
-            acceleration: never exceeded, m/s².
-            jerk: never exceeded, m/s³.
+            length: distance, m.
+            speed: largest speed, m/s; reached if `length` allows.
+            acceleration: largest acceleration, m/s².
+            jerk: largest jerk, m/s³.
 
         Raises:
-            TrajectoryError: one of them is not positive.
+            TrajectoryError: a value is not positive.
         """
         if min(length, speed, acceleration, jerk) <= 0.0:
             raise TrajectoryError("length, speed, acceleration and jerk of a line must be positive")
@@ -205,7 +205,7 @@ class LimitedJerk:
         self._pieces = _joined((*faster, (cruising, 0.0), *slower))
         self._ends = [start for start, _, _ in self._pieces[1:]]
         self.duration = 2.0 * gathering + cruising
-        """How long it lasts, s."""
+        """Duration, s."""
 
     def pieces(self) -> list[Piece]:
         """The seven pieces of constant jerk."""
@@ -239,7 +239,7 @@ def _joined(jerks: Sequence[tuple[float, float]]) -> list[_Piece]:
 
 
 def _moved(state: Progress, jerk: float, time: float) -> Progress:
-    """Progress after `time` of constant jerk."""
+    """State after `time` s of constant jerk."""
     s, v, a, _ = state
     return Progress(
         s + time * (v + time * (a / 2.0 + time * jerk / 6.0)),

@@ -33,22 +33,23 @@ def waypoints(
     along: bool = False,
     headings: Sequence[float | None] = (),
 ) -> TimedCurve:
-    """A trajectory from rest at the start through all points without a stop, to rest at the last.
+    """A trajectory through all points without a stop, from rest at the start to rest at the last.
 
     The durations of the segments have the ratios of trapezoidal speed profiles from rest to rest.
     The whole trajectory is then scaled in time until it just meets one of the two limits.
 
     Args:
-        points: (north, east, down) of the start, m; the start itself is not among them.
-        speed: largest, m/s.
-        acceleration: largest, m/s².
-        along: face along it, instead of holding the heading.
-        headings: at each point in rad from north, or None where it does not matter. From one to
-            the next the vehicle turns the short way.
+        points: (north, east, down) from the start, m, without the start itself.
+        speed: largest speed, m/s.
+        acceleration: largest acceleration, m/s².
+        along: face along the path instead of holding the heading.
+        headings: heading at each point, rad from north, or None for any. The vehicle turns the
+            short way from one to the next.
 
     Raises:
-        TrajectoryError: no points, two equal ones after each other, a limit that is not positive,
-            or headings that do not fit.
+        TrajectoryError: there are no points, two consecutive points are equal, a limit is not
+            positive, the number of headings is wrong, `along` and `headings` are both given, or the
+            trajectory lasts too long.
     """
     if min(speed, acceleration) <= 0.0:
         raise TrajectoryError("speed and acceleration of waypoints must be positive")
@@ -92,14 +93,14 @@ def _trapezoids(distances: Floats, speed: float, acceleration: float) -> Floats:
 
 
 def _through(knots: Floats, places: Floats) -> SepticSpline:
-    """Through the places (k, n) at the knots, from rest to rest."""
+    """A spline through the places (k, n) at the knots, from rest to rest."""
     states = np.zeros((knots.size, ORDER, places.shape[1]))
     states[:, 0] = places
     return minimum_snap(knots, Fixed(states, _resting_ends(np.ones(knots.size, dtype=bool))))
 
 
 def _resting_ends(values: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Mask (k, 4) of a spline that rests at its ends and has some values (k,) given."""
+    """Mask (k, 4) of a spline at rest at both ends, with the knots of known value (k,) fixed."""
     mask = np.zeros((values.size, ORDER), dtype=bool)
     mask[:, 0] = values
     mask[[0, -1], 1:] = True
@@ -119,7 +120,7 @@ def _stretch(spline: SepticSpline, knots: Floats, speed: float, acceleration: fl
 
 
 def _given_headings(knots: Floats, headings: Sequence[float | None]) -> SplineHeading:
-    """Through the headings that are given, turning the short way from one to the next."""
+    """A spline through the given headings, turning the short way from one to the next."""
     given = np.array([angle is not None for angle in (None, *headings)])
     states = np.zeros((knots.size, ORDER, 1))
     states[given, 0, 0] = np.unwrap([angle for angle in headings if angle is not None])

@@ -1,1 +1,1 @@
-"""The live page: served by the helper process, drawn in the browser."""
+"""The live page: the helper process serves it, the browser draws it."""

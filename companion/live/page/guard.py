@@ -1,4 +1,4 @@
-"""Who may speak to the live page: no other site, and from another computer only with the token."""
+"""Access to the live page: no other web site, and from another computer only with the token."""
 
 import hmac
 import socket
@@ -17,11 +17,11 @@ _COOKIE = "companion_watch"
 
 
 class Guard:
-    """ASGI middleware around the page; it judges every request and every WebSocket.
+    """ASGI middleware around the page; it checks every request and every WebSocket.
 
     Args:
         app: the page.
-        token: of the door.
+        token: token that admits users.
     """
 
     def __init__(self, app: App, token: str) -> None:
@@ -73,7 +73,7 @@ class Guard:
         )
 
     def _with_cookie(self, send: Send) -> Send:
-        """`send`, with a cookie added to the response that allows this browser to watch."""
+        """Wrap `send`: the response gets a cookie that allows this browser to watch."""
         cookie = f"{_COOKIE}={self._cookie}; HttpOnly; SameSite=Strict; Path=/"
 
         async def sending(message: MutableMapping[str, Any]) -> None:
@@ -86,7 +86,7 @@ class Guard:
 
 
 def _is_this_computer(host: str) -> bool:
-    """Whether a Host header names us by an address, or by a name that no other site can take."""
+    """Whether a Host header has an address, or a name of ours that no other site can take."""
     name = urlsplit(f"//{host}").hostname or ""
     try:
         ip_address(name)

@@ -12,7 +12,7 @@ from companion.live.page.store import Store
 
 _HERE = Path(__file__).parent
 _PUSH_PERIOD = 0.2
-"""New states go to the browsers this often, s."""
+"""Period with which new states are sent to the browsers, s."""
 
 _CELLS = (
     ("phase", "phase"),
@@ -38,7 +38,7 @@ _PLOTS = (
 
 
 def add_page(relay: Relay, store: Store, guard: Guard) -> None:
-    """Add the page, and send new states to all who have it open."""
+    """Add the page, and send new states to all browsers that show it."""
     shared = f"<style>{_text('live.css')}</style><script>{_text('live.js')}</script>"
     ui.add_head_html(shared, shared=True)
     sent: dict[str, tuple[int, int]] = {}

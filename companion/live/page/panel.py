@@ -18,16 +18,16 @@ from companion.live.page.store import Store
 _BY = "the live page"
 _FILE = "changed.yaml"
 _WRONG = 1.0
-"""A wrong token is answered after this long, s."""
+"""Delay of the answer to a wrong token, s."""
 
 
 class Panel:
-    """One tab's inputs and buttons; each tab is unlocked for itself.
+    """Inputs and buttons of one browser tab; each tab must be unlocked separately.
 
     Args:
-        relay: to the flight.
-        store: knows the values now.
-        guard: knows the token.
+        relay: passes changes to the flight.
+        store: holds the present values.
+        guard: checks the token.
         unlocked: whether the tab was opened with the token.
     """
 
@@ -93,7 +93,7 @@ class Panel:
             self._say(str(error))
 
     async def _save(self) -> None:
-        """Give the changed values to the browser, and write them into the flight's folder."""
+        """Send the changed values to the browser, and write them to the flight's folder."""
         text = self._store.changed_yaml()
         ui.download.content(text, _FILE)
         folder = self._relay.first["folder"]
@@ -109,7 +109,7 @@ class Panel:
             self._say(f"saved as {path}")
 
     def _follow(self) -> None:
-        """Show values that somebody has changed, unless the user is typing another one."""
+        """Show values that somebody else changed, except in a field in which the user is typing."""
         for key in self._store.values():
             name, value = (key.section, key.name), shown(key.value)
             field = self._inputs[name]
@@ -124,7 +124,7 @@ class Panel:
 
 
 def _range(allowed: str) -> str:
-    """The range of a key, without the words that hold for all of them."""
+    """The range of a key, without the words that all ranges share."""
     return (
         allowed.replace("changeable in flight within its range", "")
         .strip(", ")
@@ -133,7 +133,7 @@ def _range(allowed: str) -> str:
 
 
 def _typed(text: str) -> Any:
-    """A number, or null where the field is empty; other words stay as they are, to be refused."""
+    """A number, or null for an empty field; other texts stay unchanged and are then refused."""
     if text in ("", "null"):
         return None
     try:

@@ -1,4 +1,4 @@
-"""What the live page shows: the newest state, the last half minute, events and values."""
+"""The data on the live page: newest state, last half minute, events and values."""
 
 from collections import deque
 from typing import Any
@@ -15,20 +15,20 @@ _MOST_FRAMES, _MOST_EVENTS = 400, 200
 
 
 class Store:
-    """Takes the messages of the flight.
+    """Keeps the messages of the flight.
 
     Attributes:
         frames: states of the last `KEPT` seconds, oldest first.
         count: number of states so far.
-        events: newest last, each {"time_s", "text"}.
+        events: the events, newest last, each {"time_s", "text"}.
         phase: the running phase and what it waits for.
         config: the configuration after the newest change.
         start: the configuration with which the flight began.
         can_undo: whether a change can be undone.
-        over: how the flight ended, or None.
+        over: how the flight ended; None: it has not.
 
     Args:
-        config: of the flight.
+        config: configuration of the flight.
     """
 
     def __init__(self, config: Config) -> None:
@@ -59,21 +59,21 @@ class Store:
                 self.over = str(message["text"])
 
     def end(self) -> None:
-        """Note that the flight has gone without a word."""
+        """Note that the flight has vanished without a last message."""
         self.over = self.over or "the program that flew has ended"
 
     def since(self, count: int) -> list[Message]:
-        """The states after the first `count` of all."""
+        """The states after the first `count` states."""
         new = min(self.count - count, len(self.frames))
         return list(self.frames)[len(self.frames) - new :]
 
     def events_since(self, count: int) -> list[dict[str, Any]]:
-        """The events after the first `count` of all."""
+        """The events after the first `count` events."""
         new = min(self.event_count - count, len(self.events))
         return list(self.events)[len(self.events) - new :]
 
     def values(self) -> list[Key]:
-        """The keys that may change in flight, with their values now."""
+        """The keys that may change in flight, with their present values."""
         return [key for key in keys(self.config) if (key.section, key.name) in changeable()]
 
     def fence(self) -> dict[str, Any]:

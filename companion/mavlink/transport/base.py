@@ -4,11 +4,13 @@ from collections.abc import Callable
 from typing import Protocol
 
 Receive = Callable[[bytes, int], bool]
-"""Takes bytes and the `perf_counter_ns` of their arrival; returns whether it accepted a frame."""
+"""Called with bytes and the `perf_counter_ns` of their arrival; returns whether a frame was
+accepted.
+"""
 
 
 class Receiver(Protocol):
-    """Takes the bytes that a transport receives. `PeerRule` says what a claim is."""
+    """Takes the bytes that a transport receives. `PeerRule` explains claims."""
 
     def connect(self, *, streaming: bool) -> None:
         """Forget an incomplete frame: the next bytes come over another connection."""
@@ -36,10 +38,10 @@ class Receiver(Protocol):
 
 
 Lost = Callable[[str], None]
-"""Takes the reason why the connection is gone."""
+"""Called with the reason when the connection is lost."""
 
 Tap = Callable[[float, bytes], None]
-"""Takes the event-loop time in s and one whole frame, received or sent. It must be quick."""
+"""Called with the event-loop time (s) and one whole frame, received or sent. It must be quick."""
 
 OPEN_TIMEOUT_S = 5.0
 """Time allowed to open a TCP connection, s."""

@@ -15,9 +15,9 @@ _SERIAL = re.compile(r"(/[^:]+|COM\d+):(\d{1,8})")
 _DEVICE = re.compile(r"(?:serial:/*)?(/?dev/[^:,]+|tty[^:,/]+|COM\d+)(?:[:,](\d{1,8}))?")
 """A serial device as other programs write it, and its baud rate."""
 _ADDRESS = re.compile(r"(?:(\w+):/*)?([^:/\[\]]*|\[[0-9a-fA-F:.]+\]):(\d{1,5})/?")
-"""An address as other programs write it: of pymavlink's kind, or without a scheme."""
+"""An address as other programs write it: in pymavlink's notation, or without a scheme."""
 _OURSELVES = ("", "0.0.0.0", "127.0.0.1", "localhost", "::", "::1")
-"""Hosts at which `udp://` can only mean to listen."""
+"""Hosts for which `udp://` can only mean listening."""
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ def _peers(text: str, query: str) -> tuple[PeerAddress, ...]:
 
 
 def is_host(text: str) -> bool:
-    """Whether a host may have this name: labels of 1 to 63 characters, 253 in all, no blanks."""
+    """Whether this is a valid host name: labels of 1 to 63 characters, 253 in all, no blanks."""
     try:
         text.encode("idna")  # as the resolver does, whose UnicodeError would surprise its caller
     except UnicodeError:
@@ -164,7 +164,7 @@ def _serial(text: str, rest: str) -> SerialPort:
 
 
 def _remedy(text: str) -> str:
-    """How to write the endpoint of another program here; if it is unknown, all notations."""
+    """How to write another program's endpoint here; if it is unknown, all notations."""
     text = text.strip()
     if device := _DEVICE.fullmatch(text):
         name, baud = device[1], device[2]

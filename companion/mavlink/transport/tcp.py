@@ -11,7 +11,7 @@ from companion.mavlink.transport.base import OPEN_TIMEOUT_S, Lost, Receiver
 from companion.mavlink.transport.endpoint import TcpClient, TcpServer
 
 _MAX_UNSENT_BYTES = 2048
-"""With more unsent bytes (about 40 setpoints), frames are dropped: they would arrive too late."""
+"""Unsent bytes (about 40 setpoints) above which frames are dropped, because they would be late."""
 
 
 async def open_tcp_client(endpoint: TcpClient, receiver: Receiver, lost: Lost) -> "TcpTransport":
@@ -91,7 +91,7 @@ class TcpTransport:
 
     @property
     def reconnects(self) -> bool:
-        """Whether the link must open a new connection: of a client, not of a server."""
+        """Whether the link must open a new connection: True for a client, False for a server."""
         return self._server is None
 
     def listen(self, server: asyncio.Server) -> None:

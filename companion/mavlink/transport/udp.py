@@ -25,7 +25,7 @@ _OLDEST_NS = 1_000_000_000  # an older stamp means that the computer's clock was
 _BURST = 32  # datagrams read before the loop does other work
 
 PEER_SILENCE_S = 2.0
-"""After this silence of the peer, a sender at another address may become the peer, s."""
+"""A sender at another address may become the peer after the peer was silent for this time, s."""
 
 
 async def open_udp(endpoint: UdpIn | UdpOut, receiver: Receiver) -> "UdpTransport":
@@ -39,11 +39,11 @@ async def open_udp(endpoint: UdpIn | UdpOut, receiver: Receiver) -> "UdpTranspor
 
 
 class UdpAddress(NamedTuple):
-    """Where an endpoint is.
+    """The addresses of an endpoint.
 
     Attributes:
-        family: of the socket.
-        address: to bind or to send to, as sockets take it.
+        family: address family of the socket.
+        address: socket address to bind or to send to.
         named: the senders that the endpoint names.
     """
 
@@ -152,7 +152,7 @@ class UdpTransport:
             return
 
     def _take_unconnected(self, data: bytes, received_ns: int, address: Any) -> bool:
-        """Take a datagram; return whether its sender is the peer from now on."""
+        """Take a datagram of an unconnected socket; return whether its sender is now the peer."""
         who = host_and_port(address)
         if not self._named.admit(address):
             self._receiver.note_stranger(who)
@@ -198,7 +198,7 @@ class UdpTransport:
 
 
 def _arrival_ns(stamps: list[tuple[int, int, bytes]]) -> int:
-    """When the kernel received the datagram, as a `perf_counter_ns`; now, if it is not known."""
+    """Arrival of the datagram in the kernel, as a `perf_counter_ns`; now if it is unknown."""
     now = time.perf_counter_ns()
     if not stamps:
         return now

@@ -1,1 +1,1 @@
-"""`flight.mcap`: the channels of a recorded flight, how they are written and how they are read."""
+"""`flight.mcap`: the channels of a recorded flight, their writer and their reader."""

@@ -1,6 +1,6 @@
-"""Words in CDR messages of ROS 2, and the message types of Foxglove that we write.
+"""Text messages in CDR (ROS 2), and the Foxglove message types that we write.
 
-Foxglove, Lichtblick and PlotJuggler know these types by their names and draw them as they are.
+Foxglove, Lichtblick and PlotJuggler recognise these types by name and draw them.
 """
 
 import struct
@@ -33,6 +33,8 @@ _POSE_TYPE = """MSG: geometry_msgs/Pose
 geometry_msgs/Point position
 geometry_msgs/Quaternion orientation
 """
+GEOMETRY = (_TIME, _QUATERNION, _VECTOR, _POINT, _POSE_TYPE)
+"""Definitions of the types of time and geometry."""
 _RULE = "=" * 80 + "\n"
 
 
@@ -43,11 +45,12 @@ class MessageType(NamedTuple):
     schema: bytes
 
 
-def _type(name: str, *parts: str) -> MessageType:
+def message_type(name: str, *parts: str) -> MessageType:
+    """A message type from its own fields and the definitions of the types in it."""
     return MessageType(name, _RULE.join(parts).encode())
 
 
-FRAME_TRANSFORM = _type(
+FRAME_TRANSFORM = message_type(
     "foxglove_msgs/msg/FrameTransform",
     "builtin_interfaces/Time timestamp\nstring parent_frame_id\nstring child_frame_id\n"
     "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n",
@@ -55,7 +58,7 @@ FRAME_TRANSFORM = _type(
     _VECTOR,
     _QUATERNION,
 )
-POSE_IN_FRAME = _type(
+POSE_IN_FRAME = message_type(
     "foxglove_msgs/msg/PoseInFrame",
     "builtin_interfaces/Time timestamp\nstring frame_id\ngeometry_msgs/Pose pose\n",
     _TIME,
@@ -63,30 +66,30 @@ POSE_IN_FRAME = _type(
     _POINT,
     _QUATERNION,
 )
-LOG = _type(
+LOG = message_type(
     "foxglove_msgs/msg/Log",
     "uint8 UNKNOWN=0\nuint8 DEBUG=1\nuint8 INFO=2\nuint8 WARNING=3\nuint8 ERROR=4\nuint8 FATAL=5\n"
     "builtin_interfaces/Time timestamp\nuint8 level\nstring message\nstring name\nstring file\n"
     "uint32 line\n",
     _TIME,
 )
-PHASE = _type(
+PHASE = message_type(
     f"{PACKAGE}/Phase",
     "# A phase of the flight began.\n# When, on our clock, s.\nfloat64 time_s\nstring name\n"
     "# The condition that ends it.\nstring waits_for\n",
 )
-MANEUVER = _type(
+MANEUVER = message_type(
     f"{PACKAGE}/Maneuver",
     "# A maneuver began; an empty name: the last one ended.\n# When, on our clock, s.\n"
     "float64 time_s\n# The same on the vehicle's clock, s.\nfloat64 vehicle_time_s\nstring name\n",
 )
-ALARM = _type(
+ALARM = message_type(
     f"{PACKAGE}/Alarm",
     "# A safety monitor raised its alarm, or its alarm is over.\n# When, on our clock, s.\n"
     "float64 time_s\n# 1: raised, 0: over.\nfloat64 raised\nstring monitor\nstring reason\n"
     "# What the flight does about it.\nstring action\n",
 )
-CHANGE = _type(
+CHANGE = message_type(
     f"{PACKAGE}/Change",
     "# Values of the configuration begin to change in flight.\n# When, on our clock, s.\n"
     "float64 time_s\n# 1: at once, 0: slewed.\nfloat64 at_once\n"
@@ -97,18 +100,18 @@ Pose = tuple[float, float, float, float, float, float, float]
 
 
 def words_message(numbers: tuple[float, ...], texts: tuple[str, ...]) -> bytes:
-    """A message of float64 fields and then strings, as PHASE, MANEUVER, ALARM and CHANGE are."""
+    """Encode float64 fields followed by strings, the form of PHASE, MANEUVER, ALARM and CHANGE."""
     message = bytearray(struct.pack(f"<4s{len(numbers)}d", CDR, *numbers))
     for text in texts:
-        _add_string(message, text)
+        add_string(message, text)
     return bytes(message)
 
 
 def words_of(message: bytes, numbers: int, texts: int) -> tuple[tuple[float, ...], list[str]]:
-    """Decode what `words_message` made: the numbers and the strings.
+    """Decode a message of `words_message`: the numbers and the strings.
 
     Raises:
-        ValueError: it is not such a message.
+        ValueError: the message does not have this form.
     """
     try:
         found = struct.unpack_from(f"<{numbers}d", message, 4)
@@ -122,19 +125,19 @@ def words_of(message: bytes, numbers: int, texts: int) -> tuple[tuple[float, ...
 
 
 def log_message(time_ns: int, level: int, text: str, name: str) -> bytes:
-    """A message of the type LOG, at a time in ns since 1970."""
-    message = bytearray(CDR + _stamp(time_ns) + bytes((level,)))
+    """Encode a message of type LOG at a time in ns since 1970."""
+    message = bytearray(CDR + stamp(time_ns) + bytes((level,)))
     for each in (text, name, ""):
-        _add_string(message, each)
+        add_string(message, each)
     _align(message)
     return bytes(message + _COUNT.pack(0))
 
 
 def log_of(message: bytes) -> tuple[int, str, str]:
-    """Level, text and name of a message of the type LOG.
+    """Decode level, text and name of a message of type LOG.
 
     Raises:
-        ValueError: it is not such a message.
+        ValueError: the message does not have this form.
     """
     try:
         text, at = _string(message, 13)
@@ -145,7 +148,7 @@ def log_of(message: bytes) -> tuple[int, str, str]:
 
 
 class PoseEncoder:
-    """Makes messages of the types FRAME_TRANSFORM (two frames) or POSE_IN_FRAME (one frame).
+    """Encodes messages of type FRAME_TRANSFORM (two frames) or POSE_IN_FRAME (one frame).
 
     Args:
         frames: names of the frames, which are the same in all messages.
@@ -154,26 +157,28 @@ class PoseEncoder:
     def __init__(self, *frames: str) -> None:
         names = bytearray(12)
         for frame in frames:
-            _add_string(names, frame)
+            add_string(names, frame)
         while (len(names) - 4) % 8:
             names.append(0)
         self._names = bytes(names[12:])
 
     def message(self, time_ns: int, pose: Pose) -> bytes:
         """The message for `pose` at a time in ns since 1970."""
-        return CDR + _stamp(time_ns) + self._names + _POSE.pack(*pose)
+        return CDR + stamp(time_ns) + self._names + _POSE.pack(*pose)
 
 
-def _stamp(time_ns: int) -> bytes:
+def stamp(time_ns: int) -> bytes:
+    """A time in ns since 1970, as `builtin_interfaces/Time`."""
     return _STAMP.pack(*divmod(time_ns, _NANOSECONDS))
 
 
 def _align(message: bytearray) -> None:
-    """Pad to 4 bytes; positions count after the 4 bytes of the header, so this is the same."""
+    """Pad to 4 bytes. Positions count after the 4-byte header; the alignment is the same."""
     message.extend(bytes(-len(message) % 4))
 
 
-def _add_string(message: bytearray, text: str) -> None:
+def add_string(message: bytearray, text: str) -> None:
+    """Add a string to a message, with its length in front and a zero at its end."""
     _align(message)
     encoded = text.encode("utf-8", "replace") + b"\0"
     message.extend(_COUNT.pack(len(encoded)) + encoded)

@@ -1,8 +1,11 @@
-"""All channels of numbers in `flight.mcap`, with those of the status a few times a second.
+"""All channels of `flight.mcap`; here are those of the status, a few times a second.
 
 The columns follow the conventions of `companion.recording.mcap_file.loop_channels`.
 """
 
+from typing import NamedTuple
+
+from companion.recording.mcap_file import cdr
 from companion.recording.mcap_file.fields import Channel, Field
 from companion.recording.mcap_file.loop_channels import (
     ACTION,
@@ -14,6 +17,7 @@ from companion.recording.mcap_file.loop_channels import (
     TARGET,
     VEHICLE_TIME,
 )
+from companion.recording.mcap_file.scene import SCENE_UPDATE
 
 THRUST = Channel(
     "/thrust",
@@ -70,3 +74,41 @@ CHANNELS = (
     MOTION,
     RESOURCES,
 )
+"""The channels of numbers."""
+WORDS = {
+    "/phase": cdr.PHASE,
+    "/maneuver": cdr.MANEUVER,
+    "/alarm": cdr.ALARM,
+    "/change": cdr.CHANGE,
+    "/log": cdr.LOG,
+    "/tf": cdr.FRAME_TRANSFORM,
+    "/pose": cdr.POSE_IN_FRAME,
+    "/reference": cdr.POSE_IN_FRAME,
+    "/scene": SCENE_UPDATE,
+    "/paths": SCENE_UPDATE,
+    "/fence": SCENE_UPDATE,
+}
+"""The other channels, and their types."""
+
+
+class Topic(NamedTuple):
+    """A channel as the file and the live stream announce it.
+
+    Attributes:
+        name: with a slash in front.
+        type_name: ROS 2 name of the message type.
+        schema: its definition (ros2msg).
+    """
+
+    name: str
+    type_name: str
+    schema: bytes
+
+
+TOPICS = (
+    *(Topic(channel.topic, channel.schema_name, channel.schema) for channel in CHANNELS),
+    *(Topic(name, kind.name, kind.schema) for name, kind in WORDS.items()),
+)
+"""All channels."""
+ENCODING, SCHEMA_ENCODING = "cdr", "ros2msg"
+"""Of the messages, and of their definitions."""

@@ -24,8 +24,8 @@ class Field:
     """One column of a channel.
 
     Attributes:
-        name: ends with the unit, if the column has one.
-        meaning: what it is.
+        name: name, which ends with the unit if there is one.
+        meaning: description of the column.
     """
 
     name: str
@@ -34,7 +34,7 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class Code(Field):
-    """A column of small numbers, each of which has a name.
+    """A column of codes: small numbers that each have a name.
 
     Attributes:
         names: the name of each number; the first is that of 0.
@@ -48,9 +48,9 @@ class Channel:
     """A channel of numbers.
 
     Attributes:
-        topic: name in the file, with a slash in front.
-        meaning: what one message is.
-        numbers: the float64 columns. NaN: not known, or does not apply.
+        topic: name in the file, with a leading slash.
+        meaning: description of a message.
+        numbers: the float64 columns. NaN: unknown or not applicable.
         codes: the uint8 columns.
     """
 
@@ -72,7 +72,7 @@ class Channel:
 
     @cached_property
     def schema(self) -> bytes:
-        """The message definition (ros2msg); the names of codes are constants."""
+        """The message definition (ros2msg), in which the names of codes are constants."""
         lines = [f"# {self.meaning}"]
         for field in self.numbers:
             lines += [f"# {field.meaning}", f"float64 {field.name}"]
@@ -88,7 +88,7 @@ class Channel:
 
     @cached_property
     def packing(self) -> struct.Struct:
-        """Packs the header and the columns of one message."""
+        """The packing of the header and the columns of one message."""
         return struct.Struct(f"<4s{len(self.numbers)}d{len(self.codes)}B")
 
     @cached_property
@@ -103,7 +103,7 @@ class Channel:
         """All messages of the channel as a structured array.
 
         Args:
-            messages: as they stand in the file, in their order.
+            messages: messages in the order of the file.
 
         Raises:
             ValueError: a message has another length, or a code without a name.

@@ -1,4 +1,4 @@
-"""What a recorded flight tells in words: phases, events, alarms, and changes of values."""
+"""The text messages of a recorded flight: phases, events, alarms, and changes of values."""
 
 from typing import Any, NamedTuple
 
@@ -7,7 +7,7 @@ class Phase(NamedTuple):
     """A phase of the flight.
 
     Attributes:
-        time: when it began, s since the flight began.
+        time: its beginning, s since the flight began.
         name: shown to the user.
         waits_for: the condition that ends it.
     """
@@ -18,11 +18,11 @@ class Phase(NamedTuple):
 
 
 class Event(NamedTuple):
-    """Something that happened, in words.
+    """An event, in words.
 
     Attributes:
-        time: s since the flight began.
-        text: as the user saw it.
+        time: time since the flight began, s.
+        text: text as shown to the user.
         level: 2 information, 3 warning, 4 error (foxglove_msgs/msg/Log).
         source: "flight", "safety", "autopilot" or "phase".
     """
@@ -34,14 +34,14 @@ class Event(NamedTuple):
 
 
 class AlarmChange(NamedTuple):
-    """A safety monitor raised its alarm, or its alarm is over.
+    """A safety monitor raised or ended its alarm.
 
     Attributes:
-        time: s since the flight began.
-        raised: false: it is over.
-        monitor: its name, as in `companion.safety.table`.
-        reason: what was wrong; empty when it is over.
-        action: what the flight does about it, in words.
+        time: time since the flight began, s.
+        raised: true: the alarm was raised. False: it ended.
+        monitor: name of the monitor in `companion.safety.table`.
+        reason: description of the breach; empty when the alarm ended.
+        action: action of the flight, in words.
     """
 
     time: float
@@ -52,12 +52,12 @@ class AlarmChange(NamedTuple):
 
 
 class ValuesChange(NamedTuple):
-    """Values of the configuration begin to change.
+    """A change of values of the configuration begins.
 
     Attributes:
-        time: on our clock, s.
-        at_once: whether they are not slewed.
-        values: the new ones, by section and key.
+        time: time on our clock, s.
+        at_once: whether the values change at once, without slewing.
+        values: new values, by section and key.
     """
 
     time: float

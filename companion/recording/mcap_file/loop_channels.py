@@ -1,4 +1,4 @@
-"""The channels of what the loops took, made and sent. They are what `companion replay` reads.
+"""The channels with the inputs and outputs of the loops; `companion replay` reads them.
 
 This table is the reference of their columns. Times end with `_s`. `time_s` and `received_s` are on
 our clock (event-loop time). `vehicle_time_s` is the vehicle's clock without its jumps. Positions
@@ -22,7 +22,7 @@ REASONS = (
     "invalid_setpoint",
     "not_sent",
 )
-"""Why a sample is unanswered, by number: 0 and 1, then the values of `Unanswered` in order."""
+"""Why a sample is unanswered, by number: two codes of our own, then the values of `Unanswered`."""
 ACTIONS = (
     "stand_by",
     "hold_here",
@@ -33,7 +33,7 @@ ACTIONS = (
     "restart_planner",
     "drag_prior",
 )
-"""What a phase told guidance to do, by number."""
+"""Commands of a phase to guidance, by number."""
 
 
 def _vector(prefix: str, unit: str, meaning: str) -> tuple[Field, ...]:

@@ -1,4 +1,4 @@
-"""Reads a `.mcap` by the format's own library, also one that was cut off anywhere."""
+"""Reads a `.mcap` with the format's own library, also one that was cut off anywhere."""
 
 import struct
 from collections import defaultdict
@@ -10,11 +10,10 @@ from mcap.records import Channel, Chunk, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 from zstandard import ZstdError
 
-from companion.recording.mcap_file.channels import CHANNELS
-from companion.recording.mcap_file.writer import WORDS
+from companion.recording.mcap_file.channels import TOPICS
 
 _MOST_BYTES = 1 << 28
-"""No record of ours is longer; a longer one is damage."""
+"""Largest length of a record that we write, bytes; a longer one is damaged."""
 _DAMAGE = (
     McapError,
     ZstdError,
@@ -27,18 +26,18 @@ _DAMAGE = (
     OverflowError,
     struct.error,
 )
-"""What the library and its decompression raise on damaged bytes."""
+"""Exceptions that the library and its decompression raise for damaged bytes."""
 
 
 @dataclass
 class McapContent:
-    """What a `.mcap` holds.
+    """The content of a `.mcap`.
 
     Attributes:
         messages: (time ns, data) of each message, by topic, in the order of the file.
         order: the topic of each message, in the order of the file.
         schemas: the message definition of each topic.
-        metadata: metadata records by name; of several with one name the last.
+        metadata: metadata records by name; the last one if a name occurs several times.
         complete: whether the file was closed, with its index at the end.
         damage: why reading ended before the end of the file, or None.
     """
@@ -95,8 +94,7 @@ def _take(
 
 def changed_topic(content: McapContent) -> str | None:
     """A topic whose messages have other columns than this version writes, or None."""
-    ours = {channel.topic: channel.schema for channel in CHANNELS}
-    ours.update((topic, kind.schema) for topic, kind in WORDS.items())
+    ours = {topic.name: topic.schema for topic in TOPICS}
     for topic, schema in content.schemas.items():
         if topic in ours and _columns(schema) != _columns(ours[topic]):
             return topic

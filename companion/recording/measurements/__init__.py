@@ -1,1 +1,1 @@
-"""What a flight is measured and judged by: tracking, steps, dead time, and the verdict."""
+"""Measurements of a flight: tracking, steps, dead time, and the verdict."""

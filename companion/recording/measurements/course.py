@@ -1,4 +1,4 @@
-"""The course of a flight: its phases, how it ended, and the circumstances it is judged by."""
+"""The course of a flight: phases, end, and the circumstances that the verdict considers."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -6,14 +6,14 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class EarlyEnd:
-    """Where and why a flight ended before its maneuvers did.
+    """Place and reason of the end of a flight before the end of its maneuvers.
 
     Attributes:
-        time: s since the flight began.
-        since_takeoff: s since the vehicle left the ground; None: it had not.
+        time: time since the flight began, s.
+        since_takeoff: time since the vehicle left the ground, s; None: it had not.
         phase: the phase that failed.
-        maneuver: that was flown then, or None.
-        into_maneuver: for how long it had been flown, s.
+        maneuver: maneuver at that time, or None.
+        into_maneuver: time since its beginning, s.
         monitor: name of the safety monitor that ended the flight, or None.
     """
 
@@ -25,7 +25,7 @@ class EarlyEnd:
     monitor: str | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """The early end as JSON."""
         return {
             "time_s": _rounded(self.time),
             "since_takeoff_s": _rounded(self.since_takeoff),
@@ -38,23 +38,23 @@ class EarlyEnd:
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """What happened besides the figures. Times in s since the flight began.
+    """The course of a flight besides its figures. Times in s since the flight began.
 
     Attributes:
-        began: s on our clock.
-        phases: when each phase began, and its name.
-        takeoff: when the vehicle left the ground; None: it did not.
-        early_end: None: the flight was flown to its end.
+        began: beginning of the flight, s on our clock.
+        phases: beginning and name of each phase.
+        takeoff: time when the vehicle left the ground; None: it did not.
+        early_end: the early end; None: the flight was flown to its end.
         armed: whether the vehicle is armed at the end; None: unknown.
-        mode: of the vehicle at the end; None: unknown.
-        battery: share that is left at take-off and at the end; None: unknown.
+        mode: mode of the vehicle at the end; None: unknown.
+        battery: remaining charge, 0..1, at take-off and at the end; None: unknown.
         min_battery: smallest share allowed, `limits.min_battery_percent`.
         deadline: longest latency allowed, `deadman.deadline_ms`, s.
-        lockstep: whether the vehicle waited for us, so that no latency means anything.
-        advice: each key to set that differs from what was measured, one sentence each.
-        gain_warning: if the gain is above the largest sensible one, one sentence.
-        settings: these keys and what to set them to, as for `--set`.
-        changes: made in flight, each with `time_s`, `by` and `keys`: the values before and after.
+        lockstep: whether the vehicle waited for us, so that latencies are meaningless.
+        advice: one sentence for each key whose value differs from the measurement.
+        gain_warning: a sentence if the gain is above the largest sensible one, or None.
+        settings: keys and values that follow from the advice, as for `--set`.
+        changes: changes in flight, each with `time_s`, `by` and `keys` (values before and after).
     """
 
     began: float = 0.0
@@ -73,7 +73,7 @@ class Course:
     changes: tuple[dict[str, Any], ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """The course as JSON."""
         begin, end = self.battery
         return {
             "lockstep": self.lockstep,

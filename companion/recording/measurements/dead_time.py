@@ -12,11 +12,11 @@ result depends on the maneuver: by up to 3 ms over a flight, by up to 7 ms over 
 
 
 class AxisDeadTime(NamedTuple):
-    """One axis; each from a sample to the first effect of its answer, s.
+    """Dead time of one axis: from a sample to the first effect of its setpoint, s.
 
     Attributes:
-        measured: None where the flight had too little undisturbed rotation, or the lag is unknown.
-        configured: None where the configuration names none.
+        measured: None: the flight had too little undisturbed rotation, or the lag is unknown.
+        configured: None: not configured.
     """
 
     measured: float | None = None
@@ -24,7 +24,7 @@ class AxisDeadTime(NamedTuple):
 
     @property
     def is_wrong(self) -> bool:
-        """Whether they differ by more than 30 % of the configured one and by more than 8 ms."""
+        """Whether the two differ by more than 30 % of the configured one and by more than 8 ms."""
         if self.measured is None or self.configured is None:
             return False
         apart = abs(self.measured - self.configured)
@@ -32,9 +32,10 @@ class AxisDeadTime(NamedTuple):
 
 
 class SampleAge(NamedTuple):
-    """How old a sample is when it arrives, by TIMESYNC, s: the link's share of the dead time.
+    """Age of samples at arrival by TIMESYNC, s: the link's share of the dead time.
 
-    TIMESYNC cannot tell the way to us from the way back: it is wrong by half their difference.
+    TIMESYNC measures only the round trip, so the age is wrong by half the difference between both
+    ways.
     """
 
     p50: float = nan
@@ -46,9 +47,9 @@ class DeadTimes:
     """Dead times measured in a flight.
 
     Attributes:
-        axes: by name: roll, pitch, yaw.
-        sample_age: NaN where the vehicle's clock was never compared with ours.
-        lag_known: whether the lag is configured: without it no dead time can be measured.
+        axes: dead time by axis: roll, pitch, yaw.
+        sample_age: age of samples; NaN without TIMESYNC.
+        lag_known: whether the lag is configured, which the measurement needs.
     """
 
     axes: dict[str, AxisDeadTime] = field(
@@ -58,7 +59,7 @@ class DeadTimes:
     lag_known: bool = False
 
     def warning(self) -> str | None:
-        """What differs and what to do about it, one sentence; None if nothing does."""
+        """A sentence on wrong dead times and their remedy; None if none is wrong."""
         wrong = [
             f"{name} {1e3 * axis.measured:.0f} ms, not {1e3 * axis.configured:.0f}"
             for name, axis in self.axes.items()

@@ -1,4 +1,4 @@
-"""Tracking by maneuver: a hover, a circle and open-loop steps have no error in common."""
+"""Tracking of each maneuver by itself, since errors of different maneuvers do not compare."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -14,35 +14,36 @@ from companion.recording.trace import ManeuverMark
 Floats = NDArray[np.float64]
 
 BEGINNING = 2.0
-"""Left out at the beginning of a maneuver, s: until then the vehicle comes from what was flown
-before, which is no error of this maneuver."""
+"""Time left out at the beginning of a maneuver, s: the vehicle still comes from the previous
+maneuver, which is not an error of this one.
+"""
 _MOST_OF_IT = 0.25
-"""At most this share of a maneuver is left out."""
+"""Largest share of a maneuver that is left out."""
 _AT_REST = 0.05
-"""A reference that never moves faster is at rest, m/s."""
+"""A reference that is never faster than this is at rest, m/s."""
 
 
 @dataclass(frozen=True, slots=True)
 class ManeuverFigures:
-    """How one maneuver was tracked; NaN: not measured.
+    """Tracking figures of one maneuver; NaN: not measured.
 
-    Level means north and east. In open loop no position is meant: `level_rms` and `level_max` are
-    NaN, and `drift` says how far the vehicle went.
+    Level means north and east. In open loop there is no reference position: `level_rms` and
+    `level_max` are NaN, and `drift` says how far the vehicle moved away.
 
     Attributes:
-        name: of the maneuver.
-        begin: s since the flight began.
-        duration: for which it was flown, s.
-        open_loop: whether a part of it is flown in open loop.
-        beginning: left out of RMS and largest errors, s.
-        level_rms: m.
-        level_max: m.
-        height_rms: m.
-        height_max: m.
+        name: name of the maneuver.
+        begin: its beginning, s since the flight began.
+        duration: its duration, s.
+        open_loop: whether a part of it is open loop.
+        beginning: time left out of RMS and largest errors, s.
+        level_rms: RMS of the level error, m.
+        level_max: largest level error, m.
+        height_rms: RMS of the height error, m.
+        height_max: largest height error, m.
         beginning_max: largest distance in the part left out, m.
-        drift: largest level distance from where it began, m.
-        speed: largest of the reference, m/s.
-        swing: of roll and pitch; not measured in open loop.
+        drift: largest level distance from its starting point, m.
+        speed: largest speed of the reference, m/s.
+        swing: oscillation of roll and pitch; not measured in open loop.
     """
 
     name: str
@@ -60,7 +61,7 @@ class ManeuverFigures:
     swing: Swing = NOT_MEASURED
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON; what was not measured is null."""
+        """The figures as JSON; null for values that were not measured."""
         numbers = {
             "begin_s": self.begin,
             "duration_s": self.duration,
@@ -89,10 +90,10 @@ def measure_maneuvers(
     """Measure each maneuver that was flown.
 
     Args:
-        rows: (N, 7) of `FlightTrace.tracking`.
+        rows: (N, 7), rows of `FlightTrace.tracking`.
         rates: (M, 3) vehicle time, s, and measured roll and pitch rate, rad/s.
-        marks: of `FlightTrace.maneuvers`.
-        began: when the flight began, s on our clock.
+        marks: marks of `FlightTrace.maneuvers`.
+        began: beginning of the flight, s on our clock.
     """
     measured = []
     for mark, part in _parts(rows, marks):
@@ -102,18 +103,18 @@ def measure_maneuvers(
 
 
 def settled_parts(rows: Floats, marks: Sequence[ManeuverMark]) -> list[Floats]:
-    """The rows of each maneuver in closed loop, without its beginning.
+    """The rows of each maneuver in closed loop, without the time left out at its beginning.
 
     Args:
-        rows: (N, 7) of `FlightTrace.tracking`.
-        marks: of `FlightTrace.maneuvers`.
+        rows: (N, 7), rows of `FlightTrace.tracking`.
+        marks: marks of `FlightTrace.maneuvers`.
     """
     parts = [part for _, part in _parts(rows, marks) if not _is_open_loop(part)]
     return [part[part[:, 0] >= part[0, 0] + _beginning(part)] for part in parts]
 
 
 def _parts(rows: Floats, marks: Sequence[ManeuverMark]) -> Iterator[tuple[ManeuverMark, Floats]]:
-    """Each maneuver that was flown, and its rows."""
+    """Each maneuver that was flown, with its rows."""
     ends = [*(mark.vehicle_time for mark in marks[1:]), inf]
     for mark, end in zip(marks, ends, strict=False):  # without marks there is an end too many
         part = rows[(rows[:, 0] >= mark.vehicle_time) & (rows[:, 0] < end)]
@@ -133,7 +134,7 @@ def _beginning(rows: Floats) -> float:
 
 
 def _swing(figures: ManeuverFigures, rates: Floats, begin: float, end: float) -> Swing:
-    """The swing of a maneuver from `begin` to `end`, s; steps in open loop have none."""
+    """Oscillation of roll and pitch in a maneuver, from `begin` to `end`, s; none in open loop."""
     if figures.open_loop:
         return NOT_MEASURED
     if figures.duration - figures.beginning >= SHORTEST:
@@ -170,7 +171,7 @@ def _measured(name: str, begin: float, rows: Floats) -> ManeuverFigures:
 
 
 def _speed(time: Floats, reference: Floats) -> float:
-    """The largest speed of the reference, m/s; NaN where it has none."""
+    """The largest speed of the reference, m/s; NaN without a reference."""
     spans = np.diff(time)
     steps = np.linalg.norm(np.diff(reference, axis=0), axis=1)
     speeds = steps[spans > 0.0] / spans[spans > 0.0]

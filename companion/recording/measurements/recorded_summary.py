@@ -1,7 +1,7 @@
-"""The summary of a recorded flight: as the flight wrote it, else derived from its record.
+"""The summary of a recorded flight: its `summary.json`, or else derived from its record.
 
-A flight that was killed wrote no `summary.json`. Then the same figures are measured from the rows,
-by the code that measures them after a flight.
+A flight that was killed wrote no `summary.json`. The same figures are then computed from the
+recorded rows, by the code that computes them after a flight.
 """
 
 import json
@@ -30,29 +30,29 @@ _KEYS = frozenset(
         *("advice", "at_the_end", "settings", "log"),
     )
 )
-"""Keys of `summary.json` without which a summary is not used: it is of another version."""
+"""Keys that `summary.json` of this version must have; without them it is not used."""
 _NO_REASONS = 2
-"""The first of `REASONS` are no reasons of an unanswered sample."""
+"""Number of the first codes of `REASONS` that do not mean an unanswered sample."""
 
 
 def summary_of(record: FlightRecord) -> tuple[dict[str, Any], bool]:
-    """The summary of a flight, with the keys of `summary.json`, and whether it is provisional.
+    """The summary of a flight with the keys of `summary.json`, and whether it is provisional.
 
-    A provisional one is derived from the record: `result` says that the record ends early, and the
-    dead times, the realtime grants and the advice are missing.
+    A provisional summary is derived from the record: `result` says that the record ends early, and
+    the dead times, the realtime grants and the advice are missing.
 
     Raises:
-        RecordError: the record is not as a flight writes it.
+        RecordError: the record is not valid.
     """
     written = _written(record.folder / "summary.json")
     return (derived_summary(record), True) if written is None else (written, False)
 
 
 def derived_summary(record: FlightRecord) -> dict[str, Any]:
-    """The summary of a flight, from its record alone.
+    """The summary of a flight, derived only from its record.
 
     Raises:
-        RecordError: it is not as a flight writes it.
+        RecordError: the record is not valid.
     """
     with as_recorded(record.folder):
         return _derived(record).as_dict()
@@ -90,10 +90,10 @@ def _derived(record: FlightRecord) -> Summary:
 
 
 def trace_of(record: FlightRecord) -> FlightTrace:
-    """The rows that the measurements after a flight take, as the flight itself kept them.
+    """The recorded rows in the form of the trace that the measurements use.
 
     Raises:
-        RecordError: the record is not as a flight writes it.
+        RecordError: the record is not valid.
     """
     with as_recorded(record.folder):
         return _trace(record)
@@ -124,7 +124,7 @@ def _trace(record: FlightRecord) -> FlightTrace:
 
 
 def tracking_rows(guidance: NDArray[np.void]) -> NDArray[np.float64]:
-    """(N, 7) of `FlightTrace.tracking`, from the rows of the channel "guidance"."""
+    """(N, 7), rows of `FlightTrace.tracking` from those of the channel "guidance"."""
     flown = guidance[guidance["offboard_active"] == 1]
     columns = [flown["vehicle_time_s"]]
     for axis, held in zip(
@@ -137,7 +137,7 @@ def tracking_rows(guidance: NDArray[np.void]) -> NDArray[np.float64]:
 
 
 def _answers(samples: NDArray[np.float64], setpoints: NDArray[np.float64]) -> NDArray[np.int64]:
-    """The number of each setpoint's sample; −1: it was not recorded."""
+    """The index of each setpoint's sample; −1: the sample was not recorded."""
     if len(samples) == 0:
         return np.full(len(setpoints), -1)
     at = np.minimum(np.searchsorted(samples, setpoints), len(samples) - 1)
@@ -162,7 +162,7 @@ def _counts(record: FlightRecord, deadline: float) -> LoopCounts:
 
 
 def _takeoff(record: FlightRecord) -> float | None:
-    """When the vehicle left the ground, s since the flight began; None: it did not."""
+    """Time when the vehicle left the ground, s since the flight began; None: it did not."""
     read = record.rows("guidance_input")
     begun = next((each.time for each in record.phases if each.name == "takeoff"), None)
     if begun is None:
@@ -173,7 +173,7 @@ def _takeoff(record: FlightRecord) -> float | None:
 
 
 def _rate(record: FlightRecord) -> float:
-    """Setpoints a second of vehicle time, from the first maneuver on."""
+    """Rate of setpoints in vehicle time from the first maneuver on, Hz."""
     begun = [mark.vehicle_time for mark in record.maneuvers if mark.name is not None]
     times = record.rows("setpoint")["vehicle_time_s"]
     times = times[times >= begun[0]] if begun else times[:0]
@@ -187,7 +187,7 @@ def _last(values: NDArray[np.float64]) -> float | None:
 
 
 def _written(path: Path) -> dict[str, Any] | None:
-    """`summary.json`; None where the flight wrote none, not all of it, or other keys than ours."""
+    """`summary.json`; None if it is missing, incomplete, or of another version."""
     try:
         found = json.loads(read_text(path, _LONGEST))
     except (FileRefusedError, ValueError, RecursionError):

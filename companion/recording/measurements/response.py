@@ -14,22 +14,23 @@ from companion.recording.measurements.second_order import (
 )
 
 _TIME_CONSTANT = (0.02, 2.0)
-"""Range in which it is searched, s."""
+"""Range in which the time constant is searched, s."""
 _ASKED = 1e-3
-"""Smallest target coefficient that counts as a step."""
+"""Smallest target coefficient of a step."""
 
 
 @dataclass(frozen=True, slots=True)
 class StepResponse:
-    """Measured over all steps; coefficients are accelerations per specific thrust.
+    """The response to all steps; coefficients are accelerations per specific thrust.
 
     Attributes:
-        time_constant_north_s: of the first-order model that fits a_N best (least squares), s.
+        time_constant_north_s: time constant of the first-order model that fits a_N best (least
+            squares), s.
         time_constant_east_s: the same for a_E.
         step_size: largest target, the sine of the tilt.
         cross_axis_max: straightness: largest distance from the line of a step.
         model_deviation_max: largest distance from the ideal model ċ = p·(c_d − c).
-        second_order: the second-order model with a dead time that comes nearest.
+        second_order: the second-order model with a dead time that fits best.
         second_order_deviation_max: largest distance from that model.
     """
 
@@ -43,7 +44,7 @@ class StepResponse:
 
 
 def measure_response(rows: Floats, gain: float) -> StepResponse | None:
-    """Measure the rows (N, 7) of `FlightTrace.response`; None where no step was flown.
+    """Measure the rows (N, 7) of `FlightTrace.response`; None without steps.
 
     Args:
         rows: vehicle time s, quaternion w x y z, target north, target east.
@@ -88,7 +89,7 @@ def _distance(run: StepRun, model: Floats) -> float:
 def _largest_deviation(step: StepRun) -> float:
     """Largest distance of a step from the straight line to its target.
 
-    The line begins at the attitude when the target changed, which in wind is not level.
+    The line begins at the attitude when the target changed; in wind this is not level.
     """
     way = step.target[0] - step.measured[0]
     away = step.measured - step.measured[0]
@@ -97,7 +98,7 @@ def _largest_deviation(step: StepRun) -> float:
 
 
 def _time_constant(runs: list[StepRun], axis: int, start: float) -> float:
-    """The τ in s that fits one axis best, searched from `start`; NaN where it was not stepped."""
+    """The time constant in s that fits one axis best, searched from `start`; NaN without a step."""
     stepped = [
         StepRun(run.time, run.measured[:, [axis]], run.target[:, [axis]])
         for run in runs

@@ -18,12 +18,12 @@ _FEWEST = 10
 
 
 class StepRun(NamedTuple):
-    """Steps flown without a pause between them, as a doublet is.
+    """Steps flown without a pause between them, such as a doublet.
 
     Attributes:
         time: (n,), vehicle time, s, rising.
         measured: (n, 2), coefficients north and east.
-        target: (n, 2), in force when the sample of that row was answered.
+        target: (n, 2), target coefficients when the sample of that row was answered.
     """
 
     time: Floats
@@ -31,7 +31,7 @@ class StepRun(NamedTuple):
     target: Floats
 
     def steps(self) -> list["StepRun"]:
-        """Each step by itself: from one change of the target to the next."""
+        """The single steps: each from one change of the target to the next."""
         return [StepRun(*parts) for parts in zip(*self._split(), strict=True)]
 
     def _split(self) -> list[list[Floats]]:
@@ -56,23 +56,23 @@ def step_runs(rows: Floats) -> list[StepRun]:
 
 
 _ENOUGH = 600
-"""About this many rows are used to find the model."""
+"""Approximate number of rows used to find the model."""
 _LAG, _DAMPING, _DEAD_TIME = (0.02, 4.0), (0.2, 10.0), (0.0, 0.5)
 """Ranges in which 2ζ/ω (s), ζ and the dead time (s) are searched. ζ = 10 is first order."""
 _TRIED_LAGS, _TRIED_DAMPINGS = np.geomspace(0.05, 1.0, 5), (0.7, 1.5)
 _TRIED_DEAD_TIMES = (0.0, 0.04, 0.1, 0.2)
 _UNANSWERED = 0.03
-"""Shortest dead time of a vehicle, s: until then it moves as before the first step."""
+"""Shortest dead time of a vehicle, s; before it, a step has no effect."""
 
 
 @dataclass(frozen=True, slots=True)
 class SecondOrderFit:
-    """c̈ = ω²·(c_d(t − dead time) − c) − 2ζω·ċ.
+    """Second-order model with dead time: c̈ = ω²·(c_d(t − dead time) − c) − 2ζω·ċ.
 
     Attributes:
         frequency: ω, rad/s.
         damping: ζ.
-        dead_time: from the sample at which the target changed, s.
+        dead_time: time from the sample at which the target changed to the first effect, s.
     """
 
     frequency: float
@@ -82,12 +82,13 @@ class SecondOrderFit:
     def path(self, run: StepRun, thinning: int = 1) -> Floats:
         """(n, 2) coefficients of the model at every `thinning`-th row of `run`.
 
-        It starts as the measurement does, and keeps that speed until the first target has effect.
+        It starts with the measured coefficients and speed, and keeps this speed until the first
+        target has an effect.
         """
         return self.along(Course.of(run, thinning))
 
     def along(self, course: "Course") -> Floats:
-        """(m, 2) coefficients of the model at the rows of a course, as `path`."""
+        """(m, 2), coefficients of the model at the rows of a course; see `path`."""
         time, effects = course.time, course.changes + self.dead_time
         latest = np.searchsorted(effects, time, side="right") - 1
         acted = np.maximum(time - effects[np.maximum(latest, 0)], 0.0)
@@ -116,13 +117,13 @@ class SecondOrderFit:
 
 
 class Course(NamedTuple):
-    """What a model needs of a run.
+    """The data of a run that a model needs.
 
     Attributes:
-        time: (m,), of the rows, since the first row of the run, s.
+        time: (m,), times of the rows since the first row of the run, s.
         start: (2, 2), coefficients and their speed (1/s), measured before the first step acts.
-        changes: (s,), when each target was first in force, on the same clock.
-        targets: (s, 2).
+        changes: (s,), when each target came into force, on the same clock; the first one is 0.
+        targets: (s, 2), coefficients of each target.
     """
 
     time: Floats
@@ -164,6 +165,6 @@ def nearest_second_order(runs: list[StepRun]) -> SecondOrderFit:
 
 
 def _fit(unknown: Floats) -> SecondOrderFit:
-    """From (log 2ζ/ω, log ζ, dead time): unlike ω and ζ these hardly depend on one another."""
+    """The model from (log 2ζ/ω, log ζ, dead time), which are less correlated than ω and ζ."""
     damping = exp(unknown[1])
     return SecondOrderFit(2.0 * damping / exp(unknown[0]), damping, float(unknown[2]))

@@ -29,10 +29,10 @@ class LoopCounts:
         samples: attitude samples received while control was switched on.
         setpoints: setpoints sent.
         missed_deadlines: answers that took longer than `deadman.deadline_ms`.
-        stale: samples not answered because they or the target were too old, or out of order.
-        refused: samples not answered because they could not be used or the answer could not leave.
-        unanswered: all samples that were not answered, by reason.
-        rate_hz: setpoints a second of vehicle time, over the maneuver.
+        stale: samples not answered because the sample or the target was too old or out of order.
+        refused: samples not answered because no valid setpoint could be computed or sent.
+        unanswered: unanswered samples, by reason.
+        rate_hz: rate of setpoints in vehicle time during the maneuvers, Hz.
     """
 
     samples: int = 0
@@ -51,7 +51,7 @@ class PredictiveFigures:
     Attributes:
         flown: answers that were flown.
         troubles: answers that were not flown, by reason.
-        seconds: that each flown answer took in the solver's process.
+        seconds: computing time of each flown answer in the solver's process.
     """
 
     flown: int
@@ -59,7 +59,7 @@ class PredictiveFigures:
     seconds: tuple[float, ...]
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON; milliseconds."""
+        """The figures as JSON, in milliseconds."""
         p50, p99 = np.percentile(self.seconds, (50, 99)) if self.seconds else (math.nan, math.nan)
         times = {"p50": 1e3 * float(p50), "p99": 1e3 * float(p99)}
         return {"flown": self.flown, "troubles": self.troubles, "solve_ms": _without_nan(times)}
@@ -67,22 +67,22 @@ class PredictiveFigures:
 
 @dataclass(frozen=True)
 class Summary:
-    """A finished flight.
+    """The summary of a finished flight.
 
     Attributes:
-        result: "ok", or the reason for which it ended.
+        result: "ok", or the reason why it ended early.
         phase: the last phase it reached.
         planner: name of the planner that flew.
-        gain: its p, 1/s.
-        counts: what the control loop counted.
+        gain: gain p of the planner, 1/s.
+        counts: counters of the control loop.
         link: frames received, lost, damaged and so on, by name.
         trace: recorded rows.
-        events: what happened, each with its time in s.
+        events: (time in s, text) of each event.
         log: the flight's folder.
         dead_times: measured and configured.
-        predictive: counts of predictive control; None where it did not fly.
+        predictive: counts of predictive control; None: it did not fly.
         realtime: each real-time request to the operating system: "granted", or the reason why not.
-        course: phases, how it ended, and the circumstances.
+        course: phases, end, and circumstances of the flight.
     """
 
     result: str
@@ -100,7 +100,7 @@ class Summary:
     course: Course = field(default_factory=Course)
 
     def response(self) -> StepResponse | None:
-        """The measured step response, or None where no step was flown."""
+        """The measured step response; None without steps."""
         return self._response
 
     @cached_property
@@ -108,7 +108,7 @@ class Summary:
         return measure_response(self.trace.response_rows(), self.gain)
 
     def latency_us(self) -> dict[str, float]:
-        """p50, p99 and max of sample in → setpoint out inside this process, µs."""
+        """Latency from sample to setpoint in this process: p50, p99 and maximum, µs."""
         latencies = self.trace.latencies_ns.rows()[:, 0] / 1e3
         if len(latencies) == 0:
             return {"p50": math.nan, "p99": math.nan, "max": math.nan}
@@ -116,7 +116,7 @@ class Summary:
         return {"p50": float(p50), "p99": float(p99), "max": float(latencies.max())}
 
     def tracking(self) -> dict[str, float]:
-        """Position error on the closed-loop parts, and height error over all of control, m."""
+        """Position error in closed loop, and height error during all of control, m."""
         return tracking_errors(self.trace.tracking_rows())
 
     def maneuvers(self) -> tuple[ManeuverFigures, ...]:
@@ -142,7 +142,7 @@ class Summary:
         }
 
     def as_dict(self) -> dict[str, Any]:
-        """What `--json` prints; values that were not measured are null."""
+        """The content of `--json`; null for values that were not measured."""
         figures = {
             "result": self.result,
             "phase": self.phase,
@@ -177,10 +177,10 @@ class Summary:
 
 
 def tracking_errors(rows: "np.ndarray[Any, np.dtype[np.float64]]") -> dict[str, float]:
-    """Position error on the closed-loop rows, and height error over all rows, m; NaN: none.
+    """Position error of the closed-loop rows, and height error of all rows, m; NaN: no rows.
 
     Args:
-        rows: (N, 7) as `FlightTrace.tracking`.
+        rows: (N, 7), rows of `FlightTrace.tracking`.
     """
     if len(rows) == 0:
         return dict.fromkeys(("position_rms_m", "position_max_m", "height_rms_m"), math.nan)

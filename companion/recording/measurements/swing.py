@@ -1,7 +1,7 @@
-"""Measures whether a vehicle swings: roll and pitch that repeat with a short period.
+"""Detects whether a vehicle swings: an oscillation of roll and pitch with a short period.
 
-Body rates are integrated to angles. Slow motion is taken out by a moving mean, for wind and slow
-corrections are no swing. What repeats is found by the autocorrelation of what is left. On the mock
+Body rates are integrated to angles. A moving mean removes slow motion, because wind and slow
+corrections are not a swing. The autocorrelation of the rest shows what repeats. On the mock
 vehicles, in hovers of 3 to 8 s, gusts of 1 to 2 m/s reach 0.71 at most and mostly less than 0.4;
 weights of the hold that are 2.5 times too large reach 0.8 to 1.
 """
@@ -16,13 +16,13 @@ Floats = NDArray[np.float64]
 
 
 class _Rule(NamedTuple):
-    """What counts as a swing.
+    """The criteria of a swing.
 
     Attributes:
-        shortest: time that is judged, s.
-        window: length of the moving mean, s; slower motion is no swing.
-        passes: how often the moving mean is taken out.
-        longest: period, s.
+        shortest: shortest part of a flight that is judged, s.
+        window: length of the moving mean, s; slower motion does not count.
+        passes: number of times that the moving mean is removed.
+        longest: longest period, s.
     """
 
     shortest: float
@@ -37,15 +37,17 @@ SHORTEST = _SHORT_HOVER.shortest
 _LONGEST_STEP = 0.05
 """Longest time between samples, s."""
 _PEAK = 0.9
-"""A peak of at least this share of the highest one is the period: a multiple repeats as well."""
+"""The first peak of at least this share of the highest one gives the period, because multiples of
+the period also have peaks.
+"""
 
 
 class Swing(NamedTuple):
-    """Motion of roll and pitch; NaN: not measured.
+    """Oscillation of roll and pitch; NaN: not measured.
 
     Attributes:
-        rms: of roll and pitch together, without slow motion, rad.
-        period: after which they repeat best, s.
+        rms: RMS of roll and pitch together, without slow motion, rad.
+        period: period of the oscillation, s.
         regularity: autocorrelation at that period: 1 repeats exactly, 0 not at all.
     """
 
@@ -58,12 +60,12 @@ NOT_MEASURED = Swing()
 
 
 def measure_swing(time: Floats, rates: Floats, *, at_rest: bool) -> Swing:
-    """Measure the swing in a part of a flight.
+    """Measure the oscillation in a part of a flight.
 
     Args:
         time: (N,) vehicle time, s.
         rates: (N, 2) measured roll and pitch rate, rad/s.
-        at_rest: whether the reference is at rest, so that slower motion is a swing, too.
+        at_rest: whether the reference is at rest; slower motion then also counts as a swing.
     """
     duration = float(time[-1] - time[0]) if len(time) > 1 else 0.0
     hover = _LONG_HOVER if duration >= _LONG_HOVER.shortest else _SHORT_HOVER

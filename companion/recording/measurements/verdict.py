@@ -1,19 +1,20 @@
-"""Whether a flight was good: each figure beside its limit, from what `--json` prints."""
+"""Whether a flight was good: compares the figures of `--json` with their limits."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 Figures = Mapping[str, Any]
-"""As `Summary.as_dict` makes them."""
+"""The figures; the result of `Summary.as_dict`."""
 
 LEVEL_RMS, LEVEL_RMS_PER_SPEED = 0.15, 0.02
-"""Largest level RMS error of a maneuver: at rest, m, and per speed of the reference, s."""
+"""Largest level RMS error of a maneuver: at rest, m, plus an amount per speed of the reference, s.
+"""
 HEIGHT_RMS = 0.15
 """Largest RMS error of the height, m."""
 SWING_RMS = 3.0
 """Largest RMS of a swing of roll and pitch, °."""
 SWING_REGULARITY = 0.7
-"""From this autocorrelation on, roll and pitch swing; below, wind and noise turn the vehicle."""
+"""Smallest autocorrelation of a swing; below it, the motion comes from wind and noise."""
 STRAIGHTNESS = 0.03
 """Largest distance from a step's line, as a share of the step."""
 MODEL_DEVIATION = 0.20
@@ -23,17 +24,17 @@ UNANSWERED = 0.01
 LOST = 0.02
 """Largest share of the vehicle's frames that may be lost."""
 BATTERY_MARGIN = 0.10
-"""Least battery above `limits.min_battery_percent` at the end, as a share of the whole."""
+"""Smallest battery charge above `limits.min_battery_percent` at the end, 0..1."""
 
 
 class Check(NamedTuple):
-    """One figure beside its limit.
+    """One figure and its limit.
 
     Attributes:
-        what: it is about.
+        what: subject of the check.
         found: the figure and its limit, in words.
         good: whether it is within the limit.
-        remedy: what to do if it is not.
+        remedy: what to do if it is not within the limit.
     """
 
     what: str
@@ -43,7 +44,7 @@ class Check(NamedTuple):
 
 
 def checks(figures: Figures) -> list[Check]:
-    """All checks that the figures of a flight allow; none where nothing was measured."""
+    """All checks that the figures of a flight permit; empty if nothing was measured."""
     return [
         *_maneuvers(figures),
         *_steps(figures),
@@ -54,7 +55,7 @@ def checks(figures: Figures) -> list[Check]:
 
 
 def is_good(figures: Figures) -> bool:
-    """Whether a flight was flown to its end, with every figure within its limit."""
+    """Whether a flight reached its end with every figure within its limit."""
     good = all(check.good for check in checks(figures))
     return figures["result"] == "ok" and good and not figures["advice"]
 

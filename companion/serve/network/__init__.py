@@ -1,1 +1,1 @@
-"""The MAVLink router: the clients' channels, their addresses, and what passes between them."""
+"""The MAVLink router: the clients' channels and addresses, and the frames between them."""

@@ -1,4 +1,4 @@
-"""To whom a frame is addressed. Source: "Routing" of the MAVLink guide."""
+"""The target of a frame. Source: "Routing" of the MAVLink guide."""
 
 import struct
 from typing import NamedTuple
@@ -28,7 +28,7 @@ def source_of(frame: Frame) -> Address:
 def target_of(frame: Frame) -> Address:
     """The target of a frame; everybody for a message without one, or of an unknown kind.
 
-    MAVLink 2 cuts trailing zeros off a payload, so a field that is not there is 0.
+    MAVLink 2 cuts trailing zeros off a payload, so a missing field is 0.
     """
     system_at, component_at = _TARGET_FIELDS.get(frame.message_id, (None, None))
     if system_at is None:

@@ -20,9 +20,9 @@ class ClientStats:
     """Counters of one client, in frames.
 
     Attributes:
-        received: intact, from the client.
-        sent: handed to the kernel.
-        dropped: not sent, because the client or its connection is too slow.
+        received: intact frames from the client.
+        sent: frames passed to the kernel.
+        dropped: frames not sent, because the client or its connection is too slow.
     """
 
     received: int = 0
@@ -47,7 +47,7 @@ class Client(ABC):
     """A client's channel. It queues frames until `flush`; it drops late frames, but never cuts one.
 
     Args:
-        name: what the user calls it.
+        name: name for messages.
         host: IP address of the client, or None.
         device: its serial device, or None.
         streaming: whether a frame may continue in the next bytes.
@@ -121,7 +121,7 @@ class Client(ABC):
 
 
 class Flood:
-    """Detects a client that sends faster than any program has reason to."""
+    """Detects a client that sends faster than any program needs to."""
 
     WINDOW = 0.02
     """Length of the window in which frames are counted, s; reading pauses until its end."""

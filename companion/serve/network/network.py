@@ -1,8 +1,8 @@
 """The network: joins the link to the vehicle and the clients' endpoints by the routing rules.
 
-Forwarding comes after the control loop: what arrives is only noted, and passed on once an attitude
-sample has been answered, when the next one is a whole period away. Without samples it is passed on
-within `_LONGEST_WAIT`.
+The control loop comes first: an arriving frame is only queued. It is forwarded after an attitude
+sample has been answered, when the next sample is a whole period away. Without samples it is
+forwarded within `_LONGEST_WAIT`.
 """
 
 import asyncio
@@ -31,11 +31,11 @@ from companion.serve.network.uplink import Uplink, uplink_rate
 from companion.vehicle.link import Link
 
 _LONGEST_WAIT = 0.004
-"""What came waits no longer than this to be passed on, s."""
+"""Longest time that a frame waits to be forwarded, s."""
 _MOST_NOTED = 4096
-"""Frames of the vehicle that may wait to be passed on; more come only after a stall."""
+"""Largest number of the vehicle's frames that wait to be forwarded; only a stall causes more."""
 _MOST_FAULTS = 16
-"""Different faults that are told."""
+"""Largest number of different faults that are reported."""
 
 Port = UdpPort | TcpPort | SerialLine
 
@@ -44,16 +44,17 @@ class Network:
     """Use it as `async with Network(link, endpoints) as network:`, inside the open link.
 
     Args:
-        link: to the vehicle, open; its `on_frame` is taken.
-        endpoints: of the clients, in the notation of `companion.mavlink.transport.endpoint`.
-        note: takes events as sentences.
+        link: open link to the vehicle; its `on_frame` is replaced.
+        endpoints: endpoints of the clients, in the notation of
+            `companion.mavlink.transport.endpoint`.
+        note: called with events as sentences.
 
     Attributes:
         routing: the rules and their counters; takes hooks for setpoints and for our component.
         uplink: the clients' frames on their way to the vehicle.
         ports: the open endpoints, in their order.
         attitude: payload of the autopilot's newest ATTITUDE_QUATERNION; empty before the first.
-        attitude_at: when it came, s on our clock.
+        attitude_at: arrival of that payload, s on our clock.
         overflowed: frames of the vehicle that were dropped after a stall.
     """
 
@@ -106,7 +107,7 @@ class Network:
 
     @property
     def clients(self) -> tuple[Client, ...]:
-        """The clients there are now."""
+        """The connected clients."""
         return tuple(self._clients)
 
     def now(self) -> float:
@@ -136,7 +137,7 @@ class Network:
             self.uplink.forget(client)
 
     def received(self, client: Client, frames: Iterable[Frame]) -> None:
-        """A client has sent frames. One that causes a fault is dropped: it ends no session."""
+        """A client has sent frames. One that causes a fault is dropped and ends no session."""
         for frame in frames:
             try:
                 self.routing.from_client(client, frame)
@@ -145,7 +146,7 @@ class Network:
         self._flush_later()
 
     def flush(self) -> None:
-        """Pass on all that waits, to the vehicle first."""
+        """Forward all queued frames, to the vehicle first."""
         self._soon = None
         if self._timer is not None:
             self._timer.cancel()
@@ -160,7 +161,7 @@ class Network:
             self._flush_later()
 
     def _note(self, frame: Frame) -> None:
-        """Take a frame from the link; called where the next sample may already wait."""
+        """Queue a frame of the link; the next sample may already be waiting."""
         if len(self._noted) >= _MOST_NOTED:
             self.overflowed += 1
             return

@@ -1,6 +1,6 @@
-"""Who may command the vehicle: programs on this computer, those that sign, and those we trust.
+"""Who may command the vehicle: programs on this computer, those that sign, and trusted ones.
 
-Everybody else may listen and read: parameters, missions, logs, files, single messages.
+All others may listen and read: parameters, missions, logs, files, single messages.
 """
 
 from collections.abc import Iterable
@@ -14,7 +14,6 @@ from companion.serve.network.client import Client
 
 _READING = frozenset(
     {
-        dialect.MAVLINK_MSG_ID_HEARTBEAT,
         dialect.MAVLINK_MSG_ID_PING,
         dialect.MAVLINK_MSG_ID_TIMESYNC,
         dialect.MAVLINK_MSG_ID_PARAM_REQUEST_READ,
@@ -28,7 +27,8 @@ _READING = frozenset(
         dialect.MAVLINK_MSG_ID_LOG_REQUEST_END,
     }
 )
-"""Messages that change nothing on the vehicle."""
+"""Messages that change nothing on the vehicle. HEARTBEAT is not among them: that of a ground
+station holds off the autopilot's failsafe for a lost ground station."""
 _READING_COMMANDS = frozenset(
     {
         dialect.MAV_CMD_REQUEST_MESSAGE,
@@ -38,10 +38,10 @@ _READING_COMMANDS = frozenset(
 )
 _COMMANDS = dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT
 _COMMAND_AT = 28
-"""Offset of the command's number in both payloads, which begin with seven numbers of four bytes."""
+"""Offset of the command's number in both payloads, after seven numbers of four bytes."""
 _FTP = dialect.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL
 _OPCODE_AT = 6
-"""Offset of the FTP opcode: after three bytes of addresses and a running number and session."""
+"""Offset of the FTP opcode, after three address bytes, a sequence number and a session."""
 _READING_OPCODES = frozenset({0, 1, 2, 3, 4, 5, 14, 15})
 """None, TerminateSession, ResetSessions, ListDirectory, OpenFileRO, ReadFile, CalcFileCRC32 and
 BurstReadFile. Source: "File Transfer Protocol" of the MAVLink guide."""
@@ -58,7 +58,7 @@ def reads_only(frame: Frame) -> bool:
 
 
 class Permission:
-    """Decides which frames of a client are passed on.
+    """Decides which frames of a client are forwarded.
 
     Args:
         trusted: hosts and serial devices that the configuration trusts.
@@ -74,7 +74,7 @@ class Permission:
         return client.is_local or (client.host or client.device) in self._trusted
 
     def refusal(self, client: Client, frame: Frame) -> str | None:
-        """Why a frame is not passed on, in words for its sender; None if it is."""
+        """Why a frame is not forwarded, in words for its sender; None if it is forwarded."""
         if reads_only(frame) or self.trusts(client):
             return None
         if self._signing is None:

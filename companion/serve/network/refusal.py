@@ -1,4 +1,4 @@
-"""Why an endpoint for clients cannot be opened, in words."""
+"""The message for an endpoint of clients that cannot be opened."""
 
 import errno
 

@@ -1,19 +1,19 @@
-"""Frames that come back: a client may return what it hears, directly or by way of another one."""
+"""Detects frames that come back: a client may return frames directly or through another client."""
 
 from collections import OrderedDict
 from collections.abc import Callable
 
 _WITHIN = 0.2
-"""A frame that is identical to one that was passed on less than this ago is a repetition, s."""
+"""A frame identical to one that was forwarded within this time is a repetition, s."""
 _MOST = 4096
-"""Largest number of frames remembered; of a flood, only the newest are."""
+"""Largest number of remembered frames; in a flood, only the newest ones."""
 
 
 class Repeats:
-    """Finds frames that came before, on whatever channel.
+    """Detects frames that have come before, on any channel.
 
-    A frame's running number and checksum make it differ from its sender's next 255. Of a sender
-    without running numbers, the same content is passed on once in 0.2 s.
+    Sequence number and checksum distinguish a frame from its sender's next 255 frames. If a sender
+    does not count its frames, the same content is forwarded once in 0.2 s.
 
     Args:
         clock: our clock, s.
@@ -24,7 +24,7 @@ class Repeats:
         self._passed: OrderedDict[bytes, float] = OrderedDict()
 
     def is_repeat(self, raw: bytes) -> bool:
-        """Whether these bytes were passed on just before; if not, remembers them."""
+        """Whether these bytes were forwarded just before; if not, remember them."""
         now, passed = self._clock(), self._passed
         at = passed.pop(raw, None)
         if at is not None and now - at <= _WITHIN:

@@ -1,6 +1,6 @@
-"""Where a frame goes: learned addresses, targets, no loops. Source: "Routing" of the MAVLink guide.
+"""Where a frame goes: learned addresses, targets, no loops (MAVLink guide, "Routing").
 
-Pure: channels are told what to queue, the clock is given.
+Pure: it only queues frames at the given channels, and uses the given clock.
 """
 
 from collections.abc import Callable
@@ -13,11 +13,11 @@ from companion.serve.network.repeats import Repeats
 
 
 class Channel(Protocol):
-    """The connection of a client, behind which there may be several nodes."""
+    """The connection of a client; several nodes may be behind it."""
 
     @property
     def name(self) -> str:
-        """What the user calls it, such as `udp 127.0.0.1:14550`."""
+        """Name for messages, such as `udp 127.0.0.1:14550`."""
         ...
 
     def put(self, frame: bytes) -> None:
@@ -26,27 +26,28 @@ class Channel(Protocol):
 
 
 class VehicleChannel(Protocol):
-    """The way to the vehicle, and to whatever is connected to its autopilot."""
+    """The channel to the vehicle, and to the nodes connected to its autopilot."""
 
     def put(self, frame: bytes, origin: Channel) -> None:
-        """Queue one whole frame of a client, as `Channel.put`."""
+        """Queue one whole frame of a client; see `Channel.put`."""
         ...
 
 
 Intercept = Callable[[Channel, Frame], bool]
-"""Takes a client's frame before it is forwarded; true if it must not be."""
+"""Called with a client's frame before it is forwarded; returns whether it must not be."""
 
 
 @dataclass
 class RoutingStats:
-    """What became of frames.
+    """Counters of forwarded and dropped frames.
 
     Attributes:
         to_clients: frames of the vehicle that were queued for clients, each client counted.
         to_vehicle: clients' frames that were queued for the vehicle.
         between_clients: clients' frames that were queued for other clients.
-        looped: frames that had come just before, or claim to be the autopilot's or ours; dropped.
-        no_route: targeted frames whose target was never heard; dropped.
+        looped: frames dropped because they were repetitions, or claimed to be the autopilot's or
+            ours.
+        no_route: frames dropped because their target was never heard.
     """
 
     to_clients: int = 0
@@ -67,14 +68,14 @@ class Routing:
 
     Args:
         vehicle: the channel to the autopilot.
-        autopilot: its address.
-        own: our component's address.
+        autopilot: address of the autopilot.
+        own: address of our component.
         clock: our clock, s.
 
     Attributes:
-        stats: what became of frames.
+        stats: counters of frames.
         intercept: see `Intercept`; until it is set, nothing of a client is forwarded.
-        on_own: called with each client's frame that is for our component alone, or None.
+        on_own: called with each client's frame that only our component should receive, or None.
     """
 
     def __init__(
@@ -94,12 +95,12 @@ class Routing:
         return self._clients
 
     def attach(self, client: Channel) -> None:
-        """Forward to a further client from now on."""
+        """Add a client; frames are forwarded to it from now on."""
         self._heard[client] = set()
         self._clients = (*self._clients, client)
 
     def detach(self, client: Channel) -> None:
-        """Forget a client and the addresses that were heard on its channel."""
+        """Remove a client and the addresses heard on its channel."""
         self._heard.pop(client, None)
         self._clients = tuple(each for each in self._clients if each is not client)
 

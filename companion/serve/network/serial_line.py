@@ -12,7 +12,7 @@ _RETRY = 2.0
 
 
 class SerialLine:
-    """Keeps a serial device open and hands its client over.
+    """Keeps a serial device open, and attaches its client.
 
     Raises:
         EndpointError: the device is missing, in use, or not permitted.
@@ -57,7 +57,7 @@ class SerialLine:
 
 
 class SerialClient(Client):
-    """Whoever is at the other end of the line.
+    """The client at the other end of the line.
 
     Attributes:
         transport: the open device, or None.

@@ -12,9 +12,9 @@ from companion.serve.network.refusal import refusal
 
 _MOST_CLIENTS = 16
 _MOST_UNSENT = 65_536
-"""Bytes that the operating system has not taken yet; while there are more, frames are dropped."""
+"""Unsent bytes above which frames are dropped."""
 _KERNEL_BUFFER = 65_536
-"""Bytes that the operating system keeps for a client. After a stop it reads these first."""
+"""Size of the kernel's buffer for a client, bytes. A client that was stopped first reads these."""
 _RETRY = 2.0
 """Pause before connecting again, s."""
 _CONNECT_TIMEOUT = 5.0
@@ -24,7 +24,7 @@ async def open_tcp_server(endpoint: TcpServer, clients: Clients) -> "TcpPort":
     """Listen for clients.
 
     Raises:
-        EndpointError: port in use or not permitted.
+        EndpointError: the port is in use or not permitted.
     """
     named = await resolve(endpoint.peers, socket.SOCK_STREAM)
     port = TcpPort(clients, named)
@@ -40,7 +40,7 @@ async def open_tcp_server(endpoint: TcpServer, clients: Clients) -> "TcpPort":
 
 
 def open_tcp_client(endpoint: TcpOut, clients: Clients) -> "TcpPort":
-    """Connect to a program that listens, now or later, and again when the connection is lost."""
+    """Connect to a program that listens, now or later; reconnect when the connection is lost."""
     port = TcpPort(clients, NamedPeers())
     port.connect(endpoint)
     return port
@@ -88,7 +88,7 @@ class TcpPort:
             await asyncio.sleep(_RETRY)
 
     def accept(self, transport: asyncio.Transport) -> "TcpClient | None":
-        """A client for a new connection; None if it is not let in."""
+        """Make a client for a new connection; None if it is refused."""
         address = transport.get_extra_info("peername")
         full = len(self._open) >= _MOST_CLIENTS
         if self._closed or full or address is None or not self._named.admit(address):
@@ -103,7 +103,7 @@ class TcpPort:
         return client
 
     def received(self, client: "TcpClient", data: bytes) -> int:
-        """Pass on what a client sent; returns the number of frames."""
+        """Pass on what a client sent; return the number of frames."""
         frames = client.scan(data)
         self._clients.received(client, frames)
         return len(frames)
@@ -127,14 +127,14 @@ class TcpPort:
 
 
 class TcpClient(Client):
-    """One connection."""
+    """A client with one TCP connection."""
 
     def __init__(self, name: str, host: str, transport: asyncio.Transport) -> None:
         super().__init__(name, host=host, streaming=True)
         self._transport = transport
 
     def abort(self) -> None:
-        """Close the connection; what was not sent never will be."""
+        """Close the connection; unsent data are lost."""
         self._transport.abort()
 
     def _flush(self) -> None:

@@ -13,11 +13,11 @@ from companion.serve.network.refusal import refusal
 
 _LARGEST_READ = 4_096
 _LARGEST_SENT = 1_400
-"""Several frames travel in one datagram, as long as no network has to split it, bytes."""
+"""Largest datagram that joins several frames, bytes, so that no network must split it."""
 _BURST = 8
-"""Datagrams read before the loop does other work."""
+"""Number of datagrams read before the loop does other work."""
 _SILENT = 15.0
-"""A client that sent nothing for this long has gone, s: ground stations send once a second."""
+"""A client counts as gone after this silence, s; ground stations send once a second."""
 _MOST_CLIENTS = 16
 
 
@@ -25,7 +25,7 @@ async def open_udp(endpoint: UdpIn | UdpOut, clients: Clients) -> "UdpPort":
     """Open a UDP endpoint for clients.
 
     Raises:
-        EndpointError: port in use, host unknown, no permission.
+        EndpointError: the port is in use, the host unknown, or permission is missing.
     """
     where = f"UDP {endpoint.host}:{endpoint.port}"
     try:
@@ -49,7 +49,7 @@ async def open_udp(endpoint: UdpIn | UdpOut, clients: Clients) -> "UdpPort":
 
 
 class UdpPort:
-    """A socket with its clients, told apart by their addresses.
+    """A socket with its clients, distinguished by their addresses.
 
     Attributes:
         local: the (host, port) it is bound to.
@@ -67,7 +67,7 @@ class UdpPort:
         self._loop.add_reader(opened.fileno(), self._read)
 
     def call(self, address: Any) -> None:
-        """Send to one client, which need not have sent anything; hear no other."""
+        """Send to one client, which need not send first; ignore all others."""
         self._only = address
         self._attach(address)
 
@@ -83,7 +83,7 @@ class UdpPort:
         self._by_address.clear()
 
     def send(self, data: bytes, address: Any) -> bool:
-        """Send a datagram; false if the kernel does not take it now."""
+        """Send a datagram; return false if the kernel does not take it now."""
         try:
             self._socket.sendto(data, address)
         except BlockingIOError:
@@ -137,10 +137,10 @@ class UdpPort:
 
 
 class UdpClient(Client):
-    """One client's address.
+    """A client with one UDP address.
 
     Attributes:
-        heard_at: when its last datagram came, s.
+        heard_at: arrival of its last datagram, s.
     """
 
     def __init__(self, port: UdpPort, address: Any) -> None:

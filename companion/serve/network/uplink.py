@@ -1,4 +1,4 @@
-"""Clients' frames on their way to the vehicle: bounded, fair, and never in the way of setpoints."""
+"""Clients' frames to the vehicle: bounded, fair, and without delaying setpoints."""
 
 from collections import deque
 from collections.abc import Callable
@@ -8,18 +8,18 @@ from companion.mavlink.transport.endpoint import Endpoint, SerialPort
 _QUEUE = 64
 """Largest number of frames that wait for one client."""
 _OLDEST = 1.0
-"""An older frame is dropped, s: a command from before an outage of the link must not arm later."""
+"""Largest age of a frame that is sent, s: a command from before an outage must not arm later."""
 _LARGEST_FRAME = 280
 _SERIAL_SHARE = 0.5
 """Share of a serial line that clients may use; our setpoints and requests need the rest."""
 _BITS_PER_BYTE = 10
 _NETWORK_RATE = 500_000.0
-"""Clients' bytes per second over a network."""
+"""Largest rate of clients' bytes over a network, per second."""
 _NETWORK_BURST = 50_000.0
 
 
 def uplink_rate(endpoint: Endpoint) -> tuple[float, float]:
-    """What clients may send to the vehicle at this endpoint: bytes per second, and at once."""
+    """Limits for clients' frames to the vehicle at this endpoint: bytes per second, and at once."""
     if isinstance(endpoint, SerialPort):
         rate = _SERIAL_SHARE * endpoint.baud / _BITS_PER_BYTE
         return rate, max(float(_LARGEST_FRAME), 0.01 * rate)
@@ -30,14 +30,14 @@ class Uplink:
     """Queues the frames of each client and sends them in turn, as fast as the link allows.
 
     Args:
-        send: sends a whole frame now; false if it could not leave.
+        send: sends a whole frame now; returns false if it could not be sent.
         rate: bytes per second.
-        burst: bytes that may leave at once.
+        burst: bytes that may be sent at once.
         clock: our clock, s.
 
     Attributes:
-        sent: frames that left.
-        dropped: frames that found their client's queue full, or waited too long.
+        sent: number of frames sent.
+        dropped: frames dropped because their client's queue was full, or they waited too long.
     """
 
     name = "vehicle"
@@ -52,7 +52,7 @@ class Uplink:
         self._turns: deque[object] = deque()
 
     def put(self, frame: bytes, origin: object) -> None:
-        """Queue a frame of the client `origin`; drop it if that client has too many waiting."""
+        """Queue a frame of the client `origin`; drop it if that client has too many queued."""
         queue = self._queues.get(origin)
         if queue is None:
             queue = self._queues[origin] = deque()
@@ -63,7 +63,7 @@ class Uplink:
         queue.append((self._clock(), frame))
 
     def drain(self) -> bool:
-        """Send what may leave now, one frame of each client in turn; whether some are left."""
+        """Send what may be sent now, a frame of each client in turn; return whether more remain."""
         now = self._clock()
         self._allowed = min(self._burst, self._allowed + self._rate * (now - self._since))
         self._since = now
@@ -87,6 +87,6 @@ class Uplink:
         return bool(self._turns)
 
     def forget(self, origin: object) -> None:
-        """Drop what waits for a client that is gone."""
+        """Drop the queued frames of a client that is gone."""
         if self._queues.pop(origin, None) is not None:
             self._turns.remove(origin)

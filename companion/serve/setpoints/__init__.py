@@ -1,1 +1,1 @@
-"""Clients' setpoints: what is commanded, and the reference that follows from it."""
+"""Clients' setpoints: their meaning, and the reference that follows from them."""

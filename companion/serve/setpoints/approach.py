@@ -20,10 +20,10 @@ class AxisLimits(NamedTuple):
     """Limits of a motion along one axis.
 
     Attributes:
-        velocity: largest along the axis.
-        backward: largest against the axis.
-        acceleration: largest, either way.
-        jerk: largest, either way.
+        velocity: largest velocity along the axis.
+        backward: largest velocity against the axis.
+        acceleration: largest acceleration in both directions.
+        jerk: largest jerk in both directions.
     """
 
     velocity: float
@@ -33,20 +33,20 @@ class AxisLimits(NamedTuple):
 
 
 class UnplannableError(ValueError):
-    """There is no motion: the numbers are too large or too far apart."""
+    """No motion exists: the numbers are too large or too far apart."""
 
 
 class Approach:
     """A time-optimal motion of an error to zero.
 
     Args:
-        error: where it begins.
-        limits: of each axis.
-        begins: time of the beginning, s.
-        by_velocity: whether only the velocity must become zero, wherever that is.
+        error: initial error.
+        limits: limits of each axis.
+        begins: time when it begins, s.
+        by_velocity: whether only the velocity must become zero, at any position.
 
     Raises:
-        UnplannableError: there is no such motion.
+        UnplannableError: no such motion exists.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class Approach:
             raise _unplannable(result)
 
     def at(self, time: float) -> State:
-        """The error at a time, s; past the end it stays as it ended."""
+        """The error at a time, s; constant after the end."""
         elapsed = max(0.0, time - self._begins)
         position, velocity, acceleration = self._trajectory.at_time(elapsed)[:3]
         return State(tuple(position), tuple(velocity), tuple(acceleration))

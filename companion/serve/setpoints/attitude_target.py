@@ -1,8 +1,9 @@
 """SET_ATTITUDE_TARGET: an attitude or body rates, with thrust.
 
 Sources: MAVLink common (ATTITUDE_TARGET_TYPEMASK); "Offboard Mode" of the PX4 guide; "Copter
-Commands in Guided Mode" of ArduPilot's developer wiki. Both know two kinds: attitude and thrust,
-and body rates and thrust. With other masks they differ, or fall back to something else (measured).
+Commands in Guided Mode" of ArduPilot's developer wiki. Both autopilots support two kinds: attitude
+with thrust, and body rates with thrust. With other masks they differ, or do something else
+(measured).
 """
 
 from math import isfinite
@@ -18,14 +19,14 @@ _ALL_RATES = _NO_ROLL_RATE | _NO_PITCH_RATE | _NO_YAW_RATE
 _THRUST_BODY, _NO_THRUST, _NO_ATTITUDE = 32, 64, 128
 _RESERVED = 8 | 16
 _LARGEST_RATE = 100.0
-"""No vehicle turns faster, rad/s."""
+"""Rates above this are invalid, rad/s."""
 
 
 def attitude_target(message: Message) -> AttitudeRequest | RatesRequest:
-    """What a SET_ATTITUDE_TARGET commands.
+    """The command of a SET_ATTITUDE_TARGET.
 
     Raises:
-        RefusedSetpoint: it is contradictory, incomplete, or not finite.
+        RefusedSetpoint: the setpoint is contradictory, incomplete, or not finite.
     """
     mask, thrust = message.type_mask, message.thrust
     if mask & _RESERVED:

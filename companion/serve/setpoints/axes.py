@@ -1,8 +1,8 @@
-"""Some axes that follow what is commanded: a stream as it is, a jump by a motion within limits.
+"""Axes that follow commands: a stream directly, a jump by a motion within limits.
 
-The commanded state moves on between setpoints (`Carrier`). Where it jumps, the difference between
-the state so far and the commanded one becomes an error, which a jerk-limited motion brings to zero
-(`Approach`). The state is the sum of both.
+The commanded state is extrapolated between setpoints (`Carrier`). When it jumps, the difference
+between the present and the commanded state becomes an error, which a jerk-limited motion reduces to
+zero (`Approach`). The state is the sum of both.
 """
 
 from collections.abc import Sequence
@@ -16,24 +16,26 @@ from companion.serve.setpoints.carrier import Carrier, Moving, far, plus
 from companion.serve.setpoints.request import AxisDemand
 
 _STREAM = 0.25
-"""Setpoints that come at this period or faster are a stream, whose derivatives are estimated, s."""
+"""Longest period of setpoints that count as a stream, whose derivatives are estimated, s."""
 _SMOOTHING = 0.5
-"""Share of a new derivative in its estimate; the rest is the one before."""
+"""Weight of a new derivative in its running estimate."""
 _LARGEST_ACCELERATION = 15.0
 """Largest estimated acceleration, m/s²; faster changes of the velocity are jumps."""
 _MOST_BRAKED = 2.0
 """A motion begins with at most this multiple of its largest acceleration."""
 _STRAYED = 1.5
-"""Where only velocities or accelerations are commanded, the position may run ahead by this, m."""
+"""Largest distance of the reference ahead of the vehicle if no position is commanded, m."""
 _OUTRUN = 2.0
-"""Where only accelerations are commanded, the velocity may run ahead by this, m/s."""
+"""Largest velocity of the reference ahead of the vehicle's if only accelerations are commanded,
+m/s.
+"""
 
 _LEAST_SHARE = 0.25
-"""Share of the limits that is left for an axis across the direction of a motion."""
+"""Share of the limits reserved for an axis across the direction of a motion."""
 
 
 class Continuity(NamedTuple):
-    """How far a stream may jump and still be flown as it is.
+    """Largest jump of a stream that is still followed directly.
 
     Attributes:
         position: m or rad.
@@ -45,12 +47,13 @@ class Continuity(NamedTuple):
 
 
 class Axes:
-    """Follows demands along one or more axes.
+    """Follows commands along one or more axes.
 
     Args:
-        limits: of motions after a jump, along any direction in these axes: for each axis.
-        continuity: see there.
-        timeout: a stream that repeats the same moving state is continued for this long, s.
+        limits: limits of motions after a jump, one for each axis; of a motion along several axes,
+            they limit the motion along its direction.
+        continuity: largest jumps that are followed directly.
+        timeout: time for which a stream that repeats the same moving state is continued, s.
     """
 
     def __init__(
@@ -64,7 +67,7 @@ class Axes:
         self._carrier = Carrier(self._zero, self._zero, self._zero, self._zero, 0.0)
 
     def begin(self, state: State, now: float) -> None:
-        """Start from a state, and stop from there until something is commanded."""
+        """Start from a state, and come to rest until a command comes."""
         self._demand, self._approach = None, None
         self._carrier = Carrier(*state, self._zero, now)
         self.stop(now)
@@ -81,8 +84,9 @@ class Axes:
         """Come to rest within limits, and stay there.
 
         Args:
-            now: s.
-            actual: motion of the vehicle; if the state has run away from it, it stops from there.
+            now: present time, s.
+            actual: motion of the vehicle; if the state is too far from it, the stop begins at the
+                vehicle.
         """
         if actual is not None:
             current = self.at(now)
@@ -94,16 +98,16 @@ class Axes:
         self.command(AxisDemand(None, self._zero, None), now)
 
     def command(self, demand: AxisDemand, now: float, actual: Moving | None = None) -> None:
-        """Follow a new demand.
+        """Follow a new command.
 
         Args:
-            demand: what is commanded now.
-            now: s.
-            actual: motion of the vehicle; without a commanded position, the state does not run
-                further ahead of it.
+            demand: the command.
+            now: present time, s.
+            actual: motion of the vehicle; without a commanded position, the state stays close to
+                it.
 
         Raises:
-            UnplannableError: there is no motion to it; the demand before still counts.
+            UnplannableError: no motion leads to it; the previous command stays in force.
         """
         if demand == self._demand:
             self._repeat(demand, now, actual)
@@ -116,7 +120,7 @@ class Axes:
         self._demand, self._given_at = demand, now
 
     def _repeat(self, demand: AxisDemand, now: float, actual: Moving | None) -> None:
-        """Follow a demand that is repeated: its sender may hang, so nothing grows for ever."""
+        """Follow a repeated command for a limited time, because its sender may hang."""
         if demand.position is None:
             self._repeat_motion(demand, now, actual)
             return
@@ -126,7 +130,7 @@ class Axes:
             self._given_at = inf
 
     def _repeat_motion(self, demand: AxisDemand, now: float, actual: Moving | None) -> None:
-        """Follow a repeated velocity or acceleration, no further than `_STRAYED` ahead."""
+        """Follow a repeated velocity or acceleration, at most `_STRAYED` ahead of the vehicle."""
         current = self.at(now)
         if demand.velocity is not None and now - self._given_at > self._timeout:
             demand = AxisDemand(None, demand.velocity, None)
@@ -172,7 +176,7 @@ class Axes:
         return Approach(begins, limits, now, by_velocity=by_velocity)
 
     def _derivatives(self, demand: AxisDemand, now: float) -> tuple[Values, Values]:
-        """Acceleration and jerk of a stream; estimated where they are not commanded."""
+        """Acceleration and jerk of a stream; estimated if they are not commanded."""
         before, since = self._demand, now - self._given_at
         given = demand.acceleration
         fresh = before is not None and before.position is not None and 0.0 < since <= _STREAM
@@ -204,7 +208,7 @@ def _blend(old: Values, new: Values) -> Values:
 
 
 def _near(current: State, actual: Moving | None, demand: AxisDemand) -> State:
-    """The state, at the vehicle in what is not commanded and has run too far ahead of it."""
+    """The state; quantities that are not commanded and too far ahead are set to the vehicle's."""
     if actual is None:
         return current
     position, velocity, acceleration = current

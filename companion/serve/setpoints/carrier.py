@@ -1,4 +1,4 @@
-"""A commanded state along some axes, which moves on between two setpoints."""
+"""A commanded state along some axes, extrapolated between two setpoints."""
 
 from math import hypot
 from typing import NamedTuple
@@ -7,7 +7,7 @@ from companion.serve.setpoints.approach import State, Values
 
 
 class Moving(NamedTuple):
-    """How the vehicle moves along some axes; SI units.
+    """Motion of the vehicle along some axes; SI units.
 
     Attributes:
         position: m.
@@ -19,7 +19,7 @@ class Moving(NamedTuple):
 
 
 class Carrier(NamedTuple):
-    """The commanded state, continued at a constant jerk from `begins`, s."""
+    """The commanded state, extrapolated at a constant jerk from the time `begins`, s."""
 
     position: Values
     velocity: Values
@@ -45,7 +45,7 @@ class Carrier(NamedTuple):
         return State(position, velocity, acceleration)
 
     def error_of(self, state: State) -> State:
-        """How far a state is from the commanded one at `begins`."""
+        """Difference between a state and the commanded one at `begins`."""
         return State(
             _minus(state.position, self.position),
             _minus(state.velocity, self.velocity),

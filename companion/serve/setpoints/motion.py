@@ -14,22 +14,25 @@ _HORIZONTAL_CONTINUITY = Continuity(0.3, 0.6)
 _VERTICAL_CONTINUITY = Continuity(0.3, 0.4)
 _HEADING_CONTINUITY = Continuity(0.2, 1.0)
 _VERTICAL_ACCELERATION, _VERTICAL_JERK = 2.0, 6.0
-"""Largest, m/s² and m/s³: what the thrust spends on climbing, it lacks for steering."""
+"""Largest vertical acceleration, m/s², and jerk, m/s³: thrust used for climbing is not available
+for tilt.
+"""
 _YAW_ACCELERATION, _YAW_JERK = 2.0, 10.0
-"""Of a turn after a jump of the yaw, rad/s² and rad/s³: yaw responds slowly."""
+"""Largest yaw acceleration, rad/s², and jerk, rad/s³, after a jump of the yaw; yaw responds slowly.
+"""
 _STREAM = 0.25
-"""Yaws that come at this period or faster are a stream, whose rate is estimated, s."""
+"""Longest period of yaws that count as a stream, whose rate is estimated, s."""
 
 
 class MotionLimits(NamedTuple):
     """Limits of motions after a jump of the setpoints.
 
     Attributes:
-        speed: largest horizontal, m/s.
-        acceleration: largest, m/s².
-        jerk: largest, m/s³.
-        climb, descent: largest, m/s.
-        yaw_rate: largest, rad/s.
+        speed: largest horizontal speed, m/s.
+        acceleration: largest acceleration, m/s²; vertically at most `_VERTICAL_ACCELERATION`.
+        jerk: largest jerk, m/s³; vertically at most `_VERTICAL_JERK`.
+        climb, descent: largest vertical speeds, m/s.
+        yaw_rate: largest yaw rate, rad/s.
         timeout: see `Axes`, s.
     """
 
@@ -43,10 +46,10 @@ class MotionLimits(NamedTuple):
 
 
 class CommandedMotion:
-    """Turns requests into a reference that never jumps; all in one frame.
+    """Turns requests into a reference that never jumps, all in one frame.
 
     Args:
-        limits: of the motion that leads from one request to the next.
+        limits: limits of the motion from one request to the next.
     """
 
     def __init__(self, limits: MotionLimits) -> None:
@@ -66,7 +69,7 @@ class CommandedMotion:
         self._yaw: tuple[float, float, float] | None = None
 
     def begin(self, position_ned: Vector, velocity_ned: Vector, heading: float, now: float) -> None:
-        """Start from a motion, and come to rest until something is commanded."""
+        """Start from a motion, and come to rest until a request comes."""
         (x, y, z), (u, v, w) = position_ned, velocity_ned
         self._horizontal.begin(State((x, y), (u, v), (0.0, 0.0)), now)
         self._vertical.begin(State((z,), (w,), (0.0,)), now)
@@ -77,7 +80,7 @@ class CommandedMotion:
         """Follow a request; `actual` is the motion of the vehicle.
 
         Raises:
-            UnplannableError: there is no motion to it; the request before still counts.
+            UnplannableError: no motion leads to it; the previous request stays in force.
         """
         before = copy(self._horizontal), copy(self._vertical), copy(self._heading), self._yaw
         horizontal, vertical = _by_axes(actual)
@@ -104,14 +107,14 @@ class CommandedMotion:
         return Reference((x, y, z), (u, v, w), (a, b, c), heading, rate)
 
     def _within(self, vertical: AxisDemand) -> AxisDemand:
-        """The demand with a velocity that guidance flies; beside a position, as it is."""
+        """The demand with a velocity that guidance can fly; beside a position it is unchanged."""
         if vertical.velocity is None or vertical.position is not None:
             return vertical
         (down,) = vertical.velocity
         return vertical._replace(velocity=(min(max(down, -self._climb), self._descent),))
 
     def _turn(self, request: MotionRequest, now: float) -> AxisDemand:
-        """The demand on the heading: the short way to a yaw, or a rate, or as it is."""
+        """The demand on the heading: a yaw the short way, a rate, or the present heading."""
         if request.yaw is None:
             self._yaw = None
             return AxisDemand(None, (request.yaw_rate or 0.0,), None)
@@ -134,6 +137,6 @@ class CommandedMotion:
 
 
 def _by_axes(motion: VehicleMotion) -> tuple[Moving, Moving]:
-    """Horizontal and vertical motion."""
+    """The motion, split into horizontal and vertical."""
     (x, y, z), (u, v, w) = motion
     return Moving((x, y), (u, v)), Moving((z,), (w,))

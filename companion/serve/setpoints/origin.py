@@ -1,4 +1,4 @@
-"""Where the autopilot's local frame begins on the globe, from its local and global positions."""
+"""The origin of the autopilot's local frame, from its local and global positions."""
 
 from math import cos, degrees, hypot, radians
 
@@ -7,13 +7,13 @@ from companion.guidance.reference import Vector
 from companion.serve.setpoints.request import Origin
 
 _SHARE = 0.05
-"""Share of a new pair of positions: each is off by some centimetres."""
+"""Weight of a new pair of positions; each pair is off by some centimetres."""
 _MOVED = 2.0
-"""An origin that seems to be this far from the estimate has been set anew, m."""
+"""An origin this far from the estimate counts as newly set, m."""
 
 
 class OriginEstimate:
-    """Averages the origin over pairs of positions of the same instant.
+    """Averages the origin over pairs of simultaneous positions.
 
     Attributes:
         origin: the estimate, or None before the first pair.
@@ -30,14 +30,14 @@ class OriginEstimate:
         altitude: float,
         height: float,
     ) -> None:
-        """Take a pair.
+        """Take a pair of positions.
 
         Args:
-            position_ned: in the local frame, m.
-            latitude: of the same place, degrees.
-            longitude: of it, degrees.
-            altitude: above mean sea level, m.
-            height: above home, m.
+            position_ned: position in the local frame, m.
+            latitude: latitude of the same place, degrees.
+            longitude: longitude of the same place, degrees.
+            altitude: altitude above mean sea level, m.
+            height: height above home, m.
         """
         north, east, down = position_ned
         seen = Origin(

@@ -1,8 +1,9 @@
 """SET_POSITION_TARGET_LOCAL_NED and _GLOBAL_INT: masks and frames.
 
 Sources: MAVLink common; "Offboard Mode" of the PX4 guide; "Copter Commands in Guided Mode" of
-ArduPilot's developer wiki. Where the two autopilots take a setpoint differently (a position in
-MAV_FRAME_BODY_NED, a yaw in a body frame), it is refused or follows the vehicle's autopilot.
+ArduPilot's developer wiki. If the two autopilots interpret a setpoint differently, a position in
+MAV_FRAME_BODY_NED is refused, and a yaw in a body frame is interpreted as by the vehicle's
+autopilot.
 """
 
 from math import cos, hypot, isfinite, pi, radians
@@ -26,16 +27,16 @@ _KNOWN_BITS = 4095
 _HORIZONTAL, _VERTICAL = (0, 1), (2,)
 
 _FARTHEST, _FASTEST, _STRONGEST, _FASTEST_YAW = 10_000.0, 100.0, 100.0, 20.0
-"""Larger numbers are taken for errors; m, m/s, m/s², rad/s."""
+"""Larger numbers count as errors; m, m/s, m/s², rad/s."""
 
 
 class _Frame(NamedTuple):
     """A frame of SET_POSITION_TARGET_LOCAL_NED.
 
     Attributes:
-        offset: whether positions count from where the vehicle is.
-        body: whether directions count from where it points to.
-        position: whether a position in it means the same to PX4 and ArduPilot.
+        offset: whether positions are relative to the vehicle.
+        body: whether directions are relative to its heading.
+        position: whether a position in this frame means the same to PX4 and ArduPilot.
     """
 
     offset: bool
@@ -58,16 +59,16 @@ _TERRAIN = dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT, dialect.MAV_FRAME_GLOBAL_TERRAI
 def local_target(
     message: Message, situation: Situation, *, body_yaw_is_relative: bool
 ) -> MotionRequest:
-    """What a SET_POSITION_TARGET_LOCAL_NED commands.
+    """The command of a SET_POSITION_TARGET_LOCAL_NED.
 
     Args:
-        message: decoded.
-        situation: of the vehicle now.
-        body_yaw_is_relative: whether a yaw in a body frame counts from the present one (ArduPilot),
-            not from north (PX4).
+        message: decoded message.
+        situation: present situation of the vehicle.
+        body_yaw_is_relative: whether a yaw in a body frame is relative to the present yaw
+            (ArduPilot) or to north (PX4).
 
     Raises:
-        RefusedSetpoint: it is contradictory, incomplete, or not finite.
+        RefusedSetpoint: the setpoint is contradictory, incomplete, or not finite.
     """
     frame = _LOCAL_FRAMES.get(message.coordinate_frame)
     if frame is None:
@@ -86,11 +87,11 @@ def local_target(
 
 
 def global_target(message: Message, situation: Situation) -> MotionRequest:
-    """What a SET_POSITION_TARGET_GLOBAL_INT commands.
+    """The command of a SET_POSITION_TARGET_GLOBAL_INT.
 
     Raises:
-        RefusedSetpoint: it is contradictory, incomplete, or not finite; or the origin of the local
-            frame is not known.
+        RefusedSetpoint: the setpoint is contradictory, incomplete, or not finite; or the origin of
+            the local frame is unknown.
     """
     frame = message.coordinate_frame
     if frame in _TERRAIN:
@@ -113,7 +114,7 @@ _Values = tuple[float | None, ...]
 
 
 def _groups(message: Message, position: Vector) -> tuple[_Values, _Values, _Values]:
-    """Position, velocity and acceleration; None where the mask says so."""
+    """Position, velocity and acceleration; None for what the mask excludes."""
     mask = message.type_mask
     if mask & _FORCE and mask & _NO_ACCELERATION != _NO_ACCELERATION:
         raise RefusedSetpoint("forces are not flown: clear FORCE_SET")
@@ -141,7 +142,7 @@ def _masked(
 
 
 def _heading(message: Message) -> tuple[float | None, float | None]:
-    """Yaw and yaw rate; None where the mask says so."""
+    """Yaw and yaw rate; None for what the mask excludes."""
     mask = message.type_mask
     yaw = None if mask & _NO_YAW else message.yaw
     rate = None if mask & _NO_YAW_RATE else message.yaw_rate
@@ -197,7 +198,7 @@ def _picked(values: _Values, axes: tuple[int, ...]) -> tuple[float, ...] | None:
 
 
 def _to_local(message: Message, origin: Origin, *, above_home: bool) -> Vector:
-    """A place in the local frame, which is flat over the distances flown."""
+    """A place in the local frame; the earth counts as flat over the distances flown."""
     degrees = 1e-7
     north = radians(message.lat_int * degrees - origin.latitude) * EARTH_RADIUS
     east = radians((message.lon_int * degrees - origin.longitude + 180.0) % 360.0 - 180.0)

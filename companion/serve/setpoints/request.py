@@ -1,4 +1,4 @@
-"""What a setpoint commands, and the error for one that is not understood."""
+"""The meaning of a setpoint, and the error for one that is not understood."""
 
 from typing import NamedTuple
 
@@ -11,10 +11,10 @@ class RefusedSetpoint(ValueError):  # noqa: N818 - it is refused, and nothing fa
 
 
 class AxisDemand(NamedTuple):
-    """What is commanded along some axes: one of the three, or more of them together.
+    """A command along some axes: position, velocity, acceleration, or several of them.
 
     A position may come with a velocity, and both with an acceleration; a velocity may come with an
-    acceleration. What is missing is None.
+    acceleration. None: not commanded.
 
     Attributes:
         position: m, in the autopilot's local frame.
@@ -33,8 +33,8 @@ class MotionRequest(NamedTuple):
     Attributes:
         horizontal: (north, east).
         vertical: (down,).
-        yaw: rad from north; None: as it is, or as `yaw_rate` turns it.
-        yaw_rate: rad/s; None: none is commanded.
+        yaw: rad from north; None: the present yaw, turned by `yaw_rate`.
+        yaw_rate: rad/s; None: not commanded.
     """
 
     horizontal: AxisDemand
@@ -47,8 +47,8 @@ class AttitudeRequest(NamedTuple):
     """A commanded attitude.
 
     Attributes:
-        q: body to world, unit, w first.
-        yaw_rate: feed-forward, rad/s.
+        q: unit quaternion, body to world, w first.
+        yaw_rate: feedforward of the yaw rate, rad/s.
         thrust: normalised, 0..1.
     """
 
@@ -73,12 +73,12 @@ Request = MotionRequest | AttitudeRequest | RatesRequest
 
 
 class Situation(NamedTuple):
-    """What is known of the vehicle when a setpoint comes; frames are relative to it.
+    """State of the vehicle when a setpoint comes, for setpoints relative to it.
 
     Attributes:
-        position_ned: in the autopilot's local frame, m.
-        yaw: of the body, rad from north.
-        origin: of the local frame, or None while it is not known.
+        position_ned: position in the autopilot's local frame, m.
+        yaw: yaw of the body, rad from north.
+        origin: origin of the local frame; None: unknown.
     """
 
     position_ned: Vector
@@ -87,7 +87,7 @@ class Situation(NamedTuple):
 
 
 _LEAST_HEIGHT, _LEAST_CLIMB = 1.0, 0.1
-"""A setpoint this far above the vehicle (m), or upwards this fast (m/s), asks for a take-off."""
+"""Height above the vehicle (m) or upward speed (m/s) from which a setpoint requests a take-off."""
 
 
 def climbs(request: Request, situation: Situation) -> bool:
@@ -101,12 +101,12 @@ def climbs(request: Request, situation: Situation) -> bool:
 
 
 class Origin(NamedTuple):
-    """Where the local frame begins, WGS84.
+    """Origin of the local frame, WGS84.
 
     Attributes:
         latitude, longitude: degrees.
-        altitude: above mean sea level, m.
-        home_altitude: the same of home, m.
+        altitude: altitude above mean sea level, m.
+        home_altitude: altitude of home above mean sea level, m.
     """
 
     latitude: float

@@ -1,4 +1,4 @@
-"""From a client's frame to what it commands, or the reason why it is not flown."""
+"""Converts a client's frame to its command, or to the reason why it is not flown."""
 
 from companion.mavlink.framing import Frame
 from companion.mavlink.messages import decode, dialect
@@ -15,11 +15,11 @@ SETPOINTS = frozenset({_ATTITUDE, _LOCAL, _GLOBAL})
 
 
 class Setpoints:
-    """Understands setpoints for one vehicle.
+    """Interprets setpoints for one vehicle.
 
     Args:
-        autopilot: its address.
-        own: our component's address; a setpoint may be addressed to us, too.
+        autopilot: address of the autopilot.
+        own: address of our component, which setpoints may also be addressed to.
         body_yaw_is_relative: see `local_target`.
     """
 
@@ -28,14 +28,15 @@ class Setpoints:
         self._body_yaw_is_relative = body_yaw_is_relative
 
     def understand(self, frame: Frame, situation: Situation) -> Request:
-        """What a setpoint commands.
+        """The command of a setpoint.
 
         Args:
-            frame: of one of `SETPOINTS`.
-            situation: of the vehicle now.
+            frame: frame of one of `SETPOINTS`.
+            situation: present situation of the vehicle.
 
         Raises:
-            RefusedSetpoint: it is for another vehicle, contradictory, incomplete, or not finite.
+            RefusedSetpoint: the setpoint is for another vehicle, contradictory, incomplete, or not
+                finite.
         """
         self._check_target(target_of(frame))
         message = decode(frame.message_id, frame.payload)

@@ -48,8 +48,8 @@ class ArduPilot:
     """ArduCopter's `Autopilot`.
 
     GUIDED is the mode of both take-off and offboard control. The first setpoint ends the take-off,
-    so none may be sent during the climb. The guided bit of `base_mode` tells the two apart: it is
-    set while the position controller runs, and clear while body rates are obeyed.
+    so no setpoint may be sent during the climb. The guided bit of `base_mode` distinguishes both:
+    it is set while the position controller runs, and clear while body rates are obeyed.
     """
 
     name = "ArduPilot"
@@ -82,7 +82,7 @@ class ArduPilot:
     parameters = ARDUPILOT_PARAMETERS
 
     def mode_name(self, base_mode: int, custom_mode: int) -> str:
-        """Name of the mode in a heartbeat; GUIDED while it obeys body rates has its own name."""
+        """Name of the mode in a heartbeat; GUIDED has another name while it obeys body rates."""
         name = _NAMES.get(custom_mode, f"mode {custom_mode}")
         by_rates = name == "GUIDED" and base_mode & _ARMED and not base_mode & _GUIDED
         return _BY_RATES if by_rates else name

@@ -54,7 +54,7 @@ _CAUSES = {
 
 
 class _Text(NamedTuple):
-    """The text of an event.
+    """Template of the text of an event.
 
     Attributes:
         text: The text with ``{}`` for each value.

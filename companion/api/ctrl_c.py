@@ -1,0 +1,68 @@
+"""Ctrl-C while a program flies: the vehicle is handed back even if the program does not react."""
+
+import asyncio
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+from companion.api.flight_loop import FlightLoop, OwnThread
+
+REACTS_WITHIN = 0.5
+"""Time after Ctrl-C in which the program's event loop must run, s."""
+
+
+@contextmanager
+def on_ctrl_c(loop: FlightLoop, interrupt: Callable[[str], object]) -> Iterator[None]:
+    """While the block runs, hand the vehicle back if the program does not react to Ctrl-C.
+
+    The usual effects of Ctrl-C remain: `asyncio.run` cancels the program, and a second Ctrl-C
+    raises KeyboardInterrupt in it. Python handles Ctrl-C in its main thread between two
+    instructions, even in a program that never yields. A hand-back that is under way is completed.
+
+    Args:
+        loop: loop of the flight.
+        interrupt: hands the vehicle back for a reason; called in the flight's loop.
+    """
+    before = signal.getsignal(signal.SIGINT)
+    in_main = threading.current_thread() is threading.main_thread()
+    if not in_main or not isinstance(loop, OwnThread) or not callable(before):
+        yield
+        return
+    previous: Callable[[int, FrameType | None], object] = before
+
+    def take(number: int, frame: FrameType | None) -> None:
+        loop.post(_Reaction(loop, interrupt).expect)
+        previous(number, frame)
+
+    signal.signal(signal.SIGINT, take)
+    try:
+        yield
+    finally:
+        if signal.getsignal(signal.SIGINT) is take:
+            signal.signal(signal.SIGINT, before)
+
+
+class _Reaction:
+    """Waits in the flight's loop until the program's loop runs, and hands back if it does not.
+
+    Args:
+        loop: loop of the flight.
+        interrupt: hands the vehicle back for a reason.
+    """
+
+    def __init__(self, loop: FlightLoop, interrupt: Callable[[str], object]) -> None:
+        self._loop, self._interrupt, self._came = loop, interrupt, False
+
+    def expect(self) -> None:
+        """Begin to wait."""
+        self._loop.tell(self._come)
+        asyncio.get_running_loop().call_later(REACTS_WITHIN, self._judge)
+
+    def _come(self) -> None:
+        self._came = True
+
+    def _judge(self) -> None:
+        if not self._came:
+            self._interrupt("interrupted by the user (Ctrl-C)")

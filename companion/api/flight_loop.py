@@ -1,0 +1,196 @@
+"""The event loop of a program's flight, in its own thread.
+
+A program that computes, blocks or never yields then delays only its own commands. The flight
+continues to answer samples, notices the missing commands, and hands the vehicle back.
+"""
+
+import asyncio
+import sys
+import threading
+from collections.abc import Awaitable, Callable, Coroutine, Iterator
+from concurrent.futures import Future
+from contextlib import contextmanager, suppress
+from typing import Any, Protocol, TypeVar, TypeVarTuple
+
+from companion.api.program import ended_by
+from companion.mavlink.lockstep import LockstepEventLoop
+from companion.mavlink.loop import LinkEventLoop
+
+T = TypeVar("T")
+Arguments = TypeVarTuple("Arguments")
+
+SWITCH_INTERVAL = 5e-5
+"""Time for which a busy thread of the program keeps the interpreter, s. Python's 5 ms would delay
+each answer by a multiple of it, because every system call of the flight releases the
+interpreter.
+"""
+
+_LOOK_PERIOD = 0.1
+"""Period with which the flight checks whether the program still exists, s."""
+
+
+class FlightLoop(Protocol):
+    """The event loop of the flight, seen from the program's loop."""
+
+    def time(self) -> float:
+        """The clock of the flight, s."""
+        ...
+
+    def start(self, work: Coroutine[Any, Any, T]) -> asyncio.Future[T]:
+        """Run a coroutine in the flight's loop; the future belongs to the program's loop.
+
+        Raises:
+            FlightEnded: the flight is over.
+        """
+        ...
+
+    def post(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
+        """Call a function in the flight's loop without waiting for it."""
+        ...
+
+    def tell(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
+        """Call a function in the program's loop; the flight does not wait for it."""
+        ...
+
+    def on_lost(self, end: Callable[[], Awaitable[object]]) -> None:
+        """Register `end`: it ends the flight, and waits for that, when the program is lost."""
+        ...
+
+    def close(self, *, wait: bool) -> None:
+        """Accept no further work; `wait` until the thread has ended, if there is one."""
+        ...
+
+
+class SharedLoop:
+    """Program and flight share the running loop: in lockstep and in memory the vehicle waits."""
+
+    def __init__(self) -> None:
+        self.time = asyncio.get_running_loop().time
+
+    def start(self, work: Coroutine[Any, Any, T]) -> asyncio.Future[T]:
+        """Run the coroutine as a task."""
+        return asyncio.ensure_future(work)
+
+    def post(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
+        """Call the function at once."""
+        callback(*args)
+
+    def tell(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
+        """Call the function at once."""
+        callback(*args)
+
+    def on_lost(self, end: Callable[[], Awaitable[object]]) -> None:
+        """Do nothing: the flight ends with the loop."""
+
+    def close(self, *, wait: bool) -> None:
+        """Do nothing, because the loop continues."""
+
+
+class OwnThread:
+    """The flight runs in its own thread, which begins here.
+
+    If the program's loop or thread ends without `close`, the flight hands the vehicle back. The
+    interpreter waits for that before it ends.
+    """
+
+    def __init__(self) -> None:
+        self._end: Callable[[], Awaitable[object]] | None = None
+        self._program = asyncio.get_running_loop()
+        self._program_thread = threading.current_thread()
+        self._loop = LinkEventLoop()
+        self.time = self._loop.time
+        self._closing = asyncio.Event()
+        self._started: set[Future[Any]] = set()
+        self._thread = threading.Thread(target=self._run, name="flight")
+        self._thread.start()
+
+    def start(self, work: Coroutine[Any, Any, T]) -> asyncio.Future[T]:
+        """Run the coroutine as a task of the flight's loop; cancelling the future cancels the task.
+
+        Raises:
+            FlightEnded: the flight is over.
+        """
+        try:
+            started = asyncio.run_coroutine_threadsafe(work, self._loop)
+        except RuntimeError as error:  # the loop is closed
+            work.close()
+            raise ended_by("ok") from error
+        self._started.add(started)
+        started.add_done_callback(self._started.discard)
+        return asyncio.wrap_future(started)
+
+    def post(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
+        """Call the function soon; not after the flight has ended."""
+        with suppress(RuntimeError):
+            self._loop.call_soon_threadsafe(callback, *args)
+
+    def tell(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
+        """Call the function soon; not after the program's loop has ended."""
+        with suppress(RuntimeError):
+            self._program.call_soon_threadsafe(callback, *args)
+
+    def on_lost(self, end: Callable[[], Awaitable[object]]) -> None:
+        """Register `end`, which ends the flight when the program is lost."""
+        self._end = end
+
+    def close(self, *, wait: bool) -> None:
+        """End the flight if it still runs, and the thread; `wait` for both."""
+        self.post(self._closing.set)
+        if wait:
+            self._thread.join()
+
+    def _run(self) -> None:
+        try:
+            with (
+                quick_switches(),
+                asyncio.Runner(loop_factory=lambda: self._loop) as runner,
+            ):
+                runner.run(self._until_closed())
+        finally:
+            for started in tuple(self._started):  # whoever waits for them would wait for ever
+                started.cancel()
+
+    async def _until_closed(self) -> None:
+        while not self._closing.is_set() and not self._program_is_lost():
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self._closing.wait(), _LOOK_PERIOD)
+        if self._end is not None:
+            await self._end()
+
+    def _program_is_lost(self) -> bool:
+        """Whether the program's loop or thread has ended, or is ending with the interpreter."""
+        thread = self._program_thread
+        ending = thread.daemon and not threading.main_thread().is_alive()
+        return ending or not thread.is_alive() or self._program.is_closed()
+
+
+_switching = threading.Lock()
+_quick: list[float] = []
+"""Python's previous switch interval, once for each running flight."""
+
+
+@contextmanager
+def quick_switches() -> Iterator[None]:
+    """Let Python switch threads after `SWITCH_INTERVAL` while any flight runs."""
+    with _switching:
+        _quick.append(sys.getswitchinterval())
+        sys.setswitchinterval(min(SWITCH_INTERVAL, _quick[0]))
+    try:
+        yield
+    finally:
+        with _switching:
+            before = _quick[0]
+            _quick.pop()
+            if not _quick:
+                sys.setswitchinterval(before)
+
+
+def flight_loop() -> FlightLoop:
+    """The loop for a flight of the running program.
+
+    In lockstep and in memory it is the program's own loop, because the vehicle waits for the
+    program. A thread would only make the order of events random.
+    """
+    if isinstance(asyncio.get_running_loop(), LockstepEventLoop):
+        return SharedLoop()
+    return OwnThread()

@@ -1,0 +1,155 @@
+"""The vehicle as 3D viewers draw it: its body, thrust, wanted thrust, and the last seconds' paths.
+
+The frame of paths is x east, y north, z up (ENU); the frame of the vehicle's parts is x forward, y
+left, z up (FLU).
+"""
+
+from collections import deque
+from math import sqrt
+
+from companion.attitude import Quaternion
+from companion.attitude.rotation import attitude_of, body_error
+from companion.control.guidance_command import GuidanceCommand
+from companion.guidance.reference import GRAVITY, Vector
+from companion.recording.mcap_file.cdr import Pose
+from companion.recording.mcap_file.scene import (
+    Arrow,
+    Color,
+    Cube,
+    Cylinder,
+    Entity,
+    Line,
+    scene_message,
+)
+from companion.recording.mcap_file.writer import McapWriter
+
+_HALF_ROOT = sqrt(0.5)
+_KEPT = 100
+"""Number of points in a path: 20 s."""
+_POINT_EACH, _PATHS_EACH, _BODY_EACH = 2, 5, 10
+"""Drawings of the thrust (0.1 s each) per point of a path, per message of the paths, and per body.
+
+All are repeated, because a viewer may join late or jump in the recording.
+"""
+_GAP_NS = 1_000_000_000
+"""A longer gap than this starts new paths, ns."""
+_METRES_PER_M_S2 = 0.1
+"""Length of a thrust arrow, m per m/s²."""
+_LEAST_COS = 0.2
+"""Smallest cosine of the tilt for the length of an arrow."""
+_GREY: Color = (0.25, 0.25, 0.28, 1.0)
+_FRONT: Color = (0.85, 0.35, 0.1, 0.8)
+_BACK: Color = (0.3, 0.3, 0.35, 0.8)
+_THRUST: Color = (0.1, 0.7, 0.3, 1.0)
+_WANTED: Color = (0.85, 0.2, 0.75, 0.7)
+_FLOWN: Color = (0.1, 0.5, 0.95, 1.0)
+_REFERENCE: Color = (0.95, 0.65, 0.1, 1.0)
+_ARM = 0.18
+"""Distance of a rotor from the axes of the body, m."""
+
+_ROTORS = tuple(
+    Cylinder(
+        (x * _ARM, y * _ARM, 0.05, 0.0, 0.0, 0.0, 1.0),
+        (0.22, 0.22, 0.02),
+        _FRONT if x > 0 else _BACK,
+    )
+    for x in (1, -1)
+    for y in (1, -1)
+)
+_BODY = Entity(
+    "body",
+    "vehicle",
+    follows=True,
+    cubes=(Cube((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0), (0.3, 0.16, 0.08), _GREY),),
+    cylinders=_ROTORS,
+)
+
+
+class SceneRows:
+    """Writes `/scene` and `/paths`. Its methods run in the recorder's thread."""
+
+    def __init__(self) -> None:
+        self._command: GuidanceCommand | None = None
+        self._flown: deque[Vector] = deque(maxlen=_KEPT)
+        self._reference: deque[Vector] = deque(maxlen=_KEPT)
+        self._count = self._newest_ns = 0
+
+    def commanded(self, command: GuidanceCommand) -> None:
+        """Take a new command from guidance."""
+        self._command = command
+
+    def draw(
+        self, writer: McapWriter, time_ns: int, q: Quaternion, position: Vector, reference: Vector
+    ) -> None:
+        """Draw the vehicle, and from time to time the paths.
+
+        Args:
+            writer: writer of the file.
+            time_ns: ns since 1970.
+            q: attitude.
+            position: position of the vehicle, m ENU.
+            reference: position of the reference, m ENU.
+        """
+        thrust = Entity("thrust", "vehicle", follows=True, arrows=self._arrows(q))
+        scene = (thrust,) if self._count % _BODY_EACH else (_BODY, thrust)
+        writer.message("/scene", time_ns, scene_message(time_ns, scene))
+        if time_ns - self._newest_ns > _GAP_NS:
+            self._flown.clear()
+            self._reference.clear()
+        self._newest_ns = time_ns
+        if self._count % _POINT_EACH == 0:
+            self._flown.append(position)
+            self._reference.append(reference)
+        self._count += 1
+        if self._count % _PATHS_EACH == 0:
+            lines = (Line(self._reference, _REFERENCE), Line(self._flown, _FLOWN))
+            paths = (Entity("paths", "world", lines=lines),)
+            writer.message("/paths", time_ns, scene_message(time_ns, paths))
+
+    def _arrows(self, q: Quaternion) -> tuple[Arrow, ...]:
+        """Arrows of the thrust along the body's axis, and of the thrust that guidance commands."""
+        command = self._command
+        if command is None or command.idle:
+            return ()
+        lift = GRAVITY - (command.acceleration_down if command.thrust is None else 0.0)
+        arrows = [_arrow(q, q, lift, _THRUST)]
+        wanted = _wanted_attitude(command)
+        if wanted is not None:
+            arrows.append(_arrow(q, wanted, lift, _WANTED))
+        return tuple(arrows)
+
+
+def _wanted_attitude(command: GuidanceCommand) -> Quaternion | None:
+    """An attitude with the thrust direction that guidance commands; None: no command."""
+    north, east = command.target[:2]
+    if command.body_rates is not None or not north * north + east * east < 1.0:
+        return None
+    return attitude_of(north, east, 0.0)
+
+
+def _up(turn: Quaternion) -> Pose:
+    """Pose, in the frame of the body, of an arrow along the thrust after a turn of the body (FRD).
+
+    It is the turn in FLU ⊗ (√½, 0, −√½, 0), which turns x upwards.
+    """
+    w, x, y, z = turn
+    return (
+        0.0,
+        0.0,
+        0.08,
+        _HALF_ROOT * (x - z),
+        _HALF_ROOT * (-y - w),
+        _HALF_ROOT * (-z - x),
+        _HALF_ROOT * (w - y),
+    )
+
+
+def _arrow(q: Quaternion, goal: Quaternion, lift: float, color: Color) -> Arrow:
+    """An arrow along the thrust of attitude `goal`, about a vehicle of attitude `q`.
+
+    Its length shows the specific thrust whose vertical part is `lift`, m/s².
+    """
+    cos_tilt = max(1.0 - 2.0 * (goal[1] ** 2 + goal[2] ** 2), _LEAST_COS)
+    length = max(_METRES_PER_M_S2 * lift / cos_tilt, 0.01)
+    head = min(0.15, 0.4 * length)
+    return Arrow(_up(body_error(q, goal)), length - head, 0.03, head, 0.07, color)

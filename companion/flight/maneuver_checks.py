@@ -1,0 +1,181 @@
+"""Checks of maneuvers against limits and fence, with the known drag of the vehicle."""
+
+from collections.abc import Hashable, Iterable, Iterator
+from dataclasses import replace
+from functools import lru_cache
+from math import tau
+
+import numpy as np
+
+from companion.config import Config
+from companion.config.known_drag import KnownDrag
+from companion.control.inner_loop import thrust_limits
+from companion.drag import Drag
+from companion.files.yaml_file import ConfigError
+from companion.flight.fence_check import FenceCheck
+from companion.guidance import GRAVITY, Doublets, Maneuver, ManeuverSequence
+from companion.guidance.fence import Place
+from companion.guidance.follow import Follow, HeldFigure
+from companion.guidance.predicted import predicted
+from companion.guidance.reference import Vector
+from companion.guidance.trajectory import (
+    Envelope,
+    Motion,
+    TrajectoryError,
+    Violation,
+    judge,
+    violations,
+)
+from companion.safety.table import fence_of
+
+_SLOWER = "make it slower or smaller, or change the limit"
+
+
+def require_flyable(config: Config, part: Maneuver, drag: KnownDrag) -> None:
+    """Check a maneuver that is not a trajectory against the fence; a circle also against limits.
+
+    Args:
+        config: configuration of the flight.
+        part: the maneuver.
+        drag: drag of the vehicle.
+
+    Raises:
+        ConfigError: the maneuver cannot be flown within the limits and the fence.
+    """
+    try:
+        motions = list(_motions(part, drag.least))
+        _require_motions_inside(config, part, motions, None)
+    except TrajectoryError as error:
+        raise ConfigError(f"{part.name}: {error}") from error
+    if isinstance(part, HeldFigure):
+        envelope = replace(envelope_of(config, drag), max_tilt_rate=None, fence=None)
+        for broken in judge(motions[0], envelope):
+            _refuse(part.name, broken, drag.assumption)
+
+
+def require_inside(
+    config: Config, parts: Iterable[Maneuver], origin: Place | None, drag: KnownDrag
+) -> None:
+    """Check that all maneuvers stay inside the fence, a polygon on the map included.
+
+    Args:
+        config: configuration of the flight.
+        parts: the maneuvers.
+        origin: geographic position where control begins, or None.
+        drag: drag of the vehicle.
+
+    Raises:
+        ConfigError: a maneuver leaves the fence, or could not stop inside it.
+    """
+    for part in parts:
+        _require_motions_inside(config, part, _motions(part, drag.least), origin)
+
+
+def require_followable(config: Config, maneuver: Maneuver, begin: Vector, drag: KnownDrag) -> None:
+    """Check a trajectory that begins in flight against all limits and the fence.
+
+    Args:
+        config: configuration of the flight.
+        maneuver: `Follow` or `HeldFigure`.
+        begin: start of the trajectory relative to where control began, m NED.
+        drag: drag of the vehicle.
+
+    Raises:
+        ConfigError: the trajectory cannot be flown within the limits and the fence.
+    """
+    envelope = envelope_of(config, drag)
+    check = envelope.fence
+    assert check is not None
+
+    def fence(motion: Motion) -> Violation | None:
+        return check(replace(motion, position=motion.position + np.array(begin)))
+
+    if isinstance(maneuver, Follow | HeldFigure):
+        broken = violations(maneuver.trajectory, replace(envelope, fence=fence))
+        if broken:
+            raise ConfigError(f"{maneuver.name}: {broken[0]}; {broken[0].remedy}")
+
+
+def require_still_flyable(config: Config, flown: ManeuverSequence, drag: KnownDrag) -> None:
+    """Check the maneuvers again, because the limits or the vehicle have changed.
+
+    The check uses the trajectory that is flown; it is not read or slowed down again.
+
+    Args:
+        config: the changed configuration; its maneuvers are those of `flown`.
+        flown: the maneuvers that were made when the flight began.
+        drag: drag of the vehicle.
+
+    Raises:
+        ConfigError: a maneuver cannot be flown within the limits and the fence.
+    """
+    for part in flown.parts:
+        if not isinstance(part, Follow):
+            require_flyable(config, part, drag)
+        elif broken := violations(part.trajectory, envelope_of(config, drag)):
+            raise ConfigError(
+                f"{part.name}: {broken[0]}; it is flown as it was when it began{drag.assumption}"
+            )
+
+
+def _require_motions_inside(
+    config: Config, part: Maneuver, motions: Iterable[Motion], origin: Place | None
+) -> None:
+    """Check predicted motions of a maneuver; see `require_inside`."""
+    check = _fence_check(config, origin)
+    for motion in motions:
+        _refuse(part.name, check(motion))
+
+
+def _motions(part: Maneuver, drag: Drag) -> Iterator[Motion]:
+    """Predicted motions of a maneuver; for body-rate doublets, at eight initial headings."""
+    turns = 8 if isinstance(part, Doublets) else 1
+    for k in range(turns):
+        heading = tau * k / turns
+        # A flight checks its maneuvers several times. `Follow` remembers where it began: not kept.
+        if isinstance(part, Hashable):
+            yield _kept_motion(part, heading, drag)
+        else:
+            yield _motion(part, heading, drag)
+
+
+def _motion(part: Maneuver, heading: float, drag: Drag) -> Motion:
+    """The predicted motion of a maneuver that begins at a heading (rad)."""
+    times, offset, velocity, acceleration = (
+        np.array(column) for column in zip(*predicted(part, heading, drag), strict=True)
+    )
+    jerk, turning = np.zeros_like(offset), np.zeros_like(times)
+    return Motion(times, offset, velocity, acceleration, jerk, turning)
+
+
+_kept_motion = lru_cache(maxsize=32)(_motion)
+
+
+def _refuse(name: str, broken: Violation | None, assumption: str = "") -> None:
+    if broken is None:
+        return
+    # `--slow-down` applies to trajectories only.
+    remedy = _SLOWER if broken.slowing_helps else broken.remedy
+    raise ConfigError(f"{name}: {broken}; {remedy}{assumption}")
+
+
+def envelope_of(config: Config, drag: KnownDrag) -> Envelope:
+    """The limits for a trajectory, relative to where the maneuver begins."""
+    limits, (min_thrust, max_thrust) = config.limits, thrust_limits(config)
+    return Envelope(
+        max_tilt=limits.max_tilt,
+        max_tilt_rate=limits.max_tilt_rate,
+        max_yaw_rate=limits.max_yaw_rate,
+        min_thrust=min_thrust,
+        max_thrust=max_thrust,
+        max_climb=limits.max_climb_m_s,
+        max_descent=limits.max_descent_m_s,
+        max_speed=config.safety.max_speed_m_s,
+        fence=_fence_check(config, None),
+        drag=drag.most,
+        gravity=GRAVITY,
+    )
+
+
+def _fence_check(config: Config, origin: Place | None) -> FenceCheck:
+    return FenceCheck(fence_of(config), config.flight.takeoff_height_m, origin)

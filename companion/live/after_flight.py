@@ -1,0 +1,56 @@
+"""After the flight, the page and the live stream stay for users who have them open."""
+
+import asyncio
+import os
+import socket
+import struct
+from collections.abc import AsyncGenerator, Callable
+from contextlib import asynccontextmanager
+
+from companion.live.door import leave_address
+
+_ALONE = 5.0
+"""Time after which a page or stream without users ends, s."""
+_LONGEST = 3600.0
+"""Longest time that a page or stream stays after the flight, s."""
+
+
+async def until_alone(port: int, is_open: Callable[[], bool]) -> None:
+    """Wait until nobody has the page or stream open any more, or the next flight needs its port.
+
+    Args:
+        port: port of the page or stream.
+        is_open: returns whether somebody has it open.
+    """
+    async with _leave_request(port) as asked:
+        quiet = 0.0
+        for _ in range(int(_LONGEST)):
+            quiet = 0.0 if is_open() else quiet + 1.0
+            if asked.is_set() or quiet > _ALONE:
+                break
+            done = asyncio.create_task(asked.wait())
+            await asyncio.wait({done}, timeout=1.0)
+            done.cancel()
+
+
+@asynccontextmanager
+async def _leave_request(port: int) -> AsyncGenerator[asyncio.Event, None]:
+    """Yield an event that the next flight of the same user sets when it needs the port."""
+    asked = asyncio.Event()
+
+    async def answer(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        sock = writer.get_extra_info("socket")
+        credentials = sock.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
+        _, user, _ = struct.unpack("3i", credentials)
+        if user == os.getuid():
+            writer.write(b"leaving")
+            asked.set()
+        writer.close()
+
+    try:
+        server = await asyncio.start_unix_server(answer, leave_address(port))
+    except OSError:  # another one at the same number
+        yield asked
+        return
+    async with server:
+        yield asked

@@ -1,0 +1,133 @@
+"""Serves the live stream: the records of the flight, for Foxglove and Lichtblick.
+
+The library of the protocol (`foxglove-sdk`) serves in its own threads. A client that reads too
+slowly loses its oldest messages. Clients can only read: the server offers neither parameters nor
+services, and takes no messages.
+"""
+
+import asyncio
+import os
+import socket
+
+import foxglove
+from foxglove.websocket import ChannelView, Client, ServerListener, StatusLevel
+
+from companion.live.after_flight import until_alone
+from companion.live.channel import Message, datagrams
+from companion.live.helper_process import Relay
+from companion.recording.mcap_file.batch import messages_of
+from companion.recording.mcap_file.channels import ENCODING, SCHEMA_ENCODING, TOPICS
+
+_MOST_A_TURN = 20
+"""Largest number of datagrams handled in one turn of the event loop."""
+
+
+class _Subscriptions(ServerListener):
+    """Tracks whether somebody has the stream open. The library calls it in its own threads."""
+
+    def __init__(self) -> None:
+        self._found: set[tuple[int, int]] = set()
+
+    def on_subscribe(self, client: Client, channel: ChannelView) -> None:
+        """Count a subscription."""
+        self._found.add((client.id, channel.id))
+
+    def on_unsubscribe(self, client: Client, channel: ChannelView) -> None:
+        """End a subscription; a client that leaves also unsubscribes."""
+        self._found.discard((client.id, channel.id))
+
+    def any(self) -> bool:
+        """Whether a client has subscribed to a channel."""
+        return bool(self._found)
+
+
+class Stream:
+    """A server with the channels of `flight.mcap`.
+
+    Args:
+        host: IP address to listen at.
+        port: number of the port.
+
+    Raises:
+        RuntimeError: the port cannot be used.
+    """
+
+    def __init__(self, host: str, port: int) -> None:
+        # Without it, the library would close the channels.
+        self._context = foxglove.Context()
+        self._subscriptions = _Subscriptions()
+        self._channels = [
+            foxglove.Channel(
+                topic.name,
+                schema=foxglove.Schema(
+                    name=topic.type_name, encoding=SCHEMA_ENCODING, data=topic.schema
+                ),
+                message_encoding=ENCODING,
+                context=self._context,
+            )
+            for topic in TOPICS
+        ]
+        self._server = foxglove.start_server(
+            name="companion",
+            host=host,
+            port=port,
+            capabilities=[],
+            context=self._context,
+            server_listener=self._subscriptions,
+        )
+        self._dropped = 0
+
+    def take(self, datagram: bytes) -> None:
+        """Pass messages on to the clients."""
+        for number, time_ns, data in messages_of(datagram):
+            self._channels[number].log(data, log_time=time_ns)
+
+    def note(self, message: Message) -> None:
+        """Take a message of the flight; tell clients about losses, and how the flight ended."""
+        dropped = message.get("stream_dropped", 0)
+        if dropped > self._dropped:
+            self._dropped = dropped
+            words = "messages are missing: this computer is too busy to stream all of them"
+            self._server.publish_status(words, StatusLevel.Warning, "dropped")
+        if message["kind"] == "end":
+            self._server.publish_status(str(message["text"]), StatusLevel.Info, "end")
+
+    def is_open(self) -> bool:
+        """Whether somebody has the stream open."""
+        return self._subscriptions.any()
+
+    def close(self) -> None:
+        """Stop serving."""
+        self._server.stop()
+
+
+async def serve_stream(relay: Relay, feed: socket.socket) -> None:
+    """Serve the stream of a flight until the flight has ended and nobody has the stream open.
+
+    Args:
+        relay: receives messages of the flight.
+        feed: socket on which the records of the flight arrive.
+    """
+    host, port = str(relay.first["stream_host"]), int(relay.first["stream_port"])
+    try:
+        stream = Stream(host, port)
+    except RuntimeError as error:  # since the flight has looked, another program took the port
+        relay.note(f"there is no live stream: {error}; the flight goes on without it")
+        feed.close()
+        return
+    loop = asyncio.get_running_loop()
+    os.set_blocking(feed.fileno(), False)
+
+    def on_readable() -> None:
+        for datagram in datagrams(feed, _MOST_A_TURN):
+            if datagram:
+                stream.take(datagram)
+            else:
+                loop.remove_reader(feed.fileno())
+
+    loop.add_reader(feed.fileno(), on_readable)
+    relay.listen(stream.note)
+    await relay.over.wait()
+    await until_alone(port, stream.is_open)
+    loop.remove_reader(feed.fileno())
+    await asyncio.to_thread(stream.close)

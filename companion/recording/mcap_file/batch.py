@@ -1,0 +1,67 @@
+"""Messages of `flight.mcap` for the live stream: several in one datagram.
+
+A datagram is a sequence of messages. Each consists of the index of its channel in `TOPICS` (uint8),
+its time in ns since 1970 (uint64), its length (uint32), and its bytes.
+"""
+
+import struct
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+from companion.recording.mcap_file.channels import TOPICS
+
+_HEAD = struct.Struct("<BQI")
+_NUMBERS = {topic.name: number for number, topic in enumerate(TOPICS)}
+_FULL = 32_000
+"""Length above which a batch is sent, bytes; well below the buffer of a socket."""
+
+SendBatch = Callable[[bytes], None]
+"""Sends a datagram; it never blocks, and never raises."""
+
+
+class StreamedMessage(NamedTuple):
+    """A message of the live stream.
+
+    Attributes:
+        number: number of its channel in `TOPICS`.
+        time_ns: ns since 1970 (in vehicle time: since its boot).
+        data: payload, as in the file.
+    """
+
+    number: int
+    time_ns: int
+    data: bytes
+
+
+class Batch:
+    """Collects messages and sends them together. Only one thread may use it.
+
+    Args:
+        send: takes the datagrams.
+    """
+
+    def __init__(self, send: SendBatch) -> None:
+        self._send = send
+        self._collected = bytearray()
+
+    def add(self, topic: str, time_ns: int, data: bytes) -> None:
+        """Add a message; send the batch if it is full."""
+        self._collected += _HEAD.pack(_NUMBERS[topic], time_ns, len(data))
+        self._collected += data
+        if len(self._collected) > _FULL:
+            self.send()
+
+    def send(self) -> None:
+        """Send the collected messages."""
+        if self._collected:
+            self._send(bytes(self._collected))
+            self._collected.clear()
+
+
+def messages_of(datagram: bytes) -> Iterator[StreamedMessage]:
+    """The messages of a datagram, in order."""
+    at = 0
+    while at < len(datagram):
+        number, time_ns, length = _HEAD.unpack_from(datagram, at)
+        at += _HEAD.size + length
+        yield StreamedMessage(number, time_ns, datagram[at - length : at])

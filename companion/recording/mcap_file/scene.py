@@ -1,0 +1,192 @@
+"""Drawings in 3D: encodes the type `foxglove_msgs/msg/SceneUpdate`.
+
+An entity stays until another one with the same id replaces it on the same topic.
+"""
+
+import struct
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeVar
+
+from companion.recording.mcap_file import cdr
+from companion.recording.mcap_file.cdr import Pose
+from companion.recording.mcap_file.fields import CDR
+
+T = TypeVar("T")
+Color = tuple[float, float, float, float]
+"""Red, green, blue and opacity, 0..1."""
+AT_ORIGIN: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+class Arrow(NamedTuple):
+    """An arrow along the x axis of its pose; lengths and diameters in m."""
+
+    pose: Pose
+    shaft_length: float
+    shaft_diameter: float
+    head_length: float
+    head_diameter: float
+    color: Color
+
+
+class Cube(NamedTuple):
+    """A box about its pose; its size along x, y and z in m."""
+
+    pose: Pose
+    size: tuple[float, float, float]
+    color: Color
+
+
+class Cylinder(NamedTuple):
+    """A cylinder about its pose, along z; its size along x, y and z in m."""
+
+    pose: Pose
+    size: tuple[float, float, float]
+    color: Color
+
+
+class Line(NamedTuple):
+    """A line, with its thickness in pixels.
+
+    Attributes:
+        points: x, y and z of each point, m.
+        color: color of the whole line.
+        pairs: True: each pair of points is a separate line. False: all points form one line.
+    """
+
+    points: Sequence[tuple[float, float, float]]
+    color: Color
+    pairs: bool = False
+
+
+class Entity(NamedTuple):
+    """Shapes that are replaced together.
+
+    Attributes:
+        name: id of the entity.
+        frame: frame of the shapes.
+        follows: whether they move with the frame until they are replaced.
+    """
+
+    name: str
+    frame: str
+    follows: bool = False
+    arrows: Sequence[Arrow] = ()
+    cubes: Sequence[Cube] = ()
+    cylinders: Sequence[Cylinder] = ()
+    lines: Sequence[Line] = ()
+
+
+def scene_message(time_ns: int, entities: Sequence[Entity]) -> bytes:
+    """Encode a message of type SCENE_UPDATE at a time in ns since 1970."""
+    message = _Message()
+    message.count(0)  # deletions
+    message.each(entities, lambda entity: _entity(message, time_ns, entity))
+    return message.bytes()
+
+
+class _Message:
+    """A growing CDR message. Values are aligned to their size, counted after the header."""
+
+    def __init__(self) -> None:
+        self._bytes = bytearray(CDR)
+
+    def bytes(self) -> bytes:
+        return bytes(self._bytes)
+
+    def count(self, number: int) -> None:
+        self._align(4)
+        self._bytes += struct.pack("<I", number)
+
+    def flag(self, value: int) -> None:
+        self._bytes.append(value)
+
+    def doubles(self, *values: float) -> None:
+        self._align(8)
+        self._bytes += struct.pack(f"<{len(values)}d", *values)
+
+    def time(self, time_ns: int) -> None:
+        self._align(4)
+        self._bytes += cdr.stamp(time_ns)
+
+    def text(self, text: str) -> None:
+        cdr.add_string(self._bytes, text)
+
+    def each(self, items: Sequence[T], add: Callable[[T], None]) -> None:
+        self.count(len(items))
+        for item in items:
+            add(item)
+
+    def _align(self, size: int) -> None:
+        self._bytes += bytes(-(len(self._bytes) - len(CDR)) % size)
+
+
+def _entity(message: _Message, time_ns: int, entity: Entity) -> None:
+    def arrow(one: Arrow) -> None:
+        message.doubles(*one.pose, *one[1:5], *one.color)
+
+    def box(one: Cube | Cylinder) -> None:
+        scales = () if isinstance(one, Cube) else (1.0, 1.0)
+        message.doubles(*one.pose, *one.size, *scales, *one.color)
+
+    def line(one: Line) -> None:
+        message.flag(_LINE_LIST if one.pairs else _LINE_STRIP)
+        message.doubles(*AT_ORIGIN, _THICKNESS)
+        message.flag(_IN_PIXELS)
+        message.count(len(one.points))
+        if one.points:
+            message.doubles(*(value for point in one.points for value in point))
+        message.doubles(*one.color)
+        for _ in ("colors", "indices"):
+            message.count(0)
+
+    message.time(time_ns)
+    message.text(entity.frame)
+    message.text(entity.name)
+    message.time(0)  # lifetime: until it is replaced
+    message.flag(entity.follows)
+    message.count(0)  # metadata
+    message.each(entity.arrows, arrow)
+    message.each(entity.cubes, box)
+    message.count(0)  # spheres
+    message.each(entity.cylinders, box)
+    message.each(entity.lines, line)
+    for _ in ("triangles", "texts", "models"):
+        message.count(0)
+
+
+_LINE_STRIP, _LINE_LIST, _IN_PIXELS, _THICKNESS = 0, 2, 1, 2.0
+_POSE, _COLOR = "geometry_msgs/Pose pose\n", "foxglove_msgs/Color color\n"
+_SIZE = "geometry_msgs/Vector3 size\n"
+_POINTS = f"geometry_msgs/Point[] points\n{_COLOR}foxglove_msgs/Color[] colors\nuint32[] indices\n"
+_PARTS = {
+    "SceneEntityDeletion": "uint8 MATCHING_ID=0\nuint8 ALL=1\n"
+    "builtin_interfaces/Time timestamp\nuint8 type\nstring id\n",
+    "SceneEntity": "builtin_interfaces/Time timestamp\nstring frame_id\nstring id\n"
+    "builtin_interfaces/Duration lifetime\nbool frame_locked\n"
+    "foxglove_msgs/KeyValuePair[] metadata\nfoxglove_msgs/ArrowPrimitive[] arrows\n"
+    "foxglove_msgs/CubePrimitive[] cubes\nfoxglove_msgs/SpherePrimitive[] spheres\n"
+    "foxglove_msgs/CylinderPrimitive[] cylinders\nfoxglove_msgs/LinePrimitive[] lines\n"
+    "foxglove_msgs/TriangleListPrimitive[] triangles\nfoxglove_msgs/TextPrimitive[] texts\n"
+    "foxglove_msgs/ModelPrimitive[] models\n",
+    "KeyValuePair": "string key\nstring value\n",
+    "Color": "float64 r\nfloat64 g\nfloat64 b\nfloat64 a\n",
+    "ArrowPrimitive": f"{_POSE}float64 shaft_length\nfloat64 shaft_diameter\n"
+    f"float64 head_length\nfloat64 head_diameter\n{_COLOR}",
+    "CubePrimitive": _POSE + _SIZE + _COLOR,
+    "SpherePrimitive": _POSE + _SIZE + _COLOR,
+    "CylinderPrimitive": f"{_POSE}{_SIZE}float64 bottom_scale\nfloat64 top_scale\n{_COLOR}",
+    "LinePrimitive": "uint8 LINE_STRIP=0\nuint8 LINE_LOOP=1\nuint8 LINE_LIST=2\n"
+    f"uint8 type\n{_POSE}float64 thickness\nbool scale_invariant\n{_POINTS}",
+    "TriangleListPrimitive": _POSE + _POINTS,
+    "TextPrimitive": f"{_POSE}bool billboard\nfloat64 font_size\nbool scale_invariant\n{_COLOR}"
+    "string text\n",
+    "ModelPrimitive": f"{_POSE}geometry_msgs/Vector3 scale\n{_COLOR}bool override_color\n"
+    "string url\nstring media_type\nuint8[] data\n",
+}
+SCENE_UPDATE = cdr.message_type(
+    "foxglove_msgs/msg/SceneUpdate",
+    "foxglove_msgs/SceneEntityDeletion[] deletions\nfoxglove_msgs/SceneEntity[] entities\n",
+    *(f"MSG: foxglove_msgs/{name}\n{fields}" for name, fields in _PARTS.items()),
+    "MSG: builtin_interfaces/Duration\nint32 sec\nuint32 nanosec\n",
+    *cdr.GEOMETRY,
+)

@@ -1,0 +1,139 @@
+"""The thread of a flight and its event loop, without a flight."""
+
+import asyncio
+import sys
+import threading
+import time
+
+import pytest
+
+from companion.api.flight_loop import SWITCH_INTERVAL, OwnThread, SharedLoop, flight_loop
+from companion.api.state import _Wake
+from companion.safety.actions import FlightEnded
+
+
+async def where():
+    return threading.current_thread().name
+
+
+def test_results_errors_and_cancellation_cross_the_threads():
+    cancelled = threading.Event()
+
+    async def fails():
+        raise ZeroDivisionError("there")
+
+    async def waits():
+        try:
+            await asyncio.sleep(60.0)
+        finally:
+            cancelled.set()
+
+    async def main():
+        loop = flight_loop()
+        assert isinstance(loop, OwnThread)
+        assert await loop.start(where()) == "flight"
+        with pytest.raises(ZeroDivisionError):
+            await loop.start(fails())
+        waiting = loop.start(waits())
+        await asyncio.sleep(0.05)
+        waiting.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await waiting
+        await asyncio.sleep(0)
+        assert cancelled.wait(5.0)
+        told = asyncio.get_running_loop().create_future()
+        loop.post(loop.tell, told.set_result, "back")
+        assert await told == "back"
+        loop.close(wait=True)
+
+    asyncio.run(main())
+
+
+def test_after_its_end_nothing_is_started_and_nobody_waits_for_ever():
+    async def main():
+        loop = flight_loop()
+        waiting = loop.start(asyncio.sleep(60.0))
+        loop.close(wait=True)
+        with pytest.raises(asyncio.CancelledError):
+            await waiting
+        loop.post(print, "nobody hears it")
+        with pytest.raises(FlightEnded, match="the flight is over"):
+            await loop.start(where())
+
+    asyncio.run(main())
+
+
+def test_the_flight_runs_while_the_program_blocks():
+    async def ticks():
+        began = time.monotonic()
+        for _ in range(10):
+            await asyncio.sleep(0.01)
+        return time.monotonic() - began
+
+    async def main():
+        loop = flight_loop()
+        flown = loop.start(ticks())
+        until = time.monotonic() + 0.4
+        while time.monotonic() < until:
+            pass
+        loop.close(wait=False)
+        return await flown
+
+    assert asyncio.run(main()) < 0.35
+
+
+@pytest.mark.parametrize("lost", ["loop", "thread"])
+def test_a_program_that_is_lost_has_its_flight_ended(lost):
+    ended = threading.Event()
+
+    async def end():
+        ended.set()
+
+    async def main():
+        flight_loop().on_lost(end)
+
+    loop = asyncio.new_event_loop()
+    if lost == "loop":
+        loop.run_until_complete(main())
+        assert not ended.wait(0.3), "a loop that stands still is not lost"
+        loop.close()
+    else:
+        thread = threading.Thread(target=loop.run_until_complete, args=(main(),))
+        thread.start()
+        thread.join()
+    assert ended.wait(5.0)
+    loop.close()
+
+
+def test_python_changes_threads_quickly_while_any_flight_runs():
+    before = sys.getswitchinterval()
+
+    async def main():
+        first, second = flight_loop(), flight_loop()
+        await first.start(where())
+        await second.start(where())
+        first.close(wait=True)
+        assert sys.getswitchinterval() == pytest.approx(SWITCH_INTERVAL, abs=2e-6)
+        second.close(wait=True)
+
+    asyncio.run(main())
+    assert sys.getswitchinterval() == pytest.approx(before)
+
+
+def test_news_do_not_queue_up_while_the_program_does_not_run():
+    queued, heard = [], []
+
+    class Blocked(SharedLoop):
+        def tell(self, callback, *args):
+            queued.append(callback)
+
+    async def main():
+        wake = _Wake(Blocked(), lambda: heard.append(1))
+        for _ in range(1000):
+            wake()
+        assert len(queued) == 1
+        queued.pop()()
+        wake()
+        assert (len(queued), len(heard)) == (1, 1)
+
+    asyncio.run(main())
