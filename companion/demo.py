@@ -1,6 +1,5 @@
 """The mock vehicle as a process of its own, for `companion demo`."""
 
-import socket
 import subprocess
 import sys
 import tempfile
@@ -18,6 +17,7 @@ from companion.mavlink.transport.endpoint import (
     TcpServer,
     parse_endpoint,
 )
+from companion.mavlink.transport.free_port import free_port
 
 _LOCAL_PORT_OFFSET = 40
 """Distance from the companion's UDP port to the mock vehicle's own port."""
@@ -54,28 +54,13 @@ def default_config() -> Path:
     return shipped("mock-px4.yaml")
 
 
-def free_port() -> int:
-    """A free UDP port for the companion whose matching port for the mock vehicle is free too."""
-    for _ in range(100):
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as first:
-            first.bind(("127.0.0.1", 0))
-            port: int = first.getsockname()[1]
-            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as second:
-                try:
-                    second.bind(("127.0.0.1", port + _LOCAL_PORT_OFFSET))
-                except (OSError, OverflowError):
-                    continue
-                return port
-    raise ConfigError("no free pair of UDP ports on this machine")
-
-
 def udp_wire() -> Wire:
     """A connection by free UDP ports.
 
     Raises:
-        ConfigError: there are no free ports.
+        LinkError: there are no free ports.
     """
-    port = free_port()
+    port = free_port(_LOCAL_PORT_OFFSET)
     return Wire(f"udpin://127.0.0.1:{port}", ("--port", str(port)))
 
 
@@ -87,12 +72,11 @@ def wire_like(endpoint: str) -> Iterator[Wire]:
 
     Raises:
         EndpointError: the endpoint's notation is wrong.
-        ConfigError: there are no free ports.
+        LinkError: there are no free ports.
     """
     match parse_endpoint(endpoint):
         case TcpClient() | TcpServer():
-            with socket.create_server(("127.0.0.1", 0)) as probe:
-                port: int = probe.getsockname()[1]
+            port = free_port()
             yield Wire(f"tcp://127.0.0.1:{port}", ("--endpoint", f"tcpin://127.0.0.1:{port}"))
         case SerialPort(_, baud):
             with tempfile.TemporaryDirectory(prefix="companion-") as folder:

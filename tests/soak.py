@@ -24,7 +24,8 @@ from typing import NamedTuple
 import psutil
 import yaml
 
-from tests.flight.sockets import free_port, mock_vehicle
+from companion.mavlink.transport.free_port import free_port
+from tests.flight.sockets import mock_vehicle
 from tests.soak_relay import Relay
 
 RADIUS_M, SPEED_M_S = 3.0, 2.0

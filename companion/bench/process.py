@@ -2,13 +2,13 @@
 
 import ctypes
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 from companion.mavlink.errors import LinkError
+from companion.mavlink.transport.free_port import free_port
 
 _PR_SET_PDEATHSIG = 1
 _libc = ctypes.CDLL(None)
@@ -16,13 +16,6 @@ _libc = ctypes.CDLL(None)
 
 class ContestantError(LinkError):
     """A program of the benchmark failed."""
-
-
-def free_port() -> int:
-    """A UDP port that is not in use."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as opened:
-        opened.bind(("127.0.0.1", 0))
-        return int(opened.getsockname()[1])
 
 
 def end_with_parent() -> None:

@@ -12,6 +12,15 @@ from companion.api.state import _Wake
 from companion.safety.actions import FlightEnded
 
 
+@pytest.fixture(autouse=True)
+def threads_ended():
+    """The thread of a flight whose end nobody awaited would run on into the next test."""
+    yield
+    for thread in threading.enumerate():
+        if thread.name == "flight":
+            thread.join(10.0)
+
+
 async def where():
     return threading.current_thread().name
 

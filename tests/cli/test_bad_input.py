@@ -6,7 +6,7 @@ import socket
 import pytest
 
 from companion.cli.main import main
-from tests.flight.sockets import free_port
+from companion.mavlink.transport.free_port import free_port
 
 
 def run(capsys, *arguments):

@@ -10,6 +10,7 @@ import yaml
 
 from companion import demo
 from companion.cli.main import main
+from companion.mavlink.transport.free_port import free_port
 from tests.flight.fly import LOOP_HZ, QUICK_MOCK, QUICK_PARAMETERS, merged
 
 
@@ -60,8 +61,8 @@ def test_the_demo_flies_shows_and_can_be_drawn(folder, capsys):
 
 
 def test_a_vehicle_that_cannot_start_is_told_with_its_own_words(folder, monkeypatch, capsys):
-    port = demo.free_port()
-    monkeypatch.setattr(demo, "free_port", lambda: port)
+    port = free_port(40)
+    monkeypatch.setattr(demo, "free_port", lambda *_: port)
     (folder / "log").mkdir()
     wire = demo.udp_wire()
     with demo.bundled_vehicle(demo.default_config(), wire, folder / "log" / "a", lockstep=True):

@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import common as dialect
 
 from companion.cli.main import main
 from companion.mavlink import lockstep
-from tests.flight.sockets import free_port
+from companion.mavlink.transport.free_port import free_port
 from tests.mavlink.fakes import frames_of
 from tests.preflight.vehicles import FAMILIES, config_file, configured, met, shipped_vehicle
 

@@ -17,8 +17,9 @@ from companion.cli import identify
 from companion.cli.main import main
 from companion.config.files import load
 from companion.identification import FitQuality, IdentifiedVehicle, RateResponse
+from companion.mavlink.transport.free_port import free_port
 from tests.flight.fly import QUICK_FLIGHT, merged
-from tests.flight.sockets import free_port, mock_vehicle
+from tests.flight.sockets import mock_vehicle
 
 RECORDINGS = Path(__file__).parents[1] / "mavlink" / "recordings"
 

@@ -7,8 +7,8 @@ import sys
 
 import pytest
 
-from companion.demo import free_port
 from companion.files.ascii_text import ascii_for
+from companion.mavlink.transport.free_port import free_port
 from tests.cli.test_demo import quick_demo
 
 ASCII = {"PYTHONIOENCODING": "ascii"}

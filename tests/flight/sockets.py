@@ -11,11 +11,11 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
-from companion.demo import free_port
 from companion.files import bounded_yaml
 from companion.flight.observer import Silent
 from companion.flight.session import Session
 from companion.mavlink import lockstep
+from companion.mavlink.transport.free_port import free_port
 from tests.flight import mock_start
 from tests.flight.fly import LOOP_HZ, merged, quick_flight, quick_vehicle
 

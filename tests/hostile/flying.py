@@ -1,7 +1,6 @@
 """Flies the companion against a hostile autopilot, and holds every flight to the same rules."""
 
 import asyncio
-import socket
 from dataclasses import replace
 from typing import NamedTuple
 from unittest.mock import patch
@@ -13,6 +12,7 @@ from companion.files.yaml_file import parse
 from companion.flight.observer import Silent
 from companion.flight.session import Session
 from companion.mavlink import lockstep
+from companion.mavlink.transport.free_port import free_port
 from companion.testing import environment
 from companion.vehicle import link
 from companion.vehicle.clock import VehicleClock
@@ -77,7 +77,7 @@ def fly(kind, script, folder, *, mode=None, **changes):
 
 def fly_over_sockets(kind, script, folder, *, mode=None, late_by=None, **changes):
     """One flight over UDP; `late_by` is called with the vehicle's wire before its first step."""
-    port = _free_port()
+    port = free_port()
     autopilot = HostileAutopilot(kind, script, mode)
     vehicle = SocketThread(autopilot, Wire(port, kind.dialect))
     if late_by is not None:
@@ -106,9 +106,3 @@ def _own_clock():
 def _flown(summary, autopilot, config):
     events = "; ".join(text for _, text in summary.events)
     return Flown(summary.result, events, autopilot, config)
-
-
-def _free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]

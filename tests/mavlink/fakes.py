@@ -186,9 +186,3 @@ class LockstepVehicle(threading.Thread):
                     self.log.append((now, name, bytes(message.get_msgbuf()[10:-2])))
                     replies += self._hear(message)
                     answered = answered or closes
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as opened:
-        opened.bind(("127.0.0.1", 0))
-        return int(opened.getsockname()[1])

@@ -11,8 +11,9 @@ from companion.mavlink import lockstep
 from companion.mavlink.errors import LinkTimeout
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.transport import udp
+from companion.mavlink.transport.free_port import free_port
 from companion.vehicle.link import Link
-from tests.mavlink.fakes import LockstepVehicle, attitude, free_port, heartbeat, until
+from tests.mavlink.fakes import LockstepVehicle, attitude, heartbeat, until
 
 LEVEL = BodyRates(0.0, 0.0, 0.0)
 ACK = dialect.MAVLink_command_ack_message

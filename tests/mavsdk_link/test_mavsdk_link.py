@@ -16,8 +16,9 @@ from companion.attitude import BodyRates
 from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import EndpointError, InvalidSetpoint, LinkError
 from companion.mavlink.settings import LinkSettings
+from companion.mavlink.transport.free_port import free_port
 from tests.flight.fly import QUICK_FLIGHT, merged
-from tests.flight.sockets import free_port, mock_vehicle
+from tests.flight.sockets import mock_vehicle
 
 pytest.importorskip("mavsdk")
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
+from companion.mavlink.transport import free_port as ports
 from sitl_mock.config.settings import GCS_PORT_OFFSET, PORT_OFFSET
 from sitl_mock.link.framing import Framer, decode
 
@@ -29,13 +30,8 @@ def is_free(port: int) -> bool:
 
 def free_port(count: int = 1, *offsets: int) -> int:
     """Return a UDP port that is free, with `count` successors, also at each offset above it."""
-    while True:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.bind((HOST, 0))
-            port = int(probe.getsockname()[1])
-        wanted = [port + i + offset for i in range(count) for offset in (0, PORT_OFFSET, *offsets)]
-        if max(wanted) < 65536 and all(map(is_free, wanted)):
-            return port
+    wanted = (i + offset for i in range(count) for offset in (0, PORT_OFFSET, *offsets))
+    return ports.free_port(*wanted)
 
 
 def free_gcs_port() -> int:

@@ -23,11 +23,6 @@ def pings(count):
     return [FRAMER.frame(dialect.MAVLink_ping_message(n, n, 0, 0)) for n in range(count)]
 
 
-def free_tcp_port():
-    with socket.create_server((HOST, 0)) as probe:
-        return probe.getsockname()[1]
-
-
 def soon(condition):
     deadline = time.monotonic() + 5.0
     while not (found := condition()):
@@ -38,7 +33,7 @@ def soon(condition):
 
 @pytest.fixture
 def tcp():
-    endpoint = TcpEndpoint(HOST, free_tcp_port())
+    endpoint = TcpEndpoint(HOST, free_port())
     endpoint.port = int(endpoint.where.rpartition(":")[2])
     yield endpoint
     endpoint.close()
@@ -146,7 +141,7 @@ def test_each_vehicle_has_an_endpoint_of_its_own():
 
 
 def test_nothing_boots_before_the_client_is_there():
-    port, control = free_tcp_port(), free_port()
+    port, control = free_port(), free_port()
     arguments = ("--endpoint", f"tcpin://{HOST}:{port}", "--gcs-port", 0, "--control-port", control)
     with mock_process(*arguments, "--speed", 20):
         soon(lambda: not is_free(control))

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from mavsdk_grpc import System
 
-from companion.demo import free_port
+from companion.mavlink.transport.free_port import free_port
 from tests.real.build import ROOT
 from tests.real.served import ARGUMENTS, DIRECT, OURS
 from tests.real.vehicle import TUNED, merged, real_vehicle

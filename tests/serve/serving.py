@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.mavlink.fakes import free_port
+from companion.mavlink.transport.free_port import free_port
 
 ROOT = Path(__file__).parents[2]
 

@@ -9,8 +9,9 @@ from pymavlink.dialects.v20 import common as dialect
 
 from companion.attitude import BodyRates
 from companion.mavlink.errors import EndpointError
+from companion.mavlink.transport.free_port import free_port
 from companion.serve.component import Component
-from tests.mavlink.fakes import attitude, frames_of, free_port, until
+from tests.mavlink.fakes import attitude, frames_of, until
 from tests.serve.clients import GROUND, SocketClient, heartbeat, network, tcp_client, udp_client
 
 TEXT = dialect.MAVLink_statustext_message

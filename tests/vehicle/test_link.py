@@ -18,12 +18,12 @@ from companion.mavlink.errors import (
     UnsupportedAutopilot,
 )
 from companion.mavlink.settings import LinkSettings
+from companion.mavlink.transport.free_port import free_port
 from companion.vehicle.link import Link
 from tests.mavlink.fakes import (
     FakeVehicle,
     attitude,
     frames_of,
-    free_port,
     heartbeat,
     linked,
     until,

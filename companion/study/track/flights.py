@@ -21,6 +21,7 @@ from companion.files import bounded_yaml
 from companion.flight.observer import Silent, decline_landing
 from companion.flight.session import Session
 from companion.mavlink import lockstep
+from companion.mavlink.transport.free_port import free_port
 from companion.study.outcome import Tick
 from companion.study.step import Floats
 from companion.study.track.tasks import Task
@@ -121,7 +122,7 @@ def fly(task: Task) -> Tracked:
     """
     with tempfile.TemporaryDirectory(prefix="companion-track-") as name:
         folder = Path(name)
-        wire, truth_port = demo.udp_wire(), demo.free_port()
+        wire, truth_port = demo.udp_wire(), free_port()
         shipped = load(demo.default_config())
         vehicle, course = folder / "vehicle.yaml", folder / "course.yaml"
         vehicle.write_text(bounded_yaml.dump({"mock": _vehicle(shipped, task, truth_port)}))

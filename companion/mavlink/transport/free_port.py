@@ -1,0 +1,41 @@
+"""A port of this computer that no program uses."""
+
+import itertools
+import os
+import socket
+
+from companion.mavlink.errors import LinkError
+
+_FIRST, _COUNT = 20_000, 12_000
+"""Below 32768, where Linux begins to give ports to sockets that ask for any."""
+
+_BLOCK = 50
+"""Processes with neighboring numbers start this many ports apart."""
+
+_asked = itertools.count()
+
+
+def free_port(*offsets: int) -> int:
+    """A UDP and TCP port that is free on 127.0.0.1, as is the port at each of the offsets above it.
+
+    Until the caller opens it, another program could. So a process is never given the same port
+    twice in a row, and two processes at the same time are given different ports.
+
+    Raises:
+        LinkError: all ports are in use.
+    """
+    for number in itertools.islice(_asked, _COUNT):
+        port = _FIRST + (os.getpid() * _BLOCK + number) % _COUNT
+        if all(_is_free(port + offset) for offset in (0, *offsets)):
+            return port
+    raise LinkError(f"all ports from {_FIRST} to {_FIRST + _COUNT - 1} are in use")
+
+
+def _is_free(port: int) -> bool:
+    for kind in (socket.SOCK_DGRAM, socket.SOCK_STREAM):
+        with socket.socket(socket.AF_INET, kind) as probe:
+            try:
+                probe.bind(("127.0.0.1", port))
+            except OSError:
+                return False
+    return True
