@@ -45,7 +45,10 @@ def cross_track(response: Response) -> Floats:
 
 
 def time_to(response: Response, share: float = 0.05) -> Floats:
-    """(headings,) time after which no more than `share` of the step is ever left, s, or inf."""
+    """(headings,) time from which the distance to the target stays within `share` of the step.
+
+    In s; inf if the response ends before.
+    """
     start, target = np.array(response.step.start), np.array(response.step.target)
     left = response.coefficients - target[:, None]
     beyond = np.hypot(left[:, 0], left[:, 1]) > share * np.hypot(*(target - start))

@@ -31,7 +31,7 @@ class AttitudeSetpoint(NamedTuple):
     """Attitude and/or rates with thrust, from SET_ATTITUDE_TARGET.
 
     ``q`` None = no attitude control; ``rates`` (rad/s, body FRD) None = none given, NaN = hold the
-    present one; ``yaw_rate`` is the feed-forward of attitude control; thrust 0..1, NaN = none.
+    present rate; ``yaw_rate`` is the feed-forward of attitude control; thrust 0..1, NaN = none.
     """
 
     q: Quaternion | None
@@ -60,7 +60,7 @@ Setpoint = AttitudeSetpoint | PositionSetpoint
 def position_setpoint(message: Message) -> PositionSetpoint | None:
     """Decode a SET_POSITION_TARGET_LOCAL_NED; None if it controls nothing.
 
-    Frames MAV_FRAME_LOCAL_NED, and MAV_FRAME_BODY_NED/_FRD for velocity and acceleration.
+    The frame must be MAV_FRAME_LOCAL_NED, or MAV_FRAME_BODY_NED/_FRD for velocity and acceleration.
     """
     mask = message.type_mask
     in_body = message.coordinate_frame in _BODY_FRAMES

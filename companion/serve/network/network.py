@@ -52,7 +52,7 @@ class Network:
     Attributes:
         routing: the rules and their counters; takes hooks for setpoints and for our component.
         uplink: the clients' frames on their way to the vehicle.
-        ports: the open endpoints, in their order.
+        ports: the open endpoints, in the order of `endpoints`.
         attitude: payload of the autopilot's newest ATTITUDE_QUATERNION; empty before the first.
         attitude_at: arrival of that payload, s on our clock.
         overflowed: frames of the vehicle that were dropped after a stall.
@@ -137,7 +137,7 @@ class Network:
             self.uplink.forget(client)
 
     def received(self, client: Client, frames: Iterable[Frame]) -> None:
-        """A client has sent frames. One that causes a fault is dropped and ends no session."""
+        """A client has sent frames. A frame that causes a fault is dropped; the session goes on."""
         for frame in frames:
             try:
                 self.routing.from_client(client, frame)
@@ -146,7 +146,7 @@ class Network:
         self._flush_later()
 
     def flush(self) -> None:
-        """Forward all queued frames, to the vehicle first."""
+        """Forward the queued frames; those for the vehicle first, as far as their rate permits."""
         self._soon = None
         if self._timer is not None:
             self._timer.cancel()
@@ -161,7 +161,7 @@ class Network:
             self._flush_later()
 
     def _note(self, frame: Frame) -> None:
-        """Queue a frame of the link; the next sample may already be waiting."""
+        """Queue a frame of the link; forwarding it now could delay the next attitude sample."""
         if len(self._noted) >= _MOST_NOTED:
             self.overflowed += 1
             return

@@ -22,7 +22,7 @@ _SMOOTHING = 0.5
 _LARGEST_ACCELERATION = 15.0
 """Largest estimated acceleration, m/s²; faster changes of the velocity are jumps."""
 _MOST_BRAKED = 2.0
-"""A motion begins with at most this multiple of its largest acceleration."""
+"""Largest acceleration with which a motion begins, as a multiple of its limit."""
 _STRAYED = 1.5
 """Largest distance of the reference ahead of the vehicle if no position is commanded, m."""
 _OUTRUN = 2.0
@@ -31,7 +31,7 @@ m/s.
 """
 
 _LEAST_SHARE = 0.25
-"""Share of the limits reserved for an axis across the direction of a motion."""
+"""Smallest share of the limits for an axis, also if the motion is across this axis."""
 
 
 class Continuity(NamedTuple):
@@ -50,8 +50,8 @@ class Axes:
     """Follows commands along one or more axes.
 
     Args:
-        limits: limits of motions after a jump, one for each axis; of a motion along several axes,
-            they limit the motion along its direction.
+        limits: limits of motions after a jump, one for each axis. A motion along several axes is
+            limited along its direction.
         continuity: largest jumps that are followed directly.
         timeout: time for which a stream that repeats the same moving state is continued, s.
     """
@@ -104,7 +104,7 @@ class Axes:
             demand: the command.
             now: present time, s.
             actual: motion of the vehicle; without a commanded position, the state stays close to
-                it.
+                the vehicle's.
 
         Raises:
             UnplannableError: no motion leads to it; the previous command stays in force.

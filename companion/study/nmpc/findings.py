@@ -119,7 +119,7 @@ def _dead_time(flown: Flights) -> Finding:
         "ours",
         "Predicting past the dead time helps every model.",
         min(gains.values()) > 1.0,
-        f"Error on the figure-eight without it, divided by the error with it: {ratios}.",
+        f"Error on the figure-eight without this prediction, divided by that with it: {ratios}.",
     )
 
 
