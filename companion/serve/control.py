@@ -191,7 +191,7 @@ class ServedControl:
 
     def _take_control_request(self, client: Client, frame: Frame) -> None:
         """Answer a command that requests control: by a takeover or a refusal."""
-        now, owner = self._clock(), self._programs.asking(client, frame)
+        now, owner = self._clock(), self._programs.sender_of(client, frame)
         refusal, standing = self.ownership.ask(owner, now), not self._link.state.flying
         if refusal is None and self._flight is not None and self._flight.ends:
             refusal = _ENDS

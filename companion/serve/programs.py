@@ -42,7 +42,7 @@ class Programs:
         """
         return self._newest[program]
 
-    def asking(self, client: Client, frame: Frame) -> Program:
+    def sender_of(self, client: Client, frame: Frame) -> Program:
         """The program that sent a command.
 
         A program may use different component ids for commands and setpoints. If no setpoint came

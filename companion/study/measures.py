@@ -14,6 +14,7 @@ FIT_COLUMNS = ("second order: dead time, ms", "second order: ω, rad/s", "second
 """Titles of `SecondOrderFit.cells`."""
 
 _THINNING = 10
+"""The second-order model is fitted to every tenth sample."""
 _REST = Coefficients(0.0, 0.0)
 _LOWEST = np.array([log(0.1), log(0.01), 0.0])
 _HIGHEST = np.array([log(1000.0), log(100.0), 0.5])

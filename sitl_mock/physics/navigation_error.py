@@ -48,8 +48,8 @@ class FilterState(NamedTuple):
     height_noise: float  # slow noise that the height follows, m
     at: float  # fusion time of the fix, s
     corrected: float  # time of the fix, s
-    way: complex  # true position, m
-    speed: complex  # true velocity, m/s
+    position: complex  # true position, m
+    velocity: complex  # true velocity, m/s
 
 
 class ErrorLaw(NamedTuple):
@@ -79,8 +79,8 @@ def propagated(law: ErrorLaw, state: FilterState, truth: TrailRow, elapsed: floa
     """
     place, speed, tilt = extrapolated(state.level.errors, elapsed)
     wrong = complex(law.scale, state.yaw)
-    before = state.speed
-    way = complex(truth[10], truth[11]) - state.way
+    before = state.velocity
+    way = complex(truth[10], truth[11]) - state.position
     return (
         place + wrong * (way - elapsed * before),
         speed + wrong * (complex(truth[0], truth[1]) - before),

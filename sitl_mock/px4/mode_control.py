@@ -23,6 +23,7 @@ TOUCHDOWN_THRUST_RATE = 0.4
 PRESSED_DOWN: Vector = (0.0, 0.0, 100.0)
 """Acceleration setpoint of PX4's own modes while disarmed, m/s^2 (recorded)."""
 _STILL = ActuatorCommand(False, 0.0, 0.0, 0.0, 0.0)
+"""Command while disarmed: the rotors stand still."""
 
 
 class Px4ModeControl:

@@ -7,7 +7,7 @@ from companion.attitude.representation import wrap_angle
 from companion.guidance.reference import Reference, Vector, VehicleMotion
 from companion.serve.setpoints.approach import AxisLimits, State, UnplannableError
 from companion.serve.setpoints.axes import Axes, Continuity
-from companion.serve.setpoints.carrier import Moving
+from companion.serve.setpoints.carrier import AxisMotion
 from companion.serve.setpoints.request import AxisDemand, MotionRequest
 
 _HORIZONTAL_CONTINUITY = Continuity(0.3, 0.6)
@@ -136,7 +136,7 @@ class CommandedMotion:
         return AxisDemand((heading,), None if rate is None else (rate,), None)
 
 
-def _by_axes(motion: VehicleMotion) -> tuple[Moving, Moving]:
+def _by_axes(motion: VehicleMotion) -> tuple[AxisMotion, AxisMotion]:
     """The motion, split into horizontal and vertical."""
     (x, y, z), (u, v, w) = motion
-    return Moving((x, y), (u, v)), Moving((z,), (w,))
+    return AxisMotion((x, y), (u, v)), AxisMotion((z,), (w,))

@@ -95,8 +95,8 @@ def _wrong_over_the_grid(grid: Grid) -> Finding:
     where = f", from {min(cell.dead_time_ms for cell in worse)} ms of dead time on" if worse else ""
     return Finding(
         "ours",
-        "model-following is the straightest there even with lag and dead time wrong by ±50 %, in"
-        " every combination.",
+        "Over the grid model-following is the straightest even with lag and dead time wrong by"
+        " ±50 %, in every combination.",
         not worse,
         f"Worse than the best other method in {len(worse)} of {len(grid)} cells{where}. The largest"
         f" ratio is at {last}, with {place.worst_error}: {place.worst:.2g} against"
