@@ -193,7 +193,7 @@ class CompiledPlant:
         )
 
     def before(self, steps: int) -> TrailRow:
-        """Row of the trail before a number of steps."""
+        """Row of the trail `steps` steps ago."""
         row: TrailRow = tuple(self._trail[(self._steps - steps) % len(self._trail)].tolist())
         return row
 

@@ -210,7 +210,7 @@ class Estimator:
 
         Args:
             time: now, s.
-            before: returns the true motion before a number of steps, less than `trail_length`.
+            before: returns the true motion k steps ago, for k below `trail_length`.
         """
         fused = time - self._behind * self.law.dt
         if self._filter is not None and self._filter.is_due(fused):

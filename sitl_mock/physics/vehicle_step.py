@@ -167,7 +167,7 @@ class Plant(Protocol):
         ...
 
     def before(self, steps: int) -> TrailRow:
-        """Row of the trail before a number of steps."""
+        """Row of the trail `steps` steps ago."""
         ...
 
     def estimate(
@@ -197,7 +197,7 @@ class PythonPlant:
         return outcome(self.state)
 
     def before(self, steps: int) -> TrailRow:
-        """Row of the trail before a number of steps."""
+        """Row of the trail `steps` steps ago."""
         return self._trail[(self.state.steps - steps) % len(self._trail)]
 
     def estimate(
