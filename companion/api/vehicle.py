@@ -186,10 +186,6 @@ class Vehicle:
         """Let the autopilot hold the vehicle; the flight ends."""
         await self._request(lambda _: (hand_back_phase(),), last=True)
 
-    async def leave(self) -> None:
-        """End the flight: hand back in the air; on the ground leave the vehicle as it is."""
-        await self._request(leaving, last=True)
-
     def _request(
         self, phases: Callable[[FlightContext], Sequence[Phase]], *, last: bool = False
     ) -> asyncio.Future[None]:
