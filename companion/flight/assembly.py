@@ -7,10 +7,10 @@ from functools import partial
 from pathlib import Path
 
 from companion.config import Config
+from companion.config.known_drag import KnownDrag
 from companion.control.ground_contact import GroundContact
 from companion.control.loops import make_loops
 from companion.control.outer_loop import predictive
-from companion.drag import Drag
 from companion.flight.changes import Changes
 from companion.flight.context import FlightContext
 from companion.flight.dead_time_watch import DeadTimeWatch, rate_loops
@@ -94,11 +94,11 @@ def _signing(key_file: Path | None) -> Signing | None:
     return Signing(key, file=StampFile(key))
 
 
-def _record_drag(record: FlightRecorder, clock: Callable[[], float], drag: Drag | None) -> None:
-    if drag is None:
+def _record_drag(record: FlightRecorder, clock: Callable[[], float], known: KnownDrag) -> None:
+    if known.drag is None:
         record.action(clock(), "drag_prior")
     else:
-        record.action(clock(), "drag_prior", drag=(drag.linear, drag.quadratic))
+        record.action(clock(), "drag_prior", drag=(known.drag.linear, known.drag.quadratic))
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,12 +196,12 @@ def assemble(
     flight = Flight(context, plan, watch, recorder, ask_landing)
     ladder.note = context.note = preflight.note = guidance_loop.record.note = flight.note
     rate_requester.note = flight.note
-    drag_is_set = config.guidance.drag is not None
     remembered = None if folder is None else folder.parent
-    memory = VehicleMemory(remembered, guidance_loop.estimate.drag, drag_is_set, flight.note)
-    preflight.on_identity = memory.load
+    memory = VehicleMemory(config, remembered, guidance_loop.estimate.drag, flight.note)
+    preflight.drag_of = memory.load
     _prepare_trajectories(context, flight.note)
     changes = changes or Changes(config)
+    memory.on_known = changes.on_drag
     if record is not None:
         record.metadata("configuration", flat(changes.flown.model_dump(mode="json")))
         record.begin(flight.began, description(changes.flown, plan, real_time=real_time))

@@ -72,6 +72,7 @@ def course_of(
         phases=tuple((at - began, name) for at, name in phases),
         takeoff=takeoff,
         early_end=early_end,
+        vehicle_uid=context.same_vehicle.uid,
         armed=state.armed,
         mode=state.mode,
         battery=(reporter.battery_at_takeoff, end),
