@@ -236,11 +236,6 @@ class Vehicle:
         return pose
 
 
-def leaving(context: FlightContext) -> Sequence[Phase]:
-    """The phases that end the flight: hand back in the air, none on the ground."""
-    return (hand_back_phase(),) if context.loop.offboard_active else ()
-
-
 async def beside_the_loop(function: Callable[[*Arguments], T], *arguments: *Arguments) -> T:
     """Call a slow function in a thread, so that samples are still answered.
 

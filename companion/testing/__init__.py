@@ -55,8 +55,8 @@ if TYPE_CHECKING:
     from companion.testing.flying import fly as fly
     from companion.testing.flying import run as run
     from companion.testing.flying import session as session
+    from companion.testing.setpoints import ReceivedSetpoint as ReceivedSetpoint
     from companion.testing.vehicle import MockVehicle as MockVehicle
-    from companion.testing.vehicle import ReceivedSetpoint as ReceivedSetpoint
     from companion.testing.virtual_loop import VirtualEventLoop as VirtualEventLoop
     from companion.testing.wire import open_wire as open_wire
     from sitl_mock.control_channel import Truth as Truth
@@ -65,7 +65,8 @@ _NAMES = {
     "companion.testing.client_programs": ("Program", "serving"),
     "companion.testing.conformance": ("check_guidance", "check_planner"),
     "companion.testing.flying": ("UnseenError", "connect", "environment", "fly", "run", "session"),
-    "companion.testing.vehicle": ("MockVehicle", "ReceivedSetpoint"),
+    "companion.testing.setpoints": ("ReceivedSetpoint",),
+    "companion.testing.vehicle": ("MockVehicle",),
     "companion.testing.virtual_loop": ("VirtualEventLoop",),
     "companion.testing.wire": ("open_wire",),
     "sitl_mock.control_channel": ("Truth",),

@@ -101,11 +101,11 @@ def test_a_doublets_rates_go_to_the_loop_and_hold_gives_it_a_target():
 def test_a_doublet_that_tilts_too_far_is_given_up_for_good():
     bench = Bench()
     bench.fly(IN_FIRST_DOUBLET, tilt=29.0)
-    assert bench.guidance_loop.given_up is None
+    assert bench.guidance_loop.hold.given_up is None
     command = bench.fly(IN_FIRST_DOUBLET + 0.02, tilt=31.0)
     assert command.body_rates is None
     assert (
-        bench.guidance_loop.given_up
+        bench.guidance_loop.hold.given_up
         == "identify was given up at 31° of tilt, more than limits.max_tilt_deg"
     )
     assert bench.guidance_loop.flown.pose.position_ned == pytest.approx(HERE, abs=0.01)
@@ -157,13 +157,13 @@ def test_an_old_attitude_does_not_replace_a_newer_one():
     old = AttitudeSample(0, reading.vehicle_time, bench.now, 0, tilted, still, *reading[1:])
     bench.guidance_loop.note_attitude(old)
     bench.guidance_loop.step()
-    assert bench.guidance_loop.given_up is None
+    assert bench.guidance_loop.hold.given_up is None
 
 
 def test_position_hold_may_tilt_as_it_must():
     bench = Bench()
     bench.fly(IN_HOLD, tilt=31.0)
-    assert bench.guidance_loop.given_up is None
+    assert bench.guidance_loop.hold.given_up is None
 
 
 @pytest.mark.parametrize(
