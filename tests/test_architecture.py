@@ -1,4 +1,4 @@
-"""docs/architecture.md tells the truth about files and functions, and no file or function is long."""
+"""docs/architecture.md tells the truth about files and functions, and none of them is long."""
 
 import ast
 import re
