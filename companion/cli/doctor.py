@@ -51,7 +51,7 @@ def doctor(options: argparse.Namespace) -> int:
     """Find what is wrong with a vehicle before it flies, and fix it if asked to."""
     config = _as_told(load(options.config), options)
     if options.yes and not options.fix:
-        raise ConfigError("--yes answers the questions of --fix, and goes with it alone")
+        raise ConfigError("--yes needs --fix: it answers the questions that --fix asks")
     if options.fix and not options.yes and not sys.stdin.isatty():
         raise ConfigError(
             "--fix asks before each change, and standard input is no terminal; add --yes"
@@ -65,7 +65,7 @@ def doctor(options: argparse.Namespace) -> int:
         else:
             code = run(doctor_run.restore(undo, options.undo))
     except KeyboardInterrupt:
-        doctor_run.say("Interrupted; every parameter that was set is told above.")
+        doctor_run.say("Interrupted; every parameter that was set is listed above.")
         return EXIT_FLIGHT
     if options.json:
         print(json.dumps(doctor_run.result, allow_nan=False))

@@ -157,9 +157,9 @@ def _how_to_include(out: Path, config: Path | None) -> str:
         place = Path(os.path.relpath(place, config.resolve().parent))
     return "\n".join(
         (
-            f"Written to {out}. Let your configuration say",
+            f"Written to {out}. Add this to your configuration, and remove `vehicle` and",
+            "`thrust.hover_thrust` from it, because its own keys would win:",
             f"  include: {place}",
-            "and neither `vehicle` nor `thrust.hover_thrust` itself: its own keys would win.",
         )
     )
 

@@ -203,7 +203,9 @@ class Changes:
             raise ChangeRefusedError(f"{by}: {fixed}; nothing has changed")
         keys = tuple(differences(self.wanted, wanted))
         if not keys:
-            raise ChangeRefusedError(f"{by}: the values are so already; nothing has changed")
+            raise ChangeRefusedError(
+                f"{by}: these are the present values already; nothing has changed"
+            )
         refusal = self._refuses(self.wanted, wanted)
         if refusal is not None:
             raise ChangeRefusedError(f"{by}: {refusal}; nothing has changed")

@@ -97,7 +97,8 @@ class _TiltMargin:
         if tilt < _LEAST_TILT:
             raise FlightEnded(
                 f"the vehicle hovers at a thrust of {hover:.2f}: limits.max_thrust "
-                f"{limits.max_thrust:g} leaves nothing to steer with"
+                f"{limits.max_thrust:g} leaves nothing to steer with; raise it, or make "
+                "the vehicle lighter"
             )
         if tilt < limits.max_tilt_deg and not self._reported:
             self._reported = True

@@ -149,7 +149,10 @@ class Flight:
                 raise FlightEnded(internal(error)) from error
             else:
                 return
-        raise FlightEnded(f"the vehicle changed {_ATTEMPTS} times before it was armed")
+        raise FlightEnded(
+            f"the vehicle was lost, restarted or replaced {_ATTEMPTS} times before arming; "
+            "check the link and its power"
+        )
 
     async def _fly(self, phase: Phase) -> None:
         """Run one phase; every failure becomes a `FlightEnded`."""

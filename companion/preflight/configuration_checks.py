@@ -25,7 +25,7 @@ def planner(config: Config, _: Evidence) -> Iterator[Finding]:
         yield Finding(
             Key.PLANNER,
             INEFFECTIVE,
-            f"planner.name is auto and comes to {name}, for `vehicle` tells no lag and dead time",
+            f"planner.name: auto chose {name}, because `vehicle` gives no lag and dead time",
             "acceleration overshoots, and steps leave their straight line",
             "run `companion identify`, and include what it writes",
             "companion study lag",
@@ -49,7 +49,7 @@ def dead_time(config: Config, evidence: Evidence) -> Iterator[Finding]:
             SAFE,
             f"no flight of this vehicle in {config.recording.directory} with this planner and gain "
             "measured the dead time yet",
-            fix="it can be measured in the air alone: the flight tells it at its end",
+            fix="it can only be measured in flight; every flight reports it at its end",
             source="summary.json",
         )
         return

@@ -39,11 +39,16 @@ def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
         if name in least and even < least[name][1]:
             key, limit = least[name]
             uneven = even < _REACHED * rate.achieved
-            bursts = f" (in bursts, {rate.achieved:.0f} Hz by count)" if uneven else ""
+            arrives = f"arrives at {even:.0f} Hz"
+            if uneven:
+                arrives = (
+                    f"arrives in bursts, {rate.achieved:.0f} Hz on average but with the gaps of "
+                    f"{even:.0f} Hz"
+                )
             yield Finding(
                 f"link.{key}",
                 UNSAFE,
-                f"{name} arrives at {even:.0f} Hz{bursts}, less than link.{key} = {limit:g}",
+                f"{name} {arrives}, less than link.{key} = {limit:g}",
                 "the flight would be controlled on data that is too old",
                 trouble[1] if trouble else "raise the link's speed",
                 source="counted",
@@ -101,7 +106,7 @@ def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
         f"{100.0 * share:.1f} % of the vehicle's messages are lost",
         "our setpoints are lost, too, and we see the pilot's mode changes late" if bad else "",
         "ask for lower rates, or use a faster or better link" if bad else "",
-        "gaps in the running numbers",
+        "gaps in MAVLink sequence numbers",
     )
     if link.damaged > _SOME_DAMAGED * max(1, link.frames):
         yield Finding(

@@ -70,7 +70,8 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
         Key.OFFBOARD_LOSS,
         CheckResult.INEFFECTIVE,
         carried,
-        f"{worst.time:.1f} s after control begins that can end {worst.breach}",
+        f"if that happens {worst.time:.1f} s after control begins, the vehicle can end "
+        f"{worst.breach}",
         f"{shorter}fly more slowly or with a lower limits.max_tilt_rate_deg_s, or farther from the "
         "fence and the ground",
         source,

@@ -154,7 +154,7 @@ def ground(_: Config, evidence: Evidence) -> Iterator[Finding]:
         yield Finding(
             Key.HOME,
             UNSAFE,
-            f"the vehicle stands {height:.1f} m above home by what it says",
+            f"the vehicle reports that it stands {height:.1f} m above home",
             "flight.takeoff_height_m and limits.fence_floor_m would be wrong",
             "have the autopilot set home here",
             source,

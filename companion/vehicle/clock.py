@@ -166,8 +166,8 @@ class VehicleClock:
         self._told_unknown = not self.age_known
         if self._told_unknown:
             self.on_event(
-                f"the age of telemetry is not known, because {self.delay.unknown.value}; only the "
-                "delay beyond that of the quickest sample counts as lateness"
+                f"the age of telemetry is not known, because {self.delay.unknown.value}; "
+                "samples are judged late only by comparison with the quickest one"
             )
         else:
             self.on_event("the age of telemetry is known by TIMESYNC")

@@ -88,7 +88,7 @@ class DelayUnknown(Enum):
     """Why the delay is not known."""
 
     UNANSWERED = "the autopilot does not answer TIMESYNC"
-    OTHER_CLOCK = "TIMESYNC counts another clock than time_boot_ms"
+    OTHER_CLOCK = "TIMESYNC uses a different clock than time_boot_ms"
 
 
 class _Exchange(NamedTuple):

@@ -11,6 +11,7 @@ AxisState = tuple[float, float]
 Axes = tuple[AxisState, AxisState, AxisState]
 """States of roll, pitch and yaw."""
 IDLE: Axes = ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
+"""State while the motors idle: no integral, no torque."""
 Delays = tuple[int, int, int]
 """Delays of roll, pitch and yaw, steps."""
 Ring = list[Vector]

@@ -235,7 +235,7 @@ def test_a_booting_vehicle_is_not_ready_and_nothing_of_it_is_unsafe(capsys, tmp_
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--yes",), "goes with it alone"),
+        (("--yes",), "needs --fix"),
         (("--fix",), "standard input is no terminal; add --yes"),
         (("--fix", "--undo", "x.yaml"), "not allowed with"),
         (("--undo", "/not/there.yaml"), "/not/there.yaml"),

@@ -208,7 +208,7 @@ def test_fitting_is_announced_and_the_include_is_found_from_anywhere(capsys, fit
     code, out, _ = run(capsys, "--log", "flight.tlog")
     assert code == 0
     assert out.startswith("fitting…")
-    assert f"include: {fitted}/vehicle.yaml and" in out
+    assert f"include: {fitted}/vehicle.yaml" in out
     code, out, err = run(capsys, "--log", "flight.tlog", "--force", "--json")
     assert json.loads(out)["result"] == "ok"
     assert err.startswith("fitting…")

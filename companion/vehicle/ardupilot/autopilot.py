@@ -76,7 +76,9 @@ class ArduPilot:
     rates_along_target = True
     body_yaw_is_relative = True
     offboard_loss_failsafe = OffboardLossFailsafe(
-        "GUID_TIMEOUT", "it levels and keeps its height, and does not hold", brakes=False
+        "GUID_TIMEOUT",
+        "it levels and keeps its height, but drifts: it does not hold its position",
+        brakes=False,
     )
     cannot_arm_in = frozenset[Role]()
     parameters = ARDUPILOT_PARAMETERS
