@@ -202,7 +202,7 @@ def test_a_command_tells_when_it_was_made_and_where_its_target_moves():
 def test_what_a_phase_tells_guidance():
     bench, elsewhere = Bench(), (0.0, 4.0, -5.0)
     guidance = bench.guidance_loop
-    assert (guidance.bound_to_hold, guidance.given_up) == (False, None)
+    assert (guidance.bound_to_hold, guidance.hold.given_up) == (False, None)
     source = guidance.flown.source
     bench.fly(IN_HOLD, elsewhere)
     assert guidance.motion_now().position_ned == pytest.approx(elsewhere, abs=0.01)
