@@ -230,7 +230,7 @@ def test_a_guidance_loop_knows_nothing_before_its_first_step():
     guidance = Bench(begun=False).guidance_loop
     with pytest.raises(RuntimeError, match="before any position came"):
         guidance.hold_here()
-    assert (guidance.motion, guidance.off_course, guidance.given_up) == (None, None, None)
+    assert (guidance.motion, guidance.off_course, guidance.hold.given_up) == (None, None, None)
     assert guidance.attitude() == (1.0, 0.0, 0.0, 0.0)
 
 

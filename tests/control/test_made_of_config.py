@@ -74,6 +74,7 @@ def retuned(values):
     guidance_loop = SimpleNamespace(
         maker=SimpleNamespace(guidance=guidance),
         estimate=SimpleNamespace(retune=lambda settings: seen.update(observer=settings)),
+        hold=SimpleNamespace(),
     )
     loop = SimpleNamespace(retune=lambda *law: seen.update(law=law))
     Retuning(loop, guidance_loop).apply(values)
