@@ -181,7 +181,7 @@ class Plant(Protocol):
         ...
 
     def before(self, steps: int) -> TrailRow:
-        """Row of the trail that many steps ago."""
+        """Row of the trail `steps` steps ago."""
         ...
 
     def estimate(
@@ -192,7 +192,7 @@ class Plant(Protocol):
 
     @staticmethod
     def make_noise(uniform: list[float], deviations: tuple[float, ...]) -> Sequence[float]:
-        """Normal numbers in place of uniform ones: see `sensors.white_noise`."""
+        """Turn uniform random numbers into normal ones: see `sensors.white_noise`."""
         ...
 
 
@@ -211,7 +211,7 @@ class PythonPlant:
         return outcome(self.state)
 
     def before(self, steps: int) -> TrailRow:
-        """Row of the trail that many steps ago."""
+        """Row of the trail `steps` steps ago."""
         return self._trail[(self.state.steps - steps) % len(self._trail)]
 
     def estimate(
@@ -222,6 +222,6 @@ class PythonPlant:
 
     @staticmethod
     def make_noise(uniform: list[float], deviations: tuple[float, ...]) -> Sequence[float]:
-        """Normal numbers in place of uniform ones: see `sensors.white_noise`."""
+        """Turn uniform random numbers into normal ones: see `sensors.white_noise`."""
         white_noise(uniform, deviations)
         return uniform
