@@ -251,4 +251,4 @@ def test_a_frame_that_cannot_be_is_refused(tmp_path, comment, words):
 def test_unused_columns_are_told(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("\n".join([f"{TABLE[0]},volts", *(f"{line},9" for line in TABLE[1:])]))
-    assert read(path).notes[1] == "a.csv: not used are the columns volts"
+    assert read(path).notes[1] == "a.csv: these columns are not used: volts"
