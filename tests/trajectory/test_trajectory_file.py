@@ -222,7 +222,9 @@ def test_the_frame_of_a_table_is_said_and_changes_where_it_leads(tmp_path):
     path.write_text("\n".join(TABLE))
     assumed, notes = read(path)
     (note,) = notes
-    assert note.startswith("a.csv is read in s, m and rad with x east, y north, z up (enu), for it")
+    assert note.startswith(
+        "a.csv is read in s, m and rad with x east, y north, z up (enu), because it"
+    )
     assert "# frame: ned" in note
     path.write_text("\n".join(["# frame: ned", *TABLE]))
     told, notes = read(path)
