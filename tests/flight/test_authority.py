@@ -275,7 +275,7 @@ def test_a_vehicle_that_does_not_say_it_stands_is_not_armed(tmp_path):
     with mock_vehicle(tmp_path, faults=[silent]) as mock:
         summary = fly(mock, tmp_path / "log", flight={"arming_timeout_s": 3.0})
         assert not mock.state()["armed"]
-    assert "stands on the ground" in summary.result
+    assert "does not report that the vehicle is on the ground" in summary.result
     assert ARM not in [command for _, command, _ in commands(summary)]
 
 
