@@ -34,11 +34,11 @@ class Wire(NamedTuple):
 
     Attributes:
         endpoint: our end, in the notation of `link.endpoint`.
-        vehicle: the vehicle's end, as arguments of its command line.
+        vehicle_arguments: the vehicle's end, as arguments of its command line.
     """
 
     endpoint: str
-    vehicle: tuple[str, ...]
+    vehicle_arguments: tuple[str, ...]
 
 
 class VehicleStoppedError(Exception):
@@ -115,7 +115,7 @@ def bundled_vehicle(config: Path, wire: Wire, log: Path, *, lockstep: bool) -> I
     command = [sys.executable, "-m", "sitl_mock", "--headless", "--config", str(config)]
     command += ["--end-with-stdin"]
     # No link for a ground station: its fixed port may be in use.
-    command += [*wire.vehicle, "--gcs-port", "0", *(["--lockstep"] if lockstep else [])]
+    command += [*wire.vehicle_arguments, "--gcs-port", "0", *(["--lockstep"] if lockstep else [])]
     with log.open("wb") as words:
         process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=words, stderr=words, start_new_session=True

@@ -14,6 +14,7 @@ from sitl_mock.personalities import PERSONALITIES
 
 RATE_LAGS_MS = {"px4": 5.0, "ardupilot": 11.0}
 SMOOTH = {"position_noise_m": 0.0, "velocity_noise_m_s": 0.0, "position_delay_ms": 0.0}
+"""Defaults of ``sensors`` with a navigation filter: no white noise or delay of the position."""
 
 
 class MockSettings(VehicleSettings):

@@ -27,7 +27,7 @@ def attitude_of(north: float, east: float, heading: float) -> Quaternion:
 def body_error(q: Quaternion, goal: Quaternion) -> Quaternion:
     """The shorter rotation from `q` to `goal` in the body frame, q⁻¹ ⊗ q_d with w ≥ 0.
 
-    An exact half turn is equally short both ways; q and −q are given the same way.
+    An exact half turn is equally short both ways; the same one is chosen for q and −q.
     """
     w, x, y, z = q
     w_d, x_d, y_d, z_d = goal

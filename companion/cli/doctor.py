@@ -15,7 +15,7 @@ from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
 from companion.cli.terminal import read_line
 from companion.config import Config
 from companion.config.files import assigned, changed, load
-from companion.config.known_drag import of_vehicle
+from companion.config.known_drag import KnownDrag, of_vehicle
 from companion.control.expected_response import expected_response, hold_sentence
 from companion.files.yaml_file import ConfigError
 from companion.files.yaml_file import load as load_yaml
@@ -27,7 +27,7 @@ from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import LinkLost, LinkTimeout
 from companion.mavlink.frame_filter import Notice
 from companion.preflight.all_checks import run_checks
-from companion.preflight.evidence import Evidence, Identity
+from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
 from companion.preflight.parameter_fixes import (
     Answer,
@@ -51,7 +51,7 @@ def doctor(options: argparse.Namespace) -> int:
     """Find what is wrong with a vehicle before it flies, and fix it if asked to."""
     config = _as_told(load(options.config), options)
     if options.yes and not options.fix:
-        raise ConfigError("--yes answers the questions of --fix, and goes with it alone")
+        raise ConfigError("--yes needs --fix: it answers the questions that --fix asks")
     if options.fix and not options.yes and not sys.stdin.isatty():
         raise ConfigError(
             "--fix asks before each change, and standard input is no terminal; add --yes"
@@ -65,7 +65,7 @@ def doctor(options: argparse.Namespace) -> int:
         else:
             code = run(doctor_run.restore(undo, options.undo))
     except KeyboardInterrupt:
-        doctor_run.say("Interrupted; every parameter that was set is told above.")
+        doctor_run.say("Interrupted; every parameter that was set is listed above.")
         return EXIT_FLIGHT
     if options.json:
         print(json.dumps(doctor_run.result, allow_nan=False))
@@ -80,12 +80,12 @@ def _as_told(config: Config, options: argparse.Namespace) -> Config:
     return changed(config, {"link": link}, "the command line")
 
 
-def _maneuvers(config: Config, identity: Identity) -> tuple[ManeuverSequence | None, list[Finding]]:
+def _maneuvers(config: Config, drag: KnownDrag) -> tuple[ManeuverSequence | None, list[Finding]]:
     """The maneuvers to be flown by this vehicle, or the reason why they cannot be."""
     try:
-        return configured_maneuvers(config, of_vehicle(config, identity.uid)), []
+        return configured_maneuvers(config, drag), []
     except ConfigError as error:
-        found = f"what is configured cannot be flown: {error}"
+        found = f"the configured maneuvers cannot be flown: {error}"
         because = "`companion fly` refuses it"
         return None, [Finding(Key.MANEUVERS, CheckResult.INEFFECTIVE, found, because)]
 
@@ -117,15 +117,16 @@ class _DoctorRun:
             self.say(f"Asking the vehicle on {config.link.endpoint} …")
             findings = await vehicle.wait_for_vehicle()
             if findings:
-                return self._told(findings)
+                return self._report(findings)
             try:
                 evidence = await vehicle.gather(wait)
             except (LinkTimeout, LinkLost) as error:
-                return self._told(vehicle.unanswered(error))
-            flown, refusals = _maneuvers(config, evidence.identity)
-            evidence = replace(evidence, maneuvers=flown)
+                return self._report(vehicle.unanswered(error))
+            drag = of_vehicle(config, config.recording.directory, evidence.identity.uid)
+            flown, refusals = _maneuvers(config, drag)
+            evidence = replace(evidence, maneuvers=flown, known_drag=drag)
             findings = [*refusals, *run_checks(config, evidence), *_response(config)]
-            code = self._told(findings)
+            code = self._report(findings)
             if fix:
                 code = await self._fix(vehicle, evidence, findings, unasked=unasked)
         return code
@@ -138,11 +139,11 @@ class _DoctorRun:
         async with open_session(self._config, self._link) as vehicle:
             findings = await vehicle.wait_for_vehicle()
             if findings:
-                return self._told(findings)
+                return self._report(findings)
             link = vehicle.link
             if not undo.meant_for(link, await identify(link)):
                 raise ConfigError(
-                    f"{path} is of another vehicle ({undo.autopilot}, system {undo.system}); "
+                    f"{path} belongs to another vehicle ({undo.autopilot}, system {undo.system}); "
                     "nothing was set"
                 )
             await restore(link, undo, self._note)
@@ -170,8 +171,8 @@ class _DoctorRun:
             if undo.path.exists():
                 self.say(f"Undo with: companion doctor --config FILE --undo {undo.path}")
         evidence = replace(evidence, survey=await survey(link, link.autopilot.parameters))
-        _, refusals = _maneuvers(config, evidence.identity)
-        code = self._told([*refusals, *run_checks(config, evidence), *_response(config)])
+        _, refusals = _maneuvers(config, evidence.known_drag)
+        code = self._report([*refusals, *run_checks(config, evidence), *_response(config)])
         self.result["changes"] = [outcome_as_dict(outcome) for outcome in self._outcomes]
         self.result["undo"] = str(undo.path) if undo.path.exists() else None
         return code
@@ -193,7 +194,7 @@ class _DoctorRun:
             if answer is not None:
                 return answer
 
-    def _told(self, findings: list[Finding]) -> int:
+    def _report(self, findings: list[Finding]) -> int:
         self._console.print(tables(self._config, findings))
         self.result = as_dict(self._config, findings)
         return EXIT_OK if self.result["result"] == "ok" else EXIT_FLIGHT

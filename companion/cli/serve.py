@@ -100,7 +100,7 @@ def _as_told(config: Config, options: argparse.Namespace) -> Config:
     clients = {"clients": options.client} if options.client else {}
     told = changed(told, {"link": link, "serve": clients}, "the command line")
     if told.link.lockstep:
-        raise ConfigError("link.lockstep: clients have no part in it; serve runs in real time")
+        raise ConfigError("link.lockstep: serve runs in real time; set link.lockstep: false")
     if told.serve.control:
         require("ruckig", "serve", "serve.control: true")
     for endpoint in told.serve.clients:

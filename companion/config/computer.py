@@ -51,7 +51,10 @@ class LinkConfig(Section):
             raise ValueError("backend: mavsdk can neither fly in lockstep nor sign; use direct")
         ours, theirs = self.source_component, self.target_component
         if (self.source_system, ours) == (self.target_system, theirs):
-            raise ValueError("source_system and source_component are the autopilot's own")
+            raise ValueError(
+                "source_system and source_component must not both equal target_system and "
+                "target_component; 191 is usual for source_component"
+            )
         return self
 
 

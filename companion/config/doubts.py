@@ -59,8 +59,8 @@ def _body_rate(config: Config) -> Iterator[Doubt]:
         yield Doubt(
             BODY_RATE,
             f"{BODY_RATE} is {allowed:g} °/s, and the planner may command {commanded:.0f} °/s",
-            "a flight that turns as commanded ends as if control were lost",
-            "raise it, or lower limits.max_tilt_rate_deg_s and max_yaw_rate_deg_s",
+            "a turn at the commanded rate trips the body-rate monitor, which ends the flight",
+            f"raise {BODY_RATE}, or lower limits.max_tilt_rate_deg_s and max_yaw_rate_deg_s",
         )
 
 

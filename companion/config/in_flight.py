@@ -47,7 +47,7 @@ def shown(value: Any) -> str:
 
 @cache
 def changeable() -> dict[tuple[str, str], str]:
-    """The keys that may change in flight: section -> key -> permitted change, in words."""
+    """The keys that may change in flight: (section, key) -> permitted change, in words."""
     return {
         (section, key): str(extra[IN_FLIGHT])
         for section, model in sections().items()

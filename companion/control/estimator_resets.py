@@ -110,7 +110,12 @@ class EstimatorResets:
         return q if self.turn == 0.0 else turned_about_vertical(q, -self.turn)
 
     def target(self, target: Target, turn: float) -> Target:
-        """A target in the frame without jumps; `turn` is `self.turn` when it was made, rad."""
+        """Convert a target from the estimator's frame to the frame without jumps.
+
+        Args:
+            target: The target in the estimator's frame.
+            turn: The value of `self.turn` when the target was made, rad.
+        """
         if turn == 0.0:
             return target
         north, east = rotated(target.north, target.east, -turn)

@@ -11,7 +11,7 @@ from companion.guidance.reference import Vector
 
 _LONGEST = 0.03
 """Largest lag that is believed, s; a low pass of 20 Hz has 11 ms."""
-_DOUBT = 0.01
+_HALF_BELIEVED = 0.01
 """Sum of squared changes of the rates, rad²/s², by which half of a lag is believed."""
 
 
@@ -28,7 +28,7 @@ class RateLag:
     def __init__(self) -> None:
         self.seconds = 0.0
         self._products = 0.0
-        self._squares = _DOUBT
+        self._squares = _HALF_BELIEVED
 
     def mean(self, before: Vector, now: Vector, dt: float) -> Vector:
         """The mean of the body rates between two samples `dt` s apart, rad/s."""

@@ -35,7 +35,7 @@ _WORDS = {
     "┃": "|",
     "█": "#",
 }
-"""ASCII for some characters. It has no quotation mark or backslash, so JSON stays valid."""
+"""ASCII for some characters, without double quotes and backslashes, so JSON stays valid."""
 
 
 def ascii_for(text: str) -> str:
@@ -59,7 +59,11 @@ def _one(char: str) -> str:
 
 
 def _ascii_name(char: str) -> str:
-    """The name of a Greek letter, a plus for a part of a frame, `?` if there is no ASCII form."""
+    """ASCII text for a character.
+
+    A Greek letter becomes its name, a box-drawing character `+`, a Braille pattern `*`, and
+    anything else `?`.
+    """
     name = unicodedata.name(char, "")
     if name.startswith("GREEK "):
         letter = name.split(" WITH ")[0].rsplit(" ", 1)[-1].lower()

@@ -68,8 +68,8 @@ async def _fly(context: FlightContext, source: Source, progress: Callable[[], st
     def over() -> bool:
         elapsed = now() - began
         context.rate_hz = (context.loop.record.setpoints - sent) / elapsed if elapsed > 0.0 else 0.0
-        if context.guidance_loop.given_up is not None:
-            raise FlightEnded(context.guidance_loop.given_up)
+        if context.guidance_loop.hold.given_up is not None:
+            raise FlightEnded(context.guidance_loop.hold.given_up)
         if source.failure is not None:
             raise FlightEnded(source.failure, Exit.HOLD)
         tilt_margin.check()
@@ -97,7 +97,8 @@ class _TiltMargin:
         if tilt < _LEAST_TILT:
             raise FlightEnded(
                 f"the vehicle hovers at a thrust of {hover:.2f}: limits.max_thrust "
-                f"{limits.max_thrust:g} leaves nothing to steer with"
+                f"{limits.max_thrust:g} leaves nothing to steer with; raise it, or make "
+                "the vehicle lighter"
             )
         if tilt < limits.max_tilt_deg and not self._reported:
             self._reported = True

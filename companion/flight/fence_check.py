@@ -101,13 +101,13 @@ class FenceCheck:
 
 def _text(found: Breach, time: float, brakes: bool) -> str:
     if found.by > 0.0:
-        goes = "could not stop inside the fence" if brakes else "leaves the fence"
-        goes = f"it {goes}, by up to {found.by:.1f} m"
+        goes = "braking would end" if brakes else "it goes"
+        goes = f"{goes} up to {found.by:.1f} m outside the fence"
     else:
         goes = "it would stop too near to the fence" if brakes else "it comes too near to the fence"
     return (
-        f"from {time:.2f} s on {goes} ({found.where}; {found.limit} is judged with {MARGIN:g} m "
-        "for the tracking error)"
+        f"from {time:.2f} s on {goes} ({found.where}; {found.limit} with a margin of "
+        f"{MARGIN:g} m for the tracking error)"
     )
 
 

@@ -114,7 +114,8 @@ def require_still_flyable(config: Config, flown: ManeuverSequence, drag: KnownDr
             require_flyable(config, part, drag)
         elif broken := violations(part.trajectory, envelope_of(config, drag)):
             raise ConfigError(
-                f"{part.name}: {broken[0]}; it is flown as it was when it began{drag.assumption}"
+                f"{part.name}: {broken[0]}; a trajectory is not slowed down again in flight, so "
+                f"choose a value that it fits{drag.assumption}"
             )
 
 

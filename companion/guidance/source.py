@@ -201,7 +201,10 @@ class CommandedSource:
 
 
 def _kind(reference: Reference) -> tuple[bool, bool, bool]:
-    """The kind of command. Accelerations of references of different kinds are not comparable."""
+    """The kind of command: whether the loop is closed, it may drift, and it holds height.
+
+    Accelerations of references of different kinds are not comparable.
+    """
     return reference.closed_loop, reference.drifting, reference.holds_height
 
 

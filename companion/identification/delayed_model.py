@@ -113,7 +113,9 @@ class SecondOrderFit:
 DEAD_TIMES = 0.0, LONGEST_DEAD_TIME - 0.01
 """Range in which the dead time is searched, s."""
 _RAMPS = 0.01, 0.5
-"""Shortest and longest time that the largest change of command takes at the slew limit, s."""
+"""Range in which the slew limit is searched: the time in s in which the response makes the record's
+largest change of command.
+"""
 _SAME_COMMAND = 0.005
 """Commands that differ by less than this share of their range count as the same."""
 

@@ -23,7 +23,7 @@ def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
             yield Finding(
                 Key.AGE,
                 INEFFECTIVE,
-                "TIMESYNC counts another clock than time_boot_ms",
+                "TIMESYNC uses a different clock than time_boot_ms",
                 "the age of a sample on arrival is unknown",
                 "let the autopilot itself answer TIMESYNC, not a router between",
                 "TIMESYNC",
@@ -35,7 +35,7 @@ def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
         UNSAFE if late else SAFE,
         f"attitude is {1e3 * seconds:.1f} ms old when it arrives"
         + (", longer than deadman.telemetry_stale_ms" if late else ""),
-        "it would not be answered" if late else "",
+        "such samples would not be answered" if late else "",
         "find what holds the messages up: a router, a full queue, a slow link" if late else "",
         "TIMESYNC and ATTITUDE_QUATERNION time_boot_ms",
     )
@@ -49,8 +49,9 @@ def clocks(config: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.CLOCK,
             UNSAFE,
             samples.clock_change,
-            "in flight it is handed back for that",
-            "find out why; then check again",
+            "in flight, the program would give control back",
+            "restart the autopilot and check again; if it recurs, look for a second source of "
+            "ATTITUDE_QUATERNION",
             source,
         )
     elif samples.not_newer:
@@ -59,8 +60,8 @@ def clocks(config: Config, evidence: Evidence) -> Iterator[Finding]:
             UNSAFE if samples.not_newer > _MANY_NOT_NEWER * samples.heard else INEFFECTIVE,
             f"{samples.not_newer} of {samples.heard} samples are stamped no later than the one "
             "before",
-            "they are not answered, and the flight is given up when that lasts",
-            "let one link alone bring attitude; start the autopilot anew if its clock stands still",
+            "they are not answered, and if that lasts, control is given back",
+            "send attitude over one link only; restart the autopilot if its clock stands still",
             source,
         )
     elif samples.heard >= _SAMPLES_NEEDED and samples.clock_rate is not None:
@@ -74,7 +75,7 @@ def _clock_rate(config: Config, evidence: Evidence, rate: float, source: str) ->
     unsure = evidence.samples.longest_pause / max(evidence.window, 1e-3)
     too_slow = behind > unsure
     apart = abs(rate - 1.0) > MOST_DRIFT
-    because = "limits in time, such as the deadman's, are not what they say"
+    because = "time limits, such as those of `deadman`, are longer or shorter than configured"
     if too_slow:
         because = (
             f"its samples count as older than deadman.telemetry_stale_ms after {stale_after:.0f} s"

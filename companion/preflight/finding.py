@@ -77,7 +77,7 @@ class Finding:
 
     Attributes:
         key: A `Key`, or a parameter's (newest) name.
-        verdict: Severity of the finding.
+        result: Severity of the finding.
         found: The fact, as a clause.
         because: The consequence, or the effect of the parameter; may be empty.
         fix: What the user should do; empty if there is nothing to do.

@@ -39,18 +39,23 @@ def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
         if name in least and even < least[name][1]:
             key, limit = least[name]
             uneven = even < _REACHED * rate.achieved
-            bursts = f" (in bursts, {rate.achieved:.0f} Hz by count)" if uneven else ""
+            arrives = f"arrives at {even:.0f} Hz"
+            if uneven:
+                arrives = (
+                    f"arrives in bursts, {rate.achieved:.0f} Hz on average but with the gaps of "
+                    f"{even:.0f} Hz"
+                )
             yield Finding(
                 f"link.{key}",
                 UNSAFE,
-                f"{name} arrives at {even:.0f} Hz{bursts}, less than link.{key} = {limit:g}",
+                f"{name} {arrives}, less than link.{key} = {limit:g}",
                 "the flight would be controlled on data that is too old",
                 trouble[1] if trouble else "raise the link's speed",
                 source="counted",
             )
         elif trouble is not None:
             found, fix = trouble
-            because = "whatever depends on it is delayed or does not work"
+            because = "what depends on this message is delayed or does not work"
             yield Finding(
                 f"{Key.STREAMS}.{name}", INEFFECTIVE, found, because, fix, source="counted"
             )
@@ -101,14 +106,14 @@ def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
         f"{100.0 * share:.1f} % of the vehicle's messages are lost",
         "our setpoints are lost, too, and we see the pilot's mode changes late" if bad else "",
         "ask for lower rates, or use a faster or better link" if bad else "",
-        "gaps in the running numbers",
+        "gaps in MAVLink sequence numbers",
     )
     if link.damaged > _SOME_DAMAGED * max(1, link.frames):
         yield Finding(
             Key.DAMAGE,
             INEFFECTIVE,
             f"{link.damaged} damaged messages in {evidence.window:g} s",
-            "they are rejected, and so lost",
+            "such messages are rejected, and so lost",
             "check the wiring, its ground and the baud rate",
             "checksums",
         )
@@ -117,8 +122,8 @@ def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.NOT_FINITE,
             INEFFECTIVE,
             f"{link.not_finite} messages with a number that is NaN or infinite",
-            "they are rejected, and so lost",
-            "let the estimator settle; if it goes on, do not fly",
+            "such messages are rejected, and so lost",
+            "let the estimator settle; if this goes on, do not fly",
             "decoded messages",
         )
     if link.reconnects:
@@ -209,7 +214,7 @@ def other_nodes(config: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.OUR_IDS,
             UNSAFE,
             f"somebody else speaks as system/component {ours[0]}/{ours[1]}, our own ids",
-            "answers meant for one are taken by the other, and it may steer, too",
+            "each takes answers meant for the other, and both may steer",
             "end the other program, or give each its own link.source_component",
             "frames heard",
         )

@@ -19,8 +19,8 @@ from companion.preflight.finding import Change, Finding
 from companion.vehicle.link import Link
 
 Word = Annotated[str, Field(max_length=100)]
-LARGEST = 3.5e38
-"""Largest magnitude of a parameter: PARAM_SET carries a 32-bit float."""
+LARGEST = 3.4028234e38
+"""Largest finite 32-bit float, which is what PARAM_SET carries."""
 
 
 class Undo(Section):

@@ -60,7 +60,7 @@ def _missing(rule: ParameterRule, autopilot: str) -> Finding:
         CheckResult.UNSAFE,
         f"the autopilot has no parameter {rule.name}, or did not send it",
         f"it is unknown {rule.meaning}",
-        f"fix the link; where it has none, this needs a newer version of {autopilot}",
+        f"fix the link; if the autopilot really has no such parameter, update {autopilot}",
         rule.source,
     )
 

@@ -44,7 +44,7 @@ def _table(
 ) -> RenderableType:
     table = Table(title=title, title_justify="left", title_style=style, expand=True)
     table.add_column("found", ratio=3)
-    table.add_column("what comes of it, and what to do", ratio=5)
+    table.add_column("consequence, and what to do", ratio=5)
     table.add_column("source", ratio=2, style="dim")
     for finding in findings:
         excepted = "excepted by flight.accept" if finding.key in accepted else ""

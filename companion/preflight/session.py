@@ -88,12 +88,14 @@ async def gather(
         resets=listener.resets,
         identity=identity,
         stage=stage,
-        words=tuple(
-            text.text
-            for text in link.state.texts
-            if text.severity <= _WARNING and text.time >= began
-        ),
+        words=_warnings(link, began),
     )
+
+
+def _warnings(link: Link, since: float) -> tuple[str, ...]:
+    """The autopilot's texts of severity warning or worse since this time, s."""
+    texts = (text for text in link.state.texts if text.severity <= _WARNING)
+    return tuple(text.text for text in texts if text.time >= since)
 
 
 async def identify(link: Link) -> Identity:
@@ -167,7 +169,7 @@ class PreflightSession:
         silence = Finding(
             Key.ANSWERS,
             CheckResult.NOT_CONNECTED,
-            f"the vehicle is heard and does not answer: {error}",
+            f"the vehicle is heard but does not answer: {error}",
             "what it would do with our setpoints is unknown",
             "check that our messages reach it: wiring, ports, a router, signing",
             "COMMAND_ACK",

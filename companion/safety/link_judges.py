@@ -29,7 +29,8 @@ def silence(limit: float, *, heard: bool) -> Judge:
 def _silence_cause(now: float, control: Control, limit: float) -> str:
     if control.stood_still > _STALL_SHARE * (now - control.answered):
         # Data that came during the stall were read late, so they only seem old.
-        return f"this computer stood still for {control.stood_still:.1f} s"
+        still = control.stood_still
+        return f"this program did not run for {still:.1f} s (computer overloaded or suspended)"
     if now - control.sampled > limit:
         return f"no attitude from the vehicle for {now - control.sampled:.1f} s"
     reason = control.reason

@@ -70,7 +70,7 @@ class SnapshotBuilder:
         self._link, self._loop, self._guidance_loop = link, loop, guidance_loop
         self._real_time = real_time
         self._counted: deque[_Counters] = deque()
-        self._frames = 0
+        self._frames_heard = 0
         self._heard_at = 0.0
         self._start: Vector | None = None
         self._origin: Place | None = None
@@ -116,8 +116,8 @@ class SnapshotBuilder:
     def listen(self, now: float) -> None:
         """Take the counters at `now`; `flight.watch` calls this 50 times a second."""
         stats, loop, record = self._link.stats, self._loop, self._loop.record
-        if stats.frames != self._frames:
-            self._frames, self._heard_at = stats.frames, now
+        if stats.frames != self._frames_heard:
+            self._frames_heard, self._heard_at = stats.frames, now
         loop.resets.on_counter(self._link.state.reset_counter, now)
         counted = self._counted
         late = max(0.0, now - counted[-1].now - _LATE) if counted else 0.0

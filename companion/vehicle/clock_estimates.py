@@ -88,7 +88,7 @@ class DelayUnknown(Enum):
     """Why the delay is not known."""
 
     UNANSWERED = "the autopilot does not answer TIMESYNC"
-    OTHER_CLOCK = "TIMESYNC counts another clock than time_boot_ms"
+    OTHER_CLOCK = "TIMESYNC uses a different clock than time_boot_ms"
 
 
 class _Exchange(NamedTuple):
@@ -173,7 +173,7 @@ class TelemetryDelay:
         self.expire(now)
 
     def forget_after(self, since: float) -> None:
-        """Forget the exchanges after event-loop time `since` (s), when the clock had changed."""
+        """Forget the exchanges after event-loop time `since` (s): the clock may have changed."""
         while self._exchanges and self._exchanges[-1].at > since:
             self._exchanges.pop()
         self.expire(since)

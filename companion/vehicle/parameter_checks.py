@@ -1,6 +1,6 @@
 """Checks of parameter values that both autopilots use."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from math import degrees
 
 from companion.vehicle.parameter_rules import Check, CheckResult, CompanionSettings, Problem, Values
@@ -24,6 +24,24 @@ def forbidden(result: CheckResult, bad: Mapping[float, str], set_to: float | Non
     def check(value: float, _: Values, __: CompanionSettings) -> Problem | None:
         because = bad.get(value)
         return None if because is None else Problem(result, because, set_to)
+
+    return check
+
+
+def action(good: Iterable[float], bad: Mapping[float, str], set_to: float) -> Check:
+    """A check of what the autopilot does in an emergency: only the actions in `good` are safe.
+
+    Args:
+        good: safe actions.
+        bad: unsafe actions, with the consequence of each. An action in neither is unsafe, too.
+        set_to: a safe action to set.
+    """
+    known = frozenset(good)
+
+    def check(value: float, _: Values, __: CompanionSettings) -> Problem | None:
+        if value in known:
+            return None
+        return Problem(UNSAFE, bad.get(value, "companion does not know this action"), set_to)
 
     return check
 
@@ -84,7 +102,7 @@ def shortest_hold(silence_limit: float) -> float:
 
 
 def rates_held(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
-    """Check how long the autopilot holds the last rates: longer than `silence_limit`, but short."""
+    """Check that the last rates are held longer than `silence_limit`, at most `LONGEST_HELD`."""
     right = shortest_hold(settings.silence_limit)
     if value <= settings.silence_limit:
         return Problem(
@@ -112,7 +130,7 @@ def hover_thrust(value: float, _: Values, settings: CompanionSettings) -> Proble
     return Problem(
         INEFFECTIVE,
         f"thrust.hover_thrust is {ours:g}, and one of the two is wrong, so the vehicle jumps or "
-        "sags at the takeover; hover it, read its thrust, and set both to that",
+        "sags at the takeover; hover the vehicle, read its thrust, and set both to that",
     )
 
 
@@ -145,7 +163,7 @@ def system_id(value: float, _: Values, settings: CompanionSettings) -> Problem |
         return None
     return Problem(
         INEFFECTIVE,
-        f"companion's heartbeat says system {settings.source_system}, so the autopilot takes "
+        f"companion's heartbeat has system id {settings.source_system}, so the autopilot takes "
         f"companion for another vehicle; set link.source_system to {value:g}",
     )
 
@@ -154,7 +172,7 @@ def acceleration_limit(unit: float, axis: str) -> Check:
     """A check that the planner assumes the autopilot's acceleration limit of an axis.
 
     Args:
-        unit: the parameter's unit in °/s².
+        unit: the parameter's unit as a multiple of 1 °/s².
         axis: `roll`, `pitch` or `yaw`.
     """
     prefix = "" if axis == "roll" else f"{axis}_"

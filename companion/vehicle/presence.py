@@ -127,38 +127,43 @@ async def synchronise(timesync: TimeSync, clock: VehicleClock) -> None:
 
 def no_heartbeat(settings: LinkSettings, stats: LinkStats, timeout_s: float) -> str:
     """The error message if no heartbeat of the autopilot came within `timeout_s`."""
-    start = f"no heartbeat from system {settings.target_system} within {timeout_s:g} s"
-    refused = _why_refused(start, stats)
+    opening = f"no heartbeat from system {settings.target_system} within {timeout_s:g} s"
+    refused = _why_refused(opening, stats)
     if refused is not None:
         return refused
     if stats.bad_crc:
-        return f"{start}, but {stats.bad_crc} damaged frames; is the baud rate right?"
-    return f"{start} on {settings.endpoint}; is the vehicle running and sending to this address?"
+        return f"{opening}, but {stats.bad_crc} damaged frames; is the baud rate right?"
+    return f"{opening} on {settings.endpoint}; is the vehicle running and sending to this address?"
 
 
 def no_beacon(settings: LinkSettings, stats: LinkStats) -> str:
     """The error message if no lockstep beacon came within `first_beacon_timeout_s`."""
-    start = f"no lockstep beacon within {settings.first_beacon_timeout_s:g} s"
-    why = f"{start} on {settings.endpoint}; is the vehicle running, and in lockstep?"
-    return _why_refused(start, stats) or why
+    opening = f"no lockstep beacon within {settings.first_beacon_timeout_s:g} s"
+    why = f"{opening} on {settings.endpoint}; is the vehicle running, and in lockstep?"
+    return _why_refused(opening, stats) or why
 
 
-def _why_refused(start: str, stats: LinkStats) -> str | None:
-    """The error message if frames arrived and all were refused; None if none arrived."""
+def _why_refused(opening: str, stats: LinkStats) -> str | None:
+    """The error message if frames were refused for their sender or signature; otherwise None.
+
+    Args:
+        opening: first clause of the message.
+        stats: counters of the link.
+    """
     if stats.unclaimed:
         return (
-            f"{start}, but {stats.unclaimed} other frames with its ids; a sender counts as the "
-            "vehicle only after a heartbeat of its autopilot"
+            f"{opening}, but {stats.unclaimed} other frames with the vehicle's ids; a sender "
+            "counts as the vehicle only after a heartbeat of its autopilot"
         )
     if stats.ignored_foreign:
         source = "/".join(map(str, min(stats.foreign_sources)))
         return (
-            f"{start}, but {stats.ignored_foreign} frames from others, such as system/component "
+            f"{opening}, but {stats.ignored_foreign} frames from others, such as system/component "
             f"{source}; is link.target_system right?"
         )
     if stats.bad_signature:
         return (
-            f"{start}, but {stats.bad_signature} frames that are not signed with the key in "
+            f"{opening}, but {stats.bad_signature} frames that are not signed with the key in "
             "link.signing_key_file, or whose time stamp is refused; give both sides the same key, "
             "and set this computer's clock"
         )

@@ -29,6 +29,8 @@ from sitl_mock.physics.vehicle import Vehicle
 
 @dataclass
 class _Entry:
+    """A fault, the vehicle time at which it was injected (us), and whether it acts or is over."""
+
     fault: LinkFault | VehicleFault
     given_us: int
     active: bool = False
@@ -130,7 +132,7 @@ class FaultEffects:
         self._commander = commander
         self._control = control
         self._links = links
-        self._stopped: list[StopTelemetry] = []
+        self._silences: list[StopTelemetry] = []
         self._nan: list[NanField] = []
         self._gps_lost_us = 0
         self._slipped_s = 0.0
@@ -149,14 +151,14 @@ class FaultEffects:
 
     def silenced(self, message_id: int) -> bool:
         """Whether a fault stops this message now."""
-        if not self._stopped:
+        if not self._silences:
             return False
         kind = dialect.mavlink_map.get(message_id) or ardupilotmega.mavlink_map[message_id]
         name = kind.msgname
-        return any(not fault.messages or name in fault.messages for fault in self._stopped)
+        return any(not fault.messages or name in fault.messages for fault in self._silences)
 
     def watch_position(self, converged_us: float, timeout_us: float) -> None:
-        """Set the position valid from ``converged_us`` to ``timeout_us`` after the loss of GPS."""
+        """Update ``position_valid``: true from ``converged_us`` until GPS is lost for a timeout."""
         state = self._state
         lost = not state.gps_ok and state.time_us - self._gps_lost_us >= timeout_us
         state.position_valid = state.time_us >= converged_us and not lost
@@ -164,7 +166,7 @@ class FaultEffects:
     def _begin(self, fault: VehicleFault) -> None:
         match fault:
             case StopTelemetry():
-                self._stopped.append(fault)
+                self._silences.append(fault)
             case FreezeClock():
                 self.clock_frozen = True
             case SlipClock():
@@ -189,7 +191,7 @@ class FaultEffects:
     def _end(self, fault: VehicleFault) -> None:
         match fault:
             case StopTelemetry():
-                self._stopped.remove(fault)
+                self._silences.remove(fault)
             case FreezeClock():
                 self.clock_frozen = False
             case NanField():

@@ -41,7 +41,7 @@ class EkfConfig(Section):
     """Heading error in a turn, from delayed fixes: minus this times the turn rate of the course.
     The heading follows it within seconds, the sooner the more the vehicle accelerates."""
     compass_error_deg: Finite = 0.0
-    """Heading error that the compass causes in a calm; an acceleration reduces it."""
+    """Heading error that the compass causes without acceleration; an acceleration reduces it."""
     yaw_rate_bias_deg_s: Finite = 0.0
     """Error of the yaw rate in telemetry."""
     acceleration_lead_ms: Finite = 0.0

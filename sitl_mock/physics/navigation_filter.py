@@ -16,8 +16,8 @@ from sitl_mock.physics.navigation_error import (
     TrackState,
     TrailRow,
     extrapolated,
+    pending_share,
     propagated,
-    settled_share,
 )
 
 _GRAVITY = 9.80665
@@ -26,13 +26,13 @@ _SAG_S = 2.0
 _SLOW = 0.5
 """Below this speed, m/s, the course does not correct the heading."""
 _COMPASS_S = 20.0
-"""Time constant with which the heading follows the compass in a calm, s."""
-_DOUBT = 0.1
-"""Doubt of the heading after a long calm: the rate, 1/s, at which the course of an acceleration of
-1 m/s^2 corrects it. The rate grows with the acceleration's square, the doubt falls as in a Kalman
-filter."""
-_DOUBT_GROWTH = 0.0002
-"""Growth of the doubt, per s."""
+"""Time constant with which the heading follows the compass without acceleration, s."""
+_UNCERTAINTY = 0.1
+"""Uncertainty of the heading after a long time without acceleration: the rate, 1/s, at which the
+course of an acceleration of 1 m/s^2 corrects it. The rate grows with the acceleration's square,
+the uncertainty falls as in a Kalman filter."""
+_UNCERTAINTY_GROWTH = 0.0002
+"""Growth of the uncertainty, per s."""
 
 
 class NavigationFilter:
@@ -60,7 +60,7 @@ class NavigationFilter:
             config.height_offset_m,
             config.predictor_ms,
         )
-        self._doubt = _DOUBT
+        self._uncertainty = _UNCERTAINTY
         self._random = Random(f"{seed}/navigation")
         self._height_random = Random(f"{seed}/height")
         yaw = self._random.gauss(0.0, radians(config.yaw_error_deg))
@@ -102,16 +102,16 @@ class NavigationFilter:
             noise[0] - (config.position_late_ms * late + law.lead) * speed,
             noise[1] - (config.velocity_late_ms * late + law.lead) * pull,
         )
-        settled = settled_share(law, state, now)
+        unsettled = pending_share(law, state, now)
         kick = _GRAVITY * radians(config.tilt_noise_deg) * sqrt(elapsed)
-        level = self._corrected_state(state.level, moved, seen, noise, settled, kick)
+        level = self._corrected_state(state.level, moved, seen, noise, unsettled, kick)
         share = config.vertical_share
         noise = self._next_noise(state.upright.noise, share)
         still = extrapolated(state.upright.errors, elapsed)
-        upright = self._corrected_state(state.upright, still, noise, noise, settled, share * kick)
+        upright = self._corrected_state(state.upright, still, noise, noise, unsettled, share * kick)
         aligned = self._next_alignment(speed, pull, elapsed)
         yaw = self._next_yaw_noise() + aligned
-        turned = settled * state.yaw_pending + yaw - state.yaw
+        turned = unsettled * state.yaw_pending + yaw - state.yaw
         height_noise = self._next_height_noise(elapsed)
         sag = config.height_sag_s4_per_m * abs(pull) ** 2 + height_noise
         lagged = 1.0 - exp(-elapsed / _SAG_S)
@@ -132,19 +132,19 @@ class NavigationFilter:
     def _next_alignment(self, speed: complex, pull: complex, elapsed: float) -> float:
         """Return the next heading error without its noise, rad.
 
-        In a calm the heading rests on the compass. A horizontal acceleration shows it better,
-        because the fixes measure the direction of the acceleration; in a turn late fixes are
-        behind this direction.
+        Without acceleration the heading rests on the compass. A horizontal acceleration shows it
+        better, because the fixes measure the direction of the acceleration; in a turn late fixes
+        are behind this direction.
         """
         config, slow = self._config, 1.0 / _COMPASS_S
         turn_rate = (speed.conjugate() * pull).imag / max(abs(speed) ** 2, _SLOW**2)
-        shown = self._doubt * abs(pull) ** 2
+        shown = self._uncertainty * abs(pull) ** 2
         rate = slow + shown
         wrong = slow * radians(config.compass_error_deg)
         wrong -= shown * turn_rate * config.turn_yaw_ms * 1e-3
         rest = wrong / rate
-        left = self._doubt / (1.0 + shown * elapsed)
-        self._doubt = min(left + _DOUBT_GROWTH * elapsed, _DOUBT)
+        left = self._uncertainty / (1.0 + shown * elapsed)
+        self._uncertainty = min(left + _UNCERTAINTY_GROWTH * elapsed, _UNCERTAINTY)
         return rest + (self.state.aligned - rest) * exp(-rate * elapsed)
 
     def _next_height_noise(self, elapsed: float) -> float:
@@ -169,7 +169,7 @@ class NavigationFilter:
         errors: Errors,
         seen: tuple[complex, complex],
         noise: tuple[complex, complex],
-        settled: float,
+        unsettled: float,
         kick: float,
     ) -> TrackState:
         """Return the errors corrected by a fix whose own errors are `seen`; add a random tilt."""
@@ -183,6 +183,6 @@ class NavigationFilter:
         pending = track.pending
         return TrackState(
             (place + first, speed + second, tilt + third + wander),
-            (settled * pending[0] + first, settled * pending[1] + second),
+            (unsettled * pending[0] + first, unsettled * pending[1] + second),
             noise,
         )

@@ -43,11 +43,11 @@ def config(tmp_path, text):
         ("deadman: {silence_limit_ms: 90}", "at least as long as the stale limits"),
         ("deadman: {target_stale_ms: 30}", "two periods of guidance.rate_hz"),
         ("link: {attitude_rate_hz: 40}", "min_attitude_rate_hz must not exceed"),
-        ("link: {source_component: 1}", "the autopilot's own"),
+        ("link: {source_component: 1}", "must not both equal"),
         ("thrust: {hover_thrust: 0.92}", "between limits.min_thrust and limits.max_thrust"),
         (
             "limits: {fence_floor_m: 4.8}",
-            "limits.fence_floor_m is judged with 0.5 m",
+            "limits.fence_floor_m with a margin of 0.5 m",
         ),
         (
             "safety: {fence_polygon_m: [[1, 1], [1, 5], [5, 1]]}",
@@ -55,7 +55,7 @@ def config(tmp_path, text):
         ),
         ("limits: {max_tilt_deg: 10}", "steps.coefficient must not exceed the sine"),
         ("circle: {radius_m: 1, speed_m_s: 4}", "° of tilt, limits.max_tilt_deg allows 35"),
-        ("circle: {radius_m: 26}", "circle: from 33.85 s on it leaves the fence, by up to 2.0 m"),
+        ("circle: {radius_m: 26}", "circle: from 33.85 s on it goes up to 2.0 m outside the fence"),
         (
             "flight: {maneuvers: [identify]}\nlimits: {max_tilt_deg: 15}",
             "identify.tilt_rate_deg_s × identify.tilt_duration_s must not exceed 0.75 × limits",

@@ -85,7 +85,7 @@ def test_it_finds_mends_and_undoes(capsys, tmp_path, family):
         (tmp_path / "other.yaml").write_text(yaml.safe_dump(undo))
         code, _, err = doctor(capsys, "--config", config, "--undo", tmp_path / "other.yaml")
         assert code == 2
-        assert "is of another vehicle (" in err
+        assert "belongs to another vehicle (" in err
         assert held(tmp_path, mock, wrong) == wrong
 
 
@@ -235,7 +235,7 @@ def test_a_booting_vehicle_is_not_ready_and_nothing_of_it_is_unsafe(capsys, tmp_
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--yes",), "goes with it alone"),
+        (("--yes",), "needs --fix"),
         (("--fix",), "standard input is no terminal; add --yes"),
         (("--fix", "--undo", "x.yaml"), "not allowed with"),
         (("--undo", "/not/there.yaml"), "/not/there.yaml"),

@@ -259,7 +259,7 @@ def test_frozen_in_flight_ardupilot_levels_and_thawed_it_is_asked_to_hold(tmp_pa
         process.send_signal(signal.SIGCONT)
         result = finish(process, 1)
         state = mock.state()
-    assert re.fullmatch(r"this computer stood still for \d+\.\d s", result["result"])
+    assert re.fullmatch(r"this program did not run for \d+\.\d s \(.+\)", result["result"])
     assert state["last_setpoint"] == frozen["last_setpoint"]
     assert (state["crashed"], state["mode"]) == (False, "BRAKE")
 

@@ -62,7 +62,7 @@ def smallest_fence(*parts):
 def test_a_line_that_ends_inside_but_could_not_stop_there_is_refused(tmp_path):
     """The demonstrated one: 7.5 m, rest to rest, inside 8 m."""
     told = refusal(following(tmp_path, LINE), limits={"fence_radius_m": 8.0})
-    assert "it could not stop inside the fence, by up to 0." in told
+    assert "braking would end up to 0." in told
     assert "limits.fence_radius_m" in told
     assert "fly it more slowly (--slow-down" in told
     slow = merged(following(tmp_path, LINE), {"flight": {"slow_down": True}})
@@ -75,10 +75,22 @@ def test_a_line_that_ends_inside_but_could_not_stop_there_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("text", "limits", "words"),
     [
-        ("line: {to_m: [10, 0, 0], speed_m_s: 2}", {}, "leaves the fence, by up to 2.0 m (10.0 m"),
-        ("circle: {radius_m: 5, speed_m_s: 2}", {}, "leaves the fence, by up to 2.0 m (10.0 m"),
-        ("line: {to_m: [0, 0, -9], speed_m_s: 1}", {"fence_ceiling_m": 7}, "2.0 m (9.0 m above"),
-        ("line: {to_m: [0, 0, 5], speed_m_s: 1}", {}, "1.0 m (0.0 m above home; limits.fence_fl"),
+        (
+            "line: {to_m: [10, 0, 0], speed_m_s: 2}",
+            {},
+            "goes up to 2.0 m outside the fence (10.0 m",
+        ),
+        ("circle: {radius_m: 5, speed_m_s: 2}", {}, "goes up to 2.0 m outside the fence (10.0 m"),
+        (
+            "line: {to_m: [0, 0, -9], speed_m_s: 1}",
+            {"fence_ceiling_m": 7},
+            "2.0 m outside the fence (9.0 m above",
+        ),
+        (
+            "line: {to_m: [0, 0, 5], speed_m_s: 1}",
+            {},
+            "1.0 m outside the fence (0.0 m above home; limits.fence_fl",
+        ),
     ],
 )
 @pytest.mark.parametrize("slow", [False, True])
@@ -98,8 +110,8 @@ NOTCHED = [[-2, -2], [9, -2], [9, 2], [4.1, 2], [4.0, -0.4], [3.9, 2], [-2, 2]]
     ("to", "corners", "words"),
     [
         ("[7, 0, 0]", SQUARE, None),
-        ("[8.4, 0, 0]", SQUARE, "could not stop inside"),
-        ("[12, 0, 0]", SQUARE, "leaves the fence"),
+        ("[8.4, 0, 0]", SQUARE, "braking would end"),
+        ("[12, 0, 0]", SQUARE, "outside the fence"),
         ("[7, 0, 0]", NOTCHED, "comes too near to the fence"),
     ],
 )
@@ -124,7 +136,9 @@ def test_a_polygon_on_the_map_is_judged_as_soon_as_the_place_is_known():
         safety={"fence_polygon_deg": corners},
     )
     parts = configured_maneuvers(round_).parts
-    with pytest.raises(ConfigError, match=r"leaves the fence, by .* safety\.fence_polygon_deg"):
+    with pytest.raises(
+        ConfigError, match=r"goes up to .* outside the fence .* safety\.fence_polygon_deg"
+    ):
         require_inside(round_, parts, here, before_connecting(round_))
     small = config_of(
         ROUND, circle={"radius_m": 3.0, "speed_m_s": 1.0}, safety={"fence_polygon_deg": corners}

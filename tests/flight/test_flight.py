@@ -75,7 +75,10 @@ def test_vehicles_that_change_all_the_time_are_given_up(monkeypatch):
             raise ChecksVoid("another vehicle answers")
 
     result, _ = Bench(monkeypatch, judge).fly()
-    assert result == "the vehicle changed 5 times before it was armed"
+    assert result == (
+        "the vehicle was lost, restarted or replaced 5 times before arming; check the link and its "
+        "power"
+    )
 
 
 @pytest.mark.parametrize("also_landing", [False, True])

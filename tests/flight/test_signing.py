@@ -39,7 +39,7 @@ def test_keys_that_do_not_fit(theirs, ours, said, keys, tmp_path):
     with (
         wire_like("tcp://127.0.0.1:1") as wire,
         mock_vehicle(
-            tmp_path, in_lockstep=False, endpoint=wire.vehicle[1], **signed(keys[theirs])
+            tmp_path, in_lockstep=False, endpoint=wire.vehicle_arguments[1], **signed(keys[theirs])
         ) as mock,
     ):
         mock.state()  # it is there

@@ -32,7 +32,7 @@ def joined(stack, folder, autopilot, wire, signs, **settings):
     ours = {"signing_key_file": str(key)} if signs else {}
     if WIRES[wire] is not None:
         made = stack.enter_context(wire_like(WIRES[wire]))
-        ours["endpoint"], theirs["endpoint"] = made.endpoint, made.vehicle[1]
+        ours["endpoint"], theirs["endpoint"] = made.endpoint, made.vehicle_arguments[1]
     settings |= theirs | {"autopilot": autopilot, "full_rate": True}
     mock = stack.enter_context(mock_vehicle(folder, **settings))
     mock.state()  # it is there

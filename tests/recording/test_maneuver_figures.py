@@ -5,7 +5,7 @@ from math import nan
 import numpy as np
 import pytest
 
-from companion.recording.measurements.maneuver_figures import BEGINNING, measure_maneuvers
+from companion.recording.measurements.maneuver_figures import LEFT_OUT, measure_maneuvers
 from companion.recording.trace import ManeuverMark
 
 RATE = 50
@@ -21,7 +21,7 @@ def hover(off):
     return lambda _: (0.0, 0.0, -5.0), lambda time: (off(time), 0.0, -5.1)
 
 
-HOVER = rows(100.0, 10.0, *hover(lambda time: 1.0 if time < BEGINNING else 0.03))
+HOVER = rows(100.0, 10.0, *hover(lambda time: 1.0 if time < LEFT_OUT else 0.03))
 STEPS = rows(
     110.0,
     8.0,
@@ -60,7 +60,7 @@ def test_the_swing_is_measured_but_in_open_loop():
 
 def test_the_beginning_is_left_out_and_told_apart():
     hover, *_ = measure_maneuvers(ALL, RATES, MARKS, 0.0)
-    assert hover.beginning == BEGINNING
+    assert hover.beginning == LEFT_OUT
     assert (hover.level_rms, hover.level_max) == pytest.approx((0.03, 0.03))
     assert hover.beginning_max == pytest.approx((1.0 + 0.1**2) ** 0.5)
 

@@ -63,7 +63,7 @@ def unanswered(reason, **changes):
 OLD = NOW - 0.6
 SILENT = {"answered": OLD, "sampled": OLD}
 WARN, HOLD, HAND_BACK, LAND, RELEASE = Action
-STOOD_STILL = "this computer stood still for 0.4 s"
+STOOD_STILL = "this program did not run for 0.4 s (computer overloaded or suspended)"
 BREACHES = [
     ("unheard", control(**SILENT, heard=OLD), RELEASE, 0.0, "no attitude from the vehicle for 0.6"),
     ("silence", control(**SILENT), HAND_BACK, 0.0, "no attitude"),

@@ -92,7 +92,7 @@ class Straight:
     direction: Vector
 
     def sampling(self) -> PhaseSampling:
-        """Checks at equal distances."""
+        """The phases at which to check it: at equal distances."""
         return PhaseSampling(PATH_STEP)
 
     def at(self, phase: float) -> CurvePoint:

@@ -155,7 +155,7 @@ def _moments(times: Floats) -> Floats:
 
 
 def _step(length: float) -> float:
-    """Largest time between two moments, s."""
+    """Largest step between the times at which a trajectory of `length` seconds is checked, s."""
     return max(_SHORTEST_STEP, length / _EVEN_MOMENTS)
 
 

@@ -13,7 +13,7 @@ from companion.recording.trace import ManeuverMark
 
 Floats = NDArray[np.float64]
 
-BEGINNING = 2.0
+LEFT_OUT = 2.0
 """Time left out at the beginning of a maneuver, s: the vehicle still comes from the previous
 maneuver, which is not an error of this one.
 """
@@ -130,7 +130,7 @@ def _beginning(rows: Floats) -> float:
     """Time that is left out at the beginning of a maneuver, s."""
     if _is_open_loop(rows):
         return 0.0
-    return min(BEGINNING, _MOST_OF_IT * float(rows[-1, 0] - rows[0, 0]))
+    return min(LEFT_OUT, _MOST_OF_IT * float(rows[-1, 0] - rows[0, 0]))
 
 
 def _swing(figures: ManeuverFigures, rates: Floats, begin: float, end: float) -> Swing:

@@ -14,7 +14,9 @@ _MOST_CLIENTS = 16
 _MOST_UNSENT = 65_536
 """Unsent bytes above which frames are dropped."""
 _KERNEL_BUFFER = 65_536
-"""Size of the kernel's buffer for a client, bytes. A client that was stopped first reads these."""
+"""Size of the kernel's buffer for a client, bytes. A client that paused must read these old bytes
+before it reads anything new.
+"""
 _RETRY = 2.0
 """Pause before connecting again, s."""
 _CONNECT_TIMEOUT = 5.0
