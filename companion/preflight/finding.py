@@ -1,6 +1,7 @@
 """Findings of the preflight checks: fact, consequence, remedy, and source.
 
-A finding about a parameter has its name as key. All other keys are listed here.
+A finding about a parameter has its name as key. A finding about a message rate has the key
+`link.streams.MESSAGE`, or that of the limit in section `link`. All other keys are listed here.
 """
 
 from dataclasses import dataclass
@@ -77,7 +78,7 @@ class Finding:
 
     Attributes:
         key: A `Key`, or a parameter's (newest) name.
-        verdict: Severity of the finding.
+        result: Severity of the finding.
         found: The fact, as a clause.
         because: The consequence, or the effect of the parameter; may be empty.
         fix: What the user should do; empty if there is nothing to do.

@@ -75,7 +75,7 @@ def _even_rate(name: str, rate: StreamRate, evidence: Evidence) -> float:
 
 
 def _trouble(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, str] | None:
-    """The fault of a message's rate, and its remedy."""
+    """The fault of a message's rate, and its remedy; None: no fault."""
     asked, achieved = rate.asked, rate.achieved
     if rate.refusal:
         return f"{name} is refused ({rate.refusal})", "a newer version of the autopilot may send it"
@@ -214,7 +214,7 @@ def other_nodes(config: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.OUR_IDS,
             UNSAFE,
             f"somebody else speaks as system/component {ours[0]}/{ours[1]}, our own ids",
-            "answers meant for one are taken by the other, and it may steer, too",
+            "each takes the answers meant for the other, and the other may steer the vehicle, too",
             "end the other program, or give each its own link.source_component",
             "frames heard",
         )

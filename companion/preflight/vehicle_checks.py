@@ -39,8 +39,8 @@ def battery(config: Config, state: VehicleState) -> Finding:
         return Finding(
             Key.BATTERY,
             UNSAFE,
-            "the vehicle does not tell its battery's state any more",
-            "an empty one would not be noticed",
+            "the vehicle does not report its battery's state any more",
+            "an empty battery would not be noticed",
             "find what holds the messages up",
             source,
         )
@@ -48,7 +48,7 @@ def battery(config: Config, state: VehicleState) -> Finding:
         return Finding(
             Key.BATTERY,
             INEFFECTIVE,
-            "the vehicle does not tell its battery's charge",
+            "the vehicle does not report its battery's charge",
             "limits.min_battery_percent protects nothing",
             "set the battery's capacity or number of cells in the autopilot",
             source,
@@ -73,7 +73,9 @@ def motors(_: Config, evidence: Evidence) -> Iterator[Finding]:
 def power(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """Whether the battery allows a flight; see `battery`."""
     if evidence.booting and evidence.state.battery is None:
-        yield Finding(Key.BATTERY, NOT_READY, "the vehicle has not told its battery's charge yet")
+        yield Finding(
+            Key.BATTERY, NOT_READY, "the vehicle has not reported its battery's charge yet"
+        )
     else:
         yield battery(config, evidence.state)
 
@@ -85,8 +87,8 @@ def failsafe(state: VehicleState) -> Iterator[Finding]:
             Key.FAILSAFE,
             UNSAFE,
             "the autopilot is in a failsafe",
-            "it does what that asks for, and not what we ask",
-            "clear its cause first",
+            "it follows the failsafe, not our commands",
+            "clear the failsafe's cause first",
             "HEARTBEAT system_status",
         )
 
@@ -108,7 +110,7 @@ def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
             NOT_READY,
             f"not ready {stage.value}, it lacks {missing}{unsent}",
             f"the autopilot says: {said}" if said else "",
-            "wait, or put right what it says, and try again",
+            "wait, or correct what the autopilot reports, and try again",
             "SYS_STATUS, estimator flags",
         )
         return
@@ -142,11 +144,11 @@ def ground(_: Config, evidence: Evidence) -> Iterator[Finding]:
         yield Finding(
             Key.LANDED,
             UNSAFE if state.flying else NOT_READY,
-            "the vehicle says that it flies"
+            "the vehicle reports that it flies"
             if state.flying
-            else "the autopilot does not say that it stands on the ground",
-            "nothing is begun in the air",
-            "land it first, or find why EXTENDED_SYS_STATE does not tell that it stands",
+            else "the autopilot does not report that the vehicle stands on the ground",
+            "this flight can only begin on the ground",
+            "land it first, or find out why EXTENDED_SYS_STATE does not report it as landed",
             "EXTENDED_SYS_STATE",
         )
     height = state.height
@@ -177,13 +179,13 @@ def attitude(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def estimator(_: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether the estimator resets while the vehicle stands still."""
+    """Whether the estimator was reset while we listened."""
     if evidence.resets:
         yield Finding(
             Key.ESTIMATOR_RESETS,
             INEFFECTIVE,
             f"the estimate jumped {evidence.resets} times in {evidence.window:g} s",
-            "in flight each jump moves the vehicle",
+            "in flight, repeated jumps raise the alarm of the monitor `resets`",
             "wait until compass and GPS have settled",
             "ODOMETRY reset_counter",
         )
@@ -199,7 +201,7 @@ def fence(config: Config, evidence: Evidence) -> Iterator[Finding]:
         yield Finding(
             Key.FENCE,
             NOT_READY if evidence.awaits_position else UNSAFE,
-            "the vehicle does not tell its latitude and longitude",
+            "the vehicle does not report its latitude and longitude",
             "whether it is inside safety.fence_polygon_deg cannot be known",
             "wait for GPS",
             source,
@@ -207,12 +209,13 @@ def fence(config: Config, evidence: Evidence) -> Iterator[Finding]:
         return
     here = Place(told.latitude_deg, told.longitude_deg)
     if inside(0.0, 0.0, local_polygon(corners, here)):
-        yield Finding(Key.FENCE, SAFE, "it stands inside its fence", source=source)
+        yield Finding(Key.FENCE, SAFE, "the vehicle stands inside its fence", source=source)
         return
     yield Finding(
         Key.FENCE,
         UNSAFE,
-        f"it stands at {here.latitude:.5f}, {here.longitude:.5f}, outside safety.fence_polygon_deg",
+        f"the vehicle stands at {here.latitude:.5f}, {here.longitude:.5f}, outside "
+        "safety.fence_polygon_deg",
         "the flight would end as soon as it began",
         "carry it inside, or correct the corners: each is [latitude, longitude]",
         source,
