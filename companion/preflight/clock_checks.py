@@ -35,7 +35,7 @@ def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
         UNSAFE if late else SAFE,
         f"attitude is {1e3 * seconds:.1f} ms old when it arrives"
         + (", longer than deadman.telemetry_stale_ms" if late else ""),
-        "it would not be answered" if late else "",
+        "such samples would not be answered" if late else "",
         "find what holds the messages up: a router, a full queue, a slow link" if late else "",
         "TIMESYNC and ATTITUDE_QUATERNION time_boot_ms",
     )
@@ -60,7 +60,7 @@ def clocks(config: Config, evidence: Evidence) -> Iterator[Finding]:
             UNSAFE if samples.not_newer > _MANY_NOT_NEWER * samples.heard else INEFFECTIVE,
             f"{samples.not_newer} of {samples.heard} samples are stamped no later than the one "
             "before",
-            "they are not answered, and the flight is given up when that lasts",
+            "they are not answered, and if that lasts, control is given back",
             "send attitude over one link only; restart the autopilot if its clock stands still",
             source,
         )

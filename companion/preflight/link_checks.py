@@ -55,7 +55,7 @@ def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
             )
         elif trouble is not None:
             found, fix = trouble
-            because = "whatever depends on it is delayed or does not work"
+            because = "what depends on this message is delayed or does not work"
             yield Finding(
                 f"{Key.STREAMS}.{name}", INEFFECTIVE, found, because, fix, source="counted"
             )
@@ -113,7 +113,7 @@ def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.DAMAGE,
             INEFFECTIVE,
             f"{link.damaged} damaged messages in {evidence.window:g} s",
-            "they are rejected, and so lost",
+            "such messages are rejected, and so lost",
             "check the wiring, its ground and the baud rate",
             "checksums",
         )
@@ -122,8 +122,8 @@ def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.NOT_FINITE,
             INEFFECTIVE,
             f"{link.not_finite} messages with a number that is NaN or infinite",
-            "they are rejected, and so lost",
-            "let the estimator settle; if it goes on, do not fly",
+            "such messages are rejected, and so lost",
+            "let the estimator settle; if this goes on, do not fly",
             "decoded messages",
         )
     if link.reconnects:
@@ -214,7 +214,7 @@ def other_nodes(config: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.OUR_IDS,
             UNSAFE,
             f"somebody else speaks as system/component {ours[0]}/{ours[1]}, our own ids",
-            "each takes the answers meant for the other, and the other may steer the vehicle, too",
+            "each takes answers meant for the other, and both may steer",
             "end the other program, or give each its own link.source_component",
             "frames heard",
         )

@@ -168,7 +168,7 @@ class PreflightSession:
         silence = Finding(
             Key.ANSWERS,
             CheckResult.NOT_CONNECTED,
-            f"the vehicle is heard and does not answer: {error}",
+            f"the vehicle is heard but does not answer: {error}",
             "what it would do with our setpoints is unknown",
             "check that our messages reach it: wiring, ports, a router, signing",
             "COMMAND_ACK",

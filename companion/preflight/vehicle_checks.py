@@ -39,7 +39,7 @@ def battery(config: Config, state: VehicleState) -> Finding:
         return Finding(
             Key.BATTERY,
             UNSAFE,
-            "the vehicle does not report its battery's state any more",
+            "the vehicle no longer reports its battery",
             "an empty battery would not be noticed",
             "find what holds the messages up",
             source,
@@ -87,8 +87,8 @@ def failsafe(state: VehicleState) -> Iterator[Finding]:
             Key.FAILSAFE,
             UNSAFE,
             "the autopilot is in a failsafe",
-            "it follows the failsafe, not our commands",
-            "clear the failsafe's cause first",
+            "the autopilot does what the failsafe asks for, not what we ask",
+            "clear its cause first",
             "HEARTBEAT system_status",
         )
 
@@ -129,7 +129,7 @@ def gps(_: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.GPS,
             UNSAFE,
             fault,
-            "the vehicle will not know where it is",
+            "the vehicle does not know where it is",
             "wait for its fix, in the open",
             source,
         )
@@ -146,9 +146,9 @@ def ground(_: Config, evidence: Evidence) -> Iterator[Finding]:
             UNSAFE if state.flying else NOT_READY,
             "the vehicle reports that it flies"
             if state.flying
-            else "the autopilot does not report that the vehicle stands on the ground",
-            "this flight can only begin on the ground",
-            "land it first, or find out why EXTENDED_SYS_STATE does not report it as landed",
+            else "the autopilot does not report that the vehicle is on the ground",
+            "a flight that arms begins on the ground only",
+            "land it first, or find why EXTENDED_SYS_STATE does not report the ground",
             "EXTENDED_SYS_STATE",
         )
     height = state.height
@@ -172,8 +172,8 @@ def attitude(_: Config, evidence: Evidence) -> Iterator[Finding]:
             UNSAFE if samples.unusable > _FEW_UNUSABLE * samples.heard else INEFFECTIVE,
             f"{samples.unusable} of {samples.heard} attitude samples are no unit quaternion of "
             "finite numbers",
-            "they are not answered, and the flight is given up when that lasts",
-            "wait until the estimator has settled; if it goes on, do not fly",
+            "they are not answered, and if that lasts, control is given back",
+            "wait until the estimator has settled; if this goes on, do not fly",
             "ATTITUDE_QUATERNION",
         )
 
