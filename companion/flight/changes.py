@@ -63,7 +63,7 @@ class Changes:
         on_change: called with `wanted` after each change.
 
     Args:
-        start: the configuration before the first change.
+        start: the configuration with which the flight begins.
     """
 
     def __init__(self, start: Config) -> None:
@@ -82,7 +82,7 @@ class Changes:
 
     @property
     def start(self) -> Config:
-        """The configuration before the first change."""
+        """The configuration with which the flight began."""
         return self._start
 
     @property

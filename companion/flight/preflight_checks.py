@@ -31,8 +31,7 @@ class PreflightChecks:
     always the newest. Rates and parameters are measured again if they are more than a second old.
 
     Attributes:
-        note: called once with each message about what does not block the flight: keys of warnings,
-            accepted unsafe findings, rates that were not granted.
+        note: called once with each finding that does not block the flight.
         on_identity: called with the vehicle's identity once it is known.
 
     Args:
