@@ -70,7 +70,7 @@ class Connections:
         self.companion.send([self._simulation.companion.sign(beacon)])
 
     def flush(self, beacon: bytes | None = None) -> None:
-        """Send the queued frames of every link; the beacon, if any, to the companion alone."""
+        """Send the queued frames of every link; the beacon, if any, only to the companion."""
         for endpoint, link in self._links.items():
             own = beacon if endpoint is self.companion else None
             endpoint.send(self._exchange.outgoing(link, own))

@@ -13,6 +13,7 @@ from sitl_mock.config.yaml_file import Document, explain_yaml, load_yaml
 from sitl_mock.personalities import PERSONALITIES
 
 SMOOTH = {"position_noise_m": 0.0, "velocity_noise_m_s": 0.0, "position_delay_ms": 0.0}
+"""Defaults of ``sensors`` with a navigation filter: no white noise or delay of the position."""
 
 
 class MockSettings(VehicleSettings):

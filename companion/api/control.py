@@ -14,7 +14,7 @@ from companion.guidance.reference import Reference, Vector
 from companion.guidance.source import CommandedSource
 from companion.safety.actions import FlightEnded
 
-_NOWHERE = (0.0, 0.0, 0.0)
+_ZERO = (0.0, 0.0, 0.0)
 _AXES = 3
 
 
@@ -102,7 +102,7 @@ class Control:
                 drifting=True,
                 holds_height=False,
             ),
-            _NOWHERE,
+            _ZERO,
         )
 
     def follow(self, reference: Reference, jerk_ned: Vector | None = None) -> None:
@@ -120,7 +120,7 @@ class Control:
             ValueError: a number is not finite or missing; the newest command still counts.
             FlightEnded: control has ended.
         """
-        _require_usable(reference, jerk_ned or _NOWHERE)
+        _require_usable(reference, jerk_ned or _ZERO)
         self._require_control()
         self._command = reference, self._loop.time(), jerk_ned
         if not self._posted:  # else the flight has yet to take a command, and takes this one
@@ -185,7 +185,7 @@ def _require_usable(reference: Reference, jerk_ned: Vector) -> None:
         reference.position_ned,
         reference.velocity_ned,
         reference.acceleration_ned,
-        reference.body_rates or _NOWHERE,
+        reference.body_rates or _ZERO,
         jerk_ned,
     ]
     if any(len(vector) != _AXES for vector in vectors):

@@ -53,7 +53,7 @@ class FlightLoop(Protocol):
         ...
 
     def on_lost(self, end: Callable[[], Awaitable[object]]) -> None:
-        """Register `end`: it ends the flight, and waits for that, when the program is lost."""
+        """Register `end`, which ends a flight that still runs after `close` or a lost program."""
         ...
 
     def close(self, *, wait: bool) -> None:
@@ -130,7 +130,7 @@ class OwnThread:
             self._program.call_soon_threadsafe(callback, *args)
 
     def on_lost(self, end: Callable[[], Awaitable[object]]) -> None:
-        """Register `end`, which ends the flight when the program is lost."""
+        """Register `end`, which is awaited in the flight's loop when this thread ends."""
         self._end = end
 
     def close(self, *, wait: bool) -> None:

@@ -20,7 +20,7 @@ class Request:
     """Phases that the program asked for.
 
     Attributes:
-        phases: function that returns the phases for an autopilot.
+        phases: function that returns the phases for the flight's context.
         last: whether the flight ends after these phases.
         done: set when the last of these phases has ended.
     """

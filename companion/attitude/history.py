@@ -60,7 +60,7 @@ Row = TypeVar("Row", PlannedTilt, PlannedYaw)
 
 
 class History(Generic[Row]):
-    """The plan over time, interpolated linearly between rows.
+    """The plan over time, interpolated linearly between rows; a row is the plan at one time.
 
     Args:
         span: the longest delay that is looked up, s.
@@ -152,7 +152,7 @@ class PlanHistory:
     def predicted_turn(self, planned_for: float, plan: PlannedTilt) -> Turn:
         """How far the heading has turned when `plan`, made for `planned_for` (s), takes effect.
 
-        It turns by the yaw rate, less the part of the yaw rate that keeps the heading still.
+        The heading turns by the yaw rate less the part of it that keeps the heading still.
         """
         if plan is not self._turning:  # both axes and the attitude target ask for the newest plan
             acts = planned_for + self._dead_time

@@ -94,7 +94,7 @@ def make_constants(
         gain: p, 1/s.
         yaw_gain: proportional gain on the heading error, 1/s.
         limits: bounds; see `Limits`.
-        recovery_angle: rad; must lie above `limits.max_tilt` and at most 80°.
+        recovery_angle: rad; at least `limits.max_tilt`, at most 80°.
 
     Raises:
         ValueError: a gain or the recovery angle is out of range.

@@ -78,7 +78,7 @@ def coefficients(q: Quaternion) -> Coefficients:
 def heading(q: Quaternion) -> float:
     """Tilt-yaw heading 2·atan2(z, b) in rad, in (−π, π].
 
-    It equals the Euler yaw that an autopilot reports only when level.
+    When level, it equals the Euler yaw that an autopilot reports; tilted, it differs in general.
 
     Raises:
         InvalidQuaternionError: `q` is not a unit quaternion; see `normalised`.

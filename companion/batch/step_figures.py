@@ -31,7 +31,7 @@ class StepFigures(NamedTuple):
         model_deviation_max: largest distance from the ideal model ċ = p·(c_d − c).
         cross_axis_max: largest distance from the line of a step.
         rate_rms: commanded √(ω_x² + ω_y²), rad/s, RMS.
-        rate_max: the largest of them, rad/s.
+        rate_max: the largest commanded √(ω_x² + ω_y²), rad/s.
         time_constant_north: of the first-order model that fits a_N best (least squares), s; NaN if
             there was no step north.
         time_constant_east: the same for a_E.
@@ -132,7 +132,7 @@ def _squares(path: Array, targets: Array, logarithms: Array, period: float, foun
 
     Args:
         path: (N, 2), coefficients.
-        targets: (N, 4).
+        targets: (N, 2), target coefficients.
         logarithms: (2,), of the time constants, in s.
         period: time between two samples, s.
         found: (2,), is filled.

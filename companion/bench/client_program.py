@@ -21,11 +21,11 @@ _AUTOPILOT = 1, 1
 
 
 class Counter:
-    """Counts the autopilot's frames on one socket, and the gaps in their running numbers.
+    """Counts the autopilot's frames on one socket, and the gaps in their sequence numbers.
 
     Attributes:
         received: frames.
-        lost: missing ones.
+        lost: frames missing by their sequence numbers.
     """
 
     def __init__(self) -> None:

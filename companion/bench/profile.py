@@ -36,7 +36,7 @@ PARTS = {
     ),
     "recording": ("companion/recording/",),
 }
-"""Parts, and the files of each; the first part that names a file has it."""
+"""Parts, and the files of each; a file belongs to the first part that names it."""
 _REST = "rest"
 _ROOTS = tuple(
     f"{Path(spec.origin).parents[1]}/"

@@ -117,7 +117,7 @@ class CampaignFile(Section):
         if NO_FAULT in self.faults:
             raise ValueError(f"faults: {NO_FAULT} is the name of a flight without a fault")
         for key in self.set.keys() & _swept_keys(self.sweep):
-            raise ValueError(f"`{key}` stands in set and in sweep; take one of them out")
+            raise ValueError(f"`{key}` stands in set and in sweep; remove one of them")
         if self.kind == "batch" and (self.faults or FAULT in self.sweep):
             raise ValueError("faults need kind: flights")
         return self

@@ -30,7 +30,7 @@ _LOCAL = {
     # Dask sets the variables of BLAS and OpenMP to 1 itself.
     "distributed.nanny.pre-spawn-environ.NUMBA_NUM_THREADS": "1",
 }
-"""Settings of a cluster on this computer. One thread a worker: flights are pure Python."""
+"""Dask settings of this process, and of the local cluster that it starts."""
 
 
 class ClusterError(Exception):
@@ -94,7 +94,7 @@ def connected(scheduler: str | None, workers: int | None) -> "Iterator[Client]":
             with _interrupts_blocked():
                 cluster = LocalCluster(
                     n_workers=workers or local_workers(),
-                    threads_per_worker=1,
+                    threads_per_worker=1,  # flights are pure Python
                     dashboard_address="127.0.0.1:0",
                     silence_logs=logging.CRITICAL + 1,
                 )

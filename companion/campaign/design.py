@@ -82,7 +82,10 @@ def seed_of(campaign_seed: int, number: int) -> int:
 
 
 def _shares(file: CampaignFile, dimensions: int) -> NDArray[np.float64]:
-    """(samples, dimensions): cumulative probability of each sample in each distribution."""
+    """(n, dimensions): cumulative probability of each sample in each distribution.
+
+    n is `samples`, but samples**dimensions for `sampling: grid`.
+    """
     count = file.samples
     if dimensions == 0:
         return np.empty((count, 0))

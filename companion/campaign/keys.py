@@ -42,7 +42,7 @@ def check_key(key: str, base: Config, where: str) -> None:
     """
     section, dot, name = key.partition(".")
     if not (dot and section and name):
-        raise ConfigError(f"{where}: `{key}`: write SECTION.KEY, as limits.max_tilt_deg")
+        raise ConfigError(f"{where}: `{key}`: write SECTION.KEY, such as limits.max_tilt_deg")
     if any(f"{key}.".startswith(f"{other}.") for other in _WITHOUT_EFFECT):
         raise ConfigError(
             f"{where}: `{key}` has no effect in a campaign, or the campaign sets it itself"

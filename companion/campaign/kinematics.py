@@ -38,7 +38,7 @@ MANEUVERS = ("steps", "corners")
 def run_cases(cases: Sequence[Case]) -> list[dict[str, Value]]:
     """Fly cases one after the other; returns a row for each, in order.
 
-    `ok` tells whether every step stayed as close to its line as a good flight must.
+    `ok`: whether every step stayed as close to its line as a good flight must.
 
     Raises:
         ConfigError: a case cannot be flown in a batch; see `check_case`.

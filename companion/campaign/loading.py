@@ -102,7 +102,7 @@ class _Reading:
         if isinstance(told, Mapping):
             config = validated(dict(told), f"{self._path}: config", Config)
             path = config.flight.trajectory
-            return config if path is None else _following(config, self._folder / path)
+            return config if path is None else _with_trajectory(config, self._folder / path)
         return load_config(self._folder / told)
 
     def _flyable(self, base: Config) -> Config:
@@ -121,7 +121,7 @@ class _Reading:
         armed = base.flight.model_copy(update={"arm": True})
         base = base.model_copy(update={"flight": armed})
         path = base.flight.trajectory
-        return base if path is None else _following(base, self._collect(path))
+        return base if path is None else _with_trajectory(base, self._collect(path))
 
     def _with_files(self, key: str, swept: Swept) -> Swept:
         """The swept key, with the paths of its trajectory files replaced by their copies."""
@@ -196,7 +196,7 @@ class _Reading:
                 )
 
 
-def _following(config: Config, path: Path) -> Config:
+def _with_trajectory(config: Config, path: Path) -> Config:
     flight = config.flight.model_copy(update={"trajectory": path})
     return config.model_copy(update={"flight": flight})
 

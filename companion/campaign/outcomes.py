@@ -83,7 +83,7 @@ def _level(estimated: Floats, true: Floats) -> dict[str, float]:
 
 
 def response(summary: Summary) -> dict[str, float]:
-    """The response to acceleration steps; NaN if there were none."""
+    """The response to acceleration steps; empty if there were none."""
     measured = summary.response()
     if measured is None:
         return {}

@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
     if path.is_dir():
         if out is not None:
             raise ConfigError(
-                "--out goes with a campaign's file: a folder is gone on with in place"
+                "--out needs a campaign's file; a folder is continued in place, so leave out --out"
             )
         path, out = path / folder.FILE, path
     campaign = load(path)
@@ -77,7 +77,7 @@ class _Run:
 
     Args:
         campaign: the campaign to run.
-        place: folder of the campaign, locked.
+        place: folder of the campaign.
         options: options of the command line.
         console: console for messages.
     """
@@ -199,7 +199,7 @@ class _Run:
 
 
 def progress_bar(console: Console, what: ProgressColumn, *more: ProgressColumn) -> Progress:
-    """A progress bar with numbers and times; `what` stands before it, the field `more` after it."""
+    """A progress bar with numbers and times; `what` stands before it, the columns `more` after."""
     return Progress(
         what,
         BarColumn(),

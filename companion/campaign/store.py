@@ -142,7 +142,7 @@ def write_unit(
         timing: figures that differ from run to run and are therefore stored apart from the results.
 
     Raises:
-        OSError: a file cannot be written; no part of the unit is left.
+        OSError: a file cannot be written; no results of the unit are left.
     """
     import pyarrow.parquet as pq  # noqa: PLC0415  an extra
 

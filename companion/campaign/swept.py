@@ -68,7 +68,7 @@ class Swept(Section):
                 raise ValueError("each number must be finite")
         shown = [column_value(value) for value in values or ()]
         if any(shown.index(value) != place for place, value in enumerate(shown)):
-            raise ValueError("a value stands there twice")
+            raise ValueError("a value is listed twice")
         return values
 
     @model_validator(mode="after")
@@ -87,7 +87,7 @@ class Swept(Section):
         if (self.range is None) != (self.count is None):
             raise ValueError("range and count go together, as in {range: [20, 40], count: 5}")
         if self.within is not None and self.normal is None:
-            raise ValueError("within goes with normal")
+            raise ValueError("within needs normal")
         if self.times_base and not self.is_number:
             raise ValueError("times_base needs numbers")
         return self

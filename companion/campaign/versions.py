@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 Versions = dict[str, str]
-"""Version by name: of the program, its source, Python, NumPy and numba."""
+"""Version by name: of the program, its source, Python, NumPy, numba and SciPy."""
 
 _PACKAGE = "mavlink-companion"
 _PACKAGES = ("numpy", "numba", "scipy")

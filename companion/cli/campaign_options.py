@@ -70,7 +70,7 @@ def add_cluster_options(command: argparse.ArgumentParser) -> None:
     )
     where.add_argument(
         "--workers",
-        type=_workers,
+        type=_count,
         metavar="NUMBER",
         help="worker processes on this computer (one for each core)",
     )
@@ -120,7 +120,7 @@ def _add_tune(kinds: Commands) -> None:
     )
     tune.add_argument(
         "--trials",
-        type=_workers,
+        type=_count,
         metavar="NUMBER",
         help="number of trials; replaces tune.trials of the file",
     )
@@ -128,7 +128,7 @@ def _add_tune(kinds: Commands) -> None:
     tune.set_defaults(run="campaign.tune")
 
 
-def _workers(text: str) -> int:
+def _count(text: str) -> int:
     if not text.isdecimal() or not 1 <= int(text) <= 1024:
         raise argparse.ArgumentTypeError("must be a whole number from 1 to 1024")
     return int(text)

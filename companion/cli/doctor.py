@@ -85,7 +85,7 @@ def _maneuvers(config: Config, identity: Identity) -> tuple[ManeuverSequence | N
     try:
         return configured_maneuvers(config, of_vehicle(config, identity.uid)), []
     except ConfigError as error:
-        found = f"what is configured cannot be flown: {error}"
+        found = f"the configured maneuvers cannot be flown: {error}"
         because = "`companion fly` refuses it"
         return None, [Finding(Key.MANEUVERS, CheckResult.INEFFECTIVE, found, because)]
 
@@ -117,15 +117,15 @@ class _DoctorRun:
             self.say(f"Asking the vehicle on {config.link.endpoint} …")
             findings = await vehicle.wait_for_vehicle()
             if findings:
-                return self._told(findings)
+                return self._report(findings)
             try:
                 evidence = await vehicle.gather(wait)
             except (LinkTimeout, LinkLost) as error:
-                return self._told(vehicle.unanswered(error))
+                return self._report(vehicle.unanswered(error))
             flown, refusals = _maneuvers(config, evidence.identity)
             evidence = replace(evidence, maneuvers=flown)
             findings = [*refusals, *run_checks(config, evidence), *_response(config)]
-            code = self._told(findings)
+            code = self._report(findings)
             if fix:
                 code = await self._fix(vehicle, evidence, findings, unasked=unasked)
         return code
@@ -138,11 +138,11 @@ class _DoctorRun:
         async with open_session(self._config, self._link) as vehicle:
             findings = await vehicle.wait_for_vehicle()
             if findings:
-                return self._told(findings)
+                return self._report(findings)
             link = vehicle.link
             if not undo.meant_for(link, await identify(link)):
                 raise ConfigError(
-                    f"{path} is of another vehicle ({undo.autopilot}, system {undo.system}); "
+                    f"{path} belongs to another vehicle ({undo.autopilot}, system {undo.system}); "
                     "nothing was set"
                 )
             await restore(link, undo, self._note)
@@ -171,7 +171,7 @@ class _DoctorRun:
                 self.say(f"Undo with: companion doctor --config FILE --undo {undo.path}")
         evidence = replace(evidence, survey=await survey(link, link.autopilot.parameters))
         _, refusals = _maneuvers(config, evidence.identity)
-        code = self._told([*refusals, *run_checks(config, evidence), *_response(config)])
+        code = self._report([*refusals, *run_checks(config, evidence), *_response(config)])
         self.result["changes"] = [outcome_as_dict(outcome) for outcome in self._outcomes]
         self.result["undo"] = str(undo.path) if undo.path.exists() else None
         return code
@@ -193,7 +193,7 @@ class _DoctorRun:
             if answer is not None:
                 return answer
 
-    def _told(self, findings: list[Finding]) -> int:
+    def _report(self, findings: list[Finding]) -> int:
         self._console.print(tables(self._config, findings))
         self.result = as_dict(self._config, findings)
         return EXIT_OK if self.result["result"] == "ok" else EXIT_FLIGHT

@@ -51,7 +51,7 @@ def identify(options: argparse.Namespace) -> int:
         _writable(options.out, options.force)  # not to be found out after the flight
     summary = _flown(options, console)
     if summary.result != "ok" or summary.log is None:
-        _tell(options, {"result": summary.result, "log": str(summary.log)})
+        _print_json(options, {"result": summary.result, "log": str(summary.log)})
         return EXIT_FLIGHT
     log = summary.log / _LOG
     out = options.out or log.with_name(_FRAGMENT)
@@ -64,7 +64,7 @@ def identify(options: argparse.Namespace) -> int:
         )
         with suppress(OSError):
             console.print(reason, soft_wrap=True)
-        _tell(options, {"result": reason, "log": str(log)})
+        _print_json(options, {"result": reason, "log": str(log)})
         return EXIT_FLIGHT
 
 
@@ -105,10 +105,10 @@ def _fitted(log: Path, out: Path, options: argparse.Namespace, console: FlightCo
     except BadFitError as error:
         with suppress(OSError):
             console.print(vehicle_table(vehicle, GRAVITY))
-            console.print("Not written, for the fit is bad:", style="bold red")
+            console.print("Not written, because the fit is bad:", style="bold red")
             for axis, reason in vehicle.faults().items():
                 console.print(f"  {axis}: {reason}", soft_wrap=True)
-        _tell(options, {"result": str(error), "log": str(log), **_figures(vehicle)})
+        _print_json(options, {"result": str(error), "log": str(log), **_figures(vehicle)})
         return EXIT_FLIGHT
     _replace(out, text)
     kept = {
@@ -121,7 +121,7 @@ def _fitted(log: Path, out: Path, options: argparse.Namespace, console: FlightCo
             console.print(f"{axis}: {words}", style="bold yellow", soft_wrap=True)
         console.print(_how_to_include(out, options.config), soft_wrap=True)
     result = {"result": "ok", "log": str(log), "file": str(out), "kept": kept}
-    _tell(options, {**result, **_figures(vehicle)})
+    _print_json(options, {**result, **_figures(vehicle)})
     return EXIT_OK
 
 
@@ -202,6 +202,6 @@ def _rounded(value: float, digits: int) -> float | None:
     return round(value, digits) if isfinite(value) else None
 
 
-def _tell(options: argparse.Namespace, result: dict[str, Any]) -> None:
+def _print_json(options: argparse.Namespace, result: dict[str, Any]) -> None:
     if options.json:
         print(json.dumps(result, allow_nan=False))

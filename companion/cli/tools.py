@@ -54,7 +54,7 @@ def study(options: argparse.Namespace) -> int:
     """Run the experiments of the paper and our own."""
     if options.json and not all(study.prints_json for study in registry.chosen(options.name)):
         raise ConfigError(
-            f"--json goes with study {registry.names_with_json()}; study {options.name} writes its"
+            f"--json needs study {registry.names_with_json()}; study {options.name} writes its"
             " tables as CSV"
         )
     registry.check_extras(options.name)

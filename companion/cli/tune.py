@@ -123,7 +123,7 @@ def _second_order(log: Path) -> dict[str, float]:
 
 
 def _flyable(config: Config) -> Config:
-    """The configuration with `planner.name` auto: `identify` flies with another planner."""
+    """The configuration with `planner.name` auto and only `hover`: `identify` flew others."""
     return changed(
         config, {"planner": {"name": "auto"}, "flight": {"maneuvers": ("hover",)}}, "tune"
     )

@@ -45,9 +45,9 @@ def load(path: Path) -> Config:
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
-    """A configuration file and all readable files that it includes, directly or through others.
+    """A configuration file and the files that it includes, directly or through others.
 
-    The last file of the result may be missing or faulty.
+    Reading stops at the first file that is missing or faulty, which is then the last of the result.
     """
     reading = _Reading(Contents({}, {}))
     with suppress(ConfigError):
@@ -69,7 +69,7 @@ def _read(path: Path) -> Contents:
 
 
 def _unmark_times(merged: Contents) -> None:
-    """Drop `vehicle.identified` if another file replaces a key that was identified."""
+    """Drop `vehicle.identified` if another key of `vehicle` comes from another file."""
     mark = merged.places.get(("vehicle", "identified"))
     times = {
         place.file
@@ -142,7 +142,7 @@ def _check_part(included: Path, part: dict[str, Any]) -> None:
         if section == "mock":
             raise ConfigError(
                 f"{included}: `mock` must not stand here: "
-                "the bundled vehicle reads its section from the main file alone"
+                "the mock vehicle reads only the main file; move the section there"
             )
         if section == _INCLUDE:
             continue

@@ -23,7 +23,7 @@ class KnownDrag(NamedTuple):
 
     Attributes:
         drag: configured or learned drag; None: unknown.
-        source: the file of a learned drag.
+        source: the file of a learned drag; None: configured or unknown.
     """
 
     drag: Drag | None = None
@@ -31,7 +31,7 @@ class KnownDrag(NamedTuple):
 
     @property
     def least(self) -> Drag:
-        """A drag that certainly brakes the vehicle; zero if it is unknown."""
+        """The drag that may be counted on to brake the vehicle; zero if it is unknown."""
         return self.drag or NO_DRAG
 
     @property

@@ -47,8 +47,8 @@ class Key(NamedTuple):
     Attributes:
         section: name of its section.
         name: name of the key.
-        value: its value as YAML.
-        default: its default as YAML.
+        value: its value, as plain data that YAML can hold.
+        default: its default, likewise.
         unit: unit such as °/s; empty without a unit.
         allowed: range or choices, in words; empty if the type allows any value.
         meaning: what the key means.

@@ -148,7 +148,7 @@ def _identify_contradictions(config: Config) -> list[tuple[bool, str]]:
     return [
         (
             len(config.flight.maneuvers) > 1,
-            "flight.maneuvers: identify is flown alone, with a calm hold between its doublets",
+            "flight.maneuvers: identify must be the only maneuver of a flight",
         ),
         (
             identify.tilt_rate_deg_s * identify.tilt_duration_s > _TILT_SHARE * limits.max_tilt_deg,

@@ -21,7 +21,7 @@ Metres = Annotated[float, Field(ge=-2000.0, le=2000.0)]
 Latitude = Annotated[float, Field(ge=-85.0, le=85.0)]
 Longitude = Annotated[float, Field(ge=-180.0, le=180.0)]
 MonitoredShare = Annotated[float, Field(ge=0.0, le=0.9)]
-"""A share below 1; a share of 1 could never be exceeded."""
+"""Limit of a share; a limit of 1 could never be exceeded."""
 MOST_CORNERS = 200
 
 

@@ -84,7 +84,7 @@ class CsvShape(Section):
         if None not in (self.frame, named) and self.frame != named:
             raise TrajectoryError(
                 f"{path}: its comment says frame: {named}, and csv.frame says {self.frame}; "
-                "take one of them out"
+                "remove one of them"
             )
         told = self.frame or named
         return None if told is None else Frame(told)
@@ -114,10 +114,10 @@ def _understood(path: Path, frame: Frame | None, unused: tuple[str, ...]) -> tup
     axes = f"{path.name} is read in s, m and rad with {_AXES[frame or Frame.ENU]}"
     if frame is None:
         axes += (
-            ", for it says no frame; to say another, write `# frame: ned` in its first line, or "
+            ", because it names no frame; to name one, write `# frame: ned` in its first line, or "
             "csv.frame in a YAML file that names it"
         )
-    left = f"{path.name}: not used are the columns {', '.join(unused[:_COLUMNS_TOLD])}"
+    left = f"{path.name}: these columns are not used: {', '.join(unused[:_COLUMNS_TOLD])}"
     return (axes, left) if unused else (axes,)
 
 

@@ -38,7 +38,7 @@ class AxisKeys(NamedTuple):
         return converted(self.acceleration_limit_deg_s2, radians)
 
     def but(self, *keys: float | None) -> "AxisKeys":
-        """A copy with the given keys that are not None; without the damping if a lag is given."""
+        """A copy with those `keys` that are not None; a given lag drops the copied damping."""
         mine = self if keys[0] is None else self._replace(damping=None)
         return AxisKeys(*(a if b is None else b for a, b in zip(mine, keys, strict=True)))
 

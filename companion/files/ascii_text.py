@@ -35,7 +35,7 @@ _WORDS = {
     "┃": "|",
     "█": "#",
 }
-"""ASCII for some characters. It has no quotation mark or backslash, so JSON stays valid."""
+"""ASCII for some characters, without double quotes and backslashes, so JSON stays valid."""
 
 
 def ascii_for(text: str) -> str:

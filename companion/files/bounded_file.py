@@ -33,7 +33,7 @@ def read_text(path: Path, most: int) -> str:
     except OSError as error:
         raise FileRefusedError(f"cannot read it: {error.strerror}") from error
     except ValueError as error:
-        raise FileRefusedError("no such file can be named") from error
+        raise FileRefusedError("the name holds a character that no file name may hold") from error
     if len(data) > most:
         raise FileRefusedError(f"larger than {most / 1e6:g} MB")
     try:

@@ -193,7 +193,7 @@ class _Builder:
         if self._nodes > MOST_NODES:
             raise YamlError(f"more than {MOST_NODES} keys and values", line)
         if event.tag is not None:
-            raise YamlError(f"tags such as {event.tag:.40} are not read", line)
+            raise YamlError(f"take out the tag {event.tag:.40}: tags are refused", line)
         if not self._open:
             self.root = value
             return

@@ -124,7 +124,7 @@ def _number_in(key: str, text: str) -> str:
     if unit == other:
         return f"write {meant:.4g}"
     if unit:
-        return f"write {number} without {unit!r}, for the key's name says the unit"
+        return f"write {number} without {unit!r}, because the key's name gives the unit"
     if "," in found[1]:
         return f"write {number}, with a point for decimals"
     return f"write {number} without quotation marks"

@@ -62,7 +62,7 @@ class Section(BaseModel):
     @field_validator("*", mode="before")
     @classmethod
     def _no_impossible_path(cls, value: Any, field: ValidationInfo) -> Any:
-        """Refuse empty paths, which would name the folder itself, and null characters."""
+        """Refuse paths that are empty (the folder itself), too long, or hold a null character."""
         kinds = kinds_in(cls.model_fields[str(field.field_name)].annotation)
         if isinstance(value, str) and Path in kinds and not is_path(value):
             raise ValueError("must name a file or a folder")

@@ -43,7 +43,7 @@ class Component:
         self._own = Address(settings.source_system, settings.source_component)
         self._sequence = self._text_id = 0
         self._began = time.monotonic()
-        self._told: dict[tuple[Client | None, str], float] = {}
+        self._sent_at: dict[tuple[Client | None, str], float] = {}
 
     async def run(self) -> None:
         """Send heartbeats until cancelled."""
@@ -90,20 +90,20 @@ class Component:
         self._network.send_to(client, self._frame(message, by))
 
     def on_own(self, client: Channel, frame: Frame) -> None:
-        """Answer a command addressed only to us; we carry out none."""
+        """Refuse a command addressed only to our component, which carries out no commands."""
         if frame.message_id in _COMMANDS and isinstance(client, Client):
             self.acknowledge(client, frame, dialect.MAV_RESULT_UNSUPPORTED, self._own)
 
     def _not_sent_lately(self, client: Client | None, text: str) -> bool:
         now = self._loop.time()
-        self._told = {who: at for who, at in self._told.items() if now - at < _SAME_TEXT}
-        if (client, text) in self._told:
+        self._sent_at = {who: at for who, at in self._sent_at.items() if now - at < _SAME_TEXT}
+        if (client, text) in self._sent_at:
             return False
-        self._told[client, text] = now
+        self._sent_at[client, text] = now
         return True
 
     def _pieces(self, text: str, severity: int) -> list[Message]:
-        """STATUSTEXTs of one text; pieces of a long text are numbered, and a short one ends it."""
+        """STATUSTEXTs of one text; a long text becomes numbered pieces, the last one short."""
         words = text.encode("ascii", "replace")[:_LONGEST_TEXT]
         if len(words) <= _TEXT_BYTES:
             return [dialect.MAVLink_statustext_message(severity, words)]

@@ -83,7 +83,7 @@ class ServedControl:
         return None if self._flight is None else self._flight.tracking_error
 
     def intercept(self, client: Client, frame: Frame) -> bool:
-        """Whether a client's frame is not forwarded: its setpoints and requests for control."""
+        """Whether a client's frame, such as a setpoint, is handled here and not forwarded."""
         if frame.message_id in SETPOINTS:
             self._take_setpoint(client, frame)
             return True
@@ -92,7 +92,7 @@ class ServedControl:
             return False
         for_autopilot = target_of(frame).component in (0, self._autopilot.component)
         if for_autopilot and asks_for_control(frame, autopilot):
-            self._take_wish(client, frame)
+            self._take_control_request(client, frame)
             return True
         if self._flight is not None and steers_in_our_mode(frame, autopilot):
             self._component.answer(
@@ -180,7 +180,7 @@ class ServedControl:
         if state.mode is None or Role.READY not in autopilot.roles(state.mode):
             return False
         if not state.flying:
-            self._component.answer(owner.client, "setpoints are flown in the air: take off first")
+            self._component.answer(owner.client, "take off first: only then setpoints are flown")
             return False
         if not self.ownership.streams(owner, now):
             return False
@@ -189,9 +189,9 @@ class ServedControl:
             self._component.answer(owner.client, f"control refused: {refusal}")
         return refusal is None
 
-    def _take_wish(self, client: Client, frame: Frame) -> None:
+    def _take_control_request(self, client: Client, frame: Frame) -> None:
         """Answer a command that requests control: by a takeover or a refusal."""
-        now, owner = self._clock(), self._programs.asking(client, frame)
+        now, owner = self._clock(), self._programs.sender_of(client, frame)
         refusal, standing = self.ownership.ask(owner, now), not self._link.state.flying
         if refusal is None and self._flight is not None and self._flight.ends:
             refusal = _ENDS

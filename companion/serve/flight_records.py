@@ -23,7 +23,7 @@ Result = TypeVar("Result")
 class FlightRecords:
     """Makes the record of each flight; between flights nothing is recorded.
 
-    The link stays open between flights and has one tap, which is this object.
+    The link stays open between flights and passes all its frames to this object, its tap.
 
     Args:
         directory: folder for the flights' folders; None: nothing is recorded.
@@ -31,7 +31,7 @@ class FlightRecords:
         note: called with events as sentences.
 
     Attributes:
-        grants: real-time settings that were requested.
+        grants: real-time settings that were requested, and which of them were refused.
         on_recorded: called with the folder of each flight when its record is complete; returns a
             sentence for the clients, or None. It runs in a thread, except on a virtual clock.
     """
@@ -89,9 +89,9 @@ class FlightRecords:
         await self._beside(record.save, summary)
         if record.folder is not None:
             self._note(f"recorded in {record.folder}")
-            told = await self._beside(self.on_recorded, record.folder)
-            if told is not None:
-                self._note(told)
+            text = await self._beside(self.on_recorded, record.folder)
+            if text is not None:
+                self._note(text)
 
     async def discard(self, record: FlightFiles) -> None:
         """Remove the record of a failed takeover, in which nothing was flown."""

@@ -44,7 +44,7 @@ class KeptFence:
         breach = self._fence.breach((north, east, down), self._state.height, self.centre.place)
         if breach is None:
             return None
-        return f"outside the fence of the first flight: {breach}; fly it back, or land and disarm"
+        return f"outside the fence of the first flight: {breach}; fly back, or land and disarm"
 
     def _forget_if_disarmed(self, _: object) -> None:
         if self._state.armed is False:

@@ -24,8 +24,8 @@ _LEAVING = MAV_CMD_DO_SET_MODE, MAV_CMD_NAV_LAND, MAV_CMD_NAV_RETURN_TO_LAUNCH
 _CUSTOM_MODE = 1
 _MAIN_MODE = 0xFF << 16
 """PX4's main mode within a custom mode. OFFBOARD has no sub mode, and PX4 ignores one."""
-_MESSAGES = frozenset({_COMMAND_LONG, _COMMAND_INT, _SET_MODE, _REQUEST_DATA_STREAM})
-"""All messages that this module examines."""
+_MODE_MESSAGES = frozenset({_COMMAND_LONG, _COMMAND_INT, _SET_MODE})
+"""Messages that can command a mode."""
 
 
 def asks_for_control(frame: Frame, autopilot: Autopilot) -> bool:
@@ -34,14 +34,15 @@ def asks_for_control(frame: Frame, autopilot: Autopilot) -> bool:
     This applies only to a mode entered by a command (PX4's OFFBOARD). Every form that PX4 accepts
     counts: it reads modes as bytes, and also accepts NAV_GUIDED_ENABLE.
     """
-    if frame.message_id not in _MESSAGES or autopilot.control_entry is not ControlEntry.BY_COMMAND:
+    if (
+        frame.message_id not in _MODE_MESSAGES
+        or autopilot.control_entry is not ControlEntry.BY_COMMAND
+    ):
         return False
     offboard = autopilot.modes[autopilot.offboard_mode] & _MAIN_MODE
     if frame.message_id == _SET_MODE:
         custom_mode = decode(frame.message_id, frame.payload).custom_mode
         return bool(custom_mode & _MAIN_MODE == offboard)
-    if frame.message_id == _REQUEST_DATA_STREAM:
-        return False
     message = decode(frame.message_id, frame.payload)
     if message.command == dialect.MAV_CMD_NAV_GUIDED_ENABLE:
         return bool(message.param1 > 0.0)
@@ -81,7 +82,7 @@ def leaves_control(frame: Frame) -> bool:
 
 
 def starves_control(frame: Frame, needed: dict[str, float]) -> bool:
-    """Whether a frame would reduce telemetry below the rates that control needs.
+    """Whether a frame could reduce telemetry below the rates that control needs.
 
     Args:
         frame: frame of a client.

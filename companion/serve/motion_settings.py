@@ -1,4 +1,4 @@
-"""The limits of clients' motions, and the changes that these do not permit in flight."""
+"""The limits of clients' motions, and the changes that are refused while a client is in control."""
 
 from math import atan2, degrees
 
@@ -32,8 +32,8 @@ def commanded_motion(config: Config) -> CommandedMotion:
 def change_refusal(before: Config, after: Config) -> str | None:
     """Why a change is refused while a client is in control, whose motions are already planned.
 
-    The motions use the limits at the takeover. With lower limits in the loops, the vehicle could
-    not keep up with the reference.
+    The motions use the limits at the takeover. With lower limits in the guidance loop, the vehicle
+    could not keep up with the reference.
     """
     names = {each.name for each in differences(before, after)} & _MOTION_LIMITS
     if names:

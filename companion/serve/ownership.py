@@ -1,4 +1,4 @@
-"""Which client controls the vehicle: one at a time, until it releases it or falls silent. Pure."""
+"""Which client controls the vehicle: one at a time, until its release or silence. Pure."""
 
 from collections.abc import Hashable
 from dataclasses import dataclass
@@ -80,12 +80,12 @@ class Ownership:
         if owner is not None and owner != client and self._is_live(owner, now):
             return f"{_name(owner)} is in control"
         if not self._is_live(client, now):
-            return "send setpoints first, at 2 Hz or more"
+            return f"send setpoints first, every {1e3 * self._timeout:.0f} ms or more often"
         self.owner = client
         return None
 
     def streams(self, client: Hashable, now: float) -> bool:
-        """Whether a client sends a stream, which takes more than one setpoint."""
+        """Whether a client sends a stream: its last two setpoints came in time."""
         stream = self._streams.get(client, _Stream())
         return self._is_live(client, now) and stream.newest - stream.before <= self._timeout
 

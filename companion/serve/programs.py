@@ -42,11 +42,12 @@ class Programs:
         """
         return self._newest[program]
 
-    def asking(self, client: Client, frame: Frame) -> Program:
+    def sender_of(self, client: Client, frame: Frame) -> Program:
         """The program that sent a command.
 
-        A program may use different component ids for commands and setpoints. Then it is the program
-        of the same client with the newest setpoint.
+        A program may use different component ids for commands and setpoints. If no setpoint came
+        from the sender's address, the sender is taken for the program of the same client with the
+        newest setpoint.
         """
         program = Program(client, source_of(frame))
         if program in self._newest:

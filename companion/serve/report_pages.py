@@ -13,7 +13,7 @@ from companion.realtime import schedule_as_usual
 _LONGEST = 120.0
 """Time allowed for one page, s; a small computer needs about ten seconds."""
 _LOOK_PERIOD = 1.0
-"""Period with which the wait for the process can be ended, s."""
+"""Period at which the wait for the process checks whether it must end, s."""
 _NICE = 19
 """Niceness of the process, so that it yields to everything else; the next flight may have begun."""
 _INTERRUPTED = "interrupted"
@@ -56,7 +56,7 @@ class ReportPages:
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            start_new_session=True,  # a Ctrl-C is for the program, which says what becomes of it
+            start_new_session=True,  # Ctrl-C must reach only this program
         )
         _give_way(self._process.pid)
         out, errors = self._output(self._process)
@@ -74,9 +74,9 @@ class ReportPages:
         deadline = time.monotonic() + _LONGEST
         while True:
             with suppress(subprocess.TimeoutExpired):
-                told = process.communicate(timeout=_LOOK_PERIOD)
+                output = process.communicate(timeout=_LOOK_PERIOD)
                 if not self._left:
-                    return told
+                    return output
             if self._left or time.monotonic() > deadline:
                 process.kill()
                 late = f"it was not written within {_LONGEST:g} s"

@@ -115,14 +115,17 @@ class ServedFlight:
     @property
     def ends(self) -> bool:
         """Whether requests are no longer flown: a monitor holds the vehicle, or an exit runs."""
-        begun, flown = self._source.pose is not None, self._assembled.context.guidance_loop.flown
+        begun, flown = (
+            self._source.start_pose is not None,
+            self._assembled.context.guidance_loop.flown,
+        )
         given_up = begun and flown.source is not self._source
         return given_up or self._assembled.flight.failed_in is not None
 
     @property
     def fence_centre(self) -> FenceCentre | None:
-        """Centre of the fence, if control has begun."""
-        begun = self._source.pose is not None
+        """Centre of the fence; None before control has begun."""
+        begun = self._source.start_pose is not None
         return self._assembled.context.snapshot_builder.fence_centre if begun else None
 
     @property
@@ -157,11 +160,11 @@ class ServedFlight:
                 self._summary = self._record.summary(
                     self._link.stats, self._assembled, self._recorder, result, self._records.grants
                 )
-        return self._source.pose is not None
+        return self._source.start_pose is not None
 
     async def save(self) -> None:
         """Complete the record; remove it after a failed takeover."""
-        if self._summary is None or self._source.pose is None:
+        if self._summary is None or self._source.start_pose is None:
             await self._records.discard(self._record)
         else:
             await self._records.keep(self._record, self._summary)
@@ -191,16 +194,18 @@ class ServedFlight:
 
     def _tell_end(self, asked: Asked | None, result: str) -> None:
         name = self._source.name
-        if self._source.pose is not None:
-            ended = "it let go" if self.let_go else "handed back" if result == "ok" else result
+        if self._source.start_pose is not None:
+            ended = "handed back" if result == "ok" else result
+            if self.let_go:
+                ended = "released by the client"
             self._component.tell(f"control by {name} has ended: {ended}")
             return
         self._component.tell(f"control was not given to {name}: {result}")
         self._answer(asked, REJECTED)
 
     async def _follow_up(self, asked: Asked | None) -> None:
-        """Inform the client of the progress of the takeover, its end, and each silence."""
-        while self._source.pose is None:
+        """Answer the client until control begins; then tell all clients when it falls silent."""
+        while self._source.start_pose is None:
             self._answer(asked, IN_PROGRESS)
             await asyncio.sleep(_PROGRESS_PERIOD)
         self._answer(asked, ACCEPTED)

@@ -157,7 +157,7 @@ class _Gate:
         self._routing, self._system = routing, system
 
     def intercept(self, client: Channel, frame: Frame) -> bool:
-        """Whether a frame is not forwarded."""
+        """Whether a frame was refused or handled here, and so must not be forwarded."""
         assert isinstance(client, Client)
         refusal = self._permission.refusal(client, frame)
         if refusal is not None:

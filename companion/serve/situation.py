@@ -16,7 +16,7 @@ from companion.vehicle.link import Link
 
 _CHECK_PERIOD = 1.0
 _COUNTED = 0.1
-"""Time over which messages are counted after a request, s; nothing waits for it."""
+"""Time over which messages are counted after a request, s; short, as nobody uses the count."""
 _STALE = 0.5
 """Largest age of a position or attitude that is used, s."""
 _MOST_APART = 0.3
@@ -37,7 +37,7 @@ class SituationKeeper:
         link.subscribe("GLOBAL_POSITION_INT", self._on_global_position)
 
     def situation(self) -> Situation | None:
-        """The present situation; None while position or attitude is unknown."""
+        """The present situation; None while position or attitude is unknown or outdated."""
         position, now = self._link.state.position, self._network.now()
         decoded = decode_attitude(self._network.attitude) if self._network.attitude else None
         if position is None or decoded is None:
@@ -53,7 +53,7 @@ class SituationKeeper:
         return Situation(position.position_ned, yaw, self._origin.origin)
 
     def takeoff_refusal(self, request: Request) -> str | None:
-        """Why the vehicle does not take off for a client that requests control on the ground."""
+        """Why a request for control on the ground does not begin a take-off; None if it does."""
         situation = self.situation()
         if not self._link.state.landed or situation is None:
             return "take off first: it is not known whether the vehicle stands on the ground"
@@ -62,7 +62,7 @@ class SituationKeeper:
         return "command a height of 1 m or more above the ground, or take off first"
 
     async def keep_telemetry(self, wanted: Callable[[], Mapping[str, float]]) -> None:
-        """Request telemetry until cancelled while no attitude comes; ArduPilot sends none unasked.
+        """Until cancelled, request telemetry whenever no attitude comes; ArduPilot needs a request.
 
         Args:
             wanted: rates by message name, Hz; called once the autopilot is known.

@@ -27,13 +27,13 @@ class ServedSource:
 
     Attributes:
         name: shown to the user.
-        pose: pose where control began, or None before.
+        start_pose: pose of the vehicle when control began; None before.
         failure: always None; a silent client does not count as a failure.
 
     Args:
         name: name of the client.
         motion: follows commanded motions.
-        ownership: tells whether the client is active.
+        ownership: knows whether the client is silent.
         heading_now: returns the vehicle's heading without resets, rad.
     """
 
@@ -47,7 +47,7 @@ class ServedSource:
         heading_now: Callable[[], float],
     ) -> None:
         self.name = name
-        self.pose: Pose | None = None
+        self.start_pose: Pose | None = None
         self.resets = EstimatorResets()
         self._motion, self._ownership, self._heading_now = motion, ownership, heading_now
         self._vehicle = VehicleMotion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -57,13 +57,13 @@ class ServedSource:
 
     def begin(self, now: float, pose: Pose) -> None:
         """Start from the pose that was held so far, with the newest request if it is fresh."""
-        self.pose = pose
+        self.start_pose = pose
         live = self._ownership.control(now) is Control.LIVE
         self._ownership.begin(now)
         self._vehicle = VehicleMotion(pose.position_ned, (0.0, 0.0, 0.0))
         self._motion.begin(pose.position_ned, (0.0, 0.0, 0.0), pose.heading, now)
         if self._waiting is not None and live:
-            with suppress(UnplannableError):  # held; the next one is refused in words
+            with suppress(UnplannableError):  # held; the client's next setpoint is refused in words
                 self.give(self._waiting, now)
 
     def give(self, request: Request, now: float) -> None:
@@ -72,7 +72,7 @@ class ServedSource:
         Raises:
             UnplannableError: no motion leads to it; the previous request stays in force.
         """
-        if self.pose is None:
+        if self.start_pose is None:
             self._waiting = request
             return
         if isinstance(request, MotionRequest):

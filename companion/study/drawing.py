@@ -11,7 +11,7 @@ from companion.study.methods import REFERENCE, Line, Method
 from companion.study.step import Floats
 
 _MOST_POINTS = 400
-"""Largest number of points of a line; with all points a page would have megabytes."""
+"""A line of at least twice as many points is thinned; with all points a page would be megabytes."""
 
 STYLE: Any = {  # Any, because matplotlib types the keys as a literal of 300 names
     "font.size": 9.0,
@@ -35,7 +35,7 @@ def new_figure(
 
 
 def draw(axes: Axes, x: Floats, y: Floats, line: Line, label: str = "") -> None:
-    """Draw a line with at most about `_MOST_POINTS` points."""
+    """Draw a line, thinned to fewer than about two times `_MOST_POINTS` points."""
     stride = max(1, len(x) // _MOST_POINTS)
     keep = np.unique(np.append(np.arange(0, len(x), stride), len(x) - 1))
     axes.plot(x[keep], y[keep], **line, label=label or None)

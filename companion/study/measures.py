@@ -14,6 +14,7 @@ FIT_COLUMNS = ("second order: dead time, ms", "second order: ω, rad/s", "second
 """Titles of `SecondOrderFit.cells`."""
 
 _THINNING = 10
+"""The second-order model is fitted to every tenth sample."""
 _REST = Coefficients(0.0, 0.0)
 _LOWEST = np.array([log(0.1), log(0.01), 0.0])
 _HIGHEST = np.array([log(1000.0), log(100.0), 0.5])
@@ -45,7 +46,10 @@ def cross_track(response: Response) -> Floats:
 
 
 def time_to(response: Response, share: float = 0.05) -> Floats:
-    """(headings,) time after which no more than `share` of the step is ever left, s, or inf."""
+    """(headings,) time from which the distance to the target stays within `share` of the step.
+
+    In s; inf if the response ends before.
+    """
     start, target = np.array(response.step.start), np.array(response.step.target)
     left = response.coefficients - target[:, None]
     beyond = np.hypot(left[:, 0], left[:, 1]) > share * np.hypot(*(target - start))

@@ -18,7 +18,7 @@ _POLL_S = 0.05
 """Time between two looks at the progress, s."""
 
 
-class _Seams(NamedTuple):
+class _Channels(NamedTuple):
     """What a worker shares with the main process.
 
     Attributes:
@@ -30,8 +30,8 @@ class _Seams(NamedTuple):
     stop: Any
 
 
-_shared: list[_Seams] = []
-"""In a worker: its seams. Synchronised objects can only be passed when the process starts."""
+_shared: list[_Channels] = []
+"""In a worker: its one `_Channels`, because queues can only be passed when the process starts."""
 
 
 class _StoppedError(Exception):
@@ -62,22 +62,22 @@ def run_in_workers(
         OSError: a result cannot be written, or a worker was killed.
     """
     context = get_context("spawn")
-    seams = _Seams(context.SimpleQueue(), context.Event())
-    pool = ProcessPoolExecutor(workers, context, _begin, (seams,))
+    channels = _Channels(context.SimpleQueue(), context.Event())
+    pool = ProcessPoolExecutor(workers, context, _begin, (channels,))
     try:
         with interrupts_blocked():
             futures = {
                 name: pool.submit(_run_one, run_study, name)
                 for name in sorted(parts, key=lambda name: -parts[name])
             }
-        _follow(list(futures.values()), seams.ticks, tick)
+        _follow(list(futures.values()), channels.ticks, tick)
         return {name: futures[name].result() for name in parts}
     except BrokenProcessPool as error:
         raise OSError(
             "a worker process was killed, perhaps for lack of memory; run again with --workers 1"
         ) from error
     finally:
-        seams.stop.set()
+        channels.stop.set()
         pool.shutdown(cancel_futures=True)
 
 
@@ -104,18 +104,18 @@ def _follow(
             future.result()  # raises the study's exception
 
 
-def _begin(seams: _Seams) -> None:
-    """Begin a worker process."""
-    _shared.append(seams)
+def _begin(channels: _Channels) -> None:
+    """Keep the channels of a worker process that begins."""
+    _shared.append(channels)
 
 
 def _run_one(run_study: RunStudy, name: str) -> Outcome:
     """Run one study in a worker process."""
-    (seams,) = _shared
+    (channels,) = _shared
 
     def tick(part: str) -> None:
-        if seams.stop.is_set():
+        if channels.stop.is_set():
             raise _StoppedError
-        seams.ticks.put((name, part))
+        channels.ticks.put((name, part))
 
     return run_study(name, tick)

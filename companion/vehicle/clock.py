@@ -28,7 +28,7 @@ _CERTAINLY_BACK = 0.5
 _TIMESYNC_LAG = 0.012
 """Largest lag of TIMESYNC behind the samples' stamps in the simulators, s (measured)."""
 _UNKNOWN_AFTER = 3.0
-"""Time within which an autopilot that supports TIMESYNC answers it, s."""
+"""An unknown age is reported this long after the first sample, s; TIMESYNC is answered by then."""
 
 
 class VehicleClock:
@@ -126,8 +126,8 @@ class VehicleClock:
     def exchange(self, sent: float, received: float, vehicle_ns: int) -> None:
         """Take a TIMESYNC exchange.
 
-        It also shows that the clock has slipped: on a busy computer simulators lose time and do not
-        catch up. Until the next exchange, samples then seem late.
+        An exchange also shows whether the clock has slipped: on a busy computer simulators lose
+        time and do not catch up. From a slip until the next exchange, samples seem late.
 
         Args:
             sent: Event-loop time of the request, s.

@@ -173,7 +173,7 @@ class TelemetryDelay:
         self.expire(now)
 
     def forget_after(self, since: float) -> None:
-        """Forget the exchanges after event-loop time `since` (s), when the clock had changed."""
+        """Forget the exchanges after event-loop time `since` (s): the clock may have changed."""
         while self._exchanges and self._exchanges[-1].at > since:
             self._exchanges.pop()
         self.expire(since)

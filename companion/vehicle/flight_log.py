@@ -33,7 +33,7 @@ _NAMES = {
 
 @dataclass(frozen=True, slots=True)
 class FlightLog:
-    """Rows of one flight; times are in s since the vehicle's boot.
+    """Setpoints and measurements of one flight; times are in s since the vehicle's boot.
 
     Attributes:
         setpoints: Setpoints that the autopilot obeyed: (time of the sample to which the setpoint
@@ -63,14 +63,14 @@ def read_flight_log(path: Path) -> FlightLog:
         reader.take((frame.system, frame.component), message)
     if reader.vehicle is None:
         raise LogError(f"{path}: holds no heartbeat of {AUTOPILOT_NAMES}")
-    if not reader.offboard_active:
+    if not reader.obeyed:
         raise LogError(
             f"{path}: holds no body rates that the vehicle obeyed: SET_ATTITUDE_TARGET by rates, "
             "armed, in the mode that obeys it"
         )
     # Both attitude messages carry the same rates, so only one of them is used.
     return FlightLog(
-        reader.offboard_active,
+        reader.obeyed,
         max(reader.quaternion, reader.euler, key=len),
         reader.specific_thrust,
     )
@@ -82,14 +82,14 @@ class _Reader:
 
     Attributes:
         vehicle: system and component of the autopilot, from its first heartbeat.
-        offboard_active: rows of setpoints that the autopilot obeyed.
-        quaternion: rows of rates from ATTITUDE_QUATERNION.
-        euler: rows of rates from ATTITUDE.
-        specific_thrust: rows of the accelerometer.
+        obeyed: setpoints that the autopilot obeyed.
+        quaternion: rates from ATTITUDE_QUATERNION.
+        euler: rates from ATTITUDE.
+        specific_thrust: from the accelerometer.
     """
 
     vehicle: tuple[int, int] | None = None
-    offboard_active: list[Row] = field(default_factory=list)
+    obeyed: list[Row] = field(default_factory=list)
     quaternion: list[Row] = field(default_factory=list)
     euler: list[Row] = field(default_factory=list)
     specific_thrust: list[Row] = field(default_factory=list)
@@ -117,7 +117,7 @@ class _Reader:
         armed = bool(heartbeat.base_mode & _ARMED)
         obeying = armed and Role.OFFBOARD in self._autopilot.roles(mode)
         if obeying and self._obeying:
-            self.offboard_active.extend(self._unconfirmed)
+            self.obeyed.extend(self._unconfirmed)
         self._unconfirmed.clear()
         self._obeying = obeying
 

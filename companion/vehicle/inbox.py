@@ -1,8 +1,8 @@
 """Checks arriving bytes, and passes their frames to the control loop and to the router.
 
 Every frame takes the same way, whatever the transport: scan, filter, control loop, count,
-subscribers. In lockstep, frames also wait for the beacon that closes their step, and samples for
-the tasks of the step.
+subscribers. In lockstep, frames also wait for the beacon (a SYSTEM_TIME) that closes their step,
+and samples for the tasks of the step.
 """
 
 import asyncio
@@ -80,7 +80,11 @@ class Inbox:
         self.connect(streaming=False)
 
     def connect(self, *, streaming: bool) -> None:
-        """Forget an incomplete frame, because the next bytes come over another connection."""
+        """Prepare for the bytes of another connection: forget an incomplete frame.
+
+        Args:
+            streaming: whether a frame may continue in the bytes received next.
+        """
         self._scanner = FrameScanner(
             CRC_EXTRA, streaming=streaming, stats=self._stats, keep_unknown=True
         )

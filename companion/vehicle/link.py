@@ -40,7 +40,7 @@ _LOG = logging.getLogger(__name__)
 class Link(VehicleClient):
     """A MAVLink connection to one vehicle. Use it as `async with Link(settings) as link:`.
 
-    It sends heartbeats and clock requests, and reopens a dropped connection. It never repeats a
+    It sends heartbeats and TIMESYNC requests, and reopens a dropped connection. It never repeats a
     setpoint: each one is sent by one call of `send_setpoint`.
 
     Args:

@@ -84,7 +84,7 @@ def shortest_hold(silence_limit: float) -> float:
 
 
 def rates_held(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
-    """Check how long the autopilot holds the last rates: longer than `silence_limit`, but short."""
+    """Check that the last rates are held longer than `silence_limit`, at most `LONGEST_HELD`."""
     right = shortest_hold(settings.silence_limit)
     if value <= settings.silence_limit:
         return Problem(
@@ -112,7 +112,7 @@ def hover_thrust(value: float, _: Values, settings: CompanionSettings) -> Proble
     return Problem(
         INEFFECTIVE,
         f"thrust.hover_thrust is {ours:g}, and one of the two is wrong, so the vehicle jumps or "
-        "sags at the takeover; hover it, read its thrust, and set both to that",
+        "sags at the takeover; hover the vehicle, read its thrust, and set both to that",
     )
 
 
@@ -145,7 +145,7 @@ def system_id(value: float, _: Values, settings: CompanionSettings) -> Problem |
         return None
     return Problem(
         INEFFECTIVE,
-        f"companion's heartbeat says system {settings.source_system}, so the autopilot takes "
+        f"companion's heartbeat has system id {settings.source_system}, so the autopilot takes "
         f"companion for another vehicle; set link.source_system to {value:g}",
     )
 
@@ -154,7 +154,7 @@ def acceleration_limit(unit: float, axis: str) -> Check:
     """A check that the planner assumes the autopilot's acceleration limit of an axis.
 
     Args:
-        unit: the parameter's unit in °/s².
+        unit: the parameter's unit as a multiple of 1 °/s².
         axis: `roll`, `pitch` or `yaw`.
     """
     prefix = "" if axis == "roll" else f"{axis}_"

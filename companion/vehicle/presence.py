@@ -144,11 +144,16 @@ def no_beacon(settings: LinkSettings, stats: LinkStats) -> str:
 
 
 def _why_refused(opening: str, stats: LinkStats) -> str | None:
-    """The error message if frames arrived and all were refused; None if none arrived."""
+    """The error message if frames were refused for their sender or signature; otherwise None.
+
+    Args:
+        opening: first clause of the message.
+        stats: counters of the link.
+    """
     if stats.unclaimed:
         return (
-            f"{opening}, but {stats.unclaimed} other frames with its ids; a sender counts as the "
-            "vehicle only after a heartbeat of its autopilot"
+            f"{opening}, but {stats.unclaimed} other frames with the vehicle's ids; a sender "
+            "counts as the vehicle only after a heartbeat of its autopilot"
         )
     if stats.ignored_foreign:
         source = "/".join(map(str, min(stats.foreign_sources)))

@@ -8,7 +8,7 @@ from companion.vehicle.clock_jumps import Misfit
 Vector = tuple[float, float, float]
 
 _LASTS = 5.0
-"""Largest age of known telemetry, s; it should come at 1 Hz or faster."""
+"""Age from which telemetry counts as unknown, s; every message should come at 1 Hz or faster."""
 
 
 def outdated(received: float, now: float) -> bool:

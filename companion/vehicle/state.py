@@ -101,7 +101,7 @@ class VehicleState(ModeState, _Values):
         router.subscribe_raw("ODOMETRY", self._on_odometry)
 
     def forget(self) -> None:
-        """Forget everything but the newest heartbeat; the rest may belong to another vehicle."""
+        """Forget all but heartbeat, autopilot and texts; the rest may be of another vehicle."""
         self.current_mode, self.armings = None, 0
         fresh = _Values()
         for field in fields(_Values):

@@ -21,7 +21,7 @@ _GAINS = AttitudeGains(4.5, 4.5, 1.5, 1.0, (radians(180.0), radians(180.0), radi
 
 
 class ActuatorOutput:
-    """Commands the rate loop and the rotors, and learns the hover thrust.
+    """Computes the command of the rate loop and the rotors, and learns the hover thrust.
 
     Args:
         state: the autopilot's state; its ``attitude_target`` is written here.
@@ -87,7 +87,7 @@ class ActuatorOutput:
         return attitude_rates(self._state.estimate.q, target, 0.0, _GAINS)
 
     def rates(self, rates: Vector, thrust: float) -> ActuatorCommand:
-        """Return the command for rates (rad/s) and ArduPilot's normalised thrust; 0 idles."""
+        """Return the command for rates (rad/s) and normalised thrust; on the ground it is 0."""
         flying = not self._state.landed or self.taking_off
         throttle = self._throttle(specific_thrust(thrust)) if flying else 0.0
         return ActuatorCommand(True, *rates, throttle)

@@ -85,7 +85,7 @@ class Boot:
 
     @property
     def initialised(self) -> bool:
-        """Whether it accepts commands."""
+        """Whether the autopilot accepts commands."""
         return self.reached(INITIALISED_S)
 
     @property

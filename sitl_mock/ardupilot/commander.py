@@ -227,7 +227,7 @@ class ArduPilotCommander:
             self._guided.hold()
 
     def _act(self, mode: Mode) -> None:
-        """Enter a failsafe's mode, or LAND if that needs a position; on the ground, disarm."""
+        """Enter a failsafe's mode, or LAND without a needed position; on the ground, disarm."""
         state = self._state
         if state.landed:
             self._stop_motors(EventKind.DISARMED_ON_GROUND)

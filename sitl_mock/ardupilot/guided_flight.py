@@ -20,7 +20,9 @@ SPOOL_UP_US = 2_000_000
 ARRIVAL_ACCELERATION = 0.55
 """Deceleration at the end of a take-off, m/s^2 (recorded)."""
 ARRIVED_M = 0.1
+"""A take-off ends this far below its height, m."""
 _SLOWEST_ARRIVAL = 0.1
+"""Smallest climb rate of a take-off, m/s, so that it reaches its height."""
 
 
 class GuidedFlight:

@@ -16,6 +16,7 @@ from sitl_mock.physics.vehicle import ActuatorCommand
 TOUCHDOWN_THRUST_RATE = 0.43
 """After contact in LAND the thrust decreases by this per second (recorded: landed after 1.6 s)."""
 _STILL = ActuatorCommand(False, 0.0, 0.0, 0.0, 0.0)
+"""Command while disarmed: the rotors stand still."""
 
 
 class ArduPilotModeControl:

@@ -16,7 +16,7 @@ _SENT = (
     dialect.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW,
     dialect.MAVLINK_MSG_ID_VIBRATION,
 )
-"""Messages built as PX4 builds them; ODOMETRY and ALTITUDE do not exist."""
+"""Messages that ArduCopter sends as PX4 does, apart from ODOMETRY and ALTITUDE, which it lacks."""
 
 
 class ArduPilotMotionTelemetry(MotionTelemetry):

@@ -92,7 +92,7 @@ class ArduPilot:
         return with_ardupilot_defaults(section)
 
     def slot_us(self, settings: VehicleSettings) -> int:
-        """Return the period of the main loop."""
+        """Return the period of the main loop, us."""
         return self._loop_us(settings)
 
     def streams(self, link: str, settings: VehicleSettings) -> StreamSchedule:

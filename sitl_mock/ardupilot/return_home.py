@@ -9,6 +9,7 @@ from sitl_mock.autopilot.state import State
 _NEAR_M = 2.0
 """Distance at which the vehicle has reached home (WPNAV_RADIUS)."""
 _REACHED_M = 0.3
+"""The climb ends this far below the height of the flight home, m."""
 
 
 class Leg(Enum):

@@ -66,7 +66,7 @@ def attitude_rates(
 
 
 def is_usable(q: Quaternion) -> bool:
-    """Whether a quaternion has no NaN and is not zero."""
+    """Whether a quaternion has no NaN, and a length between 0.001 and 1000."""
     w, x, y, z = q
     square = w * w + x * x + y * y + z * z
     return not isnan(square) and 1e-6 < square < 1e6

@@ -29,7 +29,7 @@ class Commander(Protocol):
         """Whether setpoints control the vehicle now."""
 
     def arm(self, *, force: bool = False) -> int:
-        """Arm, and return a MAV_RESULT; ``force`` skips the checks."""
+        """Arm, and return a MAV_RESULT; ``force`` skips most checks, never that of a crash."""
 
     def announce_problem(self) -> None:
         """Announce what forbids arming now, if anything does."""

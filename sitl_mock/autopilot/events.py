@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 
 class EventKind(Enum):
-    """An event that an autopilot announces; each has its own texts for them."""
+    """An event; each autopilot has its own texts for the events that it announces."""
 
     ARMED = auto()
     ARMING_DENIED = auto()

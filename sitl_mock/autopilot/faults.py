@@ -29,6 +29,8 @@ from sitl_mock.physics.vehicle import Vehicle
 
 @dataclass
 class _Entry:
+    """A fault, the vehicle time at which it was injected (us), and whether it acts or is over."""
+
     fault: LinkFault | VehicleFault
     given_us: int
     active: bool = False
@@ -156,7 +158,7 @@ class FaultEffects:
         return any(not fault.messages or name in fault.messages for fault in self._silences)
 
     def watch_position(self, converged_us: float, timeout_us: float) -> None:
-        """Set the position valid from ``converged_us`` to ``timeout_us`` after the loss of GPS."""
+        """Update ``position_valid``: true from ``converged_us`` until GPS is lost for a timeout."""
         state = self._state
         lost = not state.gps_ok and state.time_us - self._gps_lost_us >= timeout_us
         state.position_valid = state.time_us >= converged_us and not lost

@@ -18,6 +18,7 @@ HASH_NAME = "_HASH_CHECK"
 _NO_INDEX = -1
 _NO_INDEX_UNSIGNED = 65535
 _SENT_PER_TICK = 4
+"""Number of parameters of a list that are sent in one slot."""
 
 
 class ParameterProtocol:

@@ -31,7 +31,7 @@ class AttitudeSetpoint(NamedTuple):
     """Attitude and/or rates with thrust, from SET_ATTITUDE_TARGET.
 
     ``q`` None = no attitude control; ``rates`` (rad/s, body FRD) None = none given, NaN = hold the
-    present one; ``yaw_rate`` is the feed-forward of attitude control; thrust 0..1, NaN = none.
+    present rate; ``yaw_rate`` is the feed-forward of attitude control; thrust 0..1, NaN = none.
     """
 
     q: Quaternion | None
@@ -58,9 +58,10 @@ Setpoint = AttitudeSetpoint | PositionSetpoint
 
 
 def position_setpoint(message: Message) -> PositionSetpoint | None:
-    """Decode a SET_POSITION_TARGET_LOCAL_NED; None if it controls nothing.
+    """Decode a SET_POSITION_TARGET_LOCAL_NED; None if it controls nothing or is not supported.
 
-    Frames MAV_FRAME_LOCAL_NED, and MAV_FRAME_BODY_NED/_FRD for velocity and acceleration.
+    Supported are MAV_FRAME_LOCAL_NED, and MAV_FRAME_BODY_NED/_FRD for velocity and acceleration.
+    Forces are not.
     """
     mask = message.type_mask
     in_body = message.coordinate_frame in _BODY_FRAMES

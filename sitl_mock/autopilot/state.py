@@ -11,7 +11,7 @@ NAN_VECTOR = (NAN, NAN, NAN)
 
 
 class Mode(Enum):
-    """A flight mode: PX4's names down to OFFBOARD, then those of ArduCopter alone."""
+    """A flight mode: PX4's names down to OFFBOARD, then those that only ArduCopter has."""
 
     MANUAL = auto()
     ALTCTL = auto()

@@ -13,7 +13,7 @@ NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 _LISTED = 20
-"""A message shows the list of known words up to this length."""
+"""Largest number of known words that a message lists."""
 _NUMBER_AND_UNIT = re.compile(r"([-+]?[0-9]+(?:[.,][0-9]+)?)\s*(\D*)")
 
 
@@ -86,7 +86,7 @@ def _number_in(text: str) -> str:
     if found is None:
         return f"write digits, not {text!r:.60}"
     number, unit = found[1].replace(",", "."), found[2].strip()
-    why = f" without {unit!r:.20}, for the key's name says the unit" if unit else ""
+    why = f" without {unit!r:.20}, because the key's name has the unit" if unit else ""
     return f"write {number}{why} (got {text!r:.60})"
 
 

@@ -40,7 +40,7 @@ class EkfConfig(Section):
     turn_yaw_ms: Finite = -4.0
     """Heading error in a turn, from delayed fixes: minus this times the turn rate of the course."""
     compass_error_deg: Finite = 0.0
-    """Heading error that the compass causes in a calm; an acceleration reduces it within 1 s."""
+    """Heading error by the compass without acceleration; an acceleration reduces it within 1 s."""
     yaw_rate_bias_deg_s: Finite = 0.0
     """Error of the yaw rate in telemetry."""
     acceleration_lead_ms: Finite = 0.0

@@ -42,7 +42,7 @@ def link_signing(
 
     Args:
         config: the user's settings, None = no signing.
-        link: its name.
+        link: name of the link.
         unsigned_links: links on which the autopilot accepts unsigned frames by default.
 
     Raises:

@@ -193,7 +193,7 @@ class CompiledPlant:
         )
 
     def before(self, steps: int) -> TrailRow:
-        """Row of the trail that many steps ago."""
+        """Row of the trail `steps` steps ago."""
         row: TrailRow = tuple(self._trail[(self._steps - steps) % len(self._trail)].tolist())
         return row
 
@@ -211,7 +211,7 @@ class CompiledPlant:
 
     @staticmethod
     def make_noise(uniform: list[float], deviations: tuple[float, ...]) -> Sequence[float]:
-        """Normal numbers in place of uniform ones: see `sensors.white_noise`."""
+        """Turn uniform random numbers into normal ones: see `sensors.white_noise`."""
         numbers: Any = np.array(uniform)
         _white_noise(numbers, deviations)
         return cast("Sequence[float]", numbers)

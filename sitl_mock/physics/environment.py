@@ -58,7 +58,7 @@ class GroundLaw(NamedTuple):
 
 
 def ground_law(airframe: AirframeConfig, dt: float) -> GroundLaw:
-    """Return the contact with the ground for steps of `dt` seconds."""
+    """Return the constants of the contact with the ground for steps of `dt` seconds."""
     return GroundLaw(
         cos(radians(airframe.crash_tilt_deg)),
         airframe.crash_speed_m_s,

@@ -9,7 +9,7 @@ from sitl_mock.config.airframe import AirframeConfig
 from sitl_mock.config.rate_loop import RateLoopConfig
 from sitl_mock.physics.quaternion import Quaternion, Vector
 from sitl_mock.physics.rate_loop import (
-    IDLE,
+    ZERO_STATE,
     Axes,
     RateLaw,
     Ring,
@@ -83,7 +83,7 @@ def started(law: MultirotorLaw, throttle: float) -> Actuation:
     """Return the state of controller and rotors at the start, with rotors at a steady speed."""
     thrust = steady_thrust(law.rotors, throttle)
     mixed = mix(throttle, 0.0, 0.0, 0.0)
-    return mixed, (thrust, thrust, thrust, thrust), IDLE, NOT_SHAPED
+    return mixed, (thrust, thrust, thrust, thrust), ZERO_STATE, NOT_SHAPED
 
 
 def empty_rings(law: MultirotorLaw) -> Rings:
@@ -146,7 +146,7 @@ def drive(
             yaw_saturated,
         )
     else:
-        axes = IDLE
+        axes = ZERO_STATE
     # A NaN throttle fails this comparison, which stops the rotors.
     if throttle > 0.0:
         roll, pitch, yaw = axes

@@ -48,15 +48,15 @@ class FilterState(NamedTuple):
     height_noise: float  # slow noise that the height follows, m
     at: float  # fusion time of the fix, s
     corrected: float  # time of the fix, s
-    way: complex  # true position, m
-    speed: complex  # true velocity, m/s
+    position: complex  # true position, m
+    velocity: complex  # true velocity, m/s
 
 
 class ErrorLaw(NamedTuple):
     """Constants of the errors between two fixes."""
 
-    lead: float  # s, by which errors grow with the acceleration
-    scale: float  # of the acceleration
+    lead: float  # s, position error per velocity, and velocity error per acceleration
+    scale: float  # relative error of the acceleration
     height_offset: float  # m
     predictor_ms: float
 
@@ -67,7 +67,7 @@ def extrapolated(errors: Errors, elapsed: float) -> Errors:
     return place + elapsed * (speed + 0.5 * elapsed * tilt), speed + elapsed * tilt, tilt
 
 
-def settled_share(law: ErrorLaw, state: FilterState, now: float) -> float:
+def pending_share(law: ErrorLaw, state: FilterState, now: float) -> float:
     """Return the share of the latest corrections that the output does not contain at ``now``."""
     return exp((state.corrected - now) * 1e3 / law.predictor_ms)
 
@@ -79,8 +79,8 @@ def propagated(law: ErrorLaw, state: FilterState, truth: TrailRow, elapsed: floa
     """
     place, speed, tilt = extrapolated(state.level.errors, elapsed)
     wrong = complex(law.scale, state.yaw)
-    before = state.speed
-    way = complex(truth[10], truth[11]) - state.way
+    before = state.velocity
+    way = complex(truth[10], truth[11]) - state.position
     return (
         place + wrong * (way - elapsed * before),
         speed + wrong * (complex(truth[0], truth[1]) - before),
@@ -91,17 +91,17 @@ def propagated(law: ErrorLaw, state: FilterState, truth: TrailRow, elapsed: floa
 def error_at(law: ErrorLaw, state: FilterState, truth: TrailRow, now: float) -> NavigationError:
     """Return the error at ``now`` (s), at which the true motion is ``truth`` (pure)."""
     elapsed = now - state.at
-    settled = settled_share(law, state, now)
+    unsettled = pending_share(law, state, now)
     place, speed, tilt = propagated(law, state, truth, elapsed)
     pending = state.level.pending
-    place += law.lead * complex(truth[0], truth[1]) - settled * pending[0]
-    speed += law.lead * complex(truth[13], truth[14]) - settled * pending[1]
+    place += law.lead * complex(truth[0], truth[1]) - unsettled * pending[0]
+    speed += law.lead * complex(truth[13], truth[14]) - unsettled * pending[1]
     down, sink, _ = extrapolated(state.upright.errors, elapsed)
     pending = state.upright.pending
-    down += law.height_offset + state.sag - settled * pending[0]
+    down += law.height_offset + state.sag - unsettled * pending[0]
     return NavigationError(
         (place.real, place.imag, down.real),
-        (speed.real, speed.imag, (sink - settled * pending[1]).real),
+        (speed.real, speed.imag, (sink - unsettled * pending[1]).real),
         # A wrong attitude rotates the thrust, which makes the acceleration wrong.
-        (tilt.imag / _GRAVITY, -tilt.real / _GRAVITY, state.yaw - settled * state.yaw_pending),
+        (tilt.imag / _GRAVITY, -tilt.real / _GRAVITY, state.yaw - unsettled * state.yaw_pending),
     )

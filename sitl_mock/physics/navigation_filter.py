@@ -16,8 +16,8 @@ from sitl_mock.physics.navigation_error import (
     TrackState,
     TrailRow,
     extrapolated,
+    pending_share,
     propagated,
-    settled_share,
 )
 
 _GRAVITY = 9.80665
@@ -26,9 +26,9 @@ _SAG_S = 2.0
 _SLOW = 0.5
 """Below this speed, m/s, the course does not correct the heading."""
 _COMPASS_S = 20.0
-"""Time constant with which the heading follows the compass in a calm, s."""
+"""Time constant with which the heading follows the compass without acceleration, s."""
 _SHOWN = 0.15
-"""Rate at which an acceleration of 1 m/s^2 corrects the heading, 1/s; it grows with its square."""
+"""Rate, 1/s, at which an acceleration of 1 m/s^2 corrects the heading; grows with a^2."""
 
 
 class NavigationFilter:
@@ -95,16 +95,16 @@ class NavigationFilter:
             noise[0] - (config.position_late_ms * late + law.lead) * speed,
             noise[1] - (config.velocity_late_ms * late + law.lead) * pull,
         )
-        settled = settled_share(law, state, now)
+        unsettled = pending_share(law, state, now)
         kick = _GRAVITY * radians(config.tilt_noise_deg) * sqrt(elapsed)
-        level = self._corrected_state(state.level, moved, seen, noise, settled, kick)
+        level = self._corrected_state(state.level, moved, seen, noise, unsettled, kick)
         share = config.vertical_share
         noise = self._next_noise(state.upright.noise, share)
         still = extrapolated(state.upright.errors, elapsed)
-        upright = self._corrected_state(state.upright, still, noise, noise, settled, share * kick)
-        compass = self._rested_on_compass(abs(pull), elapsed)
-        yaw = self._turned(speed, pull) + compass
-        turned = settled * state.yaw_pending + yaw - state.yaw
+        upright = self._corrected_state(state.upright, still, noise, noise, unsettled, share * kick)
+        compass = self._next_compass_error(abs(pull), elapsed)
+        yaw = self._next_turn_error(speed, pull) + compass
+        turned = unsettled * state.yaw_pending + yaw - state.yaw
         height_noise = self._next_height_noise(elapsed)
         sag = config.height_sag_s4_per_m * abs(pull) ** 2 + height_noise
         sag = state.sag + (1.0 - exp(-elapsed / _SAG_S)) * (sag - state.sag)
@@ -113,8 +113,11 @@ class NavigationFilter:
             level, upright, yaw, turned, compass, sag, height_noise, at, now, way, speed
         )
 
-    def _turned(self, speed: complex, pull: complex) -> float:
-        """Return the next heading error without the compass's part: noise that depends on turns."""
+    def _next_turn_error(self, speed: complex, pull: complex) -> float:
+        """Return the next heading error that does not come from the compass, rad.
+
+        It is noise around an error that a turn of the course causes.
+        """
         config, decay, state = self._config, self._yaw_decay, self.state
         spread = radians(config.yaw_error_deg) * sqrt(1.0 - decay**2)
         turn_rate = (speed.conjugate() * pull).imag / max(abs(speed) ** 2, _SLOW**2)
@@ -122,7 +125,7 @@ class NavigationFilter:
         before = state.yaw - state.compass
         return learned + decay * (before - learned) + self._random.gauss(0.0, spread)
 
-    def _rested_on_compass(self, pull: float, elapsed: float) -> float:
+    def _next_compass_error(self, pull: float, elapsed: float) -> float:
         """Return the next heading error that comes from the compass, rad.
 
         Only a horizontal acceleration (``pull``, m/s^2) shows the true heading, because the fixes
@@ -155,7 +158,7 @@ class NavigationFilter:
         errors: Errors,
         seen: tuple[complex, complex],
         noise: tuple[complex, complex],
-        settled: float,
+        unsettled: float,
         kick: float,
     ) -> TrackState:
         """Return the errors corrected by a fix whose own errors are `seen`; add a random tilt."""
@@ -169,6 +172,6 @@ class NavigationFilter:
         pending = track.pending
         return TrackState(
             (place + first, speed + second, tilt + third + wander),
-            (settled * pending[0] + first, settled * pending[1] + second),
+            (unsettled * pending[0] + first, unsettled * pending[1] + second),
             noise,
         )

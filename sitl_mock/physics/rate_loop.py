@@ -10,8 +10,8 @@ AxisState = tuple[float, float]
 """State of one axis, N m: its integral, and its filtered torque, which is the output."""
 Axes = tuple[AxisState, AxisState, AxisState]
 """States of roll, pitch and yaw."""
-IDLE: Axes = ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
-"""State while the motors idle: no integral, no torque."""
+ZERO_STATE: Axes = ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
+"""State of a rate loop that does not run: no integral and no torque."""
 Delays = tuple[int, int, int]
 """Delays of roll, pitch and yaw, steps."""
 Ring = list[Vector]

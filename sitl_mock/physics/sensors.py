@@ -91,7 +91,7 @@ def estimate(
         law: constants.
         state: after the latest fix and reset.
         trail: the true motion of the latest steps.
-        steps: since boot.
+        steps: steps since boot.
         time: now, s.
         noise: 15 numbers: of attitude, rates, position, velocity and force.
     """
@@ -129,9 +129,8 @@ def estimate(
 class Estimator:
     """Holds the state of the estimator; one seeded generator draws its white noise.
 
-    Only `draw` draws white noise, and always the same number of draws. So the noise depends on the
-    seed and the number of calls; the noise of the navigation filter depends on the seed and the
-    time.
+    Only `draw` uses the generator, so the white noise depends on the seed and the number of calls.
+    The noise of the navigation filter depends on the seed and the time.
 
     Args:
         config: noise, delays and filter.
@@ -211,7 +210,7 @@ class Estimator:
 
         Args:
             time: now, s.
-            before: returns the true motion that many steps ago, fewer than `trail_length`.
+            before: returns the true motion k steps ago, for k below `trail_length`.
         """
         fused = time - self._behind * self.law.dt
         if self._filter is not None and self._filter.is_due(fused):

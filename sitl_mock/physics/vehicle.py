@@ -67,7 +67,7 @@ class Vehicle:
     Attributes:
         steps: physics steps since boot.
         step_s: length of one physics step, s.
-        on_ground: whether the vehicle stands.
+        on_ground: whether the vehicle stands on the ground.
         crashed: whether a touchdown was a crash.
         estimator: errors of the estimate.
         plant: the argument `plant`.

@@ -167,7 +167,7 @@ class Plant(Protocol):
         ...
 
     def before(self, steps: int) -> TrailRow:
-        """Row of the trail that many steps ago."""
+        """Row of the trail `steps` steps ago."""
         ...
 
     def estimate(
@@ -178,7 +178,7 @@ class Plant(Protocol):
 
     @staticmethod
     def make_noise(uniform: list[float], deviations: tuple[float, ...]) -> Sequence[float]:
-        """Normal numbers in place of uniform ones: see `sensors.white_noise`."""
+        """Turn uniform random numbers into normal ones: see `sensors.white_noise`."""
         ...
 
 
@@ -197,7 +197,7 @@ class PythonPlant:
         return outcome(self.state)
 
     def before(self, steps: int) -> TrailRow:
-        """Row of the trail that many steps ago."""
+        """Row of the trail `steps` steps ago."""
         return self._trail[(self.state.steps - steps) % len(self._trail)]
 
     def estimate(
@@ -208,6 +208,6 @@ class PythonPlant:
 
     @staticmethod
     def make_noise(uniform: list[float], deviations: tuple[float, ...]) -> Sequence[float]:
-        """Normal numbers in place of uniform ones: see `sensors.white_noise`."""
+        """Turn uniform random numbers into normal ones: see `sensors.white_noise`."""
         white_noise(uniform, deviations)
         return uniform

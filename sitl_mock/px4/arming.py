@@ -96,7 +96,7 @@ class AutoDisarm:
         self._landed_since_us = 0
 
     def begin(self) -> None:
-        """Start the time on the ground: the vehicle was armed."""
+        """Start counting the time on the ground, because the vehicle was armed."""
         self._landed_since_us = self._state.time_us
 
     def due(self) -> EventKind | None:

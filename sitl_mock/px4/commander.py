@@ -60,7 +60,7 @@ class Px4Commander:
         self._status: tuple[bool, Mode, Mode, bool] | None = None
 
     def arm(self, *, force: bool = False) -> int:
-        """Arm, and return a MAV_RESULT; ``force`` skips the checks."""
+        """Arm, and return a MAV_RESULT; ``force`` skips all checks but that of a crash."""
         state = self._state
         if state.armed:
             return ACCEPTED
@@ -129,7 +129,7 @@ class Px4Commander:
         self.request_mode(mode)
 
     def receive_heartbeat(self, heartbeat: Message) -> None:
-        """Record a heartbeat; its type says which link it belongs to."""
+        """Record a heartbeat of a ground station or a companion, which differ in its type."""
         self.failsafe.receive_heartbeat(heartbeat.type)
 
     def manual_control(self, message: Message, _: Link) -> None:

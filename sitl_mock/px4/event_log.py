@@ -136,7 +136,7 @@ class Announcer:
 
         Args:
             kind: kind of the event.
-            detail: text for the placeholder of its text.
+            detail: replaces the placeholder in the event's text.
             arguments: packed arguments that replace the constant ones of the event.
         """
         event = self._personality.events[kind]

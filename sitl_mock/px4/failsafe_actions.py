@@ -159,7 +159,7 @@ class FailsafeActions:
             self._announce(EventKind.FAILSAFE_UNNAMED, "", values)
 
     def act_on_link(self, cause: Cause, parameter: str, lost_us: int) -> None:
-        """Hold for COM_FAIL_ACT_T, then execute the action of a parameter."""
+        """Execute the action of a parameter; before a return or landing hold for COM_FAIL_ACT_T."""
         action = LINK_ACTIONS.get(int(self._parameters[parameter]))
         if action is None:
             return

@@ -13,6 +13,7 @@ CRAWL_HEIGHT_M = 0.65
 BRAKING_S = 0.7
 """A hold begins at the position plus the velocity times this."""
 LEVEL_DEMAND_ACCELERATION: Vector = (0.0, 0.0, NAN)
+"""Acceleration demand of a vehicle that stays level without holding its horizontal position."""
 
 
 class FlightTasks:

@@ -17,12 +17,13 @@ from sitl_mock.px4.flight_tasks import FlightTasks
 from sitl_mock.px4.modes import PILOTED
 
 ATTITUDE_FAILS_US = 140_000
-"""After a NaN quaternion for longer, PX4's attitude control fails until a restart."""
+"""Quaternions that are NaN for longer, us, make PX4's attitude control fail until a restart."""
 TOUCHDOWN_THRUST_RATE = 0.4
 """After contact in LAND the thrust decreases by this per second."""
 PRESSED_DOWN: Vector = (0.0, 0.0, 100.0)
 """Acceleration setpoint of PX4's own modes while disarmed, m/s^2 (recorded)."""
 _STILL = ActuatorCommand(False, 0.0, 0.0, 0.0, 0.0)
+"""Command while disarmed: the rotors stand still."""
 
 
 class Px4ModeControl:

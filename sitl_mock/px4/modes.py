@@ -58,7 +58,7 @@ def mode_of(custom: int) -> Mode | None:
 
 
 def base_mode(mode: Mode, *, armed: bool, attitude_controlled: bool) -> int:
-    """Return the recorded flags: 29 auto, 1 offboard by rates, 17 above rates, +128 armed.
+    """Return the recorded flags: 29 auto; offboard 1 by rates, else 17; 128 more if armed.
 
     Args:
         mode: the flight mode.

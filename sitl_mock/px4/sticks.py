@@ -8,7 +8,9 @@ from sitl_mock.link.framing import Message
 _MAVLINK_SOURCES = frozenset({1, 2, 3, 5, 6, 7, 8})
 """Values of COM_RC_IN_MODE that accept sticks from MAVLink."""
 _FILTER_S = 0.1
+"""Time constant of the low pass on the speed of the sticks, s."""
 _FULL_TRAVEL = 1000.0
+"""Value of a MANUAL_CONTROL axis at the end of its travel."""
 
 
 class Sticks:

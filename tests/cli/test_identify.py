@@ -121,7 +121,7 @@ def test_a_bad_fit_is_not_written_and_says_why_of_each_axis(capsys, tmp_path):
     shutil.copy(RECORDINGS / "px4-rate-steps.tlog", log)
     code, out, _ = run(capsys, "--log", tmp_path)
     assert code == 1
-    assert "Not written, for the fit is bad: yaw: too little excitation: the commands span" in out
+    assert "Not written, because the fit is bad: yaw: too little excitation: the commands" in out
     assert "roll" not in out.partition("Not written")[2]  # roll and pitch are good
     assert list(tmp_path.iterdir()) == [log]
     code, out, _ = run(capsys, "--log", log, "--json")

@@ -24,7 +24,10 @@ def told(tmp_path, text):
     [
         ("limits:\n\tmax_tilt_deg: 20\n", "line 2: a tab stands where YAML wants spaces"),
         ("limits:\n  max_tilt_deg: 20 deg\n", "line 2: `limits.max_tilt_deg` must be a number: "),
-        ("limits: {max_tilt_deg: 20 deg}", "write 20 without 'deg', for the key's name says the"),
+        (
+            "limits: {max_tilt_deg: 20 deg}",
+            "write 20 without 'deg', because the key's name gives the",
+        ),
         ("limits: {max_tilt_deg: 0.35 rad}", "must be a number: write 20.05 (got '0.35 rad')"),
         ("thrust: {hover_thrust: 49%}", "must be a number: write 0.49 (got '49%')"),
         ("limits: {max_tilt_deg: '20'}", "write 20 without quotation marks (got '20')"),

@@ -303,7 +303,7 @@ def test_telemetry_without_a_heartbeat_is_told_for_what_it_is(run):
         async with Link(UDP) as link:
             stranger = await FakeVehicle(link.local_address).open_udp()
             stranger.send(attitude(1), attitude(2))
-            with pytest.raises(LinkTimeout, match="2 other frames with its ids"):
+            with pytest.raises(LinkTimeout, match="2 other frames with the vehicle's ids"):
                 await link.wait_connected(0.1)
             stranger.close()
 

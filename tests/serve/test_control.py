@@ -184,7 +184,7 @@ def test_px4_is_asked_for_offboard_by_the_rules_of_px4_and_the_flight_is_recorde
         await stream(1.0, lambda _: script.local(ALL, begin))
         assert vehicle.state()["mode"] == "LOITER"
         assert not session.control.in_control
-        assert any("it let go" in text for text in script.texts())
+        assert any("released by the client" in text for text in script.texts())
         (folder,) = tmp_path.iterdir()
         summary = json.loads((folder / "summary.json").read_text())
         assert [phase["name"] for phase in summary["phases"]][:2] == ["connect", "checks"]

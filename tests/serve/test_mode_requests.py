@@ -88,11 +88,11 @@ def test_what_ardupilot_would_fly_to_in_guided(frame, steers):
 def test_a_command_under_another_component_id_is_of_the_program_that_was_heard_last():
     client, other = object(), object()
     programs, asked = Programs(), command(176, 1.0, 6.0, 0.0)
-    assert programs.asking(client, asked) == Program(client, Address(255, 190))
+    assert programs.sender_of(client, asked) == Program(client, Address(255, 190))
     for component, request in ((5, "old"), (6, "newest")):
         programs.keep(Program(client, Address(255, component)), request)
     programs.keep(Program(other, Address(255, 190)), "of another")
-    found = programs.asking(client, asked)
+    found = programs.sender_of(client, asked)
     assert programs.newest(found) == "newest"
     for number in range(40):
         programs.keep(Program(other, Address(1, number)), "many")

@@ -214,7 +214,7 @@ def test_a_flight_that_failed_is_told_as_such_everywhere(tmp_path, monkeypatch, 
 def test_json_goes_with_this_study_alone(tmp_path, capsys):
     assert main(["study", "kmax", "--json", "--out", str(tmp_path)]) == 2
     said = capsys.readouterr()
-    assert "--json goes with study track" in said.err
+    assert "--json needs study track" in said.err
     assert not said.out
     assert not list(tmp_path.iterdir())
 

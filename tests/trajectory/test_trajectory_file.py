@@ -222,7 +222,9 @@ def test_the_frame_of_a_table_is_said_and_changes_where_it_leads(tmp_path):
     path.write_text("\n".join(TABLE))
     assumed, notes = read(path)
     (note,) = notes
-    assert note.startswith("a.csv is read in s, m and rad with x east, y north, z up (enu), for it")
+    assert note.startswith(
+        "a.csv is read in s, m and rad with x east, y north, z up (enu), because it"
+    )
     assert "# frame: ned" in note
     path.write_text("\n".join(["# frame: ned", *TABLE]))
     told, notes = read(path)
@@ -251,4 +253,4 @@ def test_a_frame_that_cannot_be_is_refused(tmp_path, comment, words):
 def test_unused_columns_are_told(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("\n".join([f"{TABLE[0]},volts", *(f"{line},9" for line in TABLE[1:])]))
-    assert read(path).notes[1] == "a.csv: not used are the columns volts"
+    assert read(path).notes[1] == "a.csv: these columns are not used: volts"

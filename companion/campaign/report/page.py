@@ -151,7 +151,7 @@ def what_to_look_at(results: Results, found: dict[str, list[Influence]]) -> Iter
     )
     if reasons:
         (reason, times) = reasons.most_common(1)[0]
-        yield f"Most frequent reason why one was not good, {times} times: {reason}."
+        yield f"Most frequent reason why a case was not good, {times} times: {reason}."
     yield from _most_influential(results, found)
     if results.error == TRUE_ERROR:
         yield (

@@ -67,7 +67,10 @@ class Level(NamedTuple):
 
 
 def levels(column: Column) -> list[Level]:
-    """The levels of a factor: its values if they are few, else ranges with equally many cases."""
+    """The levels of a factor: its values, or ranges with equally many cases for many numbers.
+
+    Of more than `_MOST_LEVELS` words only the first ones are levels.
+    """
     known = sorted({_key(value) for value in column})
     if column.dtype != float or len(known) <= _MOST_LEVELS:
         keys = [_key(value) for value in column]
@@ -133,9 +136,10 @@ class Choice(NamedTuple):
 
 
 def choices(results: Results, most: int = 300) -> list[Choice]:
-    """The choices that a campaign compares; if a chosen key is sampled, each case is a choice.
+    """The choices that a campaign compares; keys of `mock`, `flight` and `vehicle` are none.
 
-    Keys of the mock vehicle, faults and maneuvers are no choices: a result is the median over them.
+    Faults are none either. If no two cases have equal values, or there are more than `most`
+    choices, single cases are the choices, at equal distances, fewer than 2·`most`.
     """
     chosen = [name for name in results.factors if _is_choice(name)]
     keys = [tuple(_key(results.columns[name][row]) for name in chosen) for row in _rows(results)]

@@ -43,7 +43,7 @@ class Score(NamedTuple):
         return sum(self.inside) / len(self.inside)
 
     def first(self, count: int) -> "Score":
-        """The score on the first `count` cases alone."""
+        """The score on only the first `count` cases."""
         return Score(
             self.true[:count], self.estimated[:count], self.estimate[:count], self.inside[:count]
         )

@@ -69,7 +69,8 @@ class Found:
         tried: number of all candidates, including those that were abandoned.
         stopped_early: number of candidates that were abandoned.
         best: the candidate with the smallest error inside the envelope; None: none stayed inside.
-        near: the best tenth of the candidates, the best one first.
+        near: the best tenth of the candidates that met the constraint, at least three if there are
+            so many; the best one first.
     """
 
     tried: int = 0

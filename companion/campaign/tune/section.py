@@ -33,5 +33,7 @@ class Tune(Section):
             if swept.times_base or swept.keys:
                 raise ValueError(f"{key}: times_base and keys belong to `sweep`")
             if key.startswith("mock."):
-                raise ValueError(f"{key}: the mock vehicle is what it is; search our own keys")
+                raise ValueError(
+                    f"{key}: keys of the mock vehicle cannot be searched; name keys of the program"
+                )
         return search

@@ -24,7 +24,7 @@ class Result(NamedTuple):
         best: the candidate that is proposed.
         before: score of the unchanged configuration, on the unseen cases.
         after: score of the proposal, on the unseen cases.
-        comparison: comparison of the two; None if a case was not flown to its end.
+        comparison: comparison of the two; None if fewer than two samples were flown to their end.
     """
 
     campaign: Campaign

@@ -7,7 +7,7 @@ from companion.mavlink.framing import Frame
 from companion.mavlink.messages import dialect
 
 _MANUAL_CONTROL = 69
-"""Its field `target` is a system id."""
+"""Message id of MANUAL_CONTROL, whose field `target` is a system id."""
 
 
 class Address(NamedTuple):
@@ -26,7 +26,7 @@ def source_of(frame: Frame) -> Address:
 
 
 def target_of(frame: Frame) -> Address:
-    """The target of a frame; everybody for a message without one, or of an unknown kind.
+    """The target of a frame; everybody for a message without target, or of an unknown kind.
 
     MAVLink 2 cuts trailing zeros off a payload, so a missing field is 0.
     """

@@ -44,13 +44,13 @@ class Clients(Protocol):
 
 
 class Client(ABC):
-    """A client's channel. It queues frames until `flush`; it drops late frames, but never cuts one.
+    """A client's channel. It queues frames until `flush`; it may drop whole frames, never parts.
 
     Args:
         name: name for messages.
         host: IP address of the client, or None.
         device: its serial device, or None.
-        streaming: whether a frame may continue in the next bytes.
+        streaming: whether a frame may continue in the bytes of the next `scan`.
 
     Attributes:
         name, host, device: as given.
@@ -124,7 +124,7 @@ class Flood:
     """Detects a client that sends faster than any program needs to."""
 
     WINDOW = 0.02
-    """Length of the window in which frames are counted, s; reading pauses until its end."""
+    """Length of the window in which frames are counted, and of a pause in reading, s."""
     _MOST = 64
     """Largest number of frames or datagrams in one window."""
 

@@ -32,7 +32,7 @@ from companion.vehicle.link import Link
 
 _LONGEST_WAIT = 0.004
 """Longest time that a frame waits to be forwarded, s."""
-_MOST_NOTED = 4096
+_MOST_FROM_VEHICLE = 4096
 """Largest number of the vehicle's frames that wait to be forwarded; only a stall causes more."""
 _MOST_FAULTS = 16
 """Largest number of different faults that are reported."""
@@ -52,7 +52,7 @@ class Network:
     Attributes:
         routing: the rules and their counters; takes hooks for setpoints and for our component.
         uplink: the clients' frames on their way to the vehicle.
-        ports: the open endpoints, in their order.
+        ports: the open endpoints, in the order of `endpoints`.
         attitude: payload of the autopilot's newest ATTITUDE_QUATERNION; empty before the first.
         attitude_at: arrival of that payload, s on our clock.
         overflowed: frames of the vehicle that were dropped after a stall.
@@ -80,9 +80,9 @@ class Network:
         self._faults: set[str] = set()
         self._endpoints = [parse_endpoint(each) for each in endpoints]
         self._clients: list[Client] = []
-        self._noted: list[Frame] = []
+        self._from_vehicle: list[Frame] = []
         self._timer: asyncio.TimerHandle | None = None
-        self._soon: asyncio.Handle | None = None
+        self._flush_handle: asyncio.Handle | None = None
 
     async def __aenter__(self) -> "Network":
         try:
@@ -100,7 +100,7 @@ class Network:
         for port in self.ports:
             port.close()
         self.ports.clear()
-        for handle in (self._timer, self._soon):
+        for handle in (self._timer, self._flush_handle):
             if handle is not None:
                 handle.cancel()
         await asyncio.sleep(0)  # lets closed connections end
@@ -137,7 +137,7 @@ class Network:
             self.uplink.forget(client)
 
     def received(self, client: Client, frames: Iterable[Frame]) -> None:
-        """A client has sent frames. One that causes a fault is dropped and ends no session."""
+        """A client has sent frames. A frame that causes a fault is dropped; the session goes on."""
         for frame in frames:
             try:
                 self.routing.from_client(client, frame)
@@ -146,14 +146,14 @@ class Network:
         self._flush_later()
 
     def flush(self) -> None:
-        """Forward all queued frames, to the vehicle first."""
-        self._soon = None
+        """Forward the queued frames; those for the vehicle first, as far as their rate permits."""
+        self._flush_handle = None
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
-        noted, self._noted = self._noted, []
+        from_vehicle, self._from_vehicle = self._from_vehicle, []
         left = self.uplink.drain()
-        for frame in noted:
+        for frame in from_vehicle:
             self.routing.from_vehicle(frame)
         for client in self._clients:
             client.flush()
@@ -161,15 +161,15 @@ class Network:
             self._flush_later()
 
     def _note(self, frame: Frame) -> None:
-        """Queue a frame of the link; the next sample may already be waiting."""
-        if len(self._noted) >= _MOST_NOTED:
+        """Queue a frame of the link; forwarding it now could delay the next attitude sample."""
+        if len(self._from_vehicle) >= _MOST_FROM_VEHICLE:
             self.overflowed += 1
             return
-        self._noted.append(frame)
+        self._from_vehicle.append(frame)
         if frame.message_id == ATTITUDE_QUATERNION and source_of(frame) == self._autopilot:
             self.attitude, self.attitude_at = frame.payload, self._loop.time()
-            if self._soon is None:
-                self._soon = self._loop.call_soon(self.flush)
+            if self._flush_handle is None:
+                self._flush_handle = self._loop.call_soon(self.flush)
         elif self._timer is None:
             self._timer = self._loop.call_later(_LONGEST_WAIT, self.flush)
 
@@ -179,7 +179,7 @@ class Network:
             self._note_event(text)
 
     def _flush_later(self) -> None:
-        if self._timer is None and self._soon is None:
+        if self._timer is None and self._flush_handle is None:
             self._timer = self._loop.call_later(_LONGEST_WAIT, self.flush)
 
     async def _open(self, endpoint: UdpIn | UdpOut | TcpClient | TcpServer | SerialPort) -> Port:

@@ -1,4 +1,4 @@
-"""Who may command the vehicle: programs on this computer, those that sign, and trusted ones.
+"""Who may command the vehicle: programs on this computer, clients that sign, trusted clients.
 
 All others may listen and read: parameters, missions, logs, files, single messages.
 """
@@ -62,7 +62,7 @@ class Permission:
 
     Args:
         trusted: hosts and serial devices that the configuration trusts.
-        signing: checks signatures; None: no signature proves anything.
+        signing: checks signatures; None: signatures are not checked and permit nothing.
     """
 
     def __init__(self, trusted: Iterable[str], signing: Signing | None) -> None:

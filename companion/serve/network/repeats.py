@@ -6,7 +6,7 @@ from collections.abc import Callable
 _WITHIN = 0.2
 """A frame identical to one that was forwarded within this time is a repetition, s."""
 _MOST = 4096
-"""Largest number of remembered frames; in a flood, only the newest ones."""
+"""Largest number of remembered frames; in a flood, only the newest are remembered."""
 
 
 class Repeats:

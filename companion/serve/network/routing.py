@@ -61,8 +61,8 @@ class Routing:
     """Forwards each frame, byte for byte, to the channels that should hear it.
 
     - A frame without a target, or for everybody, goes to all channels but its own.
-    - A targeted frame goes where its target was heard. Unheard components of the vehicle's system
-      are looked for behind the vehicle.
+    - A targeted frame goes to the channels on which its target was heard. If a component of the
+      vehicle's system was never heard, its frames go to the vehicle.
     - Frames for our own component end here.
     - Messages of unknown kinds go to everybody, as their target is not known.
 

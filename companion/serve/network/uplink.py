@@ -19,7 +19,7 @@ _NETWORK_BURST = 50_000.0
 
 
 def uplink_rate(endpoint: Endpoint) -> tuple[float, float]:
-    """Limits for clients' frames to the vehicle at this endpoint: bytes per second, and at once."""
+    """Limits of clients' frames to the vehicle: (bytes per second, bytes that may go at once)."""
     if isinstance(endpoint, SerialPort):
         rate = _SERIAL_SHARE * endpoint.baud / _BITS_PER_BYTE
         return rate, max(float(_LARGEST_FRAME), 0.01 * rate)

@@ -68,7 +68,7 @@ def _attitude(message: Message) -> tuple[float, float, float, float]:
         q = normalised(tuple(message.q))
     except AttitudeError as error:
         raise RefusedSetpoint("q is no unit quaternion (w, x, y, z)") from error
-    # Beyond it two attitudes have the same horizontal acceleration per specific thrust.
+    # Beyond 90 degrees two attitudes have the same horizontal acceleration per specific thrust.
     if cos_tilt(q[1], q[2]) <= 0.0:
         raise RefusedSetpoint("an attitude beyond 90 degrees of tilt is not flown")
     return q

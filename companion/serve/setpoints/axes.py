@@ -12,7 +12,7 @@ from typing import NamedTuple
 from companion.attitude.rotation import clamp
 from companion.guidance.reference import LARGEST_JERK, change_rate
 from companion.serve.setpoints.approach import Approach, AxisLimits, State, Values
-from companion.serve.setpoints.carrier import Carrier, Moving, far, plus
+from companion.serve.setpoints.carrier import AxisMotion, Carrier, far, plus
 from companion.serve.setpoints.request import AxisDemand
 
 _STREAM = 0.25
@@ -22,7 +22,7 @@ _SMOOTHING = 0.5
 _LARGEST_ACCELERATION = 15.0
 """Largest estimated acceleration, m/s²; faster changes of the velocity are jumps."""
 _MOST_BRAKED = 2.0
-"""A motion begins with at most this multiple of its largest acceleration."""
+"""Largest acceleration with which a motion begins, as a multiple of its limit."""
 _STRAYED = 1.5
 """Largest distance of the reference ahead of the vehicle if no position is commanded, m."""
 _OUTRUN = 2.0
@@ -31,7 +31,7 @@ m/s.
 """
 
 _LEAST_SHARE = 0.25
-"""Share of the limits reserved for an axis across the direction of a motion."""
+"""Smallest share of the limits for an axis, also if the motion is across this axis."""
 
 
 class Continuity(NamedTuple):
@@ -50,8 +50,8 @@ class Axes:
     """Follows commands along one or more axes.
 
     Args:
-        limits: limits of motions after a jump, one for each axis; of a motion along several axes,
-            they limit the motion along its direction.
+        limits: limits of motions after a jump, one for each axis. A motion along several axes is
+            limited along its direction.
         continuity: largest jumps that are followed directly.
         timeout: time for which a stream that repeats the same moving state is continued, s.
     """
@@ -80,7 +80,7 @@ class Axes:
         error = self._approach.at(time)
         return State(*(plus(a, b) for a, b in zip(carried, error, strict=True)))
 
-    def stop(self, now: float, actual: Moving | None = None) -> None:
+    def stop(self, now: float, actual: AxisMotion | None = None) -> None:
         """Come to rest within limits, and stay there.
 
         Args:
@@ -97,14 +97,14 @@ class Axes:
                 self._carrier = Carrier(*actual, self._zero, self._zero, now)
         self.command(AxisDemand(None, self._zero, None), now)
 
-    def command(self, demand: AxisDemand, now: float, actual: Moving | None = None) -> None:
+    def command(self, demand: AxisDemand, now: float, actual: AxisMotion | None = None) -> None:
         """Follow a new command.
 
         Args:
             demand: the command.
             now: present time, s.
             actual: motion of the vehicle; without a commanded position, the state stays close to
-                it.
+                the vehicle's.
 
         Raises:
             UnplannableError: no motion leads to it; the previous command stays in force.
@@ -119,7 +119,7 @@ class Axes:
             self._carry_motion(demand, _near(current, actual, demand), now)
         self._demand, self._given_at = demand, now
 
-    def _repeat(self, demand: AxisDemand, now: float, actual: Moving | None) -> None:
+    def _repeat(self, demand: AxisDemand, now: float, actual: AxisMotion | None) -> None:
         """Follow a repeated command for a limited time, because its sender may hang."""
         if demand.position is None:
             self._repeat_motion(demand, now, actual)
@@ -129,7 +129,7 @@ class Axes:
             self._carry_position(AxisDemand(demand.position, None, None), self.at(now), now)
             self._given_at = inf
 
-    def _repeat_motion(self, demand: AxisDemand, now: float, actual: Moving | None) -> None:
+    def _repeat_motion(self, demand: AxisDemand, now: float, actual: AxisMotion | None) -> None:
         """Follow a repeated velocity or acceleration, at most `_STRAYED` ahead of the vehicle."""
         current = self.at(now)
         if demand.velocity is not None and now - self._given_at > self._timeout:
@@ -207,7 +207,7 @@ def _blend(old: Values, new: Values) -> Values:
     return tuple(a + _SMOOTHING * (b - a) for a, b in zip(old, new, strict=True))
 
 
-def _near(current: State, actual: Moving | None, demand: AxisDemand) -> State:
+def _near(current: State, actual: AxisMotion | None, demand: AxisDemand) -> State:
     """The state; quantities that are not commanded and too far ahead are set to the vehicle's."""
     if actual is None:
         return current

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from companion.serve.setpoints.approach import State, Values
 
 
-class Moving(NamedTuple):
+class AxisMotion(NamedTuple):
     """Motion of the vehicle along some axes; SI units.
 
     Attributes:

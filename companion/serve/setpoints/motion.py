@@ -7,7 +7,7 @@ from companion.attitude.representation import wrap_angle
 from companion.guidance.reference import Reference, Vector, VehicleMotion
 from companion.serve.setpoints.approach import AxisLimits, State, UnplannableError
 from companion.serve.setpoints.axes import Axes, Continuity
-from companion.serve.setpoints.carrier import Moving
+from companion.serve.setpoints.carrier import AxisMotion
 from companion.serve.setpoints.request import AxisDemand, MotionRequest
 
 _HORIZONTAL_CONTINUITY = Continuity(0.3, 0.6)
@@ -107,14 +107,14 @@ class CommandedMotion:
         return Reference((x, y, z), (u, v, w), (a, b, c), heading, rate)
 
     def _within(self, vertical: AxisDemand) -> AxisDemand:
-        """The demand with a velocity that guidance can fly; beside a position it is unchanged."""
+        """The demand with its velocity clamped to the limits, unless a position is demanded too."""
         if vertical.velocity is None or vertical.position is not None:
             return vertical
         (down,) = vertical.velocity
         return vertical._replace(velocity=(min(max(down, -self._climb), self._descent),))
 
     def _turn(self, request: MotionRequest, now: float) -> AxisDemand:
-        """The demand on the heading: a yaw the short way, a rate, or the present heading."""
+        """The demand on the heading: a yaw (turning the short way), a yaw rate, or no rotation."""
         if request.yaw is None:
             self._yaw = None
             return AxisDemand(None, (request.yaw_rate or 0.0,), None)
@@ -136,7 +136,7 @@ class CommandedMotion:
         return AxisDemand((heading,), None if rate is None else (rate,), None)
 
 
-def _by_axes(motion: VehicleMotion) -> tuple[Moving, Moving]:
+def _by_axes(motion: VehicleMotion) -> tuple[AxisMotion, AxisMotion]:
     """The motion, split into horizontal and vertical."""
     (x, y, z), (u, v, w) = motion
-    return Moving((x, y), (u, v)), Moving((z,), (w,))
+    return AxisMotion((x, y), (u, v)), AxisMotion((z,), (w,))

@@ -1,7 +1,7 @@
 """SET_POSITION_TARGET_LOCAL_NED and _GLOBAL_INT: masks and frames.
 
 Sources: MAVLink common; "Offboard Mode" of the PX4 guide; "Copter Commands in Guided Mode" of
-ArduPilot's developer wiki. If the two autopilots interpret a setpoint differently, a position in
+ArduPilot's developer wiki. The two autopilots differ in two points, so a position in
 MAV_FRAME_BODY_NED is refused, and a yaw in a body frame is interpreted as by the vehicle's
 autopilot.
 """

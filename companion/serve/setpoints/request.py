@@ -17,9 +17,9 @@ class AxisDemand(NamedTuple):
     acceleration. None: not commanded.
 
     Attributes:
-        position: m, in the autopilot's local frame.
-        velocity: m/s.
-        acceleration: m/s².
+        position: m, in the autopilot's local frame; rad for the heading.
+        velocity: m/s or rad/s.
+        acceleration: m/s² or rad/s².
     """
 
     position: tuple[float, ...] | None

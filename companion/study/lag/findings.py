@@ -55,8 +55,8 @@ def _on_the_example(example: Example) -> tuple[Finding, Finding, Finding]:
         ),
         Finding(
             "ours",
-            "There model-following is the straightest, even with lag and dead time wrong by up to"
-            " 50 %.",
+            "Behind dead time and lag model-following is the straightest, even with both times"
+            " wrong by up to 50 %.",
             worst < across[best],
             f"Cross-track {across[FOLLOWING]:.2g} with the right times, at most {worst:.2g} with"
             f" wrong ones; the best of the others has {across[best]:.2g}.",
@@ -95,7 +95,8 @@ def _wrong_over_the_grid(grid: Grid) -> Finding:
     where = f", from {min(cell.dead_time_ms for cell in worse)} ms of dead time on" if worse else ""
     return Finding(
         "ours",
-        "It still is with lag and dead time wrong by ±50 %, in every combination.",
+        "Over the grid model-following is the straightest even with lag and dead time wrong by"
+        " ±50 %, in every combination.",
         not worse,
         f"Worse than the best other method in {len(worse)} of {len(grid)} cells{where}. The largest"
         f" ratio is at {last}, with {place.worst_error}: {place.worst:.2g} against"
@@ -146,14 +147,16 @@ def _with_the_complete_loop(
         ),
         Finding(
             "ours",
-            "It still is with the fitted times wrong by up to ±50 %.",
+            "With the complete inner loop model-following is the straightest even with the fitted"
+            " times wrong by up to ±50 %.",
             at.ratio < 1.0,
             f"The largest ratio is at {last:.0f} Hz, with {at.worst_error}: {at.worst:.2g} against"
             f" {at.right[at.best_other].cross_track:.2g} of {at.best_other.label}.",
         ),
         Finding(
             "ours",
-            "Its response is the nearest to second order with dead time.",
+            "With the complete inner loop the response of model-following is the nearest to second"
+            " order with dead time.",
             from_fit[FOLLOWING] < from_fit[nearest],
             f"It stays within {from_fit[FOLLOWING]:.2g} of the fitted model; {nearest.label}, the"
             f" next, within {from_fit[nearest]:.2g}.",

@@ -81,7 +81,7 @@ class Score(NamedTuple):
 
     Attributes:
         cross_track: largest distance from the straight line, in coefficients.
-        time: time after which no more than 5 % of the step is ever left, s; inf if never.
+        time: time from which the distance to the target stays within 5 % of the step, s; or inf.
     """
 
     cross_track: float
@@ -161,12 +161,12 @@ class Complete(NamedTuple):
 
 
 def in_percent(error: float) -> str:
-    """A relative error in words for tables and legends."""
+    """A relative error for tables and legends, such as `+50 %`; `right` for no error."""
     return f"{100.0 * error:+.0f} %".replace("-", "−") if error else "right"
 
 
 def score(response: Response) -> Score:
-    """The score of a response at one heading."""
+    """The score of a response at its first heading."""
     return Score(float(cross_track(response)[0]), float(time_to(response)[0]))
 
 

@@ -23,7 +23,9 @@ from companion.study.outcome import Finding, Source
 _SETTLED_M = 0.1
 """Largest error in the last 2 s of a flight that has settled, m."""
 _LAST = round(2.0 * RATE_HZ)
+"""Number of periods in these 2 s."""
 _MAX_ANSWER_MS = 10.0
+"""Required 99th percentile of the solver process's answer time, ms; half a period."""
 
 
 def find(flown: Flights, counts: ColdStarts, times: ProcessTimes) -> tuple[Finding, ...]:
@@ -119,7 +121,7 @@ def _dead_time(flown: Flights) -> Finding:
         "ours",
         "Predicting past the dead time helps every model.",
         min(gains.values()) > 1.0,
-        f"Error on the figure-eight without it, divided by the error with it: {ratios}.",
+        f"Error on the figure-eight without this prediction, divided by that with it: {ratios}.",
     )
 
 

@@ -190,7 +190,7 @@ def fly_all(tick: Tick) -> Flights:
 
 
 def _all_flights() -> Flights:
-    """All flights, each before its first period."""
+    """All flights; none has begun."""
     unlimited = [
         Variant(model, knows_dead_time=known) for known in (True, False) for model in UNLIMITED
     ]

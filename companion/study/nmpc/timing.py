@@ -16,7 +16,9 @@ from companion.study.nmpc.variants import CIRCLE, DRAG, EIGHT, MODELS, RATE_HZ, 
 from companion.study.step import Floats
 
 _COLD_ITERATIONS = 60
+"""SQP iterations after which a cold start counts as not converged."""
 _REQUESTS = 150
+"""Number of requests with which the solver process is timed."""
 _START_TIMEOUT = 30.0  # s
 
 

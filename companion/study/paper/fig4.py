@@ -125,7 +125,7 @@ def _findings(responses: dict[Method, Response], reference: Floats) -> tuple[Fin
         ),
         Finding(
             "ours",
-            "That limit makes full use of W_M.",
+            "The limit of equation 33 makes full use of W_M.",
             rate[PAPER_LIMIT] > 0.99 * MAX_TILT_RATE,
             f"It uses {100.0 * rate[PAPER_LIMIT] / MAX_TILT_RATE:.0f} % of W_M and takes"
             f" {arrived[PAPER_LIMIT]:.3f} s; the tight limit uses"

@@ -66,7 +66,8 @@ class ArduPilot:
             **FLIGHT_RATES,
             # The default is 1 Hz; a pilot's takeover must be noticed sooner.
             "HEARTBEAT": 10.0,
-            "ATTITUDE_TARGET": 50.0,  # it turns at up to 1 rad/s; between messages it is predicted
+            # The target turns at up to 1 rad/s; between messages it is predicted.
+            "ATTITUDE_TARGET": 50.0,
             "EKF_STATUS_REPORT": 5.0,
             "HOME_POSITION": 1.0,
             "HIGHRES_IMU": 50.0,  # the thrust is identified from the accelerometer

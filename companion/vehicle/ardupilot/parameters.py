@@ -90,7 +90,8 @@ def _battery_failsafe(value: float, values: Values, _: CompanionSettings) -> Pro
         return None
     return Problem(
         INEFFECTIVE,
-        "ArduPilot does nothing about an empty battery; if companion ends, nobody lands",
+        "ArduPilot does nothing about an empty battery; if companion ends, nothing lands the "
+        "vehicle",
         set_to=1.0,
     )
 

@@ -95,13 +95,13 @@ class Px4:
     rates_along_target = False
     body_yaw_is_relative = False
     offboard_loss_failsafe = OffboardLossFailsafe(
-        "COM_OF_LOSS_T", "it does what COM_OBL_RC_ACT says", brakes=True
+        "COM_OF_LOSS_T", "it takes the action that COM_OBL_RC_ACT sets", brakes=True
     )
     cannot_arm_in = frozenset({Role.OFFBOARD, Role.LAND})
     parameters = PX4_PARAMETERS
 
     def mode_name(self, base_mode: int, custom_mode: int) -> str:
-        """Name of the mode in a heartbeat, from `custom_mode` alone."""
+        """Name of the mode in a heartbeat; PX4's depends only on `custom_mode`."""
         return _NAMES.get(custom_mode, f"mode 0x{custom_mode:08x}")
 
     def roles(self, mode: str) -> frozenset[Role]:

@@ -64,7 +64,7 @@ def _termination(value: float, values: Values, settings: CompanionSettings) -> P
         UNSAFE,
         f"a tilt of {min(angles):g}° ({_NAMED_ANGLES}) stops the motors, and "
         f"limits.max_tilt_deg is {degrees(settings.max_tilt):g}; lower limits.max_tilt_deg to "
-        f"{_OVERSHOOT:g}° below it, for gusts and steps",
+        f"{_OVERSHOOT:g}° below that angle, for gusts and steps",
     )
 
 
@@ -217,7 +217,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
         "what PX4 does about an empty battery",
         forbidden(
             INEFFECTIVE,
-            {0.0: "PX4 only warns; if companion has ended, nobody lands"},
+            {0.0: "PX4 only warns; if companion has ended, nothing lands the vehicle"},
             set_to=3.0,
         ),
         _REFERENCE,
