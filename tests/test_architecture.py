@@ -1,5 +1,6 @@
-"""docs/architecture.md tells the truth about files and functions."""
+"""docs/architecture.md tells the truth about files and functions, and none of them is long."""
 
+import ast
 import re
 from pathlib import Path
 
@@ -25,3 +26,28 @@ def test_every_room_is_on_the_map():
     rooms = {path.parent.name for path in (ROOT / "companion").glob("*/__init__.py")}
     assert {room for room in rooms if f"`companion/{room}/`" not in PAGE} <= {"mavsdk_link"}
     assert len(FUNCTIONS) > 8
+
+
+MOST_LINES_OF_A_FILE, MOST_LINES_OF_A_FUNCTION = 250, 50
+SOURCES = sorted(
+    path for room in ("companion", "sitl_mock") for path in (ROOT / room).rglob("*.py")
+)
+
+
+def long_functions(path):
+    """Name and lines, its docstring included, of each function that is too long."""
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            lines = node.end_lineno - node.lineno + 1
+            if lines > MOST_LINES_OF_A_FUNCTION:
+                yield f"{path.relative_to(ROOT)}: {node.name}: {lines} lines"
+
+
+def test_no_file_is_long():
+    lines = {path: len(path.read_text("utf-8").splitlines()) for path in SOURCES}
+    assert len(lines) > 400
+    assert {path: n for path, n in lines.items() if n > MOST_LINES_OF_A_FILE} == {}
+
+
+def test_no_function_is_long():
+    assert [told for path in SOURCES for told in long_functions(path)] == []

@@ -47,8 +47,10 @@ def public_names(package: ModuleType) -> set[str]:
     """Everything that the package offers, without its own modules."""
     return {
         name
-        for name, value in vars(package).items()
-        if not name.startswith("_") and not inspect.ismodule(value)
+        for name, value in inspect.getmembers(package)
+        if not name.startswith("_")
+        and not inspect.ismodule(value)
+        and name not in ("TYPE_CHECKING", "import_module")  # of a package that loads lazily
     }
 
 

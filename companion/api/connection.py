@@ -1,7 +1,7 @@
 """Connect a program to a vehicle, and run it."""
 
 import asyncio
-from collections.abc import AsyncGenerator, Coroutine, Mapping
+from collections.abc import AsyncGenerator, Coroutine, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -11,12 +11,13 @@ from companion.api.ctrl_c import on_ctrl_c
 from companion.api.flight_loop import FlightLoop, flight_loop
 from companion.api.program import Program, ended_by
 from companion.api.state import NewestState
-from companion.api.vehicle import Vehicle, leaving
+from companion.api.vehicle import Vehicle
 from companion.config import Config
 from companion.config.files import changed, load
 from companion.flight.context import FlightContext
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.observer import Observer, Silent, decline_landing
+from companion.flight.phases import Phase, hand_back_phase
 from companion.flight.session import Session
 from companion.mavlink import lockstep, loop
 from companion.recording.folder import flight_folder
@@ -162,7 +163,12 @@ async def _leave(program: Program) -> None:
     if program.busy:
         program.interrupt("the program ended before what it had asked for")
     elif not program.over:
-        await program.request(leaving, last=True)
+        await program.request(_leaving, last=True)
+
+
+def _leaving(context: FlightContext) -> Sequence[Phase]:
+    """The phases that end the flight: hand back in the air, none on the ground."""
+    return (hand_back_phase(),) if context.loop.offboard_active else ()
 
 
 async def _end(session: Session, program: Program) -> None:

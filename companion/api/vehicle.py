@@ -186,10 +186,6 @@ class Vehicle:
         """Let the autopilot hold the vehicle; the flight ends."""
         await self._request(lambda _: (hand_back_phase(),), last=True)
 
-    async def leave(self) -> None:
-        """End the flight: hand back in the air; on the ground leave the vehicle as it is."""
-        await self._request(leaving, last=True)
-
     def _request(
         self, phases: Callable[[FlightContext], Sequence[Phase]], *, last: bool = False
     ) -> asyncio.Future[None]:
@@ -238,11 +234,6 @@ class Vehicle:
         if pose is None or not self._context.loop.offboard_active:
             raise FlightEnded("the vehicle is not under our control: take off first", Exit.LEAVE)
         return pose
-
-
-def leaving(context: FlightContext) -> Sequence[Phase]:
-    """The phases that end the flight: hand back in the air, none on the ground."""
-    return (hand_back_phase(),) if context.loop.offboard_active else ()
 
 
 async def beside_the_loop(function: Callable[[*Arguments], T], *arguments: *Arguments) -> T:

@@ -15,7 +15,7 @@ from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
 from companion.cli.terminal import read_line
 from companion.config import Config
 from companion.config.files import assigned, changed, load
-from companion.config.known_drag import of_vehicle
+from companion.config.known_drag import KnownDrag, of_vehicle
 from companion.control.expected_response import expected_response, hold_sentence
 from companion.files.yaml_file import ConfigError
 from companion.files.yaml_file import load as load_yaml
@@ -27,7 +27,7 @@ from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import LinkLost, LinkTimeout
 from companion.mavlink.frame_filter import Notice
 from companion.preflight.all_checks import run_checks
-from companion.preflight.evidence import Evidence, Identity
+from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
 from companion.preflight.parameter_fixes import (
     Answer,
@@ -80,10 +80,10 @@ def _as_told(config: Config, options: argparse.Namespace) -> Config:
     return changed(config, {"link": link}, "the command line")
 
 
-def _maneuvers(config: Config, identity: Identity) -> tuple[ManeuverSequence | None, list[Finding]]:
+def _maneuvers(config: Config, drag: KnownDrag) -> tuple[ManeuverSequence | None, list[Finding]]:
     """The maneuvers to be flown by this vehicle, or the reason why they cannot be."""
     try:
-        return configured_maneuvers(config, of_vehicle(config, identity.uid)), []
+        return configured_maneuvers(config, drag), []
     except ConfigError as error:
         found = f"the configured maneuvers cannot be flown: {error}"
         because = "`companion fly` refuses it"
@@ -122,8 +122,9 @@ class _DoctorRun:
                 evidence = await vehicle.gather(wait)
             except (LinkTimeout, LinkLost) as error:
                 return self._report(vehicle.unanswered(error))
-            flown, refusals = _maneuvers(config, evidence.identity)
-            evidence = replace(evidence, maneuvers=flown)
+            drag = of_vehicle(config, config.recording.directory, evidence.identity.uid)
+            flown, refusals = _maneuvers(config, drag)
+            evidence = replace(evidence, maneuvers=flown, known_drag=drag)
             findings = [*refusals, *run_checks(config, evidence), *_response(config)]
             code = self._report(findings)
             if fix:
@@ -170,7 +171,7 @@ class _DoctorRun:
             if undo.path.exists():
                 self.say(f"Undo with: companion doctor --config FILE --undo {undo.path}")
         evidence = replace(evidence, survey=await survey(link, link.autopilot.parameters))
-        _, refusals = _maneuvers(config, evidence.identity)
+        _, refusals = _maneuvers(config, evidence.known_drag)
         code = self._report([*refusals, *run_checks(config, evidence), *_response(config)])
         self.result["changes"] = [outcome_as_dict(outcome) for outcome in self._outcomes]
         self.result["undo"] = str(undo.path) if undo.path.exists() else None

@@ -1,7 +1,8 @@
 """The drag known before a flight: from the configuration, or learned in an earlier flight.
 
 The maneuvers are checked twice. Before the vehicle identifies itself, it is assumed to be the one
-that flew last (`before_connecting`). Then they are checked with its own drag (`of_vehicle`).
+that flew last (`before_connecting`). Then they are checked with its own drag (`of_vehicle`), which
+is read once for each vehicle and handed on in the preflight evidence.
 """
 
 from pathlib import Path
@@ -24,10 +25,12 @@ class KnownDrag(NamedTuple):
     Attributes:
         drag: configured or learned drag; None: unknown.
         source: the file of a learned drag; None: configured or unknown.
+        trouble: why the file of a learned drag could not be used; None: it could, or there is none.
     """
 
     drag: Drag | None = None
     source: Path | None = None
+    trouble: str | None = None
 
     @property
     def least(self) -> Drag:
@@ -57,19 +60,20 @@ def before_connecting(config: Config) -> KnownDrag:
     return KnownDrag() if kept is None else KnownDrag(kept.drag, kept.path)
 
 
-def of_vehicle(config: Config, uid: str | None) -> KnownDrag:
+def of_vehicle(config: Config, directory: Path | None, uid: str | None) -> KnownDrag:
     """The configured drag, or the one that this vehicle learned.
 
     Args:
         config: configuration of the flight.
+        directory: folder of the flights; None: nothing is remembered.
         uid: hardware id (AUTOPILOT_VERSION); None: no id, so no learned drag.
     """
     if config.guidance.drag is not None:
         return KnownDrag(config.guidance.drag)
-    if uid is None:
+    if uid is None or directory is None:
         return KnownDrag()
-    kept, _trouble = LearnedFile(config.recording.directory, uid).load()
-    return KnownDrag() if kept is None else KnownDrag(kept.drag, kept.path)
+    kept, trouble = LearnedFile(directory, uid).load()
+    return KnownDrag(trouble=trouble) if kept is None else KnownDrag(kept.drag, kept.path)
 
 
 def prior_of(drag: Drag) -> DragPrior:

@@ -1,14 +1,13 @@
 """The guidance loop: a timer that makes a new command from the newest position."""
 
 from collections.abc import Callable
-from math import degrees, tan
 
 from companion.attitude import Quaternion, Target, heading, is_unit
-from companion.attitude.kinematics import tilt_angle
 from companion.control.command_maker import CommandMaker
 from companion.control.control_loop import ControlLoop
 from companion.control.flown_source import FlownSource
 from companion.control.guidance_command import GuidanceCommand
+from companion.control.hold import Hold
 from companion.control.hover_learning import HoverLearning
 from companion.control.motion_estimate import MotionEstimate
 from companion.control.step_recorder import StepRecorder
@@ -16,8 +15,8 @@ from companion.control.step_rows import StepFlags, StepOutput
 from companion.control.telemetry import Clock, FreshPosition, Ground, Telemetry
 from companion.control.ticker import Ticker
 from companion.control.tracking_record import TrackingRecord
-from companion.guidance import GRAVITY, GuidanceInput, HoverThrust, Pose, Reference, VehicleMotion
-from companion.guidance.braking import Assumed, brake
+from companion.guidance import GuidanceInput, HoverThrust, Pose, Reference, VehicleMotion
+from companion.guidance.braking import Assumed
 from companion.guidance.linear import Guidance
 from companion.guidance.reference import Horizontal
 from companion.guidance.source import Source
@@ -37,7 +36,6 @@ class GuidanceLoop:
 
     Attributes:
         flown: the held pose and the source that is flown from it.
-        given_up: why the source was given up, or None.
         bound_to_hold: True after `give_up`: from then on no source may be flown.
         motion: motion of the vehicle at the last step, without resets, or None.
         acceleration: its horizontal acceleration then, m/s², NED.
@@ -46,7 +44,7 @@ class GuidanceLoop:
         estimate: estimates the motion.
         learning: learns the hover thrust.
         maker: makes the commands.
-        max_tilt: largest tilt in open loop, rad.
+        hold: brakes and holds.
         before_step: called at the beginning of each step with the time, s.
         record: records how the reference is tracked.
     """
@@ -69,7 +67,6 @@ class GuidanceLoop:
         vehicle_clock: Clock,
     ) -> None:
         self.flown = FlownSource()
-        self.given_up: str | None = None
         self.bound_to_hold = False
         self.motion: VehicleMotion | None = None
         self.acceleration: Horizontal = (0.0, 0.0)
@@ -80,8 +77,7 @@ class GuidanceLoop:
         self._loop = loop
         self._ground = ground
         self.record = TrackingRecord(trace, self.flown)
-        self.max_tilt = max_tilt
-        self._assumed_braking = assumed_braking
+        self.hold = Hold(self.flown, self.maker, self.learning, max_tilt, assumed_braking)
         self._fresh = FreshPosition(state, vehicle_clock, position_stale)
         self.before_step: Callable[[float], None] = lambda _: None
         self._clock = clock
@@ -112,15 +108,7 @@ class GuidanceLoop:
         """
         now = self._clock()
         self._recorder.action(now, "hold_here")
-        self._hold_here(now)
-
-    def _hold_here(self, now: float) -> None:
-        if self.flown.braking_left(now) > 0.0:
-            return  # it goes on braking: a new beginning would stop it further away
-        motion = self.maker.guidance_input(now).now
-        acceleration = GRAVITY * tan(min(self.max_tilt, self.learning.largest_tilt()))
-        heading = self._heading()
-        self.flown.hold(brake(now, motion, heading, acceleration, self._assumed_braking))
+        self.hold.begin(now, self._heading())
 
     @property
     def braking_left(self) -> float:
@@ -141,7 +129,7 @@ class GuidanceLoop:
         now = self._clock()
         self._recorder.action(now, "give_up")
         self.bound_to_hold = True
-        self._hold_here(now)
+        self.hold.begin(now, self._heading())
 
     def follow(self, source: Source) -> None:
         """Fly `source` from the held pose; after `give_up`, keep holding."""
@@ -150,7 +138,7 @@ class GuidanceLoop:
         now = self._clock()
         self._recorder.action(now, "follow")
         if self.flown.pose is None:
-            self._hold_here(now)
+            self.hold.begin(now, self._heading())
         assert self.flown.pose is not None
         self.flown.begin(source, self.flown.pose, now)
 
@@ -219,7 +207,7 @@ class GuidanceLoop:
         self.estimate.note_position(position, offboard_active=self._loop.offboard_active)
         inputs = self.maker.guidance_input(now)
         self.motion, self.acceleration = inputs.now, inputs.acceleration
-        self._give_up_if_tilted(now, inputs.now)
+        self.hold.begin_if_tilted(now, inputs.now, self._q, self._heading())
         reference = self._write_command(now, inputs)
         self.off_course = self.flown.tracking_error(reference, inputs.now)
         if not standing:
@@ -249,16 +237,3 @@ class GuidanceLoop:
 
     def _heading(self) -> float:
         return heading(self.attitude())
-
-    def _give_up_if_tilted(self, now: float, motion: VehicleMotion) -> None:
-        """Brake and hold if open-loop rates have tilted the vehicle too far."""
-        name = self.flown.steers_by_rates(now, motion)
-        if name is None:
-            return
-        tilt = tilt_angle(self._q[1], self._q[2])
-        most = min(self.max_tilt, self.learning.largest_tilt())
-        if tilt <= most:
-            return
-        limit = "limits.max_tilt_deg" if most == self.max_tilt else "the thrust can hold"
-        self.given_up = f"{name} was given up at {degrees(tilt):.0f}° of tilt, more than {limit}"
-        self._hold_here(now)

@@ -39,21 +39,8 @@ def make_loops(
         ConfigError: a plug-in cannot be loaded.
     """
     thrust = hover_thrust(config)
-    deadman = config.deadman
-    loop = ControlLoop(
-        planner(config),
-        thrust,
-        send,
-        Deadlines(
-            telemetry_stale=deadman.telemetry_stale,
-            target_stale=deadman.target_stale,
-            deadline=deadman.deadline,
-        ),
-        trace,
-        rate_limits(config),
-        clock,
-        clock_ns,
-    )
+    limits, deadlines = rate_limits(config), _deadlines(config)
+    loop = ControlLoop(planner(config), thrust, send, deadlines, trace, limits, clock, clock_ns)
     guidance_loop = GuidanceLoop(
         loop,
         make_guidance(config),
@@ -65,8 +52,17 @@ def make_loops(
         max_tilt=config.limits.max_tilt,
         assumed_braking=Assumed(config.safety.reaction_s, config.safety.braking_m_s2),
         period=1.0 / config.guidance.rate_hz,
-        position_stale=deadman.position_stale,
+        position_stale=config.deadman.position_stale,
         clock=clock,
         vehicle_clock=vehicle_clock,
     )
     return loop, guidance_loop
+
+
+def _deadlines(config: Config) -> Deadlines:
+    deadman = config.deadman
+    return Deadlines(
+        telemetry_stale=deadman.telemetry_stale,
+        target_stale=deadman.target_stale,
+        deadline=deadman.deadline,
+    )

@@ -85,7 +85,7 @@ class Retuning:
         self._loop.retune(values.constants, values.limits)
         guidance.retune(values.guidance)
         guidance_loop.estimate.retune(values.observer)
-        guidance_loop.max_tilt = values.max_tilt
+        guidance_loop.hold.max_tilt = values.max_tilt
 
 
 def fixed_because(config: Config) -> str | None:

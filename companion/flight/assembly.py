@@ -2,15 +2,15 @@
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from companion.config import Config
+from companion.config.known_drag import KnownDrag
 from companion.control.ground_contact import GroundContact
 from companion.control.loops import make_loops
 from companion.control.outer_loop import predictive
-from companion.drag import Drag
+from companion.flight.assembled import Assembled
 from companion.flight.changes import Changes
 from companion.flight.context import FlightContext
 from companion.flight.dead_time_watch import DeadTimeWatch, rate_loops
@@ -32,7 +32,6 @@ from companion.mavlink.stamp_file import StampFile
 from companion.mavlink.transport.base import Tap
 from companion.mavlink.transport.opening import OpenTransport, open_transport
 from companion.realtime import Wishes
-from companion.recording.measurements.summary import LoopCounts, PredictiveFigures
 from companion.recording.recorder import FlightRecorder
 from companion.recording.trace import FlightTrace
 from companion.safety import SafetyLadder, monitors
@@ -94,52 +93,11 @@ def _signing(key_file: Path | None) -> Signing | None:
     return Signing(key, file=StampFile(key))
 
 
-def _record_drag(record: FlightRecorder, clock: Callable[[], float], drag: Drag | None) -> None:
-    if drag is None:
+def _record_drag(record: FlightRecorder, clock: Callable[[], float], known: KnownDrag) -> None:
+    if known.drag is None:
         record.action(clock(), "drag_prior")
     else:
-        record.action(clock(), "drag_prior", drag=(drag.linear, drag.quadratic))
-
-
-@dataclass(frozen=True, slots=True)
-class Assembled:
-    """A flight ready to run over an open link, and its figures afterwards."""
-
-    flight: Flight
-    context: FlightContext
-    trace: FlightTrace
-    dead_time_watch: DeadTimeWatch
-    memory: VehicleMemory
-    ladder: SafetyLadder
-    reporter: StatusReporter
-    changes: Changes
-
-    def close(self) -> None:
-        """End the process of predictive control."""
-        if self.context.guidance_loop.maker.predictive is not None:
-            self.context.guidance_loop.maker.predictive.close()
-
-    def predictive_figures(self) -> PredictiveFigures | None:
-        """The figures of predictive control; None if it did not fly."""
-        predictive = self.context.guidance_loop.maker.predictive
-        if predictive is None:
-            return None
-        record = predictive.record
-        troubles = {trouble.value: count for trouble, count in record.troubles.items()}
-        return PredictiveFigures(record.flown, troubles, tuple(record.seconds))
-
-    def counts(self) -> LoopCounts:
-        """The counters of the control loop."""
-        record = self.context.loop.record
-        return LoopCounts(
-            samples=record.samples,
-            setpoints=record.setpoints,
-            missed_deadlines=record.missed_deadlines,
-            stale=record.stale,
-            refused=record.refused,
-            unanswered={reason.value: count for reason, count in record.unanswered.items()},
-            rate_hz=self.context.rate_hz,
-        )
+        record.action(clock(), "drag_prior", drag=(known.drag.linear, known.drag.quadratic))
 
 
 def assemble(
@@ -160,6 +118,32 @@ def assemble(
     clock: Callable[[], float] = asyncio.get_running_loop().time
     record, real_time = recorder.file, environment.realtime and not config.link.lockstep
     trace = FlightTrace(folder, record)
+    context = _context(config, link, plan, trace, environment)
+    ladder = SafetyLadder(monitors(config), config.safety.hold_s)
+    rate_requester = RateRequester(link, config.link)
+    watch = Watch(context, ladder, rate_requester, clock)
+    context.loop.ask_mode = watch.ask_mode
+    flight = Flight(context, plan, watch, recorder, ask_landing)
+    ladder.note = context.note = context.preflight.note = flight.note
+    context.guidance_loop.record.note = rate_requester.note = flight.note
+    changes = changes or Changes(config)
+    memory = _vehicle_memory(context, folder, flight.note, changes)
+    _prepare_trajectories(context, flight.note)
+    if record is not None:
+        record.metadata("configuration", flat(changes.flown.model_dump(mode="json")))
+        record.begin(flight.began, description(changes.flown, plan, real_time=real_time))
+        ladder.on_change = record.alarm
+        memory.on_begin = partial(_record_drag, record, clock)
+    dead_time_watch = DeadTimeWatch(trace, rate_loops(config), flight.note)
+    reporter = _reporter(flight, context, ladder, trace, recorder, real_time=real_time)
+    return Assembled(flight, context, trace, dead_time_watch, memory, ladder, reporter, changes)
+
+
+def _context(
+    config: Config, link: Link, plan: Plan, trace: FlightTrace, environment: Environment
+) -> FlightContext:
+    """The loops of a flight, and what its phases share."""
+    clock: Callable[[], float] = asyncio.get_running_loop().time
     ground = GroundContact(link.state, clock)
     loop, guidance_loop = make_loops(
         config,
@@ -178,7 +162,7 @@ def assemble(
     same_vehicle = SameVehicle(link, clock)
     loop.is_same_vehicle = lambda: same_vehicle.same
     preflight = PreflightChecks(config, link, same_vehicle, unbegun(plan.maneuvers))
-    context = FlightContext(
+    return FlightContext(
         config,
         link,
         loop,
@@ -189,28 +173,17 @@ def assemble(
         preflight,
         same_vehicle,
     )
-    ladder = SafetyLadder(monitors(config), config.safety.hold_s)
-    rate_requester = RateRequester(link, config.link)
-    watch = Watch(context, ladder, rate_requester, clock)
-    loop.ask_mode = watch.ask_mode
-    flight = Flight(context, plan, watch, recorder, ask_landing)
-    ladder.note = context.note = preflight.note = guidance_loop.record.note = flight.note
-    rate_requester.note = flight.note
-    drag_is_set = config.guidance.drag is not None
-    remembered = None if folder is None else folder.parent
-    memory = VehicleMemory(remembered, guidance_loop.estimate.drag, drag_is_set, flight.note)
-    preflight.on_identity = memory.load
-    _prepare_trajectories(context, flight.note)
-    changes = changes or Changes(config)
-    if record is not None:
-        record.metadata("configuration", flat(changes.flown.model_dump(mode="json")))
-        record.begin(flight.began, description(changes.flown, plan, real_time=real_time))
-        ladder.on_change = record.alarm
-        memory.on_begin = partial(_record_drag, record, clock)
-    dead_time_watch = DeadTimeWatch(trace, rate_loops(config), flight.note)
 
-    reporter = _reporter(flight, context, ladder, trace, recorder, real_time=real_time)
-    return Assembled(flight, context, trace, dead_time_watch, memory, ladder, reporter, changes)
+
+def _vehicle_memory(
+    context: FlightContext, folder: Path | None, note: Callable[[str], None], changes: Changes
+) -> VehicleMemory:
+    """What earlier flights learned of the vehicle, for the checks and for guidance."""
+    remembered = None if folder is None else folder.parent
+    memory = VehicleMemory(context.config, remembered, context.guidance_loop.estimate.drag, note)
+    memory.on_known = changes.on_drag
+    context.preflight.drag_of = memory.load
+    return memory
 
 
 def _prepare_trajectories(context: FlightContext, note: Callable[[str], None]) -> None:

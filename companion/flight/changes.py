@@ -12,6 +12,7 @@ from companion.config.in_flight import (
     changed_in_flight,
     differences,
 )
+from companion.config.known_drag import KnownDrag
 from companion.control.retuning import Retuning, fixed_because, tuning
 from companion.control.slew import Slew
 from companion.files.yaml_file import ConfigError
@@ -61,6 +62,8 @@ class Changes:
         flown: configuration in the record of the flight: the one at its start.
         note: shows a change while there is no flight.
         on_change: called with `wanted` after each change.
+        on_drag: called with what is known of the vehicle's drag once the vehicle is identified; the
+            slow checks of a change need it.
 
     Args:
         start: the configuration with which the flight begins.
@@ -72,6 +75,7 @@ class Changes:
         self.flown = start
         self.note: Callable[[str], None] = lambda _: None
         self.on_change: Callable[[Config], None] = lambda _: None
+        self.on_drag: Callable[[KnownDrag], None] = lambda _: None
         self._start = start
         self._slew = Slew(start)
         self._earlier: list[Config] = []

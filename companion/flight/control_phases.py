@@ -68,8 +68,8 @@ async def _fly(context: FlightContext, source: Source, progress: Callable[[], st
     def over() -> bool:
         elapsed = now() - began
         context.rate_hz = (context.loop.record.setpoints - sent) / elapsed if elapsed > 0.0 else 0.0
-        if context.guidance_loop.given_up is not None:
-            raise FlightEnded(context.guidance_loop.given_up)
+        if context.guidance_loop.hold.given_up is not None:
+            raise FlightEnded(context.guidance_loop.hold.given_up)
         if source.failure is not None:
             raise FlightEnded(source.failure, Exit.HOLD)
         tilt_margin.check()

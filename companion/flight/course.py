@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Sequence
 
 from companion.control.expected_response import gain_warning
-from companion.flight.assembly import Assembled
+from companion.flight.assembled import Assembled
 from companion.flight.context import FlightContext
 from companion.recording.measurements.course import Course, EarlyEnd
 from companion.recording.measurements.dead_time import DeadTimes
@@ -72,6 +72,7 @@ def course_of(
         phases=tuple((at - began, name) for at, name in phases),
         takeoff=takeoff,
         early_end=early_end,
+        vehicle_uid=context.same_vehicle.uid,
         armed=state.armed,
         mode=state.mode,
         battery=(reporter.battery_at_takeoff, end),

@@ -50,11 +50,8 @@ class Flight:
         self.phase = ground_phases(context.config.flight)[0]
         self.failed_in: Phase | None = None
         self.events: list[tuple[float, str]] = []
-        self._context = context
-        self._plan = plan
-        self._watch = watch
-        self._observer = observer
-        self._ask_landing = ask_landing
+        self._context, self._plan, self._watch = context, plan, watch
+        self._observer, self._ask_landing = observer, ask_landing
         self._clock = asyncio.get_running_loop().time
         self.began = self._entered = self._clock()
         self._interrupted = self._asking = False

@@ -12,7 +12,7 @@ from companion import realtime
 from companion.config import Config
 from companion.files.write_whole import write_in_time
 from companion.flight import flown_config
-from companion.flight.assembly import Assembled
+from companion.flight.assembled import Assembled
 from companion.flight.course import advice, course_of
 from companion.flight.environment import Environment
 from companion.flight.observer import EventRecorder, Observer

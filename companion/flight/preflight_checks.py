@@ -6,6 +6,7 @@ from dataclasses import replace
 from math import inf
 
 from companion.config import Config
+from companion.config.known_drag import KnownDrag
 from companion.flight.vehicle_identity import SameVehicle
 from companion.guidance import ManeuverSequence
 from companion.preflight.all_checks import blocking, run_checks, unsafe
@@ -32,7 +33,7 @@ class PreflightChecks:
 
     Attributes:
         note: called once with each finding that does not block the flight.
-        on_identity: called with the vehicle's identity once it is known.
+        drag_of: called with the vehicle's identity; returns what is known of its drag.
 
     Args:
         config: configuration of the flight.
@@ -45,7 +46,7 @@ class PreflightChecks:
         self, config: Config, link: Link, same_vehicle: SameVehicle, maneuvers: ManeuverSequence
     ) -> None:
         self.note: Callable[[str], None] = lambda _: None
-        self.on_identity: Callable[[Identity], None] = lambda _: None
+        self.drag_of: Callable[[Identity], KnownDrag] = lambda _: KnownDrag()
         self._config, self._link, self._same_vehicle = config, link, same_vehicle
         self._maneuvers = maneuvers
         self._clock = asyncio.get_running_loop().time
@@ -90,9 +91,9 @@ class PreflightChecks:
             self._evidence, self._gathered_at = evidence, self._clock()
             self._same_vehicle.note_identity(evidence.identity)
         self._same_vehicle.require()
-        self.on_identity(evidence.identity)
+        drag = self.drag_of(evidence.identity)
         planned = self._maneuvers if self._maneuvers.parts else None
-        evidence = replace(evidence, stage=stage, maneuvers=planned)
+        evidence = replace(evidence, stage=stage, maneuvers=planned, known_drag=drag)
         self._apply(run_checks(self._config, evidence, again=before is not None))
         return evidence
 

@@ -1,6 +1,6 @@
 """The phases on the ground, one coroutine each, and the exit that disarms."""
 
-from companion.config.known_drag import before_connecting, of_vehicle
+from companion.config.known_drag import before_connecting
 from companion.control.expected_response import gain_warning
 from companion.files.yaml_file import ConfigError
 from companion.flight.commands import (
@@ -48,7 +48,7 @@ async def checks(context: FlightContext) -> None:
     if warning is not None:
         context.note(warning)
     note_heartbeat_rate(context, evidence)
-    context.known_drag = of_vehicle(context.config, evidence.identity.uid)
+    context.known_drag = evidence.known_drag
     _require_flyable_by_vehicle(context)
     report_offboard_loss(context, evidence.survey.values)
     context.mode_at_checks = context.link.state.mode

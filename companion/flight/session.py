@@ -5,7 +5,8 @@ from pathlib import Path
 
 from companion import realtime
 from companion.config import Config
-from companion.flight.assembly import Assembled, assemble, open_link, realtime_wishes
+from companion.flight.assembled import Assembled
+from companion.flight.assembly import assemble, open_link, realtime_wishes
 from companion.flight.changes import Changes
 from companion.flight.context import cancel
 from companion.flight.environment import THIS_COMPUTER, Environment

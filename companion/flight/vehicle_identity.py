@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from companion.config.known_drag import prior_of
-from companion.drag import Drag
+from companion.config import Config
+from companion.config.known_drag import KnownDrag, of_vehicle, prior_of
 from companion.guidance.drag_estimate import ANY_VEHICLE, DragEstimate
 from companion.preflight.evidence import Identity
 from companion.recording.learned_file import LearnedFile
@@ -76,6 +76,11 @@ class SameVehicle:
             self._other_uid = identity.uid
 
     @property
+    def uid(self) -> str | None:
+        """Hardware id of the checked vehicle; None: unknown."""
+        return self._uid
+
+    @property
     def same(self) -> bool:
         """Whether there is no sign of a replacement; the control loop asks at every sample."""
         return (
@@ -118,46 +123,58 @@ class VehicleMemory:
     A configured drag takes precedence. A vehicle without a hardware id is not remembered.
 
     Args:
+        config: configuration of the flight.
         directory: folder of the flights; None: nothing is remembered.
         estimate: the drag estimate.
-        configured: whether the configuration sets the drag.
         note: called with messages for the user.
 
     Attributes:
-        on_begin: called with the initial drag of the estimate; None: the drag of any vehicle.
+        on_begin: called when the estimate begins with a vehicle's learned drag, or without one.
+        on_known: called with what is known of the drag, once for each vehicle.
     """
 
     def __init__(
         self,
+        config: Config,
         directory: Path | None,
         estimate: DragEstimate,
-        configured: bool,
         note: Callable[[str], None],
     ) -> None:
-        self._directory, self._estimate = directory, estimate
-        self._configured, self._note = configured, note
+        self._config, self._directory = config, directory
+        self._estimate, self._note = estimate, note
         self._file: LearnedFile | None = None
-        self.on_begin: Callable[[Drag | None], None] = lambda _: None
+        self._uid: str | None = None
+        self._known: KnownDrag | None = None
+        self.on_begin: Callable[[KnownDrag], None] = lambda _: None
+        self.on_known: Callable[[KnownDrag], None] = lambda _: None
 
-    def load(self, identity: Identity) -> None:
-        """Load the learned drag of this vehicle, before it is flown."""
-        if identity.uid is None or self._directory is None:
+    def load(self, identity: Identity) -> KnownDrag:
+        """What is known of this vehicle's drag; it is read when the vehicle is first identified."""
+        if self._known is None or identity.uid != self._uid:
+            self._uid = identity.uid
+            self._known = of_vehicle(self._config, self._directory, identity.uid)
+            self._begin(self._known)
+            self.on_known(self._known)
+        return self._known
+
+    def _begin(self, known: KnownDrag) -> None:
+        """Start the estimate for another vehicle; one without an id changes nothing."""
+        if self._uid is None or self._directory is None:
             return
-        file = LearnedFile(self._directory, identity.uid)
+        file = LearnedFile(self._directory, self._uid)
         if self._file is not None and self._file.path == file.path:
             return
         self._file = file
-        if self._configured:
+        if self._config.guidance.drag is not None:
             return
-        kept, trouble = file.load()
-        self._estimate.begin(ANY_VEHICLE if kept is None else prior_of(kept.drag))
-        self.on_begin(None if kept is None else kept.drag)
-        if trouble is not None:
-            self._note(trouble)
-        if kept is not None:
+        self._estimate.begin(ANY_VEHICLE if known.drag is None else prior_of(known.drag))
+        self.on_begin(known)
+        if known.trouble is not None:
+            self._note(known.trouble)
+        if known.drag is not None:
             self._note(
-                f"drag from an earlier flight of this vehicle: {kept.drag.linear:.2f} 1/s + "
-                f"{kept.drag.quadratic:.3f} 1/m ({file.path})"
+                f"drag from an earlier flight of this vehicle: {known.drag.linear:.2f} 1/s + "
+                f"{known.drag.quadratic:.3f} 1/m ({file.path})"
             )
 
     def save(self) -> None:

@@ -17,29 +17,7 @@ def view(context: FlightContext, now: float) -> dict[str, Any]:
     Values that are not known are left out.
     """
     loop, guidance_loop, state = context.loop, context.guidance_loop, context.link.state
-    shown: dict[str, float | None] = {}
-    sample, command, motion = loop.resets.newest, loop.command, guidance_loop.motion
-    if sample is not None:
-        north, east = coefficients(sample.q)
-        shown.update(zip(("q_w", "q_x", "q_y", "q_z"), sample.q, strict=True))
-        shown.update(measured_north=north, measured_east=east)
-        shown.update(_named("measured", sample.body_rates, "rad_s", _RATES))
-    if command is not None and loop.on:
-        target = command.target_at(now)
-        shown.update(target_north=target.north, target_east=target.east)
-        shown.update(target_heading_rad=target.heading, thrust=loop.record.thrust)
-    if motion is not None:
-        shown.update(_named("estimated", motion.position_ned, "m"))
-        shown.update(_named("estimated", motion.velocity_ned, "m_s"))
-        reference = _reference(context, now)
-        if reference is not None:
-            shown.update(_named("reference", reference.position_ned, "m"))
-            north, east, down = reference.acceleration_ned
-            thrust = sqrt(north * north + east * east + (GRAVITY - down) ** 2)
-            shown.update(reference_north=north / thrust, reference_east=east / thrust)
-            if state.height is not None:
-                above = motion.position_ned[2] - reference.position_ned[2]
-                shown.update(reference_height_m=state.height + above)
+    shown = {**_attitude(context, now), **_motion(context, now)}
     origin = context.snapshot_builder.origin_ned
     if origin is not None:
         shown.update(_named("fence", origin, "m"))
@@ -63,6 +41,42 @@ def view(context: FlightContext, now: float) -> dict[str, Any]:
         for name, value in known
         if isfinite(value)
     }
+
+
+def _attitude(context: FlightContext, now: float) -> dict[str, float | None]:
+    """Values of the newest sample, and of the target while setpoints are sent."""
+    loop, shown = context.loop, dict[str, float | None]()
+    sample, command = loop.resets.newest, loop.command
+    if sample is not None:
+        north, east = coefficients(sample.q)
+        shown.update(zip(("q_w", "q_x", "q_y", "q_z"), sample.q, strict=True))
+        shown.update(measured_north=north, measured_east=east)
+        shown.update(_named("measured", sample.body_rates, "rad_s", _RATES))
+    if command is not None and loop.on:
+        target = command.target_at(now)
+        shown.update(target_north=target.north, target_east=target.east)
+        shown.update(target_heading_rad=target.heading, thrust=loop.record.thrust)
+    return shown
+
+
+def _motion(context: FlightContext, now: float) -> dict[str, float | None]:
+    """Values of the estimated motion, and of the reference that is flown."""
+    motion, height = context.guidance_loop.motion, context.link.state.height
+    if motion is None:
+        return {}
+    shown: dict[str, float | None] = {}
+    shown.update(_named("estimated", motion.position_ned, "m"))
+    shown.update(_named("estimated", motion.velocity_ned, "m_s"))
+    reference = _reference(context, now)
+    if reference is not None:
+        shown.update(_named("reference", reference.position_ned, "m"))
+        north, east, down = reference.acceleration_ned
+        thrust = sqrt(north * north + east * east + (GRAVITY - down) ** 2)
+        shown.update(reference_north=north / thrust, reference_east=east / thrust)
+        if height is not None:
+            above = motion.position_ned[2] - reference.position_ned[2]
+            shown.update(reference_height_m=height + above)
+    return shown
 
 
 def _reference(context: FlightContext, now: float) -> Reference | None:

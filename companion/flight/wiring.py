@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from companion.control.retuning import Retuning
-from companion.flight.assembly import Assembled
+from companion.flight.assembled import Assembled
 from companion.flight.observer import StateLogger
 from companion.vehicle.link import Link
 from companion.vehicle.records import AttitudeSample

@@ -1,11 +1,13 @@
 """The slow checks of a change; the helper process makes them before the flight's own checks."""
 
+from pathlib import Path
 from typing import Any
 
 from companion.config import Config
 from companion.config.in_flight import Values, changed_in_flight
-from companion.config.known_drag import before_connecting
+from companion.config.known_drag import KnownDrag, before_connecting
 from companion.control.retuning import fixed_because
+from companion.drag import Drag
 from companion.files.yaml_file import ConfigError
 from companion.flight.change_bounds import require_moderate
 from companion.flight.maneuver_checks import require_still_flyable
@@ -50,6 +52,13 @@ class ChangeChecks:
     def note(self, message: dict[str, Any]) -> None:
         """Take a message of a changed configuration."""
         self.now = Config.model_validate(message["config"])
+
+    def note_drag(self, message: dict[str, Any]) -> None:
+        """Take this vehicle's drag; until it comes, that of the last vehicle is assumed."""
+        drag, source = message["drag"], message["source"]
+        self._drag = KnownDrag(
+            None if drag is None else Drag(*drag), None if source is None else Path(source)
+        )
 
     def check(self, values: Values, name: str) -> None:
         """Check new values: the rules between keys, their size, stability, and the maneuvers.

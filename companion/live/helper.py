@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from companion.config import Config
+from companion.config.known_drag import KnownDrag
 from companion.flight.changes import ChangeRefusedError, Changes
 from companion.flight.status import FlightStatus
 from companion.live.channel import Channel, Feed, Message
@@ -82,7 +83,7 @@ class Helper:
     async def serve_beside(self, work: Coroutine[Any, Any, T]) -> T:
         """Run `work`, and serve the process at the same time."""
         loop = asyncio.get_running_loop()
-        self.changes.on_change = self._tell_change
+        self.changes.on_change, self.changes.on_drag = self._tell_change, self._tell_drag
         loop.add_reader(self._channel.fileno(), self._on_readable)
         try:
             return await work
@@ -143,6 +144,14 @@ class Helper:
     def _tell_change(self, config: Config) -> None:
         made = str(self.changes.made[-1])
         self._send("config", config=_plain(config), can_undo=self.changes.can_undo, text=made)
+
+    def _tell_drag(self, known: KnownDrag) -> None:
+        drag, source = known.drag, known.source
+        self._send(
+            "drag",
+            drag=None if drag is None else [drag.linear, drag.quadratic],
+            source=None if source is None else str(source),
+        )
 
     def _on_readable(self) -> None:
         """Handle the requests of the process."""

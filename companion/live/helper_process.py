@@ -117,6 +117,8 @@ class Relay:
     def _take(self, message: Message) -> None:
         if message["kind"] == "config":
             self.checks.note(message)
+        elif message["kind"] == "drag":
+            self.checks.note_drag(message)
         answered = self._asked.get(message.get("id", -1))
         if answered is not None and not answered.done():
             answered.set_result(message)

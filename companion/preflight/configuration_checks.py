@@ -34,21 +34,21 @@ def planner(config: Config, _: Evidence) -> Iterator[Finding]:
         yield Finding(Key.PLANNER, SAFE, f"{name} is flown", source="planner.name")
 
 
-def dead_time(config: Config, _: Evidence) -> Iterator[Finding]:
-    """Whether the newest flight with this planner and gain measured the configured dead time.
+def dead_time(config: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether this vehicle's newest flight with this planner and gain measured the configured one.
 
     With another gain the response of the same vehicle differs, and an oscillating hold gives a
     wrong dead time.
     """
     if not config.vehicle.known:
         return
-    folder, measured = _newest_dead_times(config)
+    folder, measured = _newest_dead_times(config, evidence.identity.uid)
     if folder is None:
         yield Finding(
             Key.DEAD_TIME,
             SAFE,
-            f"no flight in {config.recording.directory} with this planner and gain measured the "
-            "dead time yet",
+            f"no flight of this vehicle in {config.recording.directory} with this planner and gain "
+            "measured the dead time yet",
             fix="it can only be measured in flight; every flight reports it at its end",
             source="summary.json",
         )
@@ -97,16 +97,20 @@ def accepted(config: Config, _: Evidence) -> Iterator[Finding]:
             )
 
 
-def _newest_dead_times(config: Config) -> tuple[Path | None, dict[str, float]]:
-    """The newest flight with this planner and gain with dead times: folder, dead times in s."""
-    kind = config.planner_name, config.planner.gain_per_s
+def _newest_dead_times(config: Config, uid: str | None) -> tuple[Path | None, dict[str, float]]:
+    """The newest flight of this kind with dead times: folder, dead times in s.
+
+    A flight counts if vehicle (hardware id), planner and gain are the same. Flights of vehicles
+    without an id count for each other.
+    """
+    kind = uid, config.planner_name, config.planner.gain_per_s
     for summary in sorted(config.recording.directory.glob("*/summary.json"), reverse=True):
         try:
             told = json.loads(summary.read_text(encoding="utf-8"))
-            if (told["planner"], told["gain_per_s"]) != kind:
+            if (told.get("vehicle_uid"), told["planner"], told["gain_per_s"]) != kind:
                 continue
             axes = {name: told["dead_time_s"][name] for name in ("roll", "pitch", "yaw")}
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, AttributeError):
             continue  # of another program, or of a flight that was cut off
         known = {
             name: float(value)

@@ -1,10 +1,11 @@
 """What was received from a vehicle and its link: the input of the checks."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
+from companion.config.known_drag import KnownDrag
 from companion.guidance import ManeuverSequence
 from companion.mavlink.stats import share_lost
 from companion.preflight.parameter_survey import Survey
@@ -133,6 +134,7 @@ class Evidence:
         stage: The next step of the vehicle.
         words: The autopilot's texts of severity warning or worse.
         maneuvers: The planned maneuvers; `None`: no maneuvers.
+        known_drag: What is known of this vehicle's drag.
     """
 
     autopilot: Autopilot
@@ -149,6 +151,7 @@ class Evidence:
     stage: Stage = Stage.GROUND
     words: tuple[str, ...] = ()
     maneuvers: ManeuverSequence | None = None
+    known_drag: KnownDrag = field(default_factory=KnownDrag)
 
     @property
     def awaits_position(self) -> bool:

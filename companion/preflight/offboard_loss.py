@@ -5,7 +5,6 @@ from math import exp, hypot
 from typing import NamedTuple
 
 from companion.config import Config
-from companion.config.known_drag import of_vehicle
 from companion.drag import Drag
 from companion.guidance import ManeuverSequence, Pose, Reference
 from companion.guidance.fence import Fence
@@ -54,7 +53,7 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
     held = evidence.survey.values.get(failsafe.parameter)
     if maneuvers is None or held is None or not 0.0 <= held <= LONGEST_HELD:
         return  # an unknown or longer time is unsafe, whatever is flown
-    drag = of_vehicle(config, evidence.identity.uid).least
+    drag = evidence.known_drag.least
     worst = worst_reach(config, maneuvers, held, drag, brakes=failsafe.brakes)
     carried = (
         f"should our setpoints end, the last rates are held for {held:g} s "

@@ -89,12 +89,14 @@ async def gather(
         resets=listener.resets,
         identity=identity,
         stage=stage,
-        words=tuple(
-            text.text
-            for text in link.state.texts
-            if text.severity <= _WARNING and text.time >= began
-        ),
+        words=_warnings(link, began),
     )
+
+
+def _warnings(link: Link, since: float) -> tuple[str, ...]:
+    """The autopilot's texts of severity warning or worse since this time, s."""
+    texts = (text for text in link.state.texts if text.severity <= _WARNING)
+    return tuple(text.text for text in texts if text.time >= since)
 
 
 async def identify(link: Link) -> Identity:

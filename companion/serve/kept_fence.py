@@ -1,6 +1,10 @@
 """Keeps the fence of served flights in place until the vehicle is disarmed."""
 
+from math import dist
+
 from companion.config import Config
+from companion.control.estimator_resets import EstimatorResets
+from companion.guidance.reference import Vector
 from companion.safety.snapshot_builder import FenceCentre
 from companion.safety.table import fence_of
 from companion.vehicle.link import Link
@@ -11,41 +15,74 @@ class KeptFence:
 
     Otherwise a client could move the fence by releasing control and requesting it again.
 
+    A vehicle does not move when its estimator resets the position, or when somebody sets another
+    origin of its local frame. So the centre moves with these jumps, as it does in flight, and the
+    fence stays where it is over the ground. After jumps of more than `safety.max_reset_m`, which
+    would end a flight, control is refused: the position before them may have been wrong.
+
     Args:
         config: configuration of the vehicle.
         link: link to the vehicle.
-
-    Attributes:
-        centre: centre of the fence in the first flight since the vehicle was armed; None: none yet.
     """
 
     def __init__(self, config: Config, link: Link) -> None:
-        self.centre: FenceCentre | None = None
+        self._kept: FenceCentre | None = None
         self._fence, self._state = fence_of(config), link.state
+        self._most_shift = config.safety.max_reset_m
+        self._resets = EstimatorResets()
+        self._shift_when_kept: Vector = (0.0, 0.0, 0.0)
         link.subscribe("HEARTBEAT", self._forget_if_disarmed)
+        link.subscribe("LOCAL_POSITION_NED", self._find_jump)
+
+    @property
+    def centre(self) -> FenceCentre | None:
+        """Centre of the fence in the first flight since the vehicle was armed; None: none yet.
+
+        It is given in the autopilot's present local frame.
+        """
+        if self._kept is None:
+            return None
+        north, east, down = (
+            kept + shift - before
+            for kept, shift, before in zip(
+                self._kept.position_ned, self._resets.shift, self._shift_when_kept, strict=True
+            )
+        )
+        return self._kept._replace(position_ned=(north, east, down))
 
     def keep(self, centre: FenceCentre | None) -> None:
         """Keep the centre of a flight that has ended; an earlier flight's centre takes precedence.
 
         Nothing is kept if the vehicle is disarmed.
         """
-        if self.centre is None and self._state.armed is not False:
-            self.centre = centre
+        if self._kept is None and self._state.armed is not False:
+            self._kept, self._shift_when_kept = centre, self._resets.shift
 
     def refusal(self) -> str | None:
         """Why control must not begin at the present position, outside the fence; else None."""
-        position = self._state.position
-        if self.centre is None or position is None:
+        position, kept = self._state.position, self.centre
+        if kept is None or position is None:
             return None
+        shift = dist(self._resets.shift, self._shift_when_kept)
+        if shift > self._most_shift:
+            return (
+                f"the estimator has moved the position by {shift:.1f} m since the first flight, "
+                "more than safety.max_reset_m, so it is not certain where the fence lies; land and "
+                "disarm"
+            )
         north, east, down = (
             here - centre
-            for here, centre in zip(position.position_ned, self.centre.position_ned, strict=True)
+            for here, centre in zip(position.position_ned, kept.position_ned, strict=True)
         )
-        breach = self._fence.breach((north, east, down), self._state.height, self.centre.place)
+        breach = self._fence.breach((north, east, down), self._state.height, kept.place)
         if breach is None:
             return None
         return f"outside the fence of the first flight: {breach}; fly back, or land and disarm"
 
     def _forget_if_disarmed(self, _: object) -> None:
         if self._state.armed is False:
-            self.centre = None
+            self._kept = None
+
+    def _find_jump(self, _: object) -> None:
+        if self._state.position is not None:
+            self._resets.without_jumps(self._state.position)

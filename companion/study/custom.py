@@ -33,6 +33,9 @@ from companion.study.methods import BY_PLANNER, LIMIT, Method, planner_of
 from companion.study.outcome import Cell, Job, Outcome, Table, Tick
 from companion.study.step import Floats, Response, fly, fly_loop
 
+Flights = dict[tuple[Method, float], Response]
+"""The response of each method at each rate in Hz."""
+
 
 def prepare(case_file: Path) -> Job:
     """Read a case from a file, and return the job that flies it.
@@ -46,7 +49,7 @@ def prepare(case_file: Path) -> Job:
 
 def _run(case: Case, tick: Tick) -> Outcome:
     """Fly the case with each of its methods at each of its rates."""
-    flown: dict[tuple[Method, float], Response] = {}
+    flown: Flights = {}
     for hz in case.rates_hz:
         for method in (m for name, m in BY_PLANNER.items() if name in case.methods):
             tick(f"{method.label} at {hz:g} Hz")
@@ -60,44 +63,48 @@ def _run(case: Case, tick: Tick) -> Outcome:
             f"Every method at {case.rates_hz[0]:g} Hz, at the heading with its largest cross-track."
             f" The reference is {_reference_words(case)}."
         ),
-        tables=(
-            Table(
-                "custom",
-                "The custom case; largest values over"
-                f" {_count(case.headings_deg, 'heading')}, rates as commanded.",
-                (
-                    "method",
-                    "rate, Hz",
-                    "cross-track",
-                    f"largest deviation from {_reference_words(case)}",
-                    "time to 5 %, s",
-                    "largest √(ω_x²+ω_y²), rad/s",
-                    "difference between headings",
-                ),
-                tuple(
-                    (
-                        method.label,
-                        hz,
-                        float(cross_track(response).max()),
-                        float(largest_deviation(response, _reference(case, hz)).max()),
-                        float(time_to(response).max()),
-                        largest_tilt_rate(response),
-                        heading_effect(response),
-                    )
-                    for (method, hz), response in flown.items()
-                ),
-            ),
+        tables=(_results(case, flown),),
+        series=(_responses(case, flown),),
+    )
+
+
+def _results(case: Case, flown: Flights) -> Table:
+    """The largest values of each method at each rate."""
+    return Table(
+        "custom",
+        "The custom case; largest values over"
+        f" {_count(case.headings_deg, 'heading')}, rates as commanded.",
+        (
+            "method",
+            "rate, Hz",
+            "cross-track",
+            f"largest deviation from {_reference_words(case)}",
+            "time to 5 %, s",
+            "largest √(ω_x²+ω_y²), rad/s",
+            "difference between headings",
         ),
-        series=(
-            Table(
-                "custom-response",
-                "Every sample of every response; rates are held until the next sample.",
-                ("method", "rate, Hz", "heading, °", "time, s", "a_N", "a_E", "ω_x", "ω_y", "ω_z"),
-                tuple(
-                    row for key, response in flown.items() for row in _samples(case, *key, response)
-                ),
-            ),
+        tuple(
+            (
+                method.label,
+                hz,
+                float(cross_track(response).max()),
+                float(largest_deviation(response, _reference(case, hz)).max()),
+                float(time_to(response).max()),
+                largest_tilt_rate(response),
+                heading_effect(response),
+            )
+            for (method, hz), response in flown.items()
         ),
+    )
+
+
+def _responses(case: Case, flown: Flights) -> Table:
+    """Every sample of every response."""
+    return Table(
+        "custom-response",
+        "Every sample of every response; rates are held until the next sample.",
+        ("method", "rate, Hz", "heading, °", "time, s", "a_N", "a_E", "ω_x", "ω_y", "ω_z"),
+        tuple(row for key, response in flown.items() for row in _samples(case, *key, response)),
     )
 
 
@@ -155,7 +162,7 @@ def _conditions(case: Case) -> str:
     )
 
 
-def _figure(case: Case, flown: dict[tuple[Method, float], Response]) -> Figure:
+def _figure(case: Case, flown: Flights) -> Figure:
     hz = case.rates_hz[0]
     step, reference = case.step(hz), _reference(case, hz)
     shown = {method: response for (method, rate), response in flown.items() if rate == hz}

@@ -39,19 +39,49 @@ Below them
 In pytest the fixture `mock_vehicle` makes vehicles.
 """
 
-# Without `__all__`: see `companion.attitude`.
-from companion.testing.conformance import check_guidance as check_guidance
-from companion.testing.conformance import check_planner as check_planner
-from companion.testing.flying import UnseenError as UnseenError
-from companion.testing.flying import connect as connect
-from companion.testing.flying import environment as environment
-from companion.testing.flying import fly as fly
-from companion.testing.flying import run as run
-from companion.testing.flying import session as session
-from companion.testing.serving import Program as Program
-from companion.testing.serving import serving as serving
-from companion.testing.vehicle import MockVehicle as MockVehicle
-from companion.testing.vehicle import ReceivedSetpoint as ReceivedSetpoint
-from companion.testing.virtual_loop import VirtualEventLoop as VirtualEventLoop
-from companion.testing.wire import open_wire as open_wire
-from sitl_mock.control_channel import Truth as Truth
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+# Without `__all__`: see `companion.attitude`. pytest imports this package in every environment that
+# has it, for the fixture, so its modules are imported when a name of theirs is first used.
+if TYPE_CHECKING:
+    from companion.testing.client_programs import Program as Program
+    from companion.testing.client_programs import serving as serving
+    from companion.testing.conformance import check_guidance as check_guidance
+    from companion.testing.conformance import check_planner as check_planner
+    from companion.testing.flying import UnseenError as UnseenError
+    from companion.testing.flying import connect as connect
+    from companion.testing.flying import environment as environment
+    from companion.testing.flying import fly as fly
+    from companion.testing.flying import run as run
+    from companion.testing.flying import session as session
+    from companion.testing.setpoints import ReceivedSetpoint as ReceivedSetpoint
+    from companion.testing.vehicle import MockVehicle as MockVehicle
+    from companion.testing.virtual_loop import VirtualEventLoop as VirtualEventLoop
+    from companion.testing.wire import open_wire as open_wire
+    from sitl_mock.control_channel import Truth as Truth
+
+_NAMES = {
+    "companion.testing.client_programs": ("Program", "serving"),
+    "companion.testing.conformance": ("check_guidance", "check_planner"),
+    "companion.testing.flying": ("UnseenError", "connect", "environment", "fly", "run", "session"),
+    "companion.testing.setpoints": ("ReceivedSetpoint",),
+    "companion.testing.vehicle": ("MockVehicle",),
+    "companion.testing.virtual_loop": ("VirtualEventLoop",),
+    "companion.testing.wire": ("open_wire",),
+    "sitl_mock.control_channel": ("Truth",),
+}
+_MODULE_OF = {name: module for module, names in _NAMES.items() for name in names}
+
+
+def __getattr__(name: str) -> object:
+    """Import one of the public names when a program first uses it."""
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(_MODULE_OF[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    """The public names, imported or not."""
+    return sorted({*globals(), *_MODULE_OF})

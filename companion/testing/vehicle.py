@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from pymavlink.dialects.v20 import common
 
 from companion.extras import require
+from companion.testing.setpoints import ReceivedSetpoint, received_setpoint
 from sitl_mock.control_channel import Truth, add_fault, truth
 from sitl_mock.exchange import Arrived, Exchange
 from sitl_mock.link.framing import decode
@@ -30,22 +31,6 @@ def _plant(compiled: bool) -> type[Plant]:
     from sitl_mock.physics.compiled import CompiledPlant  # noqa: PLC0415  imports numba
 
     return CompiledPlant
-
-
-class ReceivedSetpoint(NamedTuple):
-    """A SET_ATTITUDE_TARGET that reached the autopilot.
-
-    Attributes:
-        time: vehicle time when it was handled, s.
-        answers: its `time_boot_ms`, the time stamp of the answered sample, ms.
-        rates: body rates about x, y, z (FRD), rad/s.
-        thrust: 0..1.
-    """
-
-    time: float
-    answers: int
-    rates: tuple[float, float, float]
-    thrust: float
 
 
 class MockVehicle:
@@ -248,9 +233,6 @@ class MockVehicle:
         return datagrams if relay is None else [out for one in datagrams for out in relay(one)]
 
     def _note(self, message: Any) -> None:
-        if message.get_type() == "SET_ATTITUDE_TARGET":
-            rates = message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate
-            time = self._simulation.time_us / 1e6
-            self.setpoints.append(
-                ReceivedSetpoint(time, message.time_boot_ms, rates, message.thrust)
-            )
+        setpoint = received_setpoint(message, self.time)
+        if setpoint is not None:
+            self.setpoints.append(setpoint)

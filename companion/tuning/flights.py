@@ -12,10 +12,11 @@ from companion.config import Config
 from companion.config.files import changed, load, shipped
 from companion.testing import MockVehicle, fly
 
+_Rows = np.ndarray[Any, np.dtype[np.float64]]
+
 GUSTS: Mapping[str, float] = {"speed_m_s": 3.0, "gust_m_s": 1.0}
 """Wind of the flights in gusts, m/s: mean and standard deviation."""
-_MAX_TILT, _MAX_TILT_RATE, _MAX_THRUST = 54.0, 135.0, 0.95
-"""Smallest limits for the figure-eight: °, °/s and normalised thrust."""
+_MAX_THRUST = 0.95
 _FENCE = 50.0
 _WIRE_S = 0.0005
 _TRUTH_EVERY = 5
@@ -60,6 +61,7 @@ class Flown:
         estimate: RMS of the distance between true and estimated position, m; no setting reduces it.
         rate: commanded roll and pitch rate, rad/s, RMS.
         rate_limited: share of the setpoints at the rate limit.
+        speed: largest speed of the reference, m/s; lower than the course's if it was slowed down.
     """
 
     result: str
@@ -68,6 +70,7 @@ class Flown:
     estimate: float = nan
     rate: float = nan
     rate_limited: float = nan
+    speed: float = nan
 
     @property
     def ok(self) -> bool:
@@ -84,7 +87,8 @@ def autopilot_like(config: Config) -> str:
 def flown(config: Config, course: Course, autopilot: str, seed: int = 3) -> Flown:
     """Fly a course on the mock vehicle, with this configuration's gains and vehicle times.
 
-    Link, thrust, take-off and limits are those of the mock vehicle and the course.
+    Limits of tilt and tilt rate are the configured ones: a course that needs more is slowed down.
+    Link, thrust, take-off and fence are those of the mock vehicle and the course.
 
     Args:
         config: the configuration.
@@ -111,7 +115,18 @@ def flown(config: Config, course: Course, autopilot: str, seed: int = 3) -> Flow
         summary = fly(told, vehicle)
     if summary.result != "ok":
         return Flown(summary.result)
-    tracking, truth = summary.trace.tracking_rows(), np.array(rows)
+    return _tracking(summary.trace.tracking_rows(), np.array(rows), vehicle, told)
+
+
+def _tracking(tracking: _Rows, truth: _Rows, vehicle: MockVehicle, told: Config) -> Flown:
+    """How a course was tracked while its reference moved.
+
+    Args:
+        tracking: rows of the flight's tracking record.
+        truth: rows of `_truth`.
+        vehicle: vehicle after the flight.
+        told: configuration of the flight.
+    """
     time, reference = tracking[:, 0], tracking[:, 1:3]
     speed = np.hypot(*np.gradient(reference, time, axis=0).T)
     moving = np.flatnonzero(speed > 0.05)
@@ -130,10 +145,11 @@ def flown(config: Config, course: Course, autopilot: str, seed: int = 3) -> Flow
         _rms(true[part] - tracking[part, 4:6]),
         float(np.sqrt(np.mean(rates**2))),
         float(np.mean(rates > 0.99 * limit)),
+        float(speed.max()),
     )
 
 
-def _rms(offsets: np.ndarray[Any, np.dtype[np.float64]]) -> float:
+def _rms(offsets: _Rows) -> float:
     return float(np.sqrt(np.mean(np.sum(offsets**2, axis=1))))
 
 
@@ -157,15 +173,12 @@ def _truth(vehicle: MockVehicle) -> Iterator[list[tuple[float, float, float]]]:
 
 def _configured(config: Config, course: Course, mock: Config) -> Config:
     """The configuration for a flight of the mock vehicle."""
-    limits = config.limits
     return changed(
         config,
         {
             "link": {"signing_key_file": None},
             "thrust": mock.thrust.model_dump(),
             "limits": {
-                "max_tilt_deg": max(limits.max_tilt_deg, _MAX_TILT),
-                "max_tilt_rate_deg_s": max(limits.max_tilt_rate_deg_s, _MAX_TILT_RATE),
                 "max_thrust": _MAX_THRUST,
                 "fence_radius_m": _FENCE,
                 "fence_ceiling_m": _FENCE,
@@ -175,6 +188,7 @@ def _configured(config: Config, course: Course, mock: Config) -> Config:
                 "arm": True,
                 "maneuvers": ("trajectory",),
                 "trajectory": shipped(f"trajectories/{course.trajectory}"),
+                "slow_down": True,
                 "takeoff_height_m": 5.0,
             },
         },

@@ -66,7 +66,11 @@ def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
         f"{3.0 * degrees(before.errors.rate):.0f}°/s"
     )
     if flights:
-        lines += ["", "Flown on the mock vehicle, RMS in m, before -> after:"]
+        lines += [
+            "",
+            "Flown on the mock vehicle within limits.max_tilt_deg and limits.max_tilt_rate_deg_s, "
+            "RMS in m, before -> after:",
+        ]
         lines += [_flight_line(name, *pair) for name, pair in flights.items()]
     return lines
 
@@ -94,7 +98,8 @@ def _flight_line(name: str, before: Flown, after: Flown) -> str:
     if not (before.ok and after.ok):
         return f"{name}: {before.result} -> {after.result}"
     return (
-        f"{name}: reported {before.reported:.3f} -> {after.reported:.3f}, true "
+        f"{name}, flown at up to {after.speed:.1f} m/s: "
+        f"reported {before.reported:.3f} -> {after.reported:.3f}, true "
         f"{before.true:.3f} -> {after.true:.3f} (estimate off by {after.estimate:.3f}), "
         f"rates {degrees(before.rate):.0f} -> {degrees(after.rate):.0f} °/s"
     )

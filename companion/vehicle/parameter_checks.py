@@ -1,6 +1,6 @@
 """Checks of parameter values that both autopilots use."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from math import degrees
 
 from companion.vehicle.parameter_rules import Check, CheckResult, CompanionSettings, Problem, Values
@@ -24,6 +24,24 @@ def forbidden(result: CheckResult, bad: Mapping[float, str], set_to: float | Non
     def check(value: float, _: Values, __: CompanionSettings) -> Problem | None:
         because = bad.get(value)
         return None if because is None else Problem(result, because, set_to)
+
+    return check
+
+
+def action(good: Iterable[float], bad: Mapping[float, str], set_to: float) -> Check:
+    """A check of what the autopilot does in an emergency: only the actions in `good` are safe.
+
+    Args:
+        good: safe actions.
+        bad: unsafe actions, with the consequence of each. An action in neither is unsafe, too.
+        set_to: a safe action to set.
+    """
+    known = frozenset(good)
+
+    def check(value: float, _: Values, __: CompanionSettings) -> Problem | None:
+        if value in known:
+            return None
+        return Problem(UNSAFE, bad.get(value, "companion does not know this action"), set_to)
 
     return check
 

@@ -128,11 +128,7 @@ def drive(
     motion, _, angular_acceleration = body
     _, _, _, w, x, y, z, p, q, r = motion
     if law.shapes:
-        goals = delayed(rings.arrived, law.shaping.delays, step, setpoint)
-        if controlled:
-            setpoint, shaped = shape(law.shaping, shaped, goals, (w, x, y, z))
-        else:
-            shaped = NOT_SHAPED
+        setpoint, shaped = _shaped(law, rings, shaped, (w, x, y, z), step, setpoint, controlled)
     setpoint = delayed(rings.shaped, law.rates.delays, step, setpoint)
     if controlled:
         _, tilt_saturated, yaw_saturated = mixed
@@ -147,20 +143,42 @@ def drive(
         )
     else:
         axes = ZERO_STATE
+    mixed = _mixed(law, axes, throttle)
+    thrusts, wrench = rotor_step(law.rotors, thrusts, mixed[0], thrust_factor)
+    return _load(law, wrench, wind), (mixed, thrusts, axes, shaped)
+
+
+def _shaped(
+    law: MultirotorLaw,
+    rings: Rings,
+    shaped: Shaped,
+    q: Quaternion,
+    step: int,
+    setpoint: Vector,
+    controlled: bool,
+) -> tuple[Vector, Shaped]:
+    """Shape a setpoint that has arrived; without control the shaping begins anew."""
+    goals = delayed(rings.arrived, law.shaping.delays, step, setpoint)
+    if controlled:
+        return shape(law.shaping, shaped, goals, q)
+    return setpoint, NOT_SHAPED
+
+
+def _mixed(law: MultirotorLaw, axes: Axes, throttle: float) -> Mix:
+    """Allocate torques and throttle to the rotors."""
     # A NaN throttle fails this comparison, which stops the rotors.
     if throttle > 0.0:
         roll, pitch, yaw = axes
         tilt_torque = law.tilt_torque
-        mixed = mix(
-            throttle, roll[1] / tilt_torque, pitch[1] / tilt_torque, yaw[1] / law.yaw_torque
-        )
-    else:
-        mixed = STOPPED
-    thrusts, wrench = rotor_step(law.rotors, thrusts, mixed[0], thrust_factor)
+        return mix(throttle, roll[1] / tilt_torque, pitch[1] / tilt_torque, yaw[1] / law.yaw_torque)
+    return STOPPED
+
+
+def _load(law: MultirotorLaw, wrench: Four, wind: Vector) -> Load:
+    """Return the load on the body: of the rotors, and of the wind."""
     thrust, torque_x, torque_y, torque_z = wrench
     wind_n, wind_e, wind_d = wind
-    load = (thrust / law.mass, torque_x, torque_y, torque_z, wind_n, wind_e, wind_d)
-    return load, (mixed, thrusts, axes, shaped)
+    return thrust / law.mass, torque_x, torque_y, torque_z, wind_n, wind_e, wind_d
 
 
 def move(law: MultirotorLaw, body: Kinematics, load: Load) -> tuple[Kinematics, Vector]:

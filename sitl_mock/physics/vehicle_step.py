@@ -20,6 +20,7 @@ from sitl_mock.physics.multirotor_step import (
 )
 from sitl_mock.physics.navigation_error import Trail, TrailRow
 from sitl_mock.physics.quaternion import Vector
+from sitl_mock.physics.rigid_body import Load
 from sitl_mock.physics.sensors import Estimate, SensorLaw, SensorState, estimate, white_noise
 
 
@@ -93,12 +94,11 @@ def advance(
         count: number of steps.
     """
     steps, body, actuation, position, on_ground, crashed, touchdown_speed = state
-    multirotor, ground = law
     armed, roll, pitch, yaw, thrust = command
     length = len(trail)
     for _ in range(count):
         load, actuation = drive(
-            multirotor,
+            law.multirotor,
             rings,
             actuation,
             body,
@@ -110,25 +110,39 @@ def advance(
             air.wind,
         )
         steps += 1
-        _, _, _, w, x, y, z, _, _, _ = body[0]
-        if crashed:
-            body = at_rest((w, x, y, z))
-        elif on_ground and sinks(multirotor, body, load):
-            body = at_rest(levelled(ground, (w, x, y, z)))
-        else:
-            on_ground = False
-            body, moved = move(multirotor, body, load)
-            north, east, down = position
-            position = (north + moved[0], east + moved[1], down + moved[2])
-            _, _, sink_speed, w, x, y, z, _, _, _ = body[0]
-            if position[2] >= 0.0 and sink_speed > 0.0:
-                touchdown_speed = sink_speed
-                on_ground = True
-                crashed = not survives(ground, (w, x, y, z), sink_speed)
-                position = (position[0], position[1], 0.0)
-                body = at_rest((w, x, y, z))
+        body, position, on_ground, crashed, touchdown_speed = _settled(
+            law, body, position, on_ground, crashed, touchdown_speed, load
+        )
         trail[steps % length] = trail_row(body, position)
     return VehicleState(steps, body, actuation, position, on_ground, crashed, touchdown_speed)
+
+
+def _settled(
+    law: VehicleLaw,
+    body: Kinematics,
+    position: Vector,
+    on_ground: bool,
+    crashed: bool,
+    touchdown_speed: float,
+    load: Load,
+) -> tuple[Kinematics, Vector, bool, bool, float]:
+    """Return motion, position and contact with the ground after one step under this load."""
+    multirotor, ground = law
+    _, _, _, w, x, y, z, _, _, _ = body[0]
+    if crashed:
+        return at_rest((w, x, y, z)), position, on_ground, crashed, touchdown_speed
+    if on_ground and sinks(multirotor, body, load):
+        body = at_rest(levelled(ground, (w, x, y, z)))
+        return body, position, on_ground, crashed, touchdown_speed
+    body, moved = move(multirotor, body, load)
+    north, east, down = position
+    position = (north + moved[0], east + moved[1], down + moved[2])
+    _, _, sink_speed, w, x, y, z, _, _, _ = body[0]
+    if position[2] >= 0.0 and sink_speed > 0.0:
+        crashed = not survives(ground, (w, x, y, z), sink_speed)
+        body, position = at_rest((w, x, y, z)), (position[0], position[1], 0.0)
+        return body, position, True, crashed, sink_speed
+    return body, position, False, crashed, touchdown_speed
 
 
 Outcome = tuple[bool, bool, float]

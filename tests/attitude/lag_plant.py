@@ -35,6 +35,7 @@ class LagPlant:
 
     def hold(self, command, dt, push=0.0):
         """Hold `command` (N, 3) for `dt`; `push` (rad/s) turns the body without its rate loop."""
+        self._forget()
         self._times = np.append(self._times, self._time)
         self._commands.append(np.asarray(command, dtype=float))
         steps = int(np.ceil(dt / LONGEST_STEP - 1e-9))
@@ -49,11 +50,18 @@ class LagPlant:
         before, after = commands[which, row, column], commands[later, row, column]
         turns = np.empty_like(now)
         for step in range(steps):
-            turned = self._answer(before[step], first[step])
-            turns[step] = turned + self._answer(after[step], h - first[step])
+            turns[step] = self._answer(before[step], first[step])
+            if (first[step] < h).any():
+                turns[step] += self._answer(after[step], h - first[step])
         self.r = self.r * one_after_the_other(turns + np.asarray(push) * h)
         self._time += dt
         self.true_rates = self.rates + push
+
+    def _forget(self):
+        """Forget the commands that no axis can answer any more, or each step would cost more."""
+        over = np.searchsorted(self._times, self._time - self._dead_time.max(), side="right") - 1
+        if over > 0:
+            self._times, self._commands = self._times[over:], self._commands[over:]
 
     def _answer(self, command, seconds):
         """Rates after so many seconds of a steady command; returns their integral."""

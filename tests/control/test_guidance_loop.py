@@ -101,11 +101,11 @@ def test_a_doublets_rates_go_to_the_loop_and_hold_gives_it_a_target():
 def test_a_doublet_that_tilts_too_far_is_given_up_for_good():
     bench = Bench()
     bench.fly(IN_FIRST_DOUBLET, tilt=29.0)
-    assert bench.guidance_loop.given_up is None
+    assert bench.guidance_loop.hold.given_up is None
     command = bench.fly(IN_FIRST_DOUBLET + 0.02, tilt=31.0)
     assert command.body_rates is None
     assert (
-        bench.guidance_loop.given_up
+        bench.guidance_loop.hold.given_up
         == "identify was given up at 31° of tilt, more than limits.max_tilt_deg"
     )
     assert bench.guidance_loop.flown.pose.position_ned == pytest.approx(HERE, abs=0.01)
@@ -157,13 +157,13 @@ def test_an_old_attitude_does_not_replace_a_newer_one():
     old = AttitudeSample(0, reading.vehicle_time, bench.now, 0, tilted, still, *reading[1:])
     bench.guidance_loop.note_attitude(old)
     bench.guidance_loop.step()
-    assert bench.guidance_loop.given_up is None
+    assert bench.guidance_loop.hold.given_up is None
 
 
 def test_position_hold_may_tilt_as_it_must():
     bench = Bench()
     bench.fly(IN_HOLD, tilt=31.0)
-    assert bench.guidance_loop.given_up is None
+    assert bench.guidance_loop.hold.given_up is None
 
 
 @pytest.mark.parametrize(
@@ -202,7 +202,7 @@ def test_a_command_tells_when_it_was_made_and_where_its_target_moves():
 def test_what_a_phase_tells_guidance():
     bench, elsewhere = Bench(), (0.0, 4.0, -5.0)
     guidance = bench.guidance_loop
-    assert (guidance.bound_to_hold, guidance.given_up) == (False, None)
+    assert (guidance.bound_to_hold, guidance.hold.given_up) == (False, None)
     source = guidance.flown.source
     bench.fly(IN_HOLD, elsewhere)
     assert guidance.motion_now().position_ned == pytest.approx(elsewhere, abs=0.01)
@@ -230,7 +230,7 @@ def test_a_guidance_loop_knows_nothing_before_its_first_step():
     guidance = Bench(begun=False).guidance_loop
     with pytest.raises(RuntimeError, match="before any position came"):
         guidance.hold_here()
-    assert (guidance.motion, guidance.off_course, guidance.given_up) == (None, None, None)
+    assert (guidance.motion, guidance.off_course, guidance.hold.given_up) == (None, None, None)
     assert guidance.attitude() == (1.0, 0.0, 0.0, 0.0)
 
 

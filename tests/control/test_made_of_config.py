@@ -74,10 +74,11 @@ def retuned(values):
     guidance_loop = SimpleNamespace(
         maker=SimpleNamespace(guidance=guidance),
         estimate=SimpleNamespace(retune=lambda settings: seen.update(observer=settings)),
+        hold=SimpleNamespace(),
     )
     loop = SimpleNamespace(retune=lambda *law: seen.update(law=law))
     Retuning(loop, guidance_loop).apply(values)
-    return {**seen, "guidance": guidance._settings, "max_tilt": guidance_loop.max_tilt}
+    return {**seen, "guidance": guidance._settings, "max_tilt": guidance_loop.hold.max_tilt}
 
 
 def test_a_change_of_values_reaches_both_loops():
@@ -193,7 +194,7 @@ def test_both_loops_are_made_and_answer_a_sample():
     assert loop._deadlines == Deadlines(telemetry_stale=0.09, target_stale=0.14, deadline=0.003)
     assert loop._limits == Limits(radians(30.0), radians(80.0), radians(50.0))
     assert loop._hover_thrust is guidance_loop.learning._hover_thrust
-    assert guidance_loop.max_tilt == pytest.approx(radians(30.0))
+    assert guidance_loop.hold.max_tilt == pytest.approx(radians(30.0))
     assert loop.command.period == pytest.approx(0.025)
     now = 10.25
     assert guidance_loop.fresh_position() is vehicle.position

@@ -126,13 +126,17 @@ def mock_vehicle(folder=None, *, in_lockstep=False, autopilot="px4", delay_s=WIR
     yield QuickVehicle(autopilot, delay_s=delay_s, lockstep=stepping, **settings)
 
 
-def session_for(mock, folder: Path, observer=None, ask_landing=None, **changes):
+def session_for(mock, folder: Path | None = None, observer=None, ask_landing=None, **changes):
     config = quick_flight(mock.autopilot, changes, attitude_rate_hz=attitude_rate_hz(mock))
     return testing.session(config, mock, folder, observer, ask_landing)
 
 
-def fly(mock, folder: Path, observer=None, ask_landing=None, **changes):
-    """One flight; returns its summary."""
+def fly(mock, folder: Path | None = None, observer=None, ask_landing=None, **changes):
+    """One flight; returns its summary.
+
+    Without a folder nothing is recorded, which is a fifth of a flight's cost. Recorded are those
+    flights whose files a test reads, each fault of `test_faults` among them.
+    """
     return testing.run(mock, session_for(mock, folder, observer, ask_landing, **changes).fly())
 
 

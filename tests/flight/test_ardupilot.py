@@ -114,7 +114,7 @@ def test_a_pilot_who_takes_over_is_not_fought(tmp_path):
     assert (state["armed"], state["mode"]) == (True, "LOITER")
 
 
-def test_a_take_off_whose_answer_was_lost_is_not_repeated_once_it_flies(tmp_path, monkeypatch):
+def test_a_take_off_whose_answer_was_lost_is_not_repeated_once_it_flies(monkeypatch):
     acks, heard, sent = [], CommandClient._on_ack, CommandClient.send
 
     def hear(client, message):
@@ -131,8 +131,8 @@ def test_a_take_off_whose_answer_was_lost_is_not_repeated_once_it_flies(tmp_path
 
     monkeypatch.setattr(CommandClient, "_on_ack", hear)
     monkeypatch.setattr(CommandClient, "send", send)
-    with mock_vehicle(tmp_path, autopilot="ardupilot") as mock:
-        summary = fly(mock, tmp_path / "log")
+    with mock_vehicle(autopilot="ardupilot") as mock:
+        summary = fly(mock)
     assert acks == [0]  # MAV_RESULT: accepted
     assert summary.result == "ok", summary.events
 

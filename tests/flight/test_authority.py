@@ -115,13 +115,13 @@ def test_interrupted_in_an_emergency_landing_it_goes_on_landing(tmp_path):
     assert (state["armed"], state["on_ground"], state["crashed"]) == (False, True, False)
 
 
-def test_an_error_of_ours_in_flight_hands_back_and_lands(tmp_path, monkeypatch):
+def test_an_error_of_ours_in_flight_hands_back_and_lands(monkeypatch):
     def broken(guidance_loop, maneuvers):
         raise ZeroDivisionError("a fault of ours")
 
     monkeypatch.setattr(GuidanceLoop, "follow", broken)
-    with mock_vehicle(tmp_path) as mock:
-        summary = fly(mock, tmp_path / "log")
+    with mock_vehicle() as mock:
+        summary = fly(mock)
         state = mock.state()
     assert summary.result == "internal error: ZeroDivisionError('a fault of ours')"
     assert (state["armed"], state["on_ground"], state["crashed"]) == (False, True, False)
@@ -157,11 +157,11 @@ def test_a_mode_that_is_not_told_any_more_lets_the_vehicle_go(tmp_path):
     assert not [command for at, command, _ in commands(summary) if at > took_over + 1.0]
 
 
-def test_without_heartbeats_the_vehicle_is_let_go_though_its_mode_is_told(tmp_path):
+def test_without_heartbeats_the_vehicle_is_let_go_though_its_mode_is_told():
     """Only they tell whether it is armed."""
     fault = {"kind": "stop_telemetry", "messages": ["HEARTBEAT"], "after_offboard_s": 2.0}
-    with mock_vehicle(tmp_path, faults=[fault]) as mock:
-        summary = fly(mock, tmp_path / "log", hover={"duration_s": 9.0})
+    with mock_vehicle(faults=[fault]) as mock:
+        summary = fly(mock, hover={"duration_s": 9.0})
     assert "whether it is armed is not known" in summary.result
     assert summary.events[-1][1] == Exit.RELEASE.value
 
@@ -177,11 +177,11 @@ def test_a_pilot_whose_takeover_cannot_be_heard_is_not_overruled(tmp_path):
     assert {command for at, command, _ in commands(summary) if at > took_over + 1.0} <= {512}
 
 
-def test_a_link_lost_in_the_takeoff_is_told_at_once_and_lets_go(tmp_path):
-    with mock_vehicle(tmp_path) as mock:
+def test_a_link_lost_in_the_takeoff_is_told_at_once_and_lets_go():
+    with mock_vehicle() as mock:
         cut = {"kind": "drop", "direction": "to_companion"}
         observer = When("takeoff", lambda: mock.inject(cut), after=1.0)
-        summary = fly(mock, tmp_path / "log", observer)
+        summary = fly(mock, None, observer)
         assert mock.state()["armed"]
     assert (summary.phase, "no heartbeat" in summary.result) == ("takeoff", True)
     began = next(at for at, text in summary.events if "TAKEOFF" in text)
@@ -275,7 +275,7 @@ def test_a_vehicle_that_does_not_say_it_stands_is_not_armed(tmp_path):
     with mock_vehicle(tmp_path, faults=[silent]) as mock:
         summary = fly(mock, tmp_path / "log", flight={"arming_timeout_s": 3.0})
         assert not mock.state()["armed"]
-    assert "stands on the ground" in summary.result
+    assert "does not report that the vehicle is on the ground" in summary.result
     assert ARM not in [command for _, command, _ in commands(summary)]
 
 
@@ -295,7 +295,7 @@ def test_a_hold_near_the_top_of_the_climb_is_respected(tmp_path, monkeypatch):
     assert LAND not in [command for _, command, _ in commands(summary)]
 
 
-def test_a_pilots_mode_just_before_the_end_is_seen_before_the_hand_back(tmp_path, monkeypatch):
+def test_a_pilots_mode_just_before_the_end_is_seen_before_the_hand_back(monkeypatch):
     """The newest heartbeat is a tenth of a second old, and we know better only if we ask."""
     hand_back = control_phases.hand_back
 
@@ -305,8 +305,8 @@ def test_a_pilots_mode_just_before_the_end_is_seen_before_the_hand_back(tmp_path
         await hand_back(context)
 
     monkeypatch.setattr(control_phases, "hand_back", taking)
-    with mock_vehicle(tmp_path) as mock:
-        summary = fly(mock, tmp_path / "log")
+    with mock_vehicle() as mock:
+        summary = fly(mock)
         assert mock.state()["mode"] == "POSCTL"
     assert "took over: mode POSCTL" in summary.result
 
@@ -321,19 +321,19 @@ def test_a_vehicle_whose_home_is_elsewhere_is_not_taken_off_with(tmp_path, monke
     assert TAKEOFF not in [command for _, command, _ in commands(summary)]
 
 
-def test_a_link_that_is_always_late_is_refused_before_takeoff(tmp_path):
+def test_a_link_that_is_always_late_is_refused_before_takeoff():
     late = {"kind": "delay", "delay_ms": 300.0, "direction": "to_companion"}
-    with mock_vehicle(tmp_path, faults=[late]) as mock:
-        summary = fly(mock, tmp_path / "log")
+    with mock_vehicle(faults=[late]) as mock:
+        summary = fly(mock)
         assert not mock.state()["armed"]
     assert summary.phase == "checks"
     assert "round trip" in summary.result
 
 
-def test_without_being_told_to_it_waits_for_the_pilot_to_arm(tmp_path):
-    with mock_vehicle(tmp_path) as mock:
+def test_without_being_told_to_it_waits_for_the_pilot_to_arm():
+    with mock_vehicle() as mock:
         observer = When("arm", lambda: mock.command(ARM, 1), after=3.0)
-        summary = fly(mock, tmp_path / "log", observer, flight={"arm": False})
+        summary = fly(mock, None, observer, flight={"arm": False})
     assert summary.result == "ok", summary.events
     assert next(at for at, text in summary.events if text == "armed") > 5.0
 
@@ -352,9 +352,9 @@ def test_a_pilot_who_arms_in_another_mode_is_waited_for_and_not_taken_off_with(t
     assert {command for _, command, _ in commands(summary)} <= {511, 512}
 
 
-def test_if_the_pilot_does_not_arm_nothing_happens(tmp_path):
-    with mock_vehicle(tmp_path) as mock:
-        summary = fly(mock, tmp_path / "log", flight={"arm": False, "arming_timeout_s": 2.0})
+def test_if_the_pilot_does_not_arm_nothing_happens():
+    with mock_vehicle() as mock:
+        summary = fly(mock, flight={"arm": False, "arming_timeout_s": 2.0})
         assert not mock.state()["armed"]
     assert summary.phase == "arm"
     assert "the pilot to arm" in summary.result
@@ -371,10 +371,10 @@ def test_a_vehicle_that_is_armed_already_is_not_touched(tmp_path):
     assert after["setpoints"] == before["setpoints"]
 
 
-def test_the_pilot_takes_over_during_the_takeoff(tmp_path):
-    with mock_vehicle(tmp_path) as mock:
+def test_the_pilot_takes_over_during_the_takeoff():
+    with mock_vehicle() as mock:
         observer = When("takeoff", mock.take_over, after=1.0)
-        summary = fly(mock, tmp_path / "log", observer)
+        summary = fly(mock, None, observer)
         state = mock.state()
     assert summary.result == "the pilot or another station took over: mode POSCTL"
     assert summary.phase == "takeoff"
@@ -401,7 +401,7 @@ def test_leaving_the_fence_lands_and_leaves_the_vehicle_in_hold(tmp_path):
     assert (state["mode"], state["on_ground"], state["crashed"]) == ("LOITER", True, False)
 
 
-def test_an_autopilot_that_gives_no_heartbeat_on_demand_is_waited_for(tmp_path, monkeypatch):
+def test_an_autopilot_that_gives_no_heartbeat_on_demand_is_waited_for(monkeypatch):
     command = Link.command
 
     async def refuse(link, number, *parameters, **options):
@@ -410,19 +410,19 @@ def test_an_autopilot_that_gives_no_heartbeat_on_demand_is_waited_for(tmp_path, 
         await command(link, number, *parameters, **options)
 
     monkeypatch.setattr(Link, "command", refuse)
-    with mock_vehicle(tmp_path) as mock:
-        summary = fly(mock, tmp_path / "log")
+    with mock_vehicle() as mock:
+        summary = fly(mock)
         assert not mock.state()["crashed"]
     assert summary.result == "ok", summary.events
 
 
-def test_a_hold_that_is_refused_becomes_a_landing(tmp_path, monkeypatch):
+def test_a_hold_that_is_refused_becomes_a_landing(monkeypatch):
     """Interrupted, and the autopilot does not hold: it must not be left to its last rates."""
     monkeypatch.setattr(Px4, "hold", lambda _: Command(MAV_CMD_DO_SET_MODE, 1.0, 99.0))
     monkeypatch.setattr(Px4, "arm", lambda _: (Command(MAV_CMD_COMPONENT_ARM_DISARM, 1.0),))
-    with mock_vehicle(tmp_path) as mock:
+    with mock_vehicle() as mock:
         observer = When("maneuvers", lambda: session.interrupt("Ctrl-C"), after=1.0)
-        session = session_for(mock, tmp_path / "log", observer)
+        session = session_for(mock, None, observer)
         summary = run(mock, session.fly())
         state = mock.state()
     said = [text for _, text in summary.events]
@@ -430,7 +430,7 @@ def test_a_hold_that_is_refused_becomes_a_landing(tmp_path, monkeypatch):
     assert (state["armed"], state["on_ground"], state["crashed"]) == (False, True, False)
 
 
-def test_an_error_at_every_sample_does_not_stop_the_landing(tmp_path, monkeypatch):
+def test_an_error_at_every_sample_does_not_stop_the_landing(monkeypatch):
     """Guidance and the sample's path are broken for good: the autopilot still is asked to land."""
 
     def broken(*_):
@@ -440,17 +440,17 @@ def test_an_error_at_every_sample_does_not_stop_the_landing(tmp_path, monkeypatc
         monkeypatch.setattr(GuidanceLoop, "hold_here", broken)
         monkeypatch.setattr(GuidanceLoop, "note_attitude", broken)
 
-    with mock_vehicle(tmp_path) as mock:
+    with mock_vehicle() as mock:
         observer = When("maneuvers", breaks, after=1.0)
-        session = session_for(mock, tmp_path / "log", observer)
+        session = session_for(mock, None, observer)
         summary = run(mock, session.fly())
         state = mock.state()
     assert summary.result == "internal error: ZeroDivisionError('a fault of ours')"
     assert (state["armed"], state["on_ground"], state["crashed"]) == (False, True, False)
 
 
-def test_the_vehicle_is_armed_in_a_mode_of_ours(tmp_path):
+def test_the_vehicle_is_armed_in_a_mode_of_ours():
     """With the sticks in POSCTL before the checks, as a transmitter leaves it."""
-    with mock_vehicle(tmp_path, faults=[{"kind": "pilot_takeover", "at_s": 0.1}]) as mock:
-        summary = fly(mock, tmp_path / "log", hover={"duration_s": 1.0})
+    with mock_vehicle(faults=[{"kind": "pilot_takeover", "at_s": 0.1}]) as mock:
+        summary = fly(mock, hover={"duration_s": 1.0})
     assert summary.result == "ok", summary.events

@@ -144,9 +144,9 @@ MILD = [
         for fault in MILD
     ],
 )
-def test_a_mild_fault_is_flown_through_and_counted(tmp_path, fault):
-    with mock_vehicle(tmp_path, faults=[{**fault, **CONTROL}]) as mock:
-        summary = fly(mock, tmp_path / "log")
+def test_a_mild_fault_is_flown_through_and_counted(fault):
+    with mock_vehicle(faults=[{**fault, **CONTROL}]) as mock:
+        summary = fly(mock)
         assert summary.result == "ok", summary.events
         assert not mock.state()["crashed"]
     link = summary.link
@@ -162,27 +162,27 @@ def test_a_mild_fault_is_flown_through_and_counted(tmp_path, fault):
     assert summary.counts.setpoints <= summary.counts.samples
 
 
-def test_refused_arming_says_why(tmp_path):
+def test_refused_arming_says_why():
     """It was ready at the checks; its pre-arm checks fail before we arm, so we do not try."""
     refusal = {"kind": "refuse_arming", "reason": "system power unavailable", "at_s": 1.4}
-    with mock_vehicle(tmp_path, faults=[refusal]) as mock:
-        summary = fly(mock, tmp_path / "log")
+    with mock_vehicle(faults=[refusal]) as mock:
+        summary = fly(mock)
         assert not mock.state()["armed"]
     assert summary.phase == "arm"
     assert "not ready to be armed, it lacks the autopilot's pre-arm checks" in summary.result
 
 
-def test_a_vehicle_that_never_gets_ready_is_left_alone(tmp_path):
-    with mock_vehicle(tmp_path, faults=[{"kind": "refuse_arming"}]) as mock:
-        summary = fly(mock, tmp_path / "log", flight={"ready_timeout_s": 3.0})
+def test_a_vehicle_that_never_gets_ready_is_left_alone():
+    with mock_vehicle(faults=[{"kind": "refuse_arming"}]) as mock:
+        summary = fly(mock, flight={"ready_timeout_s": 3.0})
         assert not mock.state()["armed"]
     assert summary.phase == "checks"
     assert "the autopilot's pre-arm checks" in summary.result
 
 
-def test_a_flat_battery_is_not_armed(tmp_path):
-    with mock_vehicle(tmp_path, faults=[{"kind": "low_battery", "remaining": 0.1}]) as mock:
-        summary = fly(mock, tmp_path / "log")
+def test_a_flat_battery_is_not_armed():
+    with mock_vehicle(faults=[{"kind": "low_battery", "remaining": 0.1}]) as mock:
+        summary = fly(mock)
         assert not mock.state()["armed"]
     assert summary.phase == "checks"
     assert "battery at 10 %" in summary.result

@@ -204,10 +204,10 @@ def test_ardupilots_acceleration_limits_are_told_from_its_lags(tmp_path):
     assert vehicle.faults() == {}
 
 
-def test_a_doublet_that_tilts_too_far_is_given_up_and_the_vehicle_lands(tmp_path):
+def test_a_doublet_that_tilts_too_far_is_given_up_and_the_vehicle_lands():
     wind = {"speed_m_s": 5.0}  # it leans by 27° against this wind, and a doublet adds 15°
-    with mock_vehicle(tmp_path, wind=wind) as mock:
-        summary = fly(mock, tmp_path / "log", flight={"maneuvers": ["identify"]})
+    with mock_vehicle(wind=wind) as mock:
+        summary = fly(mock, flight={"maneuvers": ["identify"]})
         assert "identify was given up at 3" in summary.result, summary.events
         assert "° of tilt, more than limits.max_tilt_deg" in summary.result
         assert summary.phase == "maneuvers"

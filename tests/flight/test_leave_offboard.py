@@ -19,15 +19,15 @@ from tests.flight.others import When
 HOLD_ASKED = "disarmed in OFFBOARD, in which it cannot be armed again: asking the autopilot to hold"
 
 
-def test_after_a_failsafe_landing_the_next_flight_begins(tmp_path):
-    with mock_vehicle(tmp_path, parameters={"COM_OBL_RC_ACT": 4}) as mock:
+def test_after_a_failsafe_landing_the_next_flight_begins():
+    with mock_vehicle(parameters={"COM_OBL_RC_ACT": 4}) as mock:
         cut = {"kind": "drop", "duration_s": 3.0}
         observer = When("maneuvers", lambda: mock.inject(cut), after=1.0)
-        first = fly(mock, tmp_path / "first", observer)
+        first = fly(mock, None, observer)
         assert "releasing control" in first.events[-1][1]
         left = mock.until(lambda state: not state["armed"])
         assert (left["mode"], left["crashed"]) == ("OFFBOARD", False)
-        second = fly(mock, tmp_path / "second")
+        second = fly(mock)
     assert second.result == "ok", second.events
     assert HOLD_ASKED in [text for _, text in second.events]
 

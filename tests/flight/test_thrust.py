@@ -150,19 +150,19 @@ def test_a_battery_that_sags_costs_little_height(tmp_path, exponent):
     assert height_errors(summary)[1].max() < (0.06 if exponent else 0.15)
 
 
-def test_a_battery_that_drops_at_once_costs_little_height(tmp_path):
+def test_a_battery_that_drops_at_once_costs_little_height():
     """Acceptance 5 at its worst: 15 % of the thrust are gone from one moment to the next."""
     drop = {"kind": "low_battery", "remaining": 0.455, "after_offboard_s": 4.0}
-    with mock_vehicle(tmp_path, faults=[drop], **SPARSE) as mock:
-        summary = fly(mock, tmp_path / "flight", hover={"duration_s": 7.0})
+    with mock_vehicle(faults=[drop], **SPARSE) as mock:
+        summary = fly(mock, hover={"duration_s": 7.0})
     time, error = height_errors(summary)
     assert error.max() < 0.15
     assert error[time > 6.5].max() < 0.08
 
 
 @pytest.mark.slow
-def test_vertical_gusts_cost_little_height(tmp_path):
-    with mock_vehicle(tmp_path, wind={"vertical_gust_m_s": 0.5}, **SPARSE) as mock:
-        summary = fly(mock, tmp_path / "flight", hover={"duration_s": 12.0})
+def test_vertical_gusts_cost_little_height():
+    with mock_vehicle(wind={"vertical_gust_m_s": 0.5}, **SPARSE) as mock:
+        summary = fly(mock, hover={"duration_s": 12.0})
     assert height_errors(summary)[1].max() < 0.25
     assert summary.tracking()["height_rms_m"] < 0.06

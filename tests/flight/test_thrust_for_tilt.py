@@ -80,13 +80,13 @@ def test_the_curve_and_the_autopilots_own_compensation_count(thrust, fits):
     ],
 )
 def test_a_vehicle_heavier_than_configured_keeps_its_height(
-    tmp_path, autopilot, airframe, expected, max_thrust, hovers
+    autopilot, airframe, expected, max_thrust, hovers
 ):
     """Its hover thrust is learned in the climb; steps at 44° of tilt are flown with less."""
     heavy = {"airframe": airframe, "lockstep": {"period_ms": 8}}
     flight = merged(STEPS, {"limits": {"max_thrust": max_thrust}})
-    with mock_vehicle(tmp_path, autopilot=autopilot, **heavy) as mock:
-        summary = fly(mock, tmp_path / "log", thrust={"hover_thrust": expected}, **flight)
+    with mock_vehicle(autopilot=autopilot, **heavy) as mock:
+        summary = fly(mock, thrust={"hover_thrust": expected}, **flight)
     assert summary.result == "ok", summary.events
     rows = summary.trace.tracking_rows()
     assert np.abs(rows[:, 6] - rows[:, 3]).max() < 0.15, np.abs(rows[:, 6] - rows[:, 3]).max()

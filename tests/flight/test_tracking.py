@@ -79,14 +79,14 @@ def test_a_drag_that_nobody_configured_is_learned_and_told(tmp_path):
     assert re.search(r"guidance.drag_per_s to \d.\d\d and guidance.quadratic_drag_per_m to 0", told)
 
 
-def test_what_the_limits_do_not_allow_is_refused_or_slowed_down(tmp_path):
+def test_what_the_limits_do_not_allow_is_refused_or_slowed_down():
     slow = following("figure8.yaml", limits={"max_tilt_deg": 30})
     with pytest.raises(ConfigError) as refused:
         maneuvers.configured_maneuvers(parse(yaml.safe_dump(slow), "test", Config))
     assert "° of tilt, limits.max_tilt_deg allows 30" in str(refused.value)
     assert "--slow-down" in str(refused.value)
-    with mock_vehicle(tmp_path, seed=3) as mock:
-        summary = fly(mock, tmp_path / "log", **merged(slow, {"flight": {"slow_down": True}}))
+    with mock_vehicle(seed=3) as mock:
+        summary = fly(mock, **merged(slow, {"flight": {"slow_down": True}}))
     assert summary.result == "ok", summary.events
     assert summary.tracking()["position_rms_m"] <= 0.06
     assert any("is slowed down where limits ask for it" in text for _, text in summary.events)

@@ -73,9 +73,9 @@ def test_one_sample_stamped_far_ahead_is_dropped_named_and_flown_on(tmp_path, au
     assert any("3600.0 s ahead of the vehicle's clock was dropped" in t for _, t in summary.events)
 
 
-def test_telemetry_that_is_late_from_the_start_is_refused_where_timesync_tells_it(tmp_path):
+def test_telemetry_that_is_late_from_the_start_is_refused_where_timesync_tells_it():
     with mock_vehicle() as mock:
         ClockRelay(mock).late_ms = 400
-        summary = fly(mock, tmp_path / "log")
+        summary = fly(mock)
     assert "old when it arrives, longer than deadman.telemetry_stale_ms" in summary.result
     assert summary.counts.setpoints == 0

@@ -3,6 +3,8 @@
 import pytest
 
 from companion.config import Config
+from companion.config.files import changed
+from companion.config.known_drag import KnownDrag
 from companion.drag import Drag
 from companion.files import bounded_yaml
 from companion.files.yaml_file import ConfigError, parse
@@ -22,10 +24,11 @@ CIRCLE = {
 }
 
 
-def remembered(folder, told=False):
+def remembered(folder, told=None):
     notes = []
     estimate = DragEstimate(ANY_VEHICLE)
-    return VehicleMemory(folder, estimate, told, notes.append), estimate, notes
+    config = changed(Config(), {"guidance": {"drag_per_s": told}}, "test")
+    return VehicleMemory(config, folder, estimate, notes.append), estimate, notes
 
 
 def test_a_flight_begins_with_what_was_learned_and_leaves_what_it_learned(tmp_path):
@@ -90,22 +93,26 @@ def test_another_vehicles_drag_counts_only_until_this_one_is_known(tmp_path):
 def test_it_is_the_vehicles_own(tmp_path):
     LearnedFile(tmp_path, "aa").save(Drag(0.8, 0.02), 5.0)
     memory, estimate, notes = remembered(tmp_path)
+    known = []
+    memory.on_known = known.append
     memory.load(Identity(uid=None))
-    memory.load(Identity(uid="bb"))
+    assert memory.load(Identity(uid="bb")) == KnownDrag()
     assert estimate.drag == ANY_VEHICLE.drag
     assert notes == []
     memory.load(Identity(uid="aa"))
     assert estimate.drag == Drag(0.8, 0.02)
-    memory.load(Identity(uid="aa"))
+    LearnedFile(tmp_path, "aa").save(Drag(0.1), 5.0)  # read once: each stage of the checks is alike
+    assert memory.load(Identity(uid="aa")).drag == Drag(0.8, 0.02)
     assert len(notes) == 1
+    assert [each.drag for each in known] == [None, None, Drag(0.8, 0.02)]
     memory.load(Identity(uid="bb"))  # another vehicle in its place
     assert estimate.drag == ANY_VEHICLE.drag
 
 
 def test_what_the_configuration_tells_wins(tmp_path):
     LearnedFile(tmp_path, "aa").save(Drag(0.8), 5.0)
-    memory, estimate, notes = remembered(tmp_path, told=True)
-    memory.load(Identity(uid="aa"))
+    memory, estimate, notes = remembered(tmp_path, told=0.3)
+    assert memory.load(Identity(uid="aa")) == KnownDrag(Drag(0.3))
     assert estimate.drag == ANY_VEHICLE.drag
     assert notes == []
 

@@ -35,6 +35,20 @@ def test_level_at_a_speed_it_goes_on_for_the_time_and_then_brakes_as_the_fence_r
     assert 0.0 < there.spread < 5.0
 
 
+def test_without_feedback_height_and_drift_are_what_one_reckons_by_hand():
+    """The failsafe begins 0.1 s after the rates were held, and levels a level vehicle in 0.1 s."""
+    steady = PX4._replace(max_tilt_rate=0.0)
+    climbing = reach(flown(velocity=(0.0, 0.0, -3.0)), steady)
+    assert climbing.up == pytest.approx(3.0 * 1.1 + 3.0 * 0.1 + 3.0**2 / 8.0)
+    assert climbing.down == 0.0
+    falling = reach(flown(velocity=(0.0, 0.0, 3.0)), steady)
+    assert falling.down == pytest.approx(3.0 * 1.1 + 3.0 * 0.1 + 3.0**2 / 8.0)
+    assert falling.up == 0.0
+    drifting = reach(flown(velocity=(-5.0, 0.0, 0.0)), steady._replace(brakes=False))
+    assert drifting.place == pytest.approx((-5.0 * 1.1 - 5.0 * 0.1 - 5.0 / 0.2, 0.0))
+    assert drifting.spread == pytest.approx(0.0, abs=1e-9)
+
+
 def test_an_autopilot_that_does_not_hold_lets_it_drift_until_drag_has_stopped_it():
     east = flown(velocity=(0.0, 5.0, 0.0))
     slippery, dragged = (

@@ -4,8 +4,10 @@ import pytest
 
 from companion.config import Config
 from companion.config.files import changed, load, shipped
+from companion.drag import Drag
 from companion.files.yaml_file import ConfigError
 from companion.live.checks import ChangeChecks
+from companion.recording.learned_file import LearnedFile
 from companion.serve.motion_settings import change_refusal
 
 
@@ -64,6 +66,24 @@ def test_a_slowed_trajectory_is_judged_as_it_is_flown(tmp_path):
     checks.check({"limits": {"max_climb_m_s": 1.0}}, "a test")
     with pytest.raises(ConfigError, match="not slowed down again in flight"):
         checks.check({"limits": {"max_tilt_deg": 6.0}}, "a test")
+
+
+def test_the_flown_vehicles_drag_replaces_that_of_the_vehicle_that_flew_last(tmp_path):
+    circle = {
+        "flight": {"maneuvers": ["circle"]},
+        "circle": {"radius_m": 5.0, "speed_m_s": 5.0},
+        "limits": {"max_tilt_deg": 35.0},
+        "recording": {"directory": tmp_path},
+    }
+    LearnedFile(tmp_path, "aa").save(Drag(0.2), 5.0)  # 28° are enough
+    checks = ChangeChecks(changed(Config(), circle, "a test"), follows=True)
+    less_tilt = {"limits": {"max_tilt_deg": 30.0}}
+    checks.check(less_tilt, "a test")
+    checks.note_drag({"drag": None, "source": None})
+    with pytest.raises(ConfigError, match=r"not known: assumed up to 0\.7 1/s"):
+        checks.check(less_tilt, "a test")
+    checks.note_drag({"drag": [0.3, 0.0], "source": "learned-bb.json"})
+    checks.check(less_tilt, "a test")
 
 
 @pytest.mark.parametrize("key", ["max_climb_m_s", "max_descent_m_s", "max_yaw_rate_deg_s"])

@@ -376,19 +376,22 @@ def test_the_newest_flight_that_measured_tells_the_dead_time(tmp_path, roll, exp
         _write_dead_time(tmp_path / name, measured)
     (tmp_path / "2026-01-04").mkdir()
     _write_dead_time(tmp_path / "2026-01-04", 0.3, gain=9.0)  # another gain says nothing
+    (tmp_path / "2026-01-05").mkdir()
+    _write_dead_time(tmp_path / "2026-01-05", 0.3, uid="another vehicle")
     (tmp_path / "2026-01-03").mkdir()
     (tmp_path / "2026-01-03" / "summary.json").write_text("[")  # cut off
     config = changed(CONFIG, {"recording": {"directory": tmp_path}}, "test")
     if roll is None:
         (tmp_path / "2026-01-01" / "summary.json").unlink()
         (finding,) = configuration_checks.dead_time(config, GOOD)
-        assert "no flight" in finding.found
+        assert "no flight of this vehicle" in finding.found
     assert found(configuration_checks.dead_time, config=config) == expected
 
 
-def _write_dead_time(folder, roll, gain=CONFIG.planner.gain_per_s):
+def _write_dead_time(folder, roll, gain=CONFIG.planner.gain_per_s, uid=GOOD.identity.uid):
     times = {"roll": roll, "pitch": None, "yaw": None}
     told = {"planner": CONFIG.planner_name, "gain_per_s": gain, "dead_time_s": times}
+    told["vehicle_uid"] = uid
     (folder / "summary.json").write_text(json.dumps(told))
 
 

@@ -6,6 +6,7 @@ import pytest
 
 from companion.config import Config
 from companion.config.files import changed, load
+from companion.config.known_drag import KnownDrag
 from companion.flight.maneuvers import configured_maneuvers, unbegun
 from companion.preflight.finding import Key
 from companion.preflight.offboard_loss import offboard_loss
@@ -34,7 +35,11 @@ def judged(config, held=1.0, autopilot=GOOD.autopilot):
         changed(config, WIDE, "test")
     )  # which refuses what comes near by itself
     evidence = replace(
-        GOOD, autopilot=autopilot, survey=Survey({name: held}, {name: name}), maneuvers=flown
+        GOOD,
+        autopilot=autopilot,
+        survey=Survey({name: held}, {name: name}),
+        maneuvers=flown,
+        known_drag=KnownDrag(config.guidance.drag),
     )
     (finding,) = offboard_loss(config, evidence)
     assert finding.key == Key.OFFBOARD_LOSS

@@ -54,7 +54,7 @@ def test_every_judge_stands_in_the_table():
         assert judges <= used, judges - used
 
 
-def test_a_judge_and_a_row_are_all_that_a_flight_needs(tmp_path, monkeypatch):
+def test_a_judge_and_a_row_are_all_that_a_flight_needs(monkeypatch):
     """The new judge warns above 1 m and lands after 2 s, with no other file changed."""
 
     def high(snapshot, raised):
@@ -73,8 +73,8 @@ def test_a_judge_and_a_row_are_all_that_a_flight_needs(tmp_path, monkeypatch):
 
     monkeypatch.setattr(autopilot_judges, "high", high, raising=False)
     monkeypatch.setattr(table, "_autopilot", with_new_row)
-    with mock_vehicle(tmp_path) as mock:
-        summary = fly(mock, tmp_path / "log", hover={"duration_s": 8.0})
+    with mock_vehicle() as mock:
+        summary = fly(mock, hover={"duration_s": 8.0})
         assert mock.state()["armed"] is False
     assert (summary.result, summary.phase) == ("2 m is too high", "maneuvers")
     told = [text for _, text in summary.events]

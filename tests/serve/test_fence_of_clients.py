@@ -101,11 +101,25 @@ class FakeLink:
     def __init__(self):
         self.state = SimpleNamespace(armed=True, height=5.0, position=None)
 
-    def subscribe(self, _, callback):
-        self.heartbeat = lambda: callback(None)
+        self.callbacks, self.now = {}, 0.0
+
+    def subscribe(self, name, callback):
+        self.callbacks[name] = callback
+
+    def heartbeat(self):
+        self.callbacks["HEARTBEAT"](None)
 
     def at(self, *position):
-        self.state.position = LocalPosition(0.0, 0.0, position, (0.0, 0.0, 0.0))
+        """A position after a second without any, in which the vehicle may have flown anywhere."""
+        self.now += 1.0
+        self.state.position = LocalPosition(self.now, self.now, position, (0.0, 0.0, 0.0))
+        self.callbacks["LOCAL_POSITION_NED"](None)
+
+    def jumps_to(self, *position):
+        """The next position of a vehicle that does not move, after an estimator reset."""
+        self.now += 0.02
+        self.state.position = LocalPosition(self.now, self.now, position, (0.0, 0.0, 0.0))
+        self.callbacks["LOCAL_POSITION_NED"](None)
 
 
 def test_outside_the_fence_of_the_first_flight_control_is_refused_until_the_vehicle_disarms():
@@ -121,6 +135,30 @@ def test_outside_the_fence_of_the_first_flight_control_is_refused_until_the_vehi
     assert "10.0 m from where control began, beyond limits.fence_radius_m" in fence.refusal()
     link.heartbeat()
     assert fence.refusal() is not None
+    link.state.armed = False
+    link.heartbeat()
+    assert fence.refusal() is None
+
+
+def test_a_reset_of_the_estimator_between_flights_leaves_the_fence_over_the_same_ground():
+    keys = {"limits": {"fence_radius_m": RADIUS}, "safety": {"max_reset_m": 4.0}}
+    link = FakeLink()
+    fence = KeptFence(changed(Config(), keys, "test"), link)
+    link.at(92.0, 0.0, -5.0)
+    link.jumps_to(90.0, 0.0, -5.0)  # before the fence is kept: its centre has it already
+    link.at(100.0, 0.0, -5.0)
+    fence.keep(FenceCentre((100.0, 0.0, -5.0), None))
+    link.at(108.0, 0.0, -5.0)
+    assert fence.refusal() is None
+    link.jumps_to(111.0, -1.0, -5.0)  # the vehicle is still 8 m north of the centre
+    assert fence.centre.position_ned == pytest.approx((103.0, -1.0, -5.0))
+    assert fence.refusal() is None
+    link.at(113.0, -1.0, -5.0)
+    assert "10.0 m from where control began" in fence.refusal()
+    link.at(103.0, -1.0, -5.0)
+    assert fence.refusal() is None
+    link.jumps_to(103.0, 3.0, -5.0)  # 3 m north and 3 m east in all
+    assert "moved the position by 4.2 m since the first flight" in fence.refusal()
     link.state.armed = False
     link.heartbeat()
     assert fence.refusal() is None

@@ -1,6 +1,7 @@
 """Proposals flown on the mock vehicle, against the configuration that `companion init` writes."""
 
 from functools import partial
+from math import radians
 
 import pytest
 
@@ -11,10 +12,14 @@ from companion.tuning import flights, propose
 from companion.tuning.flights import (
     CIRCLE_IN_GUSTS,
     COURSES,
+    EIGHT,
     EIGHT_IN_GUSTS,
     autopilot_like,
     flown,
 )
+
+LIMITS = {"max_tilt_deg": 54.0, "max_tilt_rate_deg_s": 135.0}
+"""What the figure-eight needs at 5 m/s."""
 
 
 @pytest.fixture(autouse=True)
@@ -32,7 +37,7 @@ def started(autopilot, factor=1.0):
         for key, value in config.vehicle.model_dump().items()
         if key in ("lag_ms", "dead_time_ms", "pitch_lag_ms", "pitch_dead_time_ms") and value
     }
-    return changed(config, {"vehicle": times, "limits": {"max_tilt_rate_deg_s": 135.0}}, "test")
+    return changed(config, {"vehicle": times, "limits": LIMITS}, "test")
 
 
 def test_in_gusts_the_error_is_much_smaller():
@@ -50,12 +55,23 @@ def test_what_an_identified_ardupilot_gets_does_not_swing_in_gusts():
     vehicle = {"lag_ms": 23.0, "dead_time_ms": 14.9, "acceleration_limit_deg_s2": 1112.0}
     drag = {"drag_per_s": 0.25, "quadratic_drag_per_m": 0.028}
     mock = load(shipped("mock-ardupilot.yaml"))
-    config = changed(mock, {"vehicle": vehicle, "guidance": drag}, "as `identify` writes it")
+    keys = {"vehicle": vehicle, "guidance": drag, "limits": {"max_tilt_deg": 54.0}}
+    config = changed(mock, keys, "as `identify` writes it")
     before = flown(config, EIGHT_IN_GUSTS, "ardupilot", seed=5)
     after = flown(propose(config).tuned, EIGHT_IN_GUSTS, "ardupilot", seed=5)
     assert before.ok, before
     assert after.ok, after
     assert after.reported <= 0.85 * before.reported
+
+
+def test_a_pilots_small_limits_are_kept_and_slow_the_course_down():
+    limits = {"max_tilt_deg": 20.0, "max_tilt_rate_deg_s": 45.0}
+    config = changed(started("px4"), {"limits": limits}, "test")
+    flight = flown(config, EIGHT, "px4")
+    assert flight.ok, flight
+    assert 1.0 < flight.speed < 4.5
+    assert flight.rate < radians(45.0)
+    assert flight.rate_limited < 0.02
 
 
 def test_the_mock_vehicle_is_like_the_identified_one():

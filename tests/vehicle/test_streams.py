@@ -7,7 +7,7 @@ import pytest
 
 from companion.mavlink.errors import CommandRefused
 from companion.mavlink.stats import LinkStats
-from companion.vehicle.streams import StreamRate, set_rates
+from companion.vehicle.streams import StreamRate, measure, set_rates
 
 WHOLE_MILLISECONDS = 1000
 DENIED, UNSUPPORTED = 2, 3
@@ -61,3 +61,24 @@ def test_no_rounding_error_costs_a_step():
     asked_of(autopilot, {"ATTITUDE_QUATERNION": 1e3 / 3, "HEARTBEAT": 0.0})
     asked_of(autopilot, {"ATTITUDE_QUATERNION": 400.0}, step_us=1)
     assert autopilot.asked == [(31.0, 3000.0), (0.0, -1.0), (31.0, 2500.0)]
+
+
+def test_only_messages_of_the_window_count_towards_a_measured_rate():
+    """5 of ATTITUDE_QUATERNION, 2 of a HEARTBEAT that was not heard before, and no ODOMETRY."""
+    stats = LinkStats()
+    stats.by_message[31] = 100
+
+    async def measured():
+        clock = asyncio.get_running_loop().time
+        began = clock()
+        counting = asyncio.ensure_future(
+            measure(stats, ("ATTITUDE_QUATERNION", "HEARTBEAT", "ODOMETRY"), 0.05)
+        )
+        await asyncio.sleep(0.01)
+        stats.by_message.update({31: 105, 0: 2})
+        return await counting, clock() - began
+
+    rates, longest = asyncio.run(measured())
+    for name, count in (("ATTITUDE_QUATERNION", 5), ("HEARTBEAT", 2)):
+        assert count / longest <= rates[name] <= count / 0.049
+    assert rates["ODOMETRY"] == 0.0

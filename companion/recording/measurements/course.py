@@ -45,6 +45,7 @@ class Course:
         phases: beginning and name of each phase.
         takeoff: time when the vehicle left the ground; None: it did not.
         early_end: the early end; None: the flight was flown to its end.
+        vehicle_uid: hardware id of the vehicle's autopilot; None: unknown.
         armed: whether the vehicle is armed at the end; None: unknown.
         mode: mode of the vehicle at the end; None: unknown.
         battery: remaining charge, 0..1, at take-off and at the end; None: unknown.
@@ -61,6 +62,7 @@ class Course:
     phases: tuple[tuple[float, str], ...] = ()
     takeoff: float | None = None
     early_end: EarlyEnd | None = None
+    vehicle_uid: str | None = None
     armed: bool | None = None
     mode: str | None = None
     battery: tuple[float | None, float | None] = (None, None)
@@ -81,6 +83,7 @@ class Course:
             "phases": [{"time_s": _rounded(time), "name": name} for time, name in self.phases],
             "takeoff_s": _rounded(self.takeoff),
             "early_end": None if self.early_end is None else self.early_end.as_dict(),
+            "vehicle_uid": self.vehicle_uid,
             "at_the_end": {"armed": self.armed, "mode": self.mode},
             "battery": {"takeoff": begin, "end": end, "min": self.min_battery},
             "advice": list(self.advice),

@@ -8,6 +8,7 @@ from math import degrees
 from companion.vehicle.parameter_checks import (
     INEFFECTIVE,
     UNSAFE,
+    action,
     at_most,
     battery_scaling,
     bit_clear,
@@ -25,6 +26,7 @@ from companion.vehicle.parameter_rules import CompanionSettings, ParameterRule, 
 _REFERENCE = "PX4 parameter reference"
 _MEASURED = "measured on PX4 main, 2026"
 _STOPS_MOTORS = "the motors stop in the air"
+_LINK_LOSS_ACTIONS = (0.0, 1.0, 2.0, 3.0)  # none, hold, return, land
 _STICKS_DO_NOTHING = "moving the sticks does not end offboard; only the mode switch does"
 _INTEGRATION_RATES = (100.0, 200.0, 250.0, 400.0)
 _TERMINATION_OFF = 121212
@@ -106,8 +108,8 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
         ("COM_OBL_RC_ACT",),
         "what PX4 does when setpoints stop",
-        forbidden(
-            UNSAFE,
+        action(
+            (0.0, 1.0, 3.0, 4.0, 5.0),  # position, altitude, return, land, hold
             {
                 2.0: "PX4 goes to manual flight, and falls or drifts unless a pilot acts at once",
                 6.0: _STOPS_MOTORS,
@@ -154,14 +156,14 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
         ("NAV_DLL_ACT",),
         "what PX4 does when the ground station's heartbeat stops, even if setpoints continue",
-        forbidden(UNSAFE, {5.0: _STOPS_MOTORS, 6.0: _STOPS_MOTORS}, set_to=2.0),
+        action(_LINK_LOSS_ACTIONS, {5.0: _STOPS_MOTORS, 6.0: _STOPS_MOTORS}, set_to=2.0),
         f"{_REFERENCE}; {_MEASURED}",
         universal=True,
     ),
     ParameterRule(
         ("NAV_RCL_ACT",),
         "what PX4 does when the pilot's transmitter is lost",
-        forbidden(UNSAFE, {5.0: _STOPS_MOTORS, 6.0: _STOPS_MOTORS}, set_to=2.0),
+        action(_LINK_LOSS_ACTIONS, {5.0: _STOPS_MOTORS, 6.0: _STOPS_MOTORS}, set_to=2.0),
         _REFERENCE,
         universal=True,
     ),
@@ -208,7 +210,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
         ("GF_ACTION",),
         "what PX4 does at its own geofence",
-        forbidden(UNSAFE, {4.0: _STOPS_MOTORS}, set_to=2.0),
+        action((0.0, 1.0, 2.0, 3.0, 5.0), {4.0: _STOPS_MOTORS}, set_to=2.0),
         _REFERENCE,
         universal=True,
     ),

@@ -1,0 +1,69 @@
+"""The hold that ends what is flown: the vehicle brakes, and holds the place where it stops."""
+
+from math import degrees, tan
+
+from companion.attitude import Quaternion
+from companion.attitude.kinematics import tilt_angle
+from companion.control.command_maker import CommandMaker
+from companion.control.flown_source import FlownSource
+from companion.control.hover_learning import HoverLearning
+from companion.guidance import GRAVITY, VehicleMotion
+from companion.guidance.braking import Assumed, brake
+
+
+class Hold:
+    """Begins a hold when it is asked to, or when open-loop rates tilt the vehicle too far.
+
+    Args:
+        flown: what is flown; the hold replaces it.
+        maker: makes the commands, and knows the motion of the vehicle.
+        learning: learns the hover thrust, which limits the tilt at which the height is held.
+        max_tilt: largest tilt in open loop, rad.
+        assumed: braking that the monitor of the fence assumes.
+
+    Attributes:
+        max_tilt: largest tilt in open loop, rad; it may change in flight.
+        given_up: why a source was given up for its tilt, or None.
+    """
+
+    def __init__(
+        self,
+        flown: FlownSource,
+        maker: CommandMaker,
+        learning: HoverLearning,
+        max_tilt: float,
+        assumed: Assumed,
+    ) -> None:
+        self.max_tilt = max_tilt
+        self.given_up: str | None = None
+        self._flown, self._maker, self._learning = flown, maker, learning
+        self._assumed = assumed
+
+    def begin(self, now: float, heading: float) -> None:
+        """Brake, and hold this heading (rad) at the place where the vehicle stops.
+
+        Raises:
+            RuntimeError: no position has come yet.
+        """
+        if self._flown.braking_left(now) > 0.0:
+            return  # it goes on braking: a new beginning would stop it further away
+        motion = self._maker.guidance_input(now).now
+        deceleration = GRAVITY * tan(self._largest_tilt())
+        self._flown.hold(brake(now, motion, heading, deceleration, self._assumed))
+
+    def begin_if_tilted(
+        self, now: float, motion: VehicleMotion, q: Quaternion, heading: float
+    ) -> None:
+        """Give the source up if it steers by rates, and the attitude `q` is tilted too far."""
+        name = self._flown.steers_by_rates(now, motion)
+        if name is None:
+            return
+        tilt, most = tilt_angle(q[1], q[2]), self._largest_tilt()
+        if tilt <= most:
+            return
+        limit = "limits.max_tilt_deg" if most == self.max_tilt else "the thrust can hold"
+        self.given_up = f"{name} was given up at {degrees(tilt):.0f}° of tilt, more than {limit}"
+        self.begin(now, heading)
+
+    def _largest_tilt(self) -> float:
+        return min(self.max_tilt, self._learning.largest_tilt())

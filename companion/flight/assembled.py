@@ -1,0 +1,54 @@
+"""A flight that is ready to run over an open link, and its figures afterwards."""
+
+from dataclasses import dataclass
+
+from companion.flight.changes import Changes
+from companion.flight.context import FlightContext
+from companion.flight.dead_time_watch import DeadTimeWatch
+from companion.flight.flight import Flight
+from companion.flight.status import StatusReporter
+from companion.flight.vehicle_identity import VehicleMemory
+from companion.recording.measurements.summary import LoopCounts, PredictiveFigures
+from companion.recording.trace import FlightTrace
+from companion.safety import SafetyLadder
+
+
+@dataclass(frozen=True, slots=True)
+class Assembled:
+    """A flight ready to run over an open link, and its figures afterwards."""
+
+    flight: Flight
+    context: FlightContext
+    trace: FlightTrace
+    dead_time_watch: DeadTimeWatch
+    memory: VehicleMemory
+    ladder: SafetyLadder
+    reporter: StatusReporter
+    changes: Changes
+
+    def close(self) -> None:
+        """End the process of predictive control."""
+        if self.context.guidance_loop.maker.predictive is not None:
+            self.context.guidance_loop.maker.predictive.close()
+
+    def predictive_figures(self) -> PredictiveFigures | None:
+        """The figures of predictive control; None if it did not fly."""
+        predictive = self.context.guidance_loop.maker.predictive
+        if predictive is None:
+            return None
+        record = predictive.record
+        troubles = {trouble.value: count for trouble, count in record.troubles.items()}
+        return PredictiveFigures(record.flown, troubles, tuple(record.seconds))
+
+    def counts(self) -> LoopCounts:
+        """The counters of the control loop."""
+        record = self.context.loop.record
+        return LoopCounts(
+            samples=record.samples,
+            setpoints=record.setpoints,
+            missed_deadlines=record.missed_deadlines,
+            stale=record.stale,
+            refused=record.refused,
+            unanswered={reason.value: count for reason, count in record.unanswered.items()},
+            rate_hz=self.context.rate_hz,
+        )

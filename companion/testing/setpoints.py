@@ -1,0 +1,27 @@
+"""The setpoints that reached the autopilot of a mock vehicle."""
+
+from typing import Any, NamedTuple
+
+
+class ReceivedSetpoint(NamedTuple):
+    """A SET_ATTITUDE_TARGET that reached the autopilot.
+
+    Attributes:
+        time: vehicle time when it was handled, s.
+        answers: its `time_boot_ms`, the time stamp of the answered sample, ms.
+        rates: body rates about x, y, z (FRD), rad/s.
+        thrust: 0..1.
+    """
+
+    time: float
+    answers: int
+    rates: tuple[float, float, float]
+    thrust: float
+
+
+def received_setpoint(message: Any, time: float) -> ReceivedSetpoint | None:
+    """The setpoint in a pymavlink message that is handled at this vehicle time, s; else None."""
+    if message.get_type() != "SET_ATTITUDE_TARGET":
+        return None
+    rates = message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate
+    return ReceivedSetpoint(time, message.time_boot_ms, rates, message.thrust)
