@@ -110,10 +110,10 @@ class EstimatorResets:
         return q if self.turn == 0.0 else turned_about_vertical(q, -self.turn)
 
     def target(self, target: Target, turn: float) -> Target:
-        """Convert a target from the estimator's frame to the frame without jumps.
+        """Turn the horizontal part of a target from the estimator's frame to the one without jumps.
 
         Args:
-            target: The target in the estimator's frame.
+            target: The target; its heading has no jumps already, and stays.
             turn: The value of `self.turn` when the target was made, rad.
         """
         if turn == 0.0:

@@ -26,7 +26,7 @@ class ExpectedResponse:
         time_constant: time until 63 % of the step is covered, s.
         otherwise: name of a cause of delay -> time constant (s) if this cause changes: with twice
             the gain, or without the rate limit, the lag or the dead time.
-        gain: p, 1/s.
+        gain: gain p of the planner, 1/s.
         quickest_gain: the largest sensible gain, 1/s; None if lag and dead time are not known.
     """
 

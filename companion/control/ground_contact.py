@@ -62,7 +62,7 @@ class GroundContact:
 
     @property
     def standing(self) -> bool:
-        """Whether the flag says landed and the vehicle never left the ground in this flight."""
+        """Whether the flag says landed, and the vehicle neither left the ground nor rises."""
         rising = self.takeoff_commanded and self._vertical_speed() < -_STILL
         return self._state.landed and not self._left and not rising
 

@@ -151,7 +151,7 @@ def _hold_delay(config: Config) -> float:
 
 
 def feedback_delay(config: Config) -> float:
-    """Delay of the attitude plus half a guidance period, the mean delay of the feedback, s."""
+    """Delay of the attitude, plus the mean wait for a guidance step (half a period), s."""
     return tilt_response(config).effective_delay + 0.5 / config.guidance.rate_hz
 
 

@@ -46,7 +46,7 @@ def law_constants(config: Config) -> Constants:
 
 
 def plugin(group: str, name: str) -> Any:
-    """A planner or guidance of another package.
+    """The class or function of another package that makes a planner or guidance.
 
     Raises:
         ConfigError: it is not installed or cannot be loaded.
@@ -103,7 +103,7 @@ def tilt_response(config: Config) -> InnerResponse:
 
 
 def slower_tilt(config: Config) -> tuple[float, float]:
-    """Lag and dead time of the slower of roll and pitch, s; 0 if unknown.
+    """The larger lag and the larger dead time of roll and pitch, s; 0 if unknown.
 
     The quicker axis is delayed to match the slower one, so the coefficients respond like this.
     """

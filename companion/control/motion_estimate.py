@@ -143,7 +143,12 @@ class MotionEstimate:
         )
 
     def vehicle(self, now: float, inputs: GuidanceInput) -> Vehicle:
-        """Attitude and rates at `now`, s of event-loop time, with `inputs`, for the solver."""
+        """The state for the solver: `inputs`, newest attitude and body rates.
+
+        Args:
+            now: time of the state, s of event-loop time.
+            inputs: motion, disturbance and drag at `now`.
+        """
         north, east = inputs.disturbance
         return Vehicle(
             now,

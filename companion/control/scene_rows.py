@@ -27,7 +27,8 @@ _HALF_ROOT = sqrt(0.5)
 _KEPT = 100
 """Number of points in a path: 20 s."""
 _POINT_EACH, _PATHS_EACH, _BODY_EACH = 2, 5, 10
-"""Drawings of the thrust (0.1 s each) per point of a path, per message of the paths, and per body.
+"""The thrust is drawn every 0.1 s. Every second drawing adds a point to the paths, every fifth
+sends the paths, every tenth sends the body.
 
 All are repeated, because a viewer may join late or jump in the recording.
 """
@@ -120,7 +121,7 @@ class SceneRows:
 
 
 def _wanted_attitude(command: GuidanceCommand) -> Quaternion | None:
-    """An attitude with the thrust direction that guidance commands; None: no command."""
+    """An attitude with the thrust direction that guidance commands; None with body rates."""
     north, east = command.target[:2]
     if command.body_rates is not None or not north * north + east * east < 1.0:
         return None

@@ -66,7 +66,7 @@ class Changes:
             slow checks of a change need it.
 
     Args:
-        start: the configuration with which the flight begins.
+        start: the configuration before the first change.
     """
 
     def __init__(self, start: Config) -> None:
@@ -86,7 +86,7 @@ class Changes:
 
     @property
     def start(self) -> Config:
-        """The configuration with which the flight began."""
+        """The configuration before the first change."""
         return self._start
 
     @property

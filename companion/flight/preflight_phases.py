@@ -70,7 +70,7 @@ async def stream(context: FlightContext) -> None:
 
 
 async def arm(context: FlightContext) -> None:
-    """Arm if `flight.arm` says so; else wait until the pilot arms and hands the vehicle over."""
+    """Arm if `flight.arm` is true; else wait until the pilot arms and hands the vehicle over."""
     if context.config.flight.arm:
         await _arm(context)
         return

@@ -72,7 +72,7 @@ class StatusRows:
         )
 
     def _resources(self, now: float, recorder: Recording) -> tuple[float, ...]:
-        """Record this process's use of the processor; in a test it includes the mock vehicle."""
+        """The row of `RESOURCES`; in a test the processor time includes the mock vehicle's."""
         processor_s, before = process_time(), self._processor_s
         elapsed, self._measured_at = now - self._measured_at, now
         self._processor_s = processor_s

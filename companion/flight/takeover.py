@@ -48,7 +48,9 @@ async def _look_over(
     context.detail = "requesting telemetry"
     await context.preflight.ask_for_telemetry()
     state = context.link.state
-    await context.until(lambda: state.landed or state.flying, "whether the vehicle flies")
+    await context.until(
+        lambda: state.landed or state.flying, "the vehicle to report landed or flying"
+    )
     require(context)
     await context.until(lambda: context.fresh_position() is not None, "a fresh position")
     context.detail = "counting telemetry rates and reading the autopilot's parameters"

@@ -8,7 +8,8 @@ from companion.guidance.maneuvers import spread
 from companion.guidance.reference import Pose, Reference
 
 _SMALL = 0.5
-"""Relative size of the first doublet of an axis; only two sizes tell a slew limit from a lag."""
+"""Relative size of the first doublet of an axis; a single size cannot tell a slew limit from
+a lag."""
 _REST = 0.5
 """Time of zero rates after a doublet, in which the slowest axis comes to rest, s."""
 _CLIMBS = 3

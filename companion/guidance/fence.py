@@ -32,7 +32,8 @@ class Breach(NamedTuple):
         limit: the configuration key of the limit that is breached.
         side: on which side of the limit the place lies, such as "beyond" or "below".
         where: the place, in words that end a sentence.
-        by: how far the place lies outside, m; negative inside.
+        by: how far the place lies outside, m; negative inside, 0 if it was not computed (polygon
+            without a margin, unknown origin).
     """
 
     limit: str
@@ -53,7 +54,7 @@ class Fence:
         radius: about the place where control began, m.
         ceiling: above the place where control began, m.
         floor: above home, m.
-        polygon: corners, m north and east of where control began; empty: the cylinder alone.
+        polygon: corners, m north and east of where control began; empty: only the cylinder.
         places: corners as (latitude, longitude) in degrees, instead of `polygon`.
         deceleration: deceleration that the vehicle certainly reaches, m/s².
         reaction: time until braking begins, s.
@@ -175,7 +176,7 @@ def distance_inside(north: float, east: float, polygon: Sequence[Corner]) -> flo
 
 @lru_cache(maxsize=4)
 def circle_corners(radius: float, number: int) -> tuple[Corner, ...]:
-    """A circle about the origin as a polygon of so many corners, m north and east."""
+    """A circle about the origin as a polygon of `number` corners, m north and east."""
     angles = [2.0 * pi * corner / number for corner in range(number)]
     return tuple((radius * cos(angle), radius * sin(angle)) for angle in angles)
 

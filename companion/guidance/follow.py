@@ -17,8 +17,8 @@ def circle(radius: float, speed: float, laps: float) -> "HeldFigure":
 
     Args:
         radius: m.
-        speed: speed between the ramps, m/s.
-        laps: number of laps, including the ramps.
+        speed: speed between speeding up and slowing down, m/s.
+        laps: number of laps, in which the vehicle also speeds up and slows down.
     """
     return HeldFigure(steady_circle(radius, speed, laps, longest=inf))
 

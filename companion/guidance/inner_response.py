@@ -14,9 +14,9 @@ Path = Callable[[float], Coefficients]
 
 _STEP = 2e-3
 """Step of the central differences along a path, s; it makes an error of about 1e-7 in flight."""
-_MOMENT = 1e-3
+_INTEGRATION_STEP = 1e-3
 """Step of the integration in `step_time`, s."""
-_MOST_MOMENTS = 60_000
+_MOST_STEPS = 60_000
 _COVERED = 1.0 - exp(-1.0)
 
 
@@ -25,7 +25,7 @@ class InnerResponse:
     """Response of the coefficients: ċ + lag·c̈ = gain·(c_d − c), after a dead time.
 
     Attributes:
-        gain: p, 1/s.
+        gain: gain p of the planner, 1/s.
         lag: lag of the second order, s; 0: the response is of first order.
         dead_time: s.
         follows_model: True: the planner accounts for the dead time, and the response is that of its
@@ -55,15 +55,17 @@ class InnerResponse:
             The time; infinite if it is longer than 60 s.
         """
         delay = 0.0 if self.follows_model else self.dead_time
-        speeds = deque([0.0] * (1 + round(delay / _MOMENT)))
+        speeds = deque([0.0] * (1 + round(delay / _INTEGRATION_STEP)))
         c = speed = 0.0
-        for k in range(_MOST_MOMENTS):
+        for k in range(_MOST_STEPS):
             if c >= _COVERED * size:
-                return k * _MOMENT + (self.dead_time if self.follows_model else 0.0)
+                return k * _INTEGRATION_STEP + (self.dead_time if self.follows_model else 0.0)
             # Without a model, the error of now takes effect one dead time later.
             speeds.append(min(self.gain * (size - c), max_speed))
             wanted = speeds.popleft()
-            moved, speed = first_order_step(speed, wanted, max(self.lag, _MOMENT), _MOMENT)
+            moved, speed = first_order_step(
+                speed, wanted, max(self.lag, _INTEGRATION_STEP), _INTEGRATION_STEP
+            )
             c += moved
         return inf
 

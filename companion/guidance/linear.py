@@ -31,7 +31,8 @@ class LinearSettings:
         heading: response of the heading to its target.
         max_horizontal: largest horizontal acceleration that is commanded, m/s².
         thrust_lag: lag of the rotors, s.
-        period: period of the guidance loop, s; in a period the target moves, the feedback does not.
+        period: period of the guidance loop, s; within it the target moves, but the feedback is
+            constant.
     """
 
     gains: ChainGains

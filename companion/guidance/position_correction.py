@@ -10,7 +10,7 @@ _LONGEST = 0.5
 _LONGEST_WINDOW = 0.1
 """Time constant of each low-pass filter with noisy positions, s."""
 _WINDOW_PER_NOISE = 0.1
-"""Growth of that time constant with the noise of r, s per m/s."""
+"""Growth of that time constant with the noise of r (see `PositionCorrection`), s per m/s."""
 _SMOOTH, _NOISY = 0.2, 0.6
 """Noise of r below which positions count as smooth, and above which as noisy, m/s. It is at most
 0.1 m/s on PX4 and ArduPilot; white noise of 3 mm at 50 Hz makes 0.5 m/s."""

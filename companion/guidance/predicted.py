@@ -63,7 +63,7 @@ class _OpenLoop:
         self._roll = self._pitch = 0.0
 
     def advance(self, moment: Moment, reference: Reference, span: float) -> Moment:
-        """Integrate `span` seconds of what `reference` commands; `moment` with the result."""
+        """Integrate `span` seconds of what `reference` commands; return `moment` so moved."""
         (north, east), (fast_north, fast_east) = self._place, self._speed
         by_tilt = self._acceleration(reference, span)
         slowed = self._drag.deceleration((fast_north, fast_east, 0.0))

@@ -17,7 +17,7 @@ LARGEST_JERK = 50.0
 
 
 class Pose(NamedTuple):
-    """Position (m) and heading (rad) where a maneuver begins."""
+    """Position (m) and heading (rad) that is held, or from which a maneuver begins."""
 
     position_ned: Vector
     heading: float
@@ -66,7 +66,7 @@ class Reference(NamedTuple):
     def height_is_steady(self) -> bool:
         """Whether the thrust changes slowly enough for the rotors.
 
-        False in a doublet, and if another program commands body rates or thrust.
+        False in the doublets of `identify`, and if another program commands body rates or thrust.
         """
         return not self.thrust_steps and self.body_rates is None and self.thrust is None
 

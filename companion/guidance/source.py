@@ -163,7 +163,10 @@ class CommandedSource:
         self._ended = True
 
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
-        """The newest reference, extrapolated; if it is too old, a hold of the present position."""
+        """The newest reference, extrapolated; before the first, a hold of the initial pose.
+
+        If the newest is too old, it is a hold of the present position.
+        """
         self._require_fresh(now)
         newest, given_at, jerk = self._newest, self._given_at, self._jerk
         if newest is not None and self._failure is None:
@@ -201,7 +204,7 @@ class CommandedSource:
 
 
 def _kind(reference: Reference) -> tuple[bool, bool, bool]:
-    """The kind of command: whether the loop is closed, it may drift, and it holds height.
+    """The kind of command: whether it is closed loop, drifts, and holds the height.
 
     Accelerations of references of different kinds are not comparable.
     """

@@ -45,7 +45,7 @@ ONCE: tuple[Check, ...] = (
     configuration_checks.doubtful,
     configuration_checks.accepted,
 )
-"""Checks that a flight runs only once, because they depend only on the configuration."""
+"""Checks that a flight runs only once, because the vehicle's state does not change their result."""
 
 
 def run_checks(config: Config, evidence: Evidence, *, again: bool = False) -> list[Finding]:

@@ -69,7 +69,10 @@ def clocks(config: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def _clock_rate(config: Config, evidence: Evidence, rate: float, source: str) -> Finding:
-    """Whether the clock's rate is within what we can follow; a pause at either end falsifies it."""
+    """Judge the rate of the vehicle's clock; unsafe if samples would soon count as stale.
+
+    A pause of the samples at either end of the window makes the measured rate uncertain.
+    """
     behind = 1.0 - rate - MOST_DRIFT
     stale_after = config.deadman.telemetry_stale / behind if behind > 0.0 else inf
     unsure = evidence.samples.longest_pause / max(evidence.window, 1e-3)

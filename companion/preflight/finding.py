@@ -1,6 +1,7 @@
 """Findings of the preflight checks: fact, consequence, remedy, and source.
 
-A finding about a parameter has its name as key. All other keys are listed here.
+A finding about a parameter has its name as key. A finding about a message rate has the key
+`link.streams.MESSAGE`, or that of the limit in section `link`. All other keys are listed here.
 """
 
 from dataclasses import dataclass

@@ -75,7 +75,7 @@ def _even_rate(name: str, rate: StreamRate, evidence: Evidence) -> float:
 
 
 def _trouble(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, str] | None:
-    """The fault of a message's rate, and its remedy."""
+    """The fault of a message's rate, and its remedy; None: no fault."""
     asked, achieved = rate.asked, rate.achieved
     if rate.refusal:
         return f"{name} is refused ({rate.refusal})", "a newer version of the autopilot may send it"

@@ -24,8 +24,8 @@ _SETPOINTS = frozenset(
     }
 )
 _STILL = 0.05
-"""Largest body rate and thrust in ATTITUDE_TARGET of a disarmed autopilot (recorded: 0.02 rad/s,
-0).
+"""Largest body rate (rad/s) and thrust in ATTITUDE_TARGET of a disarmed autopilot that receives no
+setpoints (recorded: 0.02 rad/s, 0).
 """
 _ENOUGH = 10
 """Smallest number of samples to measure the rate of a clock."""
@@ -37,6 +37,9 @@ class LinkListener:
     Args:
         link: Link to listen on. The block replaces its `on_foreign`.
         clock: Our clock, s.
+
+    Attributes:
+        resets: Number of estimator resets, counted by ODOMETRY's `reset_counter`.
     """
 
     def __init__(self, link: Link, clock: Callable[[], float]) -> None:

@@ -37,7 +37,7 @@ class Worst(NamedTuple):
     Attributes:
         away, up, down: Distance from where the setpoints stopped, m.
         breach: The first breach of the fence, as the end of a sentence; `None`: none.
-        time: When the setpoints would have to stop for it, s after control begins.
+        time: When the setpoints would have to stop to cause that breach, s after control begins.
     """
 
     away: float = 0.0
@@ -81,7 +81,7 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
 def worst_reach(
     config: Config, maneuvers: ManeuverSequence, held: float, drag: Drag, *, brakes: bool
 ) -> Worst:
-    """The largest reach over the maneuvers; `held`, `drag` and `brakes` as of `LossFailsafe`."""
+    """The largest reach over the maneuvers; `held`, `drag` and `brakes` as in `LossFailsafe`."""
     limits, safety = config.limits, config.safety
     fence = Fence(
         limits.fence_radius_m,
@@ -112,7 +112,11 @@ def worst_reach(
 
 
 def _breach(config: Config, offset: Vector, there: Reach, fence: Fence) -> str | None:
-    """The breach of the fence within its reach, as the end of a sentence; `None`: none."""
+    """The breach of the fence at a place that the vehicle can reach from `offset`.
+
+    Returns:
+        The breach, as the end of a sentence; `None`: none.
+    """
     north, east = offset[0] + there.place[0], offset[1] + there.place[1]
     distance = hypot(north, east)
     outward = 1.0 + there.spread / distance if distance > 0.0 else 1.0
@@ -134,7 +138,10 @@ def _breach(config: Config, offset: Vector, there: Reach, fence: Fence) -> str |
 def _flown(
     config: Config, maneuvers: ManeuverSequence, drag: Drag
 ) -> Iterator[tuple[float, MotionAtLoss]]:
-    """The flown states over the maneuvers; open-loop steps follow the attitude law."""
+    """Time (s after control begins) and motion at each checked point of the maneuvers.
+
+    In open-loop steps the tilt follows the attitude law.
+    """
     gain = config.planner.gain_per_s
     period = max(_PERIOD, maneuvers.duration / _MOST)
     velocity: Vector = (0.0, 0.0, 0.0)

@@ -33,7 +33,7 @@ class Undo(Section):
     uid: Word | None
     """Hardware id of AUTOPILOT_VERSION; null: not received."""
     time: Word
-    """Time when the first parameter was set, UTC."""
+    """Time when `doctor --fix` began to propose changes, UTC."""
     parameters: dict[Word, Annotated[float, Field(ge=-LARGEST, le=LARGEST)]]
     """Old value of each parameter, in the order in which they were set."""
 
@@ -96,7 +96,7 @@ def _unused(directory: Path, name: str) -> Path:
 _SINGLE = 1e-6
 """Relative resolution of a single-precision parameter."""
 _KNOWN_FOR = 3.0
-"""Largest age of a heartbeat that tells whether the vehicle is armed, s."""
+"""Largest age of a heartbeat from which the vehicle counts as known to be armed or disarmed, s."""
 
 
 class Answer(Enum):
@@ -124,7 +124,7 @@ class Outcome(NamedTuple):
 
 
 class VehicleArmedError(LinkError):
-    """The vehicle may fly, so no parameter is set."""
+    """The vehicle is armed, or that is unknown, so no parameter is set."""
 
 
 async def apply_fixes(

@@ -43,7 +43,8 @@ class Survey(NamedTuple):
     Attributes:
         values: Values by newest name.
         names: Name of each in this autopilot, by newest name.
-        untold: Newest names of parameters that got no answer, neither a value nor an error.
+        untold: Newest names of parameters without a value that the autopilot may have all the same:
+            it did not report them as unknown.
         lossy: Whether the link lost frames during the survey, in either direction.
     """
 
@@ -70,7 +71,7 @@ async def survey(
     Args:
         link: Link to the vehicle.
         rules: Rules of its autopilot.
-        before: An earlier survey of the same vehicle. Parameters without an answer in it are not
+        before: An earlier survey of the same vehicle. Parameters without a value in it are not
             requested again, because each costs seconds on a link that loses frames.
         at_first: Policy of the first round of requests.
         once_more: Policy of the second round.

@@ -42,7 +42,7 @@ def parameters(config: Config, evidence: Evidence) -> Iterator[Finding]:
             CheckResult.UNSAFE,
             "the autopilot answers no parameter request",
             "its failsafes are unknown, and so is how it takes a setpoint",
-            "check that a router or a signing key between does not block PARAM messages",
+            "check that no router or signing key on the way blocks PARAM messages",
             "PARAM_REQUEST_READ",
         )
         return
@@ -66,7 +66,10 @@ def _missing(rule: ParameterRule, autopilot: str) -> Finding:
 
 
 def _untold(evidence: Evidence) -> Iterator[Finding]:
-    """Findings about parameters without an answer: lost on a bad link, else absent here."""
+    """Findings about parameters that were not received.
+
+    On a link that loses frames, one that every version has is unsafe. The others are only named.
+    """
     survey = evidence.survey
     lossy = survey.lossy or evidence.link.loss > SOME_LOST
     rules = [rule for rule in evidence.autopilot.parameters if not rule.vital]

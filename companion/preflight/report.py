@@ -16,8 +16,8 @@ from companion.vehicle.parameter_rules import CheckResult
 _TITLES = {
     CheckResult.NOT_CONNECTED: ("NOT CONNECTED: nothing was judged", "bold red"),
     CheckResult.UNSAFE: ("UNSAFE: somebody may be hurt or the vehicle lost", "bold red"),
-    CheckResult.INEFFECTIVE: ("INEFFECTIVE: it will not do what is asked of it", "bold yellow"),
-    CheckResult.NOT_READY: ("NOT READY: not to be armed yet", "bold yellow"),
+    CheckResult.INEFFECTIVE: ("INEFFECTIVE: something will not work as configured", "bold yellow"),
+    CheckResult.NOT_READY: ("NOT READY: the vehicle cannot be armed yet", "bold yellow"),
     CheckResult.SAFE: ("SAFE", "bold green"),
 }
 
@@ -64,7 +64,7 @@ def _last_line(config: Config, findings: Sequence[Finding]) -> Text:
         return Text(f"{len(forbidden)} unsafe: `companion fly` refuses{fix}", style="bold red")
     if result is CheckResult.NOT_READY:
         return Text(
-            "not ready: run again when it is ready; some checks could not be made",
+            "not ready: run again when the vehicle is ready; some checks could not be made",
             style="bold yellow",
         )
     if amiss:

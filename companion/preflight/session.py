@@ -1,6 +1,7 @@
 """One preflight session: connect, wait for readiness, listen, and judge.
 
-It only reads, and requests message rates. Nothing here arms the vehicle or sends a setpoint.
+It reads, requests message rates, and has the autopilot run its pre-arm checks. Nothing here arms
+the vehicle or sends a setpoint.
 """
 
 import asyncio
@@ -56,7 +57,7 @@ async def gather(
 
     Args:
         link: Link to a vehicle whose heartbeat was received.
-        granted: The message rates that were requested.
+        granted: The message rates that were requested and granted, by message.
         seconds: Time for counting messages, s.
         stage: The next step of the vehicle.
         thorough: Also run the pre-arm checks, so that the autopilot says what forbids arming.

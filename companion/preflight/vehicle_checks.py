@@ -110,7 +110,7 @@ def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
             NOT_READY,
             f"not ready {stage.value}, it lacks {missing}{unsent}",
             f"the autopilot says: {said}" if said else "",
-            "wait, or put right what it says, and try again",
+            "wait, or correct what the autopilot reports, and try again",
             "SYS_STATUS, estimator flags",
         )
         return
@@ -179,13 +179,13 @@ def attitude(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def estimator(_: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether the estimator was reset while the vehicle stood still."""
+    """Whether the estimator was reset while we listened."""
     if evidence.resets:
         yield Finding(
             Key.ESTIMATOR_RESETS,
             INEFFECTIVE,
             f"the estimate jumped {evidence.resets} times in {evidence.window:g} s",
-            "in flight each jump moves the vehicle",
+            "in flight, repeated jumps raise the alarm of the monitor `resets`",
             "wait until compass and GPS have settled",
             "ODOMETRY reset_counter",
         )

@@ -77,7 +77,10 @@ def estimator_reset(snapshot: Snapshot, _: bool) -> str | None:
 
 
 def estimator_resets(most: int, shift: float, turn: float) -> Judge:
-    """The estimator was reset more than `most` times, or by more than `shift` (m), `turn` (rad)."""
+    """The estimator was reset more than `most` times, or by too much.
+
+    Too much is more than `shift` (m), more than `turn` (rad) of heading, or half as much of tilt.
+    """
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
         found = snapshot.resets

@@ -5,10 +5,11 @@ from companion.safety.monitor import Judge, released, released_minimum
 from companion.safety.snapshot import Control, Snapshot
 
 _HEARD = 0.3
-"""Without a frame for this time, s, a takeover would not be noticed either."""
+"""Time without a frame, s, after which the vehicle counts as not heard: a takeover would not be
+noticed either."""
 
 _STALL_SHARE = 0.5
-"""If the timer stood still for more than this share of the silence, this computer caused it."""
+"""If this program did not run for more than this share of the silence, this computer caused it."""
 
 
 def silence(limit: float, *, heard: bool) -> Judge:

@@ -12,7 +12,9 @@ with a limit then uses `released`, so that the alarm does not toggle at the limi
 """
 
 HYSTERESIS = 0.9
-"""A raised alarm ends only below this share of its limit."""
+"""A raised alarm ends only below this share of an upper limit, or above a lower limit divided by
+it.
+"""
 
 
 def released(limit: float, raised: bool) -> float:

@@ -27,12 +27,13 @@ class Motion(NamedTuple):
     Attributes:
         q: attitude, or None.
         body_rates: rad/s.
-        offset: position relative to where control began, m, or None.
+        offset: position relative to the fence's centre, which is usually where control began, m, or
+            None.
         velocity: m/s.
         height: height above home, m, or None; in the autopilot's frame, with estimator resets.
         off_course: distance from the reference, m; None without a reference.
         thrust: thrust last sent, 0..1, or None.
-        origin: place where control began, or None if it is unknown.
+        origin: latitude and longitude of the fence's centre, or None if they are unknown.
         acceleration: horizontal acceleration, m/s², NED.
     """
 
@@ -61,7 +62,7 @@ class Control(NamedTuple):
         heard: arrival of the last frame of any kind from the vehicle.
         position_fresh: whether the newest position is fresh.
         clock_change: jump or restart of the vehicle's clock since control began, in words, or None.
-        stood_still: time for which this program stood still since the last answer, s.
+        stood_still: time for which this program did not run (a stall) since the last answer, s.
     """
 
     answered: float = inf

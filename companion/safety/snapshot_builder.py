@@ -102,7 +102,7 @@ class SnapshotBuilder:
 
     @property
     def fence_centre(self) -> FenceCentre | None:
-        """Centre of the fence, or None before control began."""
+        """Centre of the fence in the autopilot's frame, or None before control began."""
         if self._start is None:
             return None
         back = _minus((0.0, 0.0, 0.0), self._loop.resets.shift)
@@ -110,7 +110,10 @@ class SnapshotBuilder:
 
     @property
     def origin_ned(self) -> Vector | None:
-        """Position where control began, m NED, or None before."""
+        """Centre of the fence in the frame without estimator resets, m NED, or None before control.
+
+        It is where control began, unless `begin` got another centre.
+        """
         return self._start
 
     def listen(self, now: float) -> None:
@@ -170,7 +173,7 @@ class SnapshotBuilder:
         )
 
     def stood_still(self, since: float) -> float:
-        """Time for which this program stood still since `since` (s of event-loop time), s."""
+        """Time for which this program did not run since `since` (s of event-loop time), s."""
         return sum(counted.late for counted in self._counted if counted.now > since)
 
     def _motion(self) -> Motion:

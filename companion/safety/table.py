@@ -17,7 +17,7 @@ _RELEASE, _HAND_BACK, _HOLD, _LAND = Action.RELEASE, Action.HAND_BACK, Action.HO
 
 
 def monitors(config: Config) -> tuple[Monitor, ...]:
-    """The monitors of a flight, the more severe ones first.
+    """The monitors of a flight; among equally severe breaches the first row decides.
 
     The table does not contain a takeover by the pilot or an unknown mode: `companion.flight.watch`
     detects both, and releases control.

@@ -187,7 +187,7 @@ def test_changes_in_flight_are_slewed_recorded_and_undone(autopilot, vehicle, tm
             planner = loop.planner._planner
             seen.append(
                 (
-                    degrees(guidance_loop.max_tilt),
+                    degrees(guidance_loop.hold.max_tilt),
                     _constants(planner).gain,
                     guidance_loop.maker.guidance._settings.gains.position,
                     degrees(loop._limits.tilt_rate),
@@ -197,7 +197,7 @@ def test_changes_in_flight_are_slewed_recorded_and_undone(autopilot, vehicle, tm
             session.changes.change({"limits": {"fence_radius_m": 500.0}}, "a test")
         texts.append(session.changes.undo("a test"))
         await asyncio.sleep(1.5 * SLEW)
-        seen.append((degrees(guidance_loop.max_tilt), _constants(planner).gain, 0.0, 0.0))
+        seen.append((degrees(guidance_loop.hold.max_tilt), _constants(planner).gain, 0.0, 0.0))
         return await flight
 
     with mock_vehicle(autopilot=autopilot) as mock:

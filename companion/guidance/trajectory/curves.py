@@ -73,7 +73,7 @@ class Curve(Protocol):
 
 
 class Figure(Curve, Protocol):
-    """A curve with a known largest speed per phase."""
+    """A curve whose largest path length per unit of phase is known."""
 
     @property
     def steepest(self) -> float:
@@ -120,7 +120,7 @@ class Helix:
         return hypot(self.radius, self.rise / tau)
 
     def sampling(self) -> PhaseSampling:
-        """Checks of one lap; all laps are alike."""
+        """The phases at which to check it: those of one lap, because all laps are alike."""
         return _sampling_of(self)
 
     def at(self, phase: float) -> CurvePoint:
@@ -146,7 +146,7 @@ class GeronoEight:
         return sqrt(2.0) * self.half_width
 
     def sampling(self) -> PhaseSampling:
-        """Checks of one lap; all laps are alike."""
+        """The phases at which to check it: those of one lap, because all laps are alike."""
         return _sampling_of(self)
 
     def at(self, phase: float) -> CurvePoint:
@@ -175,7 +175,7 @@ class BernoulliEight:
         return self.half_width
 
     def sampling(self) -> PhaseSampling:
-        """Checks of one lap; all laps are alike."""
+        """The phases at which to check it: those of one lap, because all laps are alike."""
         return _sampling_of(self)
 
     def at(self, phase: float) -> CurvePoint:
@@ -206,7 +206,7 @@ class Turned:
         return self.figure.steepest
 
     def sampling(self) -> PhaseSampling:
-        """Checks of the figure."""
+        """`sampling` of the figure."""
         return self.figure.sampling()
 
     def at(self, phase: float) -> CurvePoint:

@@ -16,8 +16,9 @@ from companion.guidance.trajectory.time_laws import STEEPEST, Cruise, LimitedJer
 from companion.guidance.trajectory.timed_curve import HeldHeading, TangentHeading, TimedCurve
 
 _LARGEST_RAMP = 0.5
-"""Longest ramp, as a share of the time for all laps at the steady rate. With it, a ramp covers at
-most a quarter of the path, and the fastest place of each figure lies between the ramps.
+"""Longest ramp (time in which the rate rises or falls), as a share of the time for all laps at the
+steady rate. With it, a ramp covers at most a quarter of the path, and the fastest place of each
+figure lies between the ramps.
 """
 
 _RAMP_ACCELERATION = 1.0

@@ -1,6 +1,7 @@
 """A trajectory slowed down where it breaks limits.
 
-The path stays the same; only its timing changes.
+The path stays the same; only its timing changes. A moment is one of the times at which limits are
+checked.
 
 1. For each moment, find the factor by which the whole trajectory would have to be slowed down for
    this moment to keep all limits.
