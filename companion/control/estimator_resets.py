@@ -18,6 +18,7 @@ from math import asin, atan2, hypot, radians, sqrt
 
 from companion.attitude import Quaternion, Target, is_unit
 from companion.attitude.rotation import short_way, turned, turned_about_vertical
+from companion.control.rate_lag import RateLag
 from companion.guidance.reference import Vector, rotated
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
@@ -45,6 +46,7 @@ class EstimatorResets:
         shift: sum of the position jumps, m NED.
         corrections: sum of the heading changes that body rates do not explain and that are no
             jumps, rad; see `StepFrame`.
+        rate_lag: how late the body rates are against the attitude, as learned.
         largest_tilt: largest jump of the thrust axis, rad; no reference frame compensates it.
         newest: the newest attitude, or None.
         times: when the latest resets were found, s of event-loop time.
@@ -54,6 +56,7 @@ class EstimatorResets:
         self.turn = 0.0
         self.shift: Vector = (0.0, 0.0, 0.0)
         self.corrections = 0.0
+        self.rate_lag = RateLag()
         self.largest_tilt = 0.0
         self.times: deque[float] = deque(maxlen=32)
         self.newest: AttitudeSample | None = None
@@ -70,13 +73,16 @@ class EstimatorResets:
         dt = sample.vehicle_time - before.vehicle_time
         if not 0.0 < dt <= _LONGEST:
             return False
-        yaw, tilt, threshold = _attitude_jump(before, sample, dt)
+        rates = self.rate_lag.mean(before.body_rates, sample.body_rates, dt)
+        predicted = turned(before.q, rates, dt)
+        yaw, tilt, threshold = _attitude_jump(before, sample, predicted, dt)
         jumped = tilt > threshold
         if abs(yaw) > threshold:
             self.turn = short_way(self.turn + yaw)
         elif not jumped:
             if dt <= _LONGEST_STEP:
                 self.corrections += yaw
+                self.rate_lag.learn(before.body_rates, sample.body_rates, predicted, sample.q)
             return False
         self._count_reset(sample.received)
         self.largest_tilt = max(self.largest_tilt, tilt if jumped else 0.0)
@@ -140,13 +146,12 @@ class EstimatorResets:
 
 
 def _attitude_jump(
-    before: AttitudeSample, now: AttitudeSample, dt: float
+    before: AttitudeSample, now: AttitudeSample, predicted: Quaternion, dt: float
 ) -> tuple[float, float, float]:
     """Jump of the heading, jump of the thrust axis, and the threshold for both; rad."""
     p, q, r = before.body_rates
     new_p, new_q, new_r = now.body_rates
-    mean = 0.5 * (p + new_p), 0.5 * (q + new_q), 0.5 * (r + new_r)
-    w, x, y, z = turned(before.q, mean, dt)
+    w, x, y, z = predicted
     a, b, c, d = now.q
     # now ⊗ predicted⁻¹: the unexplained rotation, about world axes.
     r_w = a * w + b * x + c * y + d * z

@@ -14,6 +14,7 @@ from companion.guidance import (
     ObserverSettings,
     VehicleMotion,
 )
+from companion.guidance.climb_bias import ClimbBias
 from companion.guidance.motion_observer import SlopeHistory
 from companion.guidance.position_correction import PositionCorrection
 from companion.guidance.reference import Horizontal
@@ -56,6 +57,7 @@ class MotionEstimate:
         self.drag = drag
         self._offset = offset
         self._slopes = SlopeHistory()
+        self._climb = ClimbBias()
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
         self._body_rates = BodyRates(0.0, 0.0, 0.0)
         self._position: LocalPosition | None = None
@@ -102,8 +104,10 @@ class MotionEstimate:
             return
         since = position.vehicle_time if before is None else before.vehicle_time
         slope = self._slopes.mean(since, position.vehicle_time)
+        north, east, down = position.velocity_ned
+        down = self._climb.corrected(position.vehicle_time, position.position_ned[2], down)
         measured = self._correction.corrected(
-            position.vehicle_time, VehicleMotion(position.position_ned, position.velocity_ned)
+            position.vehicle_time, VehicleMotion(position.position_ned, (north, east, down))
         )
         known = self._known(slope, measured)
         self._observer.observe(position.vehicle_time, measured, known, self._correction.trust)

@@ -35,7 +35,7 @@ class AxisGains(Section):
     """Limit on the torque of the integral."""
     torque_filter_ms: NonNegative = 0.0
     """Time constant of the low pass on this axis's torque (PX4's MC_YAW_TQ_CUTOFF); 0 = none."""
-    setpoint_delay_ms: NonNegative = 7.0
+    setpoint_delay_ms: NonNegative = 4.0
     """Delay from the arrival of a rate setpoint, or from its shaping, to the controller."""
     shaping: AxisShaping | None = None
     """Shaping before the controller; give it for all three axes or for none."""
@@ -58,20 +58,20 @@ YAW_GAINS = AxisGains(
     torque_filter_ms=75.0,
 )
 
-# Fitted to ATTITUDE_TARGET and the body's attitude, recorded at 200 Hz: poles at wn 94 rad/s, zeta
-# 1.4 (tilt) and 9.4, 0.87 (yaw). Only 6 ms of the delay lie before the attitude target, so the body
-# lags the target, in yaw by up to 7 degrees. The negative feed-forward offsets the body rates that
-# the attitude gain adds during this lag.
+# Fitted to ATTITUDE_TARGET and the body's attitude, recorded at 200 Hz: poles at wn 125 rad/s, zeta
+# 1.2 (tilt) and 9.9, 0.83 (yaw). Only 6 ms of the delay lie before the attitude target, so the
+# body lags the target, in yaw by up to 7 degrees. The negative feed-forward offsets the body rates
+# that the attitude gain adds during this lag.
 ARDUPILOT_TILT_GAINS = AxisGains(
-    proportional_n_m_s=11.0,
-    feed_forward_n_m_s=-0.9,
-    damping_n_m_s2=0.3,
+    proportional_n_m_s=19.5,
+    feed_forward_n_m_s=-0.97,
+    damping_n_m_s2=0.349,
     setpoint_delay_ms=0.0,
     shaping=AxisShaping(acceleration_limit_rad_s2=radians(1100.0), delay_ms=6.0),
 )
 ARDUPILOT_YAW_GAINS = AxisGains(
-    proportional_n_m_s=0.146,
-    feed_forward_n_m_s=-0.032,
+    proportional_n_m_s=0.161,
+    feed_forward_n_m_s=-0.0353,
     torque_filter_ms=20.0,
     setpoint_delay_ms=4.0,
     shaping=AxisShaping(acceleration_limit_rad_s2=radians(270.0), delay_ms=6.0),

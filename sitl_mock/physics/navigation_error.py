@@ -43,8 +43,9 @@ class FilterState(NamedTuple):
     upright: TrackState
     yaw: float  # heading error, rad
     yaw_pending: float  # its change that the output does not yet contain, rad
-    compass: float  # part of the heading error that comes from the compass, rad
+    aligned: float  # the heading error without its noise, rad
     sag: float  # of the height, m
+    sink: float  # of the vertical velocity, m/s
     height_noise: float  # slow noise that the height follows, m
     at: float  # fusion time of the fix, s
     corrected: float  # time of the fix, s
@@ -101,7 +102,7 @@ def error_at(law: ErrorLaw, state: FilterState, truth: TrailRow, now: float) -> 
     down += law.height_offset + state.sag - unsettled * pending[0]
     return NavigationError(
         (place.real, place.imag, down.real),
-        (speed.real, speed.imag, (sink - unsettled * pending[1]).real),
+        (speed.real, speed.imag, (sink - unsettled * pending[1]).real + state.sink),
         # A wrong attitude rotates the thrust, which makes the acceleration wrong.
         (tilt.imag / _GRAVITY, -tilt.real / _GRAVITY, state.yaw - unsettled * state.yaw_pending),
     )

@@ -22,13 +22,17 @@ from sitl_mock.physics.navigation_error import (
 
 _GRAVITY = 9.80665
 _SAG_S = 2.0
-"""Time constant with which the height error follows the acceleration, s."""
+"""Time constant with which errors of height and climb follow the acceleration, s."""
 _SLOW = 0.5
 """Below this speed, m/s, the course does not correct the heading."""
 _COMPASS_S = 20.0
 """Time constant with which the heading follows the compass without acceleration, s."""
-_SHOWN = 0.15
-"""Rate, 1/s, at which an acceleration of 1 m/s^2 corrects the heading; grows with a^2."""
+_UNCERTAINTY = 0.1
+"""Uncertainty of the heading after a long time without acceleration: the rate, 1/s, at which the
+course of an acceleration of 1 m/s^2 corrects it. The rate grows with the acceleration's square,
+the uncertainty falls as in a Kalman filter."""
+_UNCERTAINTY_GROWTH = 0.0002
+"""Growth of the uncertainty, per s."""
 
 
 class NavigationFilter:
@@ -56,13 +60,16 @@ class NavigationFilter:
             config.height_offset_m,
             config.predictor_ms,
         )
+        self._uncertainty = _UNCERTAINTY
         self._random = Random(f"{seed}/navigation")
         self._height_random = Random(f"{seed}/height")
         yaw = self._random.gauss(0.0, radians(config.yaw_error_deg))
         level, upright = self._initial(1.0), self._initial(config.vertical_share)
         way, speed = complex(start[10], start[11]), complex(start[0], start[1])
         noise = self._height_random.gauss(0.0, config.height_noise_m)
-        self.state = FilterState(level, upright, yaw, 0.0, 0.0, noise, noise, 0.0, 0.0, way, speed)
+        self.state = FilterState(
+            level, upright, yaw, 0.0, 0.0, noise, 0.0, noise, 0.0, 0.0, way, speed
+        )
 
     def _initial(self, share: float) -> TrackState:
         """Return the state after the first fix, whose noise becomes the error."""
@@ -102,39 +109,43 @@ class NavigationFilter:
         noise = self._next_noise(state.upright.noise, share)
         still = extrapolated(state.upright.errors, elapsed)
         upright = self._corrected_state(state.upright, still, noise, noise, unsettled, share * kick)
-        compass = self._next_compass_error(abs(pull), elapsed)
-        yaw = self._next_turn_error(speed, pull) + compass
+        aligned = self._next_alignment(speed, pull, elapsed)
+        yaw = self._next_yaw_noise() + aligned
         turned = unsettled * state.yaw_pending + yaw - state.yaw
         height_noise = self._next_height_noise(elapsed)
         sag = config.height_sag_s4_per_m * abs(pull) ** 2 + height_noise
-        sag = state.sag + (1.0 - exp(-elapsed / _SAG_S)) * (sag - state.sag)
+        lagged = 1.0 - exp(-elapsed / _SAG_S)
+        sag = state.sag + lagged * (sag - state.sag)
+        sink = config.sink_per_acceleration_ms * 1e-3 * abs(pull)
+        sink = state.sink + lagged * (sink - state.sink)
         way = complex(delayed[10], delayed[11])
         self.state = FilterState(
-            level, upright, yaw, turned, compass, sag, height_noise, at, now, way, speed
+            level, upright, yaw, turned, aligned, sag, sink, height_noise, at, now, way, speed
         )
 
-    def _next_turn_error(self, speed: complex, pull: complex) -> float:
-        """Return the next heading error that does not come from the compass, rad.
+    def _next_yaw_noise(self) -> float:
+        """Return the slow noise of the heading at the next fix, rad."""
+        config, kept = self._config, self._yaw_decay
+        spread = radians(config.yaw_error_deg) * sqrt(1.0 - kept * kept)
+        return kept * (self.state.yaw - self.state.aligned) + self._random.gauss(0.0, spread)
 
-        It is noise around an error that a turn of the course causes.
+    def _next_alignment(self, speed: complex, pull: complex, elapsed: float) -> float:
+        """Return the next heading error without its noise, rad.
+
+        Without acceleration the heading rests on the compass. A horizontal acceleration shows it
+        better, because the fixes measure the direction of the acceleration; in a turn late fixes
+        are behind this direction.
         """
-        config, decay, state = self._config, self._yaw_decay, self.state
-        spread = radians(config.yaw_error_deg) * sqrt(1.0 - decay**2)
+        config, slow = self._config, 1.0 / _COMPASS_S
         turn_rate = (speed.conjugate() * pull).imag / max(abs(speed) ** 2, _SLOW**2)
-        learned = -turn_rate * config.turn_yaw_ms * 1e-3
-        before = state.yaw - state.compass
-        return learned + decay * (before - learned) + self._random.gauss(0.0, spread)
-
-    def _next_compass_error(self, pull: float, elapsed: float) -> float:
-        """Return the next heading error that comes from the compass, rad.
-
-        Only a horizontal acceleration (``pull``, m/s^2) shows the true heading, because the fixes
-        measure its direction.
-        """
-        slow = 1.0 / _COMPASS_S
-        rate = slow + _SHOWN * pull**2
-        rest = radians(self._config.compass_error_deg) * slow / rate
-        return rest + (self.state.compass - rest) * exp(-rate * elapsed)
+        shown = self._uncertainty * abs(pull) ** 2
+        rate = slow + shown
+        wrong = slow * radians(config.compass_error_deg)
+        wrong -= shown * turn_rate * config.turn_yaw_ms * 1e-3
+        rest = wrong / rate
+        left = self._uncertainty / (1.0 + shown * elapsed)
+        self._uncertainty = min(left + _UNCERTAINTY_GROWTH * elapsed, _UNCERTAINTY)
+        return rest + (self.state.aligned - rest) * exp(-rate * elapsed)
 
     def _next_height_noise(self, elapsed: float) -> float:
         """Return the slow noise of the height at the next fix, m."""

@@ -20,7 +20,7 @@ from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw, multiply,
 
 NO_ERROR = NavigationError((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 _NO_TRACK = TrackState((0j, 0j, 0j), (0j, 0j), (0j, 0j))
-_NO_FILTER = FilterState(_NO_TRACK, _NO_TRACK, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0j, 0j)
+_NO_FILTER = FilterState(_NO_TRACK, _NO_TRACK, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0j, 0j)
 _DRAWN_TOGETHER = 16
 """Number of estimates for which noise is drawn at a time; even, as normal numbers come in pairs."""
 
@@ -41,6 +41,7 @@ class SensorLaw(NamedTuple):
 
     gravity: float  # m/s^2
     attitude_delay: int  # steps
+    rate_delay: int  # steps
     position_delay: int  # steps
     dt: float  # length of a step, s
     filtered: bool  # whether there is a navigation filter, with the law that follows
@@ -104,8 +105,9 @@ def estimate(
     q = (attitude[3], attitude[4], attitude[5], attitude[6])
     fx, fy, fz = to_body(q, (attitude[13], attitude[14], attitude[15] - law.gravity))
     tilted = rotated_estimate(state.yaw, error.rotation, q)
-    yaw_rate = attitude[9] + law.yaw_rate_bias + noise[5]
-    gyro = (attitude[7] + noise[3], attitude[8] + noise[4], yaw_rate)
+    rates = trail[(steps - law.rate_delay) % len(trail)]
+    yaw_rate = rates[9] + law.yaw_rate_bias + noise[5]
+    gyro = (rates[7] + noise[3], rates[8] + noise[4], yaw_rate)
     position, velocity, offset = error.position, error.velocity, state.offset
     estimated = Estimate(
         normalise(multiply(tilted, (1.0, noise[0], noise[1], noise[2]))),
@@ -173,6 +175,7 @@ class Estimator:
         self.law = SensorLaw(
             gravity,
             round(config.attitude_delay_ms * 1e-3 / dt),
+            round((config.attitude_delay_ms + config.rate_lag_ms) * 1e-3 / dt),
             round(config.position_delay_ms * 1e-3 / dt),
             dt,
             filter_ is not None,
@@ -181,7 +184,7 @@ class Estimator:
         )
         horizon = 0 if config.ekf is None else round(config.ekf.fix_delay_ms * 1e-3 / dt)
         self._behind = max(horizon, self.law.position_delay)
-        self.trail_length = 1 + max(self.law.attitude_delay, self._behind)
+        self.trail_length = 1 + max(self.law.rate_delay, self._behind)
         self._filter = filter_
         first = _NO_FILTER if filter_ is None else filter_.state
         self.state = SensorState(first, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))

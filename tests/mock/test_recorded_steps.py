@@ -30,7 +30,7 @@ def recorded(family, dialect):
 
 
 def flown(rig, samples, setpoints):
-    """Times and body rates, (n, 4), of the mock under the setpoints at their times."""
+    """Times and estimated body rates, (n, 4), of the mock under the setpoints at their times."""
     begins, start = samples[0, 0], rig.time
     due = list(setpoints)
     rows = []
@@ -38,7 +38,7 @@ def flown(rig, samples, setpoints):
         while due and due[0][0] <= now:
             rig.rates(*map(float, due.pop(0)[1:]))
         rig.run(0.004)
-        rows.append((rig.time - start + begins, *rig.truth.body_rates))
+        rows.append((rig.time - start + begins, *rig.simulation.vehicle.estimate().body_rates))
     return np.array(rows)
 
 
@@ -59,7 +59,7 @@ def px4():
     [("ardupilot", "ardupilotmega", ardupilot), ("px4", "development", px4)],
 )
 def test_rates_follow_the_recorded_setpoints_as_recorded(family, dialect, ready):
-    """Within 6 % of what roll and pitch did, no more than 4 ms early or late."""
+    """Within 6.5 % of what roll and pitch did, no more than 4 ms early or late."""
     samples, setpoints = recorded(family, dialect)
     rig = ready()
     rig.each_tick = None
@@ -72,6 +72,6 @@ def test_rates_follow_the_recorded_setpoints_as_recorded(family, dialect, ready)
             mock = np.interp(inside[:, 0] + late, rows[:, 0], rows[:, axis])
             return np.sqrt(np.mean((mock - real) ** 2)) / np.std(real)
 
-        assert error(0.0) < 0.06
+        assert error(0.0) < 0.065
         lateness = min(np.arange(-SEARCHED_S, SEARCHED_S + 1e-9, 0.001), key=error)
         assert abs(lateness) <= 0.004

@@ -22,6 +22,7 @@ PERFECT = {
     "velocity_noise_m_s": 0.0,
     "acceleration_noise_m_s2": 0.0,
     "attitude_delay_ms": 0.0,
+    "rate_lag_ms": 0.0,
     "position_delay_ms": 0.0,
 }
 TURNING = ActuatorCommand(True, 0.6, -0.4, 0.5, 0.62)
@@ -60,14 +61,14 @@ def test_specific_force_is_what_an_accelerometer_feels():
 
 
 def test_delays_show_the_past():
-    vehicle = airborne(sensing(attitude_delay_ms=5.0, position_delay_ms=20.0))
+    vehicle = airborne(sensing(attitude_delay_ms=5.0, rate_lag_ms=4.0, position_delay_ms=20.0))
     history = [vehicle.truth]
     for _ in range(40):
         vehicle.step(TURNING)
         history.append(vehicle.truth)
     estimate = vehicle.estimate()
     assert estimate.q == pytest.approx(history[-6].q)
-    assert estimate.body_rates == history[-6].body_rates
+    assert estimate.body_rates == history[-10].body_rates
     assert estimate.position_ned == history[-21].position_ned
     assert estimate.velocity_ned == history[-21].velocity_ned
 
