@@ -30,6 +30,7 @@ def joined(stack, folder, autopilot, wire, signs, **settings):
     key.write_text("a passphrase\n")
     theirs = {"signing": {"passphrase_file": str(key)}} if signs else {}
     ours = {"signing_key_file": str(key)} if signs else {}
+    ours["min_attitude_rate_hz"] = 10.0  # in real time, a busy computer pauses telemetry
     if WIRES[wire] is not None:
         made = stack.enter_context(wire_like(WIRES[wire]))
         ours["endpoint"], theirs["endpoint"] = made.endpoint, made.vehicle_arguments[1]

@@ -154,6 +154,7 @@ def test_it_flies_the_same_maneuver(tmp_path):
                 "endpoint": f"udpin://127.0.0.1:{mock.port}",
                 "backend": "mavsdk",
                 "attitude_rate_hz": 100.0,
+                "min_attitude_rate_hz": 10.0,
             },
             "hover": {"duration_s": 1.0},
             "flight": {"takeoff_height_m": 2.0},
