@@ -12,7 +12,7 @@ from companion.config import Config
 from companion.extras import require
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.live.door import open_door, stream_address
-from companion.live.helper import Helper, Wishes
+from companion.live.helper import Helper, HelperTasks
 
 
 @contextmanager
@@ -56,7 +56,7 @@ def helper(
         if each is not None:
             console.print(each.words(), markup=False, highlight=False, soft_wrap=True)
     watched = path if options.watch else None
-    made = Helper(Wishes(watched, read, door, stream, follows, folder), config)
+    made = Helper(HelperTasks(watched, read, door, stream, follows, folder), config)
     if door is not None:
         door.listening.close()  # the process has it
     words = "the program has ended"

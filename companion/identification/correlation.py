@@ -55,12 +55,12 @@ def dead_time_by_correlation(
         damping: ζ of a lag of second order; infinite for first order.
 
     Returns:
-        The delay, s, at most 0.5; None if the commands changed too little, or explain too little
-        of the measurements.
+        The delay, s, less than 0.5; None if the commands changed too little or explain too little
+        of the measurements, or if the correlation is largest at a delay of 0 or 0.5 s.
 
     Raises:
-        ValueError: a time series and its values are not two rows of equal length, or the lag is
-            negative or not finite, or the slew is not positive.
+        ValueError: a time series and its values are not one-dimensional and equally long, or the
+            lag is negative or not finite, or the slew is not positive.
     """
     if not 0.0 <= lag < np.inf:
         raise ValueError(f"lag must be finite and not negative, not {lag}")
@@ -118,7 +118,10 @@ def _band_pass(lag: float, damping: float) -> Floats:
 def _filtered(
     part: Stretch, lag: float, slew: float | None, band: Floats
 ) -> tuple[Floats, Floats] | None:
-    """Filtered commands (n + delays,) and measurements (n,) on one grid that ends with both."""
+    """Filtered commands (n + `_DELAYS`,) and measurements (n,), sampled every `_GRID` seconds.
+
+    Both end at the last measurement. None: the measurements are shorter than the filter.
+    """
     first, last = part.measured_time[0], part.measured_time[-1]
     count = int((last - first) / _GRID)
     if count <= band.size:
@@ -134,7 +137,10 @@ def _filtered(
 
 
 def _peak(correlation: Floats) -> float | None:
-    """Delay of the largest correlation, s, interpolated by a parabola; None if it is too small."""
+    """Delay of the largest correlation, s, interpolated by a parabola.
+
+    None if this correlation is too small, or is at the first or last delay.
+    """
     top = int(np.argmax(correlation))
     if correlation[top] < _EXPLAINED**0.5 or top in {0, correlation.size - 1}:
         return None

@@ -27,8 +27,8 @@ class Model(Protocol):
     """A linear response of gain 1 whose parameters, its shape, are searched as logarithms.
 
     Attributes:
-        lowest: (k,), lower bounds of the shape.
-        highest: (k,), upper bounds of the shape.
+        lowest: (k,), lower bounds of the k parameters.
+        highest: (k,), upper bounds of the k parameters.
     """
 
     lowest: Floats
@@ -39,7 +39,10 @@ class Model(Protocol):
         ...
 
     def decay(self, shape: Floats, since: Floats) -> Floats:
-        """(m, k), components of the free response, `since` (m,) seconds after the start."""
+        """(m, k), k independent free responses, `since` (m,) seconds after the start.
+
+        Their weighted sum is the effect of any initial state.
+        """
         ...
 
 
@@ -140,7 +143,7 @@ class DelayedModel:
         self, record: list[Stretch], model: Model, gain: float | None, thinning: int = 1
     ) -> None:
         self.model, self.gain, self.thinning = model, gain, thinning
-        self._delay = model.lowest.size
+        self._dead_time_index = model.lowest.size
         span = max(float(np.ptp(part.commanded)) for part in record)
         self.commands = [
             held_commands(part.time, part.commanded, _SAME_COMMAND * span) for part in record
@@ -163,7 +166,7 @@ class DelayedModel:
 
     def response(self, unknown: Floats) -> Floats:
         """(m,), response of the model to the delayed commands."""
-        shape = unknown[: self._delay]
+        shape = unknown[: self._dead_time_index]
         return self._per_stretch(unknown, lambda knots, at: self.model.response(shape, knots, at))
 
     def delayed_commands(self, unknown: Floats, later: float = 0.0) -> Floats:
@@ -174,11 +177,11 @@ class DelayedModel:
 
     def dead_time(self, unknown: Floats) -> float:
         """Dead time among these unknowns, s."""
-        return float(unknown[self._delay])
+        return float(unknown[self._dead_time_index])
 
     def slew(self, unknown: Floats) -> float | None:
         """Slew limit among these unknowns, per second; None if they have none."""
-        return exp(unknown[-1]) if unknown.size > self._delay + 1 else None
+        return exp(unknown[-1]) if unknown.size > self._dead_time_index + 1 else None
 
     def search(self, start: Floats) -> Solution:
         """The best fit near `start`."""
@@ -203,7 +206,7 @@ class DelayedModel:
         The state is that at the first sample of the stretch. That at the first command would have
         decayed to nearly nothing at the samples, and its weight would be unbounded.
         """
-        shape = unknown[: self._delay]
+        shape = unknown[: self._dead_time_index]
         decays = [self.model.decay(shape, times - times[0]) for times in self.times]
         columns = np.zeros((self.measured.size, 1 + sum(each.shape[1] for each in decays)))
         columns[:, 0] = 1.0

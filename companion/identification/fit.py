@@ -39,7 +39,8 @@ _TRIED_DAMPINGS = (0.4, 0.7, 1.0)
 _TRIED_SHARES = (0.0, 0.3, 0.6)
 """Starts of the search for the dead time of a second-order model, as shares of the whole delay."""
 _EXCITED = 0.02
-"""Share of the commands' range; a sample that differs more from its command is excited."""
+"""A sample is excited if the modelled response differs from the command by more than this share of
+the commands' range."""
 _MEMORY = 4.0
 """Length of the vehicle's response and of its noise correlation, as multiples of the delay."""
 _COARSE = 500
@@ -67,7 +68,8 @@ class LagFit:
         dead_time_error: standard error of the dead time by noise, s.
         lag_error: standard error of the lag by noise, s.
         span: largest command minus smallest command.
-        excited: number of samples further from the command than 2 % of the span.
+        excited: number of samples at which the model differs from the command by more than 2 % of
+            the span.
         second_order: second-order fit, if it is clearly better; else None.
     """
 

@@ -84,7 +84,8 @@ def second_order_keys(vehicle: IdentifiedVehicle) -> dict[str, float]:
     """Keys of the section `vehicle` that describe roll and pitch as lags of second order.
 
     Returns:
-        The keys; empty unless second order is clearly better on both axes, without a slew limit.
+        The keys; empty unless both axes have a good fit, and second order without a slew limit is
+        clearly better on both, with a damping ratio that the configuration accepts.
     """
     keys: dict[str, float] = {}
     for name in ("roll", "pitch"):

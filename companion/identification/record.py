@@ -17,7 +17,8 @@ _MOST_ROWS = 16_000
 _WINDOW = 10.0
 """Length of a window, s; of a long record only the most excited windows are used."""
 _LEAD = 1.5
-"""Time before a window from which commands are kept, s: the longest dead time and ramp."""
+"""Time before a window from which commands are kept, s: more than the longest dead time plus the
+longest duration of a slew-limited change of command that is searched."""
 
 
 class Stretch(NamedTuple):
@@ -49,7 +50,7 @@ def stretches(
         measured: (m,), samples; rows that are not finite are left out.
 
     Raises:
-        ValueError: a time series and its values are not two rows of equal length.
+        ValueError: a time series and its values are not one-dimensional and equally long.
     """
     t, u = _series(time, commanded)
     sampled, y = _series(measured_time, measured)
@@ -101,7 +102,9 @@ def _windows(part: Stretch) -> list[Stretch]:
 def _series(time: ArrayLike, values: ArrayLike) -> tuple[Floats, Floats]:
     t, v = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if t.ndim != 1 or t.shape != v.shape:
-        raise ValueError(f"times {t.shape} and values {v.shape} must be two rows of equal length")
+        raise ValueError(
+            f"times {t.shape} and values {v.shape} must be one-dimensional and equally long"
+        )
     finite = np.isfinite(t) & np.isfinite(v)
     t, v = t[finite], v[finite]
     order = np.argsort(t, kind="stable")

@@ -158,10 +158,11 @@ def fit_rate_response(
             is fitted too.
 
     Returns:
-        The response. If no command changed, its values are NaN and `reason` says so.
+        The response. If no command changed or there are fewer than 10 samples, its values are NaN
+        and `reason` names too little excitation.
 
     Raises:
-        ValueError: a time series and its values are not two rows of equal length.
+        ValueError: a time series and its values are not one-dimensional and equally long.
     """
     found = fit_lag(stretches(time, commanded, measured_time, measured), gain)
     if found is None:

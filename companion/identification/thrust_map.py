@@ -94,10 +94,11 @@ def fit_thrust_map(
         specific_thrust: (m,), m/s²: the accelerometer's −z (FRD), or (g − v̇_down)/cos(tilt).
 
     Returns:
-        The map, or None if the thrust never changed. Samples of steady thrust are left out.
+        The map, or None if the thrust never changed or fewer than 10 samples follow its changes.
+        Samples of steady thrust are left out.
 
     Raises:
-        ValueError: a time series and its values are not two rows of equal length.
+        ValueError: a time series and its values are not one-dimensional and equally long.
     """
     record = _excited_samples(stretches(time, thrust, measured_time, specific_thrust))
     found = fit_lag(record, may_slew=False)

@@ -16,7 +16,8 @@ class Channel:
     """One end of the channel. Messages that the other end does not read in time are dropped.
 
     Attributes:
-        dropped: messages that were not sent because the buffer was full.
+        dropped: messages that were not sent: the buffer was full, the message too large, or the
+            other end gone.
         open: whether the other end existed at the last attempt.
 
     Args:
@@ -99,7 +100,7 @@ class Feed:
     """Sends records of the flight to the helper process. Its methods may run in any thread.
 
     Attributes:
-        dropped: datagrams that the process did not read in time.
+        dropped: datagrams that were not sent: the buffer was full, or the process gone.
 
     Args:
         end: a SEQPACKET socket.

@@ -79,7 +79,7 @@ def open_door(address: str) -> Door:
 
 
 def stream_address(address: str) -> StreamAddress:
-    """Find a free port at [HOST][:PORT]; the default is port 8765, for this computer only.
+    """Check that [HOST][:PORT] is free; the default is port 8765, for this computer only.
 
     The library of the live stream opens the port itself, later.
 

@@ -23,7 +23,7 @@ _MOST_A_TURN = 10
 """Largest number of messages handled in one turn of the event loop; samples come between turns."""
 
 
-class Wishes(NamedTuple):
+class HelperTasks(NamedTuple):
     """The tasks of the helper process.
 
     Attributes:
@@ -47,7 +47,7 @@ class Helper:
     """An observer that passes everything to the helper process. Its methods return at once.
 
     Args:
-        wishes: tasks of the process.
+        tasks: tasks of the process.
         config: configuration of the flight.
 
     Attributes:
@@ -59,25 +59,25 @@ class Helper:
         OSError: the process cannot be started.
     """
 
-    def __init__(self, wishes: Wishes, config: Config) -> None:
+    def __init__(self, tasks: HelperTasks, config: Config) -> None:
         self.changes = Changes(config)
         self.note: Callable[[str], None] = lambda _: None
-        self._what = _what(wishes)
+        self._name = _helper_name(tasks)
         self._channel, theirs = Channel.pair()
         self.feed: Feed | None = None
         fed: socket.socket | None = None
-        if wishes.stream is not None:
+        if tasks.stream is not None:
             self.feed, fed = Feed.pair()
-        served = None if wishes.door is None else wishes.door.listening
-        self._process = _started((theirs, served, fed), wishes.folder)
+        served = None if tasks.door is None else tasks.door.listening
+        self._process = _started((theirs, served, fed), tasks.folder)
         theirs.close()
         if fed is not None:
             fed.close()
-        self._send("start", **_first(wishes, config))
+        self._send("start", **_first(tasks, config))
 
     @property
     def dropped(self) -> int:
-        """Number of messages that the process did not read in time."""
+        """Number of messages that could not be sent to the process."""
         return self._channel.dropped
 
     async def serve_beside(self, work: Coroutine[Any, Any, T]) -> T:
@@ -102,7 +102,7 @@ class Helper:
         self._send("phase", name=name, waits_for=waits_for)
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
-        """Ignore it: the status contains the same."""
+        """Do nothing: `status` sends the same detail."""
 
     def status(self, status: FlightStatus) -> None:
         """Pass the state of the flight on."""
@@ -139,7 +139,7 @@ class Helper:
         was_open = self._channel.open
         self._channel.send({"kind": kind, **content})
         if was_open and not self._channel.open and kind != "end":
-            self.note(f"{self._what} has ended by itself; the flight goes on without it")
+            self.note(f"{self._name} has ended by itself; the flight goes on without it")
 
     def _tell_change(self, config: Config) -> None:
         made = str(self.changes.made[-1])
@@ -158,12 +158,12 @@ class Helper:
         for message in self._channel.waiting(_MOST_A_TURN):
             if message is None:
                 asyncio.get_running_loop().remove_reader(self._channel.fileno())
-                self.note(f"{self._what} has ended by itself; the flight goes on without it")
+                self.note(f"{self._name} has ended by itself; the flight goes on without it")
             else:
                 self._handle(message)
 
     def _handle(self, message: Message) -> None:
-        kind, by = message.get("kind"), str(message.get("by", self._what))
+        kind, by = message.get("kind"), str(message.get("by", self._name))
         if kind == "note":
             self.note(str(message.get("text")))
             return
@@ -178,11 +178,11 @@ class Helper:
             self._send("answer", id=message.get("id"), refusal=None, text=told)
 
 
-def _what(wishes: Wishes) -> str:
-    """The parts that end with the process, in words."""
-    if wishes.door is not None:
+def _helper_name(tasks: HelperTasks) -> str:
+    """Name of the helper process in messages: what the user sees of it."""
+    if tasks.door is not None:
         return "the live page"
-    return "the watch of the file" if wishes.stream is None else "the live stream"
+    return "the file watcher" if tasks.stream is None else "the live stream"
 
 
 def _started(
@@ -205,14 +205,14 @@ def _started(
     return process
 
 
-def _first(wishes: Wishes, config: Config) -> Message:
-    door, stream = wishes.door, wishes.stream
+def _first(tasks: HelperTasks, config: Config) -> Message:
+    door, stream = tasks.door, tasks.stream
     return {
         "config": _plain(config),
-        "read": _plain(wishes.read),
-        "follows": wishes.follows,
-        "watch": None if wishes.watch is None else str(wishes.watch.absolute()),
-        "folder": None if wishes.folder is None else str(wishes.folder.absolute()),
+        "read": _plain(tasks.read),
+        "follows": tasks.follows,
+        "watch": None if tasks.watch is None else str(tasks.watch.absolute()),
+        "folder": None if tasks.folder is None else str(tasks.folder.absolute()),
         "token": None if door is None else door.token,
         "host": None if door is None else door.host,
         "port": None if door is None else door.port,

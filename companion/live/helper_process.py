@@ -26,7 +26,7 @@ _NICE = 5
 
 
 class Relay:
-    """The process's end of the channel.
+    """The helper process's end of the channel to the flight: requests changes, takes messages.
 
     Attributes:
         first: the first message of the flight.
@@ -93,8 +93,8 @@ class Relay:
                 told = await answer
         except TimeoutError as error:
             raise NoAnswerError(
-                f"no answer of the flight within {_ANSWER:g} s; it may have been applied, so look "
-                "at the values of the flight"
+                f"no answer from the flight within {_ANSWER:g} s; the change may have been "
+                "applied, so look at the values of the flight"
             ) from error
         finally:
             del self._asked[number]
@@ -148,12 +148,12 @@ async def watch(relay: Relay, path: Path) -> None:
 
 
 async def _help(descriptor: int, listening: int, feed: int) -> None:
-    """Do all that is asked for; the arguments are descriptors, -1: there is none.
+    """Do the requested tasks; the arguments are file descriptors of sockets, −1: none.
 
     Args:
         descriptor: channel to the flight.
-        listening: the page is served here.
-        feed: what the flight records arrives here, for the stream.
+        listening: listening socket of the live page.
+        feed: socket on which the flight sends its records for the live stream.
     """
     channel = Channel(socket.socket(fileno=descriptor))
     first = channel.receive()

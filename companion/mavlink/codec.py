@@ -1,4 +1,4 @@
-"""Fast codecs of the control loop's messages, of lockstep's, and of ODOMETRY.
+"""Fast codecs of the control loop's and lockstep's messages, and of ODOMETRY's reset counter.
 
 The control loop receives ATTITUDE_QUATERNION and sends SET_ATTITUDE_TARGET; lockstep uses
 SYSTEM_TIME. pymavlink takes about 40 us for one message, because its checksum is computed in

@@ -56,7 +56,8 @@ class CommandRefused(LinkError):  # noqa: N818
         command: The command's name, such as `MAV_CMD_COMPONENT_ARM_DISARM`.
         result: MAV_RESULT number of the ACK.
         result_name: The result without its prefix, such as `TEMPORARILY_REJECTED`.
-        words: STATUSTEXTs that the autopilot sent around the refusal, oldest first; may be empty.
+        words: STATUSTEXTs that the autopilot sent from the command until 0.3 s after the refusal,
+            oldest first; may be empty.
     """
 
     def __init__(self, command: str, result: int, result_name: str, words: tuple[str, ...]) -> None:

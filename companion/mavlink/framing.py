@@ -32,7 +32,7 @@ class Frame(NamedTuple):
         system: Source system id.
         component: Source component id.
         sequence: The sender's sequence number, 0..255.
-        payload: Payload as sent, without trailing zeros; pad it before unpacking.
+        payload: Payload as sent; version 2 cuts trailing zeros, so pad it before unpacking.
         raw: The whole frame with header, checksum and signature.
         signed: Whether the frame carries a signature; it has not been checked.
     """
@@ -137,7 +137,11 @@ class FrameScanner:
         return end - at
 
     def _fault(self, data: bytes, at: int, check_at: int, end: int, message_id: int) -> int | None:
-        """How many bytes to skip instead of the frame at `at`..`end`; None if it is intact."""
+        """Why the bytes `at`..`end` are not an intact frame of a known message; None: they are.
+
+        Returns:
+            `_NOT_A_FRAME`, `_INCOMPLETE`, or the length of a frame of an unknown message.
+        """
         extra = self._crc_extra.get(message_id)
         if extra is None:
             return self._unknown_frame(data, at, end)

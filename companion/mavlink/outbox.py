@@ -17,7 +17,8 @@ class Outbox:
 
     Attributes:
         transport: The open connection; None while there is none.
-        setpoint_at: Event-loop time of the last setpoint, s; −inf before the first.
+        setpoint_at: Event-loop time of the last setpoint, sent or dropped, s; −inf before the
+            first.
     """
 
     def __init__(self, settings: LinkSettings, stats: LinkStats, tap: Tap | None) -> None:

@@ -87,7 +87,8 @@ class ParameterClient:
 
         Raises:
             UnansweredParameter, UnknownParameter: As for `read`.
-            ParameterRefused: The value does not fit the type, or the autopilot keeps another value.
+            ParameterRefused: The value does not fit the type, or the autopilot keeps another value
+                or answered with an error.
             LinkLost: The connection dropped while waiting.
         """
         self._check(name)

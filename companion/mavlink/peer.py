@@ -86,8 +86,8 @@ class PeerRule:
 
     A sender becomes the peer by a claim: a HEARTBEAT of the configured system and component that
     comes from an autopilot (not type GCS, not autopilot INVALID). With signing or in lockstep, each
-    accepted frame is a claim. A claim lapses after `CLAIM_LASTS_S`, except while setpoints are sent
-    and for 2 s after the last one.
+    accepted frame is a claim, and no claim lapses. Otherwise a claim lapses after `CLAIM_LASTS_S`,
+    except while setpoints are sent and for 2 s after the last one.
 
     Args:
         stats: Counts the changes of the peer.

@@ -84,7 +84,7 @@ class Status(IntEnum):
     FAILED = 1
     """The solver found no plan."""
     TILTED_TOO_FAR = 2
-    """The tilt is larger than the models allow."""
+    """The tilt is larger than the models allow, or the attitude is not a unit quaternion."""
 
 
 class Answer(NamedTuple):

@@ -54,7 +54,7 @@ class BackgroundFile(ABC, Generic[T]):
 
     Attributes:
         path: path of the file.
-        dropped: items that were not written because too many waited, or the disk was full.
+        dropped: items that were not written because too many waited, or writing had failed.
         failure: why writing ended early, for example a full disk; None: it did not.
 
     Args:

@@ -100,9 +100,9 @@ def _extent(figures: Figures) -> str:
 def _ended_early(figures: Figures) -> tuple[str, list[str]]:
     end = figures["early_end"]
     interrupted = figures["result"].startswith(_INTERRUPTED)
-    remedy = "nothing is to be mended" if interrupted else what_to_do(end["monitor"], end["phase"])
+    remedy = "nothing needs fixing" if interrupted else what_to_do(end["monitor"], end["phase"])
     if figures["at_the_end"]["armed"] and end["since_takeoff_s"] is not None:
-        remedy = f"take the vehicle over or land it, for it is armed; then: {remedy}"
+        remedy = f"the vehicle is armed: take it over or land it; then: {remedy}"
     return f"The flight ended early: {figures['result'].rstrip('.')}.", [
         f"  when: {_when(end)}",
         f"  vehicle now: {_vehicle(figures['at_the_end'])}",

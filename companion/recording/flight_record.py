@@ -95,7 +95,7 @@ class FlightRecord:
 
     @cached_property
     def _rows(self) -> dict[str, Row]:
-        """The rows of one channel."""
+        """The channels read so far, by name: `rows` reads each channel once."""
         return {}
 
     def since_start(self, times: NDArray[np.float64]) -> NDArray[np.float64]:

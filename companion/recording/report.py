@@ -148,7 +148,7 @@ def _loop_words(summary: Summary) -> Text:
     missed = "" if summary.course.lockstep else f"{counts.missed_deadlines} missed deadlines, "
     return Text(
         f"{counts.setpoints} setpoints for {counts.samples} samples, {counts.rate_hz:.0f} Hz "
-        f"in the maneuver\n{missed}{counts.stale} too old, "
+        f"in the maneuvers\n{missed}{counts.stale} too old, "
         f"{counts.refused} refused; link: {link.get('lost', 0)} lost, "
         f"{link.get('bad_crc', 0)} damaged, {link.get('non_finite', 0)} not finite{unanswered}"
     )

@@ -124,15 +124,15 @@ def _write(queue: "SimpleQueue[_Work]", failures: list[str]) -> None:
 
 
 class Series:
-    """Rows of one kind, appended in flight; `fromlist` takes half as long as `extend`.
+    """Rows of one kind, appended in flight.
 
     Args:
-        columns: their names.
+        columns: names of the columns.
         spool: writes the rows that are not kept in memory.
         kept: number of newest rows that are always in memory.
 
     Attributes:
-        columns: their names.
+        columns: names of the columns.
         lost: rows that were lost because the disk was full or too slow.
     """
 
@@ -152,7 +152,7 @@ class Series:
 
     def add(self, row: list[float]) -> None:
         """Record one row; its length is not checked."""
-        self._chunk.fromlist(row)
+        self._chunk.fromlist(row)  # takes half as long as `extend`
         if len(self._chunk) == self._full:
             self._put_away()
 

@@ -60,9 +60,9 @@ class FlightTrace:
         tracking: (vehicle time s, reference north, east, down, measured north, east, down).
         rates: (vehicle time s, arrival on our clock s, commanded roll, pitch, yaw rad/s, thrust
             0..1, measured roll, pitch, yaw rad/s, age of the sample s or NaN), while offboard
-            control is active by its heartbeats.
+            control is active by the vehicle's heartbeats.
         latencies_ns: latencies from sample to setpoint inside this process, ns.
-        newest_latency_ns: the newest of them; 0 before the first.
+        newest_latency_ns: the newest latency, ns; 0 before the first.
         motion: (time since the flight began s, vehicle time s, height over home m, speed m/s, tilt
             °, distance from the reference m), ten times a second in all phases; NaN: unknown.
         maneuvers: beginning of each maneuver, and end of the last one.

@@ -38,9 +38,9 @@ BY_PHASE: Mapping[str, str] = {
     "arm": "mend what the autopilot names in the events; --arm lets the program arm",
     "takeoff": "read the autopilot's words in the events; the pilot may have taken over",
     "offboard": "mend what the message names; the autopilot must accept our setpoints",
-    "maneuvers": "read the events before it; if the pilot took over, nothing is to be mended",
-    "hand back": "read the events before it; the pilot may have taken over",
-    "land": "read the events before it; the pilot may have taken over",
+    "maneuvers": "read the events before the end; if the pilot took over, nothing needs fixing",
+    "hand back": "read the events before the end; the pilot may have taken over",
+    "land": "read the events before the end; the pilot may have taken over",
     "disarm": "disarm by the pilot's switch",
 }
 """Advice by the name of the phase."""
@@ -50,4 +50,4 @@ def what_to_do(monitor: str | None, phase: str) -> str:
     """Advice as one sentence without a full stop."""
     if monitor is not None and monitor in BY_MONITOR:
         return BY_MONITOR[monitor]
-    return BY_PHASE.get(phase, "read the events before it")
+    return BY_PHASE.get(phase, "read the events before the end")

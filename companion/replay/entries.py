@@ -79,6 +79,7 @@ class _Messages:
         return next(self._changes)
 
     def take(self, channel: Channel) -> Row:
+        """The next message if it is one of `channel`, else a row of NaN."""
         names = channel.dtype.names or ()
         if self.next() is not channel:
             return dict.fromkeys(names, float("nan"))

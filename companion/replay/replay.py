@@ -206,5 +206,5 @@ class _RecordedSource:
         return lambda _: held
 
     def finished(self, now: float) -> bool:
-        """Always false: the record tells when another source follows."""
+        """Always false: a recorded action ends this source."""
         return False

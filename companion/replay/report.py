@@ -36,7 +36,7 @@ def words(samples: Sequence[ReplayedSample], began: float, *, follows_record: bo
         )
     if not different:
         lines.append(
-            f"identical: {recorded} commands to the bit, {len(samples) - recorded} unanswered"
+            f"identical: {recorded} setpoints to the bit, {len(samples) - recorded} unanswered"
             " samples with the same reasons"
         )
         return lines

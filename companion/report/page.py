@@ -80,8 +80,8 @@ def _of_this_version(path: Path) -> Iterator[None]:
         yield
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise RecordError(
-            f"{path}: not as this version records a flight ({error!r}); without its summary.json "
-            "the figures are measured again"
+            f"{path}: not as this version records a flight ({error!r}); rename its "
+            "summary.json, and the figures are computed from flight.mcap"
         ) from error
 
 

@@ -44,7 +44,7 @@ class Plot:
 
 
 def line(name: str, x: Floats, y: Floats, colour: str, **more: Any) -> dict[str, Any]:
-    """A line through all points; `over_time` thins them before."""
+    """A line through all points; for many points use `over_time`, which thins them."""
     dash = more.pop("dash", "solid")
     return {
         "type": "scatter",

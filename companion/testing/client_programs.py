@@ -87,9 +87,13 @@ class Program(Client):
             self._session.network.detach(self)
 
     def send(self, message: Message) -> None:
-        """Send a message under the program's ids."""
+        """Send a message under the program's ids.
+
+        Raises:
+            RuntimeError: the program is not connected.
+        """
         if self._session is None or self._session.network is None:
-            raise RuntimeError("the program is not connected")
+            raise RuntimeError("the program is not connected; call connect(session) first")
         raw = message.pack(self.packer)
         self.packer.seq = (self.packer.seq + 1) & 0xFF
         frames = FrameScanner(CRC_EXTRA, keep_unknown=True).feed(raw)

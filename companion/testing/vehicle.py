@@ -34,7 +34,7 @@ def _plant(compiled: bool) -> type[Plant]:
 
 
 class MockVehicle:
-    """A multirotor with its autopilot, without sockets. It also lives between flights.
+    """A multirotor with its autopilot, without sockets. Its state is kept between flights.
 
     Args:
         autopilot: "px4" or "ardupilot"; None: that of `config`, by default PX4.

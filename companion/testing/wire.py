@@ -180,5 +180,5 @@ async def open_wire(_endpoint: Any, receiver: Receiver, _lost: Any) -> MemoryTra
     """
     loop = asyncio.get_running_loop()
     if not (isinstance(loop, VirtualEventLoop) and isinstance(loop.world, Wire)):
-        raise EndpointError("a mock vehicle in memory is reached inside companion.testing.run only")
+        raise EndpointError("a mock vehicle in memory is reached only inside companion.testing.run")
     return loop.world.open(receiver)

@@ -17,6 +17,7 @@ Floats = NDArray[np.float64]
 _SETTLED = 0.05
 """Share of its peak below which the response to a gust has settled."""
 _LONGEST = 10.0
+"""Duration of the computed response to a gust, s."""
 _STEP = 0.01
 """Time between computed points of the response to a gust, s."""
 

@@ -86,10 +86,10 @@ def guidance_feedback(
 def _states(
     s: Complex, observer: ObserverSettings, period: float
 ) -> tuple[Complex, Complex, Complex]:
-    """Responses (n, 3) of observed position, velocity and disturbance.
+    """Responses (n, 3) of the observed position, velocity and disturbance.
 
-    To the known acceleration, the measured position and the measured velocity, from
-    z·x = (I − K·C)·(A·x + B·a) + K·y.
+    One array for each input: known acceleration, measured position, measured velocity. The observer
+    is z·x = (I − K·C)·(A·x + B·a) + K·y.
     """
     # The largest trust, in motion, leaves the smallest margins.
     gains, pull = observer.gains(period, trust=1.0), observer.pull(period, trust=1.0)

@@ -19,6 +19,7 @@ GUSTS: Mapping[str, float] = {"speed_m_s": 3.0, "gust_m_s": 1.0}
 _MAX_THRUST = 0.95
 _FENCE = 50.0
 _WIRE_S = 0.0005
+"""Delay of each datagram between program and mock vehicle, s."""
 _TRUTH_EVERY = 5
 """Steps of the mock vehicle between two true positions."""
 _QUICK = {

@@ -15,7 +15,11 @@ _POINTS = 120
 
 
 def frequencies() -> Complex:
-    """Frequencies (n,) for margins and errors, rad/s, rising from 0, densest around 10 rad/s."""
+    """Complex frequencies s (n,) for margins and errors, rad/s.
+
+    The real part is `_OFFSET`; the imaginary part rises from 0 to `_UP_TO`, with most points above
+    0.05 rad/s.
+    """
     low = np.geomspace(1e-3, 0.05, 12)[:-1]
     high = np.geomspace(0.05, _UP_TO, _POINTS)
     s: Complex = _OFFSET + 1j * np.concatenate([[0.0], low, high])

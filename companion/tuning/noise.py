@@ -34,8 +34,8 @@ def measured_disturbances(log: Path, drag: float, usual: Disturbances) -> Distur
     Args:
         log: a `.tlog` of this or another program.
         drag: linear drag of the vehicle, 1/s.
-        usual: usual disturbances; gusts are taken from it, and everything if the flight is too
-            short.
+        usual: usual disturbances, which give the values that a log does not: gusts and the errors
+            on a path. They are returned unchanged if the flight is too short.
 
     Raises:
         LogError: the file cannot be read or is not a `.tlog`.

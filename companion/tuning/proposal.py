@@ -104,7 +104,7 @@ def propose(
     ):
         raise ConfigError(
             f"no values keep {aims.gain_db:g} dB and {aims.phase_deg:g}° of margin with this "
-            "vehicle; look at its lag and dead time"
+            "vehicle; check vehicle.lag_ms and vehicle.dead_time_ms"
         )
     errors = tuple((error, stability(tuned, error)) for error in errors_to_bear(tuned, aims))
     return Proposal(

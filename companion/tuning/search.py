@@ -206,7 +206,10 @@ def errors_to_bear(config: Config, aims: Aims) -> list[ModelError]:
 
 
 def _missed(found: Margins, gain_db: float, phase_deg: float) -> float:
-    """How far the margins are missed, in units of 6 dB and 30°; 1 + its own if unstable."""
+    """How far the margins are missed, in units of 6 dB and 30°.
+
+    For an unstable loop: 1 plus the found margins in these units.
+    """
     if not found.stable:
         return 1.0 + found.gain_db / 6.0 + found.phase_deg / 30.0
     short = max(0.0, gain_db - found.gain_db) / 6.0

@@ -94,7 +94,7 @@ def test_what_only_the_whole_flight_shows_is_told_at_its_end():
     assert bench.notes == []
     bench.watch.over_the_flight()
     ((_, text),) = bench.notes
-    assert "roll 80 ms, not 40;" in text
+    assert "roll 80 ms (configured 40 ms);" in text
 
 
 def test_one_look_that_finds_it_wrong_is_not_yet_believed(monkeypatch):

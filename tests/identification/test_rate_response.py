@@ -166,5 +166,5 @@ def test_too_few_samples_and_too_much_doubt_are_refused():
 
 
 def test_times_without_their_values_are_an_error():
-    with pytest.raises(ValueError, match="equal length"):
+    with pytest.raises(ValueError, match="equally long"):
         fit_rate_response([0.0, 0.1], [0.0], [0.0], [0.0])

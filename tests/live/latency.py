@@ -20,7 +20,7 @@ from companion.config.files import changed, load
 from companion.flight.observer import Silent, decline_landing
 from companion.flight.session import Session
 from companion.live.door import open_door
-from companion.live.helper import Helper, Wishes
+from companion.live.helper import Helper, HelperTasks
 from companion.mavlink import loop as link_loop
 from tests.live.browser import chromium
 
@@ -70,7 +70,7 @@ def _flight(seconds: float, *, page: bool) -> tuple[list[float], list[float]]:
         helper, observer = None, Silent()
         if page:
             door = open_door("127.0.0.1:0")
-            helper = observer = Helper(Wishes(None, config, door, None, True, folder), config)
+            helper = observer = Helper(HelperTasks(None, config, door, None, True, folder), config)
             stack.callback(helper.close, "over")
             door.listening.close()
             tab = stack.enter_context(chromium())()

@@ -7,7 +7,7 @@ from math import cos, pi, sin
 from companion.config import Config
 from companion.flight.status import FlightStatus
 from companion.live.door import open_door
-from companion.live.helper import Helper, Wishes
+from companion.live.helper import Helper, HelperTasks
 
 
 def status(time):
@@ -69,7 +69,7 @@ class Page:
 
     def __init__(self, folder=None, address="127.0.0.1:0"):
         self.door, self.notes = open_door(address), []
-        self.helper = Helper(Wishes(None, Config(), self.door, None, True, folder), Config())
+        self.helper = Helper(HelperTasks(None, Config(), self.door, None, True, folder), Config())
         self.helper.note = self.notes.append
         self.door.listening.close()
         self.url = f"http://127.0.0.1:{self.door.port}/"

@@ -22,7 +22,7 @@ from companion.flight.observer import Silent, decline_landing
 from companion.flight.session import Session
 from companion.live.channel import Feed
 from companion.live.door import stream_address
-from companion.live.helper import Helper, Wishes
+from companion.live.helper import Helper, HelperTasks
 from companion.recording.flight_record import read_flight
 from companion.recording.mcap_file import cdr
 from companion.recording.mcap_file.batch import Batch, messages_of
@@ -190,7 +190,7 @@ class Client:
 def served():
     """A helper process that serves the stream, and its address."""
     address = stream_address("0")
-    helper = Helper(Wishes(None, Config(), None, address, True, None), Config())
+    helper = Helper(HelperTasks(None, Config(), None, address, True, None), Config())
     try:
         yield helper, address
         helper._process.wait(30.0)

@@ -9,7 +9,7 @@ from companion.config import Config
 from companion.config.files import load
 from companion.live import helper_process
 from companion.live.channel import Channel, NoAnswerError
-from companion.live.helper import Helper, Wishes
+from companion.live.helper import Helper, HelperTasks
 from tests.live.pages import status
 
 
@@ -40,7 +40,7 @@ def test_a_message_that_is_too_large_is_dropped():
 def test_edits_of_the_file_reach_the_flight(tmp_path):
     path = tmp_path / "flown.yaml"
     path.write_text("planner: {gain_per_s: 5.0}\n")
-    helper = Helper(Wishes(path, load(path), None, None, True, None), load(path))
+    helper = Helper(HelperTasks(path, load(path), None, None, True, None), load(path))
     notes = []
     helper.note = helper.changes.note = notes.append
 
@@ -75,7 +75,7 @@ def test_without_an_answer_a_change_may_have_been_applied(monkeypatch):
         first = {"config": Config().model_dump(mode="json"), "follows": False}
         relay = helper_process.Relay(Channel(theirs), first)
         try:
-            with pytest.raises(NoAnswerError, match="it may have been applied"):
+            with pytest.raises(NoAnswerError, match="the change may have been applied"):
                 await relay.undo("a test")
         finally:
             asyncio.get_running_loop().remove_reader(theirs.fileno())

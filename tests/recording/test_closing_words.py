@@ -190,7 +190,7 @@ def test_a_vehicle_that_is_left_armed_in_the_air_comes_before_all_else():
     armed = {**GOOD, **ENDED, "at_the_end": {"armed": True, "mode": "AUTO.LOITER"}}
     _, text = words(armed)
     assert "vehicle now: ARMED, in mode AUTO.LOITER" in text
-    assert "what to do: take the vehicle over or land it, for it is armed; then: make" in text
+    assert "what to do: the vehicle is armed: take it over or land it; then: make" in text
 
 
 @pytest.mark.parametrize("phase", ["connect", "checks", "stream", "arm"])
@@ -207,7 +207,7 @@ def test_before_take_off_the_doctor_is_next(phase):
 def test_a_flight_that_the_user_interrupted_has_nothing_to_mend():
     figures = {**GOOD, **ENDED, "result": "interrupted by the user (Ctrl-C)"}
     told, text = words(figures, MINE)
-    assert "nothing is to be mended" in text
+    assert "nothing needs fixing" in text
     assert told.next_command == ".venv/bin/companion fly --config 'my own.yaml'"
 
 

@@ -27,7 +27,7 @@ def test_30_percent_beyond_doubt_is_wrong(measured, configured, wrong):
 def test_the_warning_names_the_axes_the_times_and_what_to_do():
     right, wrong, unknown = AxisDeadTime(0.042, 0.04), AxisDeadTime(0.081, 0.04), AxisDeadTime()
     warning = DeadTimes({"roll": right, "pitch": wrong, "yaw": unknown}).warning()
-    assert "pitch 81 ms, not 40" in warning
+    assert "pitch 81 ms (configured 40 ms)" in warning
     assert "roll" not in warning
     assert "yaw" not in warning
     assert "`companion identify`" in warning

@@ -180,7 +180,7 @@ def test_the_record_alone_gives_the_figures_of_the_summary(good):
 def test_the_command_tells_what_is_the_same_and_what_differs(good, tmp_path, capsys):
     folder, summary = good
     assert main(["replay", str(folder)]) == 0
-    assert f"identical: {summary['setpoints']} commands to the bit" in capsys.readouterr().out
+    assert f"identical: {summary['setpoints']} setpoints to the bit" in capsys.readouterr().out
     table = tmp_path / "both.csv"
     changes = ["--set", "planner.gain_per_s=4", "--csv", str(table)]
     assert main(["replay", str(folder), *changes]) == 0

@@ -223,7 +223,7 @@ def test_a_summary_with_values_of_another_kind_is_one_sentence(copied, capsys):
     path = copied / "summary.json"
     path.write_text(json.dumps({**json.loads(path.read_text()), "maneuvers": [5]}))
     assert main(["report", str(copied)]) == 2
-    assert "without its summary.json" in capsys.readouterr().err
+    assert "rename its summary.json" in capsys.readouterr().err
 
 
 def test_text_of_a_log_cannot_become_a_tag():

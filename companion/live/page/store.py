@@ -77,7 +77,7 @@ class Store:
         return [key for key in keys(self.config) if (key.section, key.name) in changeable()]
 
     def fence(self) -> dict[str, Any]:
-        """The fence and the largest coefficient, for the drawings."""
+        """The fence and the tilt limit in force, for the drawings."""
         limits, safety = self.config.limits, self.config.safety
         return {
             "radius_m": limits.fence_radius_m,

@@ -54,7 +54,10 @@ class SerialTransport:
         self._receive(data, time.perf_counter_ns())
 
     def send(self, frame: bytes) -> bool:
-        """Write one frame; return False if the device is gone or the last frame is unfinished."""
+        """Write one frame, or drop it and return False.
+
+        It is dropped if the device is gone, its buffer is full, or the last frame is unfinished.
+        """
         if self._fd < 0 or self._unsent:
             return False
         return self._write(frame)

@@ -1,4 +1,4 @@
-"""All channels of `flight.mcap`; here are those of the status, a few times a second.
+"""All channels of `flight.mcap`; those of the status, ten times or once a second, are defined here.
 
 The columns follow the conventions of `companion.recording.mcap_file.loop_channels`.
 """
@@ -111,4 +111,4 @@ TOPICS = (
 )
 """All channels."""
 ENCODING, SCHEMA_ENCODING = "cdr", "ros2msg"
-"""Of the messages, and of their definitions."""
+"""Encoding of the messages, and of their definitions, as MCAP names them."""

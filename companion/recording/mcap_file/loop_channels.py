@@ -195,5 +195,5 @@ ACTION = Channel(
         Field("drag_per_s", "Linear drag of an earlier flight, 1/s; of `drag_prior` only."),
         Field("quadratic_drag_per_m", "Quadratic drag of an earlier flight, 1/m; the same."),
     ),
-    (Code("action", "Which.", ACTIONS),),
+    (Code("action", "The command to guidance.", ACTIONS),),
 )

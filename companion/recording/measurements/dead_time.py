@@ -61,7 +61,7 @@ class DeadTimes:
     def warning(self) -> str | None:
         """A sentence on wrong dead times and their remedy; None if none is wrong."""
         wrong = [
-            f"{name} {1e3 * axis.measured:.0f} ms, not {1e3 * axis.configured:.0f}"
+            f"{name} {1e3 * axis.measured:.0f} ms (configured {1e3 * axis.configured:.0f} ms)"
             for name, axis in self.axes.items()
             if axis.is_wrong and axis.measured is not None and axis.configured is not None
         ]

@@ -42,7 +42,7 @@ class ManeuverFigures:
         height_max: largest height error, m.
         beginning_max: largest distance in the part left out, m.
         drift: largest level distance from its starting point, m.
-        speed: largest speed of the reference, m/s.
+        speed: largest speed of the reference (95th percentile), m/s; NaN without a reference.
         swing: oscillation of roll and pitch; not measured in open loop.
     """
 
@@ -171,7 +171,7 @@ def _measured(name: str, begin: float, rows: Floats) -> ManeuverFigures:
 
 
 def _speed(time: Floats, reference: Floats) -> float:
-    """The largest speed of the reference, m/s; NaN without a reference."""
+    """The largest speed of the reference (95th percentile), m/s; NaN without a reference."""
     spans = np.diff(time)
     steps = np.linalg.norm(np.diff(reference, axis=0), axis=1)
     speeds = steps[spans > 0.0] / spans[spans > 0.0]

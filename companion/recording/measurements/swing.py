@@ -34,6 +34,7 @@ class _Rule(NamedTuple):
 _LONG_HOVER, _SHORT_HOVER = _Rule(5.0, 2.0, 1, 2.5), _Rule(2.9, 1.0, 1, 1.25)
 _MOVING = _Rule(4.0, 1.0, 2, 1.25)
 SHORTEST = _SHORT_HOVER.shortest
+"""Shortest part of a flight in which a swing can be measured, s."""
 _LONGEST_STEP = 0.05
 """Longest time between samples, s."""
 _PEAK = 0.9

@@ -55,7 +55,10 @@ def checks(figures: Figures) -> list[Check]:
 
 
 def is_good(figures: Figures) -> bool:
-    """Whether a flight reached its end with every figure within its limit."""
+    """Whether a flight reached its end, every figure within its limit, and without advice.
+
+    Advice names keys whose values do not fit the vehicle.
+    """
     good = all(check.good for check in checks(figures))
     return figures["result"] == "ok" and good and not figures["advice"]
 
@@ -108,7 +111,8 @@ def _steps(figures: Figures) -> Iterator[Check]:
         "straightness of the steps",
         f"{across:.4f} from their lines (limit {limit:.4f})",
         across <= limit,
-        "run `companion identify` and fly planner.name: model-following with its times",
+        "run `companion identify` and fly planner.name: model-following with the "
+        "lag and dead time that it finds",
     )
     deviation = response["second_order"]["deviation_max"]
     if deviation is None:
