@@ -12,7 +12,6 @@ from sitl_mock.config.settings import VehicleSettings
 from sitl_mock.config.yaml_file import Document, explain_yaml, load_yaml
 from sitl_mock.personalities import PERSONALITIES
 
-RATE_LAGS_MS = {"px4": 5.0, "ardupilot": 11.0}
 SMOOTH = {"position_noise_m": 0.0, "velocity_noise_m_s": 0.0, "position_delay_ms": 0.0}
 """Defaults of ``sensors`` with a navigation filter: no white noise or delay of the position."""
 
@@ -25,7 +24,7 @@ class MockSettings(VehicleSettings):
     def _with_defaults(cls, section: object) -> object:
         if not isinstance(section, dict):
             return section
-        section = {**section, "sensors": _as_measured(section)}
+        section = {**section, "sensors": _with_ekf(section)}
         personality = PERSONALITIES.get(str(section.get("autopilot", "px4")))
         return section if personality is None else personality.with_defaults(section)
 
@@ -46,13 +45,12 @@ class MockSettings(VehicleSettings):
         return parameters
 
 
-def _as_measured(section: dict[str, Any]) -> object:
-    """Return the ``sensors`` section with this autopilot's navigation filter and rate lag."""
+def _with_ekf(section: dict[str, Any]) -> object:
+    """Return the ``sensors`` section with the navigation filter of this autopilot as default."""
     sensors = section.get("sensors", {})
     if not isinstance(sensors, dict):
         return sensors
-    autopilot = section.get("autopilot", "px4")
-    filled = {"ekf": autopilot, "rate_lag_ms": RATE_LAGS_MS.get(str(autopilot), 0.0), **sensors}
+    filled = {"ekf": section.get("autopilot", "px4"), **sensors}
     # The output of a navigation filter is smooth, and as recent as the attitude.
     return filled if filled["ekf"] in (None, "none") else {**SMOOTH, **filled}
 

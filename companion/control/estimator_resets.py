@@ -19,7 +19,7 @@ from math import asin, atan2, hypot, radians, sqrt
 from companion.attitude import Quaternion, Target, is_unit
 from companion.attitude.rotation import short_way, turned, turned_about_vertical
 from companion.control.rate_lag import RateLag
-from companion.guidance.reference import Vector, rotated
+from companion.guidance.reference import Vector, minus, rotated
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
 _LONGEST = 0.1
@@ -93,7 +93,7 @@ class EstimatorResets:
         before, self._raw = self._raw, position
         if before is not None:
             self._find_position_jump(before, position)
-        return position._replace(position_ned=_difference(position.position_ned, self.shift))
+        return position._replace(position_ned=minus(position.position_ned, self.shift))
 
     def forget(self) -> None:
         """Forget all jumps: the frame without jumps is now the estimator's. Used on the ground."""
@@ -162,7 +162,3 @@ def _attitude_jump(
     tilt = 2.0 * asin(min(1.0, hypot(r_x, r_y)))
     change = sqrt((new_p - p) ** 2 + (new_q - q) ** 2 + (new_r - r) ** 2)
     return yaw, tilt, _ANGLE + 0.5 * change * dt
-
-
-def _difference(left: Vector, right: Vector) -> Vector:
-    return left[0] - right[0], left[1] - right[1], left[2] - right[2]

@@ -6,7 +6,7 @@ turn of the heading in a corner only within 0.5°.
 """
 
 from companion.attitude import Quaternion
-from companion.attitude.rotation import clamp
+from companion.attitude.rotation import body_error, clamp
 from companion.guidance.reference import Vector
 
 _LONGEST = 0.03
@@ -50,13 +50,9 @@ class RateLag:
             predicted: this sample's attitude by the one before and `mean`.
             found: its attitude.
         """
-        w, x, y, z = predicted
-        a, b, c, d = found
-        side = 2.0 if a * w + b * x + c * y + d * z > 0.0 else -2.0
-        roll = side * (w * b - a * x - y * d + z * c)
-        pitch = side * (w * c - a * y - z * b + x * d)
+        _, x, y, _ = body_error(predicted, found)
         p, q = now[0] - before[0], now[1] - before[1]
         square = p * p + q * q
-        self._products += roll * p + pitch * q + self.seconds * square
+        self._products += 2.0 * (x * p + y * q) + self.seconds * square
         self._squares += square
         self.seconds = clamp(self._products / self._squares, _LONGEST)

@@ -8,6 +8,7 @@ from collections import deque
 from math import sqrt
 
 from companion.attitude import Quaternion
+from companion.attitude.kinematics import cos_tilt
 from companion.attitude.rotation import attitude_of, body_error
 from companion.control.guidance_command import GuidanceCommand
 from companion.guidance.reference import GRAVITY, Vector
@@ -150,7 +151,7 @@ def _arrow(q: Quaternion, goal: Quaternion, lift: float, color: Color) -> Arrow:
 
     Its length shows the specific thrust whose vertical part is `lift`, m/s².
     """
-    cos_tilt = max(1.0 - 2.0 * (goal[1] ** 2 + goal[2] ** 2), _LEAST_COS)
-    length = max(_METRES_PER_M_S2 * lift / cos_tilt, 0.01)
+    cosine = max(cos_tilt(goal[1], goal[2]), _LEAST_COS)
+    length = max(_METRES_PER_M_S2 * lift / cosine, 0.01)
     head = min(0.15, 0.4 * length)
     return Arrow(_up(body_error(q, goal)), length - head, 0.03, head, 0.07, color)

@@ -79,6 +79,11 @@ Horizontal = tuple[float, float]
 """(north, east)."""
 
 
+def minus(left: Vector, right: Vector) -> Vector:
+    """The difference of two vectors."""
+    return left[0] - right[0], left[1] - right[1], left[2] - right[2]
+
+
 def limited(north: float, east: float, most: float) -> Horizontal:
     """The vector, shortened to `most` if it is longer; its direction is kept."""
     length = hypot(north, east)

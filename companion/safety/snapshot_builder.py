@@ -8,7 +8,7 @@ from companion.attitude.representation import wrap_angle
 from companion.control.control_loop import ControlLoop
 from companion.control.guidance_loop import GuidanceLoop
 from companion.guidance.fence import Place
-from companion.guidance.reference import Vector
+from companion.guidance.reference import Vector, minus
 from companion.mavlink.stats import share_lost
 from companion.safety.snapshot import Autopilot, Control, Health, Motion, Resets, Snapshot
 from companion.vehicle.held_rates import HeldRates
@@ -92,7 +92,7 @@ class SnapshotBuilder:
         self._start = None if motion is None else motion.position_ned
         self._origin = self._place(now)
         if centre is not None:
-            self._start = _minus(centre.position_ned, resets.shift)
+            self._start = minus(centre.position_ned, resets.shift)
             self._origin = centre.place
         self._began_at, self._turn, self._shift = now, resets.turn, resets.shift
         resets.largest_tilt = 0.0
@@ -105,8 +105,8 @@ class SnapshotBuilder:
         """Centre of the fence in the autopilot's frame, or None before control began."""
         if self._start is None:
             return None
-        back = _minus((0.0, 0.0, 0.0), self._loop.resets.shift)
-        return FenceCentre(_minus(self._start, back), self._origin)
+        back = minus((0.0, 0.0, 0.0), self._loop.resets.shift)
+        return FenceCentre(minus(self._start, back), self._origin)
 
     @property
     def origin_ned(self) -> Vector | None:
@@ -233,7 +233,3 @@ class SnapshotBuilder:
         if newest is None or now - newest.received > _PLACE_LASTS:
             return None
         return Place(newest.latitude_deg, newest.longitude_deg)
-
-
-def _minus(left: Vector, right: Vector) -> Vector:
-    return left[0] - right[0], left[1] - right[1], left[2] - right[2]

@@ -4,7 +4,7 @@ from math import dist
 
 from companion.config import Config
 from companion.control.estimator_resets import EstimatorResets
-from companion.guidance.reference import Vector
+from companion.guidance.reference import Vector, minus
 from companion.safety.snapshot_builder import FenceCentre
 from companion.safety.table import fence_of
 from companion.vehicle.link import Link
@@ -42,13 +42,8 @@ class KeptFence:
         """
         if self._kept is None:
             return None
-        north, east, down = (
-            kept + shift - before
-            for kept, shift, before in zip(
-                self._kept.position_ned, self._resets.shift, self._shift_when_kept, strict=True
-            )
-        )
-        return self._kept._replace(position_ned=(north, east, down))
+        back = minus(self._shift_when_kept, self._resets.shift)
+        return self._kept._replace(position_ned=minus(self._kept.position_ned, back))
 
     def keep(self, centre: FenceCentre | None) -> None:
         """Keep the centre of a flight that has ended; an earlier flight's centre takes precedence.
@@ -70,11 +65,8 @@ class KeptFence:
                 "more than safety.max_reset_m, so it is not certain where the fence lies; land and "
                 "disarm"
             )
-        north, east, down = (
-            here - centre
-            for here, centre in zip(position.position_ned, kept.position_ned, strict=True)
-        )
-        breach = self._fence.breach((north, east, down), self._state.height, kept.place)
+        offset = minus(position.position_ned, kept.position_ned)
+        breach = self._fence.breach(offset, self._state.height, kept.place)
         if breach is None:
             return None
         return f"outside the fence of the first flight: {breach}; fly back, or land and disarm"

@@ -100,6 +100,9 @@ BURST_MS = 5.6
 ROTOR_LAG_MS = 22.5
 """Time constant of the specific thrust (measured: 5 ms after a dead time of 15 ms)."""
 
+RATE_LAG_MS = 11.0
+"""Delay of the gyro's low pass (measured)."""
+
 AIRFRAME: dict[str, Any] = {
     "thrust_slope_m_s2": specific_thrust(1.0),
     "thrust_offset_m_s2": 0.0,
@@ -167,7 +170,8 @@ def with_ardupilot_defaults(section: dict[str, Any]) -> dict[str, Any]:
     filled = {**own, **section}
     if filled["rate_loop"] == "ardupilot":
         filled["rate_loop"] = RATE_LOOP
-    for key, defaults in (("airframe", AIRFRAME), ("battery", BATTERY)):
+    sensors = {"rate_lag_ms": RATE_LAG_MS}
+    for key, defaults in (("airframe", AIRFRAME), ("battery", BATTERY), ("sensors", sensors)):
         given = section.get(key, {})
         filled[key] = {**defaults, **given} if isinstance(given, dict) else given
     return filled

@@ -12,12 +12,13 @@ from scipy.optimize import curve_fit
 from scipy.spatial.transform import Rotation
 
 from sitl_mock.__main__ import main
+from sitl_mock.ardupilot.defaults import RATE_LAG_MS
 from sitl_mock.config.airframe import AirframeConfig
 from sitl_mock.config.rate_loop import AxisShaping, RateLoopConfig
 from sitl_mock.physics.multirotor import Multirotor
 from sitl_mock.physics.rate_shaping import NOT_SHAPED, shape, shaping_law, sqrt_controller
 from sitl_mock.physics.vehicle import ActuatorCommand, Vehicle
-from sitl_mock.settings import RATE_LAGS_MS, MockSettings, load_settings
+from sitl_mock.settings import MockSettings, load_settings
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 REST = (0.0, 0.0, 0.0)
@@ -25,7 +26,7 @@ GRAVITY = 9.80665
 DT = 1e-3
 ROLL, PITCH, YAW = range(3)
 TILT_LIMIT, YAW_LIMIT = 1100.0, 270.0  # measured, deg/s^2
-GYRO = RATE_LAGS_MS["ardupilot"]  # in the measured rates, not in the body's, ms
+GYRO = RATE_LAG_MS  # in the measured rates, not in the body's, ms
 # Measured fits of the answer to a step of so many rad/s: first-order lag and dead time, ms.
 MEASURED = {
     ROLL: {0.5: (18, 27 - GYRO), 1.0: (28, 34 - GYRO), 2.0: (48, 46 - GYRO)},
