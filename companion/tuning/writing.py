@@ -112,14 +112,14 @@ def _reasons(proposal: Proposal) -> dict[str, str]:
     capped = design.gain > 0.97 * limit
     slewing = slewing_delay(tuned)
     if capped:
-        why = f"the quickest sensible gain, 0.45 / (lag + dead time) = {limit:.2f}"
+        why = f"the largest sensible gain, 0.45 / (lag + dead time) = {limit:.2f}"
     elif slewing:
         why = (
-            f"below {limit:.1f}, the quickest sensible gain: the rate loop slews for "
+            f"below {limit:.1f}, the largest sensible gain: the rate loop slews for "
             f"{2e3 * slewing:.0f} ms to limits.max_tilt_rate_deg_s; tune again after a change of it"
         )
     else:
-        why = f"below {limit:.2f}, the quickest sensible gain, for the margins"
+        why = f"below {limit:.2f}, the largest sensible gain, for the margins"
     drag = "as configured, or learned in an earlier flight of this vehicle"
     order = "the log shows clearly that the rate loop is of second order"
     return {
