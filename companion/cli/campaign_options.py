@@ -49,7 +49,7 @@ def _add_run(kinds: Commands) -> None:
         "--out",
         type=Path,
         metavar="FOLDER",
-        help="folder for the results (runs/campaigns/NAME-TIME); continues a campaign in it",
+        help="folder for the results (runs/campaigns/NAME-TIME); a campaign in it is continued",
     )
     add_cluster_options(run)
     run.add_argument(

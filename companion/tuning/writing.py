@@ -90,8 +90,9 @@ def _compared(before: Expectation, after: Expectation) -> list[str]:
 def _error(error: ModelError) -> str:
     if error.delay:
         return f"with {1e3 * error.delay:.0f} ms of added delay, as while the rate loop slews"
-    percent = round(100.0 * abs(error.slower - 1.0))
-    return f"with lag and dead time {percent} % {'larger' if error.slower > 1.0 else 'smaller'}"
+    percent = round(100.0 * abs(error.time_factor - 1.0))
+    change = "larger" if error.time_factor > 1.0 else "smaller"
+    return f"with lag and dead time {percent} % {change}"
 
 
 def _flight_line(name: str, before: Flown, after: Flown) -> str:

@@ -139,10 +139,11 @@ class Choice(NamedTuple):
 
 
 def choices(results: Results, most: int = 300) -> list[Choice]:
-    """The choices that a campaign compares; keys of `mock`, `flight` and `vehicle` are none.
+    """The choices that a campaign compares, by the values of its swept keys.
 
-    Faults are none either. If no two cases have equal values, or there are more than `most`
-    choices, single cases are the choices, at equal distances, fewer than 2·`most`.
+    Keys of `mock`, `flight` and `vehicle`, and faults, are not chosen by a user and do not count.
+    If no two cases have equal values, or there are more than `most` choices, each choice is one
+    case: every k-th, with k such that there are fewer than 2·`most`.
     """
     chosen = [name for name in results.factors if _is_choice(name)]
     keys = [tuple(_key(results.columns[name][row]) for name in chosen) for row in _rows(results)]
