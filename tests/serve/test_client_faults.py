@@ -221,7 +221,7 @@ async def contradictions(scene):
         scene.script.attitude(7 | 64, (1.0, 0.0, 0.0, 0.0), 0.5)  # no thrust
 
     await stream(1.0, send, 0.05)
-    scene.is_said("without velocity")
+    scene.is_said("need velocity, too")
     await scene.is_flown()
     return REFUSED
 
