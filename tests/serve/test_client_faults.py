@@ -313,7 +313,7 @@ async def beyond_limits(scene):
         scene.judge.commanded()
         scene.script.attitude(7, q, 1.0)
 
-    await stream(0.8, tilt)
+    await stream(0.5, tilt)
     assert 2.0 * math.asin(math.hypot(*scene.vehicle.state()["q"][1:3])) < math.radians(47.0)
     await scene.recover()
 
