@@ -5,8 +5,6 @@ import json
 import os
 import shutil
 import signal
-import subprocess
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -19,6 +17,7 @@ from companion.config.files import load
 from companion.identification import FitQuality, IdentifiedVehicle, RateResponse
 from companion.mavlink.transport.free_port import free_port
 from tests.flight.fly import QUICK_FLIGHT, merged
+from tests.flight.programs import Program
 from tests.flight.sockets import mock_vehicle
 
 RECORDINGS = Path(__file__).parents[1] / "mavlink" / "recordings"
@@ -47,22 +46,23 @@ def config_for(folder, endpoint, **changes):
     return path
 
 
+def identifying(config):
+    """`companion identify` in a process of its own; test_terminal_encoding.py starts it anew."""
+    arguments = ("identify", "--config", config, "--json")
+    return Program("companion.cli.main", *arguments, environment={"COLUMNS": "80"})
+
+
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory):
     """A folder with a configuration and one flight of `identify`, and what that printed."""
     folder = tmp_path_factory.mktemp("identify")
     with mock_vehicle(folder, full_rate=True, seed=2) as mock:
         config = config_for(folder, f"udpin://127.0.0.1:{mock.port}")
-        done = subprocess.run(
-            [sys.executable, "-m", "companion", "identify", "--config", str(config), "--json"],
-            capture_output=True,
-            text=True,
-            check=False,
-            env={**os.environ, "COLUMNS": "80"},
-        )
+        process = identifying(config)
+        out, err = process.communicate()
         assert not mock.state()["armed"]
-    assert done.returncode == 0, done.stderr
-    return folder, done
+    assert process.returncode == 0, err
+    return folder, SimpleNamespace(stdout=out, stderr=err)
 
 
 def test_it_flies_fits_writes_and_tells_how_to_include_it(flown):
@@ -282,12 +282,7 @@ def test_a_flight_that_failed_is_not_fitted(capsys, tmp_path):
 def test_an_interrupted_flight_is_not_fitted(tmp_path):
     with mock_vehicle(tmp_path, full_rate=True) as mock:
         config = config_for(tmp_path, f"udpin://127.0.0.1:{mock.port}")
-        process = subprocess.Popen(
-            [sys.executable, "-m", "companion", "identify", "--config", str(config), "--json"],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
+        process = identifying(config)
         mock.until(lambda state: state["mode"] == "OFFBOARD" and state["armed"])
         process.send_signal(signal.SIGTERM)
         out, err = process.communicate(timeout=30)
