@@ -16,6 +16,7 @@ from importlib import import_module
 from multiprocessing.connection import Connection
 from pathlib import Path
 
+from companion.mavlink import lockstep
 from sitl_mock import __main__ as command_line
 from sitl_mock import server
 
@@ -41,8 +42,13 @@ def _run_mock(arguments, words):
     with words.open("wb") as file:
         for stream in (sys.stdout, sys.stderr):
             os.dup2(file.fileno(), stream.fileno())
-    server.SPIN_S = 0.0  # the cores are busy with other flights
+    _leave_cores()
     sys.exit(command_line.main(arguments))
+
+
+def _leave_cores():
+    """No program waits by polling: the cores are busy with other flights."""
+    server.SPIN_S = lockstep._SPIN_S = 0.0
 
 
 class Program:
@@ -128,5 +134,6 @@ def _run(module, arguments, environment, folder, writers):
     os.environ.update(environment)
     os.chdir(folder)
     sys.argv = [module, *arguments]
+    _leave_cores()
     main: Callable[[], int] = import_module(module).main
     sys.exit(main())
