@@ -271,7 +271,7 @@ def test_an_interrupted_fit_says_where_the_flight_is(capsys, fitted, monkeypatch
     assert code == 1
     assert json.loads(out)["result"] == (
         f"interrupted while fitting; the flight is kept in {fitted}; "
-        f"fit it with identify --log {fitted}"
+        f"fit it with companion identify --log {fitted}"
     )
     assert f"the flight is kept in {fitted}" in err
     assert not (fitted / "vehicle.yaml").exists()

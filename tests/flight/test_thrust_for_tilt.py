@@ -90,7 +90,7 @@ def test_a_vehicle_heavier_than_configured_keeps_its_height(
     assert summary.result == "ok", summary.events
     rows = summary.trace.tracking_rows()
     assert np.abs(rows[:, 6] - rows[:, 3]).max() < 0.15, np.abs(rows[:, 6] - rows[:, 3]).max()
-    (told,) = [text for _, text in summary.events if "of tilt: no more is asked for" in text]
+    (told,) = [text for _, text in summary.events if "of tilt: the tilt is limited to that" in text]
     assert any(f"the vehicle hovers at a thrust of {hover}" in told for hover in hovers), told
     assert told.endswith("although limits.max_tilt_deg is 45")
     assert not [text for _, text in summary.events if text.startswith("safety: thrust")]
