@@ -28,7 +28,10 @@ _ENDING = (signal.SIGINT, signal.SIGTERM)
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command line and return the exit code: 0 ended by a signal, 2 cannot start."""
+    """Run the command line and return the exit code.
+
+    0: ended by a signal, or `--check` found no fault. 2: cannot start, or `--check` found a fault.
+    """
     options = _parser().parse_args(arguments)
     try:
         settings = load_settings(options.config, _overrides(options))
@@ -64,9 +67,9 @@ def _parser() -> argparse.ArgumentParser:
         description="A multirotor with its autopilot.",
     )
     parser.add_argument("--config", type=Path, help="YAML file; its `mock` section is read")
-    parser.add_argument("--port", type=int, help="where the companion listens (default 14540)")
+    parser.add_argument("--port", type=int, help="UDP port of the companion (default 14540)")
     parser.add_argument("--endpoint", help="udp (default), tcpin://HOST:PORT or serial:///PATH")
-    parser.add_argument("--gcs-port", type=int, help="where a ground station listens, 0 = none")
+    parser.add_argument("--gcs-port", type=int, help="UDP port of a ground station, 0 = none")
     parser.add_argument(
         "--control-port", type=int, help="UDP port of the JSON control channel, 0 = none"
     )

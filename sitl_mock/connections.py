@@ -23,11 +23,11 @@ class Connections:
 
     Args:
         settings: settings of this vehicle.
-        simulation: the vehicle; its links are sent from, and the control channel acts on it.
+        simulation: the vehicle. What its links queue is sent; the control channel acts on it.
         exchange: takes arriving datagrams, and provides datagrams to send.
 
     Raises:
-        ConfigError: a port is in use.
+        ConfigError: a port cannot be used, or a pseudo-terminal or its link cannot be made.
     """
 
     def __init__(self, settings: MockSettings, simulation: Simulation, exchange: Exchange) -> None:

@@ -1,6 +1,7 @@
-"""The datagrams that one vehicle receives and sends, with the faults of its companion link (pure).
+"""The datagrams that one vehicle receives and sends, with the faults of its companion link.
 
-`Server` joins it to sockets, `companion.testing` joins it to an application in the same process.
+It has no sockets and no clock. `Server` joins it to sockets, `companion.testing` to an application
+in the same process.
 Both do the same in each slot: collect what arrived, `step`, send `outgoing` of each link.
 """
 

@@ -7,7 +7,6 @@ import os
 import resource
 import subprocess
 import sys
-from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -18,18 +17,6 @@ from companion.realtime import RealtimeError, Wishes, asked_for
 def refusals(wishes):
     with asked_for(wishes) as grants:
         return [grant.refusal for grant in grants]
-
-
-def policies_elsewhere():
-    """Of a thread that begins now, and of a process that is to be as every other."""
-    with ThreadPoolExecutor(1) as pool:
-        in_a_thread = pool.submit(os.sched_getscheduler, 0).result()
-    process = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
-    with process:
-        realtime.schedule_as_usual(process.pid)
-        in_a_process = os.sched_getscheduler(process.pid)
-        process.communicate(b"\n")
-    return in_a_thread, in_a_process
 
 
 def test_who_asks_for_nothing_gets_nothing():
@@ -51,21 +38,45 @@ def test_what_this_computer_surely_grants_is_granted_and_given_back():
     assert gc.isenabled()
 
 
+TRUTH = """
+import os, subprocess, sys
+from concurrent.futures import ThreadPoolExecutor
+from companion import realtime
+
+def policies_elsewhere():
+    "Of a thread that begins now, and of a process that is to be as every other."
+    with ThreadPoolExecutor(1) as pool:
+        in_a_thread = pool.submit(os.sched_getscheduler, 0).result()
+    process = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    with process:
+        realtime.schedule_as_usual(process.pid)
+        in_a_process = os.sched_getscheduler(process.pid)
+        process.communicate(b"\\n")
+    return in_a_thread, in_a_process
+
+before = os.sched_getscheduler(0)
+with realtime.asked_for(realtime.Wishes(fifo_priority=7, lock_memory=True)) as grants:
+    memory, scheduler = grants
+    assert (os.sched_getscheduler(0) == os.SCHED_FIFO) == (scheduler.refusal is None)
+    if scheduler.refusal is None:
+        assert os.sched_getparam(0).sched_priority == 7
+    with open("/proc/self/status") as status:
+        (locked,) = (int(line.split()[1]) for line in status if line.startswith("VmLck"))
+    assert (locked > 0) == (memory.refusal is None)
+    in_a_thread, in_a_process = policies_elsewhere()
+    assert in_a_thread == os.sched_getscheduler(0)
+    assert in_a_process == os.SCHED_OTHER
+assert os.sched_getscheduler(0) == before
+"""
+"""In a process of its own: to lock all the memory of this one takes seconds."""
+
+
 def test_the_truth_is_told_of_the_scheduler_and_of_memory():
     """Whatever this computer allows: what is told is what then is so."""
-    before = os.sched_getscheduler(0)
-    with asked_for(Wishes(fifo_priority=7, lock_memory=True)) as grants:
-        memory, scheduler = grants
-        assert (os.sched_getscheduler(0) == os.SCHED_FIFO) == (scheduler.refusal is None)
-        if scheduler.refusal is None:
-            assert os.sched_getparam(0).sched_priority == 7
-        with open("/proc/self/status") as status:  # noqa: PTH123
-            (locked,) = (int(line.split()[1]) for line in status if line.startswith("VmLck"))
-        assert (locked > 0) == (memory.refusal is None)
-        in_a_thread, in_a_process = policies_elsewhere()
-        assert in_a_thread == os.sched_getscheduler(0)
-        assert in_a_process == os.SCHED_OTHER
-    assert os.sched_getscheduler(0) == before
+    told = subprocess.run(
+        [sys.executable, "-c", TRUTH], capture_output=True, text=True, check=False
+    )
+    assert told.returncode == 0, told.stderr
 
 
 def test_a_user_who_may_not_is_told_how_he_may(monkeypatch):

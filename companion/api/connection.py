@@ -114,7 +114,9 @@ async def _vehicle(
 
 
 def run(main: Coroutine[Any, Any, T], *, in_lockstep: bool = False) -> T:
-    """Like `asyncio.run`; the garbage collector ignores all objects that exist already.
+    """Like `asyncio.run`, in the event loop that a flight needs.
+
+    In real time the garbage collector ignores all objects that exist already.
 
     Args:
         main: the program.

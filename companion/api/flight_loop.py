@@ -1,7 +1,7 @@
-"""The event loop of a program's flight, in its own thread.
+"""The event loop of a program's flight: in its own thread, or in lockstep the program's own loop.
 
-A program that computes, blocks or never yields then delays only its own commands. The flight
-continues to answer samples, notices the missing commands, and hands the vehicle back.
+With its own thread, a program that computes, blocks or never yields delays only its own commands.
+The flight continues to answer samples, notices the missing commands, and hands the vehicle back.
 """
 
 import asyncio

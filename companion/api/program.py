@@ -46,8 +46,7 @@ class Program:
             ended.
         ended: exception that every later call raises; None before the end of the flight.
         finished: set when the flight has ended and its files are written.
-        interrupt: function that ends the flight for a reason in words, by the exit of the current
-            phase.
+        interrupt: function that ends the flight for a reason in words: see `Session.interrupt`.
     """
 
     def __init__(self) -> None:

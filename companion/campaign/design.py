@@ -84,7 +84,7 @@ def seed_of(campaign_seed: int, number: int) -> int:
 def _shares(file: CampaignFile, dimensions: int) -> NDArray[np.float64]:
     """(n, dimensions): cumulative probability of each sample in each distribution.
 
-    n is `samples`, but samples**dimensions for `sampling: grid`.
+    n is `samples`, but samples**dimensions for `sampling: grid` if there is a distribution.
     """
     count = file.samples
     if dimensions == 0:

@@ -1,7 +1,7 @@
 """The options of `companion campaign` and its sub-commands."""
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from companion.cli.tool_options import Commands
@@ -49,7 +49,7 @@ def _add_run(kinds: Commands) -> None:
         "--out",
         type=Path,
         metavar="FOLDER",
-        help="folder for the results (runs/campaigns/NAME-TIME); continues a campaign in it",
+        help="folder for the results (runs/campaigns/NAME-TIME); a campaign in it is continued",
     )
     add_cluster_options(run)
     run.add_argument(
@@ -70,7 +70,7 @@ def add_cluster_options(command: argparse.ArgumentParser) -> None:
     )
     where.add_argument(
         "--workers",
-        type=_count,
+        type=_count_up_to(1024),
         metavar="NUMBER",
         help="worker processes on this computer (one for each core)",
     )
@@ -120,7 +120,7 @@ def _add_tune(kinds: Commands) -> None:
     )
     tune.add_argument(
         "--trials",
-        type=_count,
+        type=_count_up_to(100_000),
         metavar="NUMBER",
         help="number of trials; replaces tune.trials of the file",
     )
@@ -128,7 +128,10 @@ def _add_tune(kinds: Commands) -> None:
     tune.set_defaults(run="campaign.tune")
 
 
-def _count(text: str) -> int:
-    if not text.isdecimal() or not 1 <= int(text) <= 1024:
-        raise argparse.ArgumentTypeError("must be a whole number from 1 to 1024")
-    return int(text)
+def _count_up_to(largest: int) -> Callable[[str], int]:
+    def count(text: str) -> int:
+        if not text.isdecimal() or not 1 <= int(text) <= largest:
+            raise argparse.ArgumentTypeError(f"must be a whole number from 1 to {largest}")
+        return int(text)
+
+    return count

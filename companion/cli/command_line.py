@@ -76,7 +76,8 @@ def _add_flights(commands: Commands) -> None:
             "--maneuvers",
             type=lambda text: tuple(text.split(",")),
             metavar="NAME[,NAME]",
-            help="maneuvers that replace flight.maneuvers: hover, steps, circle, corners",
+            help="maneuvers that replace flight.maneuvers: hover, steps, circle, corners, or "
+            "trajectory if flight.trajectory is set",
         )
         command.add_argument(
             "--trajectory",
@@ -102,7 +103,8 @@ def _add_doctor(commands: Commands) -> None:
         "parameters, message rates, estimator, link, and other nodes. Report what is "
         "unsafe or ineffective, what to set, and the source of each finding. "
         "`companion fly` runs the same checks, and refuses unsafe findings unless "
-        "flight.accept names them. Exit code 1: something unsafe was found.",
+        "flight.accept names them. Exit code 1: something is unsafe and not in "
+        "flight.accept, the vehicle is not ready, or it does not answer.",
     )
     shared_options.add_required_config(command)
     shared_options.add_endpoint(command)

@@ -86,7 +86,7 @@ def _maneuvers(config: Config, drag: KnownDrag) -> tuple[ManeuverSequence | None
         return configured_maneuvers(config, drag), []
     except ConfigError as error:
         found = f"the configured maneuvers cannot be flown: {error}"
-        because = "`companion fly` refuses it"
+        because = "`companion fly` refuses to fly them"
         return None, [Finding(Key.MANEUVERS, CheckResult.INEFFECTIVE, found, because)]
 
 

@@ -60,7 +60,7 @@ def identify(options: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         reason = (
             f"interrupted while fitting; the flight is kept in {summary.log}; "
-            f"fit it with identify --log {summary.log}"
+            f"fit it with companion identify --log {summary.log}"
         )
         with suppress(OSError):
             console.print(reason, soft_wrap=True)

@@ -44,6 +44,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _loaded(arguments: Sequence[str] | None) -> Callable[[], int]:
     """Parse the arguments, and import the command they name."""
+    # Our matrices are small: a second thread takes twice the CPU time and is slower.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from companion.cli.text_streams import print_anything  # noqa: PLC0415
 
     print_anything()

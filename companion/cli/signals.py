@@ -11,7 +11,9 @@ from companion.recording.measurements.summary import Summary
 LEAVE_AFTER = 1.0
 """Shortest time between two Ctrl-C for the second one to leave, s; a key may bounce."""
 
-HOW_TO_LEAVE = f"Ctrl-C again, {LEAVE_AFTER:g} s later or more, leaves at once"
+HOW_TO_LEAVE = (
+    f"Ctrl-C again, {LEAVE_AFTER:g} s later or more, stops the setpoints and ends the flight"
+)
 
 
 class Signals:

@@ -31,7 +31,7 @@ class _PrintThread:
 
     def __init__(self) -> None:
         self._lines: queue.Queue[Callable[[], None] | None] = queue.Queue(_WAITING)
-        self._thread = threading.Thread(target=self._speak, name="terminal", daemon=True)
+        self._thread = threading.Thread(target=self._print_lines, name="terminal", daemon=True)
         self._thread.start()
 
     def say(self, line: Callable[[], None]) -> bool:
@@ -50,7 +50,7 @@ class _PrintThread:
                 return
             self._thread.join(_PATIENCE)
 
-    def _speak(self) -> None:
+    def _print_lines(self) -> None:
         broken = False
         while (line := self._lines.get()) is not None:
             if broken:
@@ -132,7 +132,7 @@ class TerminalObserver:
         self._asking = True
         self._printer.say(self._clear)
         self._printer.say(
-            lambda: self._print("The vehicle holds. Land it now? [y/N] (Ctrl-C again leaves) ")
+            lambda: self._print("The vehicle holds. Land it now? [y/N] (Ctrl-C ends the flight) ")
         )
         try:
             return (await read_line()).strip().lower() in ("y", "yes")

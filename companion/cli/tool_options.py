@@ -127,7 +127,7 @@ def add_study(commands: Commands) -> None:
     """Add `study`."""
     study = commands.add_parser(
         "study",
-        help="the paper's experiments, as figures, tables and a page (extra `study`)",
+        help="the paper's experiments and further ones: figures, tables, a page (extra `study`)",
         epilog=f"studies:\n{registry.help_table()}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

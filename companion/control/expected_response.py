@@ -27,14 +27,14 @@ class ExpectedResponse:
         otherwise: name of a cause of delay -> time constant (s) if this cause changes: with twice
             the gain, or without the rate limit, the lag or the dead time.
         gain: gain p of the planner, 1/s.
-        quickest_gain: the largest sensible gain, 1/s; None if lag and dead time are not known.
+        largest_gain: the largest sensible gain, 1/s; None if lag and dead time are not known.
     """
 
     coefficient: float
     time_constant: float
     otherwise: dict[str, float]
     gain: float
-    quickest_gain: float | None
+    largest_gain: float | None
 
     @property
     def limited_by(self) -> str:
@@ -44,7 +44,7 @@ class ExpectedResponse:
     @property
     def too_quick(self) -> bool:
         """Whether the gain is larger than the largest sensible gain."""
-        return self.quickest_gain is not None and self.gain > self.quickest_gain
+        return self.largest_gain is not None and self.gain > self.largest_gain
 
     def sentence(self) -> str:
         """A message for the user: time constant, its main limit, and the effect of each change."""
@@ -62,24 +62,24 @@ class ExpectedResponse:
 
     def gain_sentence(self) -> str:
         """A message for the user about the largest sensible gain."""
-        if self.quickest_gain is None:
-            return "the quickest sensible gain is not known before `companion identify`"
-        return _gain_sentence(self.gain, self.quickest_gain)
+        if self.largest_gain is None:
+            return "the largest sensible gain is not known before `companion identify`"
+        return _gain_sentence(self.gain, self.largest_gain)
 
 
 def gain_warning(config: Config) -> str | None:
     """A warning for the user if one of our planners has more than the largest sensible gain."""
-    gain, quickest = config.planner.gain_per_s, sensible_gain(config)
-    if config.planner_name not in PLANNER_NAMES or gain <= quickest:
+    gain, largest = config.planner.gain_per_s, sensible_gain(config)
+    if config.planner_name not in PLANNER_NAMES or gain <= largest:
         return None
-    return _gain_sentence(gain, quickest)
+    return _gain_sentence(gain, largest)
 
 
-def _gain_sentence(gain: float, quickest: float) -> str:
+def _gain_sentence(gain: float, largest: float) -> str:
     remedy = "; lower it, for above that the response overshoots and the hold may swing"
     return (
-        f"planner.gain_per_s is {gain:g}, and {quickest:.1f} is the quickest sensible one "
-        f"({LARGEST_PRODUCT} / (lag + dead time)){remedy if gain > quickest else ''}"
+        f"planner.gain_per_s is {gain:g}, and {largest:.1f} is the largest sensible one "
+        f"({LARGEST_PRODUCT} / (lag + dead time)){remedy if gain > largest else ''}"
     )
 
 
@@ -94,13 +94,13 @@ def expected_response(config: Config) -> ExpectedResponse:
         _RATE: response.step_time(step),
         **_without_the_vehicle(config, response, speed),
     }
-    quickest = sensible_gain(config)
+    largest = sensible_gain(config)
     return ExpectedResponse(
         config.steps.coefficient,
         response.step_time(step, speed),
         otherwise,
         config.planner.gain_per_s,
-        None if quickest == inf else quickest,
+        None if largest == inf else largest,
     )
 
 

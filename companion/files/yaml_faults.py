@@ -170,11 +170,11 @@ def _either(places: list[str]) -> str:
     return " or ".join(f"`{place}`" for place in places[:_PLACES_TOLD])
 
 
-def _likeness(one: str, other: str) -> float:
-    """Similarity of two keys, 0 to 1. Two keys that differ only in the unit are very similar."""
-    if other.startswith(f"{one}_"):
+def _likeness(written: str, known: str) -> float:
+    """Similarity of a written key to a known one, 0 to 1; 0.99 if the known one continues it."""
+    if known.startswith(f"{written}_"):
         return 0.99
-    return difflib.SequenceMatcher(None, one, other).ratio()
+    return difflib.SequenceMatcher(None, written, known).ratio()
 
 
 def _nearest(name: str, keys: Iterable[str], least: float) -> str | None:

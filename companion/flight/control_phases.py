@@ -104,8 +104,8 @@ class _TiltMargin:
             self._reported = True
             self._context.note(
                 f"the vehicle hovers at a thrust of {hover:.2f}, so limits.max_thrust "
-                f"{limits.max_thrust:g} holds the height up to {tilt:.0f}° of tilt: no more is "
-                f"asked for, although limits.max_tilt_deg is {limits.max_tilt_deg:g}"
+                f"{limits.max_thrust:g} holds the height only up to {tilt:.0f}° of tilt: the tilt "
+                f"is limited to that, although limits.max_tilt_deg is {limits.max_tilt_deg:g}"
             )
 
 

@@ -189,7 +189,7 @@ class Flight:
         return self.phase.exit_on_failure(standing=self._context.ground.standing)
 
     async def _leave(self, exit_: Exit) -> None:
-        """Fly the exit; a failure in it is noted, not raised."""
+        """Fly the exit, then land if the user wants it; a failure is noted, not raised."""
         try:
             await self._exit(exit_)
             if exit_ is Exit.HOLD and self._interrupted and await self._user_wants_landing():

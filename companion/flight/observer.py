@@ -143,7 +143,7 @@ class EventRecorder:
             tell(self._observer)
         except Exception as error:
             self._observer = Silent()
-            self.write(f"the observer of this flight failed and is told nothing more: {error!r}")
+            self.write(f"the observer of this flight failed and gets no more messages: {error!r}")
 
 
 class StateLogger:

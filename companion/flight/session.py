@@ -59,7 +59,7 @@ class Session:
         self._early_notes: list[str] = []
 
     def interrupt(self, reason: str) -> bool:
-        """Hand the vehicle back; return False if there is no flight to interrupt yet."""
+        """End the flight like `Flight.interrupt`; return False if there is no flight yet."""
         if self._assembled is None:
             return False
         self._assembled.flight.interrupt(reason)

@@ -32,12 +32,13 @@ def slowing(before: Trajectory, found: SlowDown) -> tuple[str, ...]:
     if found.even:
         (whole,) = found.parts
         told = (
-            f"{before.name} is slowed down {whole.factor:.2f} times all along, for {found.reason}; "
+            f"{before.name} is slowed down evenly, by a factor of {whole.factor:.2f}, because "
+            f"{found.reason}; "
             f"{_limit(after, whole)}"
         )
         return (f"{told}; {left}",)
     parts = "; ".join(
-        f"from {part.begin:.1f} to {part.end:.1f} s up to {part.factor:.2f} times, "
+        f"from {part.begin:.1f} to {part.end:.1f} s by a factor of up to {part.factor:.2f}, "
         f"{_limit(after, part)}"
         for part in found.parts[:_PARTS_TOLD]
     )

@@ -173,8 +173,8 @@ class VehicleMemory:
             self._note(known.trouble)
         if known.drag is not None:
             self._note(
-                f"drag from an earlier flight of this vehicle: {known.drag.linear:.2f} 1/s + "
-                f"{known.drag.quadratic:.3f} 1/m ({file.path})"
+                f"drag from an earlier flight of this vehicle: linear {known.drag.linear:.2f} 1/s, "
+                f"quadratic {known.drag.quadratic:.3f} 1/m ({file.path})"
             )
 
     def save(self) -> None:

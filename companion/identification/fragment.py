@@ -70,7 +70,7 @@ def vehicle_fragment(
     kept = kept_axes(vehicle, known)
     lines = [_comment(name, response, kept) for name, response in vehicle.axes.items()]
     thrust = vehicle.thrust
-    if thrust is not None and thrust.is_good(gravity):
+    if thrust is not None and thrust.flaw(gravity) is None:
         lines.append(f"# thrust: {thrust.described()}")
         lines += ["thrust:", f"  hover_thrust: {thrust.normalised(gravity):.3f}"]
     axes = {name: kept.get(name) or _fitted_values(each) for name, each in vehicle.axes.items()}

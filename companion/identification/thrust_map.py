@@ -39,18 +39,22 @@ class ThrustMap:
         """The normalised thrust that gives a specific thrust in m/s²."""
         return (specific_thrust - self.offset) / self.slope
 
-    def is_good(self, gravity: float) -> bool:
-        """Whether the map may be used: it rises, has a short delay, and explains the measurements.
+    def flaw(self, gravity: float) -> str | None:
+        """Why the map may not be used, in words; None if it may.
 
         Args:
             gravity: m/s²; by the map, the vehicle must hover at a thrust between 0.05 and 0.95.
         """
-        return (
-            self.slope > 0.0
-            and self.explained >= _LEAST_EXPLAINED
-            and self.lag + self.dead_time < _LARGEST_DELAY
-            and _HOVER[0] < self.normalised(gravity) < _HOVER[1]
-        )
+        if not self.explained >= _LEAST_EXPLAINED:
+            return f"it explains {self.explained:.0%} of the measured thrust"
+        if not self.slope > 0.0:
+            return "more thrust was commanded, and less was measured"
+        if not self.lag + self.dead_time < _LARGEST_DELAY:
+            return f"the rotors seem {self.lag + self.dead_time:.2f} s late"
+        hover = self.normalised(gravity)
+        if not _HOVER[0] < hover < _HOVER[1]:
+            return f"it puts hover at a thrust of {hover:.2f}"
+        return None
 
     def described(self) -> str:
         """The map in one line."""

@@ -117,6 +117,7 @@ def _cells(response: RateResponse) -> tuple[str, ...]:
 def _thrust_line(thrust: ThrustMap | None, gravity: float) -> str:
     if thrust is None:
         return "thrust: not measured, or never changed"
-    if not thrust.is_good(gravity):
-        return f"thrust: the fit is bad: it explains {thrust.explained:.0%} of the measured thrust"
+    flaw = thrust.flaw(gravity)
+    if flaw is not None:
+        return f"thrust: the fit is bad: {flaw}"
     return f"thrust: {thrust.described()}; hovers at {thrust.normalised(gravity):.3f}"

@@ -65,7 +65,8 @@ class StampJudge:
     an NTP step in flight makes no good stamp bad.
 
     - A stamp up to a day ahead of the date must be newer than all before it on its stream,
-      including those on disk. On a stream not yet heard in this run it may be a minute older.
+      including those on disk. On a stream not yet heard in this run it must also be less than a
+      minute older than the date, and than the newest stamp of the other streams.
     - A stamp up to 5 years ahead may have three causes: this computer's clock is behind (no
       battery), the frame is a recording, or the vehicle's clock is wrong. It is refused until the
       vehicle has answered a TIMESYNC request of this run, which no recording can do. Such stamps

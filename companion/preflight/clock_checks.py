@@ -81,12 +81,13 @@ def _clock_rate(config: Config, evidence: Evidence, rate: float, source: str) ->
     because = "time limits, such as those of `deadman`, are longer or shorter than configured"
     if too_slow:
         because = (
-            f"its samples count as older than deadman.telemetry_stale_ms after {stale_after:.0f} s"
+            f"within {stale_after:.0f} s its samples would count as older than "
+            "deadman.telemetry_stale_ms"
         )
     return Finding(
         Key.CLOCK,
         UNSAFE if too_slow else INEFFECTIVE if apart else SAFE,
-        f"the vehicle's clock runs at {rate:.3f} of ours",
+        f"the vehicle's clock runs {rate:.3f} times as fast as ours",
         because if apart else "",
         "run a simulation at the speed of real time, or in lockstep" if apart else "",
         source,

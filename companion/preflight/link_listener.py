@@ -46,7 +46,7 @@ class LinkListener:
         self._link, self._clock = link, clock
         self._stamps: list[tuple[float, float]] = []
         self._ages: list[float] = []
-        self._timeline = link.clock.timeline
+        self._clock_changes = link.clock.changes
         self._unusable = 0
         self._sources: set[tuple[int, int]] = set()
         self._companions: set[tuple[int, int]] = set()
@@ -120,7 +120,7 @@ class LinkListener:
     @property
     def _clock_change(self) -> str:
         clock = self._link.clock
-        return clock.last_change if clock.timeline != self._timeline else ""
+        return clock.last_change if clock.changes != self._clock_changes else ""
 
     def _on_attitude(self, message: Message) -> None:
         now, clock = self._clock(), self._link.clock

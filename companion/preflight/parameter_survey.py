@@ -127,7 +127,7 @@ class _Questions:
         return self._repeated or lost > SOME_LOST
 
     def leave_out(self, names: Iterable[str]) -> None:
-        """Do not request these names: the autopilot is known to lack them."""
+        """Do not request these names: the parameters have other names in this autopilot."""
         self._none.update(names)
 
     def untold(self, rules: Iterable[ParameterRule]) -> list[ParameterRule]:

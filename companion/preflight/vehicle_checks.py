@@ -147,7 +147,7 @@ def ground(_: Config, evidence: Evidence) -> Iterator[Finding]:
             "the vehicle reports that it flies"
             if state.flying
             else "the autopilot does not report that the vehicle is on the ground",
-            "a flight that arms begins on the ground only",
+            "a flight that takes off must begin on the ground",
             "land it first, or find why EXTENDED_SYS_STATE does not report the ground",
             "EXTENDED_SYS_STATE",
         )

@@ -111,13 +111,13 @@ class FlightRecord:
     @cached_property
     def phases(self) -> tuple[Phase, ...]:
         """The phases of the flight, in order."""
-        found = self._words("/phase", 1, 2)
+        found = self._fields("/phase", 1, 2)
         return tuple(Phase(time - self.began, *words) for (time,), words in found)
 
     @cached_property
     def maneuvers(self) -> tuple[ManeuverMark, ...]:
         """Beginning of each maneuver and end of the last one (name None); `time` on our clock."""
-        found = self._words("/maneuver", 2, 1)
+        found = self._fields("/maneuver", 2, 1)
         return tuple(
             ManeuverMark(time, vehicle_time, name or None)
             for (time, vehicle_time), (name,) in found
@@ -136,7 +136,7 @@ class FlightRecord:
     @cached_property
     def alarms(self) -> tuple[AlarmChange, ...]:
         """The alarms of the safety monitors, in order."""
-        found = self._words("/alarm", 2, 3)
+        found = self._fields("/alarm", 2, 3)
         return tuple(
             AlarmChange(time - self.began, raised != 0.0, *words) for (time, raised), words in found
         )
@@ -148,7 +148,7 @@ class FlightRecord:
         Raises:
             RecordError: a change is not valid.
         """
-        found = self._words("/change", 2, 1)
+        found = self._fields("/change", 2, 1)
         with as_recorded(self.folder):
             return tuple(
                 ValuesChange(time, at_once != 0.0, json.loads(values))
@@ -171,12 +171,12 @@ class FlightRecord:
             raise RecordError(f"{self.folder / 'config.yaml'}: not a configuration")
         return found
 
-    def _words(
+    def _fields(
         self, topic: str, numbers: int, texts: int
     ) -> list[tuple[tuple[float, ...], list[str]]]:
         messages = self.content.messages[topic]
         with as_recorded(self.folder):
-            return [cdr.words_of(data, numbers, texts) for _, data in messages]
+            return [cdr.fields_of(data, numbers, texts) for _, data in messages]
 
 
 def read_flight(folder: Path) -> FlightRecord:

@@ -53,7 +53,7 @@ class Marks:
         phases: beginning and name of each phase.
         maneuvers: the maneuvers, in order.
         end: time when the flight ended early, or None.
-        reason: reason of the early end.
+        reason: result of the flight: the reason if it ended early.
     """
 
     phases: Sequence[tuple[float, str]] = ()

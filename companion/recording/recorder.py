@@ -90,16 +90,16 @@ class FlightRecorder(BackgroundFile[Entry]):
     def phase(self, name: str, waits_for: str) -> None:
         """Record that a phase begins now."""
         now = self._clock()
-        self.add(now, _words, ("/phase", (now,), (name, waits_for)))
+        self.add(now, _fields, ("/phase", (now,), (name, waits_for)))
 
     def maneuver(self, time: float, vehicle_time: float, name: str | None) -> None:
         """Record the beginning of a maneuver or the end of the last one (None): `ManeuverMark`."""
-        self.add(time, _words, ("/maneuver", (time, vehicle_time), (name or "",)))
+        self.add(time, _fields, ("/maneuver", (time, vehicle_time), (name or "",)))
 
     def alarm(self, raised: bool, monitor: str, reason: str, action: str) -> None:
         """Record that the alarm of a safety monitor is raised or ended now."""
         now = self._clock()
-        self.add(now, _words, ("/alarm", (now, float(raised)), (monitor, reason, action)))
+        self.add(now, _fields, ("/alarm", (now, float(raised)), (monitor, reason, action)))
 
     def action(
         self,
@@ -120,7 +120,7 @@ class FlightRecorder(BackgroundFile[Entry]):
             at_once: whether the values change at once, without slewing.
         """
         now = self._clock()
-        self.add(now, _words, ("/change", (now, float(at_once)), (json.dumps(values),)))
+        self.add(now, _fields, ("/change", (now, float(at_once)), (json.dumps(values),)))
 
     def event(self, text: str) -> None:
         """Record an event at the present time."""
@@ -168,13 +168,13 @@ def _metadata(writer: McapWriter, _: int, values: tuple[str, Mapping[str, str]])
     writer.metadata(*values)
 
 
-def _words(
+def _fields(
     writer: McapWriter,
     time_ns: int,
     values: tuple[str, tuple[float, ...], tuple[str, ...]],
 ) -> None:
     topic, numbers, texts = values
-    writer.message(topic, time_ns, cdr.words_message(numbers, texts))
+    writer.message(topic, time_ns, cdr.fields_message(numbers, texts))
 
 
 def _log(writer: McapWriter, time_ns: int, values: tuple[str, str]) -> None:

@@ -51,7 +51,7 @@ def gps(snapshot: Snapshot, _: bool) -> str | None:
 
 
 def estimator_flags(snapshot: Snapshot, _: bool) -> str | None:
-    """ESTIMATOR_STATUS lost flags that were set when control began, or is no longer received."""
+    """The estimator's status lost flags that it had when control began, or is not received."""
     estimator, good = snapshot.autopilot.estimator, snapshot.good_flags
     if estimator is None:
         return None
@@ -62,7 +62,7 @@ def estimator_flags(snapshot: Snapshot, _: bool) -> str | None:
         missing |= good & HORIZONTAL
     if not missing:
         return None
-    return f"the estimator is not sure any more (ESTIMATOR_STATUS lost flags 0x{missing:x})"
+    return f"the estimator is not sure any more (its status lost flags 0x{missing:x})"
 
 
 def estimator_reset(snapshot: Snapshot, _: bool) -> str | None:
@@ -93,7 +93,7 @@ def estimator_resets(most: int, shift: float, turn: float) -> Judge:
         if found.tilt > 0.5 * turn:
             return f"the autopilot's estimator was reset by {degrees(found.tilt):.0f}° of tilt"
         if found.recent > most:
-            return f"the autopilot's estimator was reset {found.recent} times in a short while"
+            return f"the autopilot's estimator was reset {found.recent} times within 30 s"
         return None
 
     return judge

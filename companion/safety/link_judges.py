@@ -90,13 +90,13 @@ def deadlines(most: float) -> Judge:
 
 
 def starvation(most: float) -> Judge:
-    """CPU starvation: the program's timer is late by more than the share `most` of the time."""
+    """CPU starvation: the program's timer lost more than the share `most` of the last second."""
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
         starved = snapshot.health.starved
         if starved is None or starved <= released(most, raised):
             return None
-        return f"CPU starvation: the program's timer is late by {100 * starved:.0f} % of the time"
+        return f"CPU starvation: the program's timer lost {100 * starved:.0f} % of the last second"
 
     return judge
 

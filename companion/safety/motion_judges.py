@@ -99,6 +99,6 @@ def braking(fence: Fence) -> Judge:
         found = fence.stop_breach(
             offset, velocity, height, motion.origin, acceleration=motion.acceleration
         )
-        return None if found is None else f"about to stop {found}"
+        return None if found is None else f"braking now would end {found}"
 
     return judge

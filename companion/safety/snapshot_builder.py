@@ -78,7 +78,7 @@ class SnapshotBuilder:
         self._turn = 0.0
         self._shift: Vector = (0.0, 0.0, 0.0)
         self._good_flags = 0
-        self._timeline = 0
+        self._clock_changes = 0
 
     def begin(self, now: float, centre: FenceCentre | None = None) -> None:
         """Note that control begins at `now`; earlier resets do not count.
@@ -97,7 +97,7 @@ class SnapshotBuilder:
         self._began_at, self._turn, self._shift = now, resets.turn, resets.shift
         resets.largest_tilt = 0.0
         self._good_flags = 0 if state.estimator is None else state.estimator.flags
-        self._timeline = self._link.clock.timeline
+        self._clock_changes = self._link.clock.changes
         self._counted.clear()
 
     @property
@@ -163,7 +163,7 @@ class SnapshotBuilder:
                 -inf if state.position is None else state.position.received,
                 self._heard_at,
                 self._guidance_loop.fresh_position() is not None,
-                None if clock.timeline == self._timeline else clock.last_change,
+                None if clock.changes == self._clock_changes else clock.last_change,
                 self.stood_still(since=record.last_answer),
             ),
             self._health(now),

@@ -63,14 +63,14 @@ class Ownership:
             self._forget_silent(now)
         return None
 
-    def withdraw(self, client: Hashable, owner: Hashable | None) -> None:
+    def withdraw(self, client: Hashable, owner_before: Hashable | None) -> None:
         """Withdraw the setpoint that was noted last, because it cannot be flown.
 
         Args:
             client: sender of the setpoint.
-            owner: client in control before the setpoint.
+            owner_before: client in control before the setpoint.
         """
-        self.owner = owner
+        self.owner = owner_before
         stream = self._streams[client]
         stream.newest = stream.before
 

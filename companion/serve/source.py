@@ -102,7 +102,7 @@ class ServedSource:
         return self._ownership.control(now) not in _FLOWN
 
     def _leave_direct(self, now: float) -> None:
-        """Continue with motions at the vehicle's position after attitudes or rates."""
+        """If attitudes or rates were flown, let the commanded motion begin where the vehicle is."""
         if self._direct is not None:
             self._direct = None
             position, velocity = self._vehicle

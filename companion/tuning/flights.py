@@ -80,7 +80,7 @@ class Flown:
 
 
 def autopilot_like(config: Config) -> str:
-    """The most similar personality of the mock vehicle: ArduPilot for a slew limit, else PX4."""
+    """The most similar personality of the mock vehicle: ArduPilot if roll has a slew limit."""
     slews = [axis.acceleration_limit for axis in config.vehicle.axes.values()]
     return "px4" if slews[0] is None else "ardupilot"
 

@@ -34,12 +34,12 @@ class ModelError:
     """Difference between the real rate loop and the configured one.
 
     Attributes:
-        slower: factor on lag and dead time.
+        time_factor: factor on lag and dead time.
         delay: additional dead time, s.
         gain: factor on the body rates.
     """
 
-    slower: float = 1.0
+    time_factor: float = 1.0
     delay: float = 0.0
     gain: float = 1.0
 
@@ -111,9 +111,9 @@ def control_loop(config: Config, s: Complex, error: ModelError = EXACT) -> Loop:
         )
     guidance, drag = linear_settings(config), drag_prior(config).drag.linear
     forward, back = _planner(config, s)
-    axis, slower = _believed(config), error.slower
-    late = np.exp(-s * (slower * axis.dead_time + error.delay))
-    rates = error.gain * late / (1.0 + slower * s * (axis.lag + slower * s * axis.square)) / s
+    axis, times = _believed(config), error.time_factor
+    late = np.exp(-s * (times * axis.dead_time + error.delay))
+    rates = error.gain * late / (1.0 + times * s * (axis.lag + times * s * axis.square)) / s
     held = hold_element(s, 1.0 / config.link.attitude_rate_hz)
     measured = guidance_feedback(
         s, guidance, observer_settings(config), drag, 1.0 / config.link.position_rate_hz

@@ -25,18 +25,18 @@ class Aims:
     Attributes:
         gain_db: smallest gain margin, dB.
         phase_deg: smallest phase margin, degrees.
-        slower: factor by which real lag and dead time may be larger or smaller than configured.
-        slower_gain_db: smallest gain margin in that case, dB.
-        slower_phase_deg: smallest phase margin in that case, degrees.
+        mismatch: factor by which real lag and dead time may be larger or smaller than configured.
+        mismatch_gain_db: smallest gain margin in that case, dB.
+        mismatch_phase_deg: smallest phase margin in that case, degrees.
         rate_share: largest share of the rate limit that three standard deviations of the commanded
             roll and pitch rates may take.
     """
 
     gain_db: float = 7.0
     phase_deg: float = 31.0
-    slower: float = 1.3
-    slower_gain_db: float = 3.0
-    slower_phase_deg: float = 15.0
+    mismatch: float = 1.3
+    mismatch_gain_db: float = 3.0
+    mismatch_phase_deg: float = 15.0
     rate_share: float = 1.0
 
 
@@ -193,14 +193,14 @@ def _cost(
             break
         loop = control_loop(tried, s, error)
         share = _SLEWING_SHARE if error.delay else 1.0
-        needed = share * aims.slower_gain_db, share * aims.slower_phase_deg
+        needed = share * aims.mismatch_gain_db, share * aims.mismatch_phase_deg
         cost += _PENALTY * _missed(margins(s, loop.whole), *needed)
     return cost
 
 
 def errors_to_bear(config: Config, aims: Aims) -> list[ModelError]:
     """Errors of the vehicle's times for which the loop must stay stable."""
-    errors = [ModelError(slower=aims.slower), ModelError(slower=1.0 / aims.slower)]
+    errors = [ModelError(time_factor=each) for each in (aims.mismatch, 1.0 / aims.mismatch)]
     delay = slewing_delay(config)
     return [*errors, ModelError(delay=delay)] if delay > 0.0 else errors
 

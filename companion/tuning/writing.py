@@ -90,8 +90,9 @@ def _compared(before: Expectation, after: Expectation) -> list[str]:
 def _error(error: ModelError) -> str:
     if error.delay:
         return f"with {1e3 * error.delay:.0f} ms of added delay, as while the rate loop slews"
-    percent = round(100.0 * abs(error.slower - 1.0))
-    return f"with lag and dead time {percent} % {'larger' if error.slower > 1.0 else 'smaller'}"
+    percent = round(100.0 * abs(error.time_factor - 1.0))
+    change = "larger" if error.time_factor > 1.0 else "smaller"
+    return f"with lag and dead time {percent} % {change}"
 
 
 def _flight_line(name: str, before: Flown, after: Flown) -> str:
@@ -112,14 +113,14 @@ def _reasons(proposal: Proposal) -> dict[str, str]:
     capped = design.gain > 0.97 * limit
     slewing = slewing_delay(tuned)
     if capped:
-        why = f"the quickest sensible gain, 0.45 / (lag + dead time) = {limit:.2f}"
+        why = f"the largest sensible gain, 0.45 / (lag + dead time) = {limit:.2f}"
     elif slewing:
         why = (
-            f"below {limit:.1f}, the quickest sensible gain: the rate loop slews for "
+            f"below {limit:.1f}, the largest sensible gain: the rate loop slews for "
             f"{2e3 * slewing:.0f} ms to limits.max_tilt_rate_deg_s; tune again after a change of it"
         )
     else:
-        why = f"below {limit:.2f}, the quickest sensible gain, for the margins"
+        why = f"below {limit:.2f}, the largest sensible gain, for the margins"
     drag = "as configured, or learned in an earlier flight of this vehicle"
     order = "the log shows clearly that the rate loop is of second order"
     return {

@@ -43,7 +43,7 @@ class VehicleClock:
     Attributes:
         rate: Rate of the vehicle's clock.
         delay: Delay of the quickest sample, measured by TIMESYNC.
-        timeline: Counts jumps, wraps, standstills and restarts of the clock.
+        changes: Counts jumps, wraps, standstills and restarts of the clock.
         restarts: Counts restarts of the autopilot, after which its time since boot continues from a
             smaller value.
         last_change: The newest of these changes in words.
@@ -54,7 +54,7 @@ class VehicleClock:
     def __init__(self, *, lockstep: bool = False) -> None:
         self.rate = ClockRate(fixed=lockstep)
         self.delay = TelemetryDelay()
-        self.timeline = self.restarts = self.outliers = 0
+        self.changes = self.restarts = self.outliers = 0
         self.last_change = ""
         self.on_event: Callable[[str], None] = lambda _: None
         self._lockstep = lockstep
@@ -244,7 +244,7 @@ class VehicleClock:
         self.delay.forget_after(self._received - self.delay.seconds - TOGETHER)
         if self._received - self._began < _SETTLES_FOR and by > -REBOOTED:
             return
-        self.timeline += 1
+        self.changes += 1
         self.restarts += restarted and not has_wrapped(by, before) and by < -REBOOTED
         self.last_change = describe_change(by, before, time_boot_ms / 1000.0, restarted=restarted)
         self.on_event(self.last_change)

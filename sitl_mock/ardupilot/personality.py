@@ -97,12 +97,12 @@ class ArduPilot:
 
     def streams(self, link: str, settings: VehicleSettings) -> StreamSchedule:
         """Return the streams of a link: until a client requests more, those of the boot."""
-        silent_s = settings.prearm_delay_s * INITIALISED_S / RECORDED_READY_S
+        booting_s = settings.prearm_delay_s * INITIALISED_S / RECORDED_READY_S
         return ArduPilotStreams(
             _BOOT_RATES,
             _SUPPORTED,
             loop_us=self._loop_us(settings),
-            silent_until_us=silent_s * 1e6,
+            booting_until_us=booting_s * 1e6,
         )
 
     def mode_of(self, custom_mode: int) -> Mode | None:

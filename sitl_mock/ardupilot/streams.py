@@ -19,7 +19,7 @@ class ArduPilotStreams:
         rates: message id -> Hz at boot.
         supported: ids of the messages that can be requested.
         loop_us: period of the main loop.
-        silent_until_us: before this time only the streams of the boot are sent.
+        booting_until_us: before this time only the streams of the boot are sent.
     """
 
     def __init__(
@@ -28,12 +28,12 @@ class ArduPilotStreams:
         supported: Collection[int],
         *,
         loop_us: int,
-        silent_until_us: float,
+        booting_until_us: float,
     ) -> None:
         self._defaults = {message: round(1e6 / hz) for message, hz in rates.items()}
         self._supported = supported
         self._loop_us = loop_us
-        self._silent_until_us = silent_until_us
+        self._booting_until_us = booting_until_us
         self._intervals = dict(self._defaults)
         self._last = dict.fromkeys(self._defaults, 0)
 
@@ -67,7 +67,7 @@ class ArduPilotStreams:
     def due(self, slot_us: int, status_us: int = 0) -> list[int]:
         """Return the ids of the messages due in the slot at ``slot_us``, and count them as sent."""
         due = []
-        booting = slot_us < self._silent_until_us
+        booting = slot_us < self._booting_until_us
         last_us = self._last
         for message_id, interval in self._intervals.items():
             waited = slot_us - last_us[message_id]

@@ -59,7 +59,11 @@ def _is_host(text: str) -> bool:
 
 
 def for_vehicle(text: str, index: int) -> str:
-    """The endpoint of the vehicle with this index: the next port, or a path with its number."""
+    """The endpoint of the vehicle with this index, from 0.
+
+    The index is added to a TCP port. From index 1 on, a serial path gets the suffix ``-2``, ``-3``
+    ... Other texts are the same for all vehicles; `MockSettings.for_vehicle` sets the UDP ports.
+    """
     if index == 0:
         return text
     match parse_endpoint(text):

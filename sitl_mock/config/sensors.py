@@ -68,38 +68,41 @@ class EkfConfig(Section):
     acceleration_gains: Gains = (0.0056, 0.0102)
     """Gains of the acceleration error, m/s^2 per m and m/s^2 per m/s."""
     predictor_ms: Positive = 250.0
-    """Time constant with which the output predictor applies a correction."""
+    """Time constant with which the output predictor applies a correction of position or speed."""
+    heading_predictor_ms: Positive = 250.0
+    """Time constant with which it applies a correction of the heading."""
 
 
 EKFS: dict[str, EkfConfig | None] = {
     "none": None,
     "px4": EkfConfig(),
     # Fitted to the errors of position and velocity, sample by sample, in circles at 2, 5, 8 and
-    # 10 m/s and figure-eights at 5 and 8 m/s. What is left of them is 0.03 to 0.05 m and 0.03 to
-    # 0.06 m/s, 40 to 50 % of their size.
+    # 10 m/s and figure-eights at 5 and 8 m/s. What is left of them is 0.01 to 0.03 m and 0.02 to
+    # 0.03 m/s, 14 to 35 % of their size but at 2 m/s.
     "ardupilot": EkfConfig(
         fix_period_ms=200.0,
-        fix_delay_ms=220.0,
-        position_late_ms=32.2,
+        fix_delay_ms=260.0,
+        position_late_ms=27.7,
         velocity_late_ms=16.5,
         position_noise_m=0.005,
         velocity_noise_m_s=0.005,
         tilt_noise_deg=0.006,
         yaw_error_deg=0.1,
-        turn_yaw_ms=24.0,
-        compass_error_deg=1.3,
+        turn_yaw_ms=25.4,
+        compass_error_deg=1.1,
         yaw_rate_bias_deg_s=0.05,
-        acceleration_lead_ms=3.1,
-        acceleration_scale=0.0019,
+        acceleration_lead_ms=1.2,
+        acceleration_scale=-0.0018,
         vertical_share=0.6,
         height_offset_m=0.1,
         height_sag_s4_per_m=0.0004,
         sink_per_acceleration_ms=0.0,
         height_noise_m=0.013,
         height_noise_time_s=6.0,
-        position_gains=(0.0853, 0.1278),
-        velocity_gains=(0.0291, 0.1134),
-        acceleration_gains=(0.0057, 0.0433),
+        position_gains=(0.0433, 0.1119),
+        velocity_gains=(0.2113, 0.2197),
+        acceleration_gains=(0.0366, 0.0397),
+        predictor_ms=865.0,
     ),
 }
 """Preset name -> navigation filter."""

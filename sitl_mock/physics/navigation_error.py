@@ -60,6 +60,7 @@ class ErrorLaw(NamedTuple):
     scale: float  # relative error of the acceleration
     height_offset: float  # m
     predictor_ms: float
+    heading_predictor_ms: float
 
 
 def extrapolated(errors: Errors, elapsed: float) -> Errors:
@@ -68,9 +69,9 @@ def extrapolated(errors: Errors, elapsed: float) -> Errors:
     return place + elapsed * (speed + 0.5 * elapsed * tilt), speed + elapsed * tilt, tilt
 
 
-def pending_share(law: ErrorLaw, state: FilterState, now: float) -> float:
+def pending_share(predictor_ms: float, state: FilterState, now: float) -> float:
     """Return the share of the latest corrections that the output does not contain at ``now``."""
-    return exp((state.corrected - now) * 1e3 / law.predictor_ms)
+    return exp((state.corrected - now) * 1e3 / predictor_ms)
 
 
 def propagated(law: ErrorLaw, state: FilterState, truth: TrailRow, elapsed: float) -> Errors:
@@ -92,7 +93,8 @@ def propagated(law: ErrorLaw, state: FilterState, truth: TrailRow, elapsed: floa
 def error_at(law: ErrorLaw, state: FilterState, truth: TrailRow, now: float) -> NavigationError:
     """Return the error at ``now`` (s), at which the true motion is ``truth`` (pure)."""
     elapsed = now - state.at
-    unsettled = pending_share(law, state, now)
+    unsettled = pending_share(law.predictor_ms, state, now)
+    turning = pending_share(law.heading_predictor_ms, state, now)
     place, speed, tilt = propagated(law, state, truth, elapsed)
     pending = state.level.pending
     place += law.lead * complex(truth[0], truth[1]) - unsettled * pending[0]
@@ -104,5 +106,5 @@ def error_at(law: ErrorLaw, state: FilterState, truth: TrailRow, now: float) -> 
         (place.real, place.imag, down.real),
         (speed.real, speed.imag, (sink - unsettled * pending[1]).real + state.sink),
         # A wrong attitude rotates the thrust, which makes the acceleration wrong.
-        (tilt.imag / _GRAVITY, -tilt.real / _GRAVITY, state.yaw - unsettled * state.yaw_pending),
+        (tilt.imag / _GRAVITY, -tilt.real / _GRAVITY, state.yaw - turning * state.yaw_pending),
     )

@@ -59,6 +59,7 @@ class NavigationFilter:
             config.acceleration_scale,
             config.height_offset_m,
             config.predictor_ms,
+            config.heading_predictor_ms,
         )
         self._uncertainty = _UNCERTAINTY
         self._random = Random(f"{seed}/navigation")
@@ -102,7 +103,7 @@ class NavigationFilter:
             noise[0] - (config.position_late_ms * late + law.lead) * speed,
             noise[1] - (config.velocity_late_ms * late + law.lead) * pull,
         )
-        unsettled = pending_share(law, state, now)
+        unsettled = pending_share(law.predictor_ms, state, now)
         kick = _GRAVITY * radians(config.tilt_noise_deg) * sqrt(elapsed)
         level = self._corrected_state(state.level, moved, seen, noise, unsettled, kick)
         share = config.vertical_share
@@ -111,7 +112,8 @@ class NavigationFilter:
         upright = self._corrected_state(state.upright, still, noise, noise, unsettled, share * kick)
         aligned = self._next_alignment(speed, pull, elapsed)
         yaw = self._next_yaw_noise() + aligned
-        turned = unsettled * state.yaw_pending + yaw - state.yaw
+        turning = pending_share(law.heading_predictor_ms, state, now)
+        turned = turning * state.yaw_pending + yaw - state.yaw
         height_noise = self._next_height_noise(elapsed)
         sag = config.height_sag_s4_per_m * abs(pull) ** 2 + height_noise
         lagged = 1.0 - exp(-elapsed / _SAG_S)

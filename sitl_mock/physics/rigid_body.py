@@ -15,6 +15,8 @@ Motion = tuple[float, float, float, float, float, float, float, float, float, fl
 Load = tuple[float, float, float, float, float, float, float]
 """(specific thrust [m/s^2], torque x, y, z [N m, FRD], wind n, e, d [m/s])."""
 
+NONE = 0.0, 0.0, 0.0
+
 
 class Body(NamedTuple):
     """Constants of the rigid body."""
@@ -24,7 +26,8 @@ class Body(NamedTuple):
     inertia_z: float  # kg m^2, about body z
     drag: float  # linear drag per mass, 1/s
     quadratic_drag: float  # per mass, 1/m
-    axis_drag: float  # quadratic drag along each body axis, per mass, 1/m
+    axis_drag: Vector  # quadratic drag along each body axis, per mass, 1/m
+    momentum_drag: Vector  # of the rotors at hover thrust, along each body axis, per mass, 1/s
     rotational_drag: float  # damping torque, N m per rad/s
     gravity: float  # m/s^2
 
@@ -35,10 +38,16 @@ def body_of(airframe: AirframeConfig) -> Body:
         *airframe.inertia_kg_m2,
         drag=airframe.drag_n_s_per_m / airframe.mass_kg,
         quadratic_drag=airframe.quadratic_drag_n_s2_per_m2 / airframe.mass_kg,
-        axis_drag=airframe.axis_drag_n_s2_per_m2 / airframe.mass_kg,
+        axis_drag=_per(airframe.mass_kg, airframe.axis_drag_n_s2_per_m2),
+        momentum_drag=_per(airframe.mass_kg, airframe.momentum_drag_n_s_per_m),
         rotational_drag=airframe.rotational_drag_n_m_s,
         gravity=airframe.gravity_m_s2,
     )
+
+
+def _per(mass: float, along_axes: Vector) -> Vector:
+    x, y, z = along_axes
+    return x / mass, y / mass, z / mass
 
 
 def derivative(
@@ -57,22 +66,23 @@ def derivative(
 ) -> Motion:
     """Return the time derivative of a `Motion` (Newton, Euler, quaternion kinematics).
 
-    m v' = m g - T z_body - (drag + quadratic |v - wind|) (v - wind) - axis_drag f, where f has the
-    components |u_i| u_i along the body axes and u = v - wind;
+    m v' = m g - T z_body - (drag + quadratic |v - wind|) (v - wind) - f, where f has the components
+    (axis_drag_i |u_i| + momentum_drag_i sqrt(T / (m g))) u_i along the body axes and u = v - wind;
     J w' = torque - damping w - w x J w; q' = q (0, w) / 2.
     """
     thrust, torque_x, torque_y, torque_z, wind_n, wind_e, wind_d = load
-    jx, jy, jz, drag, quadratic, along_axes, damping, gravity = body
+    jx, jy, jz, drag, quadratic, axis, momentum, damping, gravity = body
     air_n, air_e, air_d = wind_n - vn, wind_e - ve, wind_d - vd
     if quadratic:
         drag += quadratic * sqrt(air_n * air_n + air_e * air_e + air_d * air_d)
     push_n = push_e = push_d = 0.0
-    if along_axes:
-        air = to_body((w, x, y, z), (air_n, air_e, air_d))
+    if axis != NONE or momentum != NONE:
+        air_x, air_y, air_z = to_body((w, x, y, z), (air_n, air_e, air_d))
+        inflow = sqrt(max(thrust, 0.0) / gravity)
         force = (
-            along_axes * abs(air[0]) * air[0],
-            along_axes * abs(air[1]) * air[1],
-            along_axes * abs(air[2]) * air[2],
+            (axis[0] * abs(air_x) + momentum[0] * inflow) * air_x,
+            (axis[1] * abs(air_y) + momentum[1] * inflow) * air_y,
+            (axis[2] * abs(air_z) + momentum[2] * inflow) * air_z,
         )
         push_n, push_e, push_d = to_body((w, -x, -y, -z), force)
     return (

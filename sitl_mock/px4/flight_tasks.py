@@ -11,7 +11,7 @@ from sitl_mock.physics.quaternion import Vector, along_heading, yaw
 CRAWL_HEIGHT_M = 0.65
 """Below this height LAND descends at MPC_LAND_CRWL (recorded with a distance sensor)."""
 BRAKING_S = 0.7
-"""A hold begins at the position plus the velocity times this."""
+"""The held point lies ahead of the position by the velocity times this, s."""
 LEVEL_DEMAND_ACCELERATION: Vector = (0.0, 0.0, NAN)
 """Acceleration demand of a vehicle that stays level without holding its horizontal position."""
 

@@ -127,8 +127,10 @@ def test_the_levels_of_a_factor_hold_each_case_once():
         np.array([1.0, 2.0, 1.0]),
         np.array(["a", None, "b"], dtype=object),
         np.array([True, False, True], dtype=object),
+        np.array([f"word {number:02}" for number in range(14)], dtype=object),
     ):
         found = levels(column)
+        assert len(found) <= 12
         assert np.sum([level.cases for level in found], axis=0).tolist() == [1] * len(column)
     assert [level.name for level in levels(np.array([True, False], dtype=object))] == [
         "false",

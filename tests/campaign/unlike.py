@@ -27,7 +27,8 @@ _QUICK = {
     "ardupilot": {"LAND_SPEED": 150.0},
 }
 """Parameters that shorten take-off and landing."""
-_DRAG = "drag_n_s_per_m", "quadratic_drag_n_s2_per_m2", "axis_drag_n_s2_per_m2"
+_DRAG = "drag_n_s_per_m", "quadratic_drag_n_s2_per_m2"
+_AXIS_DRAG = "axis_drag_n_s2_per_m2", "momentum_drag_n_s_per_m"
 _NOISE = (
     "attitude_noise_deg",
     "rate_noise_rad_s",
@@ -49,6 +50,7 @@ def vehicle(autopilot: str, factor: float) -> dict[str, Any]:
     whole: Any = complete_mock({"autopilot": autopilot})
     air, sensors = whole["airframe"], whole["sensors"]
     keys = {f"airframe.{key}": factor * air[key] for key in (*_DRAG, "rotor_lag_ms")}
+    keys |= {f"airframe.{key}": [factor * share for share in air[key]] for key in _AXIS_DRAG}
     keys |= {f"sensors.{key}": factor * sensors[key] for key in (*_NOISE, "attitude_delay_ms")}
     keys |= {f"sensors.ekf.{key}": factor * sensors["ekf"][key] for key in _FILTER_NOISE}
     for name, axis in whole["rate_loop"].items():

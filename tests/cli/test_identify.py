@@ -5,20 +5,25 @@ import json
 import os
 import shutil
 import signal
-import subprocess
-import sys
+from contextlib import redirect_stderr, redirect_stdout
+from functools import partial
+from io import StringIO
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 import yaml
 
-from companion.cli import identify
+from companion import testing
+from companion.cli import flying, identify
 from companion.cli.main import main
 from companion.config.files import load
 from companion.identification import FitQuality, IdentifiedVehicle, RateResponse
 from companion.mavlink.transport.free_port import free_port
+from companion.testing.flying import environment
+from tests.flight import fly as memory
 from tests.flight.fly import QUICK_FLIGHT, merged
+from tests.flight.programs import Program
 from tests.flight.sockets import mock_vehicle
 
 RECORDINGS = Path(__file__).parents[1] / "mavlink" / "recordings"
@@ -49,20 +54,25 @@ def config_for(folder, endpoint, **changes):
 
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory):
-    """A folder with a configuration and one flight of `identify`, and what that printed."""
+    """A folder with a configuration and one flight of `identify`, and what that printed.
+
+    The vehicle is in memory, where a flight costs a third; below, one over UDP is interrupted.
+    """
     folder = tmp_path_factory.mktemp("identify")
-    with mock_vehicle(folder, full_rate=True, seed=2) as mock:
-        config = config_for(folder, f"udpin://127.0.0.1:{mock.port}")
-        done = subprocess.run(
-            [sys.executable, "-m", "companion", "identify", "--config", str(config), "--json"],
-            capture_output=True,
-            text=True,
-            check=False,
-            env={**os.environ, "COLUMNS": "80"},
-        )
-        assert not mock.state()["armed"]
-    assert done.returncode == 0, done.stderr
-    return folder, done
+    config = config_for(folder, f"udpin://127.0.0.1:{free_port()}")
+    out, err = StringIO(), StringIO()
+    with (
+        memory.mock_vehicle(full_rate=True, in_lockstep=True, seed=2) as mock,
+        pytest.MonkeyPatch.context() as patch,
+        redirect_stdout(out),
+        redirect_stderr(err),
+    ):
+        patch.setenv("COLUMNS", "80")
+        patch.setattr(flying, "environment", lambda _: environment)
+        patch.setattr(flying, "lockstep", SimpleNamespace(run=partial(testing.run, mock)))
+        assert main(["identify", "--config", str(config), "--json"]) == 0, err.getvalue()
+    assert not mock.state()["armed"]
+    return folder, SimpleNamespace(stdout=out.getvalue(), stderr=err.getvalue())
 
 
 def test_it_flies_fits_writes_and_tells_how_to_include_it(flown):
@@ -261,7 +271,7 @@ def test_an_interrupted_fit_says_where_the_flight_is(capsys, fitted, monkeypatch
     assert code == 1
     assert json.loads(out)["result"] == (
         f"interrupted while fitting; the flight is kept in {fitted}; "
-        f"fit it with identify --log {fitted}"
+        f"fit it with companion identify --log {fitted}"
     )
     assert f"the flight is kept in {fitted}" in err
     assert not (fitted / "vehicle.yaml").exists()
@@ -282,12 +292,7 @@ def test_a_flight_that_failed_is_not_fitted(capsys, tmp_path):
 def test_an_interrupted_flight_is_not_fitted(tmp_path):
     with mock_vehicle(tmp_path, full_rate=True) as mock:
         config = config_for(tmp_path, f"udpin://127.0.0.1:{mock.port}")
-        process = subprocess.Popen(
-            [sys.executable, "-m", "companion", "identify", "--config", str(config), "--json"],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
+        process = Program("companion.cli.main", "identify", "--config", config, "--json")
         mock.until(lambda state: state["mode"] == "OFFBOARD" and state["armed"])
         process.send_signal(signal.SIGTERM)
         out, err = process.communicate(timeout=30)

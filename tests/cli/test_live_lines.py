@@ -248,7 +248,7 @@ def test_a_question_is_asked_without_live_lines(on_a_pty, monkeypatch):
     assert asyncio.run(observer.ask_landing())
     observer.close()
     lines = [line for line in Screen().feed(seen()).lines if line]
-    assert lines == ["The vehicle holds. Land it now? [y/N] (Ctrl-C again leaves) "]
+    assert lines == ["The vehicle holds. Land it now? [y/N] (Ctrl-C ends the flight) "]
 
 
 @pytest.mark.parametrize("variable", [None, "NO_COLOR"])

@@ -58,7 +58,7 @@ def test_a_folder_gives_its_configuration_and_the_drag_that_was_learned(vehicle,
     code, told, _ = run(capsys, folder, "--no-flights")
     assert code == 0, told
     text = (folder / "tuned.yaml").read_text()
-    assert "# before 3; the quickest sensible gain" in text
+    assert "# before 3; the largest sensible gain" in text
     assert load(folder / "tuned.yaml").guidance.drag_per_s == 0.7
 
 

@@ -77,18 +77,18 @@ def test_what_limits_the_response_is_what_makes_it_quicker_when_changed(gain, ra
         assert now == pytest.approx(found.otherwise[name], abs=0.004)
 
 
-def test_the_quickest_sensible_gain_and_a_warning_above_it():
-    assert expected_response(configured("model-following", 5.0)).quickest_gain == pytest.approx(
+def test_the_largest_sensible_gain_and_a_warning_above_it():
+    assert expected_response(configured("model-following", 5.0)).largest_gain == pytest.approx(
         0.45 / 0.087
     )
     assert not expected_response(configured("model-following", 5.0)).too_quick
     quick = expected_response(configured("first-order", 6.0))
     assert quick.too_quick
-    assert "6, and 5.2 is the quickest sensible one (0.45 / (lag + dead time)); lower it" in (
+    assert "6, and 5.2 is the largest sensible one (0.45 / (lag + dead time)); lower it" in (
         quick.gain_sentence()
     )
     unknown = expected_response(Config())
-    assert unknown.quickest_gain is None
+    assert unknown.largest_gain is None
     assert "not known before `companion identify`" in unknown.gain_sentence()
 
 
@@ -106,7 +106,7 @@ def test_the_words_about_a_response():
     )
     assert not found.too_quick
     assert found.gain_sentence() == (
-        "planner.gain_per_s is 5, and 5.0 is the quickest sensible one (0.45 / (lag + dead time))"
+        "planner.gain_per_s is 5, and 5.0 is the largest sensible one (0.45 / (lag + dead time))"
     )
 
 

@@ -63,7 +63,7 @@ QUICK_FLIGHT = {
 }
 OTHER_VEHICLES = {
     "ardupilot": {
-        "guidance": {"drag_per_s": 0.25, "quadratic_drag_per_m": 0.028},
+        "guidance": {"drag_per_s": 0.33, "quadratic_drag_per_m": 0.022},
         "thrust": {"hover_thrust": 0.364},
     },
 }

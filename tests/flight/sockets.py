@@ -16,8 +16,8 @@ from companion.flight.observer import Silent
 from companion.flight.session import Session
 from companion.mavlink import lockstep
 from companion.mavlink.transport.free_port import free_port
-from tests.flight import mock_start
 from tests.flight.fly import LOOP_HZ, merged, quick_flight, quick_vehicle
+from tests.flight.programs import start_mock
 
 lockstep._SPIN_S = 0.0  # the cores are busy with other flights
 
@@ -74,7 +74,7 @@ def mock_vehicle(folder: Path, *, in_lockstep=True, autopilot="px4", full_rate=F
     config.write_text(bounded_yaml.dump({"mock": section}))
     arguments = ["--headless", "--config", str(config)]
     arguments += ["--port", str(port), "--control-port", str(control_port)]
-    process = mock_start.start(arguments + ["--lockstep"] * in_lockstep, words)
+    process = start_mock(arguments + ["--lockstep"] * in_lockstep, words)
     try:
         yield Mock(process, port, control_port, config, in_lockstep, autopilot, rate_hz)
     finally:

@@ -24,6 +24,7 @@ from tests.flight import fly as memory
 from tests.flight import sockets
 from tests.flight.fly import OTHER_VEHICLES, QUICK_FLIGHT, merged
 from tests.flight.others import When
+from tests.flight.programs import Program
 
 
 class Ways(NamedTuple):
@@ -62,7 +63,7 @@ PAGE = {"report": True}
 BOTH = pytest.mark.parametrize("ways", [PX4, ARDUPILOT], ids=lambda ways: ways.autopilot)
 
 
-def start(mock, folder, *options, **changes):
+def start(mock, folder, *options, as_users_do=False, **changes):
     """`companion fly` in real time against the mock, in a process of its own."""
     config = folder / "fly.yaml"
     quick = merged(QUICK_FLIGHT, OTHER_VEHICLES.get(mock.autopilot, {}))
@@ -72,8 +73,11 @@ def start(mock, folder, *options, **changes):
         "recording": {"directory": str(folder / "flights"), "report": False},
     }
     config.write_text(yaml.safe_dump(merged(merged(quick, places), changes)))
+    arguments = ["fly", "--config", str(config), "--json", *options]
+    if not as_users_do:
+        return Program("companion.cli.main", *arguments, environment={"COLUMNS": "200"})
     return subprocess.Popen(
-        [sys.executable, "-m", "companion", "fly", "--config", str(config), "--json", *options],
+        [sys.executable, "-m", "companion", *arguments],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -96,7 +100,7 @@ def in_offboard(state):
 
 def test_ctrl_c_hands_back_and_leaves_the_vehicle_holding(tmp_path):
     with PX4.mock(tmp_path, in_lockstep=False, speed=1.0) as mock:
-        process = start(mock, tmp_path, recording=PAGE)
+        process = start(mock, tmp_path, as_users_do=True, recording=PAGE)
         mock.until(in_offboard)
         process.send_signal(signal.SIGINT)
         result = finish(process, 1)
@@ -129,7 +133,8 @@ def test_other_signals_hand_back_too(tmp_path, ways, number):
 def test_a_terminal_that_goes_away_does_not_end_the_flight(tmp_path):
     """As `companion fly | head -1`: nobody reads any more, and every line fails."""
     with PX4.mock(tmp_path) as mock:
-        process = start(mock, tmp_path, "--lockstep", hover={"duration_s": 3.0}, recording=PAGE)
+        short = {"hover": {"duration_s": 3.0}, "recording": PAGE}
+        process = start(mock, tmp_path, "--lockstep", as_users_do=True, **short)
         process.stderr.close()
         out = process.stdout.read()
         assert process.wait(timeout=30) == 0

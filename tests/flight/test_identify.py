@@ -137,7 +137,7 @@ def test_px4s_response_is_the_one_that_the_shipped_configurations_hold(px4, axis
 
 def test_the_thrust_map_is_found_and_learning_the_hover_thrust_is_not_disturbed(px4):
     summary, vehicle = px4
-    assert vehicle.thrust.is_good(GRAVITY)
+    assert vehicle.thrust.flaw(GRAVITY) is None
     assert vehicle.thrust.slope == pytest.approx(19.55, rel=0.1)
     assert vehicle.thrust.normalised(GRAVITY) == pytest.approx(0.490, abs=0.005)
     assert summary.tracking()["height_rms_m"] < 0.05

@@ -37,7 +37,7 @@ def test_a_flight_begins_with_what_was_learned_and_leaves_what_it_learned(tmp_pa
         flown = fly(mock, tmp_path / "log", **CIRCLE, guidance={"drag_per_s": None})
     assert flown.result == "ok", flown.events
     (told,) = [text for _, text in flown.events if "earlier flight" in text]
-    assert "0.70 1/s + 0.000 1/m" in told
+    assert "linear 0.70 1/s, quadratic 0.000 1/m" in told
     assert f"learned-{BUNDLED}.json" in told
     kept, _ = LearnedFile(tmp_path, BUNDLED).load()
     assert kept.drag.per_velocity(3.0) == pytest.approx(1.0, abs=0.08)

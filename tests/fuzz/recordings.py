@@ -156,7 +156,7 @@ def _record(rows: list[list[float]], gain: str) -> bytes:
         path = Path(folder) / "flight.mcap"
         writer = McapWriter(path)
         writer.metadata("flight", {"began_s": "0.0", "epoch_s": "0.0", "gain_per_s": gain})
-        writer.message("/phase", 0, cdr.words_message((0.0,), ("connect", "a heartbeat")))
+        writer.message("/phase", 0, cdr.fields_message((0.0,), ("connect", "a heartbeat")))
         for number, row in enumerate(rows):
             for channel in CHANNELS:
                 values = (row * len(channel.numbers))[: len(channel.numbers)]

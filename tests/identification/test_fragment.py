@@ -233,7 +233,7 @@ def test_the_thrust_map_comes_back_through_the_rotors_lag():
     assert found.offset == pytest.approx(0.22, abs=0.15)
     assert found.lag == pytest.approx(0.05, abs=0.005)
     assert found.normalised(9.80665) == pytest.approx(0.490, abs=0.003)
-    assert found.is_good(GRAVITY)
+    assert found.flaw(GRAVITY) is None
 
 
 def test_vibration_in_a_long_hover_does_not_hide_the_thrust_map():
@@ -244,7 +244,7 @@ def test_vibration_in_a_long_hover_does_not_hide_the_thrust_map():
     noisy = specific + np.random.default_rng(0).normal(0.0, 0.6, times.size)
     found = fit_thrust_map(times, thrust, times, noisy)
     assert found.slope == pytest.approx(19.55, rel=0.05)
-    assert found.is_good(GRAVITY)
+    assert found.flaw(GRAVITY) is None
 
 
 def test_thrust_that_never_changed_gives_no_map():

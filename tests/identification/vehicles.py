@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
 
 from sitl_mock.config.airframe import AirframeConfig
 from sitl_mock.config.rate_loop import RateLoopConfig
@@ -60,8 +59,14 @@ def lag_with_dead_time(times, commanded, lag, dead_time, *, gain=1.0, slew=np.in
     asked = np.concatenate(([start], _slewed(start, commanded[np.maximum(held, 0)], slew * step)))
     share = step / (lag + 0.5 * step)
     means = 0.5 * (asked[:-1] + asked[1:]) - start
-    reached = lfilter([0.0, share], [1.0, share - 1.0], means)
+    reached = _filtered([0.0, share], [1.0, share - 1.0], means)
     return gain * np.interp(times, fine, start + reached)
+
+
+def _filtered(numerator, denominator, values):
+    from scipy.signal import lfilter  # noqa: PLC0415  takes half a second, in every worker
+
+    return lfilter(numerator, denominator, values)
 
 
 def _slewed(start, targets, most):
@@ -83,7 +88,7 @@ def loop_with_dead_time(times, commanded, *, frequency, damping, dead_time, gain
     start = float(commanded[0])
     asked = _slewed(start, commanded[np.maximum(held, 0)], slew * step) - start
     kept, pull = 1.0 - 2.0 * damping * frequency * step, (frequency * step) ** 2
-    rates = lfilter([0.0, pull], [1.0, pull - 1.0 - kept, kept], asked)
+    rates = _filtered([0.0, pull], [1.0, pull - 1.0 - kept, kept], asked)
     return gain * np.interp(times, fine, start + rates)
 
 

@@ -18,6 +18,7 @@ from companion.mavlink.errors import EndpointError, InvalidSetpoint, LinkError
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.transport.free_port import free_port
 from tests.flight.fly import QUICK_FLIGHT, merged
+from tests.flight.programs import Program
 from tests.flight.sockets import mock_vehicle
 
 pytest.importorskip("mavsdk")
@@ -169,10 +170,10 @@ def test_it_flies_the_same_maneuver(tmp_path):
         }
         config = tmp_path / "fly.yaml"
         config.write_text(yaml.safe_dump(merged(QUICK_FLIGHT, changes)))
-        command = [sys.executable, "-m", "companion", "fly", "--config", str(config), "--json"]
-        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=90)
-    assert done.returncode == 0, done.stderr
-    summary = json.loads(done.stdout)  # and nothing of MAVSDK's own words
+        process = Program("companion.cli.main", "fly", "--config", config, "--json")
+        out, err = process.communicate(timeout=90)
+    assert process.returncode == 0, err
+    summary = json.loads(out)  # and nothing of MAVSDK's own words
     assert (summary["result"], summary["phase"]) == ("ok", "disarm")
     assert summary["tracking"]["height_rms_m"] < 0.5
     assert summary["link"]["sent"] >= summary["setpoints"] > 100

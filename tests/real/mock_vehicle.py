@@ -103,7 +103,7 @@ class MockInMemory:
 
     def _vehicle(self) -> MockVehicle:
         """A vehicle whose telemetry is as irregular as a real one's; each has its own seed."""
-        own = {"exact_rates": False, "seed": 1 + len(self.flown)}
+        own = {"exact_rates": False, "lockstep": {"enabled": False}, "seed": 1 + len(self.flown)}
         vehicle = MockVehicle(
             config=ROOT / "configs" / f"mock-{self.autopilot}.yaml",
             **merged(self._settings, self._wind | own),

@@ -47,9 +47,13 @@ class Vehicle:
     Attributes:
         relay: stands between it and the program, or None.
         endpoint: for `link.endpoint`.
+        fifo: whether the program flies before other programs of this computer (SCHED_FIFO).
     """
 
-    def __init__(self, build: Build, folder: Path, *, relayed: bool = True) -> None:
+    def __init__(
+        self, build: Build, folder: Path, *, relayed: bool = True, fifo: bool = False
+    ) -> None:
+        self.fifo = fifo
         self.autopilot, self.folder, self.build = build.autopilot, folder, build
         self.relay = Relay(self.autopilot, *PORTS[self.autopilot]) if relayed else None
         self.endpoint = build.endpoint if self.relay is None else self.relay.endpoint
@@ -90,7 +94,8 @@ class Vehicle:
         if self.autopilot == "ardupilot":
             self.station.command(42651, 1, 100)  # its battery empties from flight to flight
         folder = folder or self.folder / f"flight{len(self.flown) + 1}"
-        config = merged({"link": {"endpoint": self.endpoint}}, config)
+        first = {"realtime": {"scheduler": "fifo"}} if self.fifo else {}
+        config = merged({"link": {"endpoint": self.endpoint}, **first}, config)
         self.flown.append(started(self, config, folder, command, prelude))
         return self.flown[-1]
 
@@ -162,7 +167,8 @@ def real_vehicle(
         arguments: of its `start`.
         folder: where it keeps its files; null: a temporary one.
         relayed: whether a `Relay` stands between it and the program.
-        fifo: before other programs of this computer (SCHED_FIFO), where that is allowed.
+        fifo: autopilot and program before other programs of this computer (SCHED_FIFO), where
+            that is allowed.
     """
     folder = (folder or Path(tempfile.mkdtemp(prefix=f"real-{autopilot}-"))).resolve()
     folder.mkdir(parents=True, exist_ok=True)
@@ -171,7 +177,7 @@ def real_vehicle(
     with Path(f"/tmp/{autopilot}.lock").open("w") as lock:
         flock(lock, LOCK_EX)
         with running(build, log, fifo=fifo):
-            vehicle = Vehicle(build, folder, relayed=relayed)
+            vehicle = Vehicle(build, folder, relayed=relayed, fifo=fifo)
             try:
                 yield vehicle
             finally:

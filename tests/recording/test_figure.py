@@ -1,6 +1,7 @@
 """What `companion plot` draws, and what it refuses in one sentence, without a traceback."""
 
 import json
+from importlib.util import find_spec
 from math import nan
 
 import numpy as np
@@ -16,7 +17,7 @@ from companion.recording.mcap_file.loop_channels import SAMPLE, SETPOINT
 from companion.recording.mcap_file.writer import McapWriter
 from companion.recording.measurements.recorded_summary import _KEYS
 
-pyplot = pytest.importorskip("matplotlib.pyplot")
+pytestmark = pytest.mark.skipif(find_spec("matplotlib") is None, reason="no Matplotlib")
 
 MARKS = Marks(
     phases=[(0.0, "connect"), (0.05, "checks"), (3.0, "takeoff"), (5.0, "maneuvers")],
@@ -90,6 +91,8 @@ def test_the_marks_are_those_of_the_summary():
 
 def test_each_panel_has_its_curve_its_unit_and_all_marks():
     motion = np.array([[0.1 * k, 50.0, 0.05 * k, 1.5, 20.0, 0.3] for k in range(100)])
+    from matplotlib import pyplot  # noqa: PLC0415  takes a third of a second, in every worker
+
     figure, panels = pyplot.subplots(len(HEIGHTS), 1)
     try:
         draw_history(panels, motion, MARKS)

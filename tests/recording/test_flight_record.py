@@ -35,12 +35,12 @@ def write(folder):
         if row == ROWS // 2:
             writer.flush()
     second = 1_000_000_000
-    writer.message("/phase", second, cdr.words_message((1.5,), ("connect", "a heartbeat é")))
-    writer.message("/maneuver", second, cdr.words_message((2.0, 3.0), ("hover",)))
-    writer.message("/maneuver", second, cdr.words_message((4.0, 5.0), ("",)))
-    writer.message("/alarm", second, cdr.words_message((3.0, 1.0), ("fence", "too far", "land")))
+    writer.message("/phase", second, cdr.fields_message((1.5,), ("connect", "a heartbeat é")))
+    writer.message("/maneuver", second, cdr.fields_message((2.0, 3.0), ("hover",)))
+    writer.message("/maneuver", second, cdr.fields_message((4.0, 5.0), ("",)))
+    writer.message("/alarm", second, cdr.fields_message((3.0, 1.0), ("fence", "too far", "land")))
     values = '{"limits": {"max_tilt_deg": 20.0}}'
-    writer.message("/change", second, cdr.words_message((1.5, 0.0), (values,)))
+    writer.message("/change", second, cdr.fields_message((1.5, 0.0), (values,)))
     writer.message("/log", 3 * second, cdr.log_message(3 * second, 3, "armed", "autopilot"))
     writer.message(
         "/tf",

@@ -4,6 +4,7 @@ import csv
 import json
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +46,18 @@ def flown(folder, autopilot="px4", flight="steps", **mock):
         return fly(vehicle, folder, hover={"duration_s": 1.0}, **FLIGHTS[flight])
 
 
+@pytest.fixture(scope="module")
+def steps(tmp_path_factory):
+    """A flight of steps by autopilot: its folder and its summary. The files stay as they are."""
+
+    @cache
+    def flight_of(autopilot):
+        folder = tmp_path_factory.mktemp(autopilot)
+        return folder, flown(folder, autopilot)
+
+    return flight_of
+
+
 def replayed(folder, **changes):
     config = changed(load(folder / "config.yaml"), changes, "test")
     return Replay(read_flight(folder), config).run()
@@ -57,7 +70,6 @@ LOCKSTEP = {"in_lockstep": True, "wind": GUSTS}
 @pytest.mark.parametrize(
     ("autopilot", "flight", "mock"),
     [
-        ("ardupilot", "steps", {}),
         ("px4", "circle", LOCKSTEP),
         pytest.param("ardupilot", "circle", LOCKSTEP, marks=SLOW),
         pytest.param("px4", "exact", {"wind": GUSTS}, marks=SLOW),
@@ -67,13 +79,21 @@ LOCKSTEP = {"in_lockstep": True, "wind": GUSTS}
     ],
 )
 def test_a_replay_gives_the_commands_of_the_flight_to_the_bit(tmp_path, autopilot, flight, mock):
-    summary = flown(tmp_path, autopilot, flight, **mock)
+    replays_to_the_bit(tmp_path, flown(tmp_path, autopilot, flight, **mock))
+
+
+def test_so_does_a_replay_of_steps(steps):
+    replays_to_the_bit(*steps("ardupilot"))
+
+
+def replays_to_the_bit(folder, summary):
     assert summary.result == "ok", summary.events
-    samples = replayed(tmp_path)
+    samples = replayed(folder)
     assert [each for each in samples if not each.same] == []
     assert sum(each.recorded is not None for each in samples) == summary.counts.setpoints > 1000
 
 
+MODES = {"px4": "OFFBOARD", "ardupilot": "GUIDED"}
 _GRAPHS = ("degrees(SET_ATTITUDE_TARGET.body_roll_rate)", "LOCAL_POSITION_NED.z*-1")
 _GRAPHER = """
 import json, sys
@@ -82,26 +102,36 @@ matplotlib.use("Agg")
 from MAVProxy.modules.lib.grapher import MavGraph
 from pymavlink import mavutil
 
-log = mavutil.mavlink_connection(sys.argv[1], notimestamps=False, zero_time_base=False)
-modes = log.flightmode_list()
-graph = MavGraph()
-graph.add_mav(log)
-for expression in sys.argv[2:]:
-    graph.add_field(expression)
-graph.process([], modes, 0)
-print(json.dumps({"modes": [mode for mode, *_ in modes], "curves": graph.y}))
+def graphed(path, expressions):
+    log = mavutil.mavlink_connection(path, notimestamps=False, zero_time_base=False)
+    modes = log.flightmode_list()
+    graph = MavGraph()
+    graph.add_mav(log)
+    for expression in expressions:
+        graph.add_field(expression)
+    graph.process([], modes, 0)
+    return {"modes": [mode for mode, *_ in modes], "curves": graph.y}
+
+print(json.dumps([graphed(path, sys.argv[3:]) for path in sys.argv[1:3]]))
 """
 """What MAVExplorer does when it loads a log and draws graphs, without its windows (wxPython)."""
 
 
-@pytest.mark.parametrize(("autopilot", "mode"), [("px4", "OFFBOARD"), ("ardupilot", "GUIDED")])
-def test_mavexplorer_and_mavlogdump_read_the_log(tmp_path, autopilot, mode):
-    summary = flown(tmp_path, autopilot)
-    tlog, python = tmp_path / "flight.tlog", sys.executable
-    command = [python, "-c", _GRAPHER, tlog, *_GRAPHS]
-    graphed = json.loads(subprocess.check_output(command, text=True).splitlines()[-1])
-    assert mode in graphed["modes"]
-    rates, heights = graphed["curves"]
+@pytest.fixture(scope="module")
+def graphs(steps):
+    """What it draws of the flight by autopilot; its imports cost more than that."""
+    logs = {autopilot: steps(autopilot)[0] / "flight.tlog" for autopilot in MODES}
+    command = [sys.executable, "-c", _GRAPHER, *logs.values(), *_GRAPHS]
+    said = subprocess.check_output(command, text=True).splitlines()[-1]
+    return dict(zip(logs, json.loads(said), strict=True))
+
+
+@pytest.mark.parametrize("autopilot", MODES)
+def test_mavexplorer_and_mavlogdump_read_the_log(steps, graphs, autopilot):
+    folder, summary = steps(autopilot)
+    tlog, python = folder / "flight.tlog", sys.executable
+    assert MODES[autopilot] in graphs[autopilot]["modes"]
+    rates, heights = graphs[autopilot]["curves"]
     assert len(rates) == summary.counts.setpoints
     assert 10.0 < max(rates) < 180.0
     assert max(heights) == pytest.approx(2.0, abs=0.4)
@@ -110,7 +140,7 @@ def test_mavexplorer_and_mavlogdump_read_the_log(tmp_path, autopilot, mode):
     command = [python, mavlogdump, "--types", "SET_ATTITUDE_TARGET", "--format", "json", tlog]
     dumped = subprocess.check_output(command, text=True).splitlines()
     thrust = [json.loads(line)["data"]["thrust"] for line in dumped]
-    assert thrust == pytest.approx(read_flight(tmp_path).rows("setpoint")["thrust"], abs=1e-6)
+    assert thrust == pytest.approx(read_flight(folder).rows("setpoint")["thrust"], abs=1e-6)
 
 
 def test_a_replay_of_a_flight_with_faults_is_that_flight_too(tmp_path):
@@ -129,10 +159,10 @@ def test_a_replay_of_a_flight_with_faults_is_that_flight_too(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def good(tmp_path_factory):
+def good(steps):
     """A flight with steps, its folder and its summary."""
-    folder = tmp_path_factory.mktemp("good")
-    return folder, flown(folder).as_dict()
+    folder, summary = steps("px4")
+    return folder, summary.as_dict()
 
 
 def test_other_readers_read_the_files(good):

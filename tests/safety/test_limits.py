@@ -135,7 +135,7 @@ SAID = [
     (
         lambda: link_judges.starvation(0.2),
         at(health=Health(starved=0.6)),
-        "CPU starvation: the program's timer is late by 60 % of the time",
+        "CPU starvation: the program's timer lost 60 % of the last second",
     ),
     (
         lambda: link_judges.gaps(2),
@@ -199,7 +199,7 @@ def test_it_brakes_in_time_before_a_fence_on_the_map():
     )
     assert judge(at(motion=moving), False) is None  # stops 2 m on
     fast = moving._replace(velocity=(12.0, 0.0, 0.0))  # stops 42 m on
-    assert "about to stop" in judge(at(motion=fast), False)
+    assert "braking now would end" in judge(at(motion=fast), False)
 
 
 def odd(name, then=Action.LAND, action=Action.HOLD):

@@ -32,7 +32,7 @@ class Flight:
             positions=0,
             gps_was_good=True,
         )
-        self.clock = SimpleNamespace(timeline=2, last_change="it jumped")
+        self.clock = SimpleNamespace(changes=2, last_change="it jumped")
         self.stats = SimpleNamespace(frames=0, lost=0)
         link = SimpleNamespace(
             state=self.state,
@@ -148,7 +148,7 @@ def test_before_control_begins_everything_counts_from_the_start_of_the_clock():
     assert flight.builder.origin_ned is None
     assert told.control.heard == 0.0
     assert told.control.clock_change == "it jumped"
-    flight.clock.timeline = 0
+    flight.clock.changes = 0
     assert flight.snapshot(4.0).control.clock_change is None
     assert told.health.gaps == 1
     assert told.resets[:3] == (1, pytest.approx(14.0**0.5), 3.0)
@@ -165,7 +165,7 @@ def test_every_stage_of_a_samples_way_has_its_time(flight):
     assert told[:6] == (9.9, 9.95, Unanswered.LATE, 9.5, 9.75, 10.02)
     assert (told.position_fresh, told.clock_change) == (True, None)
     assert told.stood_still == pytest.approx(0.17)
-    flight.clock.timeline = 3
+    flight.clock.changes = 3
     assert flight.snapshot().control.clock_change == "it jumped"
     assert flight.counted == [(3, now) for now in (10.0, 10.02, 10.04, 10.24)]
 

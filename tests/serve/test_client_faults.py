@@ -89,7 +89,7 @@ class Scene:
         assert self.speed < 0.5
         return HANDED_BACK
 
-    async def is_flown(self, seconds=1.0):
+    async def is_flown(self, seconds=TIMEOUT + 0.2):
         """The script's own setpoints are still flown."""
         await stream(seconds, self.hover)
         assert self.control.in_control
@@ -221,7 +221,7 @@ async def contradictions(scene):
         scene.script.attitude(7 | 64, (1.0, 0.0, 0.0, 0.0), 0.5)  # no thrust
 
     await stream(1.0, send, 0.05)
-    scene.is_said("without velocity")
+    scene.is_said("need velocity, too")
     await scene.is_flown()
     return REFUSED
 
@@ -313,7 +313,7 @@ async def beyond_limits(scene):
         scene.judge.commanded()
         scene.script.attitude(7, q, 1.0)
 
-    await stream(0.8, tilt)
+    await stream(0.5, tilt)
     assert 2.0 * math.asin(math.hypot(*scene.vehicle.state()["q"][1:3])) < math.radians(47.0)
     await scene.recover()
 

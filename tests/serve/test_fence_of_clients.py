@@ -85,7 +85,7 @@ def test_a_client_that_asks_again_does_not_take_the_fence_along(autopilot):
             await stream(2.0, to(5000.0))
             assert vehicle.state()["mode"] == "LAND"
             said = " ".join(script.texts())
-            assert "safety: braking: about to stop" in said, said
+            assert "safety: braking: braking now would end" in said, said
             assert "the vehicle is held, and control ends" in said
             # After a run-up of 3 m; without the acceleration it was up to 1.3 m outside.
             assert max(controlled) < RADIUS + 0.2

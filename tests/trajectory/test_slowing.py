@@ -202,7 +202,7 @@ def test_what_is_too_long_is_slowed_evenly_and_says_so():
     assert found.even
     assert violations(found.trajectory, ENVELOPE) == ()
     (note,) = slowing(laps, found)
-    assert "all along, for it is too long to be slowed down in parts; most by limits." in note
+    assert "because it is too long to be slowed down in parts; most by limits." in note
 
 
 def test_what_slowness_does_not_mend_is_told_at_its_own_time():

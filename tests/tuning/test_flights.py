@@ -53,7 +53,7 @@ def test_in_gusts_the_error_is_much_smaller():
 def test_what_an_identified_ardupilot_gets_does_not_swing_in_gusts():
     """Without margins while the rate loop slews, such a proposal swung by more than 1 m."""
     vehicle = {"lag_ms": 23.0, "dead_time_ms": 14.9, "acceleration_limit_deg_s2": 1112.0}
-    drag = {"drag_per_s": 0.25, "quadratic_drag_per_m": 0.028}
+    drag = {"drag_per_s": 0.33, "quadratic_drag_per_m": 0.022}
     mock = load(shipped("mock-ardupilot.yaml"))
     keys = {"vehicle": vehicle, "guidance": drag, "limits": LIMITS}
     config = changed(mock, keys, "as `identify` writes it")

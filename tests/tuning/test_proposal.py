@@ -36,7 +36,7 @@ def test_it_keeps_the_margins_and_expects_a_smaller_error_where_they_were_kept(n
         assert proposal.after.errors.position < proposal.before.errors.position
     assert proposal.design.gain <= 1.01 * largest_gain(VEHICLES[name])
     for slower in (0.7, 1.3):
-        left = stability(proposal.tuned, ModelError(slower=slower))
+        left = stability(proposal.tuned, ModelError(time_factor=slower))
         assert left.stable
         assert left.gain_db >= 2.5
     written = changed(VEHICLES[name], proposal.changes, "test")
@@ -53,7 +53,7 @@ def test_a_rate_loop_of_second_order_is_proposed_too_and_keeps_the_margins():
     assert proposal.tuned.vehicle.damping == 0.73
     written = changed(VEHICLES["px4"], proposal.changes, "test")
     assert written.vehicle == proposal.tuned.vehicle
-    assert stability(proposal.tuned, ModelError(slower=1.3)).stable
+    assert stability(proposal.tuned, ModelError(time_factor=1.3)).stable
     text = proposal_text(proposal, Path("vehicle.yaml"), {}, "a flight")
     assert "second order" in text
     assert yaml.safe_load(text)["vehicle"] == nearer

@@ -69,14 +69,17 @@ class Level(NamedTuple):
 def levels(column: Column) -> list[Level]:
     """The levels of a factor: its values, or ranges with equally many cases for many numbers.
 
-    Of more than `_MOST_LEVELS` words only the first ones are levels.
+    Of more than `_MOST_LEVELS` words the last level holds all that have none of their own.
     """
     known = sorted({_key(value) for value in column})
     if column.dtype != float or len(known) <= _MOST_LEVELS:
+        own = known if len(known) <= _MOST_LEVELS else known[: _MOST_LEVELS - 1]
         keys = [_key(value) for value in column]
-        return [
-            Level(key[1], np.array([key == each for each in keys])) for key in known[:_MOST_LEVELS]
-        ]
+        found = [Level(key[1], np.array([key == each for each in keys])) for key in own]
+        others = len(known) - len(own)
+        if others:
+            found.append(Level(f"{others} others", np.array([key not in own for key in keys])))
+        return found
     edges = np.nanquantile(column, np.linspace(0.0, 1.0, _RANGES + 1))
     found = []
     for number, (low, high) in enumerate(pairwise(edges)):
@@ -136,10 +139,11 @@ class Choice(NamedTuple):
 
 
 def choices(results: Results, most: int = 300) -> list[Choice]:
-    """The choices that a campaign compares; keys of `mock`, `flight` and `vehicle` are none.
+    """The choices that a campaign compares, by the values of its swept keys.
 
-    Faults are none either. If no two cases have equal values, or there are more than `most`
-    choices, single cases are the choices, at equal distances, fewer than 2·`most`.
+    Keys of `mock`, `flight` and `vehicle`, and faults, are not chosen by a user and do not count.
+    If no two cases have equal values, or there are more than `most` choices, each choice is one
+    case: every k-th, with k such that there are fewer than 2·`most`.
     """
     chosen = [name for name in results.factors if _is_choice(name)]
     keys = [tuple(_key(results.columns[name][row]) for name in chosen) for row in _rows(results)]

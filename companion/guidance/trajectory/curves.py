@@ -11,7 +11,7 @@ from companion.guidance.trajectory.sample import TrajectoryError, Vector
 
 
 class CurvePoint(NamedTuple):
-    """A point of a curve, m, and its derivatives: the k-th in m per unit of phase to the k-th."""
+    """A point of a curve, m, and its first three derivatives by the phase."""
 
     position: Vector
     first: Vector

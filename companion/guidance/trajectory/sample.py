@@ -71,7 +71,7 @@ class Trajectory(Protocol):
         ...
 
     def check_times(self) -> Sequence[float]:
-        """Times at which to check the trajectory against limits, s: `timed_curve.check_times`.
+        """Times at which to check the trajectory against limits, s, ascending from 0 to its end.
 
         Raises:
             TrajectoryError: the trajectory is too long to be checked.

@@ -18,7 +18,7 @@ _HEADING_CUTOFF = 2.0
 """Cutoff frequency of the heading along a spline, Hz: no vehicle follows a faster one."""
 
 HEADING_CHECK_STEP = 1.0 / (32.0 * _HEADING_CUTOFF)
-"""Longest time between two checks of such a heading, s."""
+"""Longest time between two checks of a trajectory whose heading is such a spline, s."""
 
 _HEADING_STEP = 0.01
 """Sample period of the direction of flight, s."""

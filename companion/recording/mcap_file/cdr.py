@@ -99,7 +99,7 @@ Pose = tuple[float, float, float, float, float, float, float]
 """Position x, y, z (m) and orientation x, y, z, w."""
 
 
-def words_message(numbers: tuple[float, ...], texts: tuple[str, ...]) -> bytes:
+def fields_message(numbers: tuple[float, ...], texts: tuple[str, ...]) -> bytes:
     """Encode float64 fields followed by strings, the form of PHASE, MANEUVER, ALARM and CHANGE."""
     message = bytearray(struct.pack(f"<4s{len(numbers)}d", CDR, *numbers))
     for text in texts:
@@ -107,8 +107,8 @@ def words_message(numbers: tuple[float, ...], texts: tuple[str, ...]) -> bytes:
     return bytes(message)
 
 
-def words_of(message: bytes, numbers: int, texts: int) -> tuple[tuple[float, ...], list[str]]:
-    """Decode a message of `words_message`: the numbers and the strings.
+def fields_of(message: bytes, numbers: int, texts: int) -> tuple[tuple[float, ...], list[str]]:
+    """Decode a message of `fields_message`: the numbers and the strings.
 
     Raises:
         ValueError: the message does not have this form.

@@ -7,8 +7,8 @@ Figures = Mapping[str, Any]
 """The figures; the result of `Summary.as_dict`."""
 
 LEVEL_RMS, LEVEL_RMS_PER_SPEED = 0.15, 0.02
-"""Largest level RMS error of a maneuver: at rest, m, plus an amount per speed of the reference, s.
-"""
+"""Largest RMS of the level error of a maneuver: with the reference at rest, m; and what is added
+for each m/s of its speed, m."""
 HEIGHT_RMS = 0.15
 """Largest RMS error of the height, m."""
 SWING_RMS = 3.0

@@ -1,8 +1,8 @@
 """The network: joins the link to the vehicle and the clients' endpoints by the routing rules.
 
-The control loop comes first: an arriving frame is only queued. It is forwarded after an attitude
-sample has been answered, when the next sample is a whole period away. Without samples it is
-forwarded within `_LONGEST_WAIT`.
+The control loop comes first: an arriving frame is only queued. It is forwarded after the next
+attitude sample has been answered, when another one is a whole period away; if that takes longer
+than `_LONGEST_WAIT`, it is forwarded without waiting for the sample.
 """
 
 import asyncio

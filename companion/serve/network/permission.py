@@ -78,7 +78,7 @@ class Permission:
         if reads_only(frame) or self.trusts(client):
             return None
         if self._signing is None:
-            return "read-only: name this host in serve.trusted"
+            return "read-only: name your host or serial device in serve.trusted"
         if self._signing.check(frame) is SignatureResult.GOOD:
             return None
         return "read-only: sign with the vehicle's key, or see serve.trusted"

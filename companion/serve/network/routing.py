@@ -133,7 +133,10 @@ class Routing:
             client.put(frame.raw)
 
     def from_client(self, client: Channel, frame: Frame) -> None:
-        """Forward a client's frame, unless it is intercepted."""
+        """Forward a client's frame, unless it is looped, for our component, or intercepted.
+
+        A looped frame (see `RoutingStats`) is dropped; one for our component goes to `on_own`.
+        """
         source = source_of(frame)
         if (
             source in (self._autopilot, self._own)

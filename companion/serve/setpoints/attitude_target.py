@@ -43,7 +43,9 @@ def attitude_target(message: Message) -> AttitudeRequest | RatesRequest:
             raise RefusedSetpoint("body rates are incomplete: give roll, pitch and yaw rate")
         return RatesRequest(_rates(message), thrust)
     if ignored & (_NO_ROLL_RATE | _NO_PITCH_RATE) != _NO_ROLL_RATE | _NO_PITCH_RATE:
-        raise RefusedSetpoint("attitude and body rates contradict each other: ignore one")
+        raise RefusedSetpoint(
+            "attitude and body rates contradict each other: set the ignore bits of one"
+        )
     return AttitudeRequest(
         _attitude(message), 0.0 if ignored & _NO_YAW_RATE else _rate(message.body_yaw_rate), thrust
     )

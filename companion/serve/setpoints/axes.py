@@ -78,7 +78,11 @@ class Axes:
         if self._approach is None:
             return carried
         error = self._approach.at(time)
-        return State(*(plus(a, b) for a, b in zip(carried, error, strict=True)))
+        return State(
+            plus(carried.position, error.position),
+            plus(carried.velocity, error.velocity),
+            plus(carried.acceleration, error.acceleration),
+        )
 
     def stop(self, now: float, actual: AxisMotion | None = None) -> None:
         """Come to rest within limits, and stay there.

@@ -30,19 +30,13 @@ class Carrier(NamedTuple):
     def at(self, time: float) -> State:
         """The state at a time, s."""
         t = max(0.0, time - self.begins)
+        position, velocity, acceleration = [], [], []
         rows = zip(self.position, self.velocity, self.acceleration, self.jerk, strict=True)
-        position, velocity, acceleration = zip(
-            *(
-                (
-                    p + t * (v + t * (0.5 * a + t * j / 6.0)),
-                    v + t * (a + 0.5 * t * j),
-                    a + t * j,
-                )
-                for p, v, a, j in rows
-            ),
-            strict=True,
-        )
-        return State(position, velocity, acceleration)
+        for p, v, a, j in rows:  # guidance asks for a dozen states in each of its steps
+            position.append(p + t * (v + t * (0.5 * a + t * j / 6.0)))
+            velocity.append(v + t * (a + 0.5 * t * j))
+            acceleration.append(a + t * j)
+        return State(tuple(position), tuple(velocity), tuple(acceleration))
 
     def error_of(self, state: State) -> State:
         """Difference between a state and the commanded one at `begins`."""
@@ -55,7 +49,7 @@ class Carrier(NamedTuple):
 
 def plus(left: Values, right: Values) -> Values:
     """The sum of two vectors."""
-    return tuple(a + b for a, b in zip(left, right, strict=True))
+    return tuple([a + b for a, b in zip(left, right, strict=True)])
 
 
 def _minus(left: Values, right: Values) -> Values:

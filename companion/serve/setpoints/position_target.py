@@ -76,7 +76,7 @@ def local_target(
     groups = _groups(message, (message.x, message.y, message.z))
     position, velocity, acceleration = groups
     if not frame.position and any(value is not None for value in position):
-        raise RefusedSetpoint("position in BODY_NED is ambiguous: use LOCAL_NED, BODY_OFFSET_NED")
+        raise RefusedSetpoint("position in BODY_NED is ambiguous: use LOCAL_NED or BODY_OFFSET_NED")
     turn = situation.yaw if frame.body else 0.0
     start = situation.position_ned if frame.offset else (0.0, 0.0, 0.0)
     position = _shifted(_turned(position, turn), start)
@@ -186,7 +186,7 @@ def _demand(
     if position is velocity is acceleration is None:
         raise RefusedSetpoint(f"nothing {name} is commanded: give position, velocity or accel.")
     if position is not None and velocity is None and acceleration is not None:
-        raise RefusedSetpoint("position and acceleration without velocity")
+        raise RefusedSetpoint("position and acceleration need velocity, too")
     if position is not None and hypot(*position) > _FARTHEST:
         raise RefusedSetpoint(f"the position is farther than {_FARTHEST:g} m")
     return AxisDemand(position, velocity, acceleration)

@@ -35,8 +35,8 @@ class Setpoints:
             situation: present situation of the vehicle.
 
         Raises:
-            RefusedSetpoint: the setpoint is for another vehicle, contradictory, incomplete, or not
-                finite.
+            RefusedSetpoint: the setpoint is for another vehicle, contradictory, incomplete, not
+                finite, too large, or of a kind that is not flown.
         """
         self._check_target(target_of(frame))
         message = decode(frame.message_id, frame.payload)

@@ -102,7 +102,7 @@ def _acceleration(axis: str, name: str) -> tuple[ParameterRule, ParameterRule]:
         ParameterRule((f"ATC_ACC_{axis}_MAX",), meaning, acceleration_limit(1.0, name), _MEASURED),
         ParameterRule(
             (f"ATC_ACCEL_{axis}_MAX",),
-            f"{meaning}, centidegrees (before 4.7)",
+            f"{meaning}, centidegrees/s² (before 4.7)",
             acceleration_limit(0.01, name),
             _REFERENCE,
         ),
