@@ -85,8 +85,8 @@ class Autopilot(Protocol):
     """How to command one kind of autopilot, and what its modes and parameters mean to a flight.
 
     Every autopilot takes thrust as 0..1 of the collective. An autopilot that can divide thrust by
-    cos(tilt) itself has a rule for this in `parameters`. When setpoints stop it holds the last rates for
-    a while, and then obeys a later setpoint unless a mode was commanded in between.
+    cos(tilt) itself has a rule for this in `parameters`. When setpoints stop it holds the last
+    rates for a while, and then obeys a later setpoint unless a mode was commanded in between.
 
     Attributes:
         name: Name to show to users, such as `PX4`.
