@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.flight.fly import QUICK_PARAMETERS
+from tests.flight.fly import LOOP_HZ, QUICK_PARAMETERS
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs/extending.md").read_text("utf-8")
@@ -57,16 +57,25 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tree
 
 
+QUICKLY = """
+from functools import partial
+from companion import testing
+QUICK = {"prearm_delay_s": 0.2, "parameters": PARAMETERS, "inner_loop_hz": RATE}
+QUICK["lockstep"] = {"period_ms": 1000 // RATE}
+testing.MockVehicle = partial(testing.MockVehicle, **QUICK)
+""".replace("PARAMETERS", repr(QUICK_PARAMETERS["px4"])).replace("RATE", str(LOOP_HZ))
+"""The vehicle boots, climbs and lands quickly, with a slower loop: most of the time of a flight."""
+
 FLIGHT = """
 from companion.config.files import changed, load, shipped
 from companion.testing import MockVehicle, fly
 px4 = shipped("mock-px4.yaml")
 changes = {"planner": {"name": "thrust-axis"}, "flight": {"maneuvers": ["hover"]}}
 changes["hover"] = {"duration_s": 1.5}
-mock = MockVehicle(config=px4, prearm_delay_s=0.2, parameters=QUICK)
-summary = fly(changed(load(px4), changes, "hover"), mock)
+changes["link"] = {"attitude_rate_hz": RATE}
+summary = fly(changed(load(px4), changes, "hover"), MockVehicle(config=px4))
 print(summary.result, summary.planner, [text for _, text in summary.events])
-""".replace("QUICK", repr(QUICK_PARAMETERS["px4"]))
+""".replace("RATE", str(LOOP_HZ))
 
 MAY_FLY = """
 from companion.attitude.thrust_axis import thrust_axis
@@ -103,6 +112,7 @@ def said(tree: Path) -> dict[str, str]:
     path = {"maneuvers": ["trajectory"], "trajectory": "down.yaml", "takeoff_height_m": 5.0}
     (helix,) = [text for title, text in blocks() if not title and "helix" in text]
     programs = {
+        "quickly": QUICKLY,
         "hover": FLIGHT,
         "may fly": MAY_FLY,
         "descent": FLIGHT.replace('{"maneuvers": ["hover"]}', repr(path)),

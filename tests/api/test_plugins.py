@@ -1,7 +1,6 @@
 """Planners and guidance of another package: found, checked, flown, limited."""
 
 import sys
-from functools import partial
 from importlib import invalidate_caches
 from math import hypot, isfinite, nan
 
@@ -145,7 +144,7 @@ def test_the_rest_of_a_planner_is_passed_on():
 @pytest.fixture
 def quick(monkeypatch):
     """The vehicles of `check_guidance` boot, climb and land quickly."""
-    monkeypatch.setattr(conformance, "MockVehicle", partial(QuickVehicle, full_rate=True))
+    monkeypatch.setattr(conformance, "MockVehicle", QuickVehicle)
 
 
 @pytest.mark.usefixtures("quick")

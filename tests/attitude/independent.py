@@ -13,10 +13,16 @@ def coefficients_of(r):
     return -r.as_matrix()[..., :2, 2]
 
 
+def path_of(seen):
+    """Coefficients (S, N, 2) of S stacks of N attitudes."""
+    whole = Rotation.from_quat(np.concatenate([r.as_quat() for r in seen]))
+    return coefficients_of(whole).reshape(len(seen), -1, 2)
+
+
 def headings_of(r):
     """Tilt-yaw heading: the twist about body z, 2·atan2(z, w)."""
-    _, _, z, w = np.moveaxis(r.as_quat(), -1, 0)
-    return wrapped(2.0 * np.arctan2(z, w))
+    q = r.as_quat()
+    return wrapped(2.0 * np.arctan2(q[..., 2], q[..., 3]))
 
 
 def wrapped(angle):
@@ -37,16 +43,13 @@ def attitudes(c, headings):
 
 def multiplied(p, q):
     """p ⊗ q of quaternions (..., 4) in the order x, y, z, w, as SciPy has them."""
-    (a, b, c, d), (x, y, z, w) = np.moveaxis(p, -1, 0), np.moveaxis(q, -1, 0)
-    return np.stack(
-        [
-            d * x + a * w + b * z - c * y,
-            d * y - a * z + b * w + c * x,
-            d * z + a * y - b * x + c * w,
-            d * w - a * x - b * y - c * z,
-        ],
-        axis=-1,
-    )
+    (a, b, c, d), (x, y, z, w) = ([each[..., k] for k in range(4)] for each in (p, q))
+    product = np.empty_like(p)
+    product[..., 0] = d * x + a * w + b * z - c * y
+    product[..., 1] = d * y - a * z + b * w + c * x
+    product[..., 2] = d * z + a * y - b * x + c * w
+    product[..., 3] = d * w - a * x - b * y - c * z
+    return product
 
 
 def quaternion(r, goal, gain, tilt_rate=np.inf, yaw_rate=np.inf):
@@ -127,12 +130,11 @@ def held(r, rates, dt):
 
 def sampled(law, start, seconds, dt):
     """Discrete time, rates held over each sample: coefficients (S + 1, N, 2), rates (S, N, 3)."""
-    r, path, rates = start, [coefficients_of(start)], []
+    seen, rates = [start], []
     for _ in range(round(seconds / dt)):
-        rates.append(law(r))
-        r = held(r, rates[-1], dt)
-        path.append(coefficients_of(r))
-    return np.array(path), np.array(rates)
+        rates.append(law(seen[-1]))
+        seen.append(held(seen[-1], rates[-1], dt))
+    return path_of(seen), np.array(rates)
 
 
 def continuous(law, start, seconds, step):
@@ -150,12 +152,12 @@ def continuous(law, start, seconds, step):
             ]
         )
 
-    q, path = start.as_quat(), [coefficients_of(start)]
+    q, path = start.as_quat(), [start]
     for _ in range(round(seconds / step)):
         first = slope(q)
         second = slope(q + 0.5 * step * first)
         third = slope(q + 0.5 * step * second)
         fourth = slope(q + step * third)
         q = q + step / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
-        path.append(coefficients_of(Rotation.from_quat(q)))
-    return np.array(path)
+        path.append(Rotation.from_quat(q))
+    return path_of(path)

@@ -48,11 +48,13 @@ class LagPlant:
         commands = np.array(self._commands)
         row, column = np.indices(self.rates.shape)
         before, after = commands[which, row, column], commands[later, row, column]
-        turns = np.empty_like(now)
+        turns, changed = np.empty_like(now), (first < h).any(axis=(1, 2))
+        second = h - first
+        decay, later_decay = self._decay(first), self._decay(second) if changed.any() else None
         for step in range(steps):
-            turns[step] = self._answer(before[step], first[step])
-            if (first[step] < h).any():
-                turns[step] += self._answer(after[step], h - first[step])
+            turns[step] = self._answer(before[step], first[step], decay[step])
+            if changed[step]:
+                turns[step] += self._answer(after[step], second[step], later_decay[step])
         self.r = self.r * one_after_the_other(turns + np.asarray(push) * h)
         self._time += dt
         self.true_rates = self.rates + push
@@ -63,12 +65,15 @@ class LagPlant:
         if over > 0:
             self._times, self._commands = self._times[over:], self._commands[over:]
 
-    def _answer(self, command, seconds):
+    def _decay(self, seconds):
+        """What is left of a deviation after (S, N, 3) seconds; the first axis is that of steps."""
+        return np.exp(-seconds / self._lag)
+
+    def _answer(self, command, seconds, kept):
         """Rates after so many seconds of a steady command; returns their integral."""
-        kept = np.exp(-seconds / self._lag)
-        turned = command * seconds + (self.rates - command) * self._lag * (1.0 - kept)
-        self.rates = command + (self.rates - command) * kept
-        return turned
+        away = self.rates - command
+        self.rates = command + away * kept
+        return command * seconds + away * self._lag * (1.0 - kept)
 
 
 def one_after_the_other(turns):
@@ -114,12 +119,15 @@ class SecondOrderPlant(LagPlant):
         self._modes = (-self._lag + root) / (2.0 * square), (-self._lag - root) / (2.0 * square)
         self._slopes = np.zeros_like(self.rates)
 
-    def _answer(self, command, seconds):
+    def _decay(self, seconds):
+        return np.stack([np.exp(mode * seconds) for mode in self._modes], axis=1)
+
+    def _answer(self, command, seconds, kept):
         first, second = self._modes
         away = self.rates - command
         a = (self._slopes - second * away) / (first - second)
         b = away - a
-        a_later, b_later = a * np.exp(first * seconds), b * np.exp(second * seconds)
+        a_later, b_later = a * kept[0], b * kept[1]
         self.rates = command + (a_later + b_later).real
         self._slopes = (first * a_later + second * b_later).real
         return command * seconds + ((a_later - a) / first + (b_later - b) / second).real
@@ -139,9 +147,11 @@ def fly(planners, plant, target_at, samples, dt, push_at=None):
         commands.append(np.array([p.rates(q, target, dt, w) for p, q, w, target in measured]))
         plant.hold(commands[-1], dt, 0.0 if push_at is None else push_at(n))
         seen.append((plant.r, plant.true_rates))
+    shape = len(seen), len(planners)
+    r = Rotation.from_quat(np.concatenate([r.as_quat() for r, _ in seen]))
     return Flight(
-        np.array([coefficients_of(r) for r, _ in seen]),
-        np.unwrap([headings_of(r) for r, _ in seen], axis=0),
+        coefficients_of(r).reshape(*shape, 2),
+        np.unwrap(headings_of(r).reshape(shape), axis=0),
         np.array([rates for _, rates in seen]),
         np.array(commands),
         dt,
@@ -149,5 +159,5 @@ def fly(planners, plant, target_at, samples, dt, push_at=None):
 
 
 def _measured(plant):
-    q = np.roll(plant.r.as_quat(), 1, axis=1).tolist()
+    q = plant.r.as_quat(scalar_first=True).tolist()
     return [tuple(row) for row in q], [BodyRates(*row) for row in plant.true_rates.tolist()]

@@ -5,7 +5,7 @@ from scipy.spatial.transform import Rotation
 
 from companion.attitude import Coefficients, Quaternion, Target
 from companion.attitude.planner import Planner
-from tests.attitude.independent import attitudes, coefficients_of, sampled
+from tests.attitude.independent import attitudes, coefficients_of, held, sampled
 
 
 def rotation(q: Quaternion) -> Rotation:
@@ -28,7 +28,7 @@ def upright(c: Coefficients, heading: float) -> Rotation:
 
 def answers(planner: Planner, r: Rotation, targets: list[Target], dt: float) -> np.ndarray:
     """The planner's rates (N, 3) for a stack of N attitudes, each with its own target."""
-    q = np.roll(r.as_quat(), 1, axis=1).tolist()
+    q = r.as_quat(scalar_first=True).tolist()
     return np.array([planner.rates(q_i, t, dt) for q_i, t in zip(q, targets, strict=True)])
 
 
@@ -43,11 +43,9 @@ def fly(
     planner: Planner, start: Rotation, target: Target, seconds: float, dt: float
 ) -> tuple[np.ndarray, np.ndarray, Rotation]:
     """One flight: (coefficients, rates, last attitude)."""
-    r = start
-    path, rates = [coefficients_of(r)], []
+    seen, rates = [start], []
     for _ in range(round(seconds / dt)):
-        w = planner.rates(quaternion(r), target, dt)
-        r = r * Rotation.from_rotvec(np.array(w) * dt)
-        path.append(coefficients_of(r))
-        rates.append(w)
-    return np.array(path), np.array(rates), r
+        rates.append(planner.rates(quaternion(seen[-1]), target, dt))
+        seen.append(held(seen[-1], rates[-1], dt))
+    path = coefficients_of(Rotation.from_quat([r.as_quat() for r in seen]))
+    return path, np.array(rates), seen[-1]

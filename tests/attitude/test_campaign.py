@@ -4,6 +4,8 @@ What is commanded keeps its limits always. The plan keeps the tilt limit; the ve
 what nobody told the planner: what it moves during the delay that is not known, and gusts.
 """
 
+from math import hypot
+
 import numpy as np
 import pytest
 
@@ -87,18 +89,20 @@ def test_the_plan_keeps_the_tilt_limit(acceleration):
     fleet = Fleet.random(rng, 200, 0.5)
     asked = random_targets(rng, fleet.longest, 125, dt)
     lengths = []
-    for vehicle, longest in enumerate(fleet.longest):
-        gain, lag = fleet.gain[vehicle], fleet.known[vehicle, 0, 0]
-        limits = Limits(fleet.max_tilt[vehicle], fleet.max_tilt_rate[vehicle])
+    of_each = fleet.gain, fleet.known[:, 0, 0], fleet.max_tilt, fleet.max_tilt_rate
+    rows = np.column_stack([fleet.longest, *of_each]).tolist()  # plain floats, as in a flight
+    for vehicle, (longest, gain, lag, *bounds) in enumerate(rows):
+        limits = Limits(*bounds)
         constants = make_constants(gain, 2.0, limits)
         model = ReferenceModel(constants, max(0.25 / gain, lag), acceleration)
-        for row in asked[:, vehicle]:
+        for row in asked[:, vehicle].tolist():
             model.advance(shortened(row, longest), dt)
-            lengths.append(np.hypot(model.north, model.east) / longest)
+            lengths.append(hypot(model.north, model.east) / longest)
     assert max(lengths) == pytest.approx(1.0, rel=1e-12)
 
 
 def shortened(row, longest):
     """What the planner makes of a target before its plan sees it."""
-    scale = min(1.0, longest / np.hypot(*row[:2]))
-    return Target(*(scale * row[:2]).tolist(), *row[2:].tolist())
+    north, east, *heading = row
+    scale = min(1.0, longest / hypot(north, east))
+    return Target(scale * north, scale * east, *heading)

@@ -82,10 +82,10 @@ def test_the_body_turns_as_limit_and_lag_make_it(most):
     model.start(0.2)
     aimed = rate = 0.2
     turned = 0.0
-    for command in commands:
+    for command in commands.tolist():
         model.advance(command, 0.004)
         for _ in range(400):
-            aimed += np.clip(command - aimed, -most * 1e-5, most * 1e-5)
+            aimed += min(max(command - aimed, -most * 1e-5), most * 1e-5)
             turned += rate * 1e-5
             rate += (aimed - rate) / lag * 1e-5
         assert model.rate == pytest.approx(rate, abs=2e-2 if most < 5.0 else 1e-3)

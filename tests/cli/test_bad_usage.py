@@ -16,6 +16,7 @@ from companion.mavlink.errors import EndpointError
 from companion.mavlink.transport.endpoint import parse_endpoint
 from sitl_mock.__main__ import main as start_vehicle
 from tests.cli.test_demo import quick_demo
+from tests.flight.programs import Program
 
 NO_NUMBERS = ["nan", "inf", "-inf", "-1", "0", "1e308", "soon", "9" * 400]
 NO_HOSTS = ["a" * 64, f"{'a.' * 130}com", "a..b", ".a", "a b", "a\0b", "\ud800", "ß" * 64]
@@ -130,7 +131,11 @@ def vehicle_of(process):
 
 @pytest.mark.parametrize("when", ["at once", "in flight"])
 def test_a_demo_that_is_killed_takes_its_vehicle_with_it(tmp_path, when):
-    process = started(tmp_path, "demo", "--config", quick_demo(tmp_path), "--lockstep")
+    arguments = ("demo", "--config", quick_demo(tmp_path), "--lockstep")
+    if when == "at once":
+        process = started(tmp_path, *arguments)
+    else:
+        process = Program("companion.cli.main", *arguments, folder=tmp_path)
     vehicle = vehicle_of(process)
     if when == "in flight":
         for line in process.stdout:

@@ -1,8 +1,6 @@
 """`companion demo` and `companion plot`, as a user calls them, with the shortest maneuver."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,6 +10,7 @@ from companion import demo
 from companion.cli.main import main
 from companion.mavlink.transport.free_port import free_port
 from tests.flight.fly import LOOP_HZ, QUICK_MOCK, QUICK_PARAMETERS, merged
+from tests.flight.programs import Program
 
 
 @pytest.fixture
@@ -38,17 +37,13 @@ def quick_demo(folder: Path) -> str:
 
 def test_the_demo_flies_shows_and_can_be_drawn(folder, capsys):
     options = ("--config", quick_demo(folder), "--lockstep", "--maneuvers", "steps", "--json")
-    done = subprocess.run(
-        [sys.executable, "-m", "companion", "demo", *options],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    assert "The flight was good: steps" in done.stderr
-    assert "time constant north" in done.stderr
-    result = json.loads(done.stdout)
+    # test_terminal_encoding.py starts it as users do.
+    process = Program("companion.cli.main", "demo", *options, folder=folder)
+    out, err = process.communicate()
+    assert process.returncode == 0, err
+    assert "The flight was good: steps" in err
+    assert "time constant north" in err
+    result = json.loads(out)
     assert (result["result"], result["phase"]) == ("ok", "disarm")
     assert main(["plot", result["log"]]) == 0, capsys.readouterr().err
     picture = folder / result["log"] / "flight.png"

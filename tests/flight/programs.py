@@ -12,10 +12,13 @@ import subprocess
 import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import redirect_stderr, redirect_stdout
 from importlib import import_module
+from io import StringIO
 from multiprocessing.connection import Connection
 from pathlib import Path
 
+from companion.files.yaml_file import ConfigError
 from companion.mavlink import lockstep
 from sitl_mock import __main__ as command_line
 from sitl_mock import server
@@ -49,6 +52,15 @@ def _run_mock(arguments, words):
 def _leave_cores():
     """No program waits by polling: the cores are busy with other flights."""
     server.SPIN_S = lockstep._SPIN_S = 0.0
+
+
+def checked_here(command: list[str]) -> None:
+    """What `companion check-config` lets the mock vehicle check, without a process for it."""
+    words = StringIO()
+    with redirect_stdout(words), redirect_stderr(words):
+        code = command_line.main(command[command.index("sitl_mock") + 1 :])
+    if code != 0:
+        raise ConfigError(words.getvalue())
 
 
 class Program:

@@ -160,12 +160,12 @@ def test_without_telemetry_nothing_is_sent_and_the_autopilot_levels_by_itself(tm
     assert max(map(abs, state["q"][1:3])) < 0.02
 
 
-def test_the_step_past_level_is_straight_by_what_attitude_target_tells(tmp_path):
+def test_the_step_past_level_is_straight_by_what_attitude_target_tells():
     """The axes of the rates lead the body by up to 8°; without ATTITUDE_TARGET it bends by 0.03."""
-    with mock_vehicle(tmp_path, autopilot="ardupilot", full_rate=True, seed=7) as mock:
+    with mock_vehicle(autopilot="ardupilot", full_rate=True, seed=7) as mock:
         summary = fly(
             mock,
-            tmp_path / "log",
+            None,
             vehicle=VEHICLE["vehicle"] | {"yaw_frame_lead_ms": 0.0},
             flight={"maneuvers": ["corners"], "takeoff_height_m": 3.0},
             corners={

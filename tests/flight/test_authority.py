@@ -50,18 +50,18 @@ def interrupted(mock, folder, phase, ask_landing=None, after=0.0):
     return run(mock, session.fly()), observer
 
 
-def test_interrupted_in_flight_and_told_to_land_it_lands(tmp_path):
-    with mock_vehicle(tmp_path) as mock:
-        summary, observer = interrupted(mock, tmp_path / "log", "maneuvers", accept, after=2.0)
+def test_interrupted_in_flight_and_told_to_land_it_lands():
+    with mock_vehicle() as mock:
+        summary, observer = interrupted(mock, None, "maneuvers", accept, after=2.0)
         state = mock.state()
     assert summary.result == "interrupted by the user"
     assert observer.phases[-4:] == ["maneuvers", "hand back", "land", "disarm"]
     assert (state["armed"], state["on_ground"], state["crashed"]) == (False, True, False)
 
 
-def test_interrupted_and_not_told_to_land_it_holds(tmp_path):
-    with mock_vehicle(tmp_path) as mock:
-        summary, observer = interrupted(mock, tmp_path / "log", "maneuvers", after=2.0)
+def test_interrupted_and_not_told_to_land_it_holds():
+    with mock_vehicle() as mock:
+        summary, observer = interrupted(mock, None, "maneuvers", after=2.0)
         state = mock.state()
     assert observer.phases[-1] == "hand back"
     assert (state["armed"], state["mode"]) == (True, "LOITER")
@@ -69,9 +69,9 @@ def test_interrupted_and_not_told_to_land_it_holds(tmp_path):
 
 
 @pytest.mark.parametrize("phase", ["connect", "checks", "stream"])
-def test_interrupted_on_the_ground_it_never_arms(tmp_path, phase):
-    with mock_vehicle(tmp_path) as mock:
-        summary, observer = interrupted(mock, tmp_path / "log", phase)
+def test_interrupted_on_the_ground_it_never_arms(phase):
+    with mock_vehicle() as mock:
+        summary, observer = interrupted(mock, None, phase)
         assert not mock.state()["armed"]
     assert summary.result == "interrupted by the user"
     assert observer.phases[-1] == phase
@@ -105,10 +105,10 @@ def test_interrupted_once_armed_it_disarms(tmp_path):
     assert summary.result == "interrupted by the user"
 
 
-def test_interrupted_in_an_emergency_landing_it_goes_on_landing(tmp_path):
+def test_interrupted_in_an_emergency_landing_it_goes_on_landing():
     fault = {"kind": "low_battery", "remaining": 0.15, "after_offboard_s": 3.0}
-    with mock_vehicle(tmp_path, faults=[fault]) as mock:
-        summary, observer = interrupted(mock, tmp_path / "log", "land", after=0.0)
+    with mock_vehicle(faults=[fault]) as mock:
+        summary, observer = interrupted(mock, None, "land", after=0.0)
         state = mock.state()
     assert "battery at 15 %" in summary.result
     assert observer.phases[-2:] == ["land", "disarm"]
@@ -382,15 +382,15 @@ def test_the_pilot_takes_over_during_the_takeoff():
     assert state["mode"] == "POSCTL"
 
 
-def test_leaving_the_fence_lands_and_leaves_the_vehicle_in_hold(tmp_path):
+def test_leaving_the_fence_lands_and_leaves_the_vehicle_in_hold():
     """PX4 goes back to OFFBOARD when it disarms, where it never is ready to be armed again.
 
     In still air it would stay inside the fence: open-loop steps know nothing of the wind.
     """
-    with mock_vehicle(tmp_path, wind={"speed_m_s": 5.0}) as mock:
+    with mock_vehicle(wind={"speed_m_s": 5.0}) as mock:
         summary = fly(
             mock,
-            tmp_path / "log",
+            None,
             flight={"maneuvers": ["steps"]},
             limits={"fence_radius_m": 5.0},
         )

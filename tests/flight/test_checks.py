@@ -3,14 +3,14 @@
 from tests.flight.fly import fly, mock_vehicle
 
 
-def test_what_is_unsafe_is_refused_before_arming_or_excepted_by_name(tmp_path):
+def test_what_is_unsafe_is_refused_before_arming_or_excepted_by_name():
     told = {}
-    with mock_vehicle(tmp_path, parameters={"COM_OF_LOSS_T": 5.0}) as mock:
-        refused = fly(mock, tmp_path / "refused")
+    with mock_vehicle(parameters={"COM_OF_LOSS_T": 5.0}) as mock:
+        refused = fly(mock)
         assert not mock.state()["armed"]
         accepted = fly(
             mock,
-            tmp_path / "accepted",
+            None,
             flight={"accept": ["COM_OF_LOSS_T"]},
             hover={"duration_s": 0.5},
         )

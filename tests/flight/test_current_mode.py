@@ -17,7 +17,7 @@ AFTER_A_HEARTBEAT = [0.1, pytest.param(0.35, marks=pytest.mark.slow), 0.7]
 """s; PX4's heartbeats come at whole seconds of vehicle time."""
 
 
-def takeover(tmp_path, after, **settings):
+def takeover(after, **settings):
     """A pilot takes over in the maneuver; returns the summary and how late we were silent, s."""
     at = None
 
@@ -27,7 +27,7 @@ def takeover(tmp_path, after, **settings):
         mock.inject({"kind": "pilot_takeover", "mode": "POSCTL", "at_s": at})
 
     with mock_vehicle(full_rate=True, **settings, in_lockstep=True) as mock:
-        summary = fly(mock, tmp_path / "log", When("maneuvers", begin))
+        summary = fly(mock, None, When("maneuvers", begin))
         state = mock.state()
     assert "took over: mode POSCTL" in summary.result
     assert state["mode"] == "POSCTL"
@@ -36,8 +36,8 @@ def takeover(tmp_path, after, **settings):
 
 
 @pytest.mark.parametrize("after", AFTER_A_HEARTBEAT)
-def test_a_takeover_is_heard_within_150_ms(tmp_path, after):
-    _, late = takeover(tmp_path, after)
+def test_a_takeover_is_heard_within_150_ms(after):
+    _, late = takeover(after)
     assert late < 0.15
 
 
@@ -58,10 +58,10 @@ def test_a_vehicle_that_disarms_in_flight_is_heard_at_once():
     assert state["last_setpoint"] - at < 0.15
 
 
-def test_without_current_mode_the_heartbeat_tells(tmp_path):
+def test_without_current_mode_the_heartbeat_tells():
     """As before PX4 1.15, which has no such message."""
     silent = {"kind": "stop_telemetry", "messages": ["CURRENT_MODE"]}
-    _, late = takeover(tmp_path, 0.35, faults=[silent])
+    _, late = takeover(0.35, faults=[silent])
     assert 0.6 < late < 0.7
 
 

@@ -3,11 +3,13 @@
 import pytest
 import yaml
 
+from companion import demo
 from companion.cli.main import main
 from companion.config import trajectory_file
 from companion.config.files import load
 from companion.flight import flown_config
 from companion.flight.maneuvers import configured_maneuvers
+from tests.flight.programs import checked_here
 
 SHARES = [k / 120 for k in range(121)]
 TABLE = "t,x,y,z\n" + "".join(
@@ -48,6 +50,7 @@ def configured(home, name):
 @pytest.mark.parametrize("name", FIGURES)
 def test_a_record_describes_the_same_flight_from_any_folder(home, monkeypatch, name):
     monkeypatch.chdir(home / "paths")
+    monkeypatch.setattr(demo, "_run_check", checked_here)  # a process is started by test_configs
     config = load(configured(home, name))
     before = configured_maneuvers(config).parts[0]
     flown_config.record(config, home / "flight")

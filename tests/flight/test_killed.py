@@ -62,9 +62,8 @@ def moments(speed):
     return (0.5 * speed, *(speed + (0.5 + later) * lap for later in LATER))
 
 
-def carried(folder, autopilot, speed, held, after):
+def carried(autopilot, speed, held, after):
     """One flight whose setpoints end `after` s of its circle; PX4 is set to hold afterwards."""
-    folder.mkdir()
     settings = {HELD[autopilot]: held, **({"COM_OBL_RC_ACT": 5} if autopilot == "px4" else {})}
     with mock_vehicle(autopilot=autopilot, full_rate=True, parameters=settings) as mock:
         session = None
@@ -74,7 +73,7 @@ def carried(folder, autopilot, speed, held, after):
 
         observer = When("maneuvers", leave)
         changes = flight(autopilot, speed)
-        session = session_for(mock, folder / "flight", observer, **changes)
+        session = session_for(mock, None, observer, **changes)
         assert run(mock, session.fly()).result == "left at once by the user"
         state = mock.state()
         ways, ended = [state["position"]], state["last_setpoint"]
@@ -91,17 +90,14 @@ def carried(folder, autopilot, speed, held, after):
     )
 
 
-def worst(folder, autopilot, speed, held, *, all_of_them):
+def worst(autopilot, speed, held, *, all_of_them):
     """The largest in each direction over the moments."""
     chosen = moments(speed) if all_of_them else moments(speed)[1:2]
-    flights = [
-        carried(folder / str(number), autopilot, speed, held, after)
-        for number, after in enumerate(chosen)
-    ]
+    flights = [carried(autopilot, speed, held, after) for after in chosen]
     return Carried(*map(max, zip(*flights, strict=True)))
 
 
-def bound(folder, autopilot, speed, held):
+def bound(autopilot, speed, held):
     """What the doctor's model says of the same flight."""
     config = quick_flight(autopilot, flight(autopilot, speed))
     drag = before_connecting(config).least
@@ -118,22 +114,20 @@ def compare(measured, model):
 
 
 @pytest.mark.parametrize("autopilot", HELD)
-def test_the_model_bounds_where_the_last_rates_carry_the_vehicle(tmp_path, autopilot):
-    measured = worst(tmp_path, autopilot, 5.0, 1.0, all_of_them=False)
+def test_the_model_bounds_where_the_last_rates_carry_the_vehicle(autopilot):
+    measured = worst(autopilot, 5.0, 1.0, all_of_them=False)
     assert measured.away > 5.0  # a second at 5 m/s, at least
-    compare(measured, bound(tmp_path, autopilot, 5.0, 1.0))
+    compare(measured, bound(autopilot, 5.0, 1.0))
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("held", TIMES)
 @pytest.mark.parametrize("autopilot", HELD)
-def test_the_table_of_the_exits(tmp_path, autopilot, held):
+def test_the_table_of_the_exits(autopilot, held):
     for speed in SPEEDS:
-        folder = tmp_path / f"{speed:g}"
-        folder.mkdir()
-        measured = worst(folder, autopilot, speed, held, all_of_them=True)
-        model = bound(folder, autopilot, speed, held)
+        measured = worst(autopilot, speed, held, all_of_them=True)
+        model = bound(autopilot, speed, held)
         print(
             f"| {autopilot} | {held:g} | {speed:g} | {measured.away:.1f} | {measured.down:.1f} "
             f"| {model.away:.0f} | {model.down:.0f} |"

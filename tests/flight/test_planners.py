@@ -116,16 +116,14 @@ def shipped_vehicle(loop):
 
 
 @pytest.mark.parametrize("loop", ["px4", pytest.param("ardupilot", marks=pytest.mark.slow)])
-def test_model_following_is_five_times_as_straight_on_a_measured_rate_loop(loop, tmp_path):
+def test_model_following_is_five_times_as_straight_on_a_measured_rate_loop(loop):
     """By the flight's own table; and nearest to second order with a dead time."""
     across, away = {}, {}
     for name in ("model-following", "first-order", "quaternion"):
-        folder = tmp_path / name
-        folder.mkdir()
-        with mock_vehicle(folder, seed=3, rate_loop=loop) as mock:
+        with mock_vehicle(seed=3, rate_loop=loop) as mock:
             summary = fly(
                 mock,
-                folder / "log",
+                None,
                 planner={"name": name},
                 vehicle=shipped_vehicle(loop),
                 **FIGURE_2,
@@ -139,7 +137,7 @@ def test_model_following_is_five_times_as_straight_on_a_measured_rate_loop(loop,
     assert away["model-following"] < min(away["first-order"], away["quaternion"])
 
 
-def test_model_following_leads_unlike_axes_each_by_its_own(tmp_path):
+def test_model_following_leads_unlike_axes_each_by_its_own():
     """A heavier vehicle, slower in roll, flies straight; led by the mean of both it does not."""
     yaw = {"yaw_lag_ms": 370.0, "yaw_dead_time_ms": 102.0}
     pitch = {"pitch_lag_ms": 58.0, "pitch_dead_time_ms": 46.0}
@@ -149,12 +147,10 @@ def test_model_following_leads_unlike_axes_each_by_its_own(tmp_path):
     }
     across = {}
     for name, vehicle in told.items():
-        folder = tmp_path / name
-        folder.mkdir()
-        with mock_vehicle(folder, seed=3, sensors=NO_NOISE, airframe="unlike-axes") as mock:
+        with mock_vehicle(seed=3, sensors=NO_NOISE, airframe="unlike-axes") as mock:
             summary = fly(
                 mock,
-                folder / "log",
+                None,
                 vehicle=vehicle,
                 thrust={"hover_thrust": 0.59},
                 **(FIGURE_2 | {"corners": SMALLER}),

@@ -11,7 +11,6 @@ from tests.flight.position_relay import PositionRelay
 
 def flown(folder, way, delay_ms=0, *, from_the_start=False, **changes):
     """Summary and truth of a flight in whose maneuver positions begin to come so."""
-    folder.mkdir(exist_ok=True)
     with mock_vehicle() as mock:
         relay = PositionRelay(mock)
 
@@ -20,18 +19,18 @@ def flown(folder, way, delay_ms=0, *, from_the_start=False, **changes):
 
         if from_the_start:
             begin()
-        summary = fly(mock, folder / "log", When("maneuvers", begin, after=1.0), **changes)
+        summary = fly(mock, folder, When("maneuvers", begin, after=1.0), **changes)
         return summary, mock.state()
 
 
-def test_positions_that_come_late_end_control(tmp_path):
-    summary, truth = flown(tmp_path, "late", 400)
+def test_positions_that_come_late_end_control():
+    summary, truth = flown(None, "late", 400)
     assert summary.result == "position arrives later than deadman.position_stale_ms"
     assert (truth["mode"], truth["crashed"]) == ("LOITER", False)
 
 
-def test_a_standing_position_is_silence(tmp_path):
-    summary, truth = flown(tmp_path, "standing")
+def test_a_standing_position_is_silence():
+    summary, truth = flown(None, "standing")
     assert summary.result == "no position from the vehicle"
     assert summary.link["outdated"] > 10
     assert (truth["mode"], truth["crashed"]) == ("LOITER", False)
@@ -41,10 +40,10 @@ def test_a_standing_position_is_silence(tmp_path):
     "delay_ms",
     [100, *(pytest.param(delay, marks=pytest.mark.slow) for delay in (2000, 8000))],
 )
-def test_late_copies_of_positions_change_nothing(tmp_path, delay_ms):
+def test_late_copies_of_positions_change_nothing(delay_ms):
     way = {"from_the_start": True, "flight": {"maneuvers": ["circle"]}}
-    plain, _ = flown(tmp_path / "plain", "at once", **way)
-    copied, _ = flown(tmp_path / "copied", "twice", delay_ms, **way)
+    plain, _ = flown(None, "at once", **way)
+    copied, _ = flown(None, "twice", delay_ms, **way)
     assert copied.result == "ok", copied.events
     assert copied.link["outdated"] > 100
     assert plain.link["outdated"] == 0

@@ -118,13 +118,13 @@ SPARSE = {"lockstep": {"period_ms": 8}}
     ("wrong_by", "faults"),
     [(0.6, []), (1.4, []), (1.4, [SILENT]), (0.6, [NOT_A_NUMBER])],
 )
-def test_a_wrong_hover_thrust_costs_little_height(tmp_path, wrong_by, faults):
+def test_a_wrong_hover_thrust_costs_little_height(wrong_by, faults):
     """Acceptance 5, also where the autopilot does not tell its thrust before."""
     configured = 0.49 * wrong_by
-    with mock_vehicle(tmp_path, faults=faults, **SPARSE) as mock:
+    with mock_vehicle(faults=faults, **SPARSE) as mock:
         summary = fly(
             mock,
-            tmp_path / "flight",
+            None,
             thrust={"hover_thrust": configured},
             hover={"duration_s": 6.0},
         )
@@ -136,13 +136,13 @@ def test_a_wrong_hover_thrust_costs_little_height(tmp_path, wrong_by, faults):
 
 
 @pytest.mark.parametrize("exponent", [2.0, pytest.param(0.0, marks=pytest.mark.slow)])
-def test_a_battery_that_sags_costs_little_height(tmp_path, exponent):
+def test_a_battery_that_sags_costs_little_height(exponent):
     """Acceptance 5: the voltage falls by 15 % within 9 s, and the thrust by 28 %."""
     battery = {"capacity_ah": 0.035, "empty_cell_v": 3.57}
-    with mock_vehicle(tmp_path, battery=battery) as mock:
+    with mock_vehicle(battery=battery) as mock:
         summary = fly(
             mock,
-            tmp_path / "flight",
+            None,
             thrust={"battery_exponent": exponent},
             limits={"min_battery_percent": 0.0},
             hover={"duration_s": 8.0},

@@ -96,11 +96,11 @@ def test_a_vehicle_heavier_than_configured_keeps_its_height(
     assert not [text for _, text in summary.events if text.startswith("safety: thrust")]
 
 
-def test_a_vehicle_that_only_just_hovers_is_not_flown(tmp_path):
-    with mock_vehicle(tmp_path, airframe=HEAVY, lockstep={"period_ms": 8}) as mock:
+def test_a_vehicle_that_only_just_hovers_is_not_flown():
+    with mock_vehicle(airframe=HEAVY, lockstep={"period_ms": 8}) as mock:
         summary = fly(
             mock,
-            tmp_path / "log",
+            None,
             limits={"max_thrust": 0.75, "max_tilt_deg": 30},
             flight={"takeoff_height_m": 3.0},
         )

@@ -36,18 +36,17 @@ def following(name, **changes):
     return merged(merged(FAST, {"flight": flight}), changes)
 
 
-def flown(folder, name, wind=None, **changes):
-    folder.mkdir(exist_ok=True)
-    with mock_vehicle(folder, seed=3, wind=wind or {}) as mock:
-        summary = fly(mock, folder / "log", **following(name, **changes))
+def flown(name, wind=None, **changes):
+    with mock_vehicle(seed=3, wind=wind or {}) as mock:
+        summary = fly(mock, None, **following(name, **changes))
     assert summary.result == "ok", summary.events
     return summary
 
 
 @pytest.fixture(scope="module")
-def eight(tmp_path_factory):
+def eight():
     """Tracking of the figure-eight in still air."""
-    return flown(tmp_path_factory.mktemp("eight"), "figure8.yaml").tracking()
+    return flown("figure8.yaml").tracking()
 
 
 def within(tracking, most):
@@ -61,18 +60,18 @@ def test_the_figure_eight_is_followed_within_centimetres(eight):
 @pytest.mark.parametrize(
     ("name", "wind", "most"), [("figure8.yaml", GUSTY, 0.12), ("circle5.yaml", None, 0.08)]
 )
-def test_so_are_others(name, wind, most, tmp_path):
-    tracking = flown(tmp_path, name, wind).tracking()
+def test_so_are_others(name, wind, most):
+    tracking = flown(name, wind).tracking()
     assert within(tracking, most), tracking
 
 
-def test_without_the_lead_it_is_more_than_three_times_worse(eight, tmp_path):
-    late = flown(tmp_path, "figure8.yaml", guidance={"lead": False}).tracking()
+def test_without_the_lead_it_is_more_than_three_times_worse(eight):
+    late = flown("figure8.yaml", guidance={"lead": False}).tracking()
     assert late["position_rms_m"] >= 3.0 * eight["position_rms_m"]
 
 
-def test_a_drag_that_nobody_configured_is_learned_and_told(tmp_path):
-    summary = flown(tmp_path, "circle5.yaml", guidance={"drag_per_s": None})
+def test_a_drag_that_nobody_configured_is_learned_and_told():
+    summary = flown("circle5.yaml", guidance={"drag_per_s": None})
     assert summary.tracking()["position_rms_m"] <= 0.12
     (told,) = [text for _, text in summary.events if "drag" in text]
     assert re.search(r"at 5\.\d m/s is (0.9[5-9]|1.0[0-4]) 1/s, but 0.30 was assumed", told), told

@@ -12,12 +12,12 @@ HELD = {"px4": "LOITER", "ardupilot": "BRAKE"}
 WRAP_MS = 2**32
 
 
-def flown(folder, autopilot, begin):
+def flown(autopilot, begin):
     """A flight in whose maneuver the vehicle's stamps change; its summary and the true state."""
     with mock_vehicle(autopilot=autopilot, in_lockstep=True) as mock:
         relay = ClockRelay(mock)
         observer = When("maneuvers", lambda: begin(relay), after=1.0)
-        summary = fly(mock, folder / "log", observer)
+        summary = fly(mock, None, observer)
         return summary, mock.state()
 
 
@@ -29,44 +29,44 @@ def flown(folder, autopilot, begin):
         (120, "the vehicle's clock jumped ahead by 0.12 s"),
     ],
 )
-def test_a_clock_that_jumps_in_flight_is_handed_back(tmp_path, autopilot, shift_ms, words):
+def test_a_clock_that_jumps_in_flight_is_handed_back(autopilot, shift_ms, words):
     def begin(relay):
         relay.shift_ms = shift_ms
 
-    summary, truth = flown(tmp_path, autopilot, begin)
+    summary, truth = flown(autopilot, begin)
     assert summary.result == words
     assert (truth["mode"], truth["crashed"]) == (HELD[autopilot], False)
 
 
-def wrapping(folder, autopilot, seconds):
+def wrapping(autopilot, seconds):
     """A flight whose time since boot wraps so long after its begin."""
     with mock_vehicle(autopilot=autopilot, in_lockstep=True) as mock:
         ClockRelay(mock).shift_ms = WRAP_MS - round(1000 * seconds)
-        return fly(mock, folder / "log"), mock.state()
+        return fly(mock), mock.state()
 
 
 WRAPPED = "the vehicle's time since boot wrapped around after 49.7 days"
 
 
 @pytest.mark.parametrize(("autopilot", "seconds"), [("px4", 8.0), ("ardupilot", 11.0)])
-def test_time_that_wraps_in_flight_is_named_and_handed_back(tmp_path, autopilot, seconds):
-    summary, truth = wrapping(tmp_path, autopilot, seconds)
+def test_time_that_wraps_in_flight_is_named_and_handed_back(autopilot, seconds):
+    summary, truth = wrapping(autopilot, seconds)
     assert summary.result == WRAPPED, summary.events
     assert (truth["mode"], truth["crashed"]) == (HELD[autopilot], False)
 
 
-def test_time_that_wraps_before_control_is_named_and_flown_on(tmp_path):
-    summary, _ = wrapping(tmp_path, "px4", 3.0)
+def test_time_that_wraps_before_control_is_named_and_flown_on():
+    summary, _ = wrapping("px4", 3.0)
     assert summary.result == "ok", summary.events
     assert WRAPPED in [text for _, text in summary.events]
 
 
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
-def test_one_sample_stamped_far_ahead_is_dropped_named_and_flown_on(tmp_path, autopilot):
+def test_one_sample_stamped_far_ahead_is_dropped_named_and_flown_on(autopilot):
     def begin(relay):
         relay.outlier_ms = 3_600_000
 
-    summary, _ = flown(tmp_path, autopilot, begin)
+    summary, _ = flown(autopilot, begin)
     assert summary.result == "ok", summary.events
     counted = json.loads(summary.as_json())["unanswered"]
     assert (counted["stamped_ahead"], sum(counted.values())) == (1, 1)

@@ -27,7 +27,7 @@ def test_it_answers_as_its_equation_says(frequency, damping, slew):
     loop = [frequency**2], [1.0, 2.0 * damping * frequency, frequency**2]
     _, simulated, _ = lsim(loop, asked - asked[0], at - at[0], interp=slew is not None)
     answered = second_order(commands, frequency, damping, at)
-    assert answered == pytest.approx(simulated + asked[0], abs=2e-3)
+    np.testing.assert_allclose(answered, simulated + asked[0], rtol=0.0, atol=2e-3, strict=True)
 
 
 @pytest.mark.parametrize(("frequency", "damping"), LOOPS)

@@ -30,10 +30,8 @@ class ArduRig(Rig):
             settings["parameters"] = {**QUICK, **settings.get("parameters", {})}
         super().__init__(boot=boot, quick=False, autopilot="ardupilot", **settings)
 
-    def _take(self) -> None:
-        for frame in self.simulation.companion.take():
-            message = _parser.decode(bytearray(frame))
-            self.received.append((self.time, message))
+    def _decoded(self, frame: bytes) -> list[Any]:
+        return [_parser.decode(bytearray(frame))]
 
     def say_frame(self, frame: bytes) -> None:
         """Deliver a frame as it is."""

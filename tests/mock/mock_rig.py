@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
+from pymavlink.dialects.v20 import ardupilotmega
 from pymavlink.dialects.v20 import development as dialect
 
 from companion.batch import can_compile
@@ -40,7 +41,8 @@ class Rig:
         self.simulation = Simulation(MockSettings.model_validate(settings), plant=Plant)
         self.framer = Framer(255, 190) if gcs else Framer(1, 191)
         self.heartbeat_type = dialect.MAV_TYPE_GCS if gcs else dialect.MAV_TYPE_ONBOARD_CONTROLLER
-        self.received: list[tuple[float, Any]] = []
+        self._frames: list[tuple[float, bytes]] = []
+        self._read: dict[int, list[Any]] = {}
         self.each_tick: Callable[[], None] | None = None
         if boot:
             self.heartbeat()
@@ -82,11 +84,37 @@ class Rig:
             self.run(0.004)
 
     def _take(self) -> None:
-        for frame in self.simulation.companion.take():
-            self.received.extend((self.time, message) for message in decode(frame))
+        self._frames += [(self.time, frame) for frame in self.simulation.companion.take()]
+
+    def _decoded(self, frame: bytes) -> list[Any]:
+        return decode(frame)
+
+    def _messages_of(self, number: int) -> list[Any]:
+        """The messages of one frame; decoding costs as much as flying, so only what is read is."""
+        if number not in self._read:
+            self._read[number] = self._decoded(self._frames[number][1])
+        return self._read[number]
+
+    @property
+    def received(self) -> list[tuple[float, Any]]:
+        """Time and message of all that was heard."""
+        times = enumerate(at for at, _ in self._frames)
+        return [(at, message) for number, at in times for message in self._messages_of(number)]
+
+    def forget(self) -> None:
+        """Forget what was heard."""
+        self._frames, self._read = [], {}
 
     def messages(self, name: str, since: float = 0.0) -> list[Any]:
-        return [m for at, m in self.received if m.get_type() == name and at >= since]
+        wanted = getattr(ardupilotmega, f"MAVLINK_MSG_ID_{name}", None)
+        if wanted is None:
+            wanted = getattr(dialect, f"MAVLINK_MSG_ID_{name}")
+        return [
+            message
+            for number, (at, frame) in enumerate(self._frames)
+            if at >= since and int.from_bytes(frame[7:10], "little") == wanted
+            for message in self._messages_of(number)
+        ]
 
     def texts(self) -> list[str]:
         """Every text said so far, its chunks put together."""

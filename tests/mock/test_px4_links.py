@@ -50,7 +50,7 @@ def rig(flying):
     flying.run(0.1)
     assert mode(flying) == "OFFBOARD"
     assert not flying.state.failsafe
-    flying.received.clear()
+    flying.forget()
     return flying
 
 

@@ -89,7 +89,7 @@ class Scene:
         assert self.speed < 0.5
         return HANDED_BACK
 
-    async def is_flown(self, seconds=1.0):
+    async def is_flown(self, seconds=TIMEOUT + 0.2):
         """The script's own setpoints are still flown."""
         await stream(seconds, self.hover)
         assert self.control.in_control

@@ -126,7 +126,7 @@ async def begin_control(session, script, autopilot, hold):
     while asked is not None and not asked.done():
         await stream(0.1, hold)
     assert asked is None or asked.result() == 0, script.texts()
-    await stream(1.2, hold)
+    await stream(0.5, hold)
 
 
 @asynccontextmanager

@@ -66,4 +66,5 @@ def assert_rests_at_both_ends(trajectory):
 def largest(trajectory, derivative, count=20_001):
     """Largest length of a derivative."""
     times = np.linspace(0.0, trajectory.duration, count)
-    return max(np.linalg.norm(getattr(trajectory.at(t), derivative)) for t in times.tolist())
+    vectors = [getattr(trajectory.at(t), derivative) for t in times.tolist()]
+    return np.linalg.norm(vectors, axis=1).max()
