@@ -12,10 +12,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 settings.register_profile("same", derandomize=True, deadline=None)
 settings.load_profile("same")
 
-# NumPy is not imported yet. With small matrices a second thread of OpenBLAS does nothing but wait,
-# and that costs as much processor time as the first one, which other tests need.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
 # Collecting the tests makes objects that stay: looking for garbage among them takes a second.
 gc.disable()
 

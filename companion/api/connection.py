@@ -38,8 +38,8 @@ async def connect(
 ) -> AsyncGenerator[Vehicle, None]:
     """Connect, run the preflight checks, and yield the vehicle; the flight is recorded meanwhile.
 
-    The flight runs in its own thread. When the block ends in the air, the vehicle is handed back:
-    the autopilot holds it.
+    The flight runs in its own thread, in lockstep in the program's. When the block ends in the air,
+    the vehicle is handed back: the autopilot holds it.
 
     Args:
         config: configuration of the flight, or the path of its file.
@@ -54,6 +54,7 @@ async def connect(
         FlightEnded: the vehicle did not pass the checks, or the flight ended early.
         LinkError: the link could not be opened; nothing was sent.
         OSError: the folder cannot be written; nothing was sent.
+        RealtimeError: the system refused a required `realtime` setting; nothing was sent.
     """
     told = load(Path(config)) if isinstance(config, Path | str) else config
     own: dict[str, dict[str, Any]] = {"link": {}, "flight": {}}

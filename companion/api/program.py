@@ -93,7 +93,7 @@ class Program:
         Cancelling this ends the flight: a waiting request is dropped, a running one interrupted.
 
         Raises:
-            FlightEnded: the flight has ended; the vehicle is handed back.
+            FlightEnded: the flight has ended; we do not control the vehicle any more.
             RuntimeError: an earlier request has not ended yet.
         """
         if self.ended is not None:

@@ -43,8 +43,9 @@ _BEGINS_WITHIN = 1.0
 class Vehicle:
     """One vehicle for one flight; `companion.connect` gives it.
 
-    Every method raises `FlightEnded` once the flight has ended early: a pilot took over, a safety
-    monitor ended it, or the vehicle refused. The vehicle is then handed back already.
+    Every coroutine raises `FlightEnded` once the flight has ended early: a pilot took over, a
+    safety monitor ended it, or the vehicle refused. It is then handed back or landed already.
+    While one call runs, another raises `RuntimeError`.
 
     Args:
         program: takes the requests.

@@ -27,7 +27,7 @@ _USAGE = (
     RecordError,
     SigningError,
 )
-"""The command line or the configuration is wrong."""
+"""The command line or the configuration is wrong, or something that it names cannot be used."""
 _FLIGHT = LinkError, OSError, VehicleStoppedError
 """The flight failed, or something that it needs failed."""
 

@@ -23,7 +23,7 @@ _WAITING = 1000
 """Lines queued for a stalled terminal; further lines are dropped."""
 
 _PATIENCE = 2.0
-"""Longest wait at the end for a stalled terminal, s."""
+"""Longest wait at the end for room in a stalled terminal's queue, and then for its lines, s."""
 
 
 class _PrintThread:

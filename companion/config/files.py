@@ -33,8 +33,8 @@ def load(path: Path) -> Config:
     Keys of a file override those of its includes; a later include overrides an earlier one.
 
     Raises:
-        ConfigError: a file is missing, includes itself, is not YAML, or holds an unknown key or a
-            bad value.
+        ConfigError: a file is missing, includes itself or too many files, is not YAML, or holds an
+            unknown key or a bad value.
     """
     own = _read(path)
     merged = Contents({}, {})
@@ -188,7 +188,7 @@ def assigned(texts: Sequence[str]) -> dict[str, dict[str, Any]]:
     """Parse texts such as `limits.max_tilt_deg=20`, with values in YAML, to changes for `changed`.
 
     Raises:
-        ConfigError: a text does not have this form.
+        ConfigError: a text does not have this form, there is no such section, or it is `mock`.
     """
     changes: dict[str, dict[str, Any]] = {}
     for text in texts:

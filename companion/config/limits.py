@@ -37,15 +37,16 @@ class LimitsConfig(Section):
     max_descent_m_s: Annotated[float, Field(ge=0.1, le=10.0, json_schema_extra=ANY)] = 1.0
     """Largest descent rate that height hold commands."""
     fence_radius_m: Annotated[float, Field(ge=0.1, le=2000.0)] = 50.0
-    """Fence: largest horizontal distance from the place where control began. Beyond it the vehicle
-    lands.
+    """Fence: largest horizontal distance from the place where control began. Beyond it,
+    safety.fence_action follows.
     """
     fence_ceiling_m: Annotated[float, Field(ge=0.1, le=1000.0)] = 30.0
     """Fence: largest height above the place where control began."""
     fence_floor_m: Annotated[float, Field(gt=0.0, le=100.0)] = 1.0
-    """Fence: smallest height above home. Below it the vehicle lands."""
+    """Fence: smallest height above home. Below it, safety.fence_action follows."""
     min_battery_percent: Annotated[float, Field(ge=0.0, le=100.0)] = 20.0
-    """Smallest battery charge. Below it the program does not arm, and lands in flight."""
+    """Smallest battery charge. Below it the program does not arm; in flight, safety.battery_action
+    follows."""
 
     max_tilt = Si("max_tilt_deg")
     max_tilt_rate = Si("max_tilt_rate_deg_s")

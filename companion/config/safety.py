@@ -1,8 +1,8 @@
 """The safety section of the configuration: limits, and the action on each breach.
 
-Two actions are fixed and have no key: on stale setpoints (deadman), and when a pilot or a failsafe
-has the vehicle or it is disarmed. If a breach means that our control cannot be trusted, its action
-cannot be `warn`.
+Some actions are fixed and have no key: on silence, gaps, low rates and a changed clock; when a
+pilot or a failsafe has the vehicle; when it is disarmed or on the ground. If a breach means that
+our control cannot be trusted, its action cannot be `warn`.
 """
 
 from typing import Annotated, Literal
@@ -16,7 +16,7 @@ from companion.guidance.fence import inside
 Ending = Literal["hand_back", "land"]
 """hand_back: the autopilot holds, and the program leaves it there. land: the autopilot lands."""
 Any = Literal["warn", "hold", "hand_back", "land"]
-"""warn: report the breach. hold: end the maneuver and hold in offboard. Or an `Ending`."""
+"""warn: report the breach. hold: end the maneuver, hold in offboard, and land. Or an `Ending`."""
 Metres = Annotated[float, Field(ge=-2000.0, le=2000.0)]
 Latitude = Annotated[float, Field(ge=-85.0, le=85.0)]
 Longitude = Annotated[float, Field(ge=-180.0, le=180.0)]
@@ -29,7 +29,8 @@ class SafetyConfig(Section):
     """Limits of the other safety monitors (see `limits`, `deadman`), and all monitors' actions."""
 
     hold_s: Annotated[float, Field(gt=0.0, le=60.0)] = 3.0
-    """If a hold does not clear its cause within this time, the vehicle lands."""
+    """Longest hold after a breach. The vehicle lands as soon as the breach has ended, or after this
+    time; if it is then still within braking distance of the fence, fence_action follows."""
     fence_polygon_m: Annotated[
         tuple[tuple[Metres, Metres], ...], Field(max_length=MOST_CORNERS)
     ] = ()
@@ -49,7 +50,8 @@ class SafetyConfig(Section):
     battery_action: Literal["warn", "hand_back", "land"] = "land"
     """Action if the battery is below limits.min_battery_percent, or not reported for 5 s."""
     position_action: Ending = "land"
-    """Action if GPS is lost, or the estimator reports no attitude, velocity or position for 5 s."""
+    """Action if GPS is lost, the estimator loses attitude, velocity or position, or either is not
+    reported for 5 s."""
     max_reset_m: Annotated[float, Field(ge=0.01, le=20.0)] = 1.0
     """Largest sum of the estimator's position jumps in a flight. References move with each jump."""
     max_reset_deg: Annotated[float, Field(gt=0.0, le=120.0)] = 45.0
@@ -61,11 +63,11 @@ class SafetyConfig(Section):
     reset_action: Ending = "land"
     """Action if the estimator resets more often or by more."""
     tilt_margin_deg: Annotated[float, Field(ge=1.0, le=60.0)] = 20.0
-    """Tilt beyond limits.max_tilt_deg that is tolerated for a moment."""
+    """Tilt beyond limits.max_tilt_deg that is tolerated."""
     max_body_rate_deg_s: Annotated[float, Field(ge=10.0, le=1800.0)] = 400.0
     """Largest body rate; a faster rotation counts as loss of control."""
     envelope_action: Ending = "hand_back"
-    """Action if tilt or body rate exceeds its limit."""
+    """Action if the tilt exceeds its limit for 0.3 s, or the body rate for 0.2 s."""
     max_speed_m_s: Annotated[float, Field(ge=0.1, le=60.0)] = 15.0
     """Largest speed in any direction."""
     speed_action: Any = "hold"

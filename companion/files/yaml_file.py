@@ -119,7 +119,7 @@ def read(path: Path, model: type[Section]) -> Contents:
 
     Raises:
         UnreadableFileError: the file is missing, not regular, too large, or not UTF-8.
-        ConfigError: the file is not YAML, or holds no keys.
+        ConfigError: the file is not YAML, or holds something other than keys.
     """
     try:
         text = read_text(path, MOST_BYTES)

@@ -65,6 +65,7 @@ def open_link(
     Raises:
         SigningError: the key cannot be used.
         EndpointError: the endpoint's notation is wrong.
+        LinkError: the event loop or MAVSDK cannot do what the configuration demands.
     """
     settings = link_settings(config)
     if config.link.backend == "mavsdk":

@@ -1,7 +1,7 @@
 """Commands to a vehicle that a pilot or another station may take over at any moment.
 
-Every command of a flight goes through `command_if_ours`, which first checks who controls the
-vehicle.
+Every command that arms, disarms, takes off or changes the mode goes through `command_if_ours`,
+which first checks who controls the vehicle.
 """
 
 import asyncio
@@ -72,9 +72,10 @@ async def command_if_ours(context: FlightContext, command: Command, ours: Ours, 
         done: see `Done`; called before a repetition.
 
     Raises:
-        FlightEnded: somebody else has the vehicle.
+        FlightEnded: somebody else has the vehicle, or another vehicle answers.
         CommandRefused: the autopilot refused.
         CommandTimeout: no try was answered.
+        LinkLost: the connection dropped while waiting.
     """
     for given in range(_TRIES):
         await context.fresh_heartbeat()
@@ -103,7 +104,7 @@ async def change_mode(context: FlightContext, command: Command, ours: Ours, done
 
     Raises:
         FlightEnded: somebody else has the vehicle, or left the accepted mode at once.
-        CommandRefused, CommandTimeout: see `command_if_ours`.
+        CommandRefused, CommandTimeout, LinkLost: see `command_if_ours`.
     """
     await command_if_ours(context, command, ours, done)
     accepted = asyncio.get_running_loop().time()

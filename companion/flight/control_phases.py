@@ -90,7 +90,7 @@ class _TiltMargin:
         """Report a smaller tilt limit once.
 
         Raises:
-            FlightEnded: hovering takes all of the thrust.
+            FlightEnded: the thrust allows less than 5° of tilt.
         """
         limits, learning = self._context.config.limits, self._context.guidance_loop.learning
         tilt, hover = degrees(learning.largest_tilt()), learning.hover

@@ -24,7 +24,7 @@ def advice(assembled: Assembled, dead_times: DeadTimes) -> tuple[str, ...]:
 
 
 def _settings(context: FlightContext) -> dict[str, str]:
-    """The keys that the advice names, and their values."""
+    """The keys of thrust and drag that the advice names, with the values that were learned."""
     learning, estimate = context.guidance_loop.learning, context.guidance_loop.estimate
     settings: dict[str, str] = {}
     if learning.mismatch_warning() is not None:

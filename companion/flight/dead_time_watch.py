@@ -103,7 +103,7 @@ class DeadTimeWatch:
             self._judge(name, self._dead_time(name, self._trace.rates_rows(first)))
 
     def over_the_flight(self) -> DeadTimes:
-        """Measure over the whole flight, and warn if no warning was given yet."""
+        """Measure over the flight (its last `_LONGEST` rows); warn if no warning was given yet."""
         first = max(0, len(self._trace.rates) - _LONGEST)
         rows = self._trace.rates_rows(first)
         ages = rows[:, _AGE]

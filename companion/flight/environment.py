@@ -17,7 +17,8 @@ class Environment:
     Attributes:
         open_transport: opens the link's transport.
         clock_ns: clock for latencies and for the arrival stamps of transports, ns.
-        realtime: whether the section `realtime` is requested from the operating system.
+        realtime: True: real time, and the section `realtime` is requested from the operating
+            system. False: a virtual clock.
         stream: takes the messages that the flight records, in batches, in the recording thread;
             None: nothing does.
     """

@@ -42,6 +42,7 @@ class FlightFiles:
         mcap: records the flight, or None.
 
     Raises:
+        ConfigError: the trajectory's file cannot be read.
         OSError: the folder cannot be written.
     """
 
@@ -117,7 +118,7 @@ class FlightFiles:
             self._note(text)
 
     def recorder(self, observer: Observer) -> EventRecorder:
-        """An observer that passes on and records phases and events; STATUSTEXT in the `.tlog`."""
+        """An observer that passes on and records phases and events (STATUSTEXTs of the `.tlog`)."""
         clock, texts = asyncio.get_running_loop().time, TextFrames(self._config.link.source_system)
 
         def write(words: str) -> None:
@@ -141,7 +142,7 @@ class FlightFiles:
         result: str,
         grants: tuple[realtime.Grant, ...],
     ) -> Summary:
-        """The summary of a finished flight whose log is still open.
+        """The summary of a finished flight whose log is still open; saves the learned drag, too.
 
         Args:
             stats: counters of its link.

@@ -33,6 +33,7 @@ def record(config: Config, folder: Path, *, follows: bool = True) -> None:
         follows: whether the maneuvers of the configuration are flown, including its trajectory.
 
     Raises:
+        ConfigError: the trajectory's file has changed and holds no trajectory.
         OSError: a file cannot be read or written.
     """
     data = config.model_dump(mode="json")

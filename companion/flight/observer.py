@@ -84,8 +84,8 @@ async def decline_landing() -> bool:
 class EventRecorder:
     """An observer that records phases and events, and passes everything to another observer.
 
-    After the other observer has raised an exception, it receives nothing more, because a fault in
-    it must not cost control of the vehicle.
+    After the other observer has raised an exception, it receives nothing more (after one of
+    `status`: no more states), because a fault in it must not cost control of the vehicle.
 
     Attributes:
         phases: (begin in s on our clock, name) of each phase.
@@ -130,7 +130,7 @@ class EventRecorder:
         return type(self._observer).status is not Silent.status
 
     def status(self, status: FlightStatus) -> None:
-        """Pass on; the caller notes an exception of the observer, and passes no more."""
+        """Pass on; the caller notes an exception of the observer, and passes no more states."""
         self._observer.status(status)
 
     def event(self, time: float, text: str) -> None:
@@ -147,7 +147,7 @@ class EventRecorder:
 
 
 class StateLogger:
-    """Records each change of mode and arming state, and each STATUSTEXT, as an event.
+    """Notes each change of mode and arming state, and each text of the autopilot, as an event.
 
     Args:
         state: telemetry of the vehicle.

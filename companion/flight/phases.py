@@ -60,7 +60,10 @@ class Phase:
 
 
 def ground_phases(config: FlightConfig) -> tuple[Phase, ...]:
-    """The phases before any command to the vehicle, in order; they only request telemetry."""
+    """The phases before arming, in order: they connect, request telemetry and check.
+
+    A vehicle that stands disarmed in a mode in which it cannot be armed is asked to hold.
+    """
     return (
         # A second longer than the link waits, because the link's error message says more.
         Phase("connect", "a heartbeat", preflight_phases.connect, config.connect_timeout_s + 1.0),
@@ -150,7 +153,8 @@ def _take_over_held() -> Phase:
 def program_phase(name: str, waits_for: str, work: Work, duration: float = inf) -> Phase:
     """A phase that a user's program asked for while the autopilot obeys our rates.
 
-    If it fails, the vehicle is handed back and holds. Only the program or the pilot lands it.
+    If it fails, the vehicle is handed back and holds; after some breaches of the safety monitors it
+    lands.
 
     Args:
         name: shown to the user.

@@ -60,8 +60,8 @@ class ConfiguredPlan:
 class TakeoverPlan:
     """Takes over a vehicle that its autopilot holds in the air, flies a source, hands it back.
 
-    The program does not arm. If the checks, the takeover or the source fail, the autopilot is asked
-    to hold.
+    The program does not arm. If the checks fail, the vehicle is left as it is. If the takeover or
+    the source fails, the autopilot is asked to hold; if the take-off fails in the air, to land.
 
     Args:
         source: source of references; it decides when control ends.

@@ -99,7 +99,7 @@ class PreflightChecks:
         return evidence
 
     def _apply(self, findings: list[Finding]) -> None:
-        """End the flight for unsafe findings that are not accepted; report all others."""
+        """End the flight for findings that block it; report other unsafe and ineffective ones."""
         refused = blocking(self._config, findings)
         warnings = [
             finding.key

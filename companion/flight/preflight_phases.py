@@ -63,7 +63,7 @@ def note_heartbeat_rate(context: FlightContext, evidence: Evidence) -> None:
 
 
 async def stream(context: FlightContext) -> None:
-    """Start to answer samples with idle setpoints, and wait until enough were sent."""
+    """Start to answer samples, on the ground with idle setpoints; wait until enough were sent."""
     context.loop.on = True
     enough = context.loop.record.setpoints + round(context.config.link.min_attitude_rate_hz)
     await context.until(lambda: context.loop.record.setpoints >= enough, "setpoints to flow")

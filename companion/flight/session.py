@@ -71,7 +71,7 @@ class Session:
             self._flying.cancel()
 
     def note(self, text: str) -> None:
-        """Record an event and show it."""
+        """Record an event and show it; before the flight begins, keep it until then."""
         if self._assembled is None:
             self._early_notes.append(text)
         else:
@@ -84,7 +84,7 @@ class Session:
 
         Raises:
             ConfigError: a maneuver cannot be flown; nothing was sent.
-            LinkError: the link could not be opened; nothing was sent.
+            LinkError: the link could not be opened; nothing was sent, in lockstep one heartbeat.
             OSError: the folder cannot be written; nothing was sent.
             RealtimeError: the system refused a required `realtime` setting; nothing was sent.
         """

@@ -15,6 +15,7 @@ from companion.flight.status_rows import StatusRows
 from companion.flight.view import view
 from companion.recording.trace import FlightTrace
 from companion.safety import SafetyLadder
+from companion.safety.actions import internal
 from companion.vehicle.records import Battery
 
 _PERIOD = 0.1
@@ -40,7 +41,8 @@ class FlightStatus(NamedTuple):
         tilt: tilt, rad.
         error: distance from the reference, m.
         rate: rate of setpoints, Hz.
-        latency: time from the last answered sample to its setpoint, s; None in lockstep.
+        latency: time from the last answered sample to its setpoint, s; None in lockstep, and while
+            no samples are answered.
         missed: deadlines missed so far; None in lockstep.
         battery: battery of the vehicle.
         monitored: whether the safety monitors are active.
@@ -131,10 +133,19 @@ class StatusReporter:
         due = self._clock()
         while True:
             self.record()
-            if self._show is not None:
-                self._show(self.status())
+            self._show_status()
             due = max(due + _PERIOD, self._clock())
             await asyncio.sleep(due - self._clock())
+
+    def _show_status(self) -> None:
+        """Show the state; after a fault of the observer it is only recorded."""
+        if self._show is None:
+            return
+        try:
+            self._show(self.status())
+        except Exception as error:
+            self._show = None
+            self._context.note(internal(error))
 
     def record(self) -> None:
         """Record the motion, and note the take-off."""

@@ -53,7 +53,7 @@ def result_name(result: int) -> str:
 class CommandClient:
     """Sends commands and waits for their ACKs.
 
-    An ACK names only the command, so the same command is not sent again before its ACK has come.
+    An ACK names only the command, so a call with the same command waits until the one before ends.
 
     Attributes:
         last_acks: Newest MAV_RESULT of each MAV_CMD.
@@ -82,12 +82,13 @@ class CommandClient:
         Args:
             command: MAV_CMD.
             params: Up to seven parameters; the rest are 0.
-            timeout_s: Time allowed for the ACK of each try, s.
+            timeout_s: Time allowed for the ACK of each try, s; 30 s for the next ACK after one that
+                the command is in progress.
             retries: Number of repetitions after the first try.
 
         Raises:
             CommandRefused: The result is not ACCEPTED.
-            CommandTimeout: No ACK came to any of the tries.
+            CommandTimeout: No final ACK came to any of the tries.
             LinkLost: The connection dropped while waiting.
         """
         lock = self._locks.setdefault(command, asyncio.Lock())

@@ -18,11 +18,11 @@ class LinkLost(LinkError):  # noqa: N818
 
 
 class NotConnected(LinkError):  # noqa: N818
-    """No heartbeat of the vehicle has been received yet."""
+    """No heartbeat of an autopilot that this program flies has been received yet."""
 
 
 class UnsupportedAutopilot(LinkError):  # noqa: N818
-    """This program cannot fly the vehicle's autopilot."""
+    """This program cannot fly the vehicle: another autopilot, or no multirotor."""
 
 
 class UnknownMessage(LinkError):  # noqa: N818
@@ -34,7 +34,7 @@ class LogError(LinkError):
 
 
 class SigningError(LinkError):
-    """The signing key cannot be used."""
+    """The signing key cannot be used, or there is no folder to keep its time stamps."""
 
 
 class InvalidSetpoint(LinkError, ValueError):  # noqa: N818
@@ -46,18 +46,18 @@ class NonFiniteSetpoint(InvalidSetpoint):
 
 
 class CommandTimeout(LinkTimeout):
-    """No COMMAND_ACK came for a command after all retries."""
+    """No final COMMAND_ACK came for a command after all retries."""
 
 
 class CommandRefused(LinkError):  # noqa: N818
-    """The autopilot answered a command with anything but ACCEPTED.
+    """The autopilot's final answer to a command is anything but ACCEPTED.
 
     Attributes:
         command: The command's name, such as `MAV_CMD_COMPONENT_ARM_DISARM`.
         result: MAV_RESULT number of the ACK.
         result_name: The result without its prefix, such as `TEMPORARILY_REJECTED`.
-        words: STATUSTEXTs that the autopilot sent from the command until 0.3 s after the refusal,
-            oldest first; may be empty.
+        words: The autopilot's texts (STATUSTEXT, or PX4's events) from the command until 0.3 s
+            after the refusal, oldest first; may be empty.
     """
 
     def __init__(self, command: str, result: int, result_name: str, words: tuple[str, ...]) -> None:
@@ -74,7 +74,7 @@ class ParameterError(LinkError):
 
 
 class UnknownParameter(ParameterError):  # noqa: N818
-    """The autopilot has no parameter of that name, or did not answer."""
+    """The autopilot has no parameter of that name or did not answer, or the name is not valid."""
 
 
 class UnansweredParameter(UnknownParameter):
@@ -82,4 +82,4 @@ class UnansweredParameter(UnknownParameter):
 
 
 class ParameterRefused(ParameterError):  # noqa: N818
-    """The autopilot refused to report the parameter, or did not take the value written."""
+    """The autopilot refused the request, or the parameter cannot hold the value or kept another."""

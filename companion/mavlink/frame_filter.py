@@ -30,7 +30,7 @@ class FrameFilter:
     Args:
         settings: The vehicle's ids, and the signing key.
         stats: Counts foreign frames and bad signatures.
-        notice: Called once for each reason why signatures are refused.
+        notice: Called once with each notice about signatures and their time stamps.
     """
 
     def __init__(self, settings: LinkSettings, stats: LinkStats, notice: Notice) -> None:
@@ -41,7 +41,7 @@ class FrameFilter:
 
     @property
     def awaits_answer(self) -> bool:
-        """Whether the last frame was refused for lack of an answer to a TIMESYNC request."""
+        """Whether the frame checked last was refused because no TIMESYNC request was answered."""
         return self._signing is not None and self._signing.awaits_answer
 
     def is_vehicle(self, frame: Frame) -> bool:

@@ -20,8 +20,8 @@ T = TypeVar("T")
 Arguments = TypeVarTuple("Arguments")
 
 PATIENCE_S = 2.0
-"""Wall time without traffic after which the vehicle counts as gone, s; virtual time then advances
-without it.
+"""Wall time without a new beacon after which the vehicle counts as gone, s; virtual time then
+advances without it.
 """
 
 _SPIN_S = 0.0005
@@ -156,9 +156,9 @@ class _SteppingSelector(SettlingSelector):
 
 
 class LockstepEventLoop(LinkEventLoop):
-    """An event loop in vehicle time: only `advance` changes `time()`.
+    """An event loop in vehicle time: `advance` sets `time()`.
 
-    Before the first beacon it runs on wall time. If nothing is received for `PATIENCE_S` of wall
+    Before the first beacon it runs on wall time. If no new beacon comes for `PATIENCE_S` of wall
     time, its time advances by that amount, so that timeouts expire if the vehicle is gone.
 
     Args:

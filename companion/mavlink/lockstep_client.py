@@ -12,7 +12,7 @@ class LockstepClient:
     Args:
         loop: The event loop to advance.
         process: Handles the frames of one step, in order, after the clock has advanced.
-        deliver: Passes the attitude sample of the step, if any, to the control loop.
+        deliver: Passes the attitude samples of the step, if any, to the control loop.
         answer: Sends the answer that closes the step of `time_boot_ms`.
 
     Attributes:
@@ -51,7 +51,7 @@ class LockstepClient:
         self._loop.settle(self._after_tasks)
 
     def close(self) -> None:
-        """Stop: the open step gets no sample and no answer."""
+        """Stop: the open step gets no answer, nor samples that were not delivered yet."""
         self._closed = True
 
     def _after_tasks(self) -> None:

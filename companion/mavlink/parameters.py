@@ -51,7 +51,8 @@ class ParameterClient:
         outbox: Sends the requests.
         router: Delivers the answers.
         registry: Ends the waiting when the connection drops.
-        bytewise: Whether an integer is sent as its bytes (PX4) or as a float (ArduPilot).
+        bytewise: Returns True if an integer is sent as its bytes (PX4), False if as a float
+            (ArduPilot).
     """
 
     def __init__(
@@ -74,7 +75,8 @@ class ParameterClient:
 
         Raises:
             UnansweredParameter: The autopilot did not answer.
-            UnknownParameter: The autopilot answered that it has no such parameter.
+            UnknownParameter: The autopilot answered that it has no such parameter, or the name is
+                not 1 to 16 ASCII characters.
             ParameterRefused: The autopilot answered with another error.
             LinkLost: The connection dropped while waiting.
         """

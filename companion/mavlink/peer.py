@@ -91,7 +91,7 @@ class PeerRule:
 
     Args:
         stats: Counts the changes of the peer.
-        notice: Called at each change, with a sentence for the user.
+        notice: Called with a sentence for the user at each change, and at each `ignore`.
         clock: Returns the event-loop time, s.
         last_setpoint: Returns the event-loop time of the last setpoint, s.
         every_frame_claims: Signing is on, or the link runs in lockstep.

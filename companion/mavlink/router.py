@@ -37,7 +37,7 @@ class Router:
         return _add(self._decoded, message_id(name), callback)
 
     def subscribe_raw(self, name: str, callback: Callable[[bytes], None]) -> Unsubscribe:
-        """Call `callback` with each payload of that message, without trailing zeros.
+        """Call `callback` with each payload of that message as sent; version 2 cuts trailing zeros.
 
         Raises:
             UnknownMessage: Neither the dialect nor `UNDECODED` has such a message.

@@ -55,6 +55,8 @@ def key_from_hex(text: str) -> bytes:
 def key_from_passphrase_file(path: Path) -> bytes:
     """Make a key from a passphrase as ground stations do: SHA-256 of the file's first line.
 
+    Blanks at both ends of the line do not count.
+
     Raises:
         SigningError: The file cannot be read or its first line is empty.
     """
@@ -139,7 +141,7 @@ class Signing:
 
     @property
     def awaits_answer(self) -> bool:
-        """Whether the last frame was refused for lack of an answer to a TIMESYNC request."""
+        """Whether the frame checked last was refused because no TIMESYNC request was answered."""
         return self._unproven_stamp != 0
 
     def stamps(self) -> Stamps:

@@ -14,7 +14,7 @@ from companion.mavlink.errors import SigningError
 from companion.mavlink.stamps import MOST_TICKS, Stamps, Stream
 
 _FOLDER = Path("mavlink-companion", "signing")
-_MOST_BYTES = 1_000_000
+_MOST_BYTES = 4_000_000
 """Largest file read, bytes; 65536 streams of one vehicle need less."""
 
 

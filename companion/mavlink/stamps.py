@@ -37,7 +37,7 @@ class SignatureResult(Enum):
     GOOD = "signed with the configured key, and newer than all before it on its stream"
     UNSIGNED = "not signed"
     WRONG_KEY = "signed with another key"
-    REPLAYED = "not newer than an earlier frame: repeated by the link, or a recording"
+    REPLAYED = "not newer than an earlier frame or the date: repeated by the link, or a recording"
     AHEAD = "signed with the configured key, but dated too far in the future"
 
 
@@ -154,7 +154,7 @@ class StampJudge:
         return SignatureResult.GOOD
 
     def streams(self) -> dict[Stream, tuple[int, ...]]:
-        """The newest time stamp of each stream that was heard in this run, in ticks of 10 µs."""
+        """The newest stamps of each stream that was heard in this run; see `Stamps.streams`."""
         heard = dict(self._heard)  # a copy: another thread calls this
         newest = {}
         for stream in {stream for stream, _ in heard}:

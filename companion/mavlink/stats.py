@@ -21,18 +21,20 @@ class LinkStats:
         repeated: Frames received twice or late.
         bad_crc: Frames with a wrong checksum.
         unknown: Frames of messages that the dialect does not know.
-        bad_signature: Frames unsigned, wrongly signed or replayed while signing is on.
+        bad_signature: Frames unsigned, wrongly signed, replayed or dated too far ahead, while
+            signing is on.
         ignored_foreign: Frames of other systems or components than the vehicle's.
         unclaimed: Frames with the vehicle's ids, from a sender that is not the peer (`PeerRule`).
         non_finite: Messages refused for a NaN or infinity.
         outdated: Positions refused because one with the same or a later time stamp had come.
         stamped_ahead: Positions refused because they were stamped ahead of the vehicle's clock.
         malformed: Messages that could not be decoded or whose values are impossible.
-        sent: Frames passed to the kernel.
+        sent: Frames of this program that were passed to the kernel.
         forwarded: Frames of other nodes that were passed to the kernel unchanged.
-        not_sent: Frames dropped because they could not be sent (no peer, buffer full, connection
-            down).
-        reconnects: Number of times that the connection was opened again.
+        not_sent: Frames of this program dropped because they could not be sent (no peer, buffer
+            full, connection down).
+        reconnects: Number of times that the connection was opened again; of a TCP server, number of
+            times that its client was lost.
         peers: Number of times that the peer changed to another address or port, or another TCP
             client. A peer that returns at the same address and port does not count. A serial port
             or TCP connection that this program opens again counts only in `reconnects`.

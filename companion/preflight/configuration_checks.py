@@ -1,4 +1,4 @@
-"""Checks of our configuration that do not depend on the vehicle."""
+"""Checks of our configuration; one compares it with what earlier flights measured."""
 
 import json
 from collections.abc import Iterator

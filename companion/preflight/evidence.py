@@ -31,7 +31,7 @@ class Stage(Enum):
 
 
 class Identity(NamedTuple):
-    """AUTOPILOT_VERSION; `None` where it was not received.
+    """AUTOPILOT_VERSION; `None` where it was not received, or the hardware has no id.
 
     Attributes:
         version: Version of the flight software, such as 4.7.0-dev.
@@ -162,7 +162,7 @@ class Evidence:
 
     @property
     def booting(self) -> bool:
-        """Whether no estimator status came yet; until then ArduPilot sends no other telemetry."""
+        """Whether no estimator status came lately; until the first, ArduPilot sends little else."""
         return self.state.readiness.estimator_flags is None
 
     @property

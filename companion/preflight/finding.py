@@ -77,7 +77,7 @@ class Finding:
     """Result of one check.
 
     Attributes:
-        key: A `Key`, or a parameter's (newest) name.
+        key: A `Key`, a parameter's (newest) name, or the key about a message rate (see above).
         result: Severity of the finding.
         found: The fact, as a clause.
         because: The consequence, or the effect of the parameter; may be empty.

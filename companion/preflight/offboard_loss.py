@@ -1,4 +1,7 @@
-"""Offboard loss: whether the vehicle stays inside the fence if our setpoints stop in flight."""
+"""Offboard loss: whether the vehicle stays inside the fence if our setpoints stop in flight.
+
+A fence in latitude and longitude (`safety.fence_polygon_deg`) is not checked here.
+"""
 
 from collections.abc import Iterator
 from math import exp, hypot

@@ -64,9 +64,9 @@ async def survey(
 ) -> Survey:
     """Read the rules' parameters, several at a time; ask again if the link loses frames.
 
-    An old name is requested only if the new one got no answer. A parameter without any answer is
-    requested once more, after all others and for longer, but only if frames were lost: on a good
-    link this autopilot does not have it, and the request only costs time.
+    An old name is requested only if the new one gave no value. A parameter without any answer is
+    requested in a second round, for longer, but only if frames were lost: on a good link this
+    autopilot does not have it, and the request only costs time.
 
     Args:
         link: Link to the vehicle.

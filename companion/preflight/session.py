@@ -152,7 +152,11 @@ class PreflightSession:
         self.link = link
 
     async def wait_for_vehicle(self) -> list[Finding]:
-        """Wait for the heartbeat; return findings only if further checks are impossible."""
+        """Wait for the heartbeat; return findings only if further checks are impossible.
+
+        Raises:
+            LinkLost: The connection was lost.
+        """
         try:
             await self.link.wait_connected(self._config.flight.connect_timeout_s)
         except LinkTimeout as error:
@@ -211,6 +215,7 @@ async def open_session(
 
     Raises:
         EndpointError: the endpoint cannot be opened.
+        SigningError: the signing key cannot be used.
         LinkTimeout: the configuration demands lockstep, and the vehicle is not in lockstep.
     """
     notices: list[str] = []

@@ -35,7 +35,7 @@ _TRY_AGAIN = 2.0
 
 
 class ServedControl:
-    """Flies the setpoints of one client at a time; these setpoints are not forwarded.
+    """Flies the setpoints of one client at a time; no client's setpoints are forwarded.
 
     Args:
         config: configuration of the vehicle and of `serve`.

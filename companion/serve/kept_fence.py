@@ -54,7 +54,7 @@ class KeptFence:
             self._kept, self._shift_when_kept = centre, self._resets.shift
 
     def refusal(self) -> str | None:
-        """Why control must not begin at the present position, outside the fence; else None."""
+        """Why control must not begin: outside the fence, or its place is not certain; else None."""
         position, kept = self._state.position, self.centre
         if kept is None or position is None:
             return None

@@ -6,7 +6,7 @@ from enum import Enum
 from math import inf
 
 _MOST_CLIENTS = 64
-"""Number of clients whose newest setpoint is remembered."""
+"""Number of remembered clients above which the silent ones are forgotten."""
 
 
 class Control(Enum):

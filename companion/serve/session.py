@@ -85,6 +85,7 @@ class ServeSession:
 
         Raises:
             EndpointError: the link or an endpoint of `serve.clients` could not be opened.
+            LinkError: the link cannot do what the configuration demands.
             RealtimeError: the system refused a required `realtime` setting.
             SigningError: the key cannot be used.
         """

@@ -28,12 +28,12 @@ class Role(Enum):
 
 
 class Readiness(NamedTuple):
-    """Telemetry that decides whether a vehicle can be armed and flown; `None`: not received.
+    """Telemetry that decides whether a vehicle can be armed and flown; `None`: not known now.
 
     Attributes:
         prearm_good: The autopilot's own pre-arm checks pass.
         estimator_flags: ESTIMATOR_STATUS_FLAGS.
-        position: A finite local position was received.
+        position: A finite local position was received in the last 5 s.
         home: The home position was received.
     """
 
@@ -76,15 +76,17 @@ FLIGHT_RATES: Mapping[str, float] = MappingProxyType(
         "GLOBAL_POSITION_INT": 5.0,
     }
 )
-"""Messages that a flight needs from every autopilot, with the requested rate, Hz."""
+"""Messages that a flight needs from every autopilot, with the requested rate, Hz.
+
+An autopilot may have another rate in its `wanted_rates`, and section `link` sets two of them."""
 
 
 class Autopilot(Protocol):
     """How to command one kind of autopilot, and what its modes and parameters mean to a flight.
 
-    Every autopilot takes thrust as 0..1 of the collective. It either divides thrust by cos(tilt)
-    itself or not; rules in `parameters` check both. When setpoints stop it holds the last rates for
-    a while, and then obeys a later setpoint unless a mode was commanded in between.
+    Every autopilot takes thrust as 0..1 of the collective. An autopilot that can divide thrust by
+    cos(tilt) itself has a rule for this in `parameters`. When setpoints stop it holds the last
+    rates for a while, and then obeys a later setpoint unless a mode was commanded in between.
 
     Attributes:
         name: Name to show to users, such as `PX4`.

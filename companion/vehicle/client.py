@@ -58,7 +58,11 @@ class VehicleClient:
 
     @property
     def autopilot(self) -> Autopilot:
-        """The vehicle's autopilot. Raises `NotConnected` before its first heartbeat."""
+        """The vehicle's autopilot.
+
+        Raises:
+            NotConnected: No heartbeat of an autopilot that this program flies has come yet.
+        """
         if self.state.autopilot is None:
             raise NotConnected("no heartbeat yet; wait_connected() comes first")
         return self.state.autopilot

@@ -55,8 +55,8 @@ def read_flight_log(path: Path) -> FlightLog:
     if the heartbeats before and after it say that the vehicle is armed and obeys rates.
 
     Raises:
-        LogError: the file cannot be read, is not a `.tlog`, or has no heartbeat of a supported
-            autopilot, or no setpoint that the autopilot obeyed.
+        LogError: the file cannot be read, is damaged, is not a `.tlog`, or has no heartbeat of a
+            supported autopilot, or no setpoint that the autopilot obeyed.
     """
     reader = _Reader()
     for frame, message in messages(path, _NAMES):

@@ -37,7 +37,7 @@ class Inbox:
         stats: Counters of the link.
         router: Takes every accepted frame.
         tap: Called with every accepted frame, for recordings.
-        notice: Called once for each reason why frames are refused.
+        notice: Called once with each notice about signatures, their time stamps and the peer.
         clock: The vehicle's clock; takes the time stamp of every sample.
         last_setpoint: Returns the event-loop time of the last setpoint sent, s.
 
@@ -45,7 +45,8 @@ class Inbox:
         on_attitude: Called with each attitude sample, synchronously.
         on_foreign: Called with each frame of another system or component than the vehicle's.
         on_frame: Called with each frame of the peer, whatever its source and message, after the
-            control loop and all subscribers.
+            control loop and all subscribers; not with beacons, nor with frames of the vehicle whose
+            signature is refused.
         lockstep: Handles beacons in lockstep; otherwise None.
     """
 

@@ -47,7 +47,8 @@ class Link(VehicleClient):
         settings: The endpoint, and the ids of the vehicle and of this program.
         tap: Called with every frame accepted from and sent to the vehicle, for recordings.
         opener: Opens the transport.
-        notice: Called once for each reason why frames are refused; by default it logs a warning.
+        notice: Called once with each notice about signatures, their time stamps and the peer; by
+            default it logs a warning.
 
     Attributes:
         stats: Counters of the link.
@@ -125,6 +126,7 @@ class Link(VehicleClient):
 
         Raises:
             LinkTimeout: No heartbeat came; the message says what came instead.
+            LinkLost: The connection dropped while waiting.
             UnsupportedAutopilot: This program cannot fly the autopilot.
         """
         with Pending[None](self._registry) as heard:
@@ -151,7 +153,7 @@ class Link(VehicleClient):
 
     @property
     def on_attitude(self) -> Callable[[AttitudeSample], None] | None:
-        """Called with each attitude sample, inside the read callback.
+        """Called with each attitude sample, inside the read callback; in lockstep after the tasks.
 
         An exception that it raises goes to `on_error`.
         """
@@ -172,7 +174,7 @@ class Link(VehicleClient):
 
     @property
     def on_frame(self) -> Callable[[Frame], None] | None:
-        """Called with each received frame, of any sender and message, after all other callbacks.
+        """Called with each frame of the peer, whatever its source and message; see `Inbox`.
 
         An exception that it raises goes to `on_error`. The checksum of a message that the dialect
         does not know is not checked.

@@ -28,7 +28,8 @@ class ModeState:
         heartbeat_is_newest: Whether HEARTBEAT is newer than CURRENT_MODE; `armed` is then as new as
             `mode`.
         armings: Number of times that a heartbeat showed a newly armed vehicle.
-        autopilot: How to command the vehicle; known from its first heartbeat.
+        autopilot: How to command the vehicle; known from the first heartbeat of an autopilot that
+            this program flies.
         unsupported: The error to raise if this program cannot fly the autopilot.
     """
 

@@ -25,8 +25,8 @@ class StreamRate(NamedTuple):
     Attributes:
         asked: Requested rate; 0 requests that the message stops.
         granted: Rate that the autopilot accepted; 0 if it refused all rates.
-        achieved: Measured rate. It may differ from `granted`: PX4 accepts every request, and sends
-            as often as its loops allow.
+        achieved: Measured rate. It may differ from `granted`: PX4 accepts requests (other than for
+            HEARTBEAT) at any rate, and sends as often as its loops allow.
         refusal: Result of the last refused request if all were refused, otherwise empty.
     """
 

@@ -164,7 +164,10 @@ def test_a_fault_in_what_is_shown_does_not_end_the_flight(tmp_path):
     config = merged(QUICK_FLIGHT, {"hover": {"duration_s": 1.0}})
     summary = fly(config, QuickVehicle(), tmp_path, Broken())
     assert summary.result == "ok"
-    assert any("ZeroDivisionError('the screen')" in text for _, text in summary.events)
+    faults = [time for time, text in summary.events if "ZeroDivisionError('the screen')" in text]
+    assert len(faults) == 1
+    motion = summary.trace.motion.rows()  # still recorded after the fault
+    assert motion[-1, 0] > faults[0] + 10.0
 
 
 def test_a_failure_of_the_recording_at_its_close_is_an_event(tmp_path, monkeypatch):

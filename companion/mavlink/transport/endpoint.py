@@ -85,15 +85,15 @@ _NETWORK_KINDS: dict[str, type[UdpIn | UdpOut | TcpClient | TcpServer]] = {
 def parse_endpoint(text: str) -> Endpoint:
     """Read an endpoint such as `udpin://0.0.0.0:14540` or `serial:///dev/ttyAMA0:921600`.
 
-    `udp://` with an address of this computer means `udpin://`, as in MAVSDK and mavlink-router. An
+    `udp://` with no host, 0.0.0.0 or a loopback address means `udpin://`, as in MAVSDK. An
     empty host of a listening endpoint means every interface. A listening endpoint may name its
     peers: `udpin://0.0.0.0:14540?peer=192.0.2.7`, with a port as in `?peer=192.0.2.7:14580`,
     several separated by commas.
 
     Raises:
-        EndpointError: The text is in none of the five notations, or its port is not 1..65535
-            (a listening endpoint also takes 0: any free port). If it is a notation of another
-            program, the message says what to write instead.
+        EndpointError: The text is in none of the five notations, a host name is not valid, or a
+            port is not 1..65535 (a listening endpoint also takes 0: any free port). If it is a
+            notation of another program, the message says what to write instead.
     """
     scheme, separator, rest = text.strip().partition("://")
     if separator and scheme == "serial":

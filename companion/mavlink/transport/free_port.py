@@ -18,8 +18,8 @@ _asked = itertools.count()
 def free_port(*offsets: int) -> int:
     """A UDP and TCP port that is free on 127.0.0.1, as is the port at each of the offsets above it.
 
-    Until the caller opens it, another program could. So a process is never given the same port
-    twice in a row, and two processes at the same time are given different ports.
+    Until the caller opens it, another program could. So a process is not given the same port again
+    until it has tried all others, and two processes with neighboring numbers begin 50 ports apart.
 
     Raises:
         LinkError: all ports are in use.

@@ -26,7 +26,8 @@ async def open_transport(endpoint: str | Endpoint, receiver: Receiver, lost: Los
     Args:
         endpoint: A parsed endpoint or its text.
         receiver: Takes all bytes that arrive.
-        lost: Called once if an open connection drops; never for UDP, nor after `close`.
+        lost: Called with the reason when an open connection drops: once, but for a TCP server at
+            each drop of its peer. Never called for UDP, nor after `close`.
 
     Raises:
         EndpointError: The transport cannot be opened; the message says why and what to do.

@@ -22,7 +22,7 @@ class SerialTransport:
     there is room, and frames sent meanwhile are dropped.
 
     Raises:
-        EndpointError: The device is missing, in use, or not permitted.
+        EndpointError: The device is missing, in use or not permitted, or refuses the baud rate.
     """
 
     reconnects = True

@@ -47,7 +47,8 @@ async def open_tcp_server(endpoint: TcpServer, receiver: Receiver, lost: Lost) -
     """Listen for one vehicle.
 
     Raises:
-        EndpointError: The port is in use or not permitted.
+        EndpointError: The port is in use or not permitted, the address is not that of an interface
+            of this computer, or a peer's host name is unknown.
     """
     named = await resolve(endpoint.peers, socket.SOCK_STREAM)
     transport = TcpTransport(receiver, lost, named)

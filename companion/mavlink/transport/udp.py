@@ -25,7 +25,8 @@ _OLDEST_NS = 1_000_000_000  # an older stamp means that the computer's clock was
 _BURST = 32  # datagrams read before the loop does other work
 
 PEER_SILENCE_S = 2.0
-"""A sender at another address may become the peer after the peer was silent for this time, s."""
+"""Period in which the peer is checked for silence, s. After a silent period, a sender at another
+address may become the peer."""
 
 
 async def open_udp(endpoint: UdpIn | UdpOut, receiver: Receiver) -> "UdpTransport":
@@ -77,9 +78,9 @@ class UdpTransport:
     A listening socket connects to the first sender that makes a valid claim (`PeerRule`). The
     kernel then drops datagrams of other senders, and a round trip is about 8 us shorter. The
     kernel's queue may still hold earlier datagrams of other senders, so the source of each datagram
-    is checked. If the peer is silent for 2 s, or its claim has lapsed, a new socket is opened, so
-    that a vehicle is heard that returns at another port. ICMP refusals (the vehicle has not started
-    yet) are ignored.
+    is checked. If the peer is silent for 2 to 4 s, or its claim has lapsed, a new socket is opened,
+    so that a vehicle is heard that returns at another port. ICMP refusals (the vehicle has not
+    started yet) are ignored.
 
     A datagram counts as received when the kernel received it, not when this process read it. So
     latency includes a late wake-up of this process.

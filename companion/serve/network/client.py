@@ -70,7 +70,7 @@ class Client(ABC):
 
     @property
     def is_local(self) -> bool:
-        """Whether the client runs on this computer."""
+        """Whether the client's address is a loopback address: it runs on this computer."""
         return self.host is not None and ipaddress.ip_address(self.host).is_loopback
 
     def put(self, frame: bytes) -> None:

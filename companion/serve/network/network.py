@@ -56,6 +56,9 @@ class Network:
         attitude: payload of the autopilot's newest ATTITUDE_QUATERNION; empty before the first.
         attitude_at: arrival of that payload, s on our clock.
         overflowed: frames of the vehicle that were dropped after a stall.
+
+    Raises:
+        EndpointError: an endpoint cannot be parsed, or (entering the block) cannot be opened.
     """
 
     def __init__(

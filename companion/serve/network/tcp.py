@@ -26,7 +26,8 @@ async def open_tcp_server(endpoint: TcpServer, clients: Clients) -> "TcpPort":
     """Listen for clients.
 
     Raises:
-        EndpointError: the port is in use or not permitted.
+        EndpointError: the port is in use or not permitted, the address is not that of an interface
+            of this computer, or a peer's host name is unknown.
     """
     named = await resolve(endpoint.peers, socket.SOCK_STREAM)
     port = TcpPort(clients, named)

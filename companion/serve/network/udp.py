@@ -25,7 +25,8 @@ async def open_udp(endpoint: UdpIn | UdpOut, clients: Clients) -> "UdpPort":
     """Open a UDP endpoint for clients.
 
     Raises:
-        EndpointError: the port is in use, the host unknown, or permission is missing.
+        EndpointError: the port is in use, a host is unknown, the address is not that of an
+            interface of this computer, or permission is missing.
     """
     where = f"UDP {endpoint.host}:{endpoint.port}"
     try:

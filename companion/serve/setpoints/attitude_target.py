@@ -26,7 +26,8 @@ def attitude_target(message: Message) -> AttitudeRequest | RatesRequest:
     """The command of a SET_ATTITUDE_TARGET.
 
     Raises:
-        RefusedSetpoint: the setpoint is contradictory, incomplete, or not finite.
+        RefusedSetpoint: the setpoint is contradictory, incomplete, not finite, too large, or of a
+            kind that is not flown.
     """
     mask, thrust = message.type_mask, message.thrust
     if mask & _RESERVED:

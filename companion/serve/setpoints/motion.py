@@ -46,7 +46,7 @@ class MotionLimits(NamedTuple):
 
 
 class CommandedMotion:
-    """Turns requests into a reference that never jumps, all in one frame.
+    """Turns requests into a reference that jumps by `Continuity` at most, all in one frame.
 
     Args:
         limits: limits of the motion from one request to the next.

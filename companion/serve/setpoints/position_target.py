@@ -68,7 +68,8 @@ def local_target(
             (ArduPilot) or to north (PX4).
 
     Raises:
-        RefusedSetpoint: the setpoint is contradictory, incomplete, or not finite.
+        RefusedSetpoint: the setpoint is contradictory, incomplete, not finite, too large, or of a
+            kind that is not flown.
     """
     frame = _LOCAL_FRAMES.get(message.coordinate_frame)
     if frame is None:
@@ -90,8 +91,7 @@ def global_target(message: Message, situation: Situation) -> MotionRequest:
     """The command of a SET_POSITION_TARGET_GLOBAL_INT.
 
     Raises:
-        RefusedSetpoint: the setpoint is contradictory, incomplete, or not finite; or the origin of
-            the local frame is unknown.
+        RefusedSetpoint: see `local_target`; or the origin of the local frame is unknown.
     """
     frame = message.coordinate_frame
     if frame in _TERRAIN:

@@ -2,7 +2,7 @@
 
 PX4 numbers an event by a hash of its name. The texts are in metadata that is not sent over the
 link, so this module has the texts that matter to a flight (source: PX4 main, 2026; checked against
-recorded events). Any other event is reported by its number, once.
+recorded events). Any other event that is meant for users is reported by its number, once.
 """
 
 import struct
