@@ -3,9 +3,9 @@
 import asyncio
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from math import atan2
 
 from companion.attitude import is_unit
+from companion.attitude.rotation import euler_angles
 from companion.mavlink.codec import decode_attitude
 from companion.mavlink.errors import LinkError
 from companion.mavlink.messages import Message
@@ -48,8 +48,7 @@ class SituationKeeper:
         _, q, _ = decoded
         if not is_unit(q):
             return None
-        w, x, y, z = q
-        yaw = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        _, _, yaw = euler_angles(q)
         return Situation(position.position_ned, yaw, self._origin.origin)
 
     def takeoff_refusal(self, request: Request) -> str | None:

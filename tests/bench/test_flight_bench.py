@@ -11,6 +11,8 @@ from companion.bench.profile import PARTS
 from companion.cli.main import main
 from tests.flight.fly import QuickVehicle
 
+LARGE = {"event loop and wire", "link: frames, messages, state", "guidance", "vehicle: autopilot"}
+
 
 def test_the_table_of_the_bench_is_also_json(capsys, monkeypatch):
     monkeypatch.setattr(flight, "FILES", {"px4": flight.FILES["px4"]})
@@ -26,5 +28,6 @@ def test_the_table_of_the_bench_is_also_json(capsys, monkeypatch):
             assert flown["times_real_time"] == flown["vehicle_s"] / flown["cpu_s"] > 2.0
             assert flown["compiled"] == can_compile()
             assert sum(flown["shares"].values()) == pytest.approx(1.0)
-            assert set(flown["shares"]) >= set(PARTS) - {"recording"}
+            # A part with a share of 2 % may have no sample in so short a flight.
+            assert LARGE <= set(flown["shares"]) <= {*PARTS, "rest"}
             assert flown["shares"].get("rest", 0.0) < 0.02
