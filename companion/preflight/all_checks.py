@@ -34,6 +34,7 @@ CHECKS: tuple[Check, ...] = (
     configuration_checks.planner,
     configuration_checks.dead_time,
     configuration_checks.doubtful,
+    configuration_checks.tilt_compensation,
     configuration_checks.accepted,
 )
 
@@ -43,6 +44,7 @@ ONCE: tuple[Check, ...] = (
     configuration_checks.planner,
     configuration_checks.dead_time,
     configuration_checks.doubtful,
+    configuration_checks.tilt_compensation,
     configuration_checks.accepted,
 )
 """Checks that a flight runs only once, because the vehicle's state does not change their result."""

@@ -15,7 +15,7 @@ from companion.recording.measurements.dead_time import AxisDeadTime, DeadTimes
 from companion.vehicle.parameter_rules import CheckResult
 from companion.vehicle.registry import AUTOPILOTS
 
-SAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.INEFFECTIVE
+SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 
 
 def planner(config: Config, _: Evidence) -> Iterator[Finding]:
@@ -76,6 +76,21 @@ def doubtful(config: Config, _: Evidence) -> Iterator[Finding]:
     for doubt in doubts(config):
         key = doubt.key if doubt.key in (Key.IDENTIFIED, Key.BODY_RATE) else Key.UNITS
         yield Finding(key, INEFFECTIVE, doubt.found, doubt.because, doubt.fix, doubt.key)
+
+
+def tilt_compensation(config: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether the autopilot can divide thrust by cos(tilt), if the configuration says it does."""
+    autopilot = evidence.autopilot
+    if config.thrust.autopilot_compensates_tilt and not autopilot.can_compensate_tilt:
+        yield Finding(
+            Key.TILT_COMPENSATION,
+            UNSAFE,
+            f"thrust.autopilot_compensates_tilt is true, but {autopilot.name} does not divide "
+            "thrust by cos(tilt)",
+            "the vehicle sinks when it tilts",
+            "set thrust.autopilot_compensates_tilt to false",
+            "thrust.autopilot_compensates_tilt",
+        )
 
 
 def accepted(config: Config, _: Evidence) -> Iterator[Finding]:

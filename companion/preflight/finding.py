@@ -49,6 +49,7 @@ class Key(StrEnum):
     MANEUVERS = "flight.maneuvers"
     PLANNER = "planner.name"
     DEAD_TIME = "vehicle.dead_time_ms"
+    TILT_COMPENSATION = "thrust.autopilot_compensates_tilt"
     ACCEPT = "flight.accept"
     IDENTIFIED = "vehicle.identified"
     UNITS = "configuration.units"

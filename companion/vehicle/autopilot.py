@@ -84,8 +84,7 @@ An autopilot may have another rate in its `wanted_rates`, and section `link` set
 class Autopilot(Protocol):
     """How to command one kind of autopilot, and what its modes and parameters mean to a flight.
 
-    Every autopilot takes thrust as 0..1 of the collective. An autopilot that can divide thrust by
-    cos(tilt) itself has a rule for this in `parameters`. When setpoints stop it holds the last
+    Every autopilot takes thrust as 0..1 of the collective. When setpoints stop it holds the last
     rates for a while, and then obeys a later setpoint unless a mode was commanded in between.
 
     Attributes:
@@ -103,6 +102,8 @@ class Autopilot(Protocol):
             turns before the body follows. False: along the axes of the body.
         body_yaw_is_relative: Whether a yaw in a body frame of SET_POSITION_TARGET_LOCAL_NED counts
             from the present yaw, not from north.
+        can_compensate_tilt: Whether the autopilot can divide thrust by cos(tilt) itself; a rule in
+            `parameters` then compares its setting with ours.
         offboard_loss_failsafe: What the autopilot does when setpoints stop.
         cannot_arm_in: Roles of the modes in which a disarmed vehicle cannot be armed.
         parameters: Rules for the parameters that matter to a flight by body rates.
@@ -119,6 +120,7 @@ class Autopilot(Protocol):
     interval_step_us: int
     rates_along_target: bool
     body_yaw_is_relative: bool
+    can_compensate_tilt: bool
     offboard_loss_failsafe: OffboardLossFailsafe
     cannot_arm_in: frozenset[Role]
     parameters: tuple[ParameterRule, ...]

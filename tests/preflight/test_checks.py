@@ -416,3 +416,12 @@ def test_times_that_are_not_the_vehicles_own_and_units_mistaken_are_told():
     assert all(one.result is CheckResult.INEFFECTIVE for one in found.values())
     assert found[Key.UNITS].source == "limits.max_tilt_rate_deg_s"
     assert list(configuration_checks.doubtful(CONFIG, GOOD)) == []
+
+
+def test_px4_is_not_expected_to_divide_thrust_by_the_cosine_of_the_tilt():
+    config = changed(CONFIG, {"thrust": {"autopilot_compensates_tilt": True}}, "test")
+    (found,) = blocking(config, run_checks(config, GOOD))
+    assert found.key == Key.TILT_COMPENSATION
+    assert list(configuration_checks.tilt_compensation(CONFIG, GOOD)) == []
+    other = replace(GOOD, autopilot=ARDUPILOT)
+    assert list(configuration_checks.tilt_compensation(config, other)) == []

@@ -76,6 +76,7 @@ class ArduPilot:
     interval_step_us = 1000
     rates_along_target = True
     body_yaw_is_relative = True
+    can_compensate_tilt = True
     offboard_loss_failsafe = OffboardLossFailsafe(
         "GUID_TIMEOUT",
         "it levels and keeps its height, but drifts: it does not hold its position",

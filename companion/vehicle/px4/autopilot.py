@@ -94,6 +94,7 @@ class Px4:
     interval_step_us = 1
     rates_along_target = False
     body_yaw_is_relative = False
+    can_compensate_tilt = False
     offboard_loss_failsafe = OffboardLossFailsafe(
         "COM_OF_LOSS_T", "it takes the action that COM_OBL_RC_ACT sets", brakes=True
     )
