@@ -5,23 +5,17 @@ import json
 import os
 import shutil
 import signal
-from contextlib import redirect_stderr, redirect_stdout
-from functools import partial
-from io import StringIO
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 import yaml
 
-from companion import testing
-from companion.cli import flying, identify
+from companion.cli import identify
 from companion.cli.main import main
 from companion.config.files import load
 from companion.identification import FitQuality, IdentifiedVehicle, RateResponse
 from companion.mavlink.transport.free_port import free_port
-from companion.testing.flying import environment
-from tests.flight import fly as memory
 from tests.flight.fly import QUICK_FLIGHT, merged
 from tests.flight.programs import Program
 from tests.flight.sockets import mock_vehicle
@@ -54,25 +48,16 @@ def config_for(folder, endpoint, **changes):
 
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory):
-    """A folder with a configuration and one flight of `identify`, and what that printed.
-
-    The vehicle is in memory, where a flight costs a third; below, one over UDP is interrupted.
-    """
+    """A folder with a configuration and one flight of `identify`, and what that printed."""
     folder = tmp_path_factory.mktemp("identify")
-    config = config_for(folder, f"udpin://127.0.0.1:{free_port()}")
-    out, err = StringIO(), StringIO()
-    with (
-        memory.mock_vehicle(full_rate=True, in_lockstep=True, seed=2) as mock,
-        pytest.MonkeyPatch.context() as patch,
-        redirect_stdout(out),
-        redirect_stderr(err),
-    ):
-        patch.setenv("COLUMNS", "80")
-        patch.setattr(flying, "environment", lambda _: environment)
-        patch.setattr(flying, "lockstep", SimpleNamespace(run=partial(testing.run, mock)))
-        assert main(["identify", "--config", str(config), "--json"]) == 0, err.getvalue()
-    assert not mock.state()["armed"]
-    return folder, SimpleNamespace(stdout=out.getvalue(), stderr=err.getvalue())
+    with mock_vehicle(folder, full_rate=True, seed=2) as mock:
+        config = config_for(folder, f"udpin://127.0.0.1:{mock.port}")
+        arguments = "identify", "--config", config, "--json"
+        program = Program("companion.cli.main", *arguments, environment={"COLUMNS": "80"})
+        out, err = program.communicate(timeout=100)
+        assert not mock.state()["armed"]
+    assert program.returncode == 0, err
+    return folder, SimpleNamespace(stdout=out, stderr=err)
 
 
 def test_it_flies_fits_writes_and_tells_how_to_include_it(flown):
