@@ -15,7 +15,8 @@ Motion = tuple[float, float, float, float, float, float, float, float, float, fl
 Load = tuple[float, float, float, float, float, float, float]
 """(specific thrust [m/s^2], torque x, y, z [N m, FRD], wind n, e, d [m/s])."""
 
-NONE = 0.0, 0.0, 0.0
+NO_AXIS_DRAG = 0.0, 0.0, 0.0
+"""Drag along the body axes of a body without any."""
 
 
 class Body(NamedTuple):
@@ -76,7 +77,7 @@ def derivative(
     if quadratic:
         drag += quadratic * sqrt(air_n * air_n + air_e * air_e + air_d * air_d)
     push_n = push_e = push_d = 0.0
-    if axis != NONE or momentum != NONE:
+    if axis != NO_AXIS_DRAG or momentum != NO_AXIS_DRAG:
         air_x, air_y, air_z = to_body((w, x, y, z), (air_n, air_e, air_d))
         inflow = sqrt(max(thrust, 0.0) / gravity)
         force = (

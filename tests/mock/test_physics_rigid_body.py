@@ -8,10 +8,10 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from sitl_mock.config.airframe import AirframeConfig
-from sitl_mock.physics.rigid_body import NONE, Body, advance, body_of, derivative
+from sitl_mock.physics.rigid_body import NO_AXIS_DRAG, Body, advance, body_of, derivative
 from sitl_mock.settings import MockSettings
 
-FREE = Body(0.02, 0.035, 0.05, 0.0, 0.0, NONE, NONE, rotational_drag=0.0, gravity=9.80665)
+FREE = Body(0.02, 0.035, 0.05, 0.0, 0.0, NO_AXIS_DRAG, NO_AXIS_DRAG, rotational_drag=0.0, gravity=9.80665)
 REAL = body_of(
     AirframeConfig(
         inertia_kg_m2=(0.02, 0.03, 0.045),
@@ -94,7 +94,7 @@ def test_torque_free_precession_keeps_angular_momentum_and_energy():
 def test_error_falls_with_the_fourth_power_of_the_step():
     motion = (1.0, 2.0, 3.0, *LEVEL, 5.0, -7.0, 3.0)
     load = (9.0, 0.02, -0.01, 0.01, 1.0, 2.0, 0.0)
-    body = REAL._replace(axis_drag=NONE)  # it has a kink where a component changes its sign
+    body = REAL._replace(axis_drag=NO_AXIS_DRAG)  # it has a kink where a component changes its sign
     exact = fly(motion, load, body, 0.4, dt=1e-3)
     errors = [
         [
@@ -114,7 +114,7 @@ def test_free_fall_is_the_parabola():
 
 
 def test_fall_with_linear_drag_nears_the_terminal_speed():
-    body = REAL._replace(quadratic_drag=0.0, axis_drag=NONE, momentum_drag=NONE)
+    body = REAL._replace(quadratic_drag=0.0, axis_drag=NO_AXIS_DRAG, momentum_drag=NO_AXIS_DRAG)
     motion, _ = fly((0.0, 0.0, 0.0, *LEVEL, 0.0, 0.0, 0.0), NO_LOAD, body, 3.0)
     terminal = body.gravity / body.drag
     assert motion[2] == pytest.approx(terminal * (1.0 - exp(-3.0 * body.drag)), rel=1e-9)
