@@ -11,7 +11,9 @@ from sitl_mock.config.airframe import AirframeConfig
 from sitl_mock.physics.rigid_body import NO_AXIS_DRAG, Body, advance, body_of, derivative
 from sitl_mock.settings import MockSettings
 
-FREE = Body(0.02, 0.035, 0.05, 0.0, 0.0, NO_AXIS_DRAG, NO_AXIS_DRAG, rotational_drag=0.0, gravity=9.80665)
+FREE = Body(
+    0.02, 0.035, 0.05, 0.0, 0.0, NO_AXIS_DRAG, NO_AXIS_DRAG, rotational_drag=0.0, gravity=9.80665
+)
 REAL = body_of(
     AirframeConfig(
         inertia_kg_m2=(0.02, 0.03, 0.045),
