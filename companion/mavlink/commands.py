@@ -54,9 +54,6 @@ class CommandClient:
     """Sends commands and waits for their ACKs.
 
     An ACK names only the command, so a call with the same command waits until the one before ends.
-
-    Attributes:
-        last_acks: Newest MAV_RESULT of each MAV_CMD.
     """
 
     def __init__(
@@ -71,7 +68,6 @@ class CommandClient:
         self._texts = texts
         self._locks: dict[int, asyncio.Lock] = {}
         self._waiting: dict[int, Pending[int]] = {}
-        self.last_acks: dict[int, int] = {}
         router.subscribe("COMMAND_ACK", self._on_ack)
 
     async def send(
@@ -146,7 +142,6 @@ class CommandClient:
             return
         if message.target_component not in (0, self._settings.source_component):
             return
-        self.last_acks[message.command] = message.result
         answers = self._waiting.get(message.command)
         if answers is not None:
             answers.put(message.result)
