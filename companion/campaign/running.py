@@ -53,6 +53,7 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         ConfigError: the file is wrong, the campaign is too large, or the folder cannot be used.
         MissingExtraError: the extra `campaign` is not installed.
+        OSError: the results cannot be written.
     """
     require_packages()
     path: Path = options.file
@@ -64,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
             )
         path, out = path / folder.FILE, path
     campaign = load(path)
-    place = out or folder.new_name(campaign)
+    place = out or folder.new_path(campaign)
     console = Console(highlight=False, soft_wrap=True)
     try:
         return _Run(campaign, place, options, console).run()
@@ -135,7 +136,7 @@ class _Run:
         return len(cases), case_s
 
     def _begun(self, cases: int, case_s: float | None, workers: int) -> Description:
-        """Open the campaign's folder: the existing one, or a new one."""
+        """Continue the campaign in its folder, or write the folder of a new one."""
         if folder.begun(self._place):
             return folder.resume(self._place, self._campaign)
         unit = 1 if case_s is None else size_of_units(cases, case_s, workers)

@@ -51,7 +51,7 @@ def _values(results: Results, row: int) -> str:
 
 
 def configuration(campaign: Campaign) -> Table:
-    """What all cases share: all limits, and the keys that are not the default; no swept keys."""
+    """What all cases share: limits, and keys that are not the default; without swept keys."""
     swept = {key for name, each in campaign.file.sweep.items() for key in each.keys or (name,)}
     rows = [
         (f"{key.section}.{key.name}", json.dumps(key.value), json.dumps(key.default), key.unit)
@@ -71,7 +71,7 @@ def configuration(campaign: Campaign) -> Table:
 
 
 def success_by_factor(results: Results, order: Sequence[str]) -> Table:
-    """Success rate and median error by level of each factor, the most influential factor first."""
+    """Success rate, median error and median body rate by level of the most influential factors."""
     rows = [row for name in order[:_MOST_FACTORS] for row in _by_level(results, name)]
     documented = "as_documented" in results.columns and "fault" in results.factors
     header = ["factor", "value", results.noun, "good (95 % interval)"]
