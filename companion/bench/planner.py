@@ -52,7 +52,7 @@ class _Fleet(NamedTuple):
 
 
 def run(seconds: float, as_json: bool) -> dict[str, Any]:
-    """Measure every planner, interleaved with the baselines.
+    """Measure every planner without memory, interleaved with the baselines.
 
     Args:
         seconds: Time of measuring without compiling, s; at least one round is measured.
