@@ -19,4 +19,4 @@ def flight() -> Path:
         doublets = {"flight": {"maneuvers": ["identify"]}, "planner": {"name": "first-order"}}
         config = changed(load(shipped("mock-px4.yaml")), doublets, "doublets")
         fly(config, MockVehicle("px4"), Path("flights/doublets"))
-    return max(Path("flights").glob("*/flight.tlog")).parent
+    return max(Path("flights").glob("*/flight.tlog"), key=lambda log: log.stat().st_mtime).parent

@@ -13,7 +13,7 @@ from typing import Any
 from companion.campaign import store
 from companion.campaign.campaign import Campaign
 from companion.campaign.loading import as_written
-from companion.campaign.versions import VersionError, Versions, as_found, difference, versions
+from companion.campaign.versions import VersionError, Versions, as_versions, difference, versions
 from companion.files import bounded_yaml
 from companion.files.bounded_file import FileRefusedError, read_text
 from companion.files.bounded_yaml import YamlError
@@ -96,7 +96,7 @@ def read_description(folder: Path) -> Description:
     path = folder / _DESCRIPTION
     try:
         told = json.loads(read_text(path, _MOST_BYTES))
-        return Description(**{**told, "versions": as_found(told["versions"])})
+        return Description(**{**told, "versions": as_versions(told["versions"])})
     except FileRefusedError as error:
         raise ConfigError(f"{folder}: no campaign was begun here: {error}") from error
     except (ValueError, TypeError, KeyError, RecursionError) as error:
