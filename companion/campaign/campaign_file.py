@@ -77,7 +77,7 @@ class CampaignLimits(Section):
     max_hours: Annotated[float, Field(gt=0.0, le=10_000.0)] = 4.0
     """Longest estimated time of the campaign; without effect on at most two cases per worker."""
     flight_s: Annotated[float, Field(ge=1.0, le=36_000.0)] = 600.0
-    """Longest flight, in vehicle time from boot. A longer one is ended, and is not good."""
+    """Longest flight, s of vehicle time from boot. A longer one is ended, and is not good."""
 
 
 class CampaignFile(Section):

@@ -71,11 +71,14 @@ def make(folder: Path, campaign: Campaign, description: Description) -> None:
     """Write the folder of a new campaign.
 
     Raises:
-        ConfigError: it cannot be written, or holds other files.
+        ConfigError: it cannot be written, or holds files already.
     """
     try:
         if folder.exists() and any(path.name != _LOCK for path in folder.iterdir()):
-            raise ConfigError(f"{folder}: holds files that are not those of a campaign")
+            raise ConfigError(
+                f"{folder}: holds files, but no campaign that was begun; name another folder with "
+                "--out, or empty this one"
+            )
         store.write_campaign(folder, campaign, bounded_yaml.dump(as_written(campaign)))
         write_whole(folder / _DESCRIPTION, json.dumps(asdict(description), indent=2) + "\n")
     except OSError as error:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from companion.campaign.campaign import Campaign
 from companion.campaign.campaign_file import CampaignFile
 from companion.campaign.swept import Value
-from companion.files.write_whole import write_whole
+from companion.files.write_whole import sync_folder, write_whole
 from companion.files.yaml_file import ConfigError
 
 if TYPE_CHECKING:
@@ -157,6 +157,7 @@ def write_unit(
         finally:
             os.close(descriptor)
         temporary.replace(path)
+        sync_folder(path.parent)
     finally:
         temporary.unlink(missing_ok=True)
 
