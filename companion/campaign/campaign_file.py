@@ -17,6 +17,8 @@ NO_FAULT = "none"
 """Value of the factor `fault` for a flight without a fault."""
 FAULT, FAULT_PHASE, FAULT_AFTER = "fault", "fault.phase", "fault.after_s"
 """Factors that choose a fault scenario, the phase in which it begins, and when in this phase."""
+FAULT_FACTORS = (FAULT, FAULT_PHASE, FAULT_AFTER)
+"""Factors that are not keys of a configuration."""
 _AFTER = {
     "stream": 0.0,
     "arm": 0.0,
@@ -75,7 +77,7 @@ class CampaignLimits(Section):
     max_hours: Annotated[float, Field(gt=0.0, le=10_000.0)] = 4.0
     """Longest estimated time of the campaign; without effect on at most two cases per worker."""
     flight_s: Annotated[float, Field(ge=1.0, le=36_000.0)] = 600.0
-    """Longest flight, in vehicle time from boot. A longer one is ended, and is not good."""
+    """Longest flight, s of vehicle time from boot. A longer one is ended, and is not good."""
 
 
 class CampaignFile(Section):

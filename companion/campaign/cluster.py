@@ -10,7 +10,7 @@ from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from companion.campaign.unit import Flown
-from companion.campaign.versions import VersionError, as_found, require_equal, versions
+from companion.campaign.versions import VersionError, as_versions, require_equal, versions
 from companion.extras import require
 from companion.files.yaml_file import ConfigError
 
@@ -165,7 +165,7 @@ def _compare_versions(client: "Client") -> None:
                 f"the worker {address} cannot run this version of companion ({found}): install the "
                 "same version there"
             )
-        require_equal(versions(), as_found(found), f"the worker {address}")
+        require_equal(versions(), as_versions(found), f"the worker {address}")
 
 
 def _of_dask(told: Mapping[str, Any]) -> dict[str, str]:

@@ -13,7 +13,7 @@ from typing import Any
 from companion.campaign import store
 from companion.campaign.campaign import Campaign
 from companion.campaign.loading import as_written
-from companion.campaign.versions import VersionError, Versions, as_found, difference, versions
+from companion.campaign.versions import VersionError, Versions, as_versions, difference, versions
 from companion.files import bounded_yaml
 from companion.files.bounded_file import FileRefusedError, read_text
 from companion.files.bounded_yaml import YamlError
@@ -71,11 +71,14 @@ def make(folder: Path, campaign: Campaign, description: Description) -> None:
     """Write the folder of a new campaign.
 
     Raises:
-        ConfigError: it cannot be written, or holds other files.
+        ConfigError: it cannot be written, or holds files already.
     """
     try:
         if folder.exists() and any(path.name != _LOCK for path in folder.iterdir()):
-            raise ConfigError(f"{folder}: holds files that are not those of a campaign")
+            raise ConfigError(
+                f"{folder}: holds files, but no campaign that was begun; name another folder with "
+                "--out, or empty this one"
+            )
         store.write_campaign(folder, campaign, bounded_yaml.dump(as_written(campaign)))
         write_whole(folder / _DESCRIPTION, json.dumps(asdict(description), indent=2) + "\n")
     except OSError as error:
@@ -96,7 +99,7 @@ def read_description(folder: Path) -> Description:
     path = folder / _DESCRIPTION
     try:
         told = json.loads(read_text(path, _MOST_BYTES))
-        return Description(**{**told, "versions": as_found(told["versions"])})
+        return Description(**{**told, "versions": as_versions(told["versions"])})
     except FileRefusedError as error:
         raise ConfigError(f"{folder}: no campaign was begun here: {error}") from error
     except (ValueError, TypeError, KeyError, RecursionError) as error:

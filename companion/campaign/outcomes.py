@@ -43,7 +43,10 @@ or its thrust is at most the lower limit divided by this share.
 
 
 def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
-    """Tracking error in the maneuvers by the true and the estimated position, m; largest tilt, rad.
+    """Tracking errors by the true and the estimated position, m, and the largest true tilt, rad.
+
+    Errors are those of maneuvers in closed loop, each without the time left out at its beginning.
+    Without such a maneuver the result is empty.
 
     Args:
         summary: summary of the flight.

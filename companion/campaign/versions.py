@@ -88,6 +88,6 @@ def require_equal(ours: Versions, others: Versions, who: str) -> None:
         )
 
 
-def as_found(told: Any) -> Versions:
+def as_versions(told: Any) -> Versions:
     """Versions from JSON or from another process, all converted to text."""
     return {str(name): str(value) for name, value in told.items()} if isinstance(told, dict) else {}

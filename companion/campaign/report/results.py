@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from companion.campaign import store
 from companion.campaign.folder import read_description
-from companion.campaign.store import unit
+from companion.campaign.store import physical_unit
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -48,7 +48,7 @@ LABELS = {
 def label(name: str) -> str:
     """Name and unit of an outcome or a factor on the page."""
     told = LABELS.get(name, name)
-    return f"{told}, {unit(name)}" if unit(name) else told
+    return f"{told}, {physical_unit(name)}" if physical_unit(name) else told
 
 
 @dataclass(frozen=True)

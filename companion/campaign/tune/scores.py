@@ -20,7 +20,7 @@ class Score(NamedTuple):
 
     Attributes:
         true: RMS of the true horizontal distance from the reference in each case, m; infinite where
-            a case was not flown to its end.
+            a case was not flown to its end, or had no maneuver in closed loop.
         estimated: the same distance by the estimated position, which is all that the program knows
             in flight.
         estimate: RMS of the horizontal distance between true and estimated position, m; infinite as

@@ -40,7 +40,9 @@ _FIRST_SHARE = 4
 """A candidate flies the first 1/4 of its cases, at least `_FEWEST`, before the others."""
 _FEWEST = 2
 _HOPELESS = 1.3
-"""A candidate is abandoned when its error exceeds that of the best one by this factor."""
+"""A candidate is abandoned when its error on the first cases is more than this factor times that of
+the best candidate on the same cases.
+"""
 _UNFLOWN = 10.0
 """Largest error of a flight as Optuna sees it, m; the error of a flight that ended early."""
 _VALUES, _SCORE, _MISSED, _WHOLE = "values", "score", "missed", "whole"
@@ -66,8 +68,8 @@ class Found:
     """The results of a search so far.
 
     Attributes:
-        tried: number of all candidates, including those that were abandoned.
-        stopped_early: number of candidates that were abandoned.
+        tried: number of all candidates, including those of `stopped_early`.
+        stopped_early: number of candidates that were abandoned, or whose keys were refused.
         best: of the candidates that met the constraint (`inside_share`) the one with the smallest
             error; None: none met it.
         near: the best tenth of the candidates that met the constraint, at least three if there are

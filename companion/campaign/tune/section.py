@@ -16,8 +16,9 @@ class Tune(Section):
     trials: Annotated[int, Field(ge=1, le=100_000)] = 100
     """Number of candidates that are tried; `--trials` replaces it."""
     envelope_m: Annotated[float, Field(gt=0.0, le=1000.0)] | None = 1.0
-    """Largest true distance from the reference, height included, for a flight that reaches its end
-    to count as inside the envelope. null: every flight that reaches its end counts as inside.
+    """Largest true distance from the reference (`position_max_m` of the results) for a flight that
+    reaches its end to count as inside the envelope. null: every flight that reaches its end counts
+    as inside.
     """
     inside_share: Annotated[float, Field(gt=0.0, le=1.0)] = 0.999
     """Share of the flights that must stay inside the envelope."""

@@ -43,7 +43,7 @@ def summary_lines(result: Result) -> list[str]:
     envelope = "to its end" if tune.envelope_m is None else f"within {tune.envelope_m:g} m"
     lines = [
         f"{found.tried} candidates over {cases} flights each, {found.stopped_early} of them "
-        f"stopped early; candidate {best.number} is the best.",
+        f"refused or stopped early; candidate {best.number} is the best.",
         f"Constraint: {tune.inside_share:.1%} of the flights {envelope}; in the search "
         f"{best.score.share:.1%} were.",
         f"RMS of the true horizontal error in the search: {best.score.rms:.3f} m.",
@@ -81,8 +81,8 @@ def _certainty(result: Result) -> Iterator[str]:
         f"the reference, and {floor:.3f} -> {floor_after:.3f} m from the true one."
     )
     yield (
-        "No gain or weight reduces the last: it is the autopilot's estimate. Only "
-        "guidance.position_lateness_ms reduces it, where the estimate is late."
+        "The last is the error of the position estimate, which gains and weights hardly change; "
+        "where the estimate is late, guidance.position_lateness_ms reduces it."
     )
     if told.ratio.high >= 1.0:
         yield "The interval holds 1: fly more samples before you believe that it is better."
