@@ -15,6 +15,7 @@ import yaml
 _MOST_BYTES = 250_000
 _MOST_NODES = 6000
 _DEEPEST = 20
+"""Largest number of nested levels."""
 _LONGEST = 5000  # characters of a value
 
 _PLAIN = {

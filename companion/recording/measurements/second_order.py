@@ -15,6 +15,7 @@ Floats = NDArray[np.float64]
 _GAP = 0.5
 """Rows further apart than this belong to different runs, s."""
 _FEWEST = 10
+"""A run has more rows than this."""
 
 
 class StepRun(NamedTuple):
