@@ -9,6 +9,7 @@ from typing import Any
 from companion.campaign.campaign_file import (
     FAULT,
     FAULT_AFTER,
+    FAULT_FACTORS,
     FAULT_PHASE,
     NO_FAULT,
     TRAJECTORY,
@@ -22,9 +23,6 @@ from companion.campaign.swept import Value, column_value
 from companion.config import Config
 from companion.files.yaml_file import ConfigError
 from companion.testing.settings import complete_mock
-
-_OWN = (FAULT, FAULT_PHASE, FAULT_AFTER)
-"""Factors that are not keys of a configuration."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +68,7 @@ class Campaign:
         factors = {name: _shown(name, value) for name, value in sample.values.items()}
         changes: dict[str, Any] = {}
         for name, value in sample.values.items():
-            if name not in _OWN:
+            if name not in FAULT_FACTORS:
                 for key in self.file.sweep[name].keys or (name,):
                     changes[key] = self._value(name, key, value)
         try:

@@ -17,6 +17,8 @@ NO_FAULT = "none"
 """Value of the factor `fault` for a flight without a fault."""
 FAULT, FAULT_PHASE, FAULT_AFTER = "fault", "fault.phase", "fault.after_s"
 """Factors that choose a fault scenario, the phase in which it begins, and when in this phase."""
+FAULT_FACTORS = (FAULT, FAULT_PHASE, FAULT_AFTER)
+"""All factors that are not keys of a configuration."""
 _AFTER = {
     "stream": 0.0,
     "arm": 0.0,

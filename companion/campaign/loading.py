@@ -9,6 +9,7 @@ from companion.campaign.campaign import Campaign
 from companion.campaign.campaign_file import (
     FAULT,
     FAULT_AFTER,
+    FAULT_FACTORS,
     FAULT_PHASE,
     MANEUVERS,
     NO_FAULT,
@@ -27,7 +28,6 @@ from companion.testing.settings import complete_mock
 
 FILES = "trajectories"
 """Folder of the trajectory files within the folder of a campaign."""
-_OWN = (FAULT, FAULT_PHASE, FAULT_AFTER)
 
 
 def load(path: Path) -> Campaign:
@@ -67,13 +67,13 @@ class _Reading:
         swept = [
             key
             for key, each in file.sweep.items()
-            if key not in _OWN
+            if key not in FAULT_FACTORS
             for key in each.keys or (key,)
         ]
         for key in file.set:
             check_key(key, base, self._at("set", key))
         for key, each in file.sweep.items():
-            for changed in () if key in _OWN else each.keys or (key,):
+            for changed in () if key in FAULT_FACTORS else each.keys or (key,):
                 check_key(changed, base, self._at("sweep", key))
         for key in () if file.tune is None else file.tune.search:
             check_key(key, base, self._at("tune", "search", key))
@@ -175,7 +175,7 @@ class _Reading:
                 raise ConfigError(f"{name}: faults.{scenario}: {error}") from error
         self._check_words(FAULT, (NO_FAULT, *file.faults))
         self._check_words(FAULT_PHASE, get_args(FaultPhase))
-        for key in _OWN[1:]:
+        for key in (FAULT_PHASE, FAULT_AFTER):
             if key in file.sweep and FAULT not in file.sweep:
                 raise ConfigError(f"{name}: sweep.{key} needs sweep.{FAULT}")
         after = file.sweep.get(FAULT_AFTER)
