@@ -44,6 +44,7 @@ class VehicleParts(NamedTuple):
     links: list[Link]
     ready_us: int
     """Vehicle time from which arming is possible."""
+    settings: VehicleSettings
 
 
 class Rules(NamedTuple):

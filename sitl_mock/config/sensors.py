@@ -125,6 +125,9 @@ class SensorConfig(Section):
     low pass. The default is PX4's; ArduPilot's is 11."""
     position_delay_ms: NonNegative = 10.0
     """Age of the estimated position and velocity."""
+    stamp_slips_hz: Annotated[float, Field(ge=0.0, le=20.0)] = 0.0
+    """How often the stamp of LOCAL_POSITION_NED slips by 1 ms against its position, back or forth:
+    ArduPilot takes the time, in whole milliseconds, when it writes the message."""
 
     @field_validator("ekf", mode="before")
     @classmethod
