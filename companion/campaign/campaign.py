@@ -9,6 +9,7 @@ from typing import Any
 from companion.campaign.campaign_file import (
     FAULT,
     FAULT_AFTER,
+    FAULT_FACTORS,
     FAULT_PHASE,
     NO_FAULT,
     TRAJECTORY,
@@ -23,19 +24,17 @@ from companion.config import Config
 from companion.files.yaml_file import ConfigError
 from companion.testing.settings import complete_mock
 
-_OWN = (FAULT, FAULT_PHASE, FAULT_AFTER)
-"""Factors that are not keys of a configuration."""
-
 
 @dataclass(frozen=True)
 class Campaign:
     """A campaign.
 
     Attributes:
-        file: content of the campaign file; every path in it is a key of `files`.
-        base: configuration before the sweep, changed by the keys of `set`.
-        files: the text of each file that a flight reads, by its path relative to a folder.
-        name: name of the file, for messages.
+        file: content of the campaign file; a trajectory in its `sweep` is a key of `files`.
+        base: configuration before the sweep, changed by the keys of `set`. Its trajectory, if any,
+            is a key of `files`.
+        files: the text of each file that a flight reads, by its path in the campaign's folder.
+        name: path of the campaign file, for messages.
     """
 
     file: CampaignFile
@@ -70,7 +69,7 @@ class Campaign:
         factors = {name: _shown(name, value) for name, value in sample.values.items()}
         changes: dict[str, Any] = {}
         for name, value in sample.values.items():
-            if name not in _OWN:
+            if name not in FAULT_FACTORS:
                 for key in self.file.sweep[name].keys or (name,):
                     changes[key] = self._value(name, key, value)
         try:
@@ -149,5 +148,5 @@ def _check_flyable(config: Config) -> None:
 
 
 def _shown(name: str, value: Any) -> Value:
-    """A value as written in the results; for a trajectory file its name."""
+    """A value as written in the results; a trajectory file by its name without the ending."""
     return Path(value).stem if name == TRAJECTORY and value is not None else column_value(value)

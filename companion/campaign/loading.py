@@ -9,6 +9,7 @@ from companion.campaign.campaign import Campaign
 from companion.campaign.campaign_file import (
     FAULT,
     FAULT_AFTER,
+    FAULT_FACTORS,
     FAULT_PHASE,
     MANEUVERS,
     NO_FAULT,
@@ -27,7 +28,6 @@ from companion.testing.settings import complete_mock
 
 FILES = "trajectories"
 """Folder of the trajectory files within the folder of a campaign."""
-_OWN = (FAULT, FAULT_PHASE, FAULT_AFTER)
 
 
 def load(path: Path) -> Campaign:
@@ -67,13 +67,13 @@ class _Reading:
         swept = [
             key
             for key, each in file.sweep.items()
-            if key not in _OWN
+            if key not in FAULT_FACTORS
             for key in each.keys or (key,)
         ]
         for key in file.set:
             check_key(key, base, self._at("set", key))
         for key, each in file.sweep.items():
-            for changed in () if key in _OWN else each.keys or (key,):
+            for changed in () if key in FAULT_FACTORS else each.keys or (key,):
                 check_key(changed, base, self._at("sweep", key))
         for key in () if file.tune is None else file.tune.search:
             check_key(key, base, self._at("tune", "search", key))
@@ -106,10 +106,11 @@ class _Reading:
         return load_config(self._folder / told)
 
     def _flyable(self, base: Config) -> Config:
-        """Adapt the base to a flight in memory: the program arms, its trajectory is collected.
+        """Adapt the base to a flight in memory: the program arms, its trajectory is copied.
 
         Raises:
-            ConfigError: the configuration needs a link that only a real vehicle has.
+            ConfigError: the configuration needs the MAVSDK link or signing, or its trajectory
+                cannot be read.
         """
         if base.link.backend != "direct":
             raise ConfigError(f"{self._path}: link.backend must be direct in a campaign")
@@ -175,7 +176,7 @@ class _Reading:
                 raise ConfigError(f"{name}: faults.{scenario}: {error}") from error
         self._check_words(FAULT, (NO_FAULT, *file.faults))
         self._check_words(FAULT_PHASE, get_args(FaultPhase))
-        for key in _OWN[1:]:
+        for key in (FAULT_PHASE, FAULT_AFTER):
             if key in file.sweep and FAULT not in file.sweep:
                 raise ConfigError(f"{name}: sweep.{key} needs sweep.{FAULT}")
         after = file.sweep.get(FAULT_AFTER)
@@ -202,7 +203,7 @@ def _with_trajectory(config: Config, path: Path) -> Config:
 
 
 def as_written(campaign: Campaign) -> dict[str, Any]:
-    """The resolved text of the campaign file: configuration keys and all defaults written out."""
+    """The keys of the resolved campaign file: configuration and all defaults written out."""
     data = campaign.file.model_dump(mode="json")
     if campaign.file.tune is None:
         del data["tune"]  # a section without keys would be read as an empty one

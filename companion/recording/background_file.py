@@ -54,13 +54,15 @@ class BackgroundFile(ABC, Generic[T]):
 
     Attributes:
         path: path of the file.
-        dropped: items that were not written because too many waited, or writing had failed.
+        dropped: number of items that were not written, because too many waited, writing had failed,
+            or (`FlightRecorder`) an item could not be encoded.
         failure: why writing ended early, for example a full disk; None: it did not.
 
     Args:
         path: path of the file.
         most_waiting: largest number of waiting items; further ones are dropped.
-        on_failure: called once, from the writing thread, when the file cannot be written any more.
+        on_failure: called once, with `failure`, when the file cannot be written any more: from the
+            writing thread, or from `close` if the disk does not answer.
     """
 
     def __init__(
@@ -101,7 +103,7 @@ class BackgroundFile(ABC, Generic[T]):
         return len(self._waiting)
 
     def put(self, item: T) -> None:
-        """Take one item."""
+        """Take one item, or drop it if too many wait."""
         if len(self._waiting) < self._most_waiting:
             self._waiting.append(item)
         else:

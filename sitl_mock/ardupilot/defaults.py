@@ -62,7 +62,7 @@ _PARAMETERS: tuple[tuple[str, int | float, int], ...] = (
     ("LOIT_SPEED", 1250.0, _REAL32),
     ("MAV_GCS_SYSID", 255, _INT16),  # *
     ("MAV_OPTIONS", 0, _INT16),
-    ("MAV_SYSID", 1, _INT16),
+    ("MAV_SYSID", 1, _INT16),  # *
     ("MAV1_EXTRA1", 0, _INT16),
     ("MAV1_POSITION", 0, _INT16),
     ("MOT_BAT_VOLT_MAX", 12.8, _REAL32),

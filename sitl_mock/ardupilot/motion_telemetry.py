@@ -22,7 +22,8 @@ _SENT = (
     dialect.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW,
     dialect.MAVLINK_MSG_ID_VIBRATION,
 )
-"""Messages that ArduCopter sends as PX4 does, apart from ODOMETRY and ALTITUDE, which it lacks."""
+"""Messages that ArduCopter builds as PX4 does; ATTITUDE_TARGET differs if rates are shaped. It has
+no ODOMETRY and no ALTITUDE."""
 
 
 class ArduPilotMotionTelemetry(MotionTelemetry):

@@ -29,7 +29,7 @@ class MotionTelemetry:
 
     Args:
         state: the autopilot's state.
-        vehicle: the vehicle, for rotors and reset counter.
+        vehicle: the vehicle, for rotors, reset counter and ArduPilot's shaped attitude target.
         origin: origin of the local frame.
     """
 

@@ -20,7 +20,7 @@ class EkfConfig(Section):
     fix_period_ms: Annotated[float, Field(ge=20.0, le=1000.0)] = 125.0
     """Time between two satellite fixes."""
     fix_delay_ms: Annotated[float, Field(ge=0.0, le=500.0)] = 110.0
-    """Age of the motion at the filter's fusion time."""
+    """Delay of the filter's fusion time; at least ``position_delay_ms``."""
     position_late_ms: Finite = 0.0
     """Unmodelled delay of a fix's position."""
     velocity_late_ms: Finite = 0.0
@@ -70,15 +70,15 @@ class EkfConfig(Section):
     predictor_ms: Positive = 250.0
     """Time constant with which the output predictor applies a correction of position or speed."""
     heading_predictor_ms: Positive = 250.0
-    """Time constant with which it applies a correction of the heading."""
+    """Time constant with which the output predictor applies a correction of the heading."""
 
 
 EKFS: dict[str, EkfConfig | None] = {
     "none": None,
     "px4": EkfConfig(),
     # Fitted to the errors of position and velocity, sample by sample, in circles at 2, 5, 8 and
-    # 10 m/s and figure-eights at 5 and 8 m/s. What is left of them is 0.01 to 0.03 m and 0.02 to
-    # 0.03 m/s, 14 to 35 % of their size but at 2 m/s.
+    # 10 m/s and figure-eights at 5 and 8 m/s. The fit leaves 0.01 to 0.03 m and 0.02 to 0.03 m/s
+    # unexplained: 14 to 35 % of the errors, and more at 2 m/s.
     "ardupilot": EkfConfig(
         fix_period_ms=200.0,
         fix_delay_ms=447.0,
@@ -109,10 +109,15 @@ EKFS: dict[str, EkfConfig | None] = {
 
 
 class SensorConfig(Section):
-    """Errors of the autopilot's estimate: white noise (standard deviations) and delays."""
+    """Errors of the autopilot's estimate: white noise (standard deviations) and delays.
+
+    With a navigation filter the defaults of ``position_noise_m``, ``velocity_noise_m_s`` and
+    ``position_delay_ms`` are 0 (`settings.SMOOTH`).
+    """
 
     ekf: EkfConfig | None = None
-    """Navigation filter whose errors are added: px4, ardupilot, none, or keys of its own."""
+    """Navigation filter whose errors are added: px4, ardupilot, none, or the keys of `EkfConfig`.
+    The default of a vehicle (`MockSettings`) is that of its autopilot."""
     attitude_noise_deg: NonNegative = 0.02
     rate_noise_rad_s: NonNegative = 0.002
     position_noise_m: NonNegative = 0.01

@@ -20,7 +20,7 @@ class UdpEndpoint:
         option: command-line option of the port, for the error message.
 
     Raises:
-        ConfigError: the local port is in use.
+        ConfigError: the local port cannot be bound, for example because it is in use.
     """
 
     def __init__(self, local_port: int, remote_port: int | None, option: str) -> None:
@@ -72,7 +72,7 @@ class UdpEndpoint:
             self.socket.sendto(datagram, address)
 
     def send(self, datagrams: list[bytes]) -> None:
-        """Send to the partner; datagrams that the network refuses are dropped."""
+        """Send to the partner; datagrams that the kernel refuses are dropped."""
         if self._partner is None:
             return
         for datagram in datagrams:

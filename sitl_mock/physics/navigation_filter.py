@@ -24,7 +24,8 @@ _GRAVITY = 9.80665
 _SAG_S = 2.0
 """Time constant with which errors of height and climb follow the acceleration, s."""
 _SLOW = 0.5
-"""Below this speed, m/s, the course does not correct the heading."""
+"""Smallest speed by which the turn rate of the course is computed, m/s: the course of a slower
+vehicle would seem to turn infinitely fast."""
 _COMPASS_S = 20.0
 """Time constant with which the heading follows the compass without acceleration, s."""
 _UNCERTAINTY = 0.1

@@ -57,7 +57,7 @@ class EventLog:
         """Send a new event.
 
         Args:
-            event_id: see `px4_events.event_id`.
+            event_id: see `sitl_mock.px4.events.event_id`.
             severity: MAV_SEVERITY for the user; 8 = for programs only.
             internal: MAV_SEVERITY for the vehicle's log; None = the same.
             arguments: packed arguments.

@@ -12,6 +12,8 @@ MISTAKES = {
     "lockstep: {enable: true}": ("mock.lockstep.enable", "did you mean enabled?"),
     "parameters: {COM_OBL_RC_AC: 3}": ("COM_OBL_RC_AC", "did you mean COM_OBL_RC_ACT?"),
     "parameters: {COM_OBL_RC_ACT: 3.5}": ("COM_OBL_RC_ACT is an integer",),
+    "parameters: {MPC_XY_VEL_MAX: 1.0e+300}": ("MPC_XY_VEL_MAX cannot be as large as 1e+300",),
+    "parameters: {NAV_RCL_ACT: 1.0e+12}": ("NAV_RCL_ACT cannot be as large as 1e+12",),
     "mass_kg: 2": ("line 2: mock.mass_kg stands in the wrong place; write mock.airframe.mass_kg",),
     "prearm_delay_s: 5 s": ("line 2: mock.prearm_delay_s must be a number: write 5 without 's'",),
     "wind:\n    speed_m_s: fast": ("line 3: mock.wind.speed_m_s must be a number: write digits",),

@@ -15,8 +15,8 @@ _CHUNK = 1 << 20
 class McapWriter:
     """A `.mcap` file open for writing. Only one thread may use it.
 
-    Each `flush` writes a chunk. A file that ends after a chunk can be read without the index, which
-    `close` writes at its end.
+    Each `flush` writes a chunk, and so does each MiB of messages. A file that ends after a chunk
+    can be read without the index, which `close` writes at its end.
 
     Args:
         path: file to create.
@@ -66,7 +66,7 @@ class McapWriter:
         os.fsync(self._file.fileno())
 
     def close(self, *, complete: bool = True) -> None:
-        """Close the file, and complete it by its index unless a write has failed.
+        """Close the file; if `complete`, write its index first. Without that it counts as cut off.
 
         Raises:
             OSError: the disk is full, or failed.

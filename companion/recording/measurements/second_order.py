@@ -58,11 +58,12 @@ def step_runs(rows: Floats) -> list[StepRun]:
 _ENOUGH = 600
 """Approximate number of rows used to find the model."""
 _LAG, _DAMPING, _DEAD_TIME = (0.02, 4.0), (0.2, 10.0), (0.0, 0.5)
-"""Ranges in which 2ζ/ω (s), ζ and the dead time (s) are searched. ζ = 10 is first order."""
+"""Ranges in which 2ζ/ω (s), ζ and the dead time (s) are searched. ζ = 10 is almost first order."""
 _TRIED_LAGS, _TRIED_DAMPINGS = np.geomspace(0.05, 1.0, 5), (0.7, 1.5)
 _TRIED_DEAD_TIMES = (0.0, 0.04, 0.1, 0.2)
-_UNANSWERED = 0.03
-"""Shortest dead time of a vehicle, s; before it, a step has no effect."""
+_BEFORE_EFFECT = 0.03
+"""Time after the first step in which it is assumed to have no effect, s. It gives the coefficients
+and the speed from which the model starts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +136,7 @@ class Course(NamedTuple):
     def of(cls, run: StepRun, thinning: int = 1) -> "Course":
         """The course of a run at every `thinning`-th row."""
         since, steps = run.time - run.time[0], run.steps()
-        early = since <= _UNANSWERED
+        early = since <= _BEFORE_EFFECT
         columns = np.column_stack((np.ones(int(early.sum())), since[early]))
         start, _ = project(columns, run.measured[early])
         changes = np.array([step.time[0] for step in steps]) - run.time[0]
