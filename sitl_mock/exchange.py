@@ -102,8 +102,8 @@ class Exchange:
     def is_repeated_answer(self, messages: list[Message]) -> bool:
         """Whether this datagram only answers an earlier beacon, which was sent twice.
 
-        The number of beacons depends on the wall clock. The faults of the link count datagrams, so
-        they must not see the second answer.
+        The number of beacons depends on the wall clock. The link faults draw a random number for
+        each datagram, so a second answer would make the flight depend on the wall clock, too.
         """
         now_ms = self._simulation.time_us // 1000
         return (

@@ -19,6 +19,7 @@ T = TypeVar("T")
 Item_contra = TypeVar("Item_contra", contravariant=True)
 
 _PERIOD = 0.05
+"""Time between two checks for new items, s."""
 _SLICE = 20
 """Number of items in a slice, if few are waiting."""
 _MOST_SLICES = 50

@@ -17,6 +17,7 @@ from companion.recording.mcap_file.loop_channels import ACTION, ACTIONS
 from companion.recording.mcap_file.writer import McapWriter
 
 _MOST_WAITING = 50_000
+"""Largest number of entries that wait to be written."""
 _INFORMATION, _WARNING = 2, 3
 
 Encoder = Callable[[McapWriter, int, Any], None]

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _CHUNK_ROWS = 1024
+"""Number of rows that are written at a time."""
 _MOST_WAITING = 64
 """Largest number of chunks that wait for a slow disk; further ones are lost and counted."""
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from companion.recording.background_file import BackgroundFile
 
 _MOST_WAITING = 20_000
+"""Largest number of frames that wait to be written."""
 _STAMP = struct.Struct(">Q")
 
 Record = tuple[float, bytes]

@@ -98,7 +98,8 @@ ARDUPILOT_TYPES = {name: int(kind) for name, _, kind in _PARAMETERS}
 BURST_MS = 5.6
 """Period of the bursts of the simulator's telemetry (measured: 5.4 to 5.8)."""
 ROTOR_LAG_MS = 22.5
-"""Time constant of the specific thrust (measured: 5 ms after a dead time of 15 ms)."""
+"""Time constant of the specific thrust. It stands for what was measured: 5 ms after a dead time of
+15 ms."""
 
 RATE_LAG_MS = 11.0
 """Delay of the gyro's low pass (measured)."""

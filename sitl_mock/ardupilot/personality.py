@@ -37,6 +37,7 @@ LANDED_AFTER_US = 1_000_000
 POSITION_TIMEOUT_US = 10_000_000
 """Time for which the position stays valid without GPS, us; not measured."""
 DEFAULT_LOOP_HZ = 400.0
+"""Rate of the main loop if SCHED_LOOP_RATE is not configured."""
 _HOME = (dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, dialect.MAVLINK_MSG_ID_HOME_POSITION)
 _BOOT_RATES = {dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0, dialect.MAVLINK_MSG_ID_TIMESYNC: 0.1}
 _SUPPORTED = frozenset(

@@ -110,7 +110,11 @@ class VehicleSettings(Section):
         return endpoint
 
     def for_vehicle(self, index: int) -> Self:
-        """Return the settings of the vehicle with this index: its own ports and its own seed."""
+        """Return the settings of the vehicle with this index: its own ports and its own seed.
+
+        Raises:
+            ConfigError: its TCP port would be above 65535.
+        """
         return self.model_copy(
             update={
                 "port": self.port + index,

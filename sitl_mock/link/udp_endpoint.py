@@ -20,13 +20,19 @@ class UdpEndpoint:
         option: command-line option of the port, for the error message.
 
     Raises:
-        ConfigError: the local port cannot be bound, for example because it is in use.
+        ConfigError: there is no such local port, or it cannot be bound, for example because it is
+            in use.
     """
 
     def __init__(self, local_port: int, remote_port: int | None, option: str) -> None:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self.socket.bind((HOST, local_port))
+        except OverflowError as error:
+            self.socket.close()
+            raise ConfigError(
+                f"there is no UDP port {local_port}; choose a smaller {option}"
+            ) from error
         except OSError as error:
             self.socket.close()
             raise ConfigError(

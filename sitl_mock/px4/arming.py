@@ -70,7 +70,7 @@ class ArmingChecks:
         return found
 
     def report(self, *, gcs_alive: bool, pilot: bool) -> None:
-        """Send the health report if it changed and is due."""
+        """Send the health report if it changed and is due: see `HealthReport.step`."""
         self._health.step(
             offboard_alive=self.offboard_alive,
             pilot=pilot,

@@ -1,5 +1,7 @@
 """The configuration: defaults, and each kind of mistake told in one sentence, exit code 2."""
 
+import os
+
 import pytest
 
 from sitl_mock.__main__ import main
@@ -46,6 +48,19 @@ def test_what_is_no_mapping(text, tmp_path):
     path.write_text(text)
     with pytest.raises(ConfigError, match=r"mock\.yaml"):
         load_settings(path, {})
+
+
+def test_a_file_that_is_no_text_file(tmp_path):
+    (tmp_path / "binary.yaml").write_bytes(b"mock: \xff")
+    (tmp_path / "large.yaml").write_bytes(b"#" * 250_001)
+    os.mkfifo(tmp_path / "pipe.yaml")
+    for name, words in (
+        ("pipe.yaml", "is not a regular file"),
+        ("binary.yaml", "is not text in UTF-8"),
+        ("large.yaml", "is larger than 250 kB"),
+    ):
+        with pytest.raises(ConfigError, match=f"{name}: {words}$"):
+            load_settings(tmp_path / name, {})
 
 
 def test_a_missing_file(tmp_path):

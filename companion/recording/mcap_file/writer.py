@@ -10,6 +10,7 @@ from companion.recording.mcap_file.batch import Batch, SendBatch
 from companion.recording.mcap_file.channels import ENCODING, SCHEMA_ENCODING, TOPICS
 
 _CHUNK = 1 << 20
+"""Length at which a chunk is ended, bytes."""
 
 
 class McapWriter:
