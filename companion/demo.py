@@ -1,4 +1,4 @@
-"""The mock vehicle as a process of its own, for `companion demo`."""
+"""The mock vehicle as a process of its own, for `companion demo` and the study `track`."""
 
 import subprocess
 import sys
@@ -42,11 +42,11 @@ class Wire(NamedTuple):
 
 
 class VehicleStoppedError(Exception):
-    """The mock vehicle ended before the flight did."""
+    """The mock vehicle did not start, or ended before the flight did."""
 
 
 def default_config() -> Path:
-    """Path of the shipped configuration: in the repository, or where pip installed it.
+    """Path of the shipped mock-px4.yaml: in the repository, or where pip installed it.
 
     Raises:
         ConfigError: the file is in neither place.
@@ -87,7 +87,7 @@ def wire_like(endpoint: str) -> Iterator[Wire]:
 
 
 def check_mock(config: Path) -> None:
-    """Let the mock vehicle check its section of a configuration.
+    """Let the mock vehicle check the section `mock` of a configuration.
 
     Raises:
         ConfigError: the section is wrong; the message is the vehicle's.
@@ -110,7 +110,9 @@ def bundled_vehicle(config: Path, wire: Wire, log: Path, *, lockstep: bool) -> I
     and then the vehicle ends too.
 
     Raises:
-        VehicleStoppedError: it stopped by itself; the message has its last line of output.
+        OSError: `log` cannot be written.
+        VehicleStoppedError: it stopped by itself (the message has its last line of output), or was
+            not ready within `_START`.
     """
     command = [sys.executable, "-m", "sitl_mock", "--headless", "--config", str(config)]
     command += ["--end-with-stdin"]
@@ -151,7 +153,9 @@ def _await_ready(process: "subprocess.Popen[bytes]", log: Path) -> None:
     while not log.read_text(errors="replace").startswith(_READY):
         _check_running(process, log)
         if time.monotonic() > deadline:
-            raise VehicleStoppedError(f"the mock vehicle does not start, see {log}")
+            raise VehicleStoppedError(
+                f"the mock vehicle did not start within {_START:g} s, see {log}"
+            )
         time.sleep(0.02)
 
 

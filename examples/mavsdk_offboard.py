@@ -1,4 +1,4 @@
-"""Fly positions and velocities with MAVSDK through `companion serve`; only the address differs.
+"""Fly by MAVSDK through `companion serve`; on the autopilot itself only the address differs.
 
 First, each in a terminal: `python -m sitl_mock`, `companion serve --config configs/mock-px4.yaml`.
 

@@ -1,6 +1,6 @@
 """Your own guidance as a coroutine: chase a moving point in wind, by accelerations alone.
 
-The program decides at each attitude sample how to accelerate; the vehicle does so with its known
+This code decides at each attitude sample how to accelerate; the vehicle does so with its known
 linear response. If this code stalls or raises, the vehicle is held and handed back. On a real one:
 `companion.connect("configs/px4.yaml")` and `companion.run`.
 

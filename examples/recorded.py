@@ -1,7 +1,7 @@
 """The folder of a recorded flight, for the examples that read one.
 
-It is the folder named on the command line, else the newest under `flights`, else one that is flown
-now on the mock vehicle: body-rate doublets, from which a vehicle can be identified.
+It is the folder named on the command line, else the newest under `flights`. If there is none, the
+mock vehicle flies now: body-rate doublets, from which a vehicle can be identified.
 """
 
 import sys
@@ -19,4 +19,4 @@ def flight() -> Path:
         doublets = {"flight": {"maneuvers": ["identify"]}, "planner": {"name": "first-order"}}
         config = changed(load(shipped("mock-px4.yaml")), doublets, "doublets")
         fly(config, MockVehicle("px4"), Path("flights/doublets"))
-    return max(Path("flights").glob("*/flight.tlog")).parent
+    return max(Path("flights").glob("*/flight.tlog"), key=lambda log: log.stat().st_mtime).parent

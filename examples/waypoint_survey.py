@@ -1,6 +1,6 @@
 """Survey a field in lanes: one smooth trajectory through all corners, checked before it is flown.
 
-On a real vehicle: `companion.connect("configs/px4.yaml")` and `companion.run` instead of these two.
+On a real vehicle: `connect("configs/px4.yaml")` and `run` of `companion`, not `companion.testing`.
 
 Run: python examples/waypoint_survey.py
 """

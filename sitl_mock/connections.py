@@ -45,7 +45,7 @@ class Connections:
         )
 
     def close(self) -> None:
-        """Close all sockets."""
+        """Close all endpoints and the control channel."""
         for endpoint in self._links:
             endpoint.close()
         if self._control is not None:
@@ -62,7 +62,7 @@ class Connections:
         return [by_descriptor[fd] for fd in readable if fd in by_descriptor]
 
     def deliver(self, arrived: list[Arrived], endpoint: Endpoint) -> None:
-        """Pass a datagram that arrived on an endpoint to the autopilot."""
+        """Pass the datagrams that arrived on an endpoint to the autopilot."""
         self._exchange.deliver(arrived, self._links[endpoint])
 
     def send_beacon(self, beacon: bytes) -> None:

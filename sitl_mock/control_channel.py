@@ -1,4 +1,4 @@
-"""The control channel: JSON requests that inject faults or return the true state (pure).
+"""The control channel: JSON requests that inject faults or return the true state (no sockets).
 
 Requests, one object each:
 
@@ -25,7 +25,7 @@ _USAGE = 'send {"fault": {...}}, {"clear": true} or {"state": true}'
 
 
 class Truth(TypedDict):
-    """The true state of a vehicle: SI, NED (origin: home on the ground), FRD, q body to world."""
+    """The true state of a vehicle: SI, NED (origin: where it booted), FRD, q body to world."""
 
     time: float
     """Vehicle time since boot, s."""
@@ -33,7 +33,8 @@ class Truth(TypedDict):
     mode: str
     """PX4's mode names or ArduCopter's."""
     intended_mode: str
-    """The mode that the user chose last; a failsafe does not change it."""
+    """The mode that the user chose last. A failsafe of PX4 does not change it; on ArduPilot it is
+    always ``mode``."""
     failsafe: bool
     landed: bool
     """Whether the autopilot's land detector reports landed."""
@@ -46,7 +47,7 @@ class Truth(TypedDict):
     on_ground: bool
     crashed: bool
     touchdown_speed: float | None
-    """Speed of the last touchdown, m/s; None before the first."""
+    """Sink speed of the last touchdown, m/s; None before the first."""
     battery: float
     """Charge, 0..1."""
     setpoints: int
@@ -54,7 +55,8 @@ class Truth(TypedDict):
     last_setpoint: float | None
     """Vehicle time of the last setpoint, s; None if there was none."""
     signing: dict[str, int] | None
-    """Numbers of accepted, unsigned and refused frames of the companion; None: no signing."""
+    """Numbers of validly signed (``accepted``), ``unsigned`` and ``refused`` frames of the
+    companion; None: no signing."""
 
 
 def reply(simulation: Simulation, request: bytes) -> bytes:
@@ -66,15 +68,16 @@ def add_fault(simulation: Simulation, fault: Mapping[str, Any]) -> None:
     """Inject a fault of the configuration; without a start it begins in the next slot.
 
     Raises:
-        ConfigError: there is no such fault; the message names the key.
+        ConfigError: the fault has an unknown kind, an unknown key or an invalid value; the message
+            names the key.
     """
     try:
         valid = fault_adapter.validate_python(dict(fault))
     except ValidationError as error:
         detail = error.errors()[0]
         where = ".".join(str(part) for part in detail["loc"])
-        told = f"fault {where}: {detail['msg']}".replace("fault :", "fault:")
-        raise ConfigError(told) from error
+        problem = f"fault {where}: {detail['msg']}".replace("fault :", "fault:")
+        raise ConfigError(problem) from error
     simulation.faults.add(valid, simulation.time_us)
 
 

@@ -2,7 +2,8 @@
 
 It has no sockets and no clock. `Server` joins it to sockets, `companion.testing` to an application
 in the same process.
-Both do the same in each slot: collect what arrived, `step`, send `outgoing` of each link.
+In each slot both call `step` and send `outgoing` of each link. In lockstep they hand the datagrams
+that arrived since the last slot to `step`; in real time they `deliver` each one as it arrives.
 """
 
 from collections.abc import Callable
@@ -22,7 +23,12 @@ _ANSWERS = frozenset({"SET_ATTITUDE_TARGET", "SYSTEM_TIME"})
 
 
 def in_burst(elapsed_s: float, burst_s: float) -> float:
-    """Return the time of the burst in which a step runs, s; without bursts the time itself."""
+    """Return the time of the burst in which the step at ``elapsed_s`` runs, s.
+
+    Args:
+        elapsed_s: time of the step, s.
+        burst_s: period of the bursts, s; 0 = no bursts: the step runs at its own time.
+    """
     return ceil(elapsed_s / burst_s) * burst_s if burst_s > 0.0 else elapsed_s
 
 
@@ -34,7 +40,8 @@ class Exchange:
         simulation: the vehicle.
 
     Attributes:
-        on_message: called with each message that reaches the autopilot over the companion link.
+        on_message: called with each message that arrives over the companion link after the faults,
+            also if the autopilot does not accept it.
     """
 
     def __init__(self, settings: MockSettings, simulation: Simulation) -> None:
@@ -57,7 +64,7 @@ class Exchange:
         return self._simulation.beacon() if self._lockstep else None
 
     def deliver(self, arrived: list[Arrived], link: Link) -> None:
-        """Pass datagrams of a link to the autopilot, after the faults of that link."""
+        """Pass datagrams of a link to the autopilot; the companion's go through the link faults."""
         simulation = self._simulation
         faults = simulation.faults.link
         if link is self._companion and not self._pipe_in.is_clear(faults):
@@ -95,8 +102,8 @@ class Exchange:
     def is_repeated_answer(self, messages: list[Message]) -> bool:
         """Whether this datagram only answers an earlier beacon, which was sent twice.
 
-        The number of beacons depends on the wall clock. The faults of the link count datagrams, so
-        they must not see the second answer.
+        The number of beacons depends on the wall clock. The link faults draw a random number for
+        each datagram, so a second answer would make the flight depend on the wall clock, too.
         """
         now_ms = self._simulation.time_us // 1000
         return (

@@ -21,7 +21,7 @@ which are made up, because to the companion a lost tenth would look like a slowe
 """
 
 SPIN_S = 0.0005
-"""Time of polling before the server sleeps, s."""
+"""In lockstep: time of polling for the answer before the server sleeps, s."""
 
 
 class Server:
@@ -33,7 +33,8 @@ class Server:
         status: shows the running vehicle after each slot, None = headless.
 
     Raises:
-        ConfigError: a port is in use.
+        ConfigError: an endpoint cannot be opened (see `Connections`), or the signing passphrase
+            cannot be used.
     """
 
     def __init__(
@@ -99,7 +100,7 @@ class Server:
     def _await_answer_to_first_beacon(self) -> None:
         """Send the first beacon until a client answers it; the simulation starts then.
 
-        If a client sends anything but no answer within ``patience_s``, continue in real time.
+        If no answer comes within ``patience_s`` of a client's first bytes, continue in real time.
         """
         self._beacon = self._simulation.beacon()
         self._connections.send_beacon(self._beacon)
@@ -213,7 +214,10 @@ class Server:
         self._connections.flush()
 
     def _clock_ns(self) -> int:
-        """Return vehicle time for TIMESYNC, ns; between slots it advances with the wall clock."""
+        """Return vehicle time for TIMESYNC, ns.
+
+        In real time it advances between slots with the wall clock, up to the next slot.
+        """
         simulation = self._simulation
         if self._lockstep or simulation.effects.clock_frozen:
             return simulation.state.shown_us * 1000

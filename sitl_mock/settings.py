@@ -9,7 +9,7 @@ from pydantic import ValidationError, ValidationInfo, field_validator, model_val
 from sitl_mock.autopilot.parameters import ParameterRefusedError, ParameterTable
 from sitl_mock.config.section import ConfigError, error_path, explain, suggestion
 from sitl_mock.config.settings import VehicleSettings
-from sitl_mock.config.yaml_file import Document, explain_yaml, load_yaml
+from sitl_mock.config.yaml_file import Document, FileRefusedError, explain_yaml, load_yaml
 from sitl_mock.personalities import PERSONALITIES
 
 SMOOTH = {"position_noise_m": 0.0, "velocity_noise_m_s": 0.0, "position_delay_ms": 0.0}
@@ -83,6 +83,8 @@ def _document(path: Path) -> Document:
         return load_yaml(path)
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
+    except FileRefusedError as error:
+        raise ConfigError(f"{path}: {error}") from error
     except (yaml.YAMLError, ValueError, TypeError, OverflowError) as error:
         raise ConfigError(f"{path}: {explain_yaml(error)}") from error
 

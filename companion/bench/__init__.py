@@ -1,1 +1,1 @@
-"""Benchmarks: latency and processor time of this program, compared with others."""
+"""Benchmarks: latency and processor time of this program beside others, and speed in memory."""

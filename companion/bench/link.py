@@ -57,11 +57,13 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
     Returns:
         For each of `echo`, `companion`, `pymavlink`, `companion_mavsdk` and `mavsdk`: `p50_us`,
         `p99_us`, `max_us`, `cpu_percent` (of one core), `samples` and `unanswered`. Also `ratio`:
-        the p50 of `companion` divided by that of another program, as `companion_to_…`.
+        the p50 of `companion` divided by that of `echo`, `pymavlink` and `mavsdk`, as
+        `companion_to_…`.
 
     Raises:
         MissingExtraError: MAVSDK is not installed.
         ContestantError: A program failed.
+        LinkError: There are no free ports.
     """
     require("mavsdk", "mavsdk", "this benchmark")
     rounds = ceil(seconds / ROUND_S)

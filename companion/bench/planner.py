@@ -52,7 +52,7 @@ class _Fleet(NamedTuple):
 
 
 def run(seconds: float, as_json: bool) -> dict[str, Any]:
-    """Measure every planner, interleaved with the baselines.
+    """Measure every planner without memory, interleaved with the baselines.
 
     Args:
         seconds: Time of measuring without compiling, s; at least one round is measured.
@@ -66,8 +66,9 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
         - `batch_ns`: time of a step in `batch.rates` with its checks, by planner and number of
           vehicles; its `baseline` is a copy of the same attitudes and targets.
         - `flight_ratio`, `new_target_ratio`, `batch_ratio`: the same divided by the baseline.
-        - `simulated`: `seconds_per_second`, simulated time per computing time of `vehicles` at
-          `rate_hz` with `first-order`, by `batch.advance`.
+        - `simulated`: `step_ns`, time of a step of one vehicle with `first-order`, by
+          `batch.advance`; `seconds_per_second`, simulated time per computing time of `vehicles` at
+          `rate_hz`.
     """
     compiled = batch.can_compile()
     cases = [*_flight_cases(), *_batch_cases(compiled), _advance_case(compiled)]
@@ -144,7 +145,7 @@ def _planner(name: str) -> LawPlanner:
 
 
 def _fleet(count: int) -> _Fleet:
-    """Vehicles at all headings, some with a large tilt, and targets within the limits."""
+    """Vehicles at many headings, some with a large tilt, and targets within the limits."""
     random = np.random.default_rng(1)
     q = random.normal(size=(4, count))
     q[0] = 1.5 + np.abs(q[0])

@@ -48,7 +48,7 @@ class Contestant:
         )
 
     def check_running(self) -> None:
-        """Raise `ContestantError` with the last line of its output if the program has ended."""
+        """Raise `ContestantError` with its last line of error output if the program has ended."""
         if self._process.poll() is not None:
             self._output.seek(0)
             words = self._output.read().decode(errors="replace").strip().splitlines()

@@ -49,7 +49,8 @@ _ROOTS = tuple(
 def sampled() -> Iterator[Counter[str]]:
     """Count samples by part while the block runs, in the main thread.
 
-    A function of another package counts for the part that called it.
+    A function in a file that no part names, such as one of another package, counts for the part
+    that called it.
     """
     counts: Counter[str] = Counter()
     parts: dict[str, str | None] = {}
@@ -81,7 +82,7 @@ def shares(counts: Counter[str]) -> dict[str, float]:
 
 
 def _part_of(file: str) -> str | None:
-    """Part of a source file; `None`: a file of another package."""
+    """Part of a source file; `None`: no part names it."""
     for root in _ROOTS:
         name = file.removeprefix(root)
         for part, prefixes in PARTS.items():

@@ -34,7 +34,7 @@ _TELEMETRY = (
     dialect.MAVLink_servo_output_raw_message(1, 0, *[1500] * 8),
 )
 """What a vehicle sends beside each sample."""
-_KEYS = {"alone": "no client", "with_clients": f"{_CLIENTS} clients, one stopped"}
+_KEYS = {"alone": "no client", "with_clients": f"{_CLIENTS} clients and a stopped one"}
 
 
 def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
@@ -47,10 +47,12 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
 
     Returns:
         For `alone` and `with_clients` the figures of `companion bench link`; `ratio`: p50 and p99
-        with clients divided by those without; `clients`: frames received and lost by each.
+        with clients divided by those without; `clients`: frames received and lost by each of the
+        three that read.
 
     Raises:
         ContestantError: A program failed.
+        LinkError: There are no free ports.
     """
     rounds = ceil(seconds / ROUND_S)
     with ExitStack() as stack, no_garbage_collection():

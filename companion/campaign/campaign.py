@@ -30,10 +30,11 @@ class Campaign:
     """A campaign.
 
     Attributes:
-        file: content of the campaign file; every path in it is a key of `files`.
-        base: configuration before the sweep, changed by the keys of `set`.
-        files: the text of each file that a flight reads, by its path relative to a folder.
-        name: name of the file, for messages.
+        file: content of the campaign file; a trajectory in its `sweep` is a key of `files`.
+        base: configuration before the sweep, changed by the keys of `set`. Its trajectory, if any,
+            is a key of `files`.
+        files: the text of each file that a flight reads, by its path in the campaign's folder.
+        name: path of the campaign file, for messages.
     """
 
     file: CampaignFile
@@ -147,5 +148,5 @@ def _check_flyable(config: Config) -> None:
 
 
 def _shown(name: str, value: Any) -> Value:
-    """A value as written in the results; for a trajectory file its name."""
+    """A value as written in the results; a trajectory file by its name without the ending."""
     return Path(value).stem if name == TRAJECTORY and value is not None else column_value(value)

@@ -18,7 +18,7 @@ NO_FAULT = "none"
 FAULT, FAULT_PHASE, FAULT_AFTER = "fault", "fault.phase", "fault.after_s"
 """Factors that choose a fault scenario, the phase in which it begins, and when in this phase."""
 FAULT_FACTORS = (FAULT, FAULT_PHASE, FAULT_AFTER)
-"""All factors that are not keys of a configuration."""
+"""Factors that are not keys of a configuration."""
 _AFTER = {
     "stream": 0.0,
     "arm": 0.0,
@@ -38,11 +38,12 @@ class FaultScenario(Section):
     inject: Annotated[tuple[dict[str, Any], ...], Field(min_length=1, max_length=10)]
     """Entries as in `mock.faults`, without `at_s` and `after_offboard_s`. They begin together."""
     phase: FaultPhase = "maneuvers"
-    """Phase of the flight in which they begin. The factor fault.phase replaces it."""
+    """Phase of the flight in which they begin; for stream the phase arm if a flight has no stream.
+    The factor fault.phase replaces it."""
     after_s: Annotated[float, Field(ge=0.0, le=3600.0)] | None = None
-    """Time from the beginning of the phase. The factor fault.after_s replaces it. null: the time in
-    the table of docs/safety.md: 0 s in stream and arm, 0.8 s in takeoff, 1.3 s in offboard, 0.3
-    s in maneuvers and land, 0.02 s in hand back.
+    """Time from the beginning of the phase. The factor fault.after_s replaces it. null: 0 s in
+    stream and arm, 0.8 s in takeoff, 1.3 s in offboard, 0.3 s in maneuvers and land, 0.02 s in
+    hand back.
     """
     ends: (
         Annotated[tuple[Ending, ...], Field(min_length=1)]
@@ -59,21 +60,24 @@ class FaultScenario(Section):
         return _AFTER[phase] if self.after_s is None else self.after_s
 
     def endings(self, phase: str) -> tuple[str, ...]:
-        """The documented endings for a phase; empty where the file names none."""
+        """The permitted endings for a phase; empty if the file names none for it."""
         if isinstance(self.ends, dict):
             return {str(name): endings for name, endings in self.ends.items()}.get(phase, ())
         return self.ends
 
 
 class CampaignLimits(Section):
-    """Limits above which a campaign is refused before it begins; `--yes` accepts any size."""
+    """Largest size of a campaign, and longest flight.
+
+    A larger campaign is refused before it begins, unless `--yes` accepts any size.
+    """
 
     max_cases: Annotated[int, Field(ge=1, le=100_000_000)] | None = None
     """Largest number of cases. null: 2000 flights, or 100000 vehicles of batch kinematics."""
     max_hours: Annotated[float, Field(gt=0.0, le=10_000.0)] = 4.0
-    """Longest estimated time of the campaign."""
+    """Longest estimated time of the campaign; without effect on at most two cases per worker."""
     flight_s: Annotated[float, Field(ge=1.0, le=36_000.0)] = 600.0
-    """Longest flight, in vehicle time from boot. A longer one is ended, and is not good."""
+    """Longest flight, s of vehicle time from boot. A longer one is ended, and is not good."""
 
 
 class CampaignFile(Section):
@@ -83,7 +87,7 @@ class CampaignFile(Section):
     """Name of the campaign, and of its folder."""
     kind: Literal["flights", "batch"] = "flights"
     """flights: whole flights of the application and the mock vehicle on one virtual clock. batch:
-    attitude kinematics of many vehicles at once."""
+    only the attitude kinematics of a vehicle in each case."""
     config: PathKey | dict[str, Any]
     """Base configuration of every case, including its section `mock`. Either the path of a file,
     relative to this file, or the keys themselves.
@@ -92,10 +96,12 @@ class CampaignFile(Section):
     """Seed of the samples, and of the noise and gusts of every flight."""
     samples: Annotated[int, Field(ge=1, le=10_000_000)] = 1
     """Number of samples of the distributions. Each is flown at each point of the grid. Without a
-    distribution it is the number of flights with different noise and gusts."""
+    distribution each point of the grid is flown this number of times, with different noise and
+    gusts."""
     sampling: Literal["random", "latin-hypercube", "sobol", "grid"] = "latin-hypercube"
-    """How the distributions are sampled, by SciPy's qmc. sobol needs a power of two. grid:
-    `samples` quantiles of each distribution, all combined."""
+    """How the distributions are sampled. latin-hypercube and sobol: by SciPy's qmc; sobol needs a
+    power of two. random: independently. grid: `samples` quantiles of each distribution, all
+    combined."""
     same_seeds: bool = False
     """All points of the grid fly a sample with the same noise and gusts, so that planners are
     compared in the same wind. false: every case has noise and gusts of its own."""

@@ -35,10 +35,11 @@ class Case:
         index: number in the campaign, from 0.
         seed: seed of noise and gusts.
         factors: value of each swept key, as the results hold it.
-        config: configuration of the application. `flight.trajectory` is a key of `files`.
+        config: configuration of the application. If a trajectory is flown, `flight.trajectory` is a
+            key of `files`.
         mock: the complete section `mock`, the seed included.
-        fault: None: a flight without a fault.
-        files: the text of each file that the flight reads, by its path relative to a folder.
+        fault: fault scenario; None: no fault.
+        files: the text of each file that the flight reads, by its path in the campaign's folder.
         flight_s: longest flight, s of vehicle time.
     """
 

@@ -10,7 +10,7 @@ from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from companion.campaign.unit import Flown
-from companion.campaign.versions import VersionError, as_found, require_equal, versions
+from companion.campaign.versions import VersionError, as_versions, require_equal, versions
 from companion.extras import require
 from companion.files.yaml_file import ConfigError
 
@@ -18,7 +18,10 @@ if TYPE_CHECKING:
     from distributed import Client, Future
 
 DEATHS = 3
-"""A unit is given up when it was on a dying worker, running or waiting, for the third time."""
+"""A unit is given up when it was on a dying worker, running or waiting, for the third time.
+
+An existing cluster follows its own setting, `distributed.scheduler.allowed-failures`.
+"""
 _LOST = "the connection to the Dask scheduler is lost"
 _CONNECT_S = 10.0
 _CLOSE_S = 5.0
@@ -34,7 +37,7 @@ _LOCAL = {
 
 
 class ClusterError(Exception):
-    """The cluster was lost, or it gave up a task."""
+    """The connection to the cluster was lost, or a unit of work was given up."""
 
 
 class Ended(NamedTuple):
@@ -42,7 +45,7 @@ class Ended(NamedTuple):
 
     Attributes:
         number: number of the unit.
-        flown: rows of the unit; None: the unit was given up.
+        flown: rows of the unit and their times; None: the unit was given up.
         reason: why the unit was given up.
     """
 
@@ -134,7 +137,7 @@ def wait_for_workers(client: "Client") -> None:
     """Wait until the cluster has a worker; with a queueing system that may take long.
 
     Raises:
-        VersionError: as `connected`.
+        VersionError: a worker or the scheduler has other versions.
     """
     client.wait_for_workers(1)
     _compare_versions(client)
@@ -148,6 +151,8 @@ def number_of_workers(client: "Client") -> int:
 def _compare_versions(client: "Client") -> None:
     """Refuse a scheduler or workers of other versions.
 
+    Of the scheduler only the minor version of Python and the version of Dask are compared.
+
     Raises:
         VersionError: says who has which.
     """
@@ -160,7 +165,7 @@ def _compare_versions(client: "Client") -> None:
                 f"the worker {address} cannot run this version of companion ({found}): install the "
                 "same version there"
             )
-        require_equal(versions(), as_found(found), f"the worker {address}")
+        require_equal(versions(), as_versions(found), f"the worker {address}")
 
 
 def _of_dask(told: Mapping[str, Any]) -> dict[str, str]:
@@ -179,6 +184,7 @@ def run_tasks(client: "Client", tasks: Mapping[int, tuple[Any, ...]]) -> Iterato
 
     Raises:
         ClusterError: the connection to the scheduler is lost.
+        ConfigError: the worker's program refuses a case.
         VersionError: a worker that joined later has other versions.
     """
     from distributed import as_completed  # noqa: PLC0415  an extra
@@ -195,10 +201,12 @@ def run_tasks(client: "Client", tasks: Mapping[int, tuple[Any, ...]]) -> Iterato
 
 
 def _ended(number: int, future: "Future") -> Ended:
-    """Return the result of a finished future.
+    """The unit of a future that ended.
 
     Raises:
         ClusterError: the connection to the scheduler is lost.
+        ConfigError: see `run_tasks`.
+        VersionError: see `run_tasks`.
     """
     try:
         if future.status == "finished":
@@ -211,6 +219,7 @@ def _ended(number: int, future: "Future") -> Ended:
 
 
 def _reason(error: BaseException) -> str:
+    """Why a unit was given up; a VersionError or ConfigError is raised instead."""
     from distributed import KilledWorker  # noqa: PLC0415  an extra
 
     if isinstance(error, VersionError | ConfigError):

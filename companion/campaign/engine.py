@@ -50,10 +50,11 @@ def run(
         campaign: the campaign.
         description: description of the folder.
         folder: folder of the campaign; it exists and is locked.
-        on_unit: called after each unit.
+        on_unit: called once before the first unit, and after each unit.
 
     Raises:
         ClusterError: the connection to the scheduler is lost.
+        ConfigError: the worker's program refuses a case.
         OSError: the results cannot be written.
         VersionError: a worker that joined later has other versions.
     """
@@ -84,7 +85,7 @@ def _keep(ended: Ended, unit: range, campaign: Campaign, folder: Path, progress:
 
 
 def internal_errors(folder: Path, file: CampaignFile) -> Counter[str]:
-    """The number of flights in the results that each internal error of the program ended."""
+    """By internal error of the program: the number of flights that it ended; empty for a batch."""
     if file.kind != "flights":
         return Counter()
     results = store.read(folder)["result"].to_pylist()
@@ -102,6 +103,7 @@ def rows(client: "Client", kind: str, cases: Sequence[Case], case_s: float) -> l
 
     Raises:
         ClusterError: the connection to the scheduler is lost, or a unit was given up.
+        ConfigError: the worker's program refuses a case.
         VersionError: a worker that joined later has other versions.
     """
     size = size_of_units(len(cases), case_s, number_of_workers(client))

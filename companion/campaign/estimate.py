@@ -14,17 +14,18 @@ MOST_CASES = {"flights": 2000, "batch": 100_000}
 NOUNS = {"flights": "flights", "batch": "vehicles"}
 """Plural noun for the cases of each kind."""
 _MEASURED = 3
-"""Number of flights whose time is measured."""
+"""Largest number of flights whose time is measured."""
 _BATCH = 64
-"""Number of vehicles in the measured batch. They share one planner, because compiling one takes 2
-s.
+"""Largest number of vehicles in the measured batch.
+
+They share one planner, because compiling one takes 2 s.
 """
 
 
 def measured(kind: str, cases: Sequence[Case]) -> float:
     """Measure the time that a case takes in one process here, s.
 
-    A first, short run, which imports and compiles, is not measured.
+    A first run, which imports and compiles, is not measured; of flights it flies only 1 s.
 
     Args:
         kind: "flights" or "batch".

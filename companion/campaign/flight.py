@@ -54,7 +54,7 @@ class CaseFlight:
 
     Args:
         case: the case to fly.
-        place: a new folder for the files that the flight reads.
+        place: a new folder, into which the files that the flight reads are written.
 
     Raises:
         ConfigError: the configuration cannot be flown.
@@ -141,7 +141,7 @@ class _BeginFault(Silent):
         fault: the scenario; None: no fault.
 
     Attributes:
-        begun: whether the phase was reached.
+        begun: whether there is a fault and its phase was reached.
     """
 
     def __init__(self, vehicle: MockVehicle, fault: Fault | None) -> None:
@@ -149,7 +149,7 @@ class _BeginFault(Silent):
         self.begun = False
         self._phases: tuple[str, ...] = () if fault is None else (fault.phase,)
         if self._phases == ("stream",):
-            self._phases = "stream", "arm"  # the first of them: some get no setpoints on the ground
+            self._phases = "stream", "arm"  # the first one reached: not every vehicle has `stream`
 
     def phase(self, name: str, waits_for: str) -> None:
         """Inject the faults if this is their phase."""
@@ -173,7 +173,7 @@ def _ending(state: Truth, result: str) -> str:
 
 
 def _placed(config: Config, place: Path) -> Config:
-    """The configuration with all paths moved into the folder of this flight.
+    """The configuration with `recording.directory` and the trajectory in the folder of this flight.
 
     `recording.directory` is empty, so that nothing an earlier flight learned changes this one.
     """

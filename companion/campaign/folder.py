@@ -13,7 +13,7 @@ from typing import Any
 from companion.campaign import store
 from companion.campaign.campaign import Campaign
 from companion.campaign.loading import as_written
-from companion.campaign.versions import VersionError, Versions, as_found, difference, versions
+from companion.campaign.versions import VersionError, Versions, as_versions, difference, versions
 from companion.files import bounded_yaml
 from companion.files.bounded_file import FileRefusedError, read_text
 from companion.files.bounded_yaml import YamlError
@@ -38,7 +38,7 @@ class Description:
         kind: flights or batch.
         seed: seed of the campaign.
         cases: number of cases.
-        unit: number of cases in a unit.
+        unit: number of cases in a unit of work; the last unit may have fewer.
         case_s: time that a case took in the client before the campaign began, s; None: unknown.
         versions: versions of the program and of all that results depend on.
         began: time at which the folder was made, ISO 8601, UTC.
@@ -61,8 +61,8 @@ def describe(campaign: Campaign, unit: int, case_s: float | None) -> Description
     return Description(file.name, file.kind, file.seed, cases, unit, case_s, versions(), now)
 
 
-def new_name(campaign: Campaign) -> Path:
-    """A folder for a new campaign, named by the present time in UTC."""
+def new_path(campaign: Campaign) -> Path:
+    """The path of a new campaign's folder: the campaign's name and the present time in UTC."""
     stamp = datetime.now(UTC).strftime("%Y-%m-%dT%H-%M-%SZ")
     return RUNS / f"{campaign.file.name}-{stamp}"
 
@@ -71,11 +71,14 @@ def make(folder: Path, campaign: Campaign, description: Description) -> None:
     """Write the folder of a new campaign.
 
     Raises:
-        ConfigError: it cannot be written, or holds other files.
+        ConfigError: it cannot be written, or holds files already.
     """
     try:
         if folder.exists() and any(path.name != _LOCK for path in folder.iterdir()):
-            raise ConfigError(f"{folder}: holds files that are not those of a campaign")
+            raise ConfigError(
+                f"{folder}: holds files, but no campaign that was begun; name another folder with "
+                "--out, or empty this one"
+            )
         store.write_campaign(folder, campaign, bounded_yaml.dump(as_written(campaign)))
         write_whole(folder / _DESCRIPTION, json.dumps(asdict(description), indent=2) + "\n")
     except OSError as error:
@@ -96,7 +99,7 @@ def read_description(folder: Path) -> Description:
     path = folder / _DESCRIPTION
     try:
         told = json.loads(read_text(path, _MOST_BYTES))
-        return Description(**{**told, "versions": as_found(told["versions"])})
+        return Description(**{**told, "versions": as_versions(told["versions"])})
     except FileRefusedError as error:
         raise ConfigError(f"{folder}: no campaign was begun here: {error}") from error
     except (ValueError, TypeError, KeyError, RecursionError) as error:
@@ -107,7 +110,7 @@ def resume(folder: Path, campaign: Campaign) -> Description:
     """Check that the folder holds this campaign, started by this version of the program.
 
     Raises:
-        ConfigError: it holds another campaign.
+        ConfigError: it holds another campaign, or a file in it is damaged.
         VersionError: it was begun by another version.
     """
     description = read_description(folder)
@@ -131,7 +134,11 @@ def require_version(folder: Path, description: Description) -> None:
 
 
 def _compare(folder: Path, campaign: Campaign) -> None:
-    """Compare the campaign with the file in the folder; limits may differ."""
+    """Refuse a folder with another campaign; only the limits on the campaign's size may differ.
+
+    Raises:
+        ConfigError: says what differs, or that the campaign's file is damaged.
+    """
     path = folder / FILE
     try:
         before = bounded_yaml.parse(read_text(path, _MOST_BYTES))

@@ -38,7 +38,8 @@ def check_key(key: str, base: Config, where: str) -> None:
         where: place of the key in its file, for messages.
 
     Raises:
-        ConfigError: the message names the key, and the nearest right one.
+        ConfigError: it is not SECTION.KEY, does not exist, has no effect in a campaign, or concerns
+            signing. The message names the key; for an unknown key also the nearest one, if any.
     """
     section, dot, name = key.partition(".")
     if not (dot and section and name):

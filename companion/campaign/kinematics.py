@@ -1,9 +1,9 @@
 """Batch kinematics: the open-loop steps of a maneuver, flown by attitude and rate loop alone.
 
 There is no position, no estimator and no link. The planner's law and the functions of the attitude
-are those of a flight, compiled. The section `vehicle` gives the dead time, slew limit and lag of
-the simulated rate loop. In a flight it only gives what the program assumes. The vehicle begins
-level and at rest, at the heading `mock.home.heading_deg`.
+are those of a flight, compiled. The section `vehicle` gives the dead time, slew limit, lag and
+damping of the simulated rate loop. In a flight it only gives what the program assumes. The vehicle
+begins level and at rest, at the heading `mock.home.heading_deg`.
 """
 
 import hashlib
@@ -38,7 +38,7 @@ MANEUVERS = ("steps", "corners")
 def run_cases(cases: Sequence[Case]) -> list[dict[str, Value]]:
     """Fly cases one after the other; returns a row for each, in order.
 
-    `ok`: whether every step stayed as close to its line as a good flight must.
+    `ok` is true if every step stayed as close to its line as a good flight must.
 
     Raises:
         ConfigError: a case cannot be flown in a batch; see `check_case`.

@@ -106,10 +106,11 @@ class _Reading:
         return load_config(self._folder / told)
 
     def _flyable(self, base: Config) -> Config:
-        """Adapt the base to a flight in memory: the program arms, its trajectory is collected.
+        """Adapt the base to a flight in memory: the program arms, its trajectory is copied.
 
         Raises:
-            ConfigError: the configuration needs a link that only a real vehicle has.
+            ConfigError: the configuration needs the MAVSDK link or signing, or its trajectory
+                cannot be read.
         """
         if base.link.backend != "direct":
             raise ConfigError(f"{self._path}: link.backend must be direct in a campaign")
@@ -202,7 +203,7 @@ def _with_trajectory(config: Config, path: Path) -> Config:
 
 
 def as_written(campaign: Campaign) -> dict[str, Any]:
-    """The resolved text of the campaign file: configuration keys and all defaults written out."""
+    """The keys of the resolved campaign file: configuration and all defaults written out."""
     data = campaign.file.model_dump(mode="json")
     if campaign.file.tune is None:
         del data["tune"]  # a section without keys would be read as an empty one

@@ -37,11 +37,16 @@ FLOAT_OUTCOMES = (
 )
 """Outcomes of a flight that are numbers; null where they were not measured."""
 _AT_LIMIT = 0.99
-"""A rate or thrust at or above this share of its limit counts as saturated."""
+"""A setpoint counts as saturated if its rate or thrust is at least this share of the upper limit,
+or its thrust is at most the lower limit divided by this share.
+"""
 
 
 def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
-    """Tracking error in the maneuvers, by the true and by the estimated position, m.
+    """Tracking errors by the true and the estimated position, m, and the largest true tilt, rad.
+
+    Errors are those of maneuvers in closed loop, each without the time left out at its beginning.
+    Without such a maneuver the result is empty.
 
     Args:
         summary: summary of the flight.

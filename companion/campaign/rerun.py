@@ -42,8 +42,8 @@ def rerun(place: Path, index: int) -> Rerun:
         index: number of the case.
 
     Raises:
-        ConfigError: there is no such campaign or case, or the case is not a flight.
-        OSError: the recording cannot be written.
+        ConfigError: there is no such campaign or case, the case is not a flight, the results are
+            damaged, or the folder of the recording cannot be made.
     """
     description = folder.read_description(place)
     campaign = load(place / folder.FILE)

@@ -53,6 +53,7 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         ConfigError: the file is wrong, the campaign is too large, or the folder cannot be used.
         MissingExtraError: the extra `campaign` is not installed.
+        OSError: the results cannot be written.
     """
     require_packages()
     path: Path = options.file
@@ -64,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
             )
         path, out = path / folder.FILE, path
     campaign = load(path)
-    place = out or folder.new_name(campaign)
+    place = out or folder.new_path(campaign)
     console = Console(highlight=False, soft_wrap=True)
     try:
         return _Run(campaign, place, options, console).run()
@@ -105,9 +106,9 @@ class _Run:
                     wait_for_workers(client)
                 workers = number_of_workers(client)
                 with folder.locked(self._place):
-                    description = self._begun(number, case_s, workers)
+                    description = self._opened(number, case_s, workers)
                     self._console.print(f"Dask's dashboard: {client.dashboard_link}")
-                    return self._shown(client, description)
+                    return self._run_with_progress(client, description)
         except KeyboardInterrupt:
             return self._stopped("interrupted")
         except ClusterError as error:
@@ -134,8 +135,8 @@ class _Run:
             estimate.check_size(campaign, case_s, workers)
         return len(cases), case_s
 
-    def _begun(self, cases: int, case_s: float | None, workers: int) -> Description:
-        """Open the campaign's folder: the existing one, or a new one."""
+    def _opened(self, cases: int, case_s: float | None, workers: int) -> Description:
+        """Continue the campaign in its folder, or write the folder of a new one."""
         if folder.begun(self._place):
             return folder.resume(self._place, self._campaign)
         unit = 1 if case_s is None else size_of_units(cases, case_s, workers)
@@ -149,7 +150,7 @@ class _Run:
             self._console.print(warning, markup=False)
         return description
 
-    def _shown(self, client: "Client", description: Description) -> int:
+    def _run_with_progress(self, client: "Client", description: Description) -> int:
         """Run the campaign with a progress bar; return the exit code."""
         with progress_bar(self._console, TextColumn("{task.description}")) as bar:
             task = bar.add_task(self._noun, total=description.cases)

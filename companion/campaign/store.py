@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from companion.campaign.campaign import Campaign
 from companion.campaign.campaign_file import CampaignFile
 from companion.campaign.swept import Value
-from companion.files.write_whole import write_whole
+from companion.files.write_whole import sync_folder, write_whole
 from companion.files.yaml_file import ConfigError
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def schema(file: CampaignFile) -> "pa.Schema":
     factors = [(name, _type(file, name)) for name in file.sweep]
     columns = [("case", "int64"), ("seed", "int64"), *factors, *_OUTCOMES[file.kind]]
     described = {
-        name: {**each.described(), "unit": unit(name)} for name, each in file.sweep.items()
+        name: {**each.described(), "unit": physical_unit(name)} for name, each in file.sweep.items()
     }
     told = {"name": file.name, "kind": file.kind, "factors": described}
     return pa.schema(
@@ -100,8 +100,8 @@ def _type(file: CampaignFile, name: str) -> str:
     return "float64" if swept.is_number else "string"
 
 
-def unit(name: str) -> str:
-    """The unit of a key or an outcome, from its suffix; empty without a unit."""
+def physical_unit(name: str) -> str:
+    """The physical unit of a key or an outcome, from its suffix; empty without a unit."""
     return next((unit for end, unit in _UNITS if name.endswith(end)), "")
 
 
@@ -157,6 +157,7 @@ def write_unit(
         finally:
             os.close(descriptor)
         temporary.replace(path)
+        sync_folder(path.parent)
     finally:
         temporary.unlink(missing_ok=True)
 

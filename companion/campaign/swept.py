@@ -1,4 +1,4 @@
-"""The values of a swept key in a campaign file: a list, or a distribution."""
+"""The values of a swept key in a campaign file: a list, a range, or a distribution."""
 
 from collections.abc import Mapping, Sequence
 from math import exp, isfinite, log
@@ -20,7 +20,7 @@ _MOST_VALUES = 1000
 
 
 class Swept(Section):
-    """The values of a swept key. A list alone stands for `values`.
+    """The values of a swept key. A bare list means the same as `values`.
 
     Exactly one of `values`, `range`, `uniform`, `loguniform`, `normal` and `choice` is given.
     `values` and `range` form a grid: each value is flown with every value of the other grids. The

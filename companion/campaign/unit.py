@@ -13,7 +13,10 @@ from companion.campaign.versions import Versions, require_equal, versions
 
 Row = dict[str, Value]
 SECONDS = 2.5
-"""Largest time for a unit, s: long compared with sending it, short enough to lose."""
+"""Longest planned time of a unit with several cases, s.
+
+It is long compared with the time to send a unit, and short enough to lose.
+"""
 _UNITS_PER_WORKER = 4
 """Smallest number of units for each worker, so that all workers end at about the same time."""
 
@@ -36,6 +39,7 @@ def fly_samples(campaign: Campaign, samples: Sequence[Sample], expected: Version
     """Build the cases of some samples, and fly them.
 
     Raises:
+        ConfigError: a case is refused.
         VersionError: this process has other versions than the client.
     """
     require_equal(expected, versions(), f"the worker {_worker()}")
@@ -90,7 +94,7 @@ def _of_kind(kind: str) -> Callable[[Sequence[Case]], list[Row]]:
 
 
 def _worker() -> str:
-    """The address of the worker that runs this code."""
+    """The address of the Dask worker that runs this code, or "this process" without one."""
     from distributed import get_worker  # noqa: PLC0415  an extra
 
     try:

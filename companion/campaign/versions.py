@@ -20,7 +20,7 @@ _DIGITS = 12
 
 
 class VersionError(Exception):
-    """Two processes of a campaign, or a campaign and its folder, have different versions."""
+    """Two processes of a campaign, or this process and a campaign's folder, differ in versions."""
 
 
 @cache
@@ -35,7 +35,7 @@ def versions() -> Versions:
 
 
 def source_digest() -> str:
-    """The first digits of a SHA-256 over the source code that a case runs."""
+    """The first digits of a SHA-256 over all source code that a case may run."""
     found = hashlib.sha256()
     base = Path(__file__).parents[2]
     for path in _sources(base):
@@ -70,12 +70,12 @@ def difference(ours: Versions, others: Versions) -> str:
 
 
 def require_equal(ours: Versions, others: Versions, who: str) -> None:
-    """Refuse another process, or a folder, with different versions.
+    """Refuse another process with different versions.
 
     Args:
         ours: required versions.
-        others: versions of the other process or folder.
-        who: name of the other process or folder; begins the message.
+        others: versions of the other process.
+        who: name of the other process; begins the message.
 
     Raises:
         VersionError: says what differs.
@@ -88,6 +88,6 @@ def require_equal(ours: Versions, others: Versions, who: str) -> None:
         )
 
 
-def as_found(told: Any) -> Versions:
+def as_versions(told: Any) -> Versions:
     """Versions from JSON or from another process, all converted to text."""
     return {str(name): str(value) for name, value in told.items()} if isinstance(told, dict) else {}

@@ -52,12 +52,12 @@ def write_whole(path: Path, text: str, mode: int = 0o666) -> None:
             file.flush()
             os.fsync(file.fileno())
         temporary.replace(path)
-        _sync_folder(path.parent)
+        sync_folder(path.parent)
     finally:
         temporary.unlink(missing_ok=True)
 
 
-def _sync_folder(folder: Path) -> None:
+def sync_folder(folder: Path) -> None:
     """Write the folder's entries to the disk, if the file system supports it."""
     with suppress(OSError):  # some network file systems refuse; the file itself is whole
         descriptor = os.open(folder, os.O_RDONLY)

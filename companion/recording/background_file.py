@@ -19,6 +19,7 @@ T = TypeVar("T")
 Item_contra = TypeVar("Item_contra", contravariant=True)
 
 _PERIOD = 0.05
+"""Time between two checks for new items, s."""
 _SLICE = 20
 """Number of items in a slice, if few are waiting."""
 _MOST_SLICES = 50
@@ -54,13 +55,15 @@ class BackgroundFile(ABC, Generic[T]):
 
     Attributes:
         path: path of the file.
-        dropped: items that were not written because too many waited, or writing had failed.
+        dropped: number of items that were not written, because too many waited, writing had failed,
+            or (`FlightRecorder`) an item could not be encoded.
         failure: why writing ended early, for example a full disk; None: it did not.
 
     Args:
         path: path of the file.
         most_waiting: largest number of waiting items; further ones are dropped.
-        on_failure: called once, from the writing thread, when the file cannot be written any more.
+        on_failure: called once, with `failure`, when the file cannot be written any more: from the
+            writing thread, or from `close` if the disk does not answer.
     """
 
     def __init__(
@@ -101,7 +104,7 @@ class BackgroundFile(ABC, Generic[T]):
         return len(self._waiting)
 
     def put(self, item: T) -> None:
-        """Take one item."""
+        """Take one item, or drop it if too many wait."""
         if len(self._waiting) < self._most_waiting:
             self._waiting.append(item)
         else:

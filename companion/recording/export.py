@@ -1,4 +1,4 @@
-"""Exports a recorded flight as CSV or Parquet: one file for each channel of numbers.
+"""Exports a recorded flight as CSV or Parquet: one file for each channel of numbers that has rows.
 
 Three more tables join several channels, as the figures after a flight use them: `tracking`, `rates`
 and `response` (see `FlightTrace`).
@@ -20,14 +20,18 @@ _JOINED = ("tracking", "rates", "response")
 
 
 class Table(NamedTuple):
-    """A table: the names of its columns, and the columns."""
+    """A table: its name, and its columns by name."""
 
     name: str
     columns: dict[str, NDArray[np.generic]]
 
 
 def tables(record: FlightRecord) -> Iterator[Table]:
-    """All tables of a flight that have rows."""
+    """All tables of a flight that have rows.
+
+    Raises:
+        RecordError: the record is not valid.
+    """
     for channel in CHANNELS:
         rows = record.rows(channel.name)
         if len(rows):
@@ -47,6 +51,7 @@ def export_csv(record: FlightRecord, folder: Path) -> dict[Path, int]:
 
     Raises:
         OSError: a file cannot be written.
+        RecordError: the record is not valid.
     """
     written = {}
     for name, columns in tables(record):
@@ -65,6 +70,7 @@ def export_parquet(record: FlightRecord, folder: Path) -> dict[Path, int]:
     Raises:
         MissingExtraError: pyarrow is missing.
         OSError: a file cannot be written.
+        RecordError: the record is not valid.
     """
     require("pyarrow", "export", "exporting Parquet")
     from pyarrow import Table as ArrowTable  # noqa: PLC0415  an extra

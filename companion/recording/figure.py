@@ -28,7 +28,7 @@ _STYLES = ("-", "--", ":")
 _WIDTH, _HEIGHT, _HISTORY_HEIGHT = 13.5, 4.4, 7.6
 """Width of the picture, height of its upper panels and of its history, inches."""
 _LARGEST = 1e9
-"""Times in s and distances in m above this are invalid."""
+"""Numbers above this, such as times in s and distances in m, are invalid."""
 _FOR_LEGEND = 0.2
 """Room above the curves, as a share of their height."""
 
@@ -42,7 +42,9 @@ def draw_flight(folder: Path, out: Path) -> None:
 
     Raises:
         MissingExtraError: matplotlib is missing.
-        FigureError: the folder holds nothing to draw, or `out` is of an unknown kind.
+        FigureError: the folder holds no readable record or nothing to draw, the record or its
+            summary has invalid values, or `out` is of an unknown kind.
+        RecordError: a message of the record is not valid.
         OSError: the picture cannot be written.
     """
     require("matplotlib", "plot", "drawing")
@@ -104,7 +106,7 @@ def _rows(record: FlightRecord, name: str, series: Series) -> Floats | None:
         FigureError: a number is too large to be valid.
     """
     rows = series.rows()
-    # NaN stands for what there was not; nothing else is that large.
+    # NaN means that there is no value.
     if np.abs(rows[~np.isnan(rows)]).max(initial=0.0) > _LARGEST:
         raise FigureError(
             f"{record.folder}: {name}: not as a flight records it: a number is above {_LARGEST:g}"
@@ -178,7 +180,7 @@ def _direction(run: StepRun) -> str:
 
 
 def _draw_ground(axes: "Axes", tracking: Floats) -> None:
-    """The ground track and its reference, without open-loop steps, which have no reference."""
+    """The ground track, and its reference, which has gaps in open-loop steps."""
     if not np.isnan(tracking[:, 1]).all():
         axes.plot(tracking[:, 2], tracking[:, 1], "--", color=_IDEAL, label="reference")
     axes.plot(tracking[:, 5], tracking[:, 4], color=_MEASURED, label="flown")

@@ -5,8 +5,7 @@
     guidance["estimated_north_m"]            # (N,) float64
 
 The columns of each channel are in `companion.recording.mcap_file` (`loop_channels` and `channels`),
-with their units. A channel without messages has 0 rows, never an error. NaN: not known, or does not
-apply.
+with their units. A channel without messages has 0 rows. NaN: not known, or does not apply.
 
 Three clocks: our clock (event-loop time; `began` is when the flight began on it), the vehicle's
 clock (`vehicle_time_s`), and the time since the flight began, which phases, events, alarms and the
@@ -58,7 +57,7 @@ def as_recorded(folder: Path) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class FlightRecord:
-    """A recorded flight.
+    """A recorded flight. Its properties raise RecordError if a message is not valid.
 
     Attributes:
         folder: folder of the flight.
@@ -80,7 +79,7 @@ class FlightRecord:
     metadata: Mapping[str, Mapping[str, str]]
 
     def rows(self, name: str) -> Row:
-        """All rows of a channel of numbers, such as "sample" or "guidance", in time order.
+        """All rows of a channel of numbers, such as "sample" or "guidance", in the file's order.
 
         Raises:
             KeyError: there is no such channel.
@@ -143,11 +142,7 @@ class FlightRecord:
 
     @cached_property
     def changes(self) -> tuple[ValuesChange, ...]:
-        """The changes of values in flight, in order.
-
-        Raises:
-            RecordError: a change is not valid.
-        """
+        """The changes of values in flight, in order."""
         found = self._fields("/change", 2, 1)
         with as_recorded(self.folder):
             return tuple(
@@ -185,7 +180,8 @@ def read_flight(folder: Path) -> FlightRecord:
     The record is empty if the flight was killed before it recorded anything.
 
     Raises:
-        RecordError: there is no record, or it cannot be read.
+        RecordError: there is no record, it cannot be read, or another version wrote it with other
+            columns.
     """
     path = folder / FILE
     killed_at_start = (folder / "config.yaml").is_file()

@@ -67,7 +67,7 @@ def marks_of(summary: Any) -> Marks:
 
     Raises:
         ValueError: the summary is not valid.
-        TypeError, KeyError, AttributeError: the same.
+        TypeError, KeyError, AttributeError, OverflowError: the same.
     """
     if "phases" not in summary:
         return Marks()
@@ -114,7 +114,7 @@ def draw_history(panels: Sequence["Axes"], motion: Floats, marks: Marks) -> None
 
 
 def _name_maneuvers(axes: "Axes", marks: Marks) -> None:
-    """Write above the first panel: the maneuvers, and the place and reason of an early end."""
+    """Write above the first panel: the maneuvers, and the time and reason of an early end."""
     for span in marks.maneuvers:
         axes.text(
             0.5 * (span.begin + span.end),

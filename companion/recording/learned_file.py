@@ -71,7 +71,10 @@ class LearnedFile:
 
 
 def newest(directory: Path) -> Learned | None:
-    """Learned values of the vehicle that flew last; None if there are none. Never raises."""
+    """Learned values of the vehicle whose file was saved last. Never raises.
+
+    None: there are none, that file is damaged, or the folder has more than `_MOST_FILES` of them.
+    """
     try:
         paths = sorted(directory.glob("learned-*.json"), key=lambda path: -path.stat().st_mtime)
         return _parsed(paths[0]) if 0 < len(paths) <= _MOST_FILES else None
@@ -80,13 +83,13 @@ def newest(directory: Path) -> Learned | None:
 
 
 def _parsed(path: Path) -> Learned:
-    told = json.loads(read_text(path, _MOST_BYTES))
+    values = json.loads(read_text(path, _MOST_BYTES))
     return Learned(
         Drag(
-            _number(told["drag_per_s"], _MOST_LINEAR),
-            _number(told["quadratic_drag_per_m"], _MOST_QUADRATIC),
+            _number(values["drag_per_s"], _MOST_LINEAR),
+            _number(values["quadratic_drag_per_m"], _MOST_QUADRATIC),
         ),
-        _number(told["top_speed_m_s"], 1000.0),
+        _number(values["top_speed_m_s"], 1000.0),
         path,
     )
 

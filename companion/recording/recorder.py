@@ -17,11 +17,12 @@ from companion.recording.mcap_file.loop_channels import ACTION, ACTIONS
 from companion.recording.mcap_file.writer import McapWriter
 
 _MOST_WAITING = 50_000
+"""Largest number of entries that wait to be written."""
 _INFORMATION, _WARNING = 2, 3
 
 Encoder = Callable[[McapWriter, int, Any], None]
-"""Writes the messages of an entry; called with the file, the time in ns since 1970, and the values.
-"""
+"""Writes the messages of an entry. Arguments: the file; the time in ns since 1970 (in vehicle time:
+since its boot); the values."""
 
 
 class Entry(NamedTuple):
@@ -43,10 +44,11 @@ class FlightRecorder(BackgroundFile[Entry]):
 
     Args:
         path: file that `open` creates.
-        epoch: Unix time at which the flight's clock read 0, s.
+        epoch: Unix time at which the flight's clock read 0, s; 0 if that clock is the vehicle's.
         clock: clock of the flight, s.
-        on_failure: called once, from the writing thread, when the file cannot be written any more.
-        on_bad_entry: called once, from the writing thread, when an entry cannot be recorded.
+        on_failure: see `BackgroundFile`.
+        on_bad_entry: called with a message, from the writing thread, at the first entry that cannot
+            be recorded.
         stream: takes the messages also, in batches, in the writing thread; None: nothing does.
     """
 
@@ -70,9 +72,9 @@ class FlightRecorder(BackgroundFile[Entry]):
     def _drop(self, error: Exception) -> None:
         """Count an entry that cannot be recorded; report the first one."""
         self.dropped += 1
-        told, self._on_bad_entry = self._on_bad_entry, None
-        if told is not None:
-            told(f"{self.path}: an entry was not recorded: {error!r}; the recording goes on")
+        report, self._on_bad_entry = self._on_bad_entry, None
+        if report is not None:
+            report(f"{self.path}: an entry was not recorded: {error!r}; the recording goes on")
 
     def add(self, time: float, encoder: Encoder, values: Any) -> None:
         """Record an entry at `time`, s on our clock."""
@@ -108,12 +110,20 @@ class FlightRecorder(BackgroundFile[Entry]):
         clock_offset: float | None = None,
         drag: tuple[float, float] = (nan, nan),
     ) -> None:
-        """Record a command of a phase to guidance; the arguments are the columns of ACTION."""
+        """Record a call by which a phase controls guidance or the control loop.
+
+        Args:
+            time: when, s on our clock.
+            name: one of `ACTIONS`.
+            clock_offset: vehicle time minus our time, s; None: not known.
+            drag: linear (1/s) and quadratic (1/m) drag of an earlier flight, for `drag_prior`; NaN:
+                none.
+        """
         offset = nan if clock_offset is None else clock_offset
         self.row(time, ACTION, (time, offset, *drag, ACTIONS.index(name)))
 
     def change(self, values: Mapping[str, Mapping[str, Any]], *, at_once: bool) -> None:
-        """Record that values of the configuration change now.
+        """Record that values of the configuration begin to change now.
 
         Args:
             values: new values, by section and key.

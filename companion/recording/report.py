@@ -23,7 +23,7 @@ def flight_table(summary: Summary) -> RenderableType:
     if summary.predictive is not None:
         parts.append(_predictive_words(summary.predictive))
     if summary.counts.setpoints:
-        if not summary.course.lockstep:  # there the vehicle waits for us
+        if not summary.course.lockstep:  # vehicle time has no latency
             parts.append(_loop(summary))
         parts.append(_loop_words(summary))
     return Group(*parts)
@@ -121,10 +121,10 @@ def _tracking(summary: Summary) -> RenderableType:
 
 def _predictive_words(figures: PredictiveFigures) -> Text:
     """Counts and times of predictive control, in words."""
-    told = figures.as_dict()
+    times = figures.as_dict()["solve_ms"]
     words = f"predictive control: {figures.flown} answers flown"
     if figures.flown:
-        words += f", {told['solve_ms']['p50']:.1f} ms (p99 {told['solve_ms']['p99']:.1f} ms)"
+        words += f", computed in {times['p50']:.1f} ms (p99 {times['p99']:.1f} ms)"
     missed = ", ".join(f"{count} {name}" for name, count in figures.troubles.items())
     return Text(f"{words}; linear guidance flew {missed or 'none'} instead")
 
@@ -148,7 +148,7 @@ def _loop_words(summary: Summary) -> Text:
     missed = "" if summary.course.lockstep else f"{counts.missed_deadlines} missed deadlines, "
     return Text(
         f"{counts.setpoints} setpoints for {counts.samples} samples, {counts.rate_hz:.0f} Hz "
-        f"in the maneuvers\n{missed}{counts.stale} too old, "
+        f"in the maneuvers\n{missed}{counts.stale} stale, "
         f"{counts.refused} refused; link: {link.get('lost', 0)} lost, "
         f"{link.get('bad_crc', 0)} damaged, {link.get('non_finite', 0)} not finite{unanswered}"
     )

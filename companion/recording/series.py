@@ -1,4 +1,4 @@
-"""Rows of numbers recorded in flight: the newest ones in memory, all of them on the disk.
+"""Rows of numbers recorded in flight: the newest ones in memory, all full chunks on the disk.
 
 Memory does not grow with the flight. A separate thread writes the files in large chunks; the
 control loop only passes full chunks, and never waits for the disk. A flight without a folder has no
@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _CHUNK_ROWS = 1024
+"""Number of rows that are written at a time."""
 _MOST_WAITING = 64
 """Largest number of chunks that wait for a slow disk; further ones are lost and counted."""
 
@@ -56,7 +57,7 @@ class SpooledFile:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     def read(self, width: int) -> NDArray[np.float64]:
-        """All rows of `width` doubles in one array, without an incomplete last row."""
+        """(N · width,), the doubles of all rows one after the other, without an incomplete row."""
         if self._file is None:
             return np.empty(0)
         self._file.seek(0)

@@ -1,7 +1,7 @@
 """Writes the flight's MAVLink frames, sent and received, as a `.tlog`, a common format.
 
-A record is the time in microseconds since 1970, 8 bytes big endian, then the frame as it was on the
-wire.
+A record is the time in microseconds since 1970 (in vehicle time: since its boot), 8 bytes big
+endian, then the frame as it was on the wire.
 """
 
 import os
@@ -12,6 +12,7 @@ from pathlib import Path
 from companion.recording.background_file import BackgroundFile
 
 _MOST_WAITING = 20_000
+"""Largest number of frames that wait to be written."""
 _STAMP = struct.Struct(">Q")
 
 Record = tuple[float, bytes]
@@ -23,8 +24,8 @@ class TlogWriter(BackgroundFile[Record]):
 
     Args:
         path: file that `open` creates.
-        epoch: seconds since 1970 at which the flight's clock read zero.
-        on_failure: called once, from the writing thread, when the file cannot be written any more.
+        epoch: Unix time at which the flight's clock read 0, s; 0 if that clock is the vehicle's.
+        on_failure: see `BackgroundFile`.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Record of the control loop for the measurements after the flight."""
+"""Rows of the control loop and of guidance, for the measurements in flight and after it."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -57,7 +57,8 @@ class FlightTrace:
     Attributes:
         recorder: writes `flight.mcap`; None: the flight is not recorded.
         response: (vehicle time s, w, x, y, z, target north, target east), only during steps.
-        tracking: (vehicle time s, reference north, east, down, measured north, east, down).
+        tracking: (vehicle time s, reference north, east, down, estimated north, east, down m) while
+            offboard control is active; NaN: the reference is not held along this axis.
         rates: (vehicle time s, arrival on our clock s, commanded roll, pitch, yaw rad/s, thrust
             0..1, measured roll, pitch, yaw rad/s, age of the sample s or NaN), while offboard
             control is active by the vehicle's heartbeats.
@@ -89,7 +90,7 @@ class FlightTrace:
         reference: tuple[float, float, float],
         measured: tuple[float, float, float],
     ) -> None:
-        """Record reference and measured position (NED, m)."""
+        """Record reference and estimated position (NED, m)."""
         self.tracking.add([vehicle_time, *reference, *measured])
 
     def add_rates(
@@ -123,7 +124,7 @@ class FlightTrace:
             self.recorder.maneuver(time, vehicle_time, name)
 
     def lost_rows_warning(self) -> str | None:
-        """A warning for the user if rows were lost; None: none were."""
+        """A warning for the user if rows of steps, tracking or rates were lost; None: none were."""
         lost = sum(each.lost for each in (self.response, self.tracking, self.rates))
         if lost == 0:
             return None

@@ -27,6 +27,7 @@ from companion.replay.recorded import (
 from companion.vehicle.records import AttitudeTarget
 
 Entry = RecordedSample | RecordedStep | RecordedAction | ValuesChange | AttitudeTarget
+"""An input of the loops, with what the flight made of it."""
 
 
 def entries(record: FlightRecord) -> Iterator[Entry]:

@@ -37,7 +37,7 @@ class RecordedSample(NamedTuple):
     """A sample, and the flight's answer to it.
 
     Attributes:
-        sample: the sample; its time of arrival for latencies is 0.
+        sample: the sample; `received_ns`, from which latencies are computed, is 0.
         flags: state of the control loop at its arrival.
         checked: time of the check of its age before sending, s; NaN: not checked.
         reason: why it is unanswered; one of `REASONS`.
@@ -66,7 +66,7 @@ class RecordedStep(NamedTuple):
 
 
 class RecordedAction(NamedTuple):
-    """A command of a phase to guidance.
+    """A call by which a phase controls guidance or the control loop.
 
     Attributes:
         time: time on our clock, s.

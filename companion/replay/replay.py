@@ -1,8 +1,9 @@
 """Replays a recorded flight: the same loops with the recorded inputs, in the same order.
 
-Guidance flies the maneuvers of the configuration again. If another program or predictive control
-commanded the flight, the record lacks what came from the other process. Then the recorded commands
-of guidance are used, and only the control loop is replayed. Changes in flight are repeated.
+Guidance flies the maneuvers of the configuration again. If a program commanded the flight, or the
+configuration asks for predictive control, the record lacks what came from the program or from the
+solver's process. Then the recorded commands of guidance are used, and only the control loop is
+replayed. Changes in flight are repeated.
 """
 
 from math import isnan
@@ -38,8 +39,8 @@ class ReplayedSample(NamedTuple):
         vehicle_time: its time stamp, s.
         recorded: setpoint of the flight, or None.
         replayed: setpoint of the replay, or None.
-        recorded_reason: why the flight did not answer; one of `REASONS`.
-        replayed_reason: why the replay did not answer.
+        recorded_reason: "answered", or why the flight did not answer; one of `REASONS`.
+        replayed_reason: the same for the replay.
     """
 
     received: float
@@ -99,7 +100,12 @@ class Replay:
             self._source = ManeuverSource(configured_maneuvers(config))
 
     def run(self) -> list[ReplayedSample]:
-        """Replay the whole flight; return every sample that reached the control loop."""
+        """Replay the whole flight; return every sample that reached the control loop.
+
+        Raises:
+            RecordError: an entry of the record is not valid.
+            ConfigError: a recorded change of values does not fit the configuration.
+        """
         samples = []
         for entry in entries(self._record):
             if isinstance(entry, RecordedSample):
@@ -127,10 +133,10 @@ class Replay:
         loop.on_sample(sample)
         self._guidance.note_attitude(sample)
         reason = loop.record.reason
-        told = REASONS[1] if not loop.on else REASONS[0] if reason is None else reason.value
-        sent = self._sent if told == REASONS[0] else None
+        code = REASONS[1] if not loop.on else REASONS[0] if reason is None else reason.value
+        sent = self._sent if code == REASONS[0] else None
         return ReplayedSample(
-            sample.received, sample.vehicle_time, entry.setpoint, sent, entry.reason, told
+            sample.received, sample.vehicle_time, entry.setpoint, sent, entry.reason, code
         )
 
     def _step(self, entry: RecordedStep) -> None:

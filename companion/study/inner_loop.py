@@ -88,7 +88,7 @@ class InnerLoop:
 
         Raises:
             InvalidQuaternionError: `start` is not a unit quaternion.
-            InvalidTargetError: `target` is not finite.
+            InvalidTargetError: `target` is not finite, or far too large.
             ValueError: `rate_hz` does not divide the physics rate, or `seconds` is too short for a
                 sample.
         """
@@ -170,8 +170,9 @@ class InnerLoop:
 def quickened(factor: int) -> InnerLoop:
     """The default inner loop with all of its times divided by `factor`.
 
-    Inertia and rotor lag are smaller and the torques the same, so the response is the same in
-    scaled time. The physics run `factor` times as often.
+    Inertia and rotor lag are smaller and the torques the same, so the body rates follow a command
+    in the same way, `factor` times faster; only the gyroscopic torque is not scaled like the
+    others. The physics run `factor` times as often.
     """
     airframe, rate_loop = AirframeConfig(), RateLoopConfig()
     shrunk = {

@@ -33,7 +33,10 @@ def largest_deviation(response: Response, reference: Floats) -> Floats:
 
 
 def from_line(response: Response) -> Floats:
-    """(samples + 1, headings) distance from the straight line start → target, to its right."""
+    """(samples + 1, headings) distance from the straight line start → target.
+
+    It is positive to the right of the line, in the plane of the coefficients with north up.
+    """
     start, target = np.array(response.step.start), np.array(response.step.target)
     north, east = (target - start) / np.hypot(*(target - start))
     away = response.coefficients - start[:, None]
@@ -73,7 +76,8 @@ def heading_effect(response: Response) -> float:
 def best_and_worst(values: Floats) -> tuple[int, int]:
     """Indices of the smallest and the largest of (headings,) values; of equal ones the first.
 
-    Values at opposite headings differ by rounding only, so they are rounded first.
+    The values are rounded to 1e-9 first: those of the Euler-angle method at opposite headings
+    differ by rounding only.
     """
     ranked = np.round(values, 9)
     return int(ranked.argmin()), int(ranked.argmax())

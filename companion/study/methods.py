@@ -54,5 +54,5 @@ def planner_of(
     limits: Limits = Limits(),  # noqa: B008  (frozen)
     yaw_gain: float = 2.0,
 ) -> LawPlanner:
-    """The planner of a method: the same code that flies a vehicle."""
+    """The planner of any method but `FOLLOWING`: the same code that flies a vehicle."""
     return cast(LawPlanner, make_planner(method.planner, gain, yaw_gain, limits))

@@ -54,8 +54,9 @@ def run(
 
     Raises:
         ConfigError: `out` or the case cannot be used, a case is missing, or the study takes none.
-        OSError: a result cannot be written, or a worker was killed.
-        VehicleStoppedError: the mock vehicle ended before its flight did.
+        OSError: a result cannot be written, a worker was killed, or the solver process of the
+            study `nmpc` does not start (ChildProcessError).
+        VehicleStoppedError: the mock vehicle of the study `track` ended before its flight did.
     """
     jobs = {study.name: _job(study, case_file) for study in registry.chosen(name)}
     page = _prepared(out, "study" if name == registry.ALL else name)
@@ -92,7 +93,11 @@ def _run(job: Job, out: Path, tick: Tick) -> Outcome:
 
 
 def _job(study: Study, case_file: Path | None) -> Job:
-    """Import a study, and give it its case if it takes one."""
+    """Import a study, and give it its case if it takes one.
+
+    Raises:
+        ConfigError: the case is missing or cannot be used, or the study takes none.
+    """
     if study.takes_case and case_file is None:
         raise ConfigError(f"study {study.name} needs a case: --case FILE")
     if case_file is not None and not study.takes_case:

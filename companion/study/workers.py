@@ -53,13 +53,14 @@ def run_in_workers(
         parts: names of the studies, and the number of their parts. Studies with more parts begin
             first, because they take longer.
         workers: number of processes.
-        tick: called with study and part when a part begins.
+        tick: called with study and part, in this process, soon after a part begins.
 
     Returns:
         the outcomes by study, in the order of `parts`.
 
     Raises:
         OSError: a result cannot be written, or a worker was killed.
+        Exception: whatever a study raises.
     """
     context = get_context("spawn")
     channels = _Channels(context.SimpleQueue(), context.Event())
@@ -83,7 +84,11 @@ def run_in_workers(
 
 @contextmanager
 def interrupts_blocked() -> Iterator[None]:
-    """Block SIGINT; processes started meanwhile inherit this, so Ctrl-C does not reach them."""
+    """Block SIGINT while the block runs.
+
+    Processes started in it inherit this, so that Ctrl-C does not end them. Afterwards SIGINT is not
+    blocked here.
+    """
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

@@ -77,7 +77,10 @@ class ActuatorOutput:
             parameters.set("MOT_THST_HOVER", hover + change)
 
     def attitude(self, target: Quaternion, thrust: float) -> ActuatorCommand:
-        """Return the command that turns to an attitude, with ArduPilot's normalised thrust."""
+        """Return the command that turns to an attitude, with ArduPilot's normalised thrust.
+
+        ATTITUDE_TARGET reports `self.thrust`, which has no angle boost.
+        """
         self._state.attitude_target.q = target
         self._state.attitude_target.thrust = self.thrust
         return self.rates(self.rates_towards(target), thrust)
@@ -87,7 +90,10 @@ class ActuatorOutput:
         return attitude_rates(self._state.estimate.q, target, 0.0, _GAINS)
 
     def rates(self, rates: Vector, thrust: float) -> ActuatorCommand:
-        """Return the command for rates (rad/s) and normalised thrust; on the ground it is 0."""
+        """Return the command for rates (rad/s) and normalised thrust.
+
+        On the ground the thrust is 0, except during a take-off in GUIDED.
+        """
         flying = not self._state.landed or self.taking_off
         throttle = self._throttle(specific_thrust(thrust)) if flying else 0.0
         return ActuatorCommand(True, *rates, throttle)

@@ -10,13 +10,13 @@ RECORDED_READY_S = 41.6
 """Recorded time after boot until the position estimate allows arming in GUIDED, s. The other times
 are scaled with it."""
 INITIALISED_S = 2.4
-"""Time after boot, s, from which commands are accepted."""
+"""Time after boot, s, from which the vehicle can be armed with ``force`` and change its mode."""
 ORIGIN_S = 20.0
 """Time after boot, s, from which the estimator has an origin."""
 HOME_S = 23.5
 """Time after boot, s, from which the pre-arm checks pass in modes that need no position."""
 RUNTIME_PERIOD_US = 30_000_000
-"""Period at which STAT_RUNTIME is saved and sent."""
+"""Period at which STAT_RUNTIME is sent, us."""
 
 _TEXTS = (
     (0.16, "RCInput: decoding UDP (Pulses)"),
@@ -63,7 +63,8 @@ class Boot:
     Args:
         state: state of the autopilot, for the time.
         notifier: sends the texts and messages of the boot.
-        ready_us: vehicle time at which the position estimate is good.
+        ready_us: vehicle time at which the position estimate is good; the other times of the boot
+            are scaled with it.
         elevation: elevation of home above sea level, m.
     """
 
@@ -85,7 +86,7 @@ class Boot:
 
     @property
     def initialised(self) -> bool:
-        """Whether the autopilot accepts commands."""
+        """Whether the autopilot arms (with ``force``) and changes its mode."""
         return self.reached(INITIALISED_S)
 
     @property

@@ -131,7 +131,7 @@ class ArduPilotCommander:
         self.request_mode(PILOT_MODES.get(mode, mode))
 
     def receive_heartbeat(self, heartbeat: Message) -> None:
-        """Record a heartbeat."""
+        """Record a heartbeat, for the ground station failsafe."""
         self.failsafe.receive_heartbeat(heartbeat)
 
     def setpoint(self, message: Message) -> None:

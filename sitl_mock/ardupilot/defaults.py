@@ -62,7 +62,7 @@ _PARAMETERS: tuple[tuple[str, int | float, int], ...] = (
     ("LOIT_SPEED", 1250.0, _REAL32),
     ("MAV_GCS_SYSID", 255, _INT16),  # *
     ("MAV_OPTIONS", 0, _INT16),
-    ("MAV_SYSID", 1, _INT16),
+    ("MAV_SYSID", 1, _INT16),  # *
     ("MAV1_EXTRA1", 0, _INT16),
     ("MAV1_POSITION", 0, _INT16),
     ("MOT_BAT_VOLT_MAX", 12.8, _REAL32),
@@ -98,10 +98,13 @@ ARDUPILOT_TYPES = {name: int(kind) for name, _, kind in _PARAMETERS}
 BURST_MS = 5.6
 """Period of the bursts of the simulator's telemetry (measured: 5.4 to 5.8)."""
 ROTOR_LAG_MS = 22.5
-"""Time constant of the specific thrust (measured: 5 ms after a dead time of 15 ms)."""
+"""Time constant of the specific thrust. It stands for what was measured: 5 ms after a dead time of
+15 ms."""
 
 RATE_LAG_MS = 11.0
 """Delay of the gyro's low pass (measured)."""
+STAMP_SLIPS_HZ = 1.6
+"""Slips of the position's stamp (measured in circles and figure-eights: 0.3 to 2.7)."""
 
 AIRFRAME: dict[str, Any] = {
     "thrust_slope_m_s2": specific_thrust(1.0),
@@ -171,7 +174,7 @@ def with_ardupilot_defaults(section: dict[str, Any]) -> dict[str, Any]:
     filled = {**own, **section}
     if filled["rate_loop"] == "ardupilot":
         filled["rate_loop"] = RATE_LOOP
-    sensors = {"rate_lag_ms": RATE_LAG_MS}
+    sensors = {"rate_lag_ms": RATE_LAG_MS, "stamp_slips_hz": STAMP_SLIPS_HZ}
     for key, defaults in (("airframe", AIRFRAME), ("battery", BATTERY), ("sensors", sensors)):
         given = section.get(key, {})
         filled[key] = {**defaults, **given} if isinstance(given, dict) else given

@@ -22,7 +22,9 @@ class _Act(Protocol):
 
 
 class ArduPilotFailsafe:
-    """Detects losses, and acts while armed; each failsafe acts once, at its start.
+    """Detects a lost ground station, a lost position and a low battery, and acts while armed.
+
+    Each failsafe acts once, at its start; that of the battery again when it becomes critical.
 
     Args:
         state: the autopilot's state.
@@ -93,7 +95,7 @@ class ArduPilotFailsafe:
         else:
             warning = BatteryWarning.OK
         if warning <= state.battery_warning:
-            return  # the battery failsafe does not end in flight
+            return  # the battery failsafe never ends
         state.battery_warning = warning
         critical = warning is BatteryWarning.CRITICAL
         used = parameters["BATT_CAPACITY"] - left_mah

@@ -15,6 +15,7 @@ from sitl_mock.link.framing import Message
 
 _ALL_RATES_IGNORED = ROLL_OR_PITCH_RATE_IGNORED | YAW_RATE_IGNORED
 _UNIT_LENGTH_TOLERANCE = 1e-3
+"""Largest difference of the squared length of a quaternion from 1."""
 
 
 class FatalSetpointError(Exception):

@@ -13,7 +13,8 @@ from sitl_mock.autopilot.state import NAN, PositionTargetEcho, State
 from sitl_mock.physics.quaternion import Vector, yaw
 
 STOPPING_S = 0.65
-"""A hold begins at the position plus the velocity times this (recorded on entering LAND)."""
+"""The held point lies ahead of the position by the velocity times this, s (recorded on entering
+LAND)."""
 _HEIGHT_INTEGRAL = 1.0
 """Acceleration per climb rate error and second; chosen for a steady hover, not measured."""
 _STEEP_CLIMB = 10.0

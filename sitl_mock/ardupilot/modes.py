@@ -60,7 +60,7 @@ def arming_problem(
 
     Args:
         state: the autopilot's state.
-        initialised: whether the boot is complete.
+        initialised: whether the autopilot accepts commands: see `Boot.initialised`.
         home_set: whether home is set.
         crashed: whether the vehicle has crashed.
         gcs_failsafe: whether the ground station failsafe is active.

@@ -17,7 +17,7 @@ from sitl_mock.ardupilot.defaults import (
 from sitl_mock.ardupilot.guided import Guided
 from sitl_mock.ardupilot.mode_control import ArduPilotModeControl
 from sitl_mock.ardupilot.modes import MODES_BY_NUMBER
-from sitl_mock.ardupilot.motion_telemetry import ArduPilotMotionTelemetry
+from sitl_mock.ardupilot.motion_telemetry import ArduPilotMotionTelemetry, StampSlips
 from sitl_mock.ardupilot.streams import ArduPilotStreams
 from sitl_mock.ardupilot.system_telemetry import ArduPilotSystemTelemetry
 from sitl_mock.ardupilot.texts import ARDUPILOT_EVENTS, ArduPilotAnnouncer
@@ -37,6 +37,7 @@ LANDED_AFTER_US = 1_000_000
 POSITION_TIMEOUT_US = 10_000_000
 """Time for which the position stays valid without GPS, us; not measured."""
 DEFAULT_LOOP_HZ = 400.0
+"""Rate of the main loop if SCHED_LOOP_RATE is not configured."""
 _HOME = (dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, dialect.MAVLINK_MSG_ID_HOME_POSITION)
 _BOOT_RATES = {dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0, dialect.MAVLINK_MSG_ID_TIMESYNC: 0.1}
 _SUPPORTED = frozenset(
@@ -146,7 +147,9 @@ class ArduPilot:
         )
 
     def _builders(self, parts: VehicleParts, boot: Boot) -> dict[int, Builder]:
-        motion = ArduPilotMotionTelemetry(parts.state, parts.vehicle, parts.origin)
+        settings = parts.settings
+        slips = StampSlips(settings.sensors.stamp_slips_hz, settings.seed)
+        motion = ArduPilotMotionTelemetry(parts.state, parts.vehicle, parts.origin, slips)
         system = ArduPilotSystemTelemetry(
             parts.state,
             parts.origin,

@@ -3,7 +3,7 @@
 A link sends only HEARTBEAT and TIMESYNC until a client requests messages. An interval is truncated
 to whole milliseconds. One shorter than the main loop's period is refused, and the old one stays. A
 message is sent in the first cycle after it is due and keeps its phase: 3 ms with the 400 Hz loop
-gives steps of 2.5, 2.5, 5 ms, ... (recorded), 333 Hz on average.
+gives four steps of 2.5 ms and one of 5 ms, 333 Hz on average.
 """
 
 from collections.abc import Collection, Mapping

@@ -17,7 +17,8 @@ from sitl_mock.physics.vehicle import Vehicle
 _SENSORS_PRESENT = 1399979055
 _SENSORS_ENABLED = 1382128687
 _SENSORS_HEALTHY = 1467063343
-"""Health bits of SYS_STATUS, recorded disarmed and without height or position control."""
+"""From _SENSORS_PRESENT on: bits of SYS_STATUS, recorded disarmed and without height or position
+control."""
 _HEIGHT_CONTROL = dialect.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL
 _POSITION_CONTROL = dialect.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
 _LOGGING = dialect.MAV_SYS_STATUS_LOGGING
@@ -40,7 +41,7 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
         origin: origin of the local frame.
         identity: content of AUTOPILOT_VERSION.
         vehicle: the vehicle, for its battery.
-        initialised: whether the boot is complete.
+        initialised: whether the autopilot accepts commands: see `Boot.initialised`.
         origin_set: whether the estimator has an origin.
     """
 
@@ -130,7 +131,7 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
         )
 
     def gps_raw_int(self) -> Message:
-        """Return GPS_RAW_INT: no fix during the boot, then an RTK fix (recorded)."""
+        """Return GPS_RAW_INT: no fix during the boot or without GPS, else an RTK fix (recorded)."""
         state = self._state
         if not state.gps_ok or not self._initialised():
             return dialect.MAVLink_gps_raw_int_message(0, 0, 0, 0, 0, NO_VALUE, NO_VALUE, 0, 0, 0)

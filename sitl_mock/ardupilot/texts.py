@@ -28,6 +28,7 @@ ARDUPILOT_EVENTS: dict[EventKind, Event] = {
 }
 
 _CHUNK = 50
+"""Length of STATUSTEXT.text, bytes."""
 
 
 class ArduPilotAnnouncer:

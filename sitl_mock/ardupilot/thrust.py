@@ -17,9 +17,9 @@ _CURVE = (
     (HOVER, 1.0),
     (1.0, 2.745),
 )
-"""(normalised thrust, specific thrust in g). Above 0.1 it is a straight line through 0: between 0.3
-and 0.6 the truth of circles, figure-eights and steps fits it to 0.03 m/s^2. Climbs at a constant
-thrust accelerate less, because their drag grows quickly.
+"""(normalised thrust, specific thrust in g). From HOVER on it is a straight line through 0, and
+almost one from 0.1 on. Between 0.3 and 0.6 the truth of circles, figure-eights and steps fits this
+line to 0.03 m/s^2. Climbs at a constant thrust accelerate less, because their drag grows quickly.
 """
 
 

@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 from sitl_mock.physics.quaternion import Quaternion, Vector, multiply, normalise
 
-_LEVEL_EPSILON = 1e-5
+_OPPOSITE = 1e-5
+"""Below -1 plus this cosine, two axes count as opposite: their shortest arc is not defined."""
 
 
 class AttitudeGains(NamedTuple):
@@ -77,7 +78,7 @@ def _shortest_arc(q: Quaternion, target: Quaternion) -> Quaternion:
     ax, ay, az = body_z(q)
     bx, by, bz = body_z(target)
     dot = ax * bx + ay * by + az * bz
-    if dot < -1.0 + _LEVEL_EPSILON:
+    if dot < -1.0 + _OPPOSITE:
         return multiply(target, conjugate(q))
     w = sqrt(2.0 * (1.0 + dot))
     return normalise(

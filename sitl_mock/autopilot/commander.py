@@ -44,7 +44,7 @@ class Commander(Protocol):
         """Let the pilot take over in a mode (fault injection)."""
 
     def receive_heartbeat(self, heartbeat: Message) -> None:
-        """Record the heartbeat of another system or component."""
+        """Record the heartbeat of another system or component, to notice when it is lost."""
 
     def setpoint(self, message: Message) -> None:
         """Handle a SET_ATTITUDE_TARGET or a SET_POSITION_TARGET_LOCAL_NED."""

@@ -38,10 +38,13 @@ class _Entry:
 
 
 class FaultSchedule:
-    """The faults injected so far, and those that are active now.
+    """The faults that are still to come or active now.
 
     Args:
         faults: faults of the configuration.
+
+    Attributes:
+        link: the link faults that are active now.
     """
 
     def __init__(self, faults: tuple[LinkFault | VehicleFault, ...]) -> None:
@@ -106,7 +109,7 @@ class FaultSchedule:
 
 
 class FaultEffects:
-    """Applies vehicle faults; `Connections` applies those of the link.
+    """Applies vehicle faults; `Exchange` applies those of the link.
 
     Args:
         state: the autopilot's state.
@@ -138,14 +141,14 @@ class FaultEffects:
         self._slipped_s = 0.0
 
     def apply(self, began: list[VehicleFault], ended: list[VehicleFault]) -> None:
-        """Apply the faults that began, and undo those that ended."""
+        """Apply the faults that began, and undo those that ended, as far as they can be undone."""
         for fault in began:
             self._begin(fault)
         for fault in ended:
             self._end(fault)
 
     def take_slip(self) -> float:
-        """Return the wall time that the vehicle clock lost since the last call, s."""
+        """Return the wall time that `SlipClock` faults took since the last call, s."""
         slipped, self._slipped_s = self._slipped_s, 0.0
         return slipped
 
@@ -158,7 +161,12 @@ class FaultEffects:
         return any(not fault.messages or name in fault.messages for fault in self._silences)
 
     def watch_position(self, converged_us: float, timeout_us: float) -> None:
-        """Update ``position_valid``: true from ``converged_us`` until GPS is lost for a timeout."""
+        """Update ``position_valid``: true from ``converged_us`` on, unless GPS is lost for long.
+
+        Args:
+            converged_us: vehicle time at which the position becomes valid.
+            timeout_us: time for which it stays valid without GPS.
+        """
         state = self._state
         lost = not state.gps_ok and state.time_us - self._gps_lost_us >= timeout_us
         state.position_valid = state.time_us >= converged_us and not lost

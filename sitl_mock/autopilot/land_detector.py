@@ -1,4 +1,7 @@
-"""Land detector: landed after contact with low thrust for a time, taken off at once."""
+"""Land detector: landed after contact with low thrust for a time (disarmed: at once).
+
+Without contact or with more thrust the vehicle has taken off at once.
+"""
 
 from collections.abc import Callable
 
@@ -15,9 +18,9 @@ class LandDetector:
     Args:
         state: the autopilot's state.
         announce: announces take-off and landing.
-        hover_thrust: normalised thrust of a hover.
+        hover_thrust: returns the thrust command that hovers, 0..1.
         landed_after_us: contact with low thrust for this time is a landing.
-        climbing: whether a take-off has not reached its height.
+        climbing: returns whether a take-off has not reached its height.
     """
 
     def __init__(

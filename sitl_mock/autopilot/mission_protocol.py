@@ -15,6 +15,7 @@ _ACCEPTED = dialect.MAV_MISSION_ACCEPTED
 _TYPES = range(3)
 """Mission, fence and rally points."""
 _MOST_ITEMS = 1000
+"""Largest number of items in a plan."""
 
 
 class _Upload(NamedTuple):

@@ -35,13 +35,16 @@ class ParameterProtocol:
         self._listing: dict[str, tuple[Link, int]] = {}
 
     def request_list(self, _: Message, link: Link) -> None:
-        """PARAM_REQUEST_LIST: send the hash, then every parameter, a few each slot."""
+        """PARAM_REQUEST_LIST: send PX4's hash, then every parameter, a few each slot."""
         if self._encoding.hashed:
             self._send_hash(link)
         self._listing[link.name] = (link, 0)
 
     def request_read(self, message: Message, link: Link) -> None:
-        """PARAM_REQUEST_READ: send one parameter, by index or, with index -1, by name."""
+        """PARAM_REQUEST_READ: send one parameter, by index or, with index -1, by name.
+
+        If there is none, send PARAM_ERROR.
+        """
         index = message.param_index
         if index == _NO_INDEX:
             name = message.param_id
@@ -58,7 +61,7 @@ class ParameterProtocol:
             self._refuse(message, link, dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST)
 
     def set(self, message: Message, link: Link) -> None:
-        """PARAM_SET: change the value and send the new one."""
+        """PARAM_SET: change the value and send the new one, or send PARAM_ERROR."""
         name = message.param_id
         if name == HASH_NAME:
             return

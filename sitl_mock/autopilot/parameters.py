@@ -14,7 +14,10 @@ UINT32 = int(dialect.MAV_PARAM_TYPE_UINT32)
 
 
 class Parameter(NamedTuple):
-    """A parameter's name and value; an ``int`` value makes it INT32, a ``float`` REAL32."""
+    """A parameter's name and value; an ``int`` makes it an integer, a ``float`` a REAL32.
+
+    PX4's integers are INT32; ArduPilot's have their own types (`FloatEncoding`).
+    """
 
     name: str
     value: int | float
@@ -107,7 +110,7 @@ class ParameterTable:
 
     Raises:
         KeyError: an override names no parameter.
-        ParameterRefusedError: an override of the wrong type.
+        ParameterRefusedError: an override of the wrong type, or too large.
     """
 
     def __init__(self, defaults: Iterable[Parameter], overrides: dict[str, float]) -> None:
@@ -149,14 +152,17 @@ class ParameterTable:
 
         Raises:
             KeyError: no such parameter.
-            ParameterRefusedError: the type differs from the parameter's.
+            ParameterRefusedError: the type differs from the parameter's, or the value does not fit
+                into 32 bits.
         """
         if type(value) is not type(self._values[name]):
             kind = "an integer" if isinstance(self._values[name], int) else "a float"
             raise ParameterRefusedError(f"{name} is {kind}")
-        if isinstance(value, float):
-            value = struct.unpack("<f", struct.pack("<f", value))[0]
-        self._values[name] = value
+        layout = "<f" if isinstance(value, float) else "<i"
+        try:
+            self._values[name] = struct.unpack(layout, struct.pack(layout, value))[0]
+        except (OverflowError, struct.error) as error:
+            raise ParameterRefusedError(f"{name} cannot be as large as {value:g}") from error
 
     def hash(self) -> int:
         """Return PX4's ``_HASH_CHECK``: the CRC-32 over all names and values, in index order."""

@@ -43,7 +43,8 @@ class VehicleParts(NamedTuple):
     origin: Origin
     links: list[Link]
     ready_us: int
-    """Vehicle time from which arming is possible."""
+    """Vehicle time of `mock.prearm_delay_s`, from which arming in any mode is possible."""
+    settings: VehicleSettings
 
 
 class Rules(NamedTuple):
@@ -68,7 +69,7 @@ class Personality(Protocol):
     """One autopilot."""
 
     events: Mapping[EventKind, Event]
-    """Text and id of each event."""
+    """Text and id of each event that it announces."""
     boot_mode: Mode
     system_id_parameter: str
     """Name of the parameter with the system id."""
@@ -83,7 +84,7 @@ class Personality(Protocol):
         """Return the ``mock:`` section, completed by the defaults of this autopilot."""
 
     def slot_us(self, settings: VehicleSettings) -> int:
-        """Return the period of the slots in which telemetry is sent, us."""
+        """Return the period of the slots in which telemetry is sent without lockstep, us."""
 
     def streams(self, link: str, settings: VehicleSettings) -> StreamSchedule:
         """Return the stream schedule of a link (``companion`` or ``gcs``) at boot."""

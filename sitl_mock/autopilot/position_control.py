@@ -16,8 +16,8 @@ _STEEPEST = radians(80.0)
 class PositionDemand(NamedTuple):
     """Setpoint: position, velocity, acceleration (NED, SI; NaN = not controlled) and yaw (rad).
 
-    ``speed`` limits the horizontal velocity setpoint, ``down_speed`` and ``up_speed`` the vertical
-    one, m/s.
+    The yaw must be finite. ``speed`` limits the horizontal velocity setpoint, ``down_speed`` and
+    ``up_speed`` the vertical one, m/s.
     """
 
     position: Vector
@@ -133,7 +133,7 @@ def _velocity(gains: PositionGains, demand: PositionDemand, position: Vector) ->
 def _thrust_vector(
     gains: PositionGains, acceleration: Vector, velocity_setpoint: Vector, yaw: float
 ) -> PositionOutput:
-    """Return attitude and thrust that give an acceleration (NED, m/s^2) at a yaw."""
+    """Return attitude and thrust that give an acceleration (NED, m/s^2) at a yaw, within limits."""
     north, east, down = acceleration
     lift = max(GRAVITY - down, 0.1 * GRAVITY)
     limit = lift * tan(min(gains.max_tilt, _STEEPEST))

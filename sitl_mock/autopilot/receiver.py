@@ -31,7 +31,7 @@ class Receiver:
     Args:
         state: the autopilot's state.
         rules: the autopilot's behaviour.
-        personality: decodes custom modes.
+        personality: decodes custom modes, and knows which components it answers for.
         system_id: system id of this vehicle.
     """
 
@@ -62,7 +62,8 @@ class Receiver:
     def handle(self, message: Message, link: Link) -> None:
         """Handle one message.
 
-        It ignores messages that are unknown, not accepted by signing, or for another system.
+        It ignores messages that are unknown, not accepted by signing, or for another system or (on
+        PX4) another component.
         """
         if not link.accepts(message):
             return

@@ -31,7 +31,8 @@ class AttitudeSetpoint(NamedTuple):
     """Attitude and/or rates with thrust, from SET_ATTITUDE_TARGET.
 
     ``q`` None = no attitude control; ``rates`` (rad/s, body FRD) None = none given, NaN = hold the
-    present rate; ``yaw_rate`` is the feed-forward of attitude control; thrust 0..1, NaN = none.
+    rate; ``yaw_rate`` is the feed-forward of attitude control; thrust 0..1 (ArduPilot: or the
+    climb rate, with 0.5 = none), NaN = none.
     """
 
     q: Quaternion | None
@@ -114,7 +115,10 @@ class OffboardStream:
         return fresh
 
     def alive(self, now_us: int, loss_s: float) -> bool:
-        """Whether the latest setpoint is recent enough for COM_OF_LOSS_T = ``loss_s``."""
+        """Whether the latest setpoint is at most ``loss_s`` + `DETECTION_US` old.
+
+        ``loss_s`` is COM_OF_LOSS_T.
+        """
         if self.last_us is None:
             return False
         return now_us - self.last_us <= round(loss_s * 1e6) + DETECTION_US

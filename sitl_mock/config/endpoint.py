@@ -4,6 +4,8 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from sitl_mock.config.section import ConfigError
+
 _TCP = re.compile(r"tcpin://([^:/\s]*):(\d{1,5})/?")
 _HELP = "write udp, tcpin://127.0.0.1:5760 or serial:///tmp/vehicle"
 
@@ -63,10 +65,18 @@ def for_vehicle(text: str, index: int) -> str:
 
     The index is added to a TCP port. From index 1 on, a serial path gets the suffix ``-2``, ``-3``
     ... Other texts are the same for all vehicles; `MockSettings.for_vehicle` sets the UDP ports.
+
+    Raises:
+        ConfigError: the TCP port would be above 65535.
     """
     if index == 0:
         return text
     match parse_endpoint(text):
+        case TcpIn(_, port) if port + index > 65535:
+            raise ConfigError(
+                f"there is no TCP port {port + index} for vehicle {index + 1}: choose a smaller"
+                " port in --endpoint"
+            )
         case TcpIn(host, port):
             return f"tcpin://{host}:{port + index}"
         case SerialLine(Path() as path):

@@ -27,7 +27,8 @@ class Timed(Section):
     at_s: NonNegative | None = None
     """Time after boot when the fault begins."""
     after_offboard_s: NonNegative | None = None
-    """Time from the first setpoint that controls the armed vehicle to the fault."""
+    """Time from the first control by setpoints to the fault. On PX4 that is the first time armed in
+    OFFBOARD; on ArduPilot the first time in the air in GUIDED under SET_ATTITUDE_TARGET."""
     duration_s: Positive | None = None
     """Duration of the fault; without it, the fault does not end."""
 
@@ -39,12 +40,16 @@ class Timed(Section):
 
 
 class LinkFault(Timed):
-    """Datagrams of the companion link are dropped, delayed, duplicated, reordered or corrupted."""
+    """Datagrams of the companion link are dropped, delayed, duplicated, reordered or corrupted.
+
+    In the direction to the companion, each frame counts as a datagram, and a lockstep beacon is
+    never affected.
+    """
 
     kind: Literal["drop", "delay", "duplicate", "reorder", "corrupt"]
     direction: Direction = "both"
     probability: Fraction = 1.0
-    """Probability with which it affects a datagram."""
+    """Probability with which the fault affects a datagram."""
     delay_ms: NonNegative = 100.0
     """For ``delay``: delay of the datagram in vehicle time."""
 
@@ -64,7 +69,7 @@ class FreezeClock(Timed):
 
 
 class SlipClock(Timed):
-    """The simulation stalls, and the vehicle clock does not catch up (real time only)."""
+    """The simulation stalls, and the vehicle clock does not catch up; no effect in lockstep."""
 
     kind: Literal["slip_clock"]
     slip_ms: Annotated[float, Field(gt=0.0, le=60_000.0)] = 12.0
@@ -72,7 +77,7 @@ class SlipClock(Timed):
 
 
 class NanField(Timed):
-    """One float field of one message is NaN."""
+    """One float field of one message is NaN, on every link of the vehicle."""
 
     kind: Literal["nan_field"]
     message: MessageName
@@ -97,7 +102,7 @@ class PilotTakeover(Timed):
 
 
 class EstimatorReset(Timed):
-    """The estimate jumps, and the reset counter increments."""
+    """The estimate jumps, and the reset counter increments, which only PX4 sends (in ODOMETRY)."""
 
     kind: Literal["estimator_reset"]
     yaw_deg: Finite = 0.0
@@ -119,7 +124,7 @@ class LowBattery(Timed):
 
 
 class GpsLoss(Timed):
-    """GPS loses its fix; the position becomes invalid after EKF2_NOAID_TOUT."""
+    """GPS loses its fix; the position becomes invalid after EKF2_NOAID_TOUT (ArduPilot: 10 s)."""
 
     kind: Literal["gps_loss"]
 

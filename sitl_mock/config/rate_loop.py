@@ -59,9 +59,9 @@ YAW_GAINS = AxisGains(
 )
 
 # Fitted to ATTITUDE_TARGET and the body's attitude, recorded at 200 Hz: poles at wn 125 rad/s, zeta
-# 1.2 (tilt) and 9.9, 0.83 (yaw). Only 6 ms of the delay lie before the attitude target, so the
-# body lags the target, in yaw by up to 7 degrees. The negative feed-forward offsets the body rates
-# that the attitude gain adds during this lag.
+# 1.2 (tilt), and 10.8, 0.82 with a third at 53 1/s (yaw). Only 6 ms of the delay lie before the
+# attitude target, so the body lags the target, in yaw by up to 7 degrees. The negative feed-forward
+# offsets the body rates that the attitude gain adds during this lag.
 ARDUPILOT_TILT_GAINS = AxisGains(
     proportional_n_m_s=19.5,
     feed_forward_n_m_s=-0.97,

@@ -46,7 +46,10 @@ class ConfigError(Exception):
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:
-    """Return ``; did you mean ...?`` with the nearest known word, or nothing."""
+    """Return ``; did you mean ...?`` with the nearest known word.
+
+    If none is near: ``; known are ...`` with all words, or nothing if they are more than 20.
+    """
     names = list(known)
     near = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
     if near:
@@ -55,7 +58,7 @@ def suggestion(word: str, known: Iterable[str]) -> str:
 
 
 def explain(error: ValidationError, model: type[BaseModel]) -> str:
-    """Return the first validation error as one sentence: key, problem, value given."""
+    """Return the first validation error as one sentence: the key, and what is wrong with it."""
     detail = error.errors()[0]
     path = [str(part) for part in detail["loc"]]
     where = ".".join(["mock", *path])
@@ -103,7 +106,7 @@ def _places_of(key: str, model: type[BaseModel]) -> list[str]:
 
 
 def _model_at(model: type[BaseModel], path: list[str]) -> type[BaseModel] | None:
-    """Return the model at a path of keys, None if there is none.
+    """Return the model at a path of keys, None if there is none or more than one.
 
     Positions in lists are skipped. In a union, the path names the member's ``kind``.
     """

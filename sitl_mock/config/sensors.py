@@ -20,7 +20,7 @@ class EkfConfig(Section):
     fix_period_ms: Annotated[float, Field(ge=20.0, le=1000.0)] = 125.0
     """Time between two satellite fixes."""
     fix_delay_ms: Annotated[float, Field(ge=0.0, le=500.0)] = 110.0
-    """Age of the motion at the filter's fusion time."""
+    """Delay of the filter's fusion time; at least ``position_delay_ms``."""
     position_late_ms: Finite = 0.0
     """Unmodelled delay of a fix's position."""
     velocity_late_ms: Finite = 0.0
@@ -70,49 +70,54 @@ class EkfConfig(Section):
     predictor_ms: Positive = 250.0
     """Time constant with which the output predictor applies a correction of position or speed."""
     heading_predictor_ms: Positive = 250.0
-    """Time constant with which it applies a correction of the heading."""
+    """Time constant with which the output predictor applies a correction of the heading."""
 
 
 EKFS: dict[str, EkfConfig | None] = {
     "none": None,
     "px4": EkfConfig(),
     # Fitted to the errors of position and velocity, sample by sample, in circles at 2, 5, 8 and
-    # 10 m/s and figure-eights at 5 and 8 m/s. What is left of them is 0.01 to 0.03 m and 0.02 to
-    # 0.03 m/s, 14 to 35 % of their size but at 2 m/s.
+    # 10 m/s and figure-eights at 5 and 8 m/s. The fit leaves 0.01 to 0.03 m and 0.02 to 0.03 m/s
+    # unexplained: 14 to 35 % of the errors, and more at 2 m/s.
     "ardupilot": EkfConfig(
         fix_period_ms=200.0,
-        fix_delay_ms=260.0,
-        position_late_ms=27.7,
-        velocity_late_ms=16.5,
+        fix_delay_ms=447.0,
+        position_late_ms=32.2,
+        velocity_late_ms=20.5,
         position_noise_m=0.005,
         velocity_noise_m_s=0.005,
         tilt_noise_deg=0.006,
         yaw_error_deg=0.1,
-        turn_yaw_ms=25.4,
-        compass_error_deg=1.1,
+        turn_yaw_ms=22.7,
+        compass_error_deg=1.03,
         yaw_rate_bias_deg_s=0.05,
-        acceleration_lead_ms=1.2,
-        acceleration_scale=-0.0018,
+        acceleration_lead_ms=-1.5,
+        acceleration_scale=0.0007,
         vertical_share=0.6,
         height_offset_m=0.1,
         height_sag_s4_per_m=0.0004,
         sink_per_acceleration_ms=0.0,
         height_noise_m=0.013,
         height_noise_time_s=6.0,
-        position_gains=(0.0433, 0.1119),
-        velocity_gains=(0.2113, 0.2197),
-        acceleration_gains=(0.0366, 0.0397),
-        predictor_ms=865.0,
+        position_gains=(0.0347, 0.1052),
+        velocity_gains=(0.1096, 0.1649),
+        acceleration_gains=(0.0077, 0.0312),
+        predictor_ms=206.0,
     ),
 }
 """Preset name -> navigation filter."""
 
 
 class SensorConfig(Section):
-    """Errors of the autopilot's estimate: white noise (standard deviations) and delays."""
+    """Errors of the autopilot's estimate: white noise (standard deviations) and delays.
+
+    With a navigation filter the defaults of ``position_noise_m``, ``velocity_noise_m_s`` and
+    ``position_delay_ms`` are 0 (`settings.SMOOTH`).
+    """
 
     ekf: EkfConfig | None = None
-    """Navigation filter whose errors are added: px4, ardupilot, none, or keys of its own."""
+    """Navigation filter whose errors are added: px4, ardupilot, none, or the keys of `EkfConfig`.
+    The default of a vehicle (`MockSettings`) is that of its autopilot."""
     attitude_noise_deg: NonNegative = 0.02
     rate_noise_rad_s: NonNegative = 0.002
     position_noise_m: NonNegative = 0.01
@@ -125,6 +130,9 @@ class SensorConfig(Section):
     low pass. The default is PX4's; ArduPilot's is 11."""
     position_delay_ms: NonNegative = 10.0
     """Age of the estimated position and velocity."""
+    stamp_slips_hz: Annotated[float, Field(ge=0.0, le=20.0)] = 0.0
+    """How often the stamp of LOCAL_POSITION_NED slips by 1 ms against its position, back or forth:
+    ArduPilot takes the time, in whole milliseconds, when it writes the message."""
 
     @field_validator("ekf", mode="before")
     @classmethod

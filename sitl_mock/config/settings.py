@@ -35,9 +35,12 @@ class LockstepConfig(Section):
     enabled: bool = False
     period_ms: Annotated[int, Field(ge=1, le=100)] = 4
     bundle: bool = True
-    """Send the frames of a step in one datagram; PX4 does not. The beacon is separate."""
+    """Join the frames of a step, the beacon last, into datagrams of at most 1400 bytes; PX4 sends
+    one datagram for each frame."""
     patience_s: Positive = 2.0
-    """After this wall time without an answer the vehicle continues in real time."""
+    """After this wall time without an answer the vehicle continues in real time, until an answer to
+    the latest beacon arrives. Before the first beacon is answered, the time counts from the first
+    bytes of a client."""
 
 
 class SigningConfig(Section):
@@ -59,7 +62,8 @@ class VehicleSettings(Section):
 
     autopilot: Literal["px4", "ardupilot"] = "px4"
     """The autopilot simulated. It sets the default of ``sensors.ekf``; ArduPilot also sets those of
-    airframe, battery and rate loop."""
+    ``airframe``, ``battery``, ``rate_loop``, ``sensors.rate_lag_ms``, ``burst_ms`` and
+    ``prearm_delay_s``."""
     port: Annotated[int, Field(ge=1, le=65535 - PORT_OFFSET)] = 14540
     endpoint: str = "udp"
     """The companion link: udp (see ``port``); tcpin://HOST:PORT, for one client, boots when the
@@ -77,12 +81,15 @@ class VehicleSettings(Section):
     simulate.
     """
     exact_rates: bool | None = None
-    """Send at every slot. PX4's loop skips some slots at the full rate. Null: only in lockstep."""
+    """Send at every slot. PX4's 250 Hz loop skips some slots at the full rate. Null: only in
+    lockstep. ArduPilot and the other inner loop rates skip none anyway."""
     burst_ms: NonNegative = 0.0
     """In real time the vehicle runs in bursts with this period of vehicle time, as ArduPilot's
-    simulator does (its default is 5.6); 0 = no bursts."""
+    simulator does; 0 = no bursts. The default for ArduPilot is 5.6."""
     prearm_delay_s: NonNegative = 4.5
-    """Arming is refused before this time. Measured: PX4 4.3 to 6.5 s; ArduPilot 41.6 s."""
+    """Duration of the boot. Before its end PX4 refuses arming, and ArduPilot refuses it in modes
+    that need a position; in other modes ArduPilot arms after 56 % of this time. Measured: PX4 4.3
+    to 6.5 s; ArduPilot 41.6 s, which is its default."""
     lockstep: LockstepConfig = LockstepConfig()
     signing: SigningConfig | None = None
     """Null: frames are not signed, and signatures are not checked."""
@@ -103,7 +110,11 @@ class VehicleSettings(Section):
         return endpoint
 
     def for_vehicle(self, index: int) -> Self:
-        """Return the settings of the vehicle with this index: its own ports and its own seed."""
+        """Return the settings of the vehicle with this index: its own ports and its own seed.
+
+        Raises:
+            ConfigError: its TCP port would be above 65535.
+        """
         return self.model_copy(
             update={
                 "port": self.port + index,

@@ -15,6 +15,7 @@ import yaml
 _MOST_BYTES = 250_000
 _MOST_NODES = 6000
 _DEEPEST = 20
+"""Largest number of nested levels."""
 _LONGEST = 5000  # characters of a value
 
 _PLAIN = {
@@ -62,6 +63,10 @@ for _name, _pattern in _PLAIN.items():
 _Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_decimal)
 
 
+class FileRefusedError(Exception):
+    """The file is not regular, too large, or not text; the message says which."""
+
+
 class Document(NamedTuple):
     """A YAML document.
 
@@ -94,16 +99,21 @@ def load_yaml(path: Path) -> Document:
 
     Raises:
         OSError: the file cannot be read.
-        ValueError: the file is not regular, too large, or not text.
-        yaml.YAMLError: the content is not YAML, or exceeds a limit.
+        FileRefusedError: the file is not regular, too large, or not text.
+        yaml.YAMLError, ValueError, TypeError, OverflowError: the content is not YAML, or exceeds a
+            limit.
     """
     with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-            raise ValueError("is not a regular file")
+            raise FileRefusedError("is not a regular file")
         content = file.read(_MOST_BYTES + 1)
     if len(content) > _MOST_BYTES:
-        raise ValueError(f"is larger than {_MOST_BYTES // 1000} kB")
-    loader = _Loader(content.decode("utf-8-sig"))
+        raise FileRefusedError(f"is larger than {_MOST_BYTES // 1000} kB")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise FileRefusedError("is not text in UTF-8") from error
+    loader = _Loader(text)
     try:
         node = loader.get_single_node()
         value = None if node is None else loader.construct_document(node)

@@ -11,11 +11,12 @@ _READ_BYTES = 65536
 class ByteStream:
     """Reads and writes whole frames without blocking.
 
-    Frames are never truncated. The rest of a partly written frame is written first; until then,
-    further frames are dropped, as an autopilot does when its transmit buffer is full.
+    Frames are never truncated: what the kernel did not take of a partly written batch is kept and
+    written first. Until then, further frames are dropped, as an autopilot does when its transmit
+    buffer is full.
 
     Attributes:
-        open: False after the other side closed.
+        open: False after the other side closed, or reading or writing failed.
 
     Args:
         descriptor: non-blocking; the caller closes it.
@@ -35,7 +36,7 @@ class ByteStream:
         return self._frames.popleft() if self._frames else None
 
     def send(self, frames: list[bytes]) -> None:
-        """Send the frames; drop those that the kernel does not accept."""
+        """Send the frames; drop them all if the kernel does not take a part of them now."""
         if self._unsent:
             self._unsent = self._unsent[self._write(self._unsent) :]
         if not self._unsent:

@@ -7,7 +7,10 @@ MAX_BUNDLE = 1400
 
 
 class Endpoint(Protocol):
-    """Sends and receives bytes without blocking. Bytes that cannot be sent at once are dropped."""
+    """Sends and receives bytes without blocking. Frames that cannot be sent at once are dropped.
+
+    Only a byte stream keeps the rest of a batch of which the kernel took a part.
+    """
 
     @property
     def where(self) -> str:
@@ -32,7 +35,7 @@ class Endpoint(Protocol):
         """
 
     def send(self, datagrams: list[bytes]) -> None:
-        """Send datagrams; those that the network refuses are dropped."""
+        """Send datagrams; those that the kernel refuses are dropped."""
 
     def close(self) -> None:
         """Close the endpoint."""

@@ -34,7 +34,7 @@ RESPONSE_EVENT_ERROR = Layout(413, 77, struct.Struct("<HHBBB"))
 
 @dataclass(frozen=True)
 class EventRequest:
-    """A received REQUEST_EVENT, with the methods of a pymavlink message."""
+    """A received REQUEST_EVENT, with those methods of a pymavlink message that the mock calls."""
 
     frame: bytes
     first_sequence: int

@@ -21,17 +21,25 @@ class StreamSchedule(Protocol):
         """Return the interval of a message in us, -1 if it is not streamed."""
 
     def due(self, slot_us: int, status_us: int = 0) -> list[int]:
-        """Return the ids of the messages due in the slot at ``slot_us``, and count them as sent."""
+        """Return the ids of the messages due in the slot at ``slot_us``, and count them as sent.
+
+        ``status_us``: vehicle time at which PX4 last published its status, for CURRENT_MODE.
+        """
 
 
 class Link:
-    """One link, without its socket: `Connections` sends the frames in ``outbox``.
+    """One link, without its socket: `Exchange.outgoing` takes the frames that are queued.
 
     Args:
-        name: name for logs and faults, e.g. ``companion`` or ``gcs``.
+        name: ``companion`` or ``gcs``.
         framer: packs frames.
         streams: schedules telemetry.
         signing: signs and verifies frames; None = no signing.
+
+    Attributes:
+        heard: whether an accepted message of a client arrived.
+        gcs_heard: whether a heartbeat of a ground station arrived.
+        tamper: changes each message before it is packed (faults); None = no change.
     """
 
     def __init__(

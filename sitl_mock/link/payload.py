@@ -1,7 +1,7 @@
 """Payloads of pymavlink's message classes: message to bytes and back.
 
 Field order, `struct` layout and CRC_EXTRA are pymavlink's. Its own ``pack`` and ``decode`` take
-three times as long, because they find out at every frame what depends on the class only.
+about twice as long, because they find out at every frame what depends on the class only.
 """
 
 from collections.abc import Callable, Iterable

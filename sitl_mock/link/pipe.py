@@ -1,4 +1,4 @@
-"""Link faults: drops, delays, duplicates, reorders and corrupts datagrams (pure)."""
+"""Link faults: drops, delays, duplicates, reorders and corrupts datagrams (no I/O)."""
 
 import heapq
 import random

@@ -19,10 +19,10 @@ _MAGIC_V2 = 0xFD
 
 
 def key_from_passphrase(path: Path) -> bytes:
-    """Return SHA-256 of the file's first line, as ground stations derive the key.
+    """Return SHA-256 of the file's first line without surrounding spaces, as ground stations do.
 
     Raises:
-        ConfigError: the file cannot be read, or its first line is empty.
+        ConfigError: the file cannot be read or is not UTF-8, or its first line is empty.
     """
     try:
         passphrase = path.read_text(encoding="utf-8").partition("\n")[0].strip()
@@ -65,9 +65,11 @@ class Signing:
     its wall clock.
 
     Attributes:
-        accepted: frames with a valid signature, newer than all before from their sender.
-        unsigned: frames without a signature.
-        refused: frames signed with another key, or replayed.
+        accepted: number of frames with a valid signature, newer than all before of their stream
+            (system, component, link id).
+        unsigned: number of frames without a signature, whether accepted or not.
+        refused: number of frames signed with another key, replayed, or a minute older than the
+            newest time stamp on a stream not heard before.
 
     Args:
         key: 32 bytes.

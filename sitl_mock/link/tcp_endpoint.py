@@ -14,7 +14,7 @@ class TcpEndpoint:
         port: port to listen on.
 
     Raises:
-        ConfigError: the port is in use, or the address is not local.
+        ConfigError: the port cannot be used, or the address is not local.
     """
 
     def __init__(self, host: str, port: int) -> None:

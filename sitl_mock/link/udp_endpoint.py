@@ -20,13 +20,19 @@ class UdpEndpoint:
         option: command-line option of the port, for the error message.
 
     Raises:
-        ConfigError: the local port is in use.
+        ConfigError: there is no such local port, or it cannot be bound, for example because it is
+            in use.
     """
 
     def __init__(self, local_port: int, remote_port: int | None, option: str) -> None:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self.socket.bind((HOST, local_port))
+        except OverflowError as error:
+            self.socket.close()
+            raise ConfigError(
+                f"there is no UDP port {local_port}; choose a smaller {option}"
+            ) from error
         except OSError as error:
             self.socket.close()
             raise ConfigError(
@@ -72,7 +78,7 @@ class UdpEndpoint:
             self.socket.sendto(datagram, address)
 
     def send(self, datagrams: list[bytes]) -> None:
-        """Send to the partner; datagrams that the network refuses are dropped."""
+        """Send to the partner; datagrams that the kernel refuses are dropped."""
         if self._partner is None:
             return
         for datagram in datagrams:

@@ -1,1 +1,1 @@
-"""The physics: rigid body, rotors, rate loop, wind, ground, battery, sensors (pure)."""
+"""The physics: rigid body, rotors, rate loop, wind, ground, battery, sensors. No I/O, no clock."""

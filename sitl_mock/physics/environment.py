@@ -1,4 +1,4 @@
-"""The environment: wind, and flat ground at the height of home."""
+"""The environment: wind, and flat ground at the height of the start."""
 
 from math import cos, exp, radians, sin, sqrt
 from random import Random
@@ -50,7 +50,10 @@ class Wind:
 
 
 class GroundLaw(NamedTuple):
-    """Constants of the contact with the ground: no penetration, no sliding, the vehicle levels."""
+    """Constants of the contact with the ground: no penetration, no sliding.
+
+    The vehicle levels while it stands there, unless it has crashed.
+    """
 
     crash_cosine: float  # of the tilt
     crash_speed: float  # m/s

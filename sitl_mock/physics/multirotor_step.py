@@ -56,7 +56,10 @@ shaping."""
 
 
 class Rings(NamedTuple):
-    """The latest setpoints, for the delays: as they arrive, and as the rate loop gets them."""
+    """The latest setpoints, for the delays: before the shaping, and before the rate loop.
+
+    Without shaping only ``shaped`` is used.
+    """
 
     arrived: Ring
     shaped: Ring
@@ -117,8 +120,8 @@ def drive(
         actuation: state of controller and rotors before the step.
         body: motion before the step.
         step: number of the step.
-        setpoint: body rates, rad/s, FRD; NaN holds the present rate. Infinity holds it too, but
-            if the rate loop shapes its setpoints, the rate then grows without limit.
+        setpoint: body rates, rad/s, FRD. NaN and infinity hold the present rate. If the setpoints
+            are shaped, NaN holds the shaped rate, and infinity lets it grow without limit.
         throttle: collective; NaN or <= 0 stops the rotors, values above 1 mean 1.
         controlled: whether the rate loop runs; otherwise it idles.
         thrust_factor: factor of the battery voltage on the thrust of every rotor.
@@ -157,7 +160,7 @@ def _shaped(
     setpoint: Vector,
     controlled: bool,
 ) -> tuple[Vector, Shaped]:
-    """Shape a setpoint that has arrived; without control the shaping begins anew."""
+    """Delay and shape a setpoint; without control return it as it is, and reset the shaping."""
     goals = delayed(rings.arrived, law.shaping.delays, step, setpoint)
     if controlled:
         return shape(law.shaping, shaped, goals, q)

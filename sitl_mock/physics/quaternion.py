@@ -52,7 +52,10 @@ def yaw(q: Quaternion) -> float:
 
 
 def along_heading(q: Quaternion, vector: Vector) -> Vector:
-    """Rotate a vector from the heading of ``q`` to world axes; NaN components stay NaN."""
+    """Rotate a vector from the heading of ``q`` to world axes.
+
+    A NaN in one horizontal component makes both NaN; a NaN vertical component stays NaN.
+    """
     w, _, _, z = from_yaw(yaw(q))
     c, s = w * w - z * z, 2.0 * w * z
     x, y, down = vector

@@ -1,4 +1,7 @@
-"""The autopilot's body-rate controller: PI with feed-forward and damping on each axis (pure)."""
+"""The autopilot's body-rate controller: PI with feed-forward and damping on each axis.
+
+Its functions are pure, except for the ring of delayed setpoints.
+"""
 
 from math import exp, isfinite
 from typing import NamedTuple
@@ -59,7 +62,8 @@ def axis_step(
         setpoint: setpoint of the body rate, rad/s.
         rate: present body rate, rad/s.
         acceleration: present angular acceleration, rad/s^2.
-        saturated: the rotors could not give the last torque; the integral must not grow then.
+        saturated: the rotors could not give the last torque; the integral must not grow further in
+            its direction.
         dt: step, s.
     """
     proportional, integral_gain, feed_forward, damping, limit, memory = law
@@ -137,7 +141,7 @@ def delay_steps(delays_ms: Vector, dt: float) -> Delays:
 
 
 def delayed(ring: Ring, delays: Delays, step: int, setpoint: Vector) -> Vector:
-    """Note the setpoint of a step; return the delayed one.
+    """Store the setpoint of a step in the ring; return the delayed one.
 
     Args:
         ring: the latest setpoints, longer than any delay. It is changed.

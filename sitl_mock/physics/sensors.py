@@ -26,7 +26,7 @@ _DRAWN_TOGETHER = 16
 
 
 class Estimate(NamedTuple):
-    """The autopilot's estimate. SI; world NED (origin: home on the ground), body FRD."""
+    """The autopilot's estimate. SI; world NED (origin: where it booted), body FRD."""
 
     q: Quaternion
     body_rates: Vector  # rad/s
@@ -61,7 +61,7 @@ def white_noise(numbers: list[float], deviations: tuple[float, ...]) -> None:
     """Turn uniform random numbers into normal ones, in place: as `Random.gauss`, Box-Muller.
 
     Args:
-        numbers: evenly many, 0 <= x < 1.
+        numbers: an even number of them, 0 <= x < 1.
         deviations: standard deviations of the normal numbers, which are used in turn.
     """
     period = len(deviations)
@@ -145,7 +145,8 @@ class Estimator:
     Attributes:
         law: constants of `estimate`.
         state: changed by fixes and resets.
-        rotation: small rotation of the attitude by the filter's error at the latest estimate, rad.
+        rotation: small rotation of the attitude by the filter's error at the latest estimate, rad,
+            NED.
         reset_counter: estimator resets since boot.
         trail_length: steps whose motion an estimate needs, the present one included.
     """
@@ -217,7 +218,7 @@ class Estimator:
         """
         fused = time - self._behind * self.law.dt
         if self._filter is not None and self._filter.is_due(fused):
-            self._filter.advance(before(self._behind), fused, time)
+            self._filter.advance(before(self._behind), fused, before(0), time)
             self.state = self.state._replace(filter=self._filter.state)
 
     def draw(self) -> Sequence[float]:

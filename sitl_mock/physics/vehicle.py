@@ -31,11 +31,11 @@ from sitl_mock.physics.vehicle_step import (
 __all__ = ["ActuatorCommand", "BatteryState", "Estimate", "TruthState", "Vehicle"]
 
 SLOW_STEP_S = 0.01
-"""Step of wind and battery, which change slowly."""
+"""Step of wind and battery, which change slowly, s."""
 
 
 class TruthState(NamedTuple):
-    """The true state. SI; world NED (origin: home on the ground), body FRD."""
+    """The true state. SI; world NED (origin: where it booted), body FRD."""
 
     time: float  # s since boot
     position_ned: Vector
@@ -52,7 +52,7 @@ class TruthState(NamedTuple):
 
 
 class Vehicle:
-    """One vehicle, on the ground at home at time 0; settings and seed determine its motion.
+    """One vehicle, on the ground at time 0; settings, seed and commands determine its motion.
 
     Args:
         airframe: body and rotors.

@@ -27,9 +27,9 @@ from sitl_mock.physics.sensors import Estimate, SensorLaw, SensorState, estimate
 class ActuatorCommand(NamedTuple):
     """Setpoint of the rate loop and the rotors.
 
-    Rates in rad/s, body FRD, without limit; NaN = hold the present rate. Infinity also holds it in
-    PX4's rate loop; in ArduPilot's the rate grows without limit. Thrust 0..1; NaN or <= 0 = none,
-    above 1 = full.
+    Rates in rad/s, body FRD, without limit. NaN and infinity hold the present rate in PX4's rate
+    loop; in ArduPilot's NaN holds the shaped rate, and with infinity it grows without limit.
+    Thrust 0..1; NaN or <= 0 = none, above 1 = full.
     """
 
     armed: bool

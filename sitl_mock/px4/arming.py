@@ -10,7 +10,8 @@ from sitl_mock.px4.modes import PILOTED
 NOT_ARMABLE = frozenset({Mode.RTL, Mode.LAND})
 """PX4 cannot be armed in these modes, and does not return to them when it disarms."""
 PREFLIGHT_MARGIN_US = 1_000_000
-"""Armed but not flown, PX4 disarms this long after COM_DISARM_PRFLT (measured: 11 s for 10 s)."""
+"""Armed but not flown, PX4 disarms COM_DISARM_PRFLT + this, us, after arming (measured: 11 s for
+10 s)."""
 
 
 class ArmingChecks:
@@ -41,7 +42,7 @@ class ArmingChecks:
 
     @property
     def offboard_alive(self) -> bool:
-        """Whether the latest setpoint is younger than COM_OF_LOSS_T."""
+        """Whether the setpoints are not lost: see `OffboardStream.alive`."""
         return self._stream.alive(self._state.time_us, self._parameters["COM_OF_LOSS_T"])
 
     def problem(self, *, gcs_alive: bool, pilot: bool, refusal: str | None) -> str | None:
@@ -69,7 +70,7 @@ class ArmingChecks:
         return found
 
     def report(self, *, gcs_alive: bool, pilot: bool) -> None:
-        """Send the health report if it changed and is due."""
+        """Send the health report if it changed and is due: see `HealthReport.step`."""
         self._health.step(
             offboard_alive=self.offboard_alive,
             pilot=pilot,

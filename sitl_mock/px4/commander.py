@@ -31,7 +31,7 @@ class Px4Commander:
         control: begins each mode that is entered.
         stream: the offboard setpoints.
         announce: sends texts and events.
-        checks: finds what forbids arming.
+        checks: finds what forbids arming, and sends the health report.
     """
 
     def __init__(
@@ -129,7 +129,7 @@ class Px4Commander:
         self.request_mode(mode)
 
     def receive_heartbeat(self, heartbeat: Message) -> None:
-        """Record a heartbeat of a ground station or a companion, which differ in its type."""
+        """Record a heartbeat, whose MAV_TYPE is that of a ground station or of a companion."""
         self.failsafe.receive_heartbeat(heartbeat.type)
 
     def manual_control(self, message: Message, _: Link) -> None:

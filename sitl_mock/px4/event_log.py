@@ -24,11 +24,13 @@ from sitl_mock.link.link import Link
 _KEPT = 20
 """Number of events that can be requested again."""
 _SEQUENCE_PERIOD_US = 3_000_000
+"""Period of CURRENT_EVENT_SEQUENCE."""
 _RESET = 1
 """MAV_EVENT_CURRENT_SEQUENCE_FLAGS: the sequence restarts; set before the first event."""
 _UNAVAILABLE = 0
 """Value of MAV_EVENT_ERROR_REASON: the event is not available."""
 _CHUNK = 50
+"""Length of STATUSTEXT.text, bytes."""
 
 
 class _Sent(NamedTuple):
@@ -57,7 +59,7 @@ class EventLog:
         """Send a new event.
 
         Args:
-            event_id: see `px4_events.event_id`.
+            event_id: see `sitl_mock.px4.events.event_id`.
             severity: MAV_SEVERITY for the user; 8 = for programs only.
             internal: MAV_SEVERITY for the vehicle's log; None = the same.
             arguments: packed arguments.

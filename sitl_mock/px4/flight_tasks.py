@@ -132,7 +132,10 @@ class FlightTasks:
         return slow + (fast - slow) * share
 
     def _begin_return(self) -> None:
-        """Choose the return height: the cone around home, at most RTL_RETURN_ALT."""
+        """Choose the return height: by the cone around home, at most RTL_RETURN_ALT.
+
+        It is at least the present height; within NAV_ACC_RAD of home it is the present one.
+        """
         parameters, state = self._parameters, self._state
         home = state.home_ned
         x, y, z = state.estimate.position_ned

@@ -68,7 +68,14 @@ class HealthReport:
     def step(
         self, *, offboard_alive: bool, pilot: bool, gcs_alive: bool, gcs_required: bool
     ) -> None:
-        """Send a report if it changed and is due."""
+        """Send a report if it changed and is due; also step the events (`EventLog.step`).
+
+        Args:
+            offboard_alive: whether the setpoints are not lost.
+            pilot: whether a pilot holds the sticks.
+            gcs_alive: whether a ground station is connected.
+            gcs_required: whether arming needs a ground station.
+        """
         state = self._state
         self._events.step()
         if state.time_us - self._reported_us < _PERIOD_US:

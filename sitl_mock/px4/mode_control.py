@@ -17,7 +17,8 @@ from sitl_mock.px4.flight_tasks import FlightTasks
 from sitl_mock.px4.modes import PILOTED
 
 ATTITUDE_FAILS_US = 140_000
-"""Quaternions that are NaN for longer, us, make PX4's attitude control fail until a restart."""
+"""Unusable quaternions, such as NaN, for longer than this, us, make PX4's attitude control fail
+until a restart."""
 TOUCHDOWN_THRUST_RATE = 0.4
 """After contact in LAND the thrust decreases by this per second."""
 PRESSED_DOWN: Vector = (0.0, 0.0, 100.0)

@@ -58,7 +58,9 @@ def mode_of(custom: int) -> Mode | None:
 
 
 def base_mode(mode: Mode, *, armed: bool, attitude_controlled: bool) -> int:
-    """Return the recorded flags: 29 auto; offboard 1 by rates, else 17; 128 more if armed.
+    """Return the recorded flags: 29 auto; offboard 1 by rates, else 17; 81 by a pilot.
+
+    Armed, they are 128 more.
 
     Args:
         mode: the flight mode.

@@ -19,6 +19,7 @@ NAN = float("nan")
 
 _THRUST_BODY_FIELD = struct.Struct("<3f")
 _FULL_LENGTH = 51
+"""Length of SET_ATTITUDE_TARGET with thrust_body, bytes."""
 _MAGIC_V2 = 0xFD
 
 

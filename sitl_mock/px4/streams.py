@@ -20,7 +20,7 @@ BUSY_SHARE = 0.22
 one flight, 0.23 in another)."""
 
 NEW_EVERY_US = {LOCAL_POSITION_NED: 8000}
-"""Message id -> period of new values; a value is not sent twice."""
+"""Message id -> period of new values, us; unless rates are exact, a value is not sent twice."""
 
 
 class _Stream:

@@ -15,9 +15,11 @@ from sitl_mock.px4.modes import base_mode, custom_mode, standard_mode
 _SENSORS_PRESENT = 50380847
 _SENSORS_ENABLED = 50446383
 _SENSORS_HEALTHY = 320915519
+"""From _SENSORS_PRESENT on: bits of SYS_STATUS, recorded."""
 _ESTIMATOR_GOOD = 895
 _ESTIMATOR_ON_GROUND = 1023
 _ESTIMATOR_NO_POSITION = 164
+"""From _ESTIMATOR_GOOD (in the air) on: flags of ESTIMATOR_STATUS, recorded."""
 
 
 class Px4SystemTelemetry(SystemTelemetry):

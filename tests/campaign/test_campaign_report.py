@@ -4,6 +4,7 @@ import argparse
 import json
 import re
 from math import isnan
+from types import SimpleNamespace
 
 import numpy as np
 import pyarrow.csv
@@ -11,7 +12,7 @@ import pyarrow.parquet
 import pytest
 
 from companion.campaign import folder, loading, store
-from companion.campaign.report.page import run
+from companion.campaign.report.page import _few_samples, run
 from companion.campaign.report.statistics import levels, pareto_front, share_of
 from companion.files.yaml_file import ConfigError
 
@@ -77,7 +78,7 @@ def test_the_page_says_what_was_flown_how_it_went_and_what_to_look_at(flown, cap
     page = (place / "report.html").read_text("utf-8")
     body = re.sub(r"<script.*?</script>", "", page, flags=re.S)
     assert f"{good} of 150 flights good" in body
-    assert f"{len(crashed)} of them crashed" in body
+    assert f"{len(crashed)} flights crashed" in body
     assert "Success is lowest with mock.wind.speed_m_s = " in body
     assert re.search(r"planner.name explains \d\d% ± \d+% of the variance", body)
     assert f"companion campaign rerun {place} {crashed[0]}<" in body
@@ -141,3 +142,11 @@ def test_the_levels_of_a_factor_hold_each_case_once():
 def test_the_pareto_front_holds_what_nothing_beats():
     goals = np.array([[1.0, 3.0], [2.0, 2.0], [3.0, 1.0], [3.0, 3.0], [2.0, 2.0]])
     assert pareto_front(goals).tolist() == [True, True, True, False, True]
+
+
+@pytest.mark.parametrize(("sampled", "warnings"), [(True, 1), (False, 0)])
+def test_only_sampled_factors_can_have_too_few_samples(sampled, warnings):
+    """A grid of 20 values is no sample, whatever its length."""
+    factors, columns = {"a": {"sampled": sampled}}, {"a": np.arange(20.0)}
+    results = SimpleNamespace(factors=factors, columns=columns)
+    assert len(list(_few_samples(results))) == warnings

@@ -14,6 +14,7 @@ from sitl_mock.link.byte_stream import ByteStream
 from sitl_mock.link.framing import Framer, decode, split
 from sitl_mock.link.serial_endpoint import SerialEndpoint
 from sitl_mock.link.tcp_endpoint import TcpEndpoint
+from sitl_mock.link.udp_endpoint import UdpEndpoint
 from sitl_mock.settings import MockSettings, load_settings
 
 FRAMER = Framer(255, 190)
@@ -37,6 +38,13 @@ def tcp():
     endpoint.port = int(endpoint.where.rpartition(":")[2])
     yield endpoint
     endpoint.close()
+
+
+def test_ports_above_the_largest_are_refused():
+    with pytest.raises(ConfigError, match="no UDP port 65536; choose a smaller --port"):
+        UdpEndpoint(65536, None, "--port")
+    with pytest.raises(ConfigError, match="no TCP port 65536 for vehicle 3"):
+        MockSettings(endpoint="tcpin://127.0.0.1:65534").for_vehicle(2)
 
 
 def test_a_tcp_port_takes_one_client_and_sends_the_second_off(tcp):

@@ -1,5 +1,7 @@
 """The configuration: defaults, and each kind of mistake told in one sentence, exit code 2."""
 
+import os
+
 import pytest
 
 from sitl_mock.__main__ import main
@@ -12,6 +14,8 @@ MISTAKES = {
     "lockstep: {enable: true}": ("mock.lockstep.enable", "did you mean enabled?"),
     "parameters: {COM_OBL_RC_AC: 3}": ("COM_OBL_RC_AC", "did you mean COM_OBL_RC_ACT?"),
     "parameters: {COM_OBL_RC_ACT: 3.5}": ("COM_OBL_RC_ACT is an integer",),
+    "parameters: {MPC_XY_VEL_MAX: 1.0e+300}": ("MPC_XY_VEL_MAX cannot be as large as 1e+300",),
+    "parameters: {NAV_RCL_ACT: 1.0e+12}": ("NAV_RCL_ACT cannot be as large as 1e+12",),
     "mass_kg: 2": ("line 2: mock.mass_kg stands in the wrong place; write mock.airframe.mass_kg",),
     "prearm_delay_s: 5 s": ("line 2: mock.prearm_delay_s must be a number: write 5 without 's'",),
     "wind:\n    speed_m_s: fast": ("line 3: mock.wind.speed_m_s must be a number: write digits",),
@@ -44,6 +48,19 @@ def test_what_is_no_mapping(text, tmp_path):
     path.write_text(text)
     with pytest.raises(ConfigError, match=r"mock\.yaml"):
         load_settings(path, {})
+
+
+def test_a_file_that_is_no_text_file(tmp_path):
+    (tmp_path / "binary.yaml").write_bytes(b"mock: \xff")
+    (tmp_path / "large.yaml").write_bytes(b"#" * 250_001)
+    os.mkfifo(tmp_path / "pipe.yaml")
+    for name, words in (
+        ("pipe.yaml", "is not a regular file"),
+        ("binary.yaml", "is not text in UTF-8"),
+        ("large.yaml", "is larger than 250 kB"),
+    ):
+        with pytest.raises(ConfigError, match=f"{name}: {words}$"):
+            load_settings(tmp_path / name, {})
 
 
 def test_a_missing_file(tmp_path):

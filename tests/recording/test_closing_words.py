@@ -105,7 +105,7 @@ BEYOND = {
         0.06,
         "limits.max_tilt_rate_deg_s",
     ),
-    "attitude samples": (["unanswered", "late"], 150, "Control loop"),
+    "attitude samples": (["unanswered", "late"], 150, "`unanswered samples`"),
     "link": (["link", "lost"], 900, "baud"),
     "latency": (["latency_us", "p99"], 4100.0, "realtime.scheduler"),
     "battery": (["battery", "end"], 0.29, "charge"),

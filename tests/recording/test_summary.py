@@ -66,6 +66,7 @@ def test_json_has_the_promised_keys():
     trace.add_latency(40_000)
     trace.add_tracking(0.0, (0.0, 0.0, -5.0), (0.3, 0.4, -5.1))
     trace.add_tracking(0.1, (math.nan, math.nan, -5.0), (9.0, 9.0, -4.9))
+    trace.add_tracking(0.2, (0.0, 0.0, math.nan), (9.0, 9.0, -9.0))  # a program's own thrust
     dead_times = DeadTimes(
         {"roll": AxisDeadTime(0.042, 0.04), "pitch": AxisDeadTime(), "yaw": AxisDeadTime()},
         SampleAge(0.002, 0.004),

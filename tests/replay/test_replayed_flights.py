@@ -204,6 +204,8 @@ def test_the_record_alone_gives_the_figures_of_the_summary(good):
     for key in ("extent", "latency_us", "phases", "planner", "gain_per_s", "lockstep"):
         assert derived[key] == summary[key], key
     assert derived["takeoff_s"] == pytest.approx(summary["takeoff_s"], abs=0.15)
+    since = derived["early_end"]["time_s"] - derived["takeoff_s"]
+    assert derived["early_end"]["since_takeoff_s"] == pytest.approx(since, abs=0.002)
     assert "before it was over" in derived["result"]
 
 

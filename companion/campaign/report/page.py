@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 PARQUET, CSV = "results.parquet", "results.csv"
 _DONE = 0
 _GRID_LIKE, _FEW_SAMPLES = 12, 60
-"""A factor with a number of values between these was sampled, but too rarely to separate its
-influence from that of other factors.
+"""A sampled factor with a number of values between these has too few to separate its influence
+from that of other factors.
 """
 
 
@@ -38,10 +38,11 @@ def run(options: argparse.Namespace) -> int:
     """Write the page and the tables of a campaign; returns the exit code.
 
     Args:
-        options: `folder` of the campaign, and `out`: the page, or None for `report.html` there.
+        options: `folder` of the campaign, and `out`: path of the page; None: `report.html` in the
+            folder.
 
     Raises:
-        ConfigError: the folder holds no campaign, or no results yet.
+        ConfigError: the folder holds no campaign or no results yet, or a file in it is damaged.
         MissingExtraError: an extra is missing.
         OSError: a file cannot be written.
     """
@@ -126,7 +127,7 @@ def headline(results: Results) -> str:
 
 
 def missing(results: Results) -> list[str]:
-    """What an unfinished campaign still lacks."""
+    """How many cases are missing, and how to go on; empty if all are flown."""
     left = results.planned - results.count
     if not left:
         return []
@@ -141,7 +142,7 @@ def what_to_look_at(results: Results, found: dict[str, list[Influence]]) -> Iter
     yield f"Swept: {', '.join(results.factors) or 'nothing but noise and gusts'}."
     columns = results.columns
     if crashed := results.true_cases("crashed"):
-        yield f"{crashed} of them crashed; they stand first in the table of worst cases."
+        yield f"{crashed} {results.noun} crashed; they stand first in the table of worst cases."
     documented = [value for value in columns.get("as_documented", ()) if value is not None]
     if documented:
         kept = sum(documented)
@@ -196,8 +197,8 @@ def _few_samples(results: Results) -> Iterator[str]:
     """A warning if the sampled factors took few different values."""
     drawn = [
         len(np.unique(column))
-        for name in results.factors
-        if (column := results.columns[name]).dtype == float
+        for name, factor in results.factors.items()
+        if factor["sampled"] and (column := results.columns[name]).dtype == float
     ]
     largest = max(drawn, default=0)
     if _GRID_LIKE < largest < _FEW_SAMPLES:

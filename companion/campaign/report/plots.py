@@ -113,8 +113,9 @@ def pareto(results: Results) -> Iterator[Plot]:
             trace["marker"]["color"] = MEASURED if trace is traces[0] else IDEAL
     of = "error, rate use and thrust use" if thrust else "error and rate use"
     note = (
-        f"A point for each choice of the program's own keys: the medians over everything else. On "
-        f"the front no other choice is better in {of} at once; read the success rate at the point."
+        f"A point for each choice of the program's own keys: the medians over everything else; or "
+        f"a point for single cases, if no choice was flown twice or there are very many. On the "
+        f"front no other point is better in {of} at once. Each point shows its success rate."
     )
     layout = axes(x=label(RATES), y=label(results.error))
     yield Plot("Pareto front", note, [t for t in traces if t["x"]], layout, 420)

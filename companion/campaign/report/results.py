@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from companion.campaign import store
 from companion.campaign.folder import read_description
-from companion.campaign.store import unit
+from companion.campaign.store import physical_unit
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -48,7 +48,7 @@ LABELS = {
 def label(name: str) -> str:
     """Name and unit of an outcome or a factor on the page."""
     told = LABELS.get(name, name)
-    return f"{told}, {unit(name)}" if unit(name) else told
+    return f"{told}, {physical_unit(name)}" if physical_unit(name) else told
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Results:
         folder: folder of the campaign.
         name: name of the campaign.
         kind: flights or batch.
-        planned: number of its cases.
+        planned: number of cases of the whole campaign, flown or not.
         factors: metadata of each swept key, by name.
         table: all rows, as returned by `store.read`.
     """
@@ -76,7 +76,7 @@ class Results:
         """Read the results in a folder.
 
         Raises:
-            ConfigError: the folder holds no campaign, or no results yet.
+            ConfigError: the folder holds no campaign or no results yet, or a file is damaged.
         """
         planned = read_description(folder).cases
         table = store.read(folder)
@@ -85,7 +85,7 @@ class Results:
 
     @cached_property
     def columns(self) -> dict[str, Column]:
-        """Every column, (cases,): numbers with NaN for null, and anything else as objects."""
+        """Every column, (cases,): float64 with NaN for null; any other type as objects."""
         found = {}
         for field in self.table.schema:
             column = self.table.column(field.name)
@@ -118,7 +118,7 @@ class Results:
         return next((name for name in ERRORS if self.measured(name)), ERRORS[-1])
 
     def measured(self, name: str) -> bool:
-        """Whether a column of numbers exists and has a value."""
+        """Whether a column of float64 exists and has a finite value."""
         column = self.columns.get(name)
         return column is not None and column.dtype == float and bool(np.isfinite(column).any())
 

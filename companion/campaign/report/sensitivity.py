@@ -1,9 +1,9 @@
 """Which factor an outcome depends on, estimated from the flown cases with SALib.
 
-The first-order Sobol index of a factor is the share of the outcome's variance that would vanish if
-the factor were known. It is estimated from given samples: the cases are divided into classes of the
-factor, and the variance between the classes is compared with the whole. The joint effect of two
-factors is in no first-order index.
+The first-order Sobol index of a factor is the share of the outcome's variance that would vanish on
+average if the factor were known. It is estimated from given samples: the cases are divided into
+classes of the factor, and the variance between the classes is compared with the whole. The joint
+effect of two factors is in no first-order index.
 """
 
 from typing import NamedTuple
@@ -34,7 +34,10 @@ class Influence(NamedTuple):
 
 
 def influences(results: Results, outcome: str) -> list[Influence]:
-    """The factors by their influence on an outcome, the largest first; empty with too few cases.
+    """The factors by their influence on an outcome, the largest first.
+
+    Factors with a single value are left out. The list is empty if fewer than `FEWEST` cases were
+    measured, or if the outcome is always the same.
 
     Args:
         results: results of the campaign.
@@ -62,9 +65,13 @@ def influences(results: Results, outcome: str) -> list[Influence]:
 
 
 def as_numbers(column: Column, values: Floats) -> Floats:
-    """A factor as numbers; words are numbered in the order of their mean outcome.
+    """A factor as numbers; words and booleans are numbered in the order of their mean outcome.
 
     Without this order neighbouring words could share a class, and their difference would be lost.
+
+    Args:
+        column: (cases,) values of the factor.
+        values: (cases,) values of the outcome.
     """
     if column.dtype == float:
         return np.where(np.isfinite(column), column, np.nanmin(column, initial=0.0) - 1.0)

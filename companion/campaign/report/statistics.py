@@ -67,9 +67,10 @@ class Level(NamedTuple):
 
 
 def levels(column: Column) -> list[Level]:
-    """The levels of a factor: its values, or ranges with equally many cases for many numbers.
+    """The levels of a factor: its values, or ranges if they are more than `_MOST_LEVELS` numbers.
 
-    Of more than `_MOST_LEVELS` words the last level holds all that have none of their own.
+    Ranges have about equally many cases. Of more than `_MOST_LEVELS` words the last level holds all
+    that have none of their own.
     """
     known = sorted({_key(value) for value in column})
     if column.dtype != float or len(known) <= _MOST_LEVELS:
@@ -98,7 +99,10 @@ def _key(value: object) -> tuple[float, str]:
 
 
 def worst(results: Results, count: int) -> list[int]:
-    """Rows of the worst cases: crashed, not as documented, not good, then the largest error."""
+    """Rows of the worst cases: crashed, not as documented, not good, then the largest error.
+
+    A missing error counts as infinite.
+    """
     columns = results.columns
     error = columns[results.error]
     crashed = columns.get("crashed", np.zeros(results.count))

@@ -10,7 +10,7 @@ from companion.campaign.campaign import Campaign
 from companion.campaign.report.results import LABELS, RATES, Results, label
 from companion.campaign.report.sensitivity import Influence
 from companion.campaign.report.statistics import levels, share_of, worst
-from companion.campaign.store import unit
+from companion.campaign.store import physical_unit
 from companion.config.reference import keys
 from companion.flight.flown_config import flat
 from companion.report.tables import Table
@@ -51,7 +51,7 @@ def _values(results: Results, row: int) -> str:
 
 
 def configuration(campaign: Campaign) -> Table:
-    """What all cases share: all limits, and the keys that are not the default; no swept keys."""
+    """What all cases share: limits, and keys that are not the default; without swept keys."""
     swept = {key for name, each in campaign.file.sweep.items() for key in each.keys or (name,)}
     rows = [
         (f"{key.section}.{key.name}", json.dumps(key.value), json.dumps(key.default), key.unit)
@@ -61,7 +61,7 @@ def configuration(campaign: Campaign) -> Table:
     mock = complete_mock(campaign.base.mock or {})
     usual = flat(complete_mock({"autopilot": mock["autopilot"]}))
     rows += [
-        (f"mock.{key}", value, usual.get(key, EMPTY), unit(key))
+        (f"mock.{key}", value, usual.get(key, EMPTY), physical_unit(key))
         for key, value in flat(mock).items()
         if value != usual.get(key)
     ]
@@ -71,7 +71,7 @@ def configuration(campaign: Campaign) -> Table:
 
 
 def success_by_factor(results: Results, order: Sequence[str]) -> Table:
-    """Success rate and median error by level of each factor, the most influential factor first."""
+    """Success rate, median error and median body rate by level of the most influential factors."""
     rows = [row for name in order[:_MOST_FACTORS] for row in _by_level(results, name)]
     documented = "as_documented" in results.columns and "fault" in results.factors
     header = ["factor", "value", results.noun, "good (95 % interval)"]

@@ -27,7 +27,7 @@ _UNSEEN = 1_000_003
 
 
 _SPREAD = 0.15
-"""Standard deviation of the candidates near a start, as a share of the range."""
+"""Standard deviation of the candidates near a start, as a share of the (logarithmic) range."""
 
 
 class Start(NamedTuple):
@@ -78,7 +78,7 @@ def unseen(campaign: Campaign, samples: int) -> Campaign:
 
 
 def suggested(trial: "Trial", search: Mapping[str, Swept]) -> dict[str, Any]:
-    """The values that the search tries next, rounded to three digits."""
+    """The values that the search tries next; numbers are rounded to three digits."""
     found: dict[str, Any] = {}
     for key, swept in search.items():
         if swept.choice is not None:
@@ -91,13 +91,15 @@ def suggested(trial: "Trial", search: Mapping[str, Swept]) -> dict[str, Any]:
 
 
 def starts(campaign: Campaign, tune: Tune, learned: Config | None = None) -> Iterator[Start]:
-    """The starts: the present configuration, and the proposal of `companion tune`.
+    """The starts: the present configuration, `learned`, and the proposal of `companion tune`.
+
+    Without a known rate loop there is no proposal.
 
     Args:
         campaign: its base is the present configuration.
         tune: section `tune` of the campaign.
-        learned: the configuration after a first flight of the vehicle. It becomes another start,
-            and the input of `companion tune`. None: the input is the present configuration.
+        learned: the configuration with what first flights of the vehicle measured. It is also the
+            input of `companion tune`. None: that input is the present configuration.
     """
     yield Start("the configuration", within(_present(campaign.base, tune.search), tune.search))
     known, present = learned or campaign.base, _present(learned or campaign.base, tune.search)
@@ -116,7 +118,7 @@ def starts(campaign: Campaign, tune: Tune, learned: Config | None = None) -> Ite
 
 
 def near(start: Start, search: Mapping[str, Swept], count: int, seed: int) -> Iterator[Start]:
-    """Candidates around a start: each value is moved by a normally distributed share of its range.
+    """Candidates around a start: each number is moved by a normally distributed share of its range.
 
     The optimum is more often near a reasonable start than anywhere in the ranges.
     """
@@ -141,7 +143,7 @@ def _analysed(config: Config) -> Config:
 
 
 def _present(config: Config, keys: Collection[str]) -> dict[str, Any]:
-    """The present values; where a key is null, the value that the program derives."""
+    """The present values of keys; for null the value that the program derives, if there is one."""
     weights, drag = hold_weights(config), drag_prior(config).drag
     derived = {
         "guidance.position_weight_per_s4": weights.position,
@@ -167,7 +169,10 @@ def set_values(config: Config, keys: Iterable[str]) -> dict[str, Any]:
 
 
 def within(values: Values, search: Mapping[str, Swept]) -> dict[str, Any]:
-    """The given values of searched keys, clamped to the ranges of the search."""
+    """The given values of searched keys, clamped to the ranges of the search.
+
+    A value that is not among the key's choices is left out.
+    """
     found: dict[str, Any] = {}
     for key, value in values.items():
         swept = search.get(key)

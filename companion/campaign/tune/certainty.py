@@ -1,4 +1,4 @@
-"""How certain a result is: it is compared with the start on cases that the search has not seen."""
+"""How certain a result is: it is compared with the unchanged configuration on unseen cases."""
 
 from typing import NamedTuple
 
@@ -26,13 +26,13 @@ class Comparison(NamedTuple):
     """Two configurations compared on the same cases, with the same noise and gusts.
 
     Attributes:
-        before: RMS of the true error of the start, m.
-        after: RMS of the true error of the result, m.
+        before: RMS of the true horizontal error with the configuration before the search, m.
+        after: the same with the result, m.
         ratio: after / before.
-        known: RMS of the estimated error of the start and of the result, on the same flights, m.
-        estimate: RMS of the position estimate's own error, for the start and for the result, m.
+        known: RMS of the estimated horizontal error, before and after, on the same flights, m.
+        estimate: RMS of the horizontal error of the position estimate itself, before and after, m.
         better: number of samples in which the result is better.
-        samples: number of samples.
+        samples: number of samples that were compared.
     """
 
     before: Interval
@@ -51,9 +51,9 @@ def compared(before: Score, after: Score, samples: int) -> Comparison | None:
     flight that ended early has no error and is left out.
 
     Args:
-        before: score of the start.
+        before: score of the configuration before the search.
         after: score of the result.
-        samples: number of samples that the cases belong to, in order.
+        samples: number of samples that the cases belong to, in order; all have equally many cases.
 
     Returns:
         None if fewer than two samples were flown to their end by both.

@@ -32,6 +32,9 @@ def learned(campaign: Campaign) -> Config:
     measures the drag. A second-order rate loop is used only if the search may set
     `vehicle.damping`, because it changes the meaning of lag and dead time. Values that were not
     measured stay unchanged.
+
+    Raises:
+        ConfigError: the first case cannot be flown.
     """
     tune, case, config = campaign.file.tune, next(campaign.cases()), campaign.base
     damped = tune is not None and _DAMPING in tune.search

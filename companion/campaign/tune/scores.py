@@ -20,11 +20,12 @@ class Score(NamedTuple):
 
     Attributes:
         true: RMS of the true horizontal distance from the reference in each case, m; infinite where
-            a case was not flown to its end.
+            a case was not flown to its end, or had no maneuver in closed loop.
         estimated: the same distance by the estimated position, which is all that the program knows
             in flight.
-        estimate: RMS of the horizontal distance between true and estimated position, m.
-        inside: whether each case stayed inside the envelope.
+        estimate: RMS of the horizontal distance between true and estimated position, m; infinite as
+            well.
+        inside: whether each case was flown to its end and stayed inside the envelope.
     """
 
     true: tuple[float, ...]
@@ -79,7 +80,7 @@ def scored(rows: Sequence[Row], envelope: float | None) -> Score:
 
     Args:
         rows: one row for each case.
-        envelope: largest true distance from the reference inside the envelope, m; None: any.
+        envelope: largest true distance from the reference inside the envelope, m; None: no limit.
     """
     return Score(
         tuple(_number(row, "level_rms_m") for row in rows),

@@ -35,14 +35,16 @@ STORAGE = "tune.db"
 """Optuna's storage in the folder of the search."""
 _NAME = "tune"
 _STARTS, _FEWEST_NEAR = 3, 4
-"""Number of starts, and smallest number of candidates near the last of them."""
+"""Largest number of starts, and smallest number of candidates near the last of them."""
 _FIRST_SHARE = 4
 """A candidate flies the first 1/4 of its cases, at least `_FEWEST`, before the others."""
 _FEWEST = 2
 _HOPELESS = 1.3
-"""A candidate is abandoned when its error exceeds that of the best one by this factor."""
+"""A candidate is abandoned when its error on the first cases is more than this factor times that of
+the best candidate on the same cases.
+"""
 _UNFLOWN = 10.0
-"""Error assigned to a flight that ended early, m; larger than that of any complete flight."""
+"""Largest error of a flight as Optuna sees it, m; the error of a flight that ended early."""
 _VALUES, _SCORE, _MISSED, _WHOLE = "values", "score", "missed", "whole"
 
 
@@ -66,9 +68,10 @@ class Found:
     """The results of a search so far.
 
     Attributes:
-        tried: number of all candidates, including those that were abandoned.
-        stopped_early: number of candidates that were abandoned.
-        best: the candidate with the smallest error inside the envelope; None: none stayed inside.
+        tried: number of all candidates, including those of `stopped_early`.
+        stopped_early: number of candidates that were abandoned, or whose keys were refused.
+        best: of the candidates that met the constraint (`inside_share`) the one with the smallest
+            error; None: none met it.
         near: the best tenth of the candidates that met the constraint, at least three if there are
             so many; the best one first.
     """
@@ -134,7 +137,7 @@ class Search:
 
     @property
     def _near(self) -> int:
-        """Number of candidates near the start that are tried first."""
+        """Number of candidates near the last start that are tried before Optuna proposes any."""
         return max(_FEWEST_NEAR, len(self._tune.search))
 
     def _sampler(self, number: int) -> Any:
@@ -187,7 +190,13 @@ class Search:
         self._study.tell(trial, _finite(score))
 
     def _stop(self, trial: "Trial", error: float, missed: float) -> None:
-        """End a candidate before all of its cases were flown."""
+        """End a candidate before all of its cases were flown.
+
+        Args:
+            trial: the candidate.
+            error: RMS error so far, m.
+            missed: violation of the constraint; see `_note_missed`.
+        """
         self._note_missed(trial, missed)
         trial.report(error, 0)
         self._study.tell(trial, state=self._optuna.trial.TrialState.PRUNED)
@@ -215,5 +224,5 @@ class Search:
 
 
 def _finite(score: Score) -> float:
-    """The RMS error for Optuna, m; `_UNFLOWN` for a flight that ended early."""
+    """The RMS error for Optuna, m; no flight counts more than `_UNFLOWN`."""
     return pooled(np.minimum(score.true, _UNFLOWN))

@@ -14,15 +14,17 @@ class Tune(Section):
     search: Annotated[dict[str, Swept], Field(min_length=1, max_length=30)]
     """Searched keys of the application: dotted, each with uniform, loguniform or choice."""
     trials: Annotated[int, Field(ge=1, le=100_000)] = 100
-    """Number of candidates that are tried."""
+    """Number of candidates that are tried; `--trials` replaces it."""
     envelope_m: Annotated[float, Field(gt=0.0, le=1000.0)] | None = 1.0
-    """Largest true distance from the reference for a flight to count as inside the envelope. null:
-    every flight that reaches its end counts as inside.
+    """Largest true distance from the reference (`position_max_m` of the results) for a flight that
+    reaches its end to count as inside the envelope. null: every flight that reaches its end counts
+    as inside.
     """
     inside_share: Annotated[float, Field(gt=0.0, le=1.0)] = 0.999
     """Share of the flights that must stay inside the envelope."""
     check_samples: Annotated[int, Field(ge=2, le=10_000)] = 8
-    """Samples that the search does not see; on them the result is compared with the start."""
+    """Number of samples that the search does not see; on them the result is compared with the
+    unchanged configuration."""
 
     @field_validator("search")
     @classmethod

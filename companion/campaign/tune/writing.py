@@ -12,7 +12,7 @@ from companion.campaign.tune.search import Candidate, Found
 from companion.files import bounded_yaml
 
 _AT_EDGE = 0.02
-"""A value this close to an end of its range, as a share of the range, lies at the end."""
+"""A value closer to an end of its range than this share of the range counts as at the end."""
 
 
 class Result(NamedTuple):
@@ -22,7 +22,7 @@ class Result(NamedTuple):
         campaign: the campaign, with its section `tune`.
         found: results of the search.
         best: the candidate that is proposed.
-        before: score of the unchanged configuration, on the unseen cases.
+        before: score of the configuration before the search, on the unseen cases.
         after: score of the proposal, on the unseen cases.
         comparison: comparison of the two; None if fewer than two samples were flown to their end.
     """
@@ -43,7 +43,7 @@ def summary_lines(result: Result) -> list[str]:
     envelope = "to its end" if tune.envelope_m is None else f"within {tune.envelope_m:g} m"
     lines = [
         f"{found.tried} candidates over {cases} flights each, {found.stopped_early} of them "
-        f"stopped early; candidate {best.number} is the best.",
+        f"refused or stopped early; candidate {best.number} is the best.",
         f"Constraint: {tune.inside_share:.1%} of the flights {envelope}; in the search "
         f"{best.score.share:.1%} were.",
         f"RMS of the true horizontal error in the search: {best.score.rms:.3f} m.",
@@ -58,11 +58,13 @@ def _certainty(result: Result) -> Iterator[str]:
     ]
     if any(early):
         yield (
-            f"Of {unseen} flights that the search has not seen, {early[0]} ended early before, and "
-            f"{early[1]} with the result; the errors below are those of the other samples."
+            f"Of {unseen} flights that the search has not seen, {early[0]} ended early with the "
+            f"configuration before the search, and {early[1]} with the result; samples with such a "
+            "flight are not compared."
         )
     told = result.comparison
     if told is None:
+        yield "Fewer than two samples were flown to their end by both, so no errors are compared."
         return
     yield (
         f"On {told.samples} samples that the search has not seen, RMS of the true horizontal error "
@@ -79,8 +81,8 @@ def _certainty(result: Result) -> Iterator[str]:
         f"the reference, and {floor:.3f} -> {floor_after:.3f} m from the true one."
     )
     yield (
-        "No gain or weight reduces the last: it is the autopilot's estimate. Only "
-        "guidance.position_lateness_ms reduces it, where the estimate is late."
+        "The last is the error of the position estimate, which gains and weights hardly change; "
+        "where the estimate is late, guidance.position_lateness_ms reduces it."
     )
     if told.ratio.high >= 1.0:
         yield "The interval holds 1: fly more samples before you believe that it is better."

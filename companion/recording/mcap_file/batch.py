@@ -1,7 +1,8 @@
 """Messages of `flight.mcap` for the live stream: several in one datagram.
 
 A datagram is a sequence of messages. Each consists of the index of its channel in `TOPICS` (uint8),
-its time in ns since 1970 (uint64), its length (uint32), and its bytes.
+its time in ns since 1970 (in vehicle time: since its boot; uint64), its length (uint32), and its
+bytes.
 """
 
 import struct
@@ -23,7 +24,7 @@ class StreamedMessage(NamedTuple):
     """A message of the live stream.
 
     Attributes:
-        number: number of its channel in `TOPICS`.
+        number: index of its channel in `TOPICS`.
         time_ns: ns since 1970 (in vehicle time: since its boot).
         data: payload, as in the file.
     """

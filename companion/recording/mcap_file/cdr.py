@@ -1,4 +1,4 @@
-"""Text messages in CDR (ROS 2), and the Foxglove message types that we write.
+"""Messages in CDR (ROS 2) that are not only numbers, and the Foxglove types of poses and events.
 
 Foxglove, Lichtblick and PlotJuggler recognise these types by name and draw them.
 """
@@ -173,7 +173,7 @@ def stamp(time_ns: int) -> bytes:
 
 
 def _align(message: bytearray) -> None:
-    """Pad to 4 bytes. Positions count after the 4-byte header; the alignment is the same."""
+    """Pad to 4 bytes. CDR counts them after the header, whose 4 bytes do not change the padding."""
     message.extend(bytes(-len(message) % 4))
 
 

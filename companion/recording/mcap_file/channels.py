@@ -1,6 +1,7 @@
 """All channels of `flight.mcap`; those of the status, ten times or once a second, are defined here.
 
-The columns follow the conventions of `companion.recording.mcap_file.loop_channels`.
+The columns follow the conventions of `companion.recording.mcap_file.loop_channels`, but `time_s` of
+MOTION counts from the beginning of the flight.
 """
 
 from typing import NamedTuple
@@ -24,7 +25,7 @@ THRUST = Channel(
     "The thrust estimator, ten times a second.",
     (
         Field("time_s", "When, on our clock, s."),
-        Field("hover_thrust", "Learned thrust at hover, 0..1."),
+        Field("hover_thrust", "Learned thrust at hover at the battery's initial voltage, 0..1."),
         Field("smallest_m_s2", "Smallest specific thrust that is sent, m/s²."),
         Field("largest_m_s2", "Largest specific thrust that is sent, m/s²."),
         Field("sent", "Thrust last sent, 0..1."),
@@ -51,8 +52,8 @@ RESOURCES = Channel(
         Field("time_s", "When, on our clock, s."),
         Field("processor_share", "Processor time per time, 1: one core."),
         Field("memory_mb", "Largest memory so far, MB."),
-        Field("recording_waiting", "Rows that wait to be written."),
-        Field("recording_dropped", "Rows and frames that were not recorded so far."),
+        Field("recording_waiting", "Entries of this file that wait to be written."),
+        Field("recording_dropped", "Entries of this file that were not recorded so far."),
         Field("frames", "Frames received so far."),
         Field("frames_lost", "Frames of the vehicle lost so far."),
         Field("sent", "Frames sent so far."),

@@ -23,7 +23,7 @@ class Event(NamedTuple):
     Attributes:
         time: time since the flight began, s.
         text: text as shown to the user.
-        level: 2 information, 3 warning, 4 error (foxglove_msgs/msg/Log).
+        level: 3 (warning) if the source is "safety", else 2 (information); foxglove_msgs/msg/Log.
         source: "flight", "safety", "autopilot" or "phase".
     """
 
@@ -41,7 +41,7 @@ class AlarmChange(NamedTuple):
         raised: true: the alarm was raised. False: it ended.
         monitor: name of the monitor in `companion.safety.table`.
         reason: description of the breach; empty when the alarm ended.
-        action: action of the flight, in words.
+        action: action of the flight, in words; empty when the alarm ended.
     """
 
     time: float

@@ -2,8 +2,9 @@
 
 This table is the reference of their columns. Times end with `_s`. `time_s` and `received_s` are on
 our clock (event-loop time). `vehicle_time_s` is the vehicle's clock without its jumps. Positions
-are NED in the frame of LOCAL_POSITION_NED, without jumps of the autopilot's estimator. Rates are
-about the axes of the body (FRD).
+are NED in the frame of LOCAL_POSITION_NED, without jumps of the autopilot's estimator; only INPUT
+and ATTITUDE_TARGET hold what was received, with its jumps, and so does the attitude in SAMPLE.
+Rates are about the axes of the body (FRD).
 """
 
 from companion.recording.mcap_file.fields import Channel, Code, Field
@@ -33,7 +34,7 @@ ACTIONS = (
     "restart_planner",
     "drag_prior",
 )
-"""Commands of a phase to guidance, by number."""
+"""Calls by which a phase controls guidance or the control loop, by number."""
 
 
 def _vector(prefix: str, unit: str, meaning: str) -> tuple[Field, ...]:
@@ -108,7 +109,7 @@ SETPOINT = Channel(
 )
 GUIDANCE = Channel(
     "/guidance",
-    "One step of guidance: reference, estimate, wind, drag. NaN where the step made none of them.",
+    "One step of guidance with a fresh position, unless idle: reference, estimate, wind, drag.",
     (
         Field("time_s", "When, on our clock, s."),
         VEHICLE_TIME,
@@ -188,12 +189,12 @@ ATTITUDE_TARGET = Channel(
 )
 ACTION = Channel(
     "/action",
-    "What a phase told guidance to do between two steps; `companion replay` needs it.",
+    "A call of a phase to guidance or the control loop, between steps; for `companion replay`.",
     (
         Field("time_s", "When, on our clock, s."),
         Field("clock_offset_s", "Vehicle time minus our time, s; NaN: not known."),
         Field("drag_per_s", "Linear drag of an earlier flight, 1/s; of `drag_prior` only."),
         Field("quadratic_drag_per_m", "Quadratic drag of an earlier flight, 1/m; the same."),
     ),
-    (Code("action", "The command to guidance.", ACTIONS),),
+    (Code("action", "The name of the call.", ACTIONS),),
 )

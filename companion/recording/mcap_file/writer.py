@@ -10,13 +10,14 @@ from companion.recording.mcap_file.batch import Batch, SendBatch
 from companion.recording.mcap_file.channels import ENCODING, SCHEMA_ENCODING, TOPICS
 
 _CHUNK = 1 << 20
+"""Length at which a chunk is ended, bytes."""
 
 
 class McapWriter:
     """A `.mcap` file open for writing. Only one thread may use it.
 
-    Each `flush` writes a chunk. A file that ends after a chunk can be read without the index, which
-    `close` writes at its end.
+    Each `flush` writes a chunk, and so does each MiB of messages. A file that ends after a chunk
+    can be read without the index, which `close` writes at its end.
 
     Args:
         path: file to create.
@@ -66,7 +67,7 @@ class McapWriter:
         os.fsync(self._file.fileno())
 
     def close(self, *, complete: bool = True) -> None:
-        """Close the file, and complete it by its index unless a write has failed.
+        """Close the file; if `complete`, write its index first. Without that it counts as cut off.
 
         Raises:
             OSError: the disk is full, or failed.

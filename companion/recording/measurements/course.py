@@ -6,14 +6,15 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class EarlyEnd:
-    """Place and reason of the end of a flight before the end of its maneuvers.
+    """Time, phase and cause of the end of a flight that failed in one of its phases.
 
     Attributes:
         time: time since the flight began, s.
         since_takeoff: time since the vehicle left the ground, s; None: it had not.
         phase: the phase that failed.
-        maneuver: maneuver at that time, or None.
-        into_maneuver: time since its beginning, s.
+        maneuver: the maneuver at that time, or the one that a hold had ended before; None: the
+            phase is another one than the maneuvers, or none had begun.
+        into_maneuver: time from its beginning to this end, or to the hold, s.
         monitor: name of the safety monitor that ended the flight, or None.
     """
 
@@ -44,17 +45,19 @@ class Course:
         began: beginning of the flight, s on our clock.
         phases: beginning and name of each phase.
         takeoff: time when the vehicle left the ground; None: it did not.
-        early_end: the early end; None: the flight was flown to its end.
+        early_end: the early end; None: no phase failed.
         vehicle_uid: hardware id of the vehicle's autopilot; None: unknown.
         armed: whether the vehicle is armed at the end; None: unknown.
         mode: mode of the vehicle at the end; None: unknown.
         battery: remaining charge, 0..1, at take-off and at the end; None: unknown.
         min_battery: smallest share allowed, `limits.min_battery_percent`.
         deadline: longest latency allowed, `deadman.deadline_ms`, s.
-        lockstep: whether the vehicle waited for us, so that latencies are meaningless.
-        advice: one sentence for each key whose value differs from the measurement.
+        lockstep: whether the flight ran in vehicle time (in lockstep or in memory), so that
+            latencies are meaningless.
+        advice: sentences on what differs from the configuration (hover thrust, drag, dead time),
+            and on rows of the figures that were lost.
         gain_warning: a sentence if the gain is above the largest sensible one, or None.
-        settings: keys and values that follow from the advice, as for `--set`.
+        settings: keys of hover thrust and drag that the advice names, with values for `--set`.
         changes: changes in flight, each with `time_s`, `by` and `keys` (values before and after).
     """
 

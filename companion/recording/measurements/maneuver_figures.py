@@ -116,7 +116,7 @@ def settled_parts(rows: Floats, marks: Sequence[ManeuverMark]) -> list[Floats]:
 def _parts(rows: Floats, marks: Sequence[ManeuverMark]) -> Iterator[tuple[ManeuverMark, Floats]]:
     """Each maneuver that was flown, with its rows."""
     ends = [*(mark.vehicle_time for mark in marks[1:]), inf]
-    for mark, end in zip(marks, ends, strict=False):  # without marks there is an end too many
+    for mark, end in zip(marks, ends, strict=False):  # without marks, `ends` still has one entry
         part = rows[(rows[:, 0] >= mark.vehicle_time) & (rows[:, 0] < end)]
         if mark.name is not None and len(part) > 1:
             yield mark, part

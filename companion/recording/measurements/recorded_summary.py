@@ -39,7 +39,8 @@ def summary_of(record: FlightRecord) -> tuple[dict[str, Any], bool]:
     """The summary of a flight with the keys of `summary.json`, and whether it is provisional.
 
     A provisional summary is derived from the record: `result` says that the record ends early, and
-    the dead times, the realtime grants and the advice are missing.
+    what is not recorded is null or empty, such as the dead times, the realtime grants, the advice
+    and whether the vehicle is armed.
 
     Raises:
         RecordError: the record is not valid.
@@ -80,7 +81,7 @@ def _derived(record: FlightRecord) -> Summary:
             began=record.began,
             phases=tuple((each.time, each.name) for each in record.phases),
             takeoff=_takeoff(record),
-            early_end=EarlyEnd(record.duration, None, phase),
+            early_end=_early_end(record, phase),
             battery=(None, _last(thrust["battery_remaining"])),
             min_battery=float(flight.get("min_battery", "0")),
             deadline=float(flight.get("deadline_s", "0.004")),
@@ -103,7 +104,7 @@ def _trace(record: FlightRecord) -> FlightTrace:
     trace = FlightTrace()
     sample, setpoint, guidance = map(record.rows, ("sample", "setpoint", "guidance"))
     sample = sample[sample["unanswered"] == 0]
-    # Of two samples that arrive together, the vehicle's stamps differ.
+    # Matched by the vehicle's stamps, because two samples may arrive at the same time.
     answers = _answers(sample["vehicle_time_s"], setpoint["vehicle_time_s"])
     measured = np.column_stack([sample[f"measured_{axis}_rad_s"] for axis in _AXES])
     ages = np.where(sample["age_known"] == 1, sample["age_s"], np.nan)
@@ -159,6 +160,16 @@ def _counts(record: FlightRecord, deadline: float) -> LoopCounts:
         rate_hz=_rate(record),
         unanswered=unanswered,
     )
+
+
+def _early_end(record: FlightRecord, phase: str) -> EarlyEnd:
+    """The end of the record, in the phase that ran."""
+    end, takeoff = record.duration, _takeoff(record)
+    since = None if takeoff is None else end - takeoff
+    latest = record.maneuvers[-1] if record.maneuvers else None
+    if phase != "maneuvers" or latest is None or latest.name is None:
+        return EarlyEnd(end, since, phase)
+    return EarlyEnd(end, since, phase, latest.name, end + record.began - latest.time)
 
 
 def _takeoff(record: FlightRecord) -> float | None:

@@ -16,7 +16,7 @@ from companion.recording.measurements.second_order import (
 _TIME_CONSTANT = (0.02, 2.0)
 """Range in which the time constant is searched, s."""
 _ASKED = 1e-3
-"""Smallest target coefficient of a step."""
+"""Smallest target coefficient along an axis that counts as a step along it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,9 +25,9 @@ class StepResponse:
 
     Attributes:
         time_constant_north_s: time constant of the first-order model that fits a_N best (least
-            squares), s.
-        time_constant_east_s: the same for a_E.
-        step_size: largest target, the sine of the tilt.
+            squares), s; NaN: no step goes north or south.
+        time_constant_east_s: the same for a_E, east or west.
+        step_size: largest target coefficient, which is the sine of the tilt.
         cross_axis_max: straightness: largest distance from the line of a step.
         model_deviation_max: largest distance from the ideal model ċ = p·(c_d − c).
         second_order: the second-order model with a dead time that fits best.

@@ -15,6 +15,7 @@ Floats = NDArray[np.float64]
 _GAP = 0.5
 """Rows further apart than this belong to different runs, s."""
 _FEWEST = 10
+"""A run has more rows than this."""
 
 
 class StepRun(NamedTuple):
@@ -58,11 +59,12 @@ def step_runs(rows: Floats) -> list[StepRun]:
 _ENOUGH = 600
 """Approximate number of rows used to find the model."""
 _LAG, _DAMPING, _DEAD_TIME = (0.02, 4.0), (0.2, 10.0), (0.0, 0.5)
-"""Ranges in which 2ζ/ω (s), ζ and the dead time (s) are searched. ζ = 10 is first order."""
+"""Ranges in which 2ζ/ω (s), ζ and the dead time (s) are searched. ζ = 10 is almost first order."""
 _TRIED_LAGS, _TRIED_DAMPINGS = np.geomspace(0.05, 1.0, 5), (0.7, 1.5)
 _TRIED_DEAD_TIMES = (0.0, 0.04, 0.1, 0.2)
-_UNANSWERED = 0.03
-"""Shortest dead time of a vehicle, s; before it, a step has no effect."""
+_BEFORE_EFFECT = 0.03
+"""Time after the first step in which it is assumed to have no effect, s. It gives the coefficients
+and the speed from which the model starts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,19 +87,19 @@ class SecondOrderFit:
         It starts with the measured coefficients and speed, and keeps this speed until the first
         target has an effect.
         """
-        return self.along(Course.of(run, thinning))
+        return self.along(RunData.of(run, thinning))
 
-    def along(self, course: "Course") -> Floats:
-        """(m, 2), coefficients of the model at the rows of a course; see `path`."""
-        time, effects = course.time, course.changes + self.dead_time
+    def along(self, data: "RunData") -> Floats:
+        """(m, 2), coefficients of the model at the rows of a run's data; see `path`."""
+        time, effects = data.time, data.changes + self.dead_time
         latest = np.searchsorted(effects, time, side="right") - 1
         acted = np.maximum(time - effects[np.maximum(latest, 0)], 0.0)
         moves = self._transitions(acted)[:, 0]
         between = self._transitions(np.diff(effects))
-        first, speed = course.start
+        first, speed = data.start
         out: Floats = first + np.outer(time, speed)
         state = np.array([first + self.dead_time * speed, speed])
-        for number, target in enumerate(course.targets):
+        for number, target in enumerate(data.targets):
             goal = np.array([target, (0.0, 0.0)])
             rows = latest == number
             out[rows] = moves[rows] @ (state - goal) + target
@@ -116,7 +118,7 @@ class SecondOrderFit:
         return np.moveaxis(np.array(rows), -1, 0)
 
 
-class Course(NamedTuple):
+class RunData(NamedTuple):
     """The data of a run that a model needs.
 
     Attributes:
@@ -132,10 +134,10 @@ class Course(NamedTuple):
     targets: Floats
 
     @classmethod
-    def of(cls, run: StepRun, thinning: int = 1) -> "Course":
-        """The course of a run at every `thinning`-th row."""
+    def of(cls, run: StepRun, thinning: int = 1) -> "RunData":
+        """The data of a run at every `thinning`-th row."""
         since, steps = run.time - run.time[0], run.steps()
-        early = since <= _UNANSWERED
+        early = since <= _BEFORE_EFFECT
         columns = np.column_stack((np.ones(int(early.sum())), since[early]))
         start, _ = project(columns, run.measured[early])
         changes = np.array([step.time[0] for step in steps]) - run.time[0]
@@ -145,12 +147,12 @@ class Course(NamedTuple):
 def nearest_second_order(runs: list[StepRun]) -> SecondOrderFit:
     """Least squares over ω, ζ and dead time."""
     thinning = 1 + sum(run.time.size for run in runs) // _ENOUGH
-    courses = [Course.of(run, thinning) for run in runs]
+    thinned = [RunData.of(run, thinning) for run in runs]
     measured = np.concatenate([run.measured[::thinning] for run in runs])
 
     def apart(unknown: Floats) -> tuple[Floats, Floats]:
         fit = _fit(unknown)
-        paths = np.concatenate([fit.along(course) for course in courses])
+        paths = np.concatenate([fit.along(data) for data in thinned])
         return np.empty(0), (measured - paths).ravel()
 
     grid = [

@@ -29,7 +29,9 @@ class LoopCounts:
         samples: attitude samples received while control was switched on.
         setpoints: setpoints sent.
         missed_deadlines: answers that took longer than `deadman.deadline_ms`.
-        stale: samples not answered because the sample or the target was too old or out of order.
+        stale: samples not answered for other reasons than `refused`: the sample or the target was
+            too old or out of order, there was no target, the mode was not confirmed after a gap, or
+            it may be another vehicle.
         refused: samples not answered because no valid setpoint could be computed or sent.
         unanswered: unanswered samples, by reason.
         rate_hz: rate of setpoints in vehicle time during the maneuvers, Hz.
@@ -71,13 +73,13 @@ class Summary:
 
     Attributes:
         result: "ok", or the reason why it ended early.
-        phase: the last phase it reached.
+        phase: the phase that failed, else the last one.
         planner: name of the planner that flew.
         gain: gain p of the planner, 1/s.
         counts: counters of the control loop.
         link: frames received, lost, damaged and so on, by name.
         trace: recorded rows.
-        events: (time in s, text) of each event.
+        events: (s since the flight began, text) of each event.
         log: the flight's folder.
         dead_times: measured and configured.
         predictive: counts of predictive control; None: it did not fly.
@@ -116,7 +118,7 @@ class Summary:
         return {"p50": float(p50), "p99": float(p99), "max": float(latencies.max())}
 
     def tracking(self) -> dict[str, float]:
-        """Position error in closed loop, and height error during all of control, m."""
+        """Errors of position and height under control, m: see `tracking_errors`."""
         return tracking_errors(self.trace.tracking_rows())
 
     def maneuvers(self) -> tuple[ManeuverFigures, ...]:
@@ -177,19 +179,19 @@ class Summary:
 
 
 def tracking_errors(rows: "np.ndarray[Any, np.dtype[np.float64]]") -> dict[str, float]:
-    """Position error of the closed-loop rows, and height error of all rows, m; NaN: no rows.
+    """Position error of the rows with a whole reference, height error of those with a height, m.
+
+    NaN: there are no such rows.
 
     Args:
         rows: (N, 7), rows of `FlightTrace.tracking`.
     """
-    if len(rows) == 0:
-        return dict.fromkeys(("position_rms_m", "position_max_m", "height_rms_m"), math.nan)
     error = rows[:, 4:7] - rows[:, 1:4]
-    distance = np.linalg.norm(error[~np.isnan(rows[:, 1])], axis=1)
+    distance = np.linalg.norm(error[~np.isnan(error).any(axis=1)], axis=1)
     return {
         "position_rms_m": _rms(distance),
         "position_max_m": float(distance.max()) if len(distance) else math.nan,
-        "height_rms_m": _rms(error[:, 2]),
+        "height_rms_m": _rms(error[~np.isnan(error[:, 2]), 2]),
     }
 
 

@@ -48,7 +48,7 @@ class Swing(NamedTuple):
 
     Attributes:
         rms: RMS of roll and pitch together, without slow motion, rad.
-        period: period of the oscillation, s.
+        period: period of the oscillation, s; NaN also if nothing repeats.
         regularity: autocorrelation at that period: 1 repeats exactly, 0 not at all.
     """
 

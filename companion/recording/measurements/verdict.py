@@ -57,7 +57,7 @@ def checks(figures: Figures) -> list[Check]:
 def is_good(figures: Figures) -> bool:
     """Whether a flight reached its end, every figure within its limit, and without advice.
 
-    Advice names keys whose values do not fit the vehicle.
+    Advice names what does not fit the vehicle in the configuration, and rows that were lost.
     """
     good = all(check.good for check in checks(figures))
     return figures["result"] == "ok" and good and not figures["advice"]
@@ -133,7 +133,7 @@ def _answers(figures: Figures) -> Iterator[Check]:
             "attitude samples",
             f"{unanswered} of {samples} unanswered (limit {100.0 * UNANSWERED:g} %)",
             unanswered <= UNANSWERED * samples,
-            "the reasons are below the table `Control loop`",
+            "the line `unanswered samples` names the reasons",
         )
     frames, lost = figures["link"].get("frames", 0), figures["link"].get("lost", 0)
     if frames:
@@ -148,7 +148,7 @@ def _answers(figures: Figures) -> Iterator[Check]:
 def _latency(figures: Figures) -> Iterator[Check]:
     late = figures["latency_us"]["p99"]
     if figures["lockstep"] or late is None:
-        return  # the vehicle waits for us
+        return  # vehicle time has no latency
     deadline = figures["deadline_ms"]
     yield Check(
         "latency",

@@ -132,5 +132,5 @@ def _in_time(times: ProcessTimes) -> Finding:
         f"The solver process answers within {_MAX_ANSWER_MS:.0f} ms at 50 Hz.",
         p99 < _MAX_ANSWER_MS and times.troubles == 0,
         f"p99 of the answer time, data exchange included, {p99:.2g} ms; {times.troubles} of"
-        " the requests were late or failed.",
+        " the answers were late, failed or implausible.",
     )

@@ -213,7 +213,7 @@ def _euler_rates(roll: Any, pitch: Any, x: Any, y: Any, z: Any) -> tuple[Any, An
 
 
 def _thrust_axis(roll: ca.SX, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
-    """Coefficients and cos(tilt), (3,): the third column of the rotation matrix."""
+    """Coefficients and cos(tilt), (3,): body z in NED, its north and east components negated."""
     lean = ca.sin(pitch) * ca.cos(roll)
     return ca.vertcat(
         -(ca.cos(yaw) * lean + ca.sin(yaw) * ca.sin(roll)),

@@ -89,12 +89,12 @@ class ProcessTimes(NamedTuple):
 
     Attributes:
         answer_ms: (n,), time from before a request is packed until its answer is unpacked, ms.
-        solve_ms: (n,), time in `Worker.answer`, ms.
-        troubles: number of requests without an answer in time.
+        computing_ms: (n,), time in `Worker.answer`: prediction, reference and solve, ms.
+        troubles: number of answers that were late, failed or implausible.
     """
 
     answer_ms: Floats
-    solve_ms: Floats
+    computing_ms: Floats
     troubles: int
 
 
@@ -105,7 +105,7 @@ def time_process() -> ProcessTimes:
         ChildProcessError: the process does not start; the message says why.
     """
     troubles: list[tuple[Trouble, str]] = []
-    answering, solving = [], []
+    answering, computing = [], []
     solver = Solver(
         Variant("limited").settings, EIGHT.trajectory, lambda *trouble: troubles.append(trouble)
     )
@@ -118,11 +118,11 @@ def time_process() -> ProcessTimes:
             took = monotonic() - began
             if answer is not None:
                 answering.append(took)
-                solving.append(answer.seconds)
+                computing.append(answer.seconds)
             sleep(max(0.0, 1.0 / RATE_HZ - took))
     finally:
         solver.close()
-    return ProcessTimes(1e3 * np.array(answering), 1e3 * np.array(solving), len(troubles))
+    return ProcessTimes(1e3 * np.array(answering), 1e3 * np.array(computing), len(troubles))
 
 
 def _await_start(solver: Solver, troubles: list[tuple[Trouble, str]]) -> None:

@@ -21,14 +21,14 @@ _MIN_THRUST, _MAX_THRUST = 3.0, 18.0
 """Limits of the specific thrust, m/s²."""
 
 RATE_HZ = 50.0
-"""Rate of solves."""
+"""Rate of solves, Hz."""
 MAX_ITERATIONS = 20
 """Largest number of SQP iterations of a solve to the tolerance."""
 
 STYLES: dict[ModelName, Method] = {
     "quaternion": Method("", "quaternion (39)", "#E69F00", width=3.0),
     "euler": Method("", "Euler (37)", "#D55E00", (7, 2, 1.5, 2), 1.8),
-    "euler-reduced": Method("", "Euler, cancelled, yaw fixed", "#CC79A7", (3, 1.2), 1.8),
+    "euler-reduced": Method("", "Euler by angle rates, yaw fixed", "#CC79A7", (3, 1.2), 1.8),
     "proposed": Method("", "proposed (34)", "#0072B2", width=1.3),
     "limited": Method("", "ours: (34) with limits", "#332288", width=2.0),
 }

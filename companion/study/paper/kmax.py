@@ -25,7 +25,7 @@ _Row = tuple[int, float, float, float, float]
 
 
 def scaling_factor(c: Coefficients, direction: float) -> float:
-    """K = (ω_x² + ω_y²)/(ė_N² + ė_E²) when the coefficients move towards `direction` (rad)."""
+    """K = (ω_x² + ω_y²)/|ċ|² when the coefficients c move towards `direction` (rad from north)."""
     roll, pitch, _ = rates_along(c.north, c.east, cos(direction), sin(direction))
     return roll * roll + pitch * pitch
 

@@ -91,7 +91,8 @@ def fly_all(tasks: Sequence[Task], tick: Tick) -> Flown:
     flights in progress, so that no vehicle process is left behind.
 
     Raises:
-        ConfigError, VehicleStoppedError: a flight raised it (see `fly`); no more are started.
+        ConfigError, LinkError, VehicleStoppedError: a flight raised it (see `fly`); no more are
+            started.
     """
     count = cores()
     flown: dict[Task, Future[Tracked]] = {}
@@ -118,7 +119,8 @@ def fly(task: Task) -> Tracked:
 
     Raises:
         ConfigError: the shipped configuration cannot be found or used.
-        VehicleStoppedError: the vehicle ended before the flight did.
+        LinkError: there are no free ports.
+        VehicleStoppedError: the vehicle did not start, or ended before the flight did.
     """
     with tempfile.TemporaryDirectory(prefix="companion-track-") as name:
         folder = Path(name)
