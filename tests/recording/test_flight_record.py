@@ -10,7 +10,7 @@ from companion.control.loop_record import Unanswered
 from companion.recording.flight_record import RecordError, read_flight
 from companion.recording.mcap_file import cdr, reader, writer
 from companion.recording.mcap_file.channels import CHANNELS, RESOURCES, WORDS
-from companion.recording.mcap_file.loop_channels import ACTION, REASONS, SETPOINT
+from companion.recording.mcap_file.loop_channels import ACTION, INPUT, REASONS, SETPOINT
 from companion.recording.mcap_file.scene import Entity, scene_message
 from companion.recording.mcap_file.writer import McapWriter
 from companion.recording.measurements.recorded_summary import derived_summary, summary_of
@@ -179,6 +179,22 @@ def test_other_columns_are_refused_with_the_channel_and_the_version(tmp_path, mo
     monkeypatch.setattr(writer.McapWriter, "changed", (b"float64 age_s", b"float64 age_ms"))
     with pytest.raises(RecordError, match=r"of /sample have other columns .* companion 0\.0\.7"):
         write_one(tmp_path, "/action", row(ACTION, 1.0, 0))
+
+
+@pytest.mark.parametrize("phase", ["takeoff", "offboard"])  # the second: taken over in the air
+def test_a_killed_flight_says_since_when_it_flew(tmp_path, phase):
+    writer = McapWriter(tmp_path / "flight.mcap")
+    writer.metadata("flight", {"began_s": "1.0", "epoch_s": "0.0"})
+    writer.message("/phase", 2_000_000_000, cdr.fields_message((2.0,), (phase, "the height")))
+    for time, standing in ((1.5, 0), (2.5, 1), (3.0, 0), (9.0, 0)):
+        codes = [standing if code.name == "standing" else 0 for code in INPUT.codes]
+        data = INPUT.packing.pack(cdr.CDR, time, *[np.nan] * (len(INPUT.numbers) - 1), *codes)
+        writer.message(INPUT.topic, round(time * 1e9), data)
+    writer.flush()
+    writer.close(complete=False)
+    derived = derived_summary(read_flight(tmp_path))
+    assert derived["takeoff_s"] == 2.0
+    assert derived["early_end"]["since_takeoff_s"] == 6.0
 
 
 @pytest.mark.parametrize("found", ["{}", '{"result": "ok", "phases": []}', "[]", "{"])

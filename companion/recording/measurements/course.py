@@ -10,7 +10,7 @@ class EarlyEnd:
 
     Attributes:
         time: time since the flight began, s.
-        since_takeoff: time since the vehicle left the ground, s; None: it had not.
+        since_takeoff: time since `Course.takeoff`, s; None: the vehicle had not left the ground.
         phase: the phase that failed.
         maneuver: the maneuver at that time, or the one that a hold had ended before; None: the
             phase is another one than the maneuvers, or none had begun.
@@ -44,7 +44,8 @@ class Course:
     Attributes:
         began: beginning of the flight, s on our clock.
         phases: beginning and name of each phase.
-        takeoff: time when the vehicle left the ground; None: it did not.
+        takeoff: time when the vehicle left the ground, or was to be taken over in the air; None:
+            neither happened.
         early_end: the early end; None: no phase failed.
         vehicle_uid: hardware id of the vehicle's autopilot; None: unknown.
         armed: whether the vehicle is armed at the end; None: unknown.

@@ -173,9 +173,10 @@ def _early_end(record: FlightRecord, phase: str) -> EarlyEnd:
 
 
 def _takeoff(record: FlightRecord) -> float | None:
-    """Time when the vehicle left the ground, s since the flight began; None: it did not."""
+    """See `Course.takeoff`; a vehicle that is taken over in the air has no phase of take-off."""
     read = record.rows("guidance_input")
-    begun = next((each.time for each in record.phases if each.name == "takeoff"), None)
+    flying = ("takeoff", "offboard")
+    begun = next((each.time for each in record.phases if each.name in flying), None)
     if begun is None:
         return None
     times = record.since_start(read["time_s"])
