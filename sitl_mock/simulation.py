@@ -75,6 +75,7 @@ class Simulation:
                 Origin(home.latitude_deg, home.longitude_deg, home.altitude_m),
                 self.links,
                 round(settings.prearm_delay_s * 1e6),
+                settings,
             )
         )
         self.commander = self._rules.commander

@@ -103,6 +103,8 @@ ROTOR_LAG_MS = 22.5
 
 RATE_LAG_MS = 11.0
 """Delay of the gyro's low pass (measured)."""
+STAMP_SLIPS_HZ = 1.6
+"""Slips of the position's stamp (measured in circles and figure-eights: 0.3 to 2.7)."""
 
 AIRFRAME: dict[str, Any] = {
     "thrust_slope_m_s2": specific_thrust(1.0),
@@ -172,7 +174,7 @@ def with_ardupilot_defaults(section: dict[str, Any]) -> dict[str, Any]:
     filled = {**own, **section}
     if filled["rate_loop"] == "ardupilot":
         filled["rate_loop"] = RATE_LOOP
-    sensors = {"rate_lag_ms": RATE_LAG_MS}
+    sensors = {"rate_lag_ms": RATE_LAG_MS, "stamp_slips_hz": STAMP_SLIPS_HZ}
     for key, defaults in (("airframe", AIRFRAME), ("battery", BATTERY), ("sensors", sensors)):
         given = section.get(key, {})
         filled[key] = {**defaults, **given} if isinstance(given, dict) else given

@@ -62,6 +62,11 @@ class MotionTelemetry:
     def _boot_ms(self) -> int:
         return self._state.shown_us // 1000
 
+    @property
+    def _position_ms(self) -> int:
+        """Stamp of LOCAL_POSITION_NED."""
+        return self._boot_ms
+
     def place(self) -> Geodetic:
         """Return the estimated geodetic position."""
         return to_geodetic(self._origin, self._state.estimate.position_ned)
@@ -87,7 +92,7 @@ class MotionTelemetry:
             return None
         estimate = self._state.estimate
         return dialect.MAVLink_local_position_ned_message(
-            self._boot_ms, *estimate.position_ned, *estimate.velocity_ned
+            self._position_ms, *estimate.position_ned, *estimate.velocity_ned
         )
 
     def global_position_int(self) -> Message | None:

@@ -44,6 +44,7 @@ class VehicleParts(NamedTuple):
     links: list[Link]
     ready_us: int
     """Vehicle time of `mock.prearm_delay_s`, from which arming in any mode is possible."""
+    settings: VehicleSettings
 
 
 class Rules(NamedTuple):

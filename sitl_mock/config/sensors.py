@@ -81,28 +81,28 @@ EKFS: dict[str, EkfConfig | None] = {
     # unexplained: 14 to 35 % of the errors, and more at 2 m/s.
     "ardupilot": EkfConfig(
         fix_period_ms=200.0,
-        fix_delay_ms=260.0,
-        position_late_ms=27.7,
-        velocity_late_ms=16.5,
+        fix_delay_ms=447.0,
+        position_late_ms=32.2,
+        velocity_late_ms=20.5,
         position_noise_m=0.005,
         velocity_noise_m_s=0.005,
         tilt_noise_deg=0.006,
         yaw_error_deg=0.1,
-        turn_yaw_ms=25.4,
-        compass_error_deg=1.1,
+        turn_yaw_ms=22.7,
+        compass_error_deg=1.03,
         yaw_rate_bias_deg_s=0.05,
-        acceleration_lead_ms=1.2,
-        acceleration_scale=-0.0018,
+        acceleration_lead_ms=-1.5,
+        acceleration_scale=0.0007,
         vertical_share=0.6,
         height_offset_m=0.1,
         height_sag_s4_per_m=0.0004,
         sink_per_acceleration_ms=0.0,
         height_noise_m=0.013,
         height_noise_time_s=6.0,
-        position_gains=(0.0433, 0.1119),
-        velocity_gains=(0.2113, 0.2197),
-        acceleration_gains=(0.0366, 0.0397),
-        predictor_ms=865.0,
+        position_gains=(0.0347, 0.1052),
+        velocity_gains=(0.1096, 0.1649),
+        acceleration_gains=(0.0077, 0.0312),
+        predictor_ms=206.0,
     ),
 }
 """Preset name -> navigation filter."""
@@ -130,6 +130,9 @@ class SensorConfig(Section):
     low pass. The default is PX4's; ArduPilot's is 11."""
     position_delay_ms: NonNegative = 10.0
     """Age of the estimated position and velocity."""
+    stamp_slips_hz: Annotated[float, Field(ge=0.0, le=20.0)] = 0.0
+    """How often the stamp of LOCAL_POSITION_NED slips by 1 ms against its position, back or forth:
+    ArduPilot takes the time, in whole milliseconds, when it writes the message."""
 
     @field_validator("ekf", mode="before")
     @classmethod

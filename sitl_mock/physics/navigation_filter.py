@@ -87,12 +87,13 @@ class NavigationFilter:
         """Whether a fix is due at a fusion time, s."""
         return at - self.state.at >= self._period - 1e-9
 
-    def advance(self, delayed: TrailRow, at: float, now: float) -> None:
-        """Correct the errors by a fix.
+    def advance(self, delayed: TrailRow, at: float, present: TrailRow, now: float) -> None:
+        """Correct the errors by a fix; the output does not jump, but follows.
 
         Args:
             delayed: the true motion at the fusion time.
             at: the fusion time, s.
+            present: the true motion now.
             now: the present time, s.
         """
         config, law, state, late = self._config, self.law, self.state, 1e-3
@@ -104,13 +105,12 @@ class NavigationFilter:
             noise[0] - (config.position_late_ms * late + law.lead) * speed,
             noise[1] - (config.velocity_late_ms * late + law.lead) * pull,
         )
-        unsettled = pending_share(law.predictor_ms, state, now)
         kick = _GRAVITY * radians(config.tilt_noise_deg) * sqrt(elapsed)
-        level = self._corrected_state(state.level, moved, seen, noise, unsettled, kick)
+        level = self._corrected_state(moved, seen, noise, kick)
         share = config.vertical_share
         noise = self._next_noise(state.upright.noise, share)
         still = extrapolated(state.upright.errors, elapsed)
-        upright = self._corrected_state(state.upright, still, noise, noise, unsettled, share * kick)
+        upright = self._corrected_state(still, noise, noise, share * kick)
         aligned = self._next_alignment(speed, pull, elapsed)
         yaw = self._next_yaw_noise() + aligned
         turning = pending_share(law.heading_predictor_ms, state, now)
@@ -122,9 +122,41 @@ class NavigationFilter:
         sink = config.sink_per_acceleration_ms * 1e-3 * abs(pull)
         sink = state.sink + lagged * (sink - state.sink)
         way = complex(delayed[10], delayed[11])
-        self.state = FilterState(
+        corrected = FilterState(
             level, upright, yaw, turned, aligned, sag, sink, height_noise, at, now, way, speed
         )
+        self.state = self._without_jump(corrected, present)
+
+    def _without_jump(self, corrected: FilterState, present: TrailRow) -> FilterState:
+        """Return the corrected state with pending corrections that keep the output as it was."""
+        law, state, now = self.law, self.state, corrected.corrected
+        since, ago = now - state.at, now - corrected.at
+        unsettled = pending_share(law.predictor_ms, state, now)
+        level, upright = corrected.level, corrected.upright
+        tracks = (
+            (
+                state.level,
+                level,
+                propagated(law, state, present, since),
+                propagated(law, corrected, present, ago),
+            ),
+            (
+                state.upright,
+                upright,
+                extrapolated(state.upright.errors, since),
+                extrapolated(upright.errors, ago),
+            ),
+        )
+        level, upright = (
+            track._replace(
+                pending=(
+                    unsettled * before.pending[0] + new[0] - old[0],
+                    unsettled * before.pending[1] + new[1] - old[1],
+                )
+            )
+            for before, track, old, new in tracks
+        )
+        return corrected._replace(level=level, upright=upright)
 
     def _next_yaw_noise(self) -> float:
         """Return the slow noise of the heading at the next fix, rad."""
@@ -168,11 +200,9 @@ class NavigationFilter:
 
     def _corrected_state(
         self,
-        track: TrackState,
         errors: Errors,
         seen: tuple[complex, complex],
         noise: tuple[complex, complex],
-        unsettled: float,
         kick: float,
     ) -> TrackState:
         """Return the errors corrected by a fix whose own errors are `seen`; add a random tilt."""
@@ -183,9 +213,5 @@ class NavigationFilter:
         )
         gauss = self._random.gauss
         wander = complex(gauss(0.0, kick), gauss(0.0, kick))
-        pending = track.pending
-        return TrackState(
-            (place + first, speed + second, tilt + third + wander),
-            (unsettled * pending[0] + first, unsettled * pending[1] + second),
-            noise,
-        )
+        corrected = place + first, speed + second, tilt + third + wander
+        return TrackState(corrected, (0j, 0j), noise)

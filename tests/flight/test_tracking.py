@@ -106,7 +106,10 @@ def test_a_trajectory_along_its_path_begins_with_a_turn_from_the_vehicles_headin
 
 @pytest.mark.parametrize("gain", [6.0, 10.0])
 def test_a_high_gain_does_not_make_a_quick_vehicle_swing(gain):
-    """The ArduPilot mock at 90 °/s: a stiffer hold and a quick observer swung by 5° and more."""
+    """The ArduPilot mock at 90 °/s: a stiffer hold and a quick observer swung by 5° and more.
+
+    The real one swings by 0.6 to 1.1° in circles, by the slips of its stamps.
+    """
     shipped = load(CONFIGS / "mock-ardupilot.yaml").model_dump(exclude_unset=True)
     changes = {
         "vehicle": shipped["vehicle"],
@@ -119,4 +122,4 @@ def test_a_high_gain_does_not_make_a_quick_vehicle_swing(gain):
     with mock_vehicle(autopilot="ardupilot", full_rate=True) as mock:
         figures = fly(mock, None, **changes).as_dict()
     swings = [part["swing_rms_deg"] for part in figures["maneuvers"]]
-    assert max(swings) < 1.0, swings
+    assert max(swings) < 2.0, swings

@@ -33,7 +33,7 @@ SETS = {
     "steps": ["steps"],
 }
 """What is flown, in this order: the most important first."""
-REPEATED = ("straight", "near")
+REPEATED = ("straight", "near", "nmpc")
 """Sets that `--times` repeats; the others are flown once."""
 MOCK_SETS = ("straight", "near", "wind", "compared", "steps")
 """Sets that the mock vehicle flies, too."""

@@ -26,7 +26,7 @@ ESTIMATORS = {
     "px4": {},
     # Its simulated GPS is later than its estimator takes it to be: fitted to the truth of five
     # flights. It belongs to this simulator, so the configuration that ships says 0.
-    "ardupilot": {"guidance": {"position_lateness_ms": 23.0}},
+    "ardupilot": {"guidance": {"position_lateness_ms": 20.0}},
 }
 """What is told of an autopilot's estimator in its simulation."""
 

@@ -12,8 +12,9 @@ def rows(vehicle, *flights, **more):
 
 def test_each_flight_once_before_any_comes_again_and_medians_before_the_rest():
     flights = planned("px4", list(SETS), 3)
-    assert flights[:14] == 2 * (STRAIGHT + NEAR)
-    assert flights[21:24] == SETS["identify"]
+    repeated = [*STRAIGHT, *NEAR, *SETS["nmpc"]]
+    assert flights[:16] == 2 * repeated
+    assert flights[24:27] == SETS["identify"]
     assert flights.index("ten") > flights.index("corners90:euler")
 
 
