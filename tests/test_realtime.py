@@ -38,6 +38,38 @@ def test_what_this_computer_surely_grants_is_granted_and_given_back():
     assert gc.isenabled()
 
 
+@pytest.fixture
+def unfrozen(monkeypatch):
+    """Called with the number of frozen objects; returns the calls that unfreeze and that count."""
+    calls, counted = [], []
+
+    def told(by_caller):
+        monkeypatch.setattr(gc, "get_freeze_count", lambda: counted.append(1) or by_caller)
+        return calls, counted
+
+    monkeypatch.setattr(gc, "unfreeze", lambda: calls.append("unfrozen"))
+    monkeypatch.setattr(realtime._Frozen, "by_caller", False)
+    return told
+
+
+def test_what_was_frozen_for_a_flight_is_unfrozen_at_the_end_of_the_outermost_block(unfrozen):
+    calls, _ = unfrozen(by_caller=0)
+    for flights in (1, 2):
+        with realtime.frozen_objects():
+            with realtime.frozen_objects():
+                pass
+            assert len(calls) == flights - 1
+        assert len(calls) == flights
+
+
+def test_what_the_caller_froze_stays_frozen_and_is_counted_once(unfrozen):
+    calls, counted = unfrozen(by_caller=100)
+    for _ in range(2):
+        with realtime.frozen_objects(), realtime.frozen_objects():
+            pass
+    assert (calls, len(counted)) == ([], 1)
+
+
 TRUTH = """
 import os, subprocess, sys
 from concurrent.futures import ThreadPoolExecutor

@@ -6,8 +6,8 @@ from tests.hostile import personality as kinds
 from tests.hostile.body import Body
 
 HOME_ALTITUDE = 100.0
-_STREAM_LASTS_S, _CLIMB_M_S, _DESCENT_M_S = 1.0, 2.5, 1.5
-_SPOOL_S, _LANDED_AFTER_S, _DISARM_AFTER_S = 0.2, 0.2, 0.5
+_STREAM_LASTS_S, _CLIMB_M_S, _DESCENT_M_S = 1.0, 2.5, 2.5
+_SPOOL_S, _LANDED_AFTER_S, _DISARM_AFTER_S = 0.2, 0.2, 0.4
 
 
 class Vehicle:

@@ -54,6 +54,8 @@ def results(tmp_path_factory):
         patch.setattr(fig4, "FIGURE_4", replace(fig4.FIGURE_4, headings=EIGHT))
         step = replace(fig5_flights.STEP, headings=EIGHT[3:6:2], seconds=1.5)
         patch.setattr(fig5_flights, "STEP", step)
+        # Of the sweep only the cross-track is shown, which is largest in the first second.
+        patch.setattr(fig5_flights, "FIGURE_2", replace(fig5_flights.FIGURE_2, seconds=1.0))
         page, _ = runner.run("all", None, out, Console(quiet=True))
     return out, page, ticks
 
