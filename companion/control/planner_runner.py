@@ -75,7 +75,7 @@ class PlannerRunner:
         Args:
             sample: the sample to answer.
             target: target in the frame without resets.
-            arrival_period: vehicle time since the sample before, s.
+            arrival_period: vehicle time since the usable sample before, s.
             is_step: whether the target is an open-loop step.
 
         Raises:

@@ -173,7 +173,13 @@ class SnapshotBuilder:
         )
 
     def stood_still(self, since: float) -> float:
-        """Time for which this program did not run since `since` (s of event-loop time), s."""
+        """Time for which this program did not run since `since`, s.
+
+        Only stalls that ended within the last second, or are the latest, are known.
+
+        Args:
+            since: s of event-loop time.
+        """
         return sum(counted.late for counted in self._counted if counted.now > since)
 
     def _motion(self) -> Motion:
