@@ -132,10 +132,10 @@ def asked_for(wishes: Wishes) -> Iterator[tuple[Grant, ...]]:
 
 
 _Undo = Callable[[], object]
-_Take = Callable[[], _Undo]
+_Apply = Callable[[], _Undo]
 
 
-def _requested_settings(wishes: Wishes) -> Iterator[tuple[str, str, _Take]]:
+def _requested_settings(wishes: Wishes) -> Iterator[tuple[str, str, _Apply]]:
     """For each requested setting: its key, the setting in words, and a function that applies it."""
     priority, processors = wishes.fifo_priority, wishes.processors
     if processors:

@@ -189,7 +189,7 @@ def _require_usable(reference: Reference, jerk_ned: Vector) -> None:
         jerk_ned,
     ]
     if any(len(vector) != _AXES for vector in vectors):
-        raise ValueError(f"a vector must have three components, not as in {reference}")
+        raise ValueError(f"each vector must have three components; got {reference}")
     values = [
         *chain.from_iterable(vectors),
         reference.heading,

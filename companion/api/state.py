@@ -22,7 +22,8 @@ class State(NamedTuple):
         velocity_ned: m/s.
         q: attitude, body to world, w first.
         body_rates: rad/s, about body x, y, z (FRD).
-        heading: tilt-yaw heading, rad.
+        heading: heading, rad, clockwise from north: the turn about the vertical that is left when
+            the tilt is taken out; it differs from the Euler yaw in tilted attitudes.
         height: height above home, m; None until the autopilot has reported it.
     """
 

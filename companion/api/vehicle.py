@@ -135,14 +135,16 @@ class Vehicle:
             await self.follow(replace(way, heading=FixedHeading(heading)))
 
     async def follow(self, trajectory: Trajectory | Path | str) -> None:
-        """Follow a trajectory from the present position, after a turn to its initial heading.
+        """Follow a trajectory from the present position.
+
+        Unless it holds the heading, the vehicle first turns to its initial heading.
 
         Args:
             trajectory: a trajectory, or the path of its file (the format of `flight.trajectory`).
 
         Raises:
-            ConfigError: the file cannot be read, or the limits or the fence do not allow it;
-                nothing was flown.
+            ConfigError: the file cannot be read, the trajectory cannot be computed, or the limits
+                or the fence do not allow it; nothing was flown.
         """
         if isinstance(trajectory, Path | str):
             trajectory = await beside_the_loop(trajectory_file.load, Path(trajectory))

@@ -80,7 +80,7 @@ def limited_targets(targets: Array, longest: float) -> Array:
     Targets within the limits are passed in bulk, the others are treated one by one.
 
     Raises:
-        InvalidTargetError: a value is not finite.
+        InvalidTargetError: a value is not finite or far too large.
     """
     north, east, heading, heading_rate = targets
     with np.errstate(over="ignore", invalid="ignore"):  # such a target is refused below

@@ -1,7 +1,8 @@
 """`companion bench serve`: what other programs on the link cost the time from sample to setpoint.
 
-Two processes answer the same samples and telemetry in turn, in short rounds: one forwards them to
-nobody, one to three clients that read everything and to a fourth that is stopped (SIGSTOP).
+Two processes answer the same samples and telemetry in turn, in short rounds. The first forwards
+them to nobody. The second forwards them to three clients that read everything, and to a fourth that
+is stopped (SIGSTOP).
 """
 
 import json

@@ -1,4 +1,4 @@
-"""A program that answers samples as `companion serve` does under control: it forwards them, too."""
+"""Answers samples and forwards all messages to clients, as `companion serve` does in control."""
 
 import sys
 

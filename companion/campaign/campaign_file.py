@@ -103,8 +103,8 @@ class CampaignFile(Section):
     power of two. random: independently. grid: `samples` quantiles of each distribution, all
     combined."""
     same_seeds: bool = False
-    """All points of the grid fly a sample with the same noise and gusts, so that planners are
-    compared in the same wind. false: every case has noise and gusts of its own."""
+    """true: sample number k has the same noise and gusts at every point of the grid, so that
+    planners are compared in the same wind. false: every case has noise and gusts of its own."""
     set: Annotated[dict[str, Any], Field(default_factory=dict, max_length=200)]
     """Keys that differ from `config` in every case, dotted: limits.max_tilt_deg,
     mock.wind.gust_m_s."""

@@ -44,7 +44,7 @@ def doubts(config: Config) -> Iterator[Doubt]:
     if config.vehicle.known and config.vehicle.identified is None and config.mock is None:
         yield Doubt(
             "vehicle.identified",
-            "the times of `vehicle` were not measured on this vehicle",
+            "vehicle.lag_ms and vehicle.dead_time_ms were not measured on this vehicle",
             "the response is less exact than after `companion identify`, but steps are still "
             "straighter than with first-order in the cases of docs/identify.md",
             "run `companion identify` before raising planner.gain_per_s, and include its file",

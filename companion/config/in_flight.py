@@ -97,8 +97,7 @@ def changed_in_flight(start: Config, now: Config, values: Values, name: str) -> 
             first, new = (getattr(getattr(config, section), key) for config in (start, wanted))
             if changeable()[section, key] == UP_TO_START and new > first:
                 raise ConfigError(
-                    f"{name}: {section}.{key} {new:g} is more than {first:g}, with which the "
-                    "vehicle was checked before take-off; in flight it may be lowered, and raised "
-                    "again up to that"
+                    f"{name}: {section}.{key} {new:g} is more than {first:g}, the value checked "
+                    "before take-off; in flight you may lower it, and raise it back to that value"
                 )
     return wanted

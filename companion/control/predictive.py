@@ -140,7 +140,7 @@ class Predictive:
 
     def _request(self, vehicle: Vehicle, following: Following) -> None:
         part, pose = following.part, following.pose
-        at = following.time - part.turns_for
+        at = following.time - part.turn_duration
         if at < 0.0:
             return
         self._number += 1

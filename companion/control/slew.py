@@ -6,7 +6,7 @@ from companion.control.retuning import Tuning, between, tuning
 SLEW = 0.7
 """Time over which a change takes effect, s."""
 _PERIOD = 0.035
-"""Shortest time between two steps of a change, s; each step computes the gains again."""
+"""Shortest time between two steps of a change, s, because each step computes the gains again."""
 
 
 class Slew:

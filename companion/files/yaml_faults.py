@@ -106,8 +106,8 @@ def _remedy(detail: Any, key: str) -> str | None:
         return "has no value; write one behind the colon, or take the line out"
     if kind in ("model_type", "dict_type", "model_attributes_type"):
         return (
-            f"is a section: its keys stand below it, indented by two spaces, a colon and a space "
-            f"behind each (got {shortened(value)})"
+            "is a section: write its keys on the lines below it, indented by two spaces, each as "
+            f"`key: value` (got {shortened(value)})"
         )
     if kind == "tuple_type" and isinstance(value, str | int | float):
         return f"is a list: write `{key}: [{value}]`"

@@ -81,7 +81,8 @@ def require_followable(config: Config, maneuver: Maneuver, begin: Vector, drag: 
         drag: drag of the vehicle.
 
     Raises:
-        ConfigError: the trajectory cannot be flown within the limits and the fence.
+        ConfigError: the trajectory cannot be computed, or not be flown within the limits and the
+            fence.
     """
     envelope = envelope_of(config, drag)
     check = envelope.fence
@@ -91,7 +92,10 @@ def require_followable(config: Config, maneuver: Maneuver, begin: Vector, drag: 
         return check(replace(motion, position=motion.position + np.array(begin)))
 
     if isinstance(maneuver, Follow | HeldFigure):
-        broken = violations(maneuver.trajectory, replace(envelope, fence=fence))
+        try:
+            broken = violations(maneuver.trajectory, replace(envelope, fence=fence))
+        except TrajectoryError as error:
+            raise ConfigError(f"{maneuver.name}: {error}") from error
         if broken:
             raise ConfigError(f"{maneuver.name}: {broken[0]}; {broken[0].remedy}")
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from companion.guidance.reference import Reference, Vector, VehicleMotion
 
-_SHARE = 0.47
+_DECELERATION_SHARE = 0.47
 """Mean deceleration as a share of the largest horizontal acceleration. The largest deceleration is
 0.7 of that; the rest is left for wind and feedback."""
 _JERK = 8.0
@@ -41,7 +41,7 @@ def braking_time(speed: float, acceleration: float, assumed: Assumed) -> float:
     """
     if speed < _AT_REST:
         return 0.0
-    smooth = max(speed / (_SHARE * acceleration), sqrt(6.0 * speed / _JERK))
+    smooth = max(speed / (_DECELERATION_SHARE * acceleration), sqrt(6.0 * speed / _JERK))
     reaction = max(0.0, assumed.reaction - _NOTICED)
     return min(smooth, 2.0 * reaction + speed / assumed.deceleration)
 

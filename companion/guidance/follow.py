@@ -60,7 +60,9 @@ class HeldFigure:
 
 @dataclass(slots=True)
 class Follow:
-    """Flies a trajectory from a file, after a turn on the spot to its heading.
+    """Flies a trajectory.
+
+    Unless it holds the vehicle's heading, a turn on the spot to its initial heading comes first.
 
     Attributes:
         trajectory: the trajectory to follow.
@@ -81,14 +83,14 @@ class Follow:
 
     @property
     def duration(self) -> float:
-        """Duration with the turn before it, s; with the longest turn while the start is unknown."""
+        """Duration with the turn before it, s; until the start is known, a full turn is assumed."""
         if self._turned is not None:
             return self._turned.duration
         longest = 0.0 if self.trajectory.holds_heading else tau / self.yaw_rate
         return longest + self.trajectory.duration
 
     @property
-    def turns_for(self) -> float:
+    def turn_duration(self) -> float:
         """Duration of the turn before the trajectory, s; 0 while the start is unknown."""
         return 0.0 if self._turned is None else self._turned.duration - self.trajectory.duration
 

@@ -1,4 +1,4 @@
-"""Linear guidance: follows a reference without lag, as the response of the tilt is known."""
+"""Linear guidance: follows a reference without lag, by leading the known response of the tilt."""
 
 from dataclasses import dataclass
 from math import sqrt

@@ -15,7 +15,8 @@ _LONGEST_HOLD = 0.5
 _MOST_ROWS = 16_000
 """Largest number of commands and samples in a fit: half a minute of both at 250 Hz."""
 _WINDOW = 10.0
-"""Length of a window, s; of a long record only the most excited windows are used."""
+"""A long record is cut into windows of this length, s; the fit uses those with the most
+excitation."""
 _LEAD = 1.5
 """Time before a window from which commands are kept, s: more than the longest dead time plus the
 longest duration of a slew-limited change of command that is searched."""

@@ -46,11 +46,11 @@ def words(samples: Sequence[ReplayedSample], began: float, *, follows_record: bo
     )
     both = [each for each in different if each.recorded and each.replayed]
     if both:
-        lines.append(_largest(both, began))
+        lines.append(_largest_differences(both, began))
     return lines + _reasons(different)
 
 
-def _largest(both: Sequence[ReplayedSample], began: float) -> str:
+def _largest_differences(both: Sequence[ReplayedSample], began: float) -> str:
     def distances(each: ReplayedSample) -> list[float]:
         assert each.recorded is not None
         assert each.replayed is not None

@@ -59,11 +59,11 @@ def line(name: str, x: Floats, y: Floats, colour: str, **more: Any) -> dict[str,
 
 def over_time(name: str, curve: Curve, column: int, colour: str, **more: Any) -> dict[str, Any]:
     """A column of a curve over time, thinned so that extremes are kept."""
-    kept = thinned(curve.values[:, column])
+    kept = kept_indices(curve.values[:, column])
     return line(name, curve.time[kept], curve.values[kept, column], colour, **more)
 
 
-def thinned(values: Floats) -> Any:
+def kept_indices(values: Floats) -> Any:
     """Indices (M,) of the points to draw: smallest and largest of each of many equal parts."""
     count = len(values)
     if count <= _MOST_POINTS:

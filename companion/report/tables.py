@@ -136,7 +136,7 @@ def _maneuvers(figures: Any) -> Table:
         ("level_max_m", "level max, m", "{:.3f}"),
         ("height_rms_m", "height RMS, m", "{:.3f}"),
         ("height_max_m", "height max, m", "{:.3f}"),
-        ("swing_rms_deg", "quick roll and pitch, ° RMS", "{:.1f}"),
+        ("swing_rms_deg", "swing of roll and pitch, ° RMS", "{:.1f}"),
         ("drift_max_m", "drift in open loop, m", "{:.1f}"),
     )
     rows = [

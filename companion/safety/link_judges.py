@@ -9,7 +9,8 @@ _HEARD = 0.3
 noticed either."""
 
 _STALL_SHARE = 0.5
-"""If this program did not run for more than this share of the silence, this computer caused it."""
+"""If this program did not run for more than this share of the time since its last setpoint, this
+computer is named as the cause."""
 
 
 def silence(limit: float, *, heard: bool) -> Judge:

@@ -30,10 +30,11 @@ def commanded_motion(config: Config) -> CommandedMotion:
 
 
 def change_refusal(before: Config, after: Config) -> str | None:
-    """Why a change is refused while a client is in control, whose motions are already planned.
+    """Why a change is refused while a client is in control; None: it is permitted.
 
-    The motions use the limits at the takeover. With lower limits in the guidance loop, the vehicle
-    could not keep up with the reference.
+    Motions are planned with the limits at the takeover. With lower limits in the guidance loop, the
+    vehicle could not keep up with them. So these limits must not change, and the tilt limit must
+    stay large enough.
     """
     names = {each.name for each in differences(before, after)} & _MOTION_LIMITS
     if names:

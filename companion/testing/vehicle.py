@@ -151,7 +151,7 @@ class MockVehicle:
     # --- time without an application
 
     def run(self, seconds: float) -> None:
-        """Let time pass without an application, s."""
+        """Run the vehicle for `seconds` s without the program."""
         end = self.time + seconds
         while self.time < end:
             self.step()

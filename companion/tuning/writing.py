@@ -116,8 +116,8 @@ def _reasons(proposal: Proposal) -> dict[str, str]:
         why = f"the largest sensible gain, 0.45 / (lag + dead time) = {limit:.2f}"
     elif slewing:
         why = (
-            f"below {limit:.1f}, the largest sensible gain: the rate loop slews for "
-            f"{2e3 * slewing:.0f} ms to limits.max_tilt_rate_deg_s; tune again after a change of it"
+            f"below {limit:.1f}, the largest sensible gain, because the rate loop needs "
+            f"{2e3 * slewing:.0f} ms to reach limits.max_tilt_rate_deg_s; after a change tune again"
         )
     else:
         why = f"below {limit:.2f}, the largest sensible gain, for the margins"

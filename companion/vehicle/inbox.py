@@ -99,7 +99,10 @@ class Inbox:
         return self.lockstep
 
     def receive(self, data: bytes, received_ns: int) -> bool:
-        """Take bytes of the peer; return whether a frame in them was accepted. Never raises."""
+        """Take bytes of the peer; return whether a frame in them was accepted.
+
+        Never raises: an internal error is reported, and False is returned.
+        """
         accepted = False
         try:
             for frame in self._scanner.feed(data):

@@ -17,9 +17,10 @@ _CURVE = (
     (HOVER, 1.0),
     (1.0, 2.745),
 )
-"""(normalised thrust, specific thrust in g). From HOVER on it is a straight line through 0, and
-almost one from 0.1 on. Between 0.3 and 0.6 the truth of circles, figure-eights and steps fits this
-line to 0.03 m/s^2. Climbs at a constant thrust accelerate less, because their drag grows quickly.
+"""Points of the curve: (normalised thrust, specific thrust in g). Above HOVER they lie on a line
+through the origin, and almost so from 0.1 on. Between 0.3 and 0.6 this line agrees with the
+simulator's truth of circles, figure-eights and steps within 0.03 m/s^2. Climbs at a constant thrust
+accelerate less, because their drag grows quickly.
 """
 
 

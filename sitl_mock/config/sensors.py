@@ -26,9 +26,9 @@ class EkfConfig(Section):
     velocity_late_ms: Finite = 0.0
     """Unmodelled delay of a fix's velocity."""
     position_noise_m: NonNegative = 0.0246
-    """Noise of a fix's horizontal position."""
+    """Standard deviation of the noise of a fix's horizontal position, on each axis."""
     velocity_noise_m_s: NonNegative = 0.0238
-    """Noise of a fix's horizontal velocity."""
+    """Standard deviation of the noise of a fix's horizontal velocity, on each axis."""
     noise_time_s: Positive = 0.25
     """Correlation time of the noise of position and velocity."""
     tilt_noise_deg: NonNegative = 0.028
@@ -58,7 +58,8 @@ class EkfConfig(Section):
     """Error of the vertical velocity per horizontal acceleration: the velocity says that the
     vehicle sinks while its position stays. It lags by seconds."""
     height_noise_m: NonNegative = 0.036
-    """Slow noise of the height, as of a barometer; the height follows it within 2 s."""
+    """Standard deviation of the slow noise of the height, as of a barometer; the height follows it
+    within 2 s."""
     height_noise_time_s: Positive = 6.0
     """Correlation time of the slow noise of the height."""
     position_gains: Gains = (0.0774, 0.0494)

@@ -150,7 +150,7 @@ Outcome = tuple[bool, bool, float]
 
 
 def outcome(state: VehicleState) -> Outcome:
-    """Return the result of all steps."""
+    """Return whether the vehicle is on the ground, whether it crashed, and its total thrust (N)."""
     _, (first, second, third, fourth), _, _ = state.actuation
     return state.on_ground, state.crashed, first + second + third + fourth
 

@@ -15,6 +15,7 @@ from companion.files.yaml_file import ConfigError
 from companion.guidance import Pose, Reference, VehicleMotion
 from companion.guidance.follow import HeldFigure
 from companion.guidance.source import CommandedSource
+from companion.guidance.trajectory import line
 from companion.testing import connect, run
 from tests.flight.fly import CONFIGS, OTHER_VEHICLES, QUICK_FLIGHT, QuickVehicle, merged
 from tests.flight.test_tracking import FAST
@@ -188,7 +189,7 @@ async def returns_infinity(control):
         ("ardupilot", raises, ZeroDivisionError, "the program raised ZeroDivisionError('mine')"),
         ("px4", returns_nan, ValueError, "a command must be finite"),
         ("ardupilot", returns_nan, ValueError, "a command must be finite"),
-        ("ardupilot", forgets_an_axis, ValueError, "a vector must have three components"),
+        ("ardupilot", forgets_an_axis, ValueError, "each vector must have three components"),
         ("px4", returns_infinity, ValueError, "a command must be finite"),
     ],
 )
@@ -259,6 +260,8 @@ def test_what_the_limits_do_not_allow_is_refused_and_the_vehicle_holds_on(tmp_pa
             await vehicle.go_to((north + 500.0, east, down))
         with pytest.raises(ConfigError, match="limits"):
             await vehicle.go_to((north + 20.0, east, down), speed=15.0, acceleration=30.0, jerk=1e3)
+        with pytest.raises(ConfigError, match="is the longest"):
+            await vehicle.follow(line((1e4, 0.0, 0.0), 2.9, 1e-3, 1e-3))
         for seconds in (-1.0, float("nan")):
             with pytest.raises(ValueError, match="0 s or more"):
                 await vehicle.hold(seconds)

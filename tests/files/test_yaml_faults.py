@@ -45,8 +45,8 @@ def told(tmp_path, text):
         ("max_tlt_deg: 4", "did you mean `limits.max_tilt_deg`?"),
         ("limits: {max_tilt: 4}", "did you mean `max_tilt_deg`?"),
         ("limits: {max_tilt_deg: }", "has no value; write one behind the colon"),
-        ("limits: 20", "`limits` is a section: its keys stand below it, indented"),
-        ("limits:\n  max_tilt_deg:20\n", "a colon and a space behind each"),
+        ("limits: 20", "`limits` is a section: write its keys on the lines below it, indented"),
+        ("limits:\n  max_tilt_deg:20\n", "each as `key: value`"),
         ("flight: {maneuvers: hover}", "is a list: write `maneuvers: [hover]`"),
     ],
 )

@@ -108,7 +108,7 @@ def test_a_trajectory_along_its_path_begins_with_a_turn_from_the_vehicles_headin
 def test_a_high_gain_does_not_make_a_quick_vehicle_swing(gain):
     """The ArduPilot mock at 90 °/s: a stiffer hold and a quick observer swung by 5° and more.
 
-    The real one swings by 0.6 to 1.1° in circles, by the slips of its stamps.
+    The real one swings by 0.4 to 1.2° in circles, by the slips of its stamps.
     """
     shipped = load(CONFIGS / "mock-ardupilot.yaml").model_dump(exclude_unset=True)
     changes = {

@@ -193,7 +193,7 @@ def test_the_table_tells_every_axis_within_80_columns():
         "good",
     ]
     assert " 270 " in rows["yaw"]
-    assert "yaw: nearer is a second order, natural frequency 5.6 rad/s" in text
+    assert "yaw: nearer to the flight is a second order, natural frequency 5.6 rad/s" in text
     assert "T/m = 19.55·u +0.22" in text
     assert "hovers at 0.490" in " ".join(text.split())
     assert max(map(len, text.splitlines())) <= 80

@@ -63,7 +63,7 @@ def _watch_and_change(new_tab, page, folder):
     tab.click("unlock")
     tab.wait(f"{_SAID}.includes('can be changed')")
     _change(tab, "limits.max_climb_m_s", "1.5", "from 2 to 1.5")
-    _change(tab, "limits.max_tilt_deg", "36", "more than 35, with which the vehicle was checked")
+    _change(tab, "limits.max_tilt_deg", "36", "more than 35, the value checked")
     _change(tab, "limits.max_tilt_deg", "steep", "must be a number")
     _change(tab, "limits.max_tilt_deg", "35", "no value differs")
     tab.click("save")

@@ -239,7 +239,7 @@ async def no_place(scene):
             )
 
     await stream(1.0, send, 0.05)
-    scene.is_said("the position is farther than")
+    scene.is_said("the position is more than")
     scene.is_said("position is not finite")
     await scene.is_flown()
     return REFUSED

@@ -242,7 +242,7 @@ def test_a_place_before_the_origin_is_known_is_refused_but_a_velocity_is_not():
 
 
 def test_a_place_on_another_continent_is_refused():
-    with pytest.raises(RefusedSetpoint, match="farther"):
+    with pytest.raises(RefusedSetpoint, match="from the local origin"):
         understand(place(0x0DF8, 5, 0.0, 0.0, 460.0))
 
 

@@ -67,10 +67,10 @@ class Level(NamedTuple):
 
 
 def levels(column: Column) -> list[Level]:
-    """The levels of a factor: its values, or ranges if they are more than `_MOST_LEVELS` numbers.
+    """The levels of a factor.
 
-    Ranges have about equally many cases. Of more than `_MOST_LEVELS` words the last level holds all
-    that have none of their own.
+    Up to `_MOST_LEVELS` different values give one level each. More numbers give ranges with about
+    equally many cases. Of more words, the last level joins all that have no level of their own.
     """
     known = sorted({_key(value) for value in column})
     if column.dtype != float or len(known) <= _MOST_LEVELS:

@@ -171,7 +171,11 @@ def _require_steps(times: Floats, lines: Sequence[int], name: str) -> None:
 def _require_range(
     group: str, values: Floats, names: tuple[str, ...], lines: Sequence[int], name: str
 ) -> None:
-    """Check that a quantity is within its range."""
+    """Check that a quantity is within its range, and that a quaternion has the length 1.
+
+    Raises:
+        TrajectoryError: it is not; the message names the line.
+    """
     most, unit = _RANGES[group]
     outside = np.argwhere(~(np.abs(values) <= most))
     if outside.size:

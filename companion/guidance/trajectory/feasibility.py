@@ -95,7 +95,11 @@ class _Need(NamedTuple):
 
 
 def violations(trajectory: Trajectory, envelope: Envelope) -> tuple[Violation, ...]:
-    """All limits that a trajectory breaks, in order of time; empty if it can be flown."""
+    """All limits that a trajectory breaks, in order of time; empty if it can be flown.
+
+    Raises:
+        TrajectoryError: the trajectory cannot be computed, or is too long to be checked.
+    """
     with computable():
         return broken_limits(sampled(trajectory), envelope)
 

@@ -110,7 +110,7 @@ def slow_down(trajectory: Trajectory, envelope: Envelope) -> SlowDown:
             return SlowDown(even, (whole,), True, reason)
         fine = sampled(trajectory, moments.tolist())
         if broken_limits(fine.slowed(factor), envelope):  # a finer look found more
-            reason = "it cannot be looked at finely enough"
+            reason = "a finer check found more limits exceeded"
             return SlowDown(even, (whole,), True, reason)
         best = _best_law(fine, trajectory.duration, envelope)
         if best is None or best.duration > _WORTH * even.duration:

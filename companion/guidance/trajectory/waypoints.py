@@ -96,10 +96,10 @@ def _through(knots: Floats, places: Floats) -> SepticSpline:
     """A spline through the places (k, n) at the knots, from rest to rest."""
     states = np.zeros((knots.size, ORDER, places.shape[1]))
     states[:, 0] = places
-    return minimum_snap(knots, Fixed(states, _resting_ends(np.ones(knots.size, dtype=bool))))
+    return minimum_snap(knots, Fixed(states, _rest_to_rest_mask(np.ones(knots.size, dtype=bool))))
 
 
-def _resting_ends(values: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _rest_to_rest_mask(values: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Mask (k, 4) of a spline at rest at both ends, with the knots of known value (k,) fixed."""
     mask = np.zeros((values.size, ORDER), dtype=bool)
     mask[:, 0] = values
@@ -124,4 +124,4 @@ def _given_headings(knots: Floats, headings: Sequence[float | None]) -> SplineHe
     given = np.array([angle is not None for angle in (None, *headings)])
     states = np.zeros((knots.size, ORDER, 1))
     states[given, 0, 0] = np.unwrap([angle for angle in headings if angle is not None])
-    return SplineHeading(minimum_snap(knots, Fixed(states, _resting_ends(given))))
+    return SplineHeading(minimum_snap(knots, Fixed(states, _rest_to_rest_mask(given))))

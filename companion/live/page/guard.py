@@ -54,7 +54,7 @@ class Guard:
     def _refusal(self, scope: Scope, headers: dict[str, str], *, has_token: bool) -> str | None:
         host, origin = headers.get("host", ""), headers.get("origin")
         if not _is_this_computer(host):
-            return f"the live page is not at {host!r}; use its IP address"
+            return f"the live page does not accept the host {host!r}; open it by its IP address"
         if origin is not None and urlsplit(origin).netloc != host:
             return f"another site, {origin!r}, must not use the live page"
         client = scope.get("client")

@@ -50,7 +50,7 @@ RESOURCES = Channel(
     "What the flight takes from the computer, and the counters of the link, once a second.",
     (
         Field("time_s", "When, on our clock, s."),
-        Field("processor_share", "Processor time per time, 1: one core."),
+        Field("processor_share", "Processor load of the program; 1: one core fully used."),
         Field("memory_mb", "Largest memory so far, MB."),
         Field("recording_waiting", "Entries of this file that wait to be written."),
         Field("recording_dropped", "Entries of this file that were not recorded so far."),

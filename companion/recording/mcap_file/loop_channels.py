@@ -86,7 +86,7 @@ SETPOINT = Channel(
         Field("thrust", "Collective thrust, 0..1."),
         Field("latency_us", "From the sample's arrival to the setpoint, µs. 0 in virtual time."),
         Field("target_north", "Acceleration coefficient that the planner flies to, north."),
-        Field("target_east", "The same, east."),
+        Field("target_east", "Target one period later, east; NaN: the target is constant."),
         Field("target_heading_rad", "Heading that the planner flies to, rad."),
         Field("target_heading_rate_rad_s", "Feedforward of the heading, rad/s."),
         *(
@@ -94,9 +94,9 @@ SETPOINT = Channel(
             for part in "wxyz"
         ),
         Field("measured_north", "Acceleration coefficient of this attitude, north."),
-        Field("measured_east", "The same, east."),
+        Field("measured_east", "Target one period later, east; NaN: the target is constant."),
         Field("planned_north", "Coefficient that the planner plans for now, north; NaN: no plan."),
-        Field("planned_east", "The same, east."),
+        Field("planned_east", "Target one period later, east; NaN: the target is constant."),
     ),
     (
         Code("tilt_rate_limited", "Whether the roll-pitch rate is at limits.max_tilt_rate_deg_s."),
@@ -141,9 +141,9 @@ TARGET = Channel(
         Field("heading_rad", "Target heading, rad."),
         Field("heading_rate_rad_s", "Feedforward of the heading, rad/s."),
         Field("later_north", "Target one period later, north; NaN: the target is constant."),
-        Field("later_east", "The same, east."),
-        Field("later_heading_rad", "The same, heading, rad."),
-        Field("later_heading_rate_rad_s", "The same, feedforward of the heading, rad/s."),
+        Field("later_east", "Target one period later, east; NaN: the target is constant."),
+        Field("later_heading_rad", "Target heading one period later, rad."),
+        Field("later_heading_rate_rad_s", "Feedforward of the heading one period later, rad/s."),
         Field("acceleration_down_m_s2", "Wanted vertical acceleration, down, m/s²."),
         *_rates("body", "Body rate to send instead of the planner's (NaN: the planner's)"),
         Field("thrust", "Thrust to send instead of that for the acceleration; NaN: none."),
@@ -194,7 +194,10 @@ ACTION = Channel(
         Field("time_s", "When, on our clock, s."),
         Field("clock_offset_s", "Vehicle time minus our time, s; NaN: not known."),
         Field("drag_per_s", "Linear drag of an earlier flight, 1/s; of `drag_prior` only."),
-        Field("quadratic_drag_per_m", "Quadratic drag of an earlier flight, 1/m; the same."),
+        Field(
+            "quadratic_drag_per_m",
+            "Quadratic drag of that flight, 1/m; of `drag_prior` only.",
+        ),
     ),
     (Code("action", "The name of the call.", ACTIONS),),
 )

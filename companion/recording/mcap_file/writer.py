@@ -43,7 +43,13 @@ class McapWriter:
         self._ids[topic] = self._writer.register_channel(topic, ENCODING, self._schemas[name])
 
     def message(self, topic: str, time_ns: int, data: bytes) -> None:
-        """Add one message at a time in ns since 1970 (in vehicle time: since its boot)."""
+        """Add a message.
+
+        Args:
+            topic: topic of the message.
+            time_ns: time since 1970, ns; in a file in vehicle time, since the vehicle's boot.
+            data: encoded message.
+        """
         if self._batch is not None:
             self._batch.add(topic, time_ns, data)
         self._writer.add_message(self._ids[topic], time_ns, data, time_ns)

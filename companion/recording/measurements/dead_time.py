@@ -24,7 +24,10 @@ class AxisDeadTime(NamedTuple):
 
     @property
     def is_wrong(self) -> bool:
-        """Whether the two differ by more than 30 % of the configured one and by more than 8 ms."""
+        """Whether measured and configured dead time differ by more than 30 % and by more than 8 ms.
+
+        False if one of them is unknown.
+        """
         if self.measured is None or self.configured is None:
             return False
         apart = abs(self.measured - self.configured)
@@ -69,6 +72,6 @@ class DeadTimes:
             return None
         return (
             f"dead time is not as configured: {', '.join(wrong)}; the link is slow, or the "
-            "configured lag is wrong, which is measured as dead time: find what slows the link, or "
+            "configured lag is wrong, which appears as dead time: find what slows the link, or "
             "measure both anew with `companion identify`"
         )

@@ -33,7 +33,7 @@ def attitude_target(message: Message) -> AttitudeRequest | RatesRequest:
     if mask & _RESERVED:
         raise RefusedSetpoint(f"type_mask {mask} has reserved bits")
     if mask & _THRUST_BODY:
-        raise RefusedSetpoint("thrust_body is not flown: give thrust, clear THRUST_BODY_SET")
+        raise RefusedSetpoint("thrust_body is not supported: give thrust, clear THRUST_BODY_SET")
     if mask & _NO_THRUST:
         raise RefusedSetpoint("thrust is missing: clear THROTTLE_IGNORE")
     if not 0.0 <= thrust <= 1.0:
@@ -73,5 +73,5 @@ def _attitude(message: Message) -> tuple[float, float, float, float]:
         raise RefusedSetpoint("q is no unit quaternion (w, x, y, z)") from error
     # Beyond 90 degrees two attitudes have the same horizontal acceleration per specific thrust.
     if cos_tilt(q[1], q[2]) <= 0.0:
-        raise RefusedSetpoint("an attitude beyond 90 degrees of tilt is not flown")
+        raise RefusedSetpoint("an attitude beyond 90 degrees of tilt is not supported")
     return q

@@ -73,7 +73,7 @@ def local_target(
     """
     frame = _LOCAL_FRAMES.get(message.coordinate_frame)
     if frame is None:
-        raise RefusedSetpoint(f"coordinate_frame {message.coordinate_frame} is not flown")
+        raise RefusedSetpoint(f"coordinate_frame {message.coordinate_frame} is not supported")
     groups = _groups(message, (message.x, message.y, message.z))
     position, velocity, acceleration = groups
     if not frame.position and any(value is not None for value in position):
@@ -97,7 +97,7 @@ def global_target(message: Message, situation: Situation) -> MotionRequest:
     if frame in _TERRAIN:
         raise RefusedSetpoint("heights above terrain are not known here: use AMSL or above home")
     if frame not in (*_AMSL, *_ABOVE_HOME):
-        raise RefusedSetpoint(f"coordinate_frame {frame} is not flown")
+        raise RefusedSetpoint(f"coordinate_frame {frame} is not supported")
     position, velocity, acceleration = _groups(message, (0.0, 0.0, message.alt))
     if any(value is not None for value in position):
         if situation.origin is None:
@@ -117,7 +117,7 @@ def _groups(message: Message, position: Vector) -> tuple[_Values, _Values, _Valu
     """Position, velocity and acceleration; None for what the mask excludes."""
     mask = message.type_mask
     if mask & _FORCE and mask & _NO_ACCELERATION != _NO_ACCELERATION:
-        raise RefusedSetpoint("forces are not flown: clear FORCE_SET")
+        raise RefusedSetpoint("forces are not supported: clear FORCE_SET")
     if mask & ~_KNOWN_BITS:
         raise RefusedSetpoint(f"type_mask {mask} has bits that mean nothing to a multirotor")
     return (
@@ -188,7 +188,7 @@ def _demand(
     if position is not None and velocity is None and acceleration is not None:
         raise RefusedSetpoint("position and acceleration need velocity, too")
     if position is not None and hypot(*position) > _FARTHEST:
-        raise RefusedSetpoint(f"the position is farther than {_FARTHEST:g} m")
+        raise RefusedSetpoint(f"the position is more than {_FARTHEST:g} m from the local origin")
     return AxisDemand(position, velocity, acceleration)
 
 
