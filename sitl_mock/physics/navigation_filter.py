@@ -132,29 +132,19 @@ class NavigationFilter:
         law, state, now = self.law, self.state, corrected.corrected
         since, ago = now - state.at, now - corrected.at
         unsettled = pending_share(law.predictor_ms, state, now)
-        level, upright = corrected.level, corrected.upright
-        tracks = (
-            (
-                state.level,
-                level,
-                propagated(law, state, present, since),
-                propagated(law, corrected, present, ago),
-            ),
-            (
-                state.upright,
-                upright,
-                extrapolated(state.upright.errors, since),
-                extrapolated(upright.errors, ago),
-            ),
+        level = _settling(
+            state.level,
+            corrected.level,
+            propagated(law, state, present, since),
+            propagated(law, corrected, present, ago),
+            unsettled,
         )
-        level, upright = (
-            track._replace(
-                pending=(
-                    unsettled * before.pending[0] + new[0] - old[0],
-                    unsettled * before.pending[1] + new[1] - old[1],
-                )
-            )
-            for before, track, old, new in tracks
+        upright = _settling(
+            state.upright,
+            corrected.upright,
+            extrapolated(state.upright.errors, since),
+            extrapolated(corrected.upright.errors, ago),
+            unsettled,
         )
         return corrected._replace(level=level, upright=upright)
 
@@ -215,3 +205,21 @@ class NavigationFilter:
         wander = complex(gauss(0.0, kick), gauss(0.0, kick))
         corrected = place + first, speed + second, tilt + third + wander
         return TrackState(corrected, (0j, 0j), noise)
+
+
+def _settling(
+    before: TrackState, corrected: TrackState, old: Errors, new: Errors, unsettled: float
+) -> TrackState:
+    """Return a corrected track whose output goes on from where it was.
+
+    Args:
+        before: the track before the fix.
+        corrected: the track after it.
+        old: present errors by the track before the fix.
+        new: present errors by the track after it.
+        unsettled: share of the corrections of `before` that its output does not contain.
+    """
+    place, speed = before.pending
+    return corrected._replace(
+        pending=(unsettled * place + new[0] - old[0], unsettled * speed + new[1] - old[1])
+    )
