@@ -86,7 +86,7 @@ SETPOINT = Channel(
         Field("thrust", "Collective thrust, 0..1."),
         Field("latency_us", "From the sample's arrival to the setpoint, µs. 0 in virtual time."),
         Field("target_north", "Acceleration coefficient that the planner flies to, north."),
-        Field("target_east", "Target one period later, east; NaN: the target is constant."),
+        Field("target_east", "Acceleration coefficient that the planner flies to, east."),
         Field("target_heading_rad", "Heading that the planner flies to, rad."),
         Field("target_heading_rate_rad_s", "Feedforward of the heading, rad/s."),
         *(
@@ -94,9 +94,9 @@ SETPOINT = Channel(
             for part in "wxyz"
         ),
         Field("measured_north", "Acceleration coefficient of this attitude, north."),
-        Field("measured_east", "Target one period later, east; NaN: the target is constant."),
+        Field("measured_east", "Acceleration coefficient of this attitude, east."),
         Field("planned_north", "Coefficient that the planner plans for now, north; NaN: no plan."),
-        Field("planned_east", "Target one period later, east; NaN: the target is constant."),
+        Field("planned_east", "Coefficient that the planner plans for now, east; NaN: no plan."),
     ),
     (
         Code("tilt_rate_limited", "Whether the roll-pitch rate is at limits.max_tilt_rate_deg_s."),

@@ -64,6 +64,7 @@ def _derived(record: FlightRecord) -> Summary:
     reason = f"the record ends {record.duration:.1f} s after the flight began, before it was over"
     phase = record.phases[-1].name if record.phases else "connect"
     resources, thrust = record.rows("resources"), record.rows("thrust")
+    takeoff = _takeoff(record)
     return Summary(
         result=reason,
         phase=phase,
@@ -80,8 +81,8 @@ def _derived(record: FlightRecord) -> Summary:
         course=Course(
             began=record.began,
             phases=tuple((each.time, each.name) for each in record.phases),
-            takeoff=_takeoff(record),
-            early_end=_early_end(record, phase),
+            takeoff=takeoff,
+            early_end=_early_end(record, phase, takeoff),
             battery=(None, _last(thrust["battery_remaining"])),
             min_battery=float(flight.get("min_battery", "0")),
             deadline=float(flight.get("deadline_s", "0.004")),
@@ -162,9 +163,9 @@ def _counts(record: FlightRecord, deadline: float) -> LoopCounts:
     )
 
 
-def _early_end(record: FlightRecord, phase: str) -> EarlyEnd:
+def _early_end(record: FlightRecord, phase: str, takeoff: float | None) -> EarlyEnd:
     """The end of the record, in the phase that ran."""
-    end, takeoff = record.duration, _takeoff(record)
+    end = record.duration
     since = None if takeoff is None else end - takeoff
     latest = record.maneuvers[-1] if record.maneuvers else None
     if phase != "maneuvers" or latest is None or latest.name is None:
