@@ -4,7 +4,7 @@ import difflib
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
-from math import degrees, radians
+from math import degrees, inf, radians
 from typing import Any, get_args
 
 from pydantic import BaseModel
@@ -94,6 +94,8 @@ def explained(detail: Any, model: type[BaseModel], former: Mapping[str, str]) ->
         return str(message)
     if remedy := _remedy(detail, str(location[-1])) or _other_length(detail):
         return f"`{where}` {remedy}"
+    if detail["type"] == "path_type":
+        message = "must name a file or a folder"
     got = "" if isinstance(value, dict) else f" (got {shortened(value)})"
     return f"`{where}`: {message[:1].lower()}{message[1:]}{got}{_slip(detail, where)}"
 
@@ -150,6 +152,8 @@ def _slip(detail: Any, where: str) -> str:
     if not isinstance(value, int | float) or not value:
         return ""
     unit, meant = other_unit(where, value)
+    if unit == "%" and bound.get("le", bound.get("lt", inf)) > 1.0:
+        return ""  # no share of 1
     kept = [keeps(meant, bound[name]) for name, keeps in _BOUNDS.items() if name in bound]
     return f"; if it is in {unit}, write {meant:.4g}" if kept and all(kept) else ""
 
