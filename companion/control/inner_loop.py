@@ -4,7 +4,7 @@ from math import inf
 from typing import Any
 
 from companion import plugins
-from companion.attitude import PLANNER_NAMES, Constants, Limits, Planner, make_planner
+from companion.attitude import PLANNER_NAMES, Constants, Limits, Planner, Target, make_planner
 from companion.attitude.limits import make_constants
 from companion.attitude.planner import MODEL_FOLLOWING
 from companion.attitude.reference_model import model_lag, model_response
@@ -14,6 +14,9 @@ from companion.config.known_drag import drag_prior
 from companion.files.yaml_file import ConfigError
 from companion.guidance import GRAVITY, HoverThrust, InnerResponse, ThrustSettings
 
+_QUESTION = (1.0, 0.0, 0.0, 0.0), Target(0.1, 0.1, 0.0), 0.004
+"""What a planner of another package is asked before it may fly: a step to 8° of tilt from level."""
+
 LARGEST_PRODUCT = 0.45
 """Largest sensible gain · (lag + dead time); above it, the response overshoots."""
 
@@ -22,19 +25,32 @@ def planner(config: Config) -> Planner:
     """The configured planner with its limits; `model-following` gets the vehicle's response too.
 
     Raises:
-        ConfigError: the planner of another package cannot be loaded.
+        ConfigError: the planner of another package cannot be loaded, made or asked.
     """
     name, limits = config.planner_name, rate_limits(config)
-    own = name in PLANNER_NAMES
-    made = make_planner(
-        name if own else plugin(plugins.PLANNERS, name),
-        gain=config.planner.gain_per_s,
-        yaw_gain=config.planner.yaw_gain_per_s,
-        limits=limits,
-        recovery_angle=config.limits.recovery_angle,
-        **(config.vehicle.response if name == MODEL_FOLLOWING else {}),
-    )
-    return made if own else WithinLimits(made, limits)
+
+    def made(law: Any) -> Planner:
+        return make_planner(
+            law,
+            gain=config.planner.gain_per_s,
+            yaw_gain=config.planner.yaw_gain_per_s,
+            limits=limits,
+            recovery_angle=config.limits.recovery_angle,
+            **(config.vehicle.response if name == MODEL_FOLLOWING else {}),
+        )
+
+    if name in PLANNER_NAMES:
+        return made(name)
+    law = plugin(plugins.PLANNERS, name)
+    try:
+        # A planner may remember what it was asked, so the one that flies is another.
+        WithinLimits(made(law), limits).rates(*_QUESTION)
+        return WithinLimits(made(law), limits)
+    except Exception as error:
+        raise ConfigError(
+            f"planner.name: {name} cannot be flown: {error}; "
+            "`companion.testing.check_planner` tries more attitudes"
+        ) from error
 
 
 def law_constants(config: Config) -> Constants:
