@@ -7,6 +7,7 @@ import pytest
 
 from companion.campaign import estimate, folder, loading
 from companion.campaign.design import samples_of, seed_of, too_few_samples
+from companion.campaign.estimate import duration
 from companion.campaign.swept import Swept
 from companion.cli.main import main
 from companion.files import bounded_yaml
@@ -201,3 +202,17 @@ def test_too_many_flights_are_refused_with_their_number_and_time(tmp_path, capsy
     said = capsys.readouterr().err
     assert "2000 flights, about 11 h with 3 workers, more than limits.max_hours allows (4)" in said
     assert not (tmp_path / "out").exists()
+
+
+def test_a_configuration_that_is_none_is_refused_in_words(tmp_path):
+    assert "`config`: must name a file, or hold the keys of a configuration" in refusal(
+        tmp_path, config=5
+    )
+
+
+@pytest.mark.parametrize(
+    ("seconds", "told"),
+    [(3.14, "3.1 s"), (100.0, "1.7 min"), (123_456.0, "34 h"), (8_640_000.0, "100 days")],
+)
+def test_a_time_is_told_in_the_largest_unit_that_fits(seconds, told):
+    assert duration(seconds) == told
