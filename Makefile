@@ -13,7 +13,7 @@ MAKEFLAGS += --jobs=2
 
 $(VENV)/.fly: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
-	$(INSTALL) -e '.[report]'
+	$(INSTALL) -e '.[plot,report]'
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.fly

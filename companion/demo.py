@@ -162,4 +162,5 @@ def _await_ready(process: "subprocess.Popen[bytes]", log: Path) -> None:
 def _check_running(process: "subprocess.Popen[bytes]", log: Path) -> None:
     if process.poll() is not None:
         last = log.read_text(errors="replace").strip().rpartition("\n")[2]
+        last = last or "it could not write there; is the disk full?"
         raise VehicleStoppedError(f"the mock vehicle stopped, see {log}: {last}")

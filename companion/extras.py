@@ -1,6 +1,12 @@
 """Checks for optional packages, with the error message for a missing one."""
 
 import importlib.util
+import shlex
+import sys
+from pathlib import Path
+
+_CLONE = Path(__file__).parents[1]
+"""The folder of pyproject.toml, if the program runs from a clone."""
 
 
 class MissingExtraError(Exception):
@@ -19,7 +25,17 @@ def require(module: str, extra: str, purpose: str) -> None:
         MissingExtraError: the package is not installed.
     """
     if importlib.util.find_spec(module) is None:
-        raise MissingExtraError(
-            f"{purpose} needs {module}; install it with: pip install 'mavlink-companion[{extra}]'"
-            f" (in a clone: pip install -e '.[{extra}]')"
-        )
+        raise MissingExtraError(f"{purpose} needs {module}; install it with: {pip_command(extra)}")
+
+
+def pip_command(extra: str) -> str:
+    """The shell command that installs an extra into the environment that runs this program."""
+    in_clone = (_CLONE / "pyproject.toml").is_file()
+    what = f"-e '{_from_here(_CLONE)}[{extra}]'" if in_clone else f"'mavlink-companion[{extra}]'"
+    return f"{shlex.quote(_from_here(Path(sys.executable)))} -m pip install {what}"
+
+
+def _from_here(path: Path) -> str:
+    """A path as a user in the working folder would write it."""
+    here = Path.cwd()
+    return str(path.relative_to(here)) if path.is_relative_to(here) else str(path)

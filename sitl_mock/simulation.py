@@ -10,6 +10,7 @@ from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.personality import Personality, VehicleParts
 from sitl_mock.autopilot.receiver import Receiver
 from sitl_mock.autopilot.setpoints import OffboardStream
+from sitl_mock.autopilot.stamp_slips import StampSlips
 from sitl_mock.autopilot.state import State
 from sitl_mock.link.framing import Framer, Message
 from sitl_mock.link.link import Link
@@ -75,7 +76,7 @@ class Simulation:
                 Origin(home.latitude_deg, home.longitude_deg, home.altitude_m),
                 self.links,
                 round(settings.prearm_delay_s * 1e6),
-                settings,
+                StampSlips(settings.sensors.stamp_slips_hz, settings.seed),
             )
         )
         self.commander = self._rules.commander

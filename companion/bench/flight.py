@@ -15,6 +15,7 @@ from companion.batch import can_compile
 from companion.bench.profile import sampled, shares
 from companion.config import Config
 from companion.config.files import changed, load, shipped
+from companion.extras import pip_command
 from companion.testing import MockVehicle, fly
 
 FILES = {"px4": "mock-px4.yaml", "ardupilot": "mock-ardupilot.yaml"}
@@ -108,7 +109,8 @@ def _print(figures: dict[str, Any]) -> None:
     console = Console()
     console.print(table)
     if not can_compile():
-        console.print("Flights are quicker with numba: pip install 'mavlink-companion[study]'")
+        # As markup, rich would leave out the extra's brackets.
+        console.print(f"Flights are quicker with numba: {pip_command('study')}", markup=False)
     _print_shares(figures, console)
 
 

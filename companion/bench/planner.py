@@ -18,6 +18,7 @@ from rich.table import Table
 from companion import batch
 from companion.attitude import LAW_NAMES, Limits, Target, make_planner
 from companion.attitude.planner import LawPlanner
+from companion.extras import pip_command
 
 BATCHES = (1, 1_000, 10_000)
 VEHICLES = 1_000
@@ -205,7 +206,7 @@ def _show(figures: dict[str, Any]) -> None:
     )
     if not figures["compiled"]:
         console.print(
-            "Batches are far quicker with numba: pip install 'mavlink-companion[study]'",
+            f"Batches are far quicker with numba: {pip_command('study')}",
             markup=False,
             highlight=False,
         )

@@ -1,8 +1,9 @@
 """The YAML file of a campaign: the flight, the swept keys, and the limits."""
 
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from companion.campaign.swept import Swept
 from companion.campaign.tune.section import Tune
@@ -116,6 +117,14 @@ class CampaignFile(Section):
     limits: CampaignLimits = CampaignLimits()
     tune: Tune | None = None
     """What `companion campaign tune` searches; running the campaign ignores it."""
+
+    @field_validator("config", mode="before")
+    @classmethod
+    def _file_or_keys(cls, value: Any) -> Any:
+        """Refuse other values in words: pydantic would tell the fault of each kind."""
+        if not isinstance(value, str | Path | dict):
+            raise ValueError("must name a file, or hold the keys of a configuration")
+        return value
 
     @model_validator(mode="after")
     def _consistent(self) -> "CampaignFile":

@@ -12,10 +12,12 @@ from companion.config.files import json_schema, load, shipped
 from companion.config.reference import Key, as_markdown, as_yaml, differences, keys
 from companion.control.expected_response import expectations
 from companion.demo import check_mock
+from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
 from companion.flight.assembly import link_settings
 from companion.flight.maneuvers import configured_maneuvers
 from companion.guidance.follow import Follow
+from companion.mavlink.errors import EndpointError
 from companion.mavlink.transport.endpoint import parse_endpoint
 
 
@@ -26,7 +28,8 @@ def show(options: argparse.Namespace) -> int:
     elif options.markdown:
         text = as_markdown(keys(Config()))
     elif options.diff:
-        text = as_yaml(differences(load(options.diff)))
+        changes = list(differences(load(options.diff)))
+        text = as_yaml(changes) if changes else f"# {options.diff} changes no default\n"
     else:
         config = load(options.file) if options.file else Config()
         text = as_yaml(_found(config, options.get) if options.get else keys(config))
@@ -66,21 +69,32 @@ def init(options: argparse.Namespace) -> int:
         included = shipped(line.split()[1]).read_text(encoding="utf-8")
         lines.append("# How the rate loop answers; `companion identify` measures yours.\n")
         lines.append(included[included.index("vehicle:\n") :])
+    out = Path(options.out)
+    if out.exists() or out.is_symlink():
+        raise ConfigError(f"{out} exists already; name another with --out")
     try:
-        with Path(options.out).open("x", encoding="utf-8") as file:
-            file.write("".join(lines).removeprefix("#\n"))
-    except FileExistsError:
-        raise ConfigError(f"{options.out} exists already; name another with --out") from None
+        write_whole(out, "".join(lines).removeprefix("#\n"))
     except OSError as error:
-        raise ConfigError(f"--out: cannot write {options.out}: {error.strerror}") from error
+        raise ConfigError(f"--out: cannot write {out}: {error.strerror}") from error
     print(f"Wrote {options.out}. Check it with: companion check-config {options.out}")
     return EXIT_OK
 
 
 def check(options: argparse.Namespace) -> int:
-    """Check a configuration file, its includes, its maneuvers, and its section `mock`."""
+    """Check a configuration file, its includes, its maneuvers, and its section `mock`.
+
+    Raises:
+        ConfigError: the file cannot be used.
+    """
     config = load(options.file)
-    parse_endpoint(link_settings(config).endpoint)
+    for key, endpoint in (
+        ("link.endpoint", link_settings(config).endpoint),
+        *(("serve.clients", client) for client in config.serve.clients),
+    ):
+        try:
+            parse_endpoint(endpoint)
+        except EndpointError as error:
+            raise ConfigError(f"{options.file}: `{key}`: {error}") from error
     maneuvers = configured_maneuvers(config)
     if config.mock is not None:
         check_mock(options.file)

@@ -134,7 +134,7 @@ def page_about(folder: Path) -> str:
         Exception,
         KeyboardInterrupt,
     ) as error:  # The flight is over.
-        return f"No report: {error or 'interrupted'}; `companion report {folder}` tries again"
+        return f"No report: {str(error) or 'interrupted'}; `companion report {folder}` tries again"
 
 
 def fly_bundled(

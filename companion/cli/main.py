@@ -46,12 +46,15 @@ def _loaded(arguments: Sequence[str] | None) -> Callable[[], int]:
     """Parse the arguments, and import the command they name."""
     # Our matrices are small: a second thread takes twice the CPU time and is slower.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from companion.cli.text_streams import print_anything  # noqa: PLC0415
+    from companion.cli.text_streams import lost_output, print_anything  # noqa: PLC0415
 
     print_anything()
     from companion.cli.command_line import parse  # noqa: PLC0415
 
-    options = parse(arguments)
+    try:
+        options = parse(arguments)
+    finally:
+        lost_output()  # help that is not read to its end is no error
     from companion.cli.run import command_of, run  # noqa: PLC0415
 
     command = command_of(options)

@@ -9,6 +9,7 @@ from importlib import import_module
 from rich.console import Console
 
 from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_USAGE
+from companion.cli.text_streams import lost_output
 from companion.demo import VehicleStoppedError
 from companion.extras import MissingExtraError
 from companion.files.yaml_file import ConfigError
@@ -28,7 +29,7 @@ _USAGE = (
     SigningError,
 )
 """The command line or the configuration is wrong, or something that it names cannot be used."""
-_FLIGHT = LinkError, OSError, VehicleStoppedError
+_FLIGHT = LinkError, VehicleStoppedError
 """The flight failed, or something that it needs failed."""
 
 Command = Callable[[argparse.Namespace], int]
@@ -47,22 +48,38 @@ def run(command: Command, options: argparse.Namespace) -> int:
     Raises:
         KeyboardInterrupt: Ctrl-C where no flight handles it.
     """
+    code = EXIT_FLIGHT
+    fault: OSError | None = None
     try:
-        return command(options)
+        code = command(options)
     except _USAGE as error:
         _say(str(error))
-        return EXIT_USAGE
+        code = EXIT_USAGE
     except _FLIGHT as error:
         _say(str(error))
-        return EXIT_FLIGHT
+    except BrokenPipeError:
+        pass  # nobody reads our output any more, as after `| head`; a broken link is a LinkError
+    except OSError as error:
+        fault = error
     except asyncio.CancelledError:
         _say("interrupted before anything was sent")
-        return EXIT_FLIGHT
     except Exception as error:
         if options.debug:
             traceback.print_exc()
         _say(f"internal error: {error!r}; run again with --debug for where it happened")
-        return EXIT_FLIGHT
+    lost = lost_output()
+    if fault is not None and (lost is None or fault.filename is not None):
+        _say(_in_words(fault))
+    if lost:
+        _say(f"standard output cannot be written: {lost}")
+        return code or EXIT_FLIGHT
+    return code
+
+
+def _in_words(error: OSError) -> str:
+    """What the operating system refused, with the file if it names one."""
+    reason = error.strerror or str(error)
+    return reason if error.filename is None else f"{error.filename}: {reason}"
 
 
 def _say(text: str) -> None:

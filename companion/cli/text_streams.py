@@ -1,12 +1,15 @@
 """Makes standard output and error transliterate the characters that they cannot encode.
 
 A terminal may be ASCII or Latin-1 (`LANG=C`, `PYTHONIOENCODING`), and a file name may be any bytes.
-Neither may end a command that flies.
+Neither may end a command that flies. Nor may an output that is closed, full, or no longer read.
 """
 
 import codecs
 import io
+import os
 import sys
+from contextlib import suppress
+from pathlib import Path
 
 from companion.files.ascii_text import ascii_for
 
@@ -14,11 +17,32 @@ _HANDLER = "companion.transliterated"
 
 
 def print_anything() -> None:
-    """Make standard output and error transliterate."""
+    """Make standard output and error transliterate, and discard what goes to a closed one."""
     codecs.register_error(_HANDLER, _transliterated)
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # None where it is closed
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed, as by `>&-`
+            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
+        stream = getattr(sys, name)
+        if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors=_HANDLER)
+
+
+def lost_output() -> str | None:
+    """Why the text printed so far does not reach standard output.
+
+    Returns:
+        None if it does; empty if nobody reads on, as after `| head`; else the reason in words. What
+        is printed later is then discarded: Python would complain about it at the end.
+    """
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        with suppress(OSError, ValueError):
+            null = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(null, sys.stdout.fileno())
+            os.close(null)
+        return "" if isinstance(error, BrokenPipeError) else error.strerror or str(error)
+    return None
 
 
 def _transliterated(error: UnicodeError) -> tuple[str, int]:

@@ -48,9 +48,9 @@ def tune(options: argparse.Namespace) -> int:
     proposal = propose(config, disturbances, vehicle=nearer)
     flights = {} if options.no_flights else _flights(proposal, console)
     known = _relative(vehicle, output) if included else _vehicle_of(proposal.tuned)
+    console.print("\n".join(summary_lines(proposal, flights)))  # kept if the disk is full
     write_whole(output, proposal_text(proposal, known, flights, source.name))
     load(output)
-    console.print("\n".join(summary_lines(proposal, flights)))
     keys = [f"{section}.{key}" for section, keys in proposal.changes.items() for key in keys]
     console.print(
         f"Written to {output}. Let your configuration include it, and remove {', '.join(keys)} "

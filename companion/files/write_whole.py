@@ -42,7 +42,7 @@ def write_whole(path: Path, text: str, mode: int = 0o666) -> None:
         mode: permissions of the file, less the process's umask.
 
     Raises:
-        OSError: the file cannot be written. No temporary file is left.
+        OSError: the file cannot be written; the error names it. No temporary file is left.
     """
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
@@ -53,6 +53,8 @@ def write_whole(path: Path, text: str, mode: int = 0o666) -> None:
             os.fsync(file.fileno())
         temporary.replace(path)
         sync_folder(path.parent)
+    except OSError as error:  # it names the temporary file, or none where the disk is full
+        raise OSError(error.errno, error.strerror, str(path)) from error
     finally:
         temporary.unlink(missing_ok=True)
 

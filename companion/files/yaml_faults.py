@@ -4,7 +4,7 @@ import difflib
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
-from math import degrees, radians
+from math import degrees, inf, radians
 from typing import Any, get_args
 
 from pydantic import BaseModel
@@ -86,11 +86,16 @@ def explained(detail: Any, model: type[BaseModel], former: Mapping[str, str]) ->
     if detail["type"] == "extra_forbidden":
         told = former.get(where)
         return f"`{where}` {told}" if told else f"`{where}` {_unknown(location, value, model)}"
+    if detail["type"] == "missing" and isinstance(value, list | tuple):
+        held = ".".join(str(part) for part in location[:-1])
+        return f"`{held}` has too few values (got {shortened(value)})"
     message = detail["msg"].removeprefix("Value error, ").replace("tuple", "list")
     if not where:
         return str(message)
-    if remedy := _remedy(detail, str(location[-1])):
+    if remedy := _remedy(detail, str(location[-1])) or _other_length(detail):
         return f"`{where}` {remedy}"
+    if detail["type"] == "path_type":
+        message = "must name a file or a folder"
     got = "" if isinstance(value, dict) else f" (got {shortened(value)})"
     return f"`{where}`: {message[:1].lower()}{message[1:]}{got}{_slip(detail, where)}"
 
@@ -103,7 +108,7 @@ def _remedy(detail: Any, key: str) -> str | None:
     if kind in ("float_parsing", "int_parsing"):
         return f"must be a number: {_number_in(key, str(value))} (got {shortened(value)})"
     if value is None and kind in ("float_type", "int_type", "string_type", "tuple_type"):
-        return "has no value; write one behind the colon, or take the line out"
+        return "has no value; write one, or take the key out"
     if kind in ("model_type", "dict_type", "model_attributes_type"):
         return (
             "is a section: write its keys on the lines below it, indented by two spaces, each as "
@@ -111,6 +116,16 @@ def _remedy(detail: Any, key: str) -> str | None:
         )
     if kind == "tuple_type" and isinstance(value, str | int | float):
         return f"is a list: write `{key}: [{value}]`"
+    return None
+
+
+def _other_length(detail: Any) -> str | None:
+    """How many values a list has, and how many it may have."""
+    bounds = detail.get("ctx", {})
+    if detail["type"] == "too_short":
+        return f"has {len(detail['input'])} values; it needs at least {bounds['min_length']}"
+    if detail["type"] == "too_long":
+        return f"has {len(detail['input'])} values; it takes at most {bounds['max_length']}"
     return None
 
 
@@ -137,6 +152,8 @@ def _slip(detail: Any, where: str) -> str:
     if not isinstance(value, int | float) or not value:
         return ""
     unit, meant = other_unit(where, value)
+    if unit == "%" and bound.get("le", bound.get("lt", inf)) > 1.0:
+        return ""  # no share of 1
     kept = [keeps(meant, bound[name]) for name, keeps in _BOUNDS.items() if name in bound]
     return f"; if it is in {unit}, write {meant:.4g}" if kept and all(kept) else ""
 
@@ -144,6 +161,9 @@ def _slip(detail: Any, where: str) -> str:
 def _unknown(location: tuple[int | str, ...], value: Any, model: type[BaseModel]) -> str:
     """The message about an unknown key, with the key that was probably meant."""
     name = str(location[-1])
+    section, _, key = name.partition(".")
+    if len(location) == 1 and ((section,), key) in _keys(model):
+        return f"holds a point; write `{section}: {{{key}: {shortened(value)}}}`"
     beside = list(_model_at(location, model).model_fields)
     everywhere = [(key, place) for place, key in _keys(model) if place != location[:-1]]
     if not isinstance(value, dict) and not any(key.startswith(f"{name}_") for key in beside):
@@ -171,9 +191,11 @@ def _either(places: list[str]) -> str:
 
 
 def _likeness(written: str, known: str) -> float:
-    """Similarity of a written key to a known one, 0 to 1; 0.99 if the known one continues it."""
+    """Similarity of a written key to a known one, 0 to 1; nearly 1 if the known one holds it."""
     if known.startswith(f"{written}_"):
         return 0.99
+    if known.endswith(f"_{written}"):
+        return 0.98
     return difflib.SequenceMatcher(None, written, known).ratio()
 
 

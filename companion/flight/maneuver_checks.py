@@ -1,9 +1,11 @@
 """Checks of maneuvers against limits and fence, with the known drag of the vehicle."""
 
 from collections.abc import Hashable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import lru_cache
 from math import tau
+from pathlib import Path
 
 import numpy as np
 
@@ -42,11 +44,9 @@ def require_flyable(config: Config, part: Maneuver, drag: KnownDrag) -> None:
     Raises:
         ConfigError: the maneuver cannot be flown within the limits and the fence.
     """
-    try:
+    with named_if_impossible(part.name):
         motions = list(_motions(part, drag.least))
         _require_motions_inside(config, part, motions, None)
-    except TrajectoryError as error:
-        raise ConfigError(f"{part.name}: {error}") from error
     if isinstance(part, HeldFigure):
         envelope = replace(envelope_of(config, drag), max_tilt_rate=None, fence=None)
         for broken in judge(motions[0], envelope):
@@ -92,10 +92,8 @@ def require_followable(config: Config, maneuver: Maneuver, begin: Vector, drag: 
         return check(replace(motion, position=motion.position + np.array(begin)))
 
     if isinstance(maneuver, Follow | HeldFigure):
-        try:
+        with named_if_impossible(maneuver.name):
             broken = violations(maneuver.trajectory, replace(envelope, fence=fence))
-        except TrajectoryError as error:
-            raise ConfigError(f"{maneuver.name}: {error}") from error
         if broken:
             raise ConfigError(f"{maneuver.name}: {broken[0]}; {broken[0].remedy}")
 
@@ -111,16 +109,33 @@ def require_still_flyable(config: Config, flown: ManeuverSequence, drag: KnownDr
         drag: drag of the vehicle.
 
     Raises:
-        ConfigError: a maneuver cannot be flown within the limits and the fence.
+        ConfigError: a maneuver cannot be computed, or not be flown within the limits and the
+            fence.
     """
     for part in flown.parts:
         if not isinstance(part, Follow):
             require_flyable(config, part, drag)
-        elif broken := violations(part.trajectory, envelope_of(config, drag)):
+            continue
+        with named_if_impossible(part.name):
+            broken = violations(part.trajectory, envelope_of(config, drag))
+        if broken:
             raise ConfigError(
                 f"{part.name}: {broken[0]}; a trajectory is not slowed down again in flight, so "
                 f"choose a value that it fits{drag.assumption}"
             )
+
+
+@contextmanager
+def named_if_impossible(name: str | Path) -> Iterator[None]:
+    """Name the maneuver or file in the error of a trajectory that cannot be computed.
+
+    Raises:
+        ConfigError: instead of `TrajectoryError`.
+    """
+    try:
+        yield
+    except TrajectoryError as error:
+        raise ConfigError(f"{name}: {error}") from error
 
 
 def _require_motions_inside(

@@ -6,11 +6,11 @@ from companion.config import Config, trajectory_file
 from companion.config.flight import IdentifyConfig
 from companion.config.known_drag import KnownDrag, before_connecting
 from companion.files.yaml_file import ConfigError
-from companion.flight.maneuver_checks import envelope_of, require_flyable
+from companion.flight.maneuver_checks import envelope_of, named_if_impossible, require_flyable
 from companion.flight.trajectory_notes import overview, slowing
 from companion.guidance import Corners, Doublets, Maneuver, ManeuverSequence, Steps
 from companion.guidance.follow import Follow, circle, hover
-from companion.guidance.trajectory import TrajectoryError, slow_down, violations
+from companion.guidance.trajectory import slow_down, violations
 
 
 def configured_maneuvers(config: Config, drag: KnownDrag | None = None) -> ManeuverSequence:
@@ -88,16 +88,14 @@ def _follow(config: Config, drag: KnownDrag) -> Follow:
     loaded, envelope = trajectory_file.read(path), envelope_of(config, drag)
     trajectory = loaded.trajectory
     notes = loaded.notes
-    if config.flight.slow_down:
-        try:
+    with named_if_impossible(path):
+        if config.flight.slow_down:
             slower = slow_down(trajectory, envelope)
-        except TrajectoryError as error:
-            raise ConfigError(f"{path}: {error}") from error
-        notes = (*notes, *slowing(trajectory, slower))
-        trajectory = slower.trajectory
-    elif broken := violations(trajectory, envelope):
-        first = min(broken, key=lambda one: one.slowing_helps)
-        assumption = drag.assumption if first.slowing_helps else ""
-        raise ConfigError(f"{path}: {first}; {first.remedy}{assumption}")
+            notes = (*notes, *slowing(trajectory, slower))
+            trajectory = slower.trajectory
+        elif broken := violations(trajectory, envelope):
+            first = min(broken, key=lambda one: one.slowing_helps)
+            assumption = drag.assumption if first.slowing_helps else ""
+            raise ConfigError(f"{path}: {first}; {first.remedy}{assumption}")
     notes = (*notes, overview(trajectory))
     return Follow(trajectory, config.limits.max_yaw_rate, notes)

@@ -4,10 +4,11 @@ import shlex
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from companion.recording.measurements.verdict import Check, Figures, checks, is_good
+from companion.recording.measurements.verdict import LOST_ROWS, Check, Figures, checks, is_good
 from companion.recording.what_to_do import what_to_do
 
 _BEFORE_TAKEOFF = ("connect", "checks", "stream", "arm")
+_SHARED = ("--endpoint", "--set")
 _INTERRUPTED = ("interrupted by ", "left at once by the user")
 
 
@@ -68,6 +69,8 @@ def _headline_and_reasons(figures: Figures) -> tuple[str, list[str]]:
             f"The flight was not good: {names}, {len(beyond)} of {len(judged)} figures beyond "
             "their limits."
         )
+    elif all(LOST_ROWS in text for text in advice):
+        headline = f"The flight was good, as far as it could be recorded: {names}."
     else:
         headline = f"The flight was good, but the configuration does not fit the vehicle: {names}."
     lines = [f"! {check.what}: {check.found}; {check.remedy}" for check in beyond]
@@ -102,8 +105,10 @@ def _ended_early(figures: Figures) -> tuple[str, list[str]]:
     interrupted = figures["result"].startswith(_INTERRUPTED)
     remedy = "nothing needs fixing" if interrupted else what_to_do(end["monitor"], end["phase"])
     if figures["at_the_end"]["armed"] and end["since_takeoff_s"] is not None:
-        remedy = f"the vehicle is armed: take it over or land it; then: {remedy}"
-    return f"The flight ended early: {figures['result'].rstrip('.')}.", [
+        then = "" if interrupted else f"; then: {remedy}"
+        remedy = f"the vehicle is armed: take it over or land it{then}"
+    result = figures["result"].rstrip(".")
+    return f"The flight ended early: {result}{'' if result.endswith('?') else '.'}", [
         f"  when: {_when(end)}",
         f"  vehicle now: {_vehicle(figures['at_the_end'])}",
         f"  what to do: {remedy}",
@@ -136,17 +141,29 @@ def _next(figures: Figures, called: Invocation) -> str | None:
         return f"{called.program} {shlex.join(words)}"
 
     again = called.arguments
+    own = None if called.config is None else ["--config", called.config, *_changes(again)]
     if figures["result"].startswith(_INTERRUPTED):
         return command(*again)
     end = figures["early_end"]
     if end is not None and end["phase"] in _BEFORE_TAKEOFF and end["since_takeoff_s"] is None:
-        return None if called.config is None else command("doctor", "--config", called.config)
+        return None if own is None else command("doctor", *own)
     if end is None and figures["settings"]:
         changes = [f"{key}={value}" for key, value in figures["settings"].items()]
         return command(*again, *(word for change in changes for word in ("--set", change)))
-    if end is None and called.config is not None and figures["planner"] == "first-order":
-        return command("identify", "--config", called.config)
+    if end is None and own is not None and figures["planner"] == "first-order":
+        return command("identify", *own)
     return command("plot", figures["log"]) if figures["log"] is not None else None
+
+
+def _changes(arguments: Sequence[str]) -> list[str]:
+    """The options that changed the configuration and that other commands take as well."""
+    kept: list[str] = []
+    for word, value in zip(arguments, (*arguments[1:], ""), strict=True):
+        if word in _SHARED:
+            kept += (word, value)
+        elif word.partition("=")[0] in _SHARED:
+            kept.append(word)
+    return kept
 
 
 def _enumerated(names: Sequence[str]) -> str:

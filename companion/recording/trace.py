@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from companion.attitude import BodyRates, Quaternion, Target
 from companion.recording.mcap_file.channels import MOTION
+from companion.recording.measurements.verdict import LOST_ROWS
 from companion.recording.recorder import FlightRecorder
 from companion.recording.series import Series, Spool
 
@@ -129,7 +130,7 @@ class FlightTrace:
         if lost == 0:
             return None
         why = self._spool.failure or "the disk was too slow"
-        return f"{lost} rows of the flight's figures were lost: {why}"
+        return f"{lost} {LOST_ROWS}: {why}"
 
     def response_rows(self) -> NDArray[np.float64]:
         """(N, 7), rows of `response`."""

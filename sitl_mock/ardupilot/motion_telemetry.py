@@ -1,15 +1,9 @@
 """Telemetry of position and motion in ArduCopter's conventions."""
 
-from math import inf
-from random import Random
-
 from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.autopilot.motion_telemetry import MAGNETIC_FIELD_NED, Builder, MotionTelemetry
-from sitl_mock.autopilot.state import State
 from sitl_mock.link.framing import Message
-from sitl_mock.physics.geodesy import Origin
-from sitl_mock.physics.vehicle import Vehicle
 
 _GRAVITY = 9.80665
 _SENT = (
@@ -27,25 +21,9 @@ no ODOMETRY and no ALTITUDE."""
 
 
 class ArduPilotMotionTelemetry(MotionTelemetry):
-    """Builds messages from the estimate.
-
-    Args:
-        state: the autopilot's state.
-        vehicle: the vehicle, for rotors and reset counter.
-        origin: origin of the local frame.
-        slips: slips of the position's stamp.
-    """
-
-    def __init__(self, state: State, vehicle: Vehicle, origin: Origin, slips: "StampSlips") -> None:
-        super().__init__(state, vehicle, origin)
-        self._slips = slips
+    """Builds messages from the estimate."""
 
     airspeed = 0.0
-
-    @property
-    def _position_ms(self) -> int:
-        """Stamp of LOCAL_POSITION_NED: now, or one millisecond less."""
-        return self._boot_ms - self._slips.at(self._state.shown_us)
 
     def builders(self) -> dict[int, Builder]:
         """Return message id -> builder."""
@@ -88,30 +66,3 @@ class ArduPilotMotionTelemetry(MotionTelemetry):
         return dialect.MAVLink_scaled_pressure_message(
             self._boot_ms, self.pressure_hpa(), 0.0, 3500
         )
-
-
-class StampSlips:
-    """Slips of a stamp against its message by one millisecond, alternately back and forth.
-
-    Args:
-        rate_hz: slips per second, on average; 0 = none.
-        seed: seed of their times.
-    """
-
-    def __init__(self, rate_hz: float, seed: int) -> None:
-        self._rate_hz = rate_hz
-        self._random = Random(f"{seed}/stamps")
-        self._slipped = False
-        self._next_us = self._after(0.0)
-
-    def at(self, now_us: int) -> int:
-        """Return by how much the stamp is too small now, ms: 0 or 1."""
-        if now_us >= self._next_us:
-            self._slipped = not self._slipped
-            self._next_us = self._after(now_us)
-        return int(self._slipped)
-
-    def _after(self, now_us: float) -> float:
-        if not self._rate_hz:
-            return inf
-        return now_us + 1e6 * self._random.expovariate(self._rate_hz)

@@ -17,7 +17,7 @@ from sitl_mock.ardupilot.defaults import (
 from sitl_mock.ardupilot.guided import Guided
 from sitl_mock.ardupilot.mode_control import ArduPilotModeControl
 from sitl_mock.ardupilot.modes import MODES_BY_NUMBER
-from sitl_mock.ardupilot.motion_telemetry import ArduPilotMotionTelemetry, StampSlips
+from sitl_mock.ardupilot.motion_telemetry import ArduPilotMotionTelemetry
 from sitl_mock.ardupilot.streams import ArduPilotStreams
 from sitl_mock.ardupilot.system_telemetry import ArduPilotSystemTelemetry
 from sitl_mock.ardupilot.texts import ARDUPILOT_EVENTS, ArduPilotAnnouncer
@@ -147,9 +147,7 @@ class ArduPilot:
         )
 
     def _builders(self, parts: VehicleParts, boot: Boot) -> dict[int, Builder]:
-        settings = parts.settings
-        slips = StampSlips(settings.sensors.stamp_slips_hz, settings.seed)
-        motion = ArduPilotMotionTelemetry(parts.state, parts.vehicle, parts.origin, slips)
+        motion = ArduPilotMotionTelemetry(parts.state, parts.vehicle, parts.origin, parts.slips)
         system = ArduPilotSystemTelemetry(
             parts.state,
             parts.origin,

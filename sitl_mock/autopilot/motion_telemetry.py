@@ -11,6 +11,7 @@ from sitl_mock.autopilot.setpoints import (
     VELOCITY_BITS,
     YAW_IGNORED,
 )
+from sitl_mock.autopilot.stamp_slips import StampSlips
 from sitl_mock.autopilot.state import NAN, PositionTargetEcho, State
 from sitl_mock.link.framing import Message
 from sitl_mock.physics.geodesy import Geodetic, Origin, to_geodetic
@@ -31,12 +32,14 @@ class MotionTelemetry:
         state: the autopilot's state.
         vehicle: the vehicle, for rotors, reset counter and ArduPilot's shaped attitude target.
         origin: origin of the local frame.
+        slips: slips of the stamp of LOCAL_POSITION_NED.
     """
 
-    def __init__(self, state: State, vehicle: Vehicle, origin: Origin) -> None:
+    def __init__(self, state: State, vehicle: Vehicle, origin: Origin, slips: StampSlips) -> None:
         self._state = state
         self._vehicle = vehicle
         self._origin = origin
+        self._slips = slips
 
     airspeed = NAN
     """Airspeed in VFR_HUD; there is no airspeed sensor."""
@@ -61,11 +64,6 @@ class MotionTelemetry:
     @property
     def _boot_ms(self) -> int:
         return self._state.shown_us // 1000
-
-    @property
-    def _position_ms(self) -> int:
-        """Stamp of LOCAL_POSITION_NED."""
-        return self._boot_ms
 
     def place(self) -> Geodetic:
         """Return the estimated geodetic position."""
@@ -92,7 +90,9 @@ class MotionTelemetry:
             return None
         estimate = self._state.estimate
         return dialect.MAVLink_local_position_ned_message(
-            self._position_ms, *estimate.position_ned, *estimate.velocity_ned
+            self._boot_ms - self._slips.at(self._state.shown_us),
+            *estimate.position_ned,
+            *estimate.velocity_ned,
         )
 
     def global_position_int(self) -> Message | None:

@@ -15,6 +15,7 @@ from sitl_mock.autopilot.motion_telemetry import Builder
 from sitl_mock.autopilot.parameter_protocol import ParameterProtocol
 from sitl_mock.autopilot.parameters import Parameter, ParameterTable
 from sitl_mock.autopilot.setpoints import OffboardStream
+from sitl_mock.autopilot.stamp_slips import StampSlips
 from sitl_mock.autopilot.state import Mode, State
 from sitl_mock.config.settings import VehicleSettings
 from sitl_mock.link.framing import Message
@@ -44,7 +45,7 @@ class VehicleParts(NamedTuple):
     links: list[Link]
     ready_us: int
     """Vehicle time of `mock.prearm_delay_s`, from which arming in any mode is possible."""
-    settings: VehicleSettings
+    slips: StampSlips
 
 
 class Rules(NamedTuple):

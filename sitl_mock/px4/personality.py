@@ -135,7 +135,7 @@ class Px4:
             checks,
         )
         builders = {
-            **MotionTelemetry(state, vehicle, parts.origin).builders(),
+            **MotionTelemetry(state, vehicle, parts.origin, parts.slips).builders(),
             **Px4SystemTelemetry(
                 state, parts.origin, self.identity, vehicle, parts.stream
             ).builders(),

@@ -201,3 +201,9 @@ def test_too_many_flights_are_refused_with_their_number_and_time(tmp_path, capsy
     said = capsys.readouterr().err
     assert "2000 flights, about 11 h with 3 workers, more than limits.max_hours allows (4)" in said
     assert not (tmp_path / "out").exists()
+
+
+def test_a_configuration_that_is_none_is_refused_in_words(tmp_path):
+    assert "`config`: must name a file, or hold the keys of a configuration" in refusal(
+        tmp_path, config=5
+    )

@@ -2,9 +2,13 @@
 
 import importlib.util
 import socket
+import sys
+from pathlib import Path
 
 import pytest
 
+import companion
+from companion import extras
 from companion.cli.main import main
 from companion.mavlink.transport.free_port import free_port
 
@@ -168,7 +172,8 @@ def test_a_missing_extra_is_one_sentence(capsys, monkeypatch, module, extra, arg
     )
     code, _, err = run(capsys, *arguments)
     assert code == 2
-    assert f"needs {module}; install it with: pip install 'mavlink-companion[{extra}]'" in err
+    command = f"{sys.executable} -m pip install -e '{Path(companion.__file__).parents[1]}[{extra}]'"
+    assert f"needs {module}; install it with: {command}" in err
 
 
 @pytest.mark.parametrize(
@@ -182,7 +187,16 @@ def test_a_key_whose_extra_is_not_installed_is_named(capsys, tmp_path, monkeypat
     monkeypatch.setattr(importlib.util, "find_spec", lambda *_: None)
     code, _, err = run(capsys, "fly", "--config", config(tmp_path, text))
     assert code == 2
-    assert f"{words}; install it with: pip install" in err
+    assert f"{words}; install it with: {sys.executable}" in err
+
+
+def test_the_command_for_an_extra_is_the_one_that_works_here(monkeypatch, tmp_path):
+    monkeypatch.setattr(extras, "_CLONE", tmp_path)
+    monkeypatch.setattr(sys, "executable", str(tmp_path / ".venv/bin/python"))
+    assert extras.pip_command("plot").endswith(" -m pip install 'mavlink-companion[plot]'")
+    (tmp_path / "pyproject.toml").touch()
+    monkeypatch.chdir(tmp_path)
+    assert extras.pip_command("plot") == ".venv/bin/python -m pip install -e '.[plot]'"
 
 
 def test_lockstep_on_the_command_line_does_not_go_with_mavsdk(capsys, tmp_path):

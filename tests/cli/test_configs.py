@@ -1,5 +1,7 @@
 """The shipped configurations: complete, correct, and described by the shipped schema."""
 
+import errno
+import os
 import signal
 from pathlib import Path
 
@@ -130,6 +132,35 @@ def test_a_starting_file_can_be_checked_and_is_never_replaced(name, tmp_path, ca
     assert main(["init", name, "--out", str(out)]) == 2
     assert "exists already" in capsys.readouterr().err
     assert out.read_text() == before
+
+
+def test_a_full_disk_leaves_no_half_of_a_starting_file(tmp_path, monkeypatch, capsys):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
+    out = tmp_path / "mine.yaml"
+    assert main(["init", "px4", "--out", str(out)]) == 2
+    assert "mine.yaml: No space left on device" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [("link: {endpoint: /dev/x}", "link.endpoint"), ("serve: {clients: [x]}", "serve.clients")],
+)
+def test_a_wrong_endpoint_is_told_with_its_file_and_key(text, key, tmp_path, capsys):
+    path = tmp_path / "c.yaml"
+    path.write_text(text)
+    assert main(["check-config", str(path)]) == 2
+    assert f"{path}: `{key}`: endpoint '" in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_file_that_changes_nothing_says_so(tmp_path, capsys):
+    path = tmp_path / "c.yaml"
+    path.write_text("# nothing yet\n")
+    assert main(["config", "--diff", str(path)]) == 0
+    assert capsys.readouterr().out == f"# {path} changes no default\n"
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,15 @@
 """`companion demo` and `companion plot`, as a user calls them, with the shortest maneuver."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 import yaml
 
 from companion import demo
+from companion.cli.flying import page_about
 from companion.cli.main import main
 from companion.mavlink.transport.free_port import free_port
 from tests.flight.fly import LOOP_HZ, QUICK_MOCK, QUICK_PARAMETERS, merged
@@ -73,3 +76,20 @@ def test_lockstep_with_a_vehicle_that_is_not_in_lockstep_is_refused(folder, caps
         code = main(["fly", "--config", "mine.yaml", "--lockstep", "--arm"])
     assert code == 1
     assert "no lockstep beacon" in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_page_that_ctrl_c_interrupts_is_said_to_be(tmp_path, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("companion.report.page.write_report", interrupted)
+    assert page_about(tmp_path).startswith("No report: interrupted; `companion report ")
+
+
+def test_a_mock_vehicle_without_a_word_points_at_the_disk(tmp_path):
+    log = tmp_path / "mock.log"
+    log.write_bytes(b"")
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    with pytest.raises(demo.VehicleStoppedError, match="is the disk full"):
+        demo._check_running(gone, log)

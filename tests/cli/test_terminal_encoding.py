@@ -1,4 +1,7 @@
-"""Terminals that are not UTF-8: every command says what it has to say, in characters they have."""
+"""Terminals that are not UTF-8: every command says what it has to say, in characters they have.
+
+And standard output that is closed, full, or not read to its end.
+"""
 
 import json
 import os
@@ -100,6 +103,33 @@ def test_the_doctor_is_told_on_any_terminal(tmp_path):
     )
     done = companion(tmp_path, ASCII, "doctor", "--config", "nobody.yaml", "--wait", "0.1")
     assert_said(done, 1, b"no heartbeat", b"+---")
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("command", ["config", "check-config c.yaml", "--version"])
+@pytest.mark.parametrize(
+    ("output", "words"), [(">&-", ""), (">/dev/full", "No space left on device"), ("| true", "")]
+)
+def test_output_that_cannot_be_written_is_no_traceback(
+    tmp_path, command, output, words, unbuffered
+):
+    (tmp_path / "c.yaml").write_text("limits: {max_tilt_deg: 20}\n")
+    done = subprocess.run(
+        f"{sys.executable} -m companion {command} {output}",
+        shell=True,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    for sign in ("internal error", "Traceback", "Exception ignored", "Errno"):
+        assert sign not in done.stderr
+    if command == "--version":  # printed by argparse, which goes on without an output
+        return
+    assert words in done.stderr
+    if output != "| true":  # that is the code of `true`
+        assert done.returncode == (1 if words else 0)
 
 
 @pytest.mark.slow

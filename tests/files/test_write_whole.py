@@ -76,3 +76,17 @@ def test_in_time_it_writes_or_says_why_not(tmp_path):
     assert module.write_in_time(tmp_path / "summary.json", "{}") is None
     assert (tmp_path / "summary.json").read_text() == "{}"
     assert module.write_in_time(tmp_path / "no folder" / "summary.json", "{}").startswith("No such")
+
+
+def test_an_error_names_the_file_and_not_the_temporary_one(tmp_path, monkeypatch):
+    with pytest.raises(OSError, match="No such file") as missing:
+        write_whole(tmp_path / "no folder" / "page.html", "")
+    assert missing.value.filename == str(tmp_path / "no folder" / "page.html")
+
+    def full(descriptor):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space") as unwritten:
+        write_whole(tmp_path / "page.html", "")
+    assert unwritten.value.filename == str(tmp_path / "page.html")

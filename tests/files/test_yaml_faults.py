@@ -44,14 +44,27 @@ def told(tmp_path, text):
         ("radius: 4", "did you mean `circle.radius_m`?"),
         ("max_tlt_deg: 4", "did you mean `limits.max_tilt_deg`?"),
         ("limits: {max_tilt: 4}", "did you mean `max_tilt_deg`?"),
-        ("limits: {max_tilt_deg: }", "has no value; write one behind the colon"),
+        ("limits: {max_tilt_deg: }", "has no value; write one, or take the key out"),
         ("limits: 20", "`limits` is a section: write its keys on the lines below it, indented"),
         ("limits:\n  max_tilt_deg:20\n", "each as `key: value`"),
         ("flight: {maneuvers: hover}", "is a list: write `maneuvers: [hover]`"),
+        ("flight: {maneuvers: []}", "`flight.maneuvers` has 0 values; it needs at least 1"),
+        ("safety: {fence_polygon_m: [[0, 0], [5, 0], [5]]}", "has too few values (got [5])"),
+        ("safety: {fence_polygon_m: [[0, 0, 0]]}", "_m.0` has 3 values; it takes at most 2"),
+        (
+            "recording: {directory: 5}",
+            "`recording.directory`: must name a file or a folder (got 5)",
+        ),
+        ("limits.max_tilt_deg: 20", "holds a point; write `limits: {max_tilt_deg: 20}`"),
+        ("deadman: {stale_ms: 100}", "did you mean `telemetry_stale_ms`?"),
     ],
 )
 def test_a_mistake_is_told_with_its_line_and_its_remedy(tmp_path, text, sentence):
     assert sentence in told(tmp_path, text)
+
+
+def test_what_is_no_share_of_1_is_no_percentage(tmp_path):
+    assert told(tmp_path, "flight: {takeoff_height_m: 5000}").endswith("(got 5000)")
 
 
 def test_two_faults_of_one_file_name_it_once(tmp_path):

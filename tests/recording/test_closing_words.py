@@ -9,7 +9,7 @@ from companion.config import Config
 from companion.config.flight import FlightConfig
 from companion.flight.phases import Exit, exit_phases, flight_phases, ground_phases
 from companion.recording.closing_words import Invocation, closing_words
-from companion.recording.measurements.verdict import checks, is_good
+from companion.recording.measurements.verdict import LOST_ROWS, checks, is_good
 from companion.recording.what_to_do import BY_MONITOR, BY_PHASE
 from companion.safety.table import monitors
 from companion.vehicle.registry import AUTOPILOTS
@@ -176,6 +176,15 @@ def test_a_setting_that_does_not_fit_is_told_and_tried_next():
     )
 
 
+def test_a_full_disk_is_not_blamed_on_the_configuration():
+    sentence = f"7168 {LOST_ROWS}: No space left on device"
+    told, _ = words({**GOOD, "advice": [sentence]})
+    assert told.headline == (
+        "The flight was good, as far as it could be recorded: hover, steps and circle."
+    )
+    assert (told.good, told.lines[0]) == (False, f"! {sentence}")
+
+
 def test_a_flight_that_ended_early_says_when_why_and_what_to_do():
     told, text = words({**GOOD, **ENDED})
     assert (told.good, told.flown) == (False, False)
@@ -202,12 +211,27 @@ def test_before_take_off_the_doctor_is_next(phase):
     assert BY_PHASE[phase] in text
     assert told.next_command == ".venv/bin/companion doctor --config 'my own.yaml'"
     assert words(figures)[0].next_command is None  # the bundled vehicle has no doctor
+    elsewhere = ["--arm", "--endpoint", "tcp://10.0.0.1:5760", "--set=link.target_system=2"]
+    called = MINE._replace(arguments=[*MINE.arguments, *elsewhere])
+    assert words(figures, called)[0].next_command == (
+        f"{told.next_command} --endpoint tcp://10.0.0.1:5760 --set=link.target_system=2"
+    )
+
+
+def test_a_question_keeps_its_mark():
+    figures = {**GOOD, **ENDED, "result": "no heartbeat; is the vehicle running?"}
+    assert (
+        words(figures)[0].headline
+        == "The flight ended early: no heartbeat; is the vehicle running?"
+    )
 
 
 def test_a_flight_that_the_user_interrupted_has_nothing_to_mend():
     figures = {**GOOD, **ENDED, "result": "interrupted by the user (Ctrl-C)"}
     told, text = words(figures, MINE)
     assert "nothing needs fixing" in text
+    armed = {**figures, "at_the_end": {"armed": True, "mode": None}}
+    assert words(armed)[0].lines[2].endswith("the vehicle is armed: take it over or land it")
     assert told.next_command == ".venv/bin/companion fly --config 'my own.yaml'"
 
 

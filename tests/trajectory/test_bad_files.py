@@ -82,6 +82,7 @@ def yaml_of(tmp_path, text):
         ([*rows(20), f"9,{'7' * 5000},0,0"], "x is '7+…', not a number"),
         ([*rows(20), f"9,{'x' * 9000},0,0"], "x is 'x+…', not a number"),
         ([*rows(20), "9,\0,0,0"], "not a number"),
+        ([*rows(20), "9,0,5,0,0"], "line 22: 5 values for 4 columns; write decimals with a point"),
     ],
 )
 def test_numbers_that_no_vehicle_flies_are_refused_by_line(tmp_path, lines, words):
@@ -104,6 +105,23 @@ def test_so_are_other_columns(columns, values, words):
     lines = [f"t,x,y,z,{columns}", *(f"{row},{values}" for row in rows())]
     with pytest.raises(TrajectoryError, match=f"line 2: {words}"):
         table(lines, "given")
+
+
+def test_a_column_that_is_named_twice_is_refused():
+    lines = ["t,x,y,z,x_m", *(f"{row},0" for row in rows())]
+    with pytest.raises(TrajectoryError, match="names the column x more than once"):
+        table(lines, "given")
+
+
+def test_decimal_commas_are_refused():
+    """Read as columns, `0,02,1,5` would fly another path."""
+    lines = [f"{k // 10},{k % 10},0,{k},0,0,0,0" for k in range(50)]
+    with pytest.raises(TrajectoryError, match="line 2: 8 values for 4 columns; write decimals"):
+        table(["t,x,y,z", *lines], "given")
+
+
+def test_commas_at_the_end_of_a_row_are_no_values():
+    table(["t,x,y,z", *(f"{row},," for row in rows())], "given")
 
 
 @pytest.mark.parametrize("scale", [1e-300, 0.0, 1e-9])

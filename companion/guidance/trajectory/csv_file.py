@@ -76,9 +76,10 @@ def read_csv(path: Path) -> Table:
     """Read a CSV file.
 
     Raises:
-        TrajectoryError: the file cannot be read or is too large, its header lacks a column or names
-            another unit, a value is not a number or is out of range, a quaternion has not the
-            length 1, or the duration, a time step or the number of samples is out of range.
+        TrajectoryError: the file cannot be read or is too large, its header lacks a column, names
+            one twice or names another unit, a row has too many values, a value is not a number or
+            is out of range, a quaternion has not the length 1, or the duration, a time step or the
+            number of samples is out of range.
     """
     try:
         text = read_text(path, _MOST_BYTES)
@@ -110,6 +111,7 @@ def table(lines: Iterable[str], name: str) -> Table:
     named = [column.strip().lower() for column in rows[0][1]]
     header = [without_unit(column) for column in named]
     groups = columns_of(header, named, name)
+    _require_no_more_values(rows, name)
     data = {group: _numbers(rows[1:], header, names, name) for group, names in groups.items()}
     times = data["time"][:, 0]
     lines_of = [line for line, _ in rows[1:]]
@@ -127,6 +129,24 @@ def table(lines: Iterable[str], name: str) -> Table:
         frames[0] if frames else None,
         tuple(column for column in header if column and column not in used),
     )
+
+
+def _require_no_more_values(rows: Sequence[tuple[int, Sequence[str]]], name: str) -> None:
+    """Check that no value lacks a column because a comma stands where a point should.
+
+    Published files do have values without a name in the header: as many in each row, with points.
+    """
+    columns = len(rows[0][1])
+    more = {line: len(row) for line, row in rows[1:] if any(row[columns:])}
+    as_published = len({len(row) for _, row in rows[1:]}) == 1 and any(
+        "." in cell for _, row in rows[1:] for cell in row
+    )
+    if more and not as_published:
+        line, values = next(iter(more.items()))
+        raise TrajectoryError(
+            f"{name}, line {line}: {values} values for {columns} columns; "
+            "write decimals with a point, and as many values as the header has names"
+        )
 
 
 def _numbers(

@@ -66,8 +66,8 @@ def columns_of(header: list[str], named: list[str], name: str) -> dict[str, tupl
         name: the file's name, for error messages.
 
     Raises:
-        TrajectoryError: time or position is missing, or the first line is not a header, is not
-            separated by commas, or names a unit that is not read.
+        TrajectoryError: time or position is missing, a column is named twice, or the first line is
+            not a header, is not separated by commas, or names a unit that is not read.
     """
     _require_header(named, name)
     groups = {}
@@ -79,6 +79,11 @@ def columns_of(header: list[str], named: list[str], name: str) -> dict[str, tupl
             raise TrajectoryError(f"{name}: {_missing(group, header)}")
     if "velocity" not in groups:
         groups.pop("acceleration", None)
+    for column in (column for names in groups.values() for column in names):
+        if header.count(column) > 1:
+            raise TrajectoryError(
+                f"{name}: the header names the column {column} more than once; keep one of them"
+            )
     return groups
 
 

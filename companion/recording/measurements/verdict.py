@@ -27,6 +27,10 @@ BATTERY_MARGIN = 0.10
 """By how much the charge at the end must exceed `limits.min_battery_percent`, 0..1."""
 
 
+LOST_ROWS = "rows of the flight's figures were lost"
+"""Words of the advice that says so; it blames the disk, not the configuration."""
+
+
 class Check(NamedTuple):
     """One figure and its limit.
 

@@ -1,0 +1,31 @@
+"""Slips of the stamp of a position."""
+
+from math import inf
+from random import Random
+
+
+class StampSlips:
+    """Slips of a stamp against its message by one millisecond, alternately back and forth.
+
+    Args:
+        rate_hz: slips per second, on average; 0 = none.
+        seed: seed of their times.
+    """
+
+    def __init__(self, rate_hz: float, seed: int) -> None:
+        self._rate_hz = rate_hz
+        self._random = Random(f"{seed}/stamps")
+        self._slipped = False
+        self._next_us = self._after(0.0)
+
+    def at(self, now_us: int) -> int:
+        """Return by how much the stamp is too small now, ms: 0 or 1."""
+        if now_us >= self._next_us:
+            self._slipped = not self._slipped
+            self._next_us = self._after(now_us)
+        return int(self._slipped)
+
+    def _after(self, now_us: float) -> float:
+        if not self._rate_hz:
+            return inf
+        return now_us + 1e6 * self._random.expovariate(self._rate_hz)
