@@ -16,7 +16,7 @@ from companion.guidance import (
 )
 from companion.guidance.climb_bias import ClimbBias
 from companion.guidance.motion_observer import SlopeHistory
-from companion.guidance.position_correction import PositionCorrection
+from companion.guidance.position_correction import CorrectionSettings, PositionCorrection
 from companion.guidance.reference import Horizontal
 from companion.nmpc import Vehicle
 from companion.vehicle.records import AttitudeSample, LocalPosition
@@ -74,9 +74,10 @@ class MotionEstimate:
         """The drag along the body's axes, as learned so far, at the present heading."""
         return AxisDrag(self.drag.axis_coefficient, self._heading)
 
-    def retune(self, settings: ObserverSettings) -> None:
-        """Use other settings of the observer from the next position on."""
-        self._observer.retune(settings)
+    def retune(self, observer: ObserverSettings, correction: CorrectionSettings) -> None:
+        """Use other settings of the observer and the correction from the next position on."""
+        self._observer.retune(observer)
+        self._correction.retune(correction)
 
     def note_attitude(self, sample: AttitudeSample) -> None:
         """Take an attitude, which gives the direction of the thrust."""

@@ -43,7 +43,7 @@ def analyse(
     excited: int,
     correlated: int,
 ) -> Residuals:
-    """Split a residual.
+    """Split a residual. With fewer than 8 excited samples all of it counts as noise.
 
     Args:
         residual: (m,), measured − modelled.
