@@ -88,7 +88,11 @@ class MotionEstimate:
         self._slopes.add(sample.vehicle_time, (-2.0 * ay / cosine, 2.0 * ax / cosine))
 
     def turn_to(self, turn: float) -> None:
-        """Take the sum of the heading resets, rad; a new reset discards the earlier attitudes."""
+        """Take the sum of the heading resets, rad.
+
+        A new reset rotates the disturbance and discards the earlier attitudes and the filtered
+        position correction.
+        """
         if turn != self._turn:
             self._observer.turn(turn - self._turn)
             self._slopes.forget()
@@ -98,7 +102,7 @@ class MotionEstimate:
     def note_position(self, position: LocalPosition, *, offboard_active: bool) -> None:
         """Take a measured position and velocity; a repeated one is ignored.
 
-        Drag is learned only while offboard is active, because only then the thrust is known.
+        Drag is learned only while offboard is active.
         """
         before, self._position = self._position, position
         if before is not None and position.vehicle_time == before.vehicle_time:
@@ -163,7 +167,10 @@ class MotionEstimate:
         )
 
     def vehicle_time(self, now: float, position: LocalPosition) -> float:
-        """`now` (s of event-loop time) on the vehicle's clock, s."""
+        """`now` (s of event-loop time) on the vehicle's clock, s.
+
+        Before its offset is known, `position` counts as measured when it arrived.
+        """
         offset = self._offset()
         return now + (position.vehicle_time - position.received if offset is None else offset)
 
