@@ -1,4 +1,4 @@
-"""Drag per mass: an isotropic part, and the addition of an angular body."""
+"""Drag per mass: a part that is the same in all directions, and one along the body's axes."""
 
 from math import cos, pi, sin
 from typing import NamedTuple, TypeVar

@@ -10,7 +10,7 @@ _CLONE = Path(__file__).parents[1]
 
 
 class MissingExtraError(Exception):
-    """A command needs a package that is not installed; the message says how to install it."""
+    """An optional package that is needed is not installed; the message says how to install it."""
 
 
 def require(module: str, extra: str, purpose: str) -> None:

@@ -18,12 +18,13 @@ unknowns (k,)."""
 _STEP = 1e-4
 """Step of the central differences."""
 _CONVERGED = 1e-9
-"""The search ends when a step reduces the sum of squares by less than this share."""
+"""The search ends when a step reduces the sum of squares by less than this share, or changes no
+unknown by 1e-7."""
 _MOST_STEPS = 60
 
 
 class Solution(NamedTuple):
-    """The unknowns with the smallest sum of squares.
+    """The unknowns with the smallest sum of squares that was found.
 
     Attributes:
         unknown: (k,), the nonlinear unknowns.
@@ -59,8 +60,10 @@ def project(columns: Floats, measured: Floats) -> tuple[Floats, Floats]:
 def minimise(projection: Projection, start: Floats, lowest: Floats, highest: Floats) -> Solution:
     """Minimise the sum of squares by Levenberg–Marquardt steps from `start`, within bounds.
 
+    The minimum may be a local one. The search ends after 60 steps at the latest.
+
     Args:
-        projection: eliminates the linear unknowns.
+        projection: eliminates the linear unknowns. It is called up to 1e-4 beyond the bounds, too.
         start: (k,), scaled so that a change of 1e-4 is small but has an effect.
         lowest: (k,), lower bounds.
         highest: (k,), upper bounds.

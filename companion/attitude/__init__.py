@@ -5,14 +5,14 @@
     >>> planner.rates((1.0, 0.0, 0.0, 0.0), Target(north=0.2, east=0.0, heading=0.0), dt=0.004)
     BodyRates(roll=0.0, pitch=-1.0, yaw=0.0)
 
-Nose down, towards north. Pure functions of one step: no I/O, no clock, no configuration, no arrays.
+Nose down, towards north. One step on plain floats: no I/O, no clock, no configuration, no arrays.
 World NED, body FRD; SI units and radians. Quaternions are (w, x, y, z), Hamilton product, body to
 world.
 Each name below has its own page: `help(companion.attitude.make_planner)`.
 
 Planners
     make_planner    a planner by its name, or of a law of your own
-    Planner         what each planner can do: `rates`, `reset`
+    Planner         what each planner can do: `rates`, `reset`, `note_attitude_target`
     Limits          the largest tilt, tilt rate and yaw rate
     PLANNER_NAMES   all planners; LAW_NAMES: those without memory, which `companion.batch` maps
     Law, Constants  a law of your own: a function on plain floats, and its gains and limits

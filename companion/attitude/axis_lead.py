@@ -10,7 +10,7 @@ ROLL, PITCH = 0, 1
 
 
 class AxisLead:
-    """Compensates the lag of one axis: sends ω + τ·ω̇ + σ·ω̈ for a planned rate ω.
+    """Compensates the lag of one axis: commands ω + τ·ω̇ + σ·ω̈ for a planned rate ω.
 
     The quicker axis (shorter dead time) receives older plans, so that a plan takes effect on both
     axes at the same time.

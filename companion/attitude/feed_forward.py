@@ -34,8 +34,8 @@ class FeedForward:
         frame: heading of ArduPilot's attitude target.
         tilt: responses of roll and pitch.
         yaw: response of yaw.
-        lag: lag of the slower of roll and pitch, s.
-        dead_time: dead time of the slower of roll and pitch, s.
+        lag: the larger lag of roll and pitch, s.
+        dead_time: the larger dead time of roll and pitch, s.
     """
 
     def __init__(self, constants: Constants, response: RateResponse, longest_sample: float) -> None:

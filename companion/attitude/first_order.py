@@ -22,8 +22,8 @@ def first_order(
 
     The coefficients move on a straight line to the target, at the same speed at every heading. Both
     limits, on the tilt rate and on the speed of the coefficients (equation 33), scale the whole
-    tilt rate, so the line stays straight. Beyond the recovery angle the law is faded into a
-    rotation towards level. The heading is not controlled there: it is undefined upside down.
+    tilt rate, so the line stays straight. Beyond the recovery angle the law, with its control of
+    the heading, is faded into a rotation towards level: the heading is undefined upside down.
     """
     gain, yaw_gain, _, max_yaw_rate, _, rate_weight, speed_weight, _, cos_low, slope = constants
     w, x, y, z = q

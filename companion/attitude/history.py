@@ -117,7 +117,7 @@ class PlanHistory:
     A plan for time t takes effect at t plus the dead time, which differs for tilt and heading.
 
     Args:
-        dead_time: dead time of the slower of roll and pitch, s.
+        dead_time: the larger dead time of roll and pitch, s.
         yaw_dead_time: dead time of yaw, s.
         longest_sample: longest sample period, s.
 

@@ -1,7 +1,7 @@
 """The tilt-yaw split of an attitude, and the body rates that move it (paper, equations 9 to 28).
 
 Every formula is arithmetic on plain floats, without arrays. In flight it takes well under a
-microsecond, and a batch compiles it unchanged. Most formulas need only a², a·x and a·y, and
+microsecond, and a batch compiles the same source. Most formulas need only a², a·x and a·y, and
 therefore no square root and no division.
 """
 
@@ -83,9 +83,10 @@ def rates_to_speed(
 
 
 def heading_of(a: float, w: float, z: float) -> float:
-    """Tilt-yaw heading 2·atan2(z, w) in rad, in [−π, π], equal for q and −q; a² = w² + z².
+    """Tilt-yaw heading 2·atan2(z, w) in rad, in [−π, π]; a² = w² + z², a > 0.
 
-    Computed by the half angle, so that the argument of the arctangent lies between −1 and 1.
+    It is equal for q and −q; only a half turn may be −π for one and π for the other. It is computed
+    by the half angle, so that the argument of the arctangent lies between −1 and 1.
     """
     return 4.0 * atan(z / (w + a if w >= 0.0 else w - a))
 
@@ -97,7 +98,8 @@ SMALLEST_A = 1e-12
 def share_of_law(cosine: float, cos_recovery: float, slope: float) -> float:
     """Weight of the law against the rotation to level, a smooth function of the tilt's `cosine`.
 
-    It is 1 at the recovery angle and 0 from `limits.RECOVERY_BLEND` (10°) beyond it.
+    It is 1 at the recovery angle and 0 from `limits.RECOVERY_BLEND` (10°) beyond it. Below the
+    recovery angle only the law acts, and this formula is not valid.
     """
     ratio = 1.0 + slope * (cosine - cos_recovery)
     if ratio <= 0.0:

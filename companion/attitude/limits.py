@@ -17,11 +17,12 @@ class Limits:
         max_tilt_rate: W_M, largest √(ω_x² + ω_y²), rad/s.
         max_yaw_rate: largest |ω_z|, rad/s.
         shape: form of the limit W_M. "tight" scales the tilt rate only where it would exceed W_M;
-            "paper" bounds the coefficient rate by W_M·cos(max_tilt) (equation 33), which is slower.
+            "paper" also bounds the speed of the coefficients by W_M·cos(max_tilt) (equation 33),
+            which is slower.
 
     Raises:
-        ValueError: a limit is not positive and finite, `max_tilt` is 90° or more, or the shape
-            "paper" limits the tilt rate without `max_tilt`.
+        ValueError: a limit is not positive and finite, `max_tilt` is 90° or more, the shape is
+            unknown, or the shape "paper" limits the tilt rate without `max_tilt`.
     """
 
     max_tilt: float | None = None
@@ -50,7 +51,7 @@ class Limits:
 
     @property
     def coefficient_speed(self) -> float:
-        """Largest speed of the coefficients, 1/s: W_M·cos(max_tilt) in the paper's shape (33)."""
+        """Largest speed of the coefficients, 1/s: W_M·cos(max_tilt) (33); infinite if "tight"."""
         if self.shape != "paper" or self.max_tilt is None:
             return inf
         return self.tilt_rate * cos(self.max_tilt)

@@ -43,6 +43,10 @@ class ModelFollowingPlanner:
     Args:
         constants: gains and limits.
         response: response of the vehicle's rate loop.
+
+    Attributes:
+        planned: the plan in effect at the newest sample; None before the first one and beyond the
+            recovery angle.
     """
 
     def __init__(self, constants: Constants, response: RateResponse) -> None:
@@ -85,7 +89,8 @@ class ModelFollowingPlanner:
         """Take the attitude target of ArduPilot, which takes body rates along the target's axes.
 
         Args:
-            q: attitude target; ignored if it is not a unit quaternion.
+            q: attitude target; ignored if it is not a unit quaternion or beyond the recovery angle,
+                and before the plan has begun.
             age: time from the attitude target to the newest sample, s.
         """
         if not (self._started and is_unit(q)):
@@ -102,7 +107,7 @@ class ModelFollowingPlanner:
 
         Raises:
             InvalidQuaternionError: `q` is not a unit quaternion.
-            InvalidTargetError: a value of `target` is not finite.
+            InvalidTargetError: `target` is not three or four finite numbers of usable size.
             InvalidBodyRatesError: `body_rates` are not three numbers.
         """
         constants, forward = self._constants, self._forward

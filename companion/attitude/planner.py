@@ -27,7 +27,11 @@ class Planner(Protocol):
     def rates(
         self, q: Quaternion, target: Target, dt: float, body_rates: BodyRates | None = None
     ) -> BodyRates:
-        """Body rates to send at attitude `q`, rad/s; `dt` is the sample period in s."""
+        """Body rates to send at attitude `q`, rad/s; `dt` is the sample period in s.
+
+        Raises:
+            AttitudeError: the input cannot be used; nothing is sent for this sample.
+        """
         ...
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
@@ -66,7 +70,7 @@ class LawPlanner:
 
         Raises:
             InvalidQuaternionError: `q` is not a unit quaternion.
-            InvalidTargetError: a value of `target` is not finite.
+            InvalidTargetError: `target` is not three or four finite numbers of usable size.
         """
         if target is not self._last_target:  # one target serves many samples; a tuple cannot change
             self._limited_target = limited_target(target, self.constants.longest_target)
@@ -107,7 +111,7 @@ PLANNER_NAMES = (*LAW_NAMES, MODEL_FOLLOWING)
 
 
 PlannerFactory = Callable[[Constants], Planner]
-"""A class of planners; unlike a law it may have a memory."""
+"""Makes a planner, which unlike a law may have a memory; usually its class."""
 
 
 def make_planner(
@@ -131,7 +135,8 @@ def make_planner(
             the response of the rate loop (`RateResponse`): `lag` and `dead_time`, s (default 0),
             `damping` (default None: first order), `acceleration`, rad/s² (default None: no limit),
             each also with the prefix `pitch_` or `yaw_` (default None: as roll), and `frame_lead`,
-            s. There is no `yaw_damping`.
+            s. There is no `yaw_damping`. With `pitch_lag` and no `pitch_damping`, pitch is of first
+            order.
 
     Raises:
         TypeError: the planner does not take an option.

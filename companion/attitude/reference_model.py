@@ -8,7 +8,7 @@ from companion.attitude.reference import Lag
 from companion.attitude.types import Coefficients, Target
 
 _LONGEST_REFERENCE = sin(1.4)
-"""Largest norm of the reference's coefficients; towards 1 the body rates grow without bound."""
+"""Largest norm of the coefficients at the start; towards 1 the body rates grow without bound."""
 _SMALLEST_DAMPING = 2.7
 """Smallest 4·ζ² of the model, ζ its damping."""
 _LONGEST_STEP = 0.1

@@ -1,7 +1,7 @@
 """Rotations on plain floats: products, logarithm, Euler angles, rotation at a constant body rate.
 
 As in `kinematics`, every formula is arithmetic on scalars: a flight calls it, and a batch compiles
-the same function.
+the same function. Only for `cos_and_sinc` a batch may use a series instead.
 """
 
 from math import asin, atan2, cos, pi, sin, sqrt

@@ -7,7 +7,7 @@ Quaternion = tuple[float, float, float, float]
 
 
 class TiltYaw(NamedTuple):
-    """Equation 9: an attitude as tilt ⊗ yaw = [a, x, y, 0] ⊗ [b, 0, 0, z] with a > 0."""
+    """Equation 9: an attitude as tilt ⊗ yaw = [a, x, y, 0] ⊗ [b, 0, 0, z]; a = 0 only inverted."""
 
     a: float
     b: float
@@ -45,7 +45,7 @@ class Target(NamedTuple):
 
 
 class AttitudeError(ValueError):
-    """A planner cannot use its input; no setpoint must be sent for this sample."""
+    """The input or the result cannot be used; no setpoint must be sent for this sample."""
 
 
 class InvalidQuaternionError(AttitudeError):

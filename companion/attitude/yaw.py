@@ -150,7 +150,7 @@ class TargetFrame:
         `still` is the part of `yaw` that keeps the heading still.
         """
         if self._reported_at == -inf:
-            return  # no attitude target was received: the rates are along the body's axes
+            return  # no attitude target was received, so there is no heading to advance
         self._aim += clamp(yaw - self._aim, self._acceleration * dt)
         self._time += dt
         times = self._times
@@ -165,7 +165,8 @@ class TargetFrame:
     def lead(self, heading: float, plans: PlanHistory) -> float:
         """Angle by which the target leads the body in yaw when the rates sent now take effect, rad.
 
-        It is computed from the newest attitude target, or without one from `RateResponse.lead`.
+        It is computed from the newest attitude target. If that is missing, older than `OLDEST` or
+        more than `LARGEST_LEAD` ahead, it follows from `RateResponse.lead`.
 
         Args:
             heading: heading of the body minus its predicted turn since the plans began, rad.

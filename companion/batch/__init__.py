@@ -7,10 +7,10 @@
     >>> batch.coefficients(history.q)[-1].round(4).tolist()  # after 1/p: 1 − 1/e of the way
     [[0.1264], [0.0]]
 
-Arrays are float64, component first: quaternions (4, n), targets (4, n), body rates (3, n). The
-processor then works on several vehicles in one instruction. This package contains no control law.
-With numba (extra `study`) the functions that a flight calls are compiled. Without it they are
-called for one vehicle after the other.
+Arrays are float64, component first: quaternions (4, n), targets (4, n), body rates (3, n).
+This package contains no control law. With numba (extra `study`) and from `COMPILE_FROM` steps on,
+the functions that a flight calls are compiled, and the processor works on several vehicles in one
+instruction. Otherwise they are called for one vehicle after the other.
 
     rates         body rates of many vehicles
     advance       attitudes after some samples

@@ -55,7 +55,8 @@ def rates(
         q: (4, n) attitudes w, x, y, z, body → world.
         targets: (4, n) coefficients north and east, heading in rad, heading rate in rad/s.
         dt: the sample period, s.
-        compiled: True: numba. False: Python. None: numba from `COMPILE_FROM` steps on.
+        compiled: True: numba. False: Python. None: numba, if installed, from `COMPILE_FROM` steps
+            on.
 
     Returns:
         (3, n) roll, pitch, yaw in rad/s, body FRD. The results of numba and Python differ by about
@@ -63,7 +64,7 @@ def rates(
 
     Raises:
         InvalidQuaternionError: an attitude is not a unit quaternion.
-        InvalidTargetError: a value of a target is not finite.
+        InvalidTargetError: a value of a target is not finite or far too large.
         MissingExtraError: `compiled` is True and numba is not installed.
         TypeError: the planner keeps state between samples; a batch needs one without memory.
         ValueError: the shapes of `q` and `targets` are wrong or differ.

@@ -32,9 +32,9 @@ class StepFigures(NamedTuple):
         cross_axis_max: largest distance from the line of a step.
         rate_rms: commanded √(ω_x² + ω_y²), rad/s, RMS.
         rate_max: the largest commanded √(ω_x² + ω_y²), rad/s.
-        time_constant_north: of the first-order model that fits a_N best (least squares), s; NaN if
-            there was no step north.
-        time_constant_east: the same for a_E.
+        time_constant_north: of the first-order model that fits the north coefficient best (least
+            squares), s; NaN if there was no step north.
+        time_constant_east: the same for the east coefficient.
     """
 
     model_deviation_max: float

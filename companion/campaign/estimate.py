@@ -86,5 +86,6 @@ def duration(seconds: float) -> str:
     """A time in words, rounded to two digits."""
     for unit, length in (("days", 86_400.0), ("h", 3600.0), ("min", 60.0)):
         if seconds >= 1.5 * length:
-            return f"{seconds / length:.2g} {unit}"
+            rounded = float(f"{seconds / length:.2g}")
+            return f"{rounded:.10g} {unit}"
     return f"{seconds:.2g} s"

@@ -13,13 +13,13 @@ from companion.guidance.linear import Guidance
 
 
 class CommandMaker:
-    """Asks linear or predictive control for a command; limits the tilt to what thrust can hold.
+    """Asks guidance or predictive control for a command; limits the tilt to what thrust can hold.
 
     Args:
         guidance: makes targets of references.
         flown: provides the reference.
         estimate: provides the state of the vehicle, and takes the commanded vertical thrust.
-        learning: provides the largest tilt.
+        learning: provides the largest tilt and the thrust limits.
         period: period of guidance, s.
 
     Attributes:
@@ -62,7 +62,8 @@ class CommandMaker:
     ) -> tuple[Reference, GuidanceCommand | None]:
         """The reference at `now`, and the command that follows it.
 
-        The command is None if guidance of another package returned a value that is not finite.
+        The command is None if guidance, such as that of another package, returned a value that is
+        not finite.
 
         Args:
             now: s of event-loop time.

@@ -43,7 +43,8 @@ class ControlLoop:
     the mode and sends nothing until `resume`.
 
     Attributes:
-        command: the newest command, written by guidance; None before the first.
+        command: the newest command, written by guidance; None before the first and after
+            `drop_command`.
         on: whether samples are answered at all.
         taking_over: whether offboard was requested and may become active at any moment.
         offboard_active: whether the autopilot obeys the setpoints.
@@ -99,7 +100,10 @@ class ControlLoop:
         self._limits = limits
 
     def on_sample(self, sample: AttitudeSample) -> None:
-        """Answer `sample`, or count why not. The link calls this when the datagram arrives."""
+        """Answer `sample`, or count why not. The link calls this when the datagram arrives.
+
+        In lockstep it calls this at the end of the vehicle's step.
+        """
         if not self._recorder.on:
             self._take(sample)
             return

@@ -124,7 +124,10 @@ def _largest_speed(config: Config) -> float:
 
 
 def expectations(config: Config) -> list[str]:
-    """Messages for the user: expected response, largest sensible gain, position-hold gains."""
+    """Messages for the user: expected response, largest sensible gain, position-hold gains.
+
+    For a planner of another package only the last is known.
+    """
     if config.planner_name not in PLANNER_NAMES:
         return [hold_sentence(config)]
     response = expected_response(config)

@@ -98,7 +98,8 @@ class FlownSource:
     def tracking_error(self, reference: Reference, motion: VehicleMotion) -> float | None:
         """Distance from the reference, m.
 
-        It is None without a pose, in open loop, and while the vehicle returns from open loop.
+        It is None without a pose, in open loop, while the reference drifts, and until the vehicle
+        has returned from either.
         """
         distance = dist(reference.position_ned, motion.position_ned)
         returning = self._off_reference and distance > _REJOINED

@@ -17,8 +17,8 @@ _SETTLED = 0.5
 class GroundContact:
     """Compares the landed flag (EXTENDED_SYS_STATE) with height, vertical speed and sent commands.
 
-    One wrong "on ground" in flight must not stop the motors. A vehicle whose flag and height
-    disagree counts neither as standing nor as flying.
+    One wrong "on ground" in flight must not stop the motors. While the flag says landed but height
+    or vertical speed contradict it, zero thrust counts as unsafe.
 
     Args:
         state: the vehicle's telemetry.
@@ -46,7 +46,7 @@ class GroundContact:
         self.takeoff_commanded = self._left = True
 
     def update(self) -> None:
-        """Take the newest telemetry; the watch calls this 50 times a second."""
+        """Take the newest telemetry; the watch calls this at least 50 times a second."""
         state = self._state
         if not state.landed:
             self._landed_since = None

@@ -116,7 +116,7 @@ class GuidanceLoop:
         return self.flown.braking_left(self._clock())
 
     def hold_reference(self) -> None:
-        """Hold the pose of the present reference, at which a maneuver has ended."""
+        """Hold the present reference's pose, at which a maneuver ended; raises as `hold_here`."""
         now = self._clock()
         self._recorder.action(now, "hold_reference")
         motion = self.maker.guidance_input(now).now
@@ -125,14 +125,20 @@ class GuidanceLoop:
         self.flown.pose = Pose(reference.position_ned, reference.heading)
 
     def give_up(self) -> None:
-        """Brake and hold, and fly no source any more."""
+        """Brake and hold, and fly no source any more; raises as `hold_here`."""
         now = self._clock()
         self._recorder.action(now, "give_up")
         self.bound_to_hold = True
         self.hold.begin(now, self._heading())
 
     def follow(self, source: Source) -> None:
-        """Fly `source` from the held pose; after `give_up`, keep holding."""
+        """Fly `source` from the held pose; after `give_up`, keep holding.
+
+        Without a held pose it begins where the vehicle would stop if it braked now.
+
+        Raises:
+            RuntimeError: no pose is held and no position has come yet.
+        """
         if self.bound_to_hold:
             return
         now = self._clock()
@@ -170,7 +176,7 @@ class GuidanceLoop:
         return self._loop.resets.attitude(self._q)
 
     def step(self) -> None:
-        """Make one command, unless the position is stale."""
+        """Make one command, unless the position is stale or the command would not be finite."""
         now = self._clock()
         self.before_step(now)
         position = self._fresh.at(now)

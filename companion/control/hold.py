@@ -42,6 +42,8 @@ class Hold:
     def begin(self, now: float, heading: float) -> None:
         """Brake, and hold this heading (rad) at the place where the vehicle stops.
 
+        A vehicle that already brakes for a hold goes on with it, also with its heading.
+
         Raises:
             RuntimeError: no position has come yet.
         """

@@ -49,9 +49,9 @@ def hold_weights(config: Config) -> Weights:
 
     T is the delay of the attitude behind its target (`attitude_delay`), but at least 0.275 s.
 
-    The weights 1/T⁴ and 1/T² place the poles of the hold at 1/T. A quick rate loop allows twice the
-    position weight. `tests/control/test_margins.py` checks the stability margins against errors of
-    T and of the thrust.
+    The weights 1/T⁴ and 1/T² place the three poles of the hold about 1/T from 0. A quick rate loop
+    allows twice the position weight. `tests/control/test_margins.py` checks the stability margins
+    against errors of T and of the thrust.
     """
     guidance, delay = config.guidance, _hold_delay(config)
     position, velocity = guidance.position_weight_per_s4, guidance.velocity_weight_per_s2
@@ -86,7 +86,9 @@ def _lateness(config: Config) -> float:
 
 
 def observer_quickness(config: Config) -> float:
-    """1 if the rate loop allows a quick observer of the motion, 0 if not.
+    """1 if rate loop and planner's gain allow a quick observer of the motion, 0 if not.
+
+    It is 0, too, if the bandwidth of the wind estimate is configured or the flight identifies.
 
     A quick observer follows the corrected position, so errors of the autopilot's velocity matter
     less. Its commands are less calm: on a rate loop like PX4's, body rates in hover double.
@@ -151,12 +153,16 @@ def _hold_delay(config: Config) -> float:
 
 
 def feedback_delay(config: Config) -> float:
-    """Delay of the attitude, plus the mean wait for a guidance step (half a period), s."""
+    """`InnerResponse.effective_delay` plus the mean wait for a guidance step (half a period), s."""
     return tilt_response(config).effective_delay + 0.5 / config.guidance.rate_hz
 
 
 def hold_gains(config: Config) -> ChainGains:
-    """The gains of the position hold that follow from its weights."""
+    """The gains of the position hold that follow from its weights.
+
+    Raises:
+        ValueError: no positive and finite gains follow.
+    """
     weights = _CALM if flies_identify(config) else hold_weights(config)
     return chain_gains(weights, feedback_delay(config), drag_prior(config).drag.linear)
 

@@ -12,7 +12,7 @@ _CLEAR = 1.0
 """Height above home from which there is neither ground contact nor ground effect, m."""
 
 _THRUST_STALE = 0.3
-"""Largest age of an ATTITUDE_TARGET that gives the present thrust, s; it comes at 10 Hz."""
+"""Largest age of an ATTITUDE_TARGET that gives the present thrust, s; PX4 sends it at 10 Hz."""
 
 _MISMATCH = 0.15
 """A larger relative error of the configured hover thrust is reported."""
@@ -41,7 +41,7 @@ class HoverLearning:
         return self._hover_thrust.learned
 
     def largest_tilt(self, acceleration_down: float = 0.0) -> float:
-        """Largest tilt at which full thrust still gives `acceleration_down` (m/s²), rad."""
+        """Largest tilt at which 95 % of full thrust still give `acceleration_down` (m/s²), rad."""
         return largest_tilt(GRAVITY - acceleration_down, self._hover_thrust.largest_tilted)
 
     def limit_tilt(self, target: Target, acceleration_down: float) -> Target:

@@ -121,7 +121,8 @@ def tilt_response(config: Config) -> InnerResponse:
 def slower_tilt(config: Config) -> tuple[float, float]:
     """The larger lag and the larger dead time of roll and pitch, s; 0 if unknown.
 
-    The quicker axis is delayed to match the slower one, so the coefficients respond like this.
+    `model-following` delays the axis with the shorter dead time to match the other one, so the
+    coefficients respond like this. With other planners this is the worse case of both axes.
     """
     axes = config.vehicle.axes
     tilt = axes["roll"], axes["pitch"]

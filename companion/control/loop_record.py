@@ -35,7 +35,8 @@ class Unanswered(Enum):
     def is_refusal(self) -> bool:
         """Whether the data were fresh, but no valid setpoint could be computed or sent.
 
-        Otherwise the data were stale or out of order.
+        Otherwise none was computed: sample or command was missing, stale or out of order, the mode
+        was not confirmed after a gap, or it may be another vehicle.
         """
         return self in _REFUSALS
 
@@ -93,8 +94,9 @@ class LoopRecord:
         last_vehicle_time: vehicle time of the newest usable sample, s.
         last_answer: arrival time of the newest sample that was answered.
         gap_from: `last_answer`, or inf before the first answer and after a confirmed gap.
-        gaps: when the latest gaps ended. A gap is a time longer than `Deadlines.telemetry_stale`
-            without a setpoint, while offboard is active or requested.
+        gaps: when the first answerable sample after each of the latest gaps arrived. A gap is a
+            time longer than `Deadlines.telemetry_stale` without a setpoint, while offboard is
+            active or requested.
         held: time from each setpoint to the next one, without gaps.
     """
 
@@ -137,7 +139,7 @@ class LoopRecord:
 
     @property
     def stale(self) -> int:
-        """Number of samples unanswered because sample or command was too old or out of order."""
+        """Number of samples unanswered for other reasons than `refused`; see `is_refusal`."""
         return sum(n for reason, n in self.unanswered.items() if not reason.is_refusal)
 
     @property

@@ -36,7 +36,7 @@ def make_loops(
         clock_ns: clock for latencies, ns.
 
     Raises:
-        ConfigError: a plug-in cannot be loaded.
+        ConfigError: a planner or guidance of another package cannot be loaded or made.
     """
     thrust = hover_thrust(config)
     limits, deadlines = rate_limits(config), _deadlines(config)

@@ -16,7 +16,7 @@ from companion.guidance import (
 )
 from companion.guidance.climb_bias import ClimbBias
 from companion.guidance.motion_observer import SlopeHistory
-from companion.guidance.position_correction import PositionCorrection
+from companion.guidance.position_correction import CorrectionSettings, PositionCorrection
 from companion.guidance.reference import Horizontal
 from companion.nmpc import Vehicle
 from companion.vehicle.records import AttitudeSample, LocalPosition
@@ -74,9 +74,10 @@ class MotionEstimate:
         """The drag along the body's axes, as learned so far, at the present heading."""
         return AxisDrag(self.drag.axis_coefficient, self._heading)
 
-    def retune(self, settings: ObserverSettings) -> None:
-        """Use other settings of the observer from the next position on."""
-        self._observer.retune(settings)
+    def retune(self, observer: ObserverSettings, correction: CorrectionSettings) -> None:
+        """Use other settings of the observer and the correction from the next position on."""
+        self._observer.retune(observer)
+        self._correction.retune(correction)
 
     def note_attitude(self, sample: AttitudeSample) -> None:
         """Take an attitude, which gives the direction of the thrust."""
@@ -87,7 +88,11 @@ class MotionEstimate:
         self._slopes.add(sample.vehicle_time, (-2.0 * ay / cosine, 2.0 * ax / cosine))
 
     def turn_to(self, turn: float) -> None:
-        """Take the sum of the heading resets, rad; a new reset discards the earlier attitudes."""
+        """Take the sum of the heading resets, rad.
+
+        A new reset rotates the disturbance and discards the earlier attitudes and the filtered
+        position correction.
+        """
         if turn != self._turn:
             self._observer.turn(turn - self._turn)
             self._slopes.forget()
@@ -97,7 +102,7 @@ class MotionEstimate:
     def note_position(self, position: LocalPosition, *, offboard_active: bool) -> None:
         """Take a measured position and velocity; a repeated one is ignored.
 
-        Drag is learned only while offboard is active, because only then the thrust is known.
+        Drag is learned only while offboard is active.
         """
         before, self._position = self._position, position
         if before is not None and position.vehicle_time == before.vehicle_time:
@@ -162,7 +167,10 @@ class MotionEstimate:
         )
 
     def vehicle_time(self, now: float, position: LocalPosition) -> float:
-        """`now` (s of event-loop time) on the vehicle's clock, s."""
+        """`now` (s of event-loop time) on the vehicle's clock, s.
+
+        Before its offset is known, `position` counts as measured when it arrived.
+        """
         offset = self._offset()
         return now + (position.vehicle_time - position.received if offset is None else offset)
 

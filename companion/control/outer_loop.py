@@ -42,6 +42,7 @@ def make_guidance(config: Config) -> Guidance:
 
     Raises:
         ConfigError: the guidance of another package cannot be loaded or made.
+        ValueError: the gains of the position hold cannot be computed.
     """
     settings, kind = linear_settings(config), config.guidance.kind
     if kind in GUIDANCE_NAMES:
@@ -55,7 +56,11 @@ def make_guidance(config: Config) -> Guidance:
 
 
 def linear_settings(config: Config) -> LinearSettings:
-    """Settings of guidance; `limits.max_tilt` gives its largest horizontal acceleration."""
+    """Settings of guidance; `limits.max_tilt` gives its largest horizontal acceleration.
+
+    Raises:
+        ValueError: the gains of the position hold cannot be computed.
+    """
     guidance, limits = config.guidance, config.limits
     tilt, heading, period = tilt_response(config), heading_response(config), 1.0 / guidance.rate_hz
     if not guidance.lead:
@@ -113,7 +118,8 @@ def predictive_settings(config: Config) -> Settings:
     """The settings of predictive control: response and limits of the vehicle.
 
     Raises:
-        ConfigError: the planner's response is too fast for the steps of the horizon.
+        ConfigError: the planner's response is too fast for the steps of the horizon, or gravity
+            does not lie between the smallest and the largest thrust.
     """
     limits, (min_thrust, max_thrust) = config.limits, thrust_limits(config)
     response = tilt_response(config)

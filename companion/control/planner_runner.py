@@ -17,7 +17,7 @@ _LONGEST_STEP = 0.1
 class PlannerRunner:
     """Asks the planner for body rates, in a frame without estimator resets.
 
-    During open-loop steps that is the `StepFrame`.
+    During open-loop steps, and for seconds after them, that is the `StepFrame`.
 
     Args:
         planner: the planner.

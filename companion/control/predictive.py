@@ -61,6 +61,9 @@ class Predictive:
         period: period of guidance, s.
         lockstep: whether to wait for the solver, as the vehicle waits in lockstep.
         note: called with messages for the user.
+
+    Attributes:
+        record: counters of this flight.
     """
 
     def __init__(

@@ -31,7 +31,7 @@ class RateLag:
         self._squares = _HALF_BELIEVED
 
     def mean(self, before: Vector, now: Vector, dt: float) -> Vector:
-        """The mean of the body rates between two samples `dt` s apart, rad/s."""
+        """The mean body rates between two samples `dt` s apart, corrected for the lag, rad/s."""
         ahead = self.seconds / dt
         p, q, r = before
         new_p, new_q, new_r = now

@@ -11,10 +11,11 @@ from companion.config.guidance import LINEAR
 from companion.config.in_flight import Difference, differences
 from companion.control.control_loop import ControlLoop
 from companion.control.guidance_loop import GuidanceLoop
-from companion.control.hold_settings import hold_weights, observer_settings
+from companion.control.hold_settings import correction_settings, hold_weights, observer_settings
 from companion.control.inner_loop import law_constants, rate_limits
 from companion.control.outer_loop import linear_settings
 from companion.guidance import LinearGuidance, LinearSettings, ObserverSettings
+from companion.guidance.position_correction import CorrectionSettings
 
 
 class Tuning(NamedTuple):
@@ -23,6 +24,7 @@ class Tuning(NamedTuple):
     Attributes:
         guidance: settings of linear guidance.
         observer: settings of the motion observer.
+        correction: settings of the position correction.
         constants: gains and limits of the planner.
         limits: limits of body rates that guidance commands.
         max_tilt: largest tilt in open loop, rad.
@@ -30,6 +32,7 @@ class Tuning(NamedTuple):
 
     guidance: LinearSettings
     observer: ObserverSettings
+    correction: CorrectionSettings
     constants: Constants
     limits: Limits
     max_tilt: float
@@ -44,6 +47,7 @@ def tuning(config: Config) -> Tuning:
     return Tuning(
         linear_settings(config),
         observer_settings(config),
+        correction_settings(config),
         law_constants(config),
         rate_limits(config),
         config.limits.max_tilt,
@@ -84,7 +88,7 @@ class Retuning:
             raise TypeError(f"{type(guidance).__name__} cannot be retuned")
         self._loop.retune(values.constants, values.limits)
         guidance.retune(values.guidance)
-        guidance_loop.estimate.retune(values.observer)
+        guidance_loop.estimate.retune(values.observer, values.correction)
         guidance_loop.hold.max_tilt = values.max_tilt
 
 

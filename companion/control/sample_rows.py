@@ -28,7 +28,10 @@ _NO_TARGET = Target(nan, nan, nan, nan)
 
 
 class LoopFlags(NamedTuple):
-    """The state of the control loop when a sample arrived; attributes as in `ControlLoop`."""
+    """The state of the control loop when a sample arrived; attributes as in `ControlLoop`.
+
+    `same_vehicle` is what `is_same_vehicle` returned.
+    """
 
     on: bool
     taking_over: bool

@@ -26,10 +26,10 @@ from companion.recording.mcap_file.writer import McapWriter
 
 _HALF_ROOT = sqrt(0.5)
 _KEPT = 100
-"""Number of points in a path: 20 s."""
+"""Number of points in a path: 20 s with guidance at 50 Hz."""
 _POINT_EACH, _PATHS_EACH, _BODY_EACH = 2, 5, 10
-"""The thrust is drawn every 0.1 s. Every second drawing adds a point to the paths, every fifth
-sends the paths, every tenth sends the body.
+"""With guidance at 50 Hz the thrust is drawn every 0.1 s. Every second drawing adds a point to the
+paths, every fifth sends the paths, every tenth sends the body.
 
 All are repeated, because a viewer may join late or jump in the recording.
 """
@@ -87,7 +87,7 @@ class SceneRows:
 
         Args:
             writer: writer of the file.
-            time_ns: ns since 1970.
+            time_ns: ns since 1970; in a file in vehicle time, since the vehicle's boot.
             q: attitude.
             position: position of the vehicle, m ENU.
             reference: position of the reference, m ENU.

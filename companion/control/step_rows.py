@@ -87,7 +87,7 @@ class StepEntry(NamedTuple):
 
     Attributes:
         read: its inputs.
-        made: its result; None without a fresh position or on the ground.
+        made: its result; None without a fresh position or while idle on the ground.
         command: the command for the control loop; None: no new command.
     """
 

@@ -20,7 +20,7 @@ class Telemetry(Protocol):
 
     @property
     def attitude_target_thrust(self) -> AttitudeTargetThrust | None:
-        """The newest thrust of the autopilot."""
+        """The newest thrust setpoint of the autopilot, whatever its source."""
         ...
 
     @property
@@ -57,7 +57,7 @@ class Clock(Protocol):
         ...
 
     def age(self, vehicle_time: float, now: float) -> float | None:
-        """Age at the event-loop time `now` of a message stamped with `vehicle_time`, s."""
+        """Age at the event-loop time `now` of a message stamped with `vehicle_time`, s, or None."""
         ...
 
 

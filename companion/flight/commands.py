@@ -9,7 +9,7 @@ from collections.abc import Callable, Set
 
 from companion.flight.context import FlightContext
 from companion.mavlink.commands import Command, command_name
-from companion.mavlink.errors import CommandRefused, CommandTimeout
+from companion.mavlink.errors import CommandRefused, CommandTimeout, CommandUnfinished
 from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import Role
 from companion.vehicle.link import Link
@@ -74,9 +74,10 @@ async def command_if_ours(context: FlightContext, command: Command, ours: Ours, 
     Raises:
         FlightEnded: somebody else has the vehicle, or another vehicle answers.
         CommandRefused: the autopilot refused.
-        CommandTimeout: no try was answered.
+        CommandTimeout: no try was answered, or the last one only with "in progress".
         LinkLost: the connection dropped while waiting.
     """
+    unfinished: CommandUnfinished | None = None
     for given in range(_TRIES):
         await context.fresh_heartbeat()
         context.same_vehicle.require()
@@ -86,8 +87,8 @@ async def command_if_ours(context: FlightContext, command: Command, ours: Ours, 
         try:
             await context.link.command(*command, retries=0)
             return
-        except CommandTimeout:
-            continue
+        except CommandTimeout as error:
+            unfinished = error if isinstance(error, CommandUnfinished) else None
         except CommandRefused:
             # A vehicle that has obeyed the first try refuses the second one.
             if given == 0 or not await _takes_effect(context, done):
@@ -95,6 +96,8 @@ async def command_if_ours(context: FlightContext, command: Command, ours: Ours, 
             return
     await context.fresh_heartbeat()
     if not done():
+        if unfinished:
+            raise unfinished
         name = command_name(command.command)
         raise CommandTimeout(f"{name}: no answer to {_TRIES} tries; does the uplink work?")
 

@@ -6,10 +6,10 @@ from typing import NamedTuple
 from companion.guidance.reference import Reference, Vector, VehicleMotion
 
 _DECELERATION_SHARE = 0.47
-"""Mean deceleration as a share of the largest horizontal acceleration. The largest deceleration is
-0.7 of that; the rest is left for wind and feedback."""
+"""Mean deceleration of a smooth stop as a share of the largest horizontal acceleration. The peak is
+a share of 0.7; the rest is left for wind and feedback."""
 _JERK = 8.0
-"""Largest jerk of braking, m/s³: the vehicle tilts and levels by less than 50°/s."""
+"""Largest jerk of a smooth stop, m/s³: the vehicle tilts and levels by less than 50°/s."""
 _AT_REST = 0.1
 """A slower vehicle is at rest, m/s."""
 _NOTICED = 0.1
@@ -31,8 +31,8 @@ class Assumed(NamedTuple):
 def braking_time(speed: float, acceleration: float, assumed: Assumed) -> float:
     """Time in which the vehicle brakes from a speed, s; 0 for a vehicle at rest.
 
-    It is as long as a smooth stop needs, but the vehicle stops no further than the fence's monitor
-    assumes.
+    It is as long as a smooth stop needs, but the vehicle stops no further away than the fence's
+    monitor assumes; for that it may brake harder.
 
     Args:
         speed: horizontal speed, m/s.
@@ -50,7 +50,8 @@ class Braking(NamedTuple):
     """Brakes horizontally and stays where the vehicle stops; the present height is held.
 
     A hold of the present position would let a fast vehicle pass it and swing back. The speed falls
-    by 3u² − 2u³ with u from 0 to 1, so the deceleration begins and ends with 0.
+    by the share 3u² − 2u³, where u grows from 0 to 1 over the duration, so the deceleration begins
+    and ends with 0.
 
     Attributes:
         begun_at: when the vehicle begins to brake, s.

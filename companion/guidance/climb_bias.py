@@ -1,4 +1,4 @@
-"""The error of the estimated vertical speed, as the estimated height shows it."""
+"""The error of the estimated vertical speed, found by comparison with the estimated height."""
 
 from companion.attitude.rotation import clamp
 
@@ -11,11 +11,11 @@ _LARGEST = 0.15
 
 
 class ClimbBias:
-    """Corrects the vertical speed by what the height says of it over seconds.
+    """Corrects the vertical speed so that over seconds it agrees with the change of the height.
 
     An estimator whose accelerometer is wrong while the vehicle is tilted reports a vertical speed
-    that its own height does not follow: a real PX4 0.02 to 0.04 m/s in circles at 5 to 10 m/s. A
-    height hold that believes this speed stays 0.02 to 0.03 m off.
+    that its own height does not follow. On a real PX4 the two differ by 0.02 to 0.04 m/s in circles
+    at 5 to 10 m/s, and a height hold that believes this speed stays 0.02 to 0.03 m off.
 
     Attributes:
         bias: reported speed minus true one, m/s downwards.

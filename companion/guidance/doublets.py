@@ -31,7 +31,7 @@ class _Doublet(NamedTuple):
 
     @property
     def duration(self) -> float:
-        """Duration with the rest after the doublet, s."""
+        """Duration with the rest that follows a doublet of body rates, s."""
         return 4.0 * self.step + (0.0 if self.body_rates is None else _REST)
 
     def at(self, time: float, hold: Reference) -> Reference:
@@ -70,9 +70,9 @@ class Doublets:
     """Doublets +A, −A, +A (lasting T, 2T, T) of roll, pitch and yaw rate, and of climb.
 
     Each axis is excited with half its rate, then with the full rate. The angle changes by A·T at
-    most and then returns to its value before. Position hold corrects the drift for `settle` seconds
-    before each doublet and at the end. Climbs are flown closed loop: the acceleration of the
-    reference is a doublet.
+    most and then returns to its value before. Three equal climb doublets follow. Position hold
+    corrects the drift for `settle` seconds before each doublet and at the end. Climbs are flown
+    closed loop: the acceleration of the reference is a doublet.
 
     Attributes:
         tilt_rate: A of roll and pitch, rad/s.
@@ -116,7 +116,7 @@ class Doublets:
         return *rates, *(_CLIMBS * [_Doublet(self.climb_step, climb=self.climb)])
 
     def check_times(self) -> list[float]:
-        """Times 0.01 s apart over each doublet, and the end, s."""
+        """The beginning, times 0.01 s apart over each doublet and its rest, and the end, s."""
         times, begin = [0.0], 0.0
         for part in self._doublets:
             begin += self.settle
@@ -125,7 +125,7 @@ class Doublets:
         return [*times, self.duration]
 
     def at(self, time: float, start: Pose) -> Reference:
-        """The reference: open-loop rates in a doublet, position hold between them."""
+        """The reference: open-loop rates or a climb in a doublet, position hold between them."""
         hold = Reference(start.position_ned, heading=start.heading)
         for part in self._doublets:
             time -= self.settle

@@ -97,7 +97,7 @@ class HeightGains:
 
 
 def acceleration_down(gains: HeightGains, reference: Reference, motion: VehicleMotion) -> float:
-    """The wanted acceleration downwards, m/s²."""
+    """The wanted acceleration downwards, m/s², at most half of gravity up or down."""
     wanted = reference.acceleration_ned[2]
     if reference.holds_height:
         error = reference.position_ned[2] - motion.position_ned[2]

@@ -48,7 +48,7 @@ class Breach(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Fence:
-    """A cylinder between a floor and a ceiling, with an optional polygon inside.
+    """A cylinder between a floor and a ceiling, and an optional polygon; both must be kept.
 
     Attributes:
         radius: about the place where control began, m.
@@ -71,12 +71,14 @@ class Fence:
     def breach(
         self, offset: Vector, height: float | None, origin: Place | None, margin: float = 0.0
     ) -> Breach | None:
-        """How a place breaches the fence; None: it does not.
+        """The first limit of the fence that a place breaches; None: it breaches none.
 
         Args:
             offset: position of the place relative to where control began, m NED.
-            height: height of the place above home, m; None: home is not known.
-            origin: the place where control began; None: it is not known.
+            height: height of the place above home, m; None: home is not known, and the floor is not
+                checked.
+            origin: the place where control began; None: it is not known. A fence with `places` is
+                then breached everywhere.
             margin: how far inside the fence the place must lie, m.
         """
         north, east, down = offset

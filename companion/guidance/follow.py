@@ -13,21 +13,22 @@ def hover(duration: float) -> "HeldFigure":
 
 
 def circle(radius: float, speed: float, laps: float) -> "HeldFigure":
-    """Maneuver `circle`: a circle that begins and ends at rest at the vehicle's position.
+    """Maneuver `circle`: a circle from rest at the vehicle's position; it ends at rest.
 
     Args:
         radius: m.
         speed: speed between speeding up and slowing down, m/s.
-        laps: number of laps, in which the vehicle also speeds up and slows down.
+        laps: number of laps, in which the vehicle also speeds up and slows down. If it is not
+            whole, the circle ends elsewhere.
     """
     return HeldFigure(steady_circle(radius, speed, laps, longest=inf))
 
 
 @dataclass(frozen=True, slots=True)
 class HeldFigure:
-    """A trajectory that holds its heading and is flown as configured, without slowing it down.
+    """A trajectory that holds its heading and is flown as it is: it is never slowed down.
 
-    Linear guidance always flies it, even if predictive guidance flies trajectory files (`Follow`).
+    Linear guidance always flies it, even if predictive guidance flies each `Follow`.
 
     Attributes:
         trajectory: a trajectory whose `holds_heading` is true.
@@ -83,7 +84,7 @@ class Follow:
 
     @property
     def duration(self) -> float:
-        """Duration with the turn before it, s; until the start is known, a full turn is assumed."""
+        """Duration with the turn before it, s; with the longest turn until the start is known."""
         if self._turned is not None:
             return self._turned.duration
         longest = 0.0 if self.trajectory.holds_heading else tau / self.yaw_rate
@@ -95,7 +96,11 @@ class Follow:
         return 0.0 if self._turned is None else self._turned.duration - self.trajectory.duration
 
     def check_times(self) -> list[float]:
-        """The times at which to check the trajectory, s; the turn on the spot is not checked."""
+        """The times at which to check the trajectory, s; the turn on the spot is not checked.
+
+        Raises:
+            TrajectoryError: the trajectory is too long to be checked.
+        """
         return list(self.trajectory.check_times())
 
     def at(self, time: float, start: Pose) -> Reference:

@@ -24,7 +24,8 @@ class ThrustSettings:
 
     Attributes:
         hover: normalised thrust at hover, 0..1.
-        correction_limit: largest correction of the hover thrust, as a share of it.
+        correction_limit: largest correction: the learned share of full thrust is at most
+            1 + correction_limit times that of `hover`, and at least 1/(1 + correction_limit) of it.
         correction_time: time constant with which the learned hover thrust follows a change, s.
         lowest: smallest normalised thrust that is sent, 0..1.
         highest: largest normalised thrust that is sent, 0..1.
@@ -32,7 +33,7 @@ class ThrustSettings:
         battery_exponent: exponent of `BatterySag`.
         lag: lag of the rotors, s.
         tilt_compensated: whether the autopilot divides the thrust by cos(tilt) itself.
-        drag: linear drag per mass, 1/s.
+        drag: linear drag per mass in climb and descent, 1/s.
     """
 
     hover: float

@@ -41,7 +41,11 @@ class InnerResponse:
 
     @property
     def effective_delay(self) -> float:
-        """Delay of the response behind a target that moves steadily, s."""
+        """Delay of the response as one number for the position hold: 1/gain + lag + dead time, s.
+
+        A target that moves steadily is followed with less delay: the lag does not count, and the
+        dead time only if `follows_model` is true.
+        """
         return 1.0 / self.gain + self.lag + self.dead_time
 
     def step_time(self, size: float, max_speed: float = inf) -> float:

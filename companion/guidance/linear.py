@@ -54,7 +54,7 @@ class GuidanceInput(NamedTuple):
         disturbance: horizontal acceleration due to wind and bias, m/s², NED.
         drag: drag of the vehicle.
         thrust_limits: smallest and largest specific thrust available, m/s².
-        axis_drag: difference of the drag along the body's axes.
+        axis_drag: how the drag along the body's axes differs from `drag`.
     """
 
     now: VehicleMotion
@@ -117,7 +117,8 @@ class LinearGuidance:
     """Acceleration of the reference, plus feedback of position, velocity and acceleration errors.
 
     Drag and the observed disturbance are fed forward. The result is a path of coefficients.
-    `InnerResponse.target` leads the target, so that the coefficients follow this path.
+    `InnerResponse.target` leads the target, so that the coefficients follow this path. Coefficients
+    that the reference commands open loop become the target without lead and without feedback.
     """
 
     def __init__(self, settings: LinearSettings) -> None:
@@ -138,7 +139,7 @@ class LinearGuidance:
         """One step.
 
         Args:
-            reference_at: the reference over time; it is also read a little ahead of `time`.
+            reference_at: the reference over time; it is also read shortly before and after `time`.
             time: the present time, s.
             inputs: motion, thrust and disturbance of the vehicle.
         """

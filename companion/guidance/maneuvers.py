@@ -46,8 +46,8 @@ class Steps:
     """Acceleration doublets +c, −c, +c (lasting T, 2T, T) along north, east and north-west.
 
     Before each doublet the position hold pauses, so that the attitude is at rest. With an ideal
-    response the vehicle ends where it began, at rest. Position hold corrects the remaining error
-    for `settle` seconds.
+    response and no drag the vehicle ends where it began, at rest. Position hold corrects the
+    remaining error for `settle` seconds.
 
     Attributes:
         coefficient: length of c, the sine of the tilt.
@@ -72,12 +72,12 @@ class Steps:
         return _REST + 4.0 * self.step + self.settle
 
     def check_times(self) -> list[float]:
-        """Times 0.01 s apart over each doublet, s; the settling is not checked."""
+        """Times 0.01 s apart over each doublet, s; pauses and settling are not checked."""
         begins = [which * self._period + _REST for which in range(len(self.DIRECTIONS))]
         return [time for begin in begins for time in spread(begin, begin + 4.0 * self.step)]
 
     def at(self, time: float, start: Pose) -> Reference:
-        """The reference: open-loop coefficients in a doublet, position hold between them."""
+        """The reference: a pause, open-loop coefficients in the doublet, then position hold."""
         which = min(max(int(time / self._period), 0), len(self.DIRECTIONS) - 1)
         within = time - which * self._period - _REST
         rest = Reference(start.position_ned, heading=start.heading)
@@ -97,14 +97,14 @@ class Corners:
 
     Such steps show the differences between the planners, as in the paper's figure 2; a step through
     level is straight with every planner. Before the first step the position hold pauses, so that
-    the attitude is at rest. The vehicle goes round twice, the second time mirrored. With an ideal
-    response it ends where it began, at rest. Position hold corrects the remaining error for
-    `settle` seconds.
+    the attitude is at rest. The acceleration goes round the rectangle twice, the second time
+    mirrored. With an ideal response and no drag the vehicle ends where it began, at rest. Position
+    hold corrects the remaining error for `settle` seconds.
 
     Attributes:
         north, east: absolute values of the corners' coefficients; the sine of the tilt is
             √(north² + east²). 0.4 and 0.5 give the step of the paper's figure 2.
-        step: duration of each corner, s.
+        step: duration of each corner, s; the last of the first round is that of the second, too.
         settle: time of position hold at the end, s.
     """
 
@@ -135,7 +135,7 @@ class Corners:
         return [*spread(_REST, _REST + len(self.CORNERS) * self.step), self.duration]
 
     def at(self, time: float, start: Pose) -> Reference:
-        """The reference: open-loop coefficients at the corners, then position hold."""
+        """The reference: a pause, open-loop coefficients at the corners, then position hold."""
         rest = Reference(start.position_ned, heading=start.heading)
         if time < _REST:
             return rest._replace(drifting=True)

@@ -74,7 +74,8 @@ class ObserverSettings:
 class MotionObserver:
     """A motion model driven by the measured attitude and corrected by the measured motion.
 
-    The horizontal acceleration is the sum of thrust, drag and a disturbance that changes slowly.
+    Only the horizontal motion is modelled; height and vertical speed are those measured. The
+    horizontal acceleration is the sum of thrust, drag and a disturbance that changes slowly.
     The thrust follows from the measured tilt, not the commanded one, so that the disturbance does
     not wind up when the command saturates.
 
@@ -91,11 +92,6 @@ class MotionObserver:
     def retune(self, settings: ObserverSettings) -> None:
         """Use other settings from the next measurement on; the estimate continues."""
         self._settings = settings
-
-    def reset(self) -> None:
-        """Start again: offboard control was not active, or the estimate jumped."""
-        self._motion = None
-        self.disturbance = (0.0, 0.0)
 
     def observe(
         self, time: float, measured: VehicleMotion, known: Horizontal, trust: float = 0.0
@@ -228,12 +224,10 @@ class SlopeHistory:
         extrapolated linearly.
         """
         times, sums = self._times, self._sums
-        if time >= times[-1]:
+        if time >= times[-1] or len(times) == 1:
             after = time - times[-1]
             north, east = sums[-1]
             return north + after * self.newest[0], east + after * self.newest[1]
-        if len(times) == 1:
-            return sums[0]
         later, share = between(times, time)
         (n0, e0), (n1, e1) = islice(sums, later - 1, later + 1)
         return n0 + share * (n1 - n0), e0 + share * (e1 - e0)

@@ -167,7 +167,7 @@ def _fall_distance(held: _HeldResult, size: float) -> float:
 
 
 def _level_time(tilt: float) -> float:
-    """Time that the autopilot takes to level the vehicle, s."""
+    """Time until the autopilot has levelled the vehicle, s, with a delay before it begins."""
     return _FAILSAFE_DELAY + tilt / _LEVELLING_RATE
 
 

@@ -61,6 +61,10 @@ class PositionCorrection:
         self._settings = settings
         self.reset()
 
+    def retune(self, settings: CorrectionSettings) -> None:
+        """Use other settings from the next position on; the correction continues."""
+        self._settings = settings
+
     def reset(self) -> None:
         """Start again: the estimate has jumped."""
         self._time = 0.0

@@ -23,7 +23,7 @@ class Moment(NamedTuple):
         time: time since the maneuver began, s.
         offset: position from where the maneuver began, m.
         velocity: m/s.
-        acceleration: m/s².
+        acceleration: m/s²; in open loop the acceleration by tilt, without drag.
     """
 
     time: float
@@ -63,7 +63,7 @@ class _OpenLoop:
         self._roll = self._pitch = 0.0
 
     def advance(self, moment: Moment, reference: Reference, span: float) -> Moment:
-        """Integrate `span` seconds of what `reference` commands; return `moment` so moved."""
+        """Integrate `span` s of the commands of `reference`; return `moment` with that motion."""
         (north, east), (fast_north, fast_east) = self._place, self._speed
         by_tilt = self._acceleration(reference, span)
         slowed = self._drag.deceleration((fast_north, fast_east, 0.0))

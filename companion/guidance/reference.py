@@ -13,7 +13,7 @@ GRAVITY = 9.80665
 """Standard gravity, m/s²."""
 
 LARGEST_JERK = 50.0
-"""A larger jerk between two commanded accelerations is a step, m/s³."""
+"""A commanded acceleration that changes faster counts as a step, whose jerk is unknown, m/s³."""
 
 
 class Pose(NamedTuple):
@@ -34,10 +34,11 @@ class Reference(NamedTuple):
     """What the vehicle should do at one instant; NED, m, m/s, m/s², rad.
 
     `coefficients` or `body_rates` (rad/s) command the horizontal motion open loop; position and
-    velocity then count for the height only. `thrust_steps` says that the vertical acceleration
-    jumps. `drifting` pauses the horizontal feedback: only the disturbance is compensated. Without
-    `holds_height`, the vertical acceleration is commanded as it is, and the height is not held.
-    `thrust` (0..1) replaces the thrust that guidance computes.
+    velocity then count for the height only. `body_rates` command the heading, too. `thrust_steps`
+    says that the vertical acceleration jumps. `drifting` pauses the horizontal feedback: only drag
+    and the disturbance are compensated. Without `holds_height`, the vertical acceleration is
+    commanded as it is, and the height is not held. `thrust` (0..1) replaces the thrust that
+    guidance computes.
     """
 
     position_ned: Vector
@@ -59,7 +60,7 @@ class Reference(NamedTuple):
 
     @property
     def holds_position(self) -> bool:
-        """Whether the vehicle should hold the horizontal position, not only the height."""
+        """Whether guidance corrects the horizontal position: neither open loop nor drifting."""
         return self.closed_loop and not self.drifting
 
     @property
@@ -72,7 +73,7 @@ class Reference(NamedTuple):
 
 
 ReferenceAt = Callable[[float], Reference]
-"""The reference over time, s."""
+"""The reference as a function of event-loop time, s."""
 
 
 Horizontal = tuple[float, float]

@@ -15,7 +15,7 @@ from companion.guidance.reference import (
 
 _NO_JERK = (0.0, 0.0, 0.0)
 _SHORTEST = 0.01
-"""Shortest time from which the jerk is computed, s: half a period of guidance."""
+"""Shortest time from which the jerk is computed, s: half a period of guidance at 50 Hz."""
 
 
 class Source(Protocol):
@@ -39,7 +39,7 @@ class Source(Protocol):
         ...
 
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
-        """The reference as a function of time; guidance calls this once in each period.
+        """The reference as a function of time; guidance calls this at least once in each period.
 
         Args:
             now: time of this step of guidance.
@@ -48,7 +48,7 @@ class Source(Protocol):
         ...
 
     def finished(self, now: float) -> bool:
-        """Whether the source has reached its end; its last reference stays in force."""
+        """Whether the source has reached its end; `reference` can still be called after it."""
         ...
 
 
@@ -136,7 +136,8 @@ class CommandedSource:
             reference: the reference at `now`.
             now: s of event-loop time.
             jerk_ned: derivative of the reference's acceleration, m/s³. None: it is computed from
-                the difference to the reference before; 0 for the first.
+                the difference to an earlier reference. It is 0 for the first, for one of another
+                kind and after a jump of the acceleration.
         """
         self._require_fresh(now)
         self._jerk = self._difference(reference, now) if jerk_ned is None else jerk_ned

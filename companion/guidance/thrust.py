@@ -38,7 +38,9 @@ def cos_tilt_ahead(q: Quaternion, body_rates: BodyRates, ahead: float) -> float:
 
 
 def largest_tilt(lift: float, largest: float) -> float:
-    """The largest tilt at which the thrust still gives the lift, rad; 0 if no thrust is left.
+    """The largest tilt at which `FOR_TILT` of the largest thrust still gives the lift, rad.
+
+    It is 0 if the lift needs as much or more.
 
     Args:
         lift: upward component of the specific thrust, m/s².
@@ -53,8 +55,9 @@ def height_first(wanted: Vector, smallest: float, largest: float) -> Vector:
     """Limit the acceleration to what the thrust gives, with priority for the height.
 
     If the thrust is too small, the horizontal part is shortened in its direction: the tilt shrinks
-    and the height is kept. Tilt uses at most the share `FOR_TILT` of the largest thrust. If
-    `wanted` needs less than the smallest thrust, as in a fast descent, the vertical part changes.
+    and the height is kept. Tilt uses at most the share `FOR_TILT` of the largest thrust. The
+    vertical part changes if it alone needs more than the largest thrust, or if `wanted` needs less
+    than the smallest one, as in a fast descent.
 
     Args:
         wanted: acceleration NED, m/s².
@@ -119,7 +122,7 @@ class BatterySag:
             autopilot or the speed controllers compensate the voltage.
 
     Attributes:
-        factor: thrust relative to that at V₀; 1 while the voltage is not known.
+        factor: thrust relative to that at V₀; 1 while the voltage is not known or compensated.
     """
 
     def __init__(self, exponent: float) -> None:

@@ -26,10 +26,14 @@ _NOISE_TIME = 2.0
 """Time constant with which the variance of the measurements is learned, s."""
 
 _REJECTION_TIME = 1.0
-"""Time constant of the low-pass filter on rejections, s."""
+"""Time constant of the low-pass filter that finds lasting rejections, s."""
 
 _LASTING = 0.2
-"""Filtered rejections (+1 too high, −1 too low) above this reset the variance: after 0.25 s."""
+"""If, at a rejection, the filtered value is above this, the variance is reset: after about 0.25 s.
+
+The filter's input is the squared ratio of the innovation to its gate, at most 1, with the sign of
+the innovation: +1 for a rejected one that is too high, −1 for one that is too low.
+"""
 
 
 class ThrustFilter:

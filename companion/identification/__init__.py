@@ -28,12 +28,12 @@ One axis
     RateResponse              the fit; `is_good` and `reason` say whether it may be used
     FitQuality, FitNeeds      how good a fit is, and how good it must be
     SecondOrderFit            the second-order response that fits best
-    BadFitError               raised if a fit must not be used
+    BadFitError               raised if bad fits leave an axis without values
     dead_time_by_correlation  the delay alone, by cross-correlation
 
 Thrust
     fit_thrust_map            specific thrust over thrust 0..1: a `ThrustMap`
-    ThrustMap                 slope, offset and lag
+    ThrustMap                 slope, offset, lag and dead time
 """
 
 # Without `__all__`: see `companion.attitude`.

@@ -55,8 +55,8 @@ def dead_time_by_correlation(
         damping: ζ of a lag of second order; infinite for first order.
 
     Returns:
-        The delay, s, less than 0.5; None if the commands changed too little or explain too little
-        of the measurements, or if the correlation is largest at a delay of 0 or 0.5 s.
+        The delay, s, less than 0.5; None if the record is too short, the commands changed too
+            little or explain too little, or the correlation is largest at a delay of 0 or 0.5 s.
 
     Raises:
         ValueError: a time series and its values are not one-dimensional and equally long, or the
@@ -120,7 +120,8 @@ def _filtered(
 ) -> tuple[Floats, Floats] | None:
     """Filtered commands (n + `_DELAYS`,) and measurements (n,), sampled every `_GRID` seconds.
 
-    Both end at the last measurement. None: the measurements are shorter than the filter.
+    Before filtering, both end at the last measurement. None: the measurements are shorter than the
+    filter.
     """
     first, last = part.measured_time[0], part.measured_time[-1]
     count = int((last - first) / _GRID)

@@ -35,7 +35,7 @@ class Model(Protocol):
     highest: Floats
 
     def response(self, shape: Floats, commands: Knots, at: Floats) -> Floats:
-        """(m,), response to the commands at the times `at` (m,), s, from rest."""
+        """(m,), response at the times `at` (m,), s, from the steady state of the first command."""
         ...
 
     def decay(self, shape: Floats, since: Floats) -> Floats:
@@ -116,9 +116,8 @@ class SecondOrderFit:
 DEAD_TIMES = 0.0, LONGEST_DEAD_TIME - 0.01
 """Range in which the dead time is searched, s."""
 _RAMPS = 0.01, 0.5
-"""Range in which the slew limit is searched: the time in s in which the response makes the record's
-largest change of command.
-"""
+"""Range in which the slew limit is searched, as the time (s) that the record's largest change of
+command takes at that limit."""
 _SAME_COMMAND = 0.005
 """Commands that differ by less than this share of their range count as the same."""
 
@@ -127,11 +126,13 @@ class DelayedModel:
     """A record with every n-th sample, and the response of a model to its commands.
 
     y(t) = gain·x(t − dead time) + offset + remainder of the initial state of each stretch, where x
-    is the model's exact response. Gain, offset and initial states are linear and are eliminated.
-    The unknowns are the model's shape, the dead time (s), and optionally the logarithm of the slew
-    limit.
+    is the model's exact response. Offset, initial states and a gain that is not given are linear;
+    they are eliminated. The unknowns are the model's shape, the dead time (s), and optionally the
+    logarithm of the slew limit.
 
     Attributes:
+        model: the model.
+        gain: the given gain; None: it is fitted.
         thinning: n; every n-th sample is used.
         commands: commands of each stretch, without slew limit.
         times: times of the samples of each stretch, s.

@@ -1,6 +1,7 @@
 """Fits a first-order lag with dead time to commands and measurements of any unit.
 
-Gain, offset and initial states are linear; only lag, dead time and slew limit are searched for.
+Gain, offset and initial states are linear; only lag, dead time and slew limit are searched for. A
+second-order lag is tried too, and reported if it fits clearly better.
 """
 
 from dataclasses import dataclass, replace
@@ -67,7 +68,7 @@ class LagFit:
             of the measurements' standard deviation.
         dead_time_error: standard error of the dead time by noise, s.
         lag_error: standard error of the lag by noise, s.
-        span: largest command minus smallest command.
+        span: largest command minus smallest command, after the slew limit.
         excited: number of samples at which the model differs from the command by more than 2 % of
             the span.
         second_order: second-order fit, if it is clearly better; else None.
@@ -90,7 +91,7 @@ class LagFit:
 def fit_lag(
     record: list[Stretch], gain: float | None = None, *, may_slew: bool = True
 ) -> LagFit | None:
-    """The best fit, or None if no command changed or there are fewer than 10 samples.
+    """The best fit, or None if no stretch has a changed command, or for fewer than 10 samples.
 
     Args:
         record: commands and measurements.

@@ -1,4 +1,4 @@
-"""Writes the configuration fragment of an identified vehicle from the good fits."""
+"""Writes the configuration fragment of an identified vehicle: good fits, else configured values."""
 
 from collections.abc import Mapping, Sequence
 from math import degrees
@@ -15,9 +15,9 @@ _PREFIX = {"roll": "", "pitch": "pitch_", "yaw": "yaw_"}
 _UNLIMITED = 100_000.0
 """Slew limit written for an axis that has none while roll has one, °/s²; null would mean roll's."""
 _SAME_MS = 3.0
-"""Lags and dead times of roll and pitch that differ by less count as the same, ms."""
+"""Lags and dead times of roll and pitch that differ by at most this count as the same, ms."""
 _SAME_SLEW = 0.1
-"""Slew limits of roll and pitch that differ by less than this share count as the same."""
+"""Slew limits of roll and pitch that differ by at most this share count as the same."""
 _DAMPINGS = 0.3, 10.0
 """Damping ratios that `vehicle.damping` takes."""
 
@@ -50,17 +50,18 @@ def vehicle_fragment(
     """YAML for the configuration to include, with a comment on the quality of each fit.
 
     An axis with a good fit gets its fitted values. An axis with a bad fit keeps its configured
-    values, and a comment says so. Pitch is written only if it differs from roll, a slew limit only
-    if one was found, and the hover thrust only if the thrust map is good.
+    values, and a comment says so. If roll and pitch hardly differ, their mean values are written as
+    those of roll. A slew limit is written only if there is one, or to say that the axis has none
+    while roll has one. The hover thrust is written only if the thrust map is good.
 
-    A second-order fit is written only as a comment. With it, the steps of a real PX4 at 90 °/s were
-    straighter (deviation 0.002 instead of 0.004), but those at 400 °/s less straight (0.006 instead
-    of 0.004).
+    A second-order fit is written only as a comment. With its values, the steps of a real PX4 at
+    90 °/s were straighter (deviation 0.002 instead of 0.004), but those at 400 °/s less straight
+    (0.006 instead of 0.004).
 
     Args:
         vehicle: the identified vehicle.
         gravity: gravity, m/s², which gives the hover thrust.
-        known: present configuration of each axis; axes and values may be missing.
+        known: present configuration of each axis; axes may be missing, values None.
         flight: name of the flight, written as `identified`; empty: it is not written.
 
     Raises:

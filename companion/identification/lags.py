@@ -79,9 +79,9 @@ def _values_before(commands: Knots, slew: float) -> Floats:
 
 
 def lagged(commands: Knots, lag: float, at: Floats) -> Floats:
-    """Response of a lag of `lag` > 0 s to the commands, at the times `at` (m,), s, from rest.
+    """(m,), response of a lag of `lag` > 0 s to the commands, at the times `at` (m,), s.
 
-    No time in `at` may be before the first knot.
+    It starts in the steady state of the first command. No time may be before the first knot.
     """
     return np.asarray(lagged_by(commands, lag, at), dtype=np.float64)
 
@@ -130,7 +130,7 @@ _NEARLY_CRITICAL = 1e-6
 
 
 def second_order(commands: Knots, frequency: float, damping: float, at: Floats) -> Floats:
-    """Response of a second-order lag to the commands, at the times `at`, from rest.
+    """(m,), response of a second-order lag, from the steady state of the first command.
 
     Args:
         commands: the commands; no time in `at` may be before the first knot.

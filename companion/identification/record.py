@@ -10,7 +10,8 @@ Floats = NDArray[np.float64]
 LONGEST_DEAD_TIME = 0.5
 """Longest dead time that can be found, s."""
 _LONGEST_HOLD = 0.5
-"""Longest time between two commands of a stretch, s: autopilots end offboard after 1 s."""
+"""Longest time between two commands of a stretch, s. Autopilots react to missing setpoints
+later: by default PX4 after 1 s, ArduPilot after 3 s."""
 
 _MOST_ROWS = 16_000
 """Largest number of commands and samples in a fit: half a minute of both at 250 Hz."""
@@ -67,10 +68,10 @@ def stretches(
 
 
 def most_excited(record: list[Stretch]) -> list[Stretch]:
-    """The record, or of a long one the windows in which the commands changed most.
+    """The record, or of a long one the windows in which the commands varied most.
 
-    Half an hour of flight contains no more information on the response than its most excited
-    minute. Each window keeps the commands shortly before it.
+    Half an hour of flight contains hardly more information on the response than its most excited
+    half minute. Each window keeps the commands shortly before it.
     """
     if sum(part.time.size + part.measured_time.size for part in record) <= _MOST_ROWS:
         return record

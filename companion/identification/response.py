@@ -23,9 +23,9 @@ class FitQuality:
             explain, as a share of the measurements' standard deviation.
         dead_time_error: standard error of the dead time by noise, s.
         lag_error: standard error of the lag by noise, s.
-        span: largest command minus smallest command, rad/s.
-        excited: number of samples at which the model differs from the command by at least 2 % of
-            the span; only these contain information on lag and dead time.
+        span: largest command minus smallest command after the slew limit, rad/s.
+        excited: number of samples at which the model differs from the command by more than 2 %
+            of the span; only these contain information on lag and dead time.
     """
 
     explained: float
@@ -68,7 +68,8 @@ class RateResponse:
     Attributes:
         dead_time: time from a sample to the first effect of its command, s; NaN if not found.
         lag: time constant, s; NaN if not found.
-        gain: steady rate per commanded rate; NaN if not found.
+        gain: steady rate per commanded rate; NaN if not found. It is fitted freely, also where lag
+            and dead time are for a given gain; by the second-order fit if there is one.
         slew: slew limit of the autopilot before the lag, rad/s²; None if none was found.
         fit: quality of the fit.
         second_order: second-order fit, if it is clearly better; else None.

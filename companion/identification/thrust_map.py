@@ -25,7 +25,7 @@ class ThrustMap:
         slope: m/s² per unit of normalised thrust.
         offset: m/s².
         lag: lag of the rotors, s.
-        dead_time: dead time of the rotors, s.
+        dead_time: time from a sample to the first effect of its command on the thrust, s.
         explained: R².
     """
 
@@ -66,7 +66,10 @@ class ThrustMap:
 
 
 def _excited_samples(record: list[Stretch]) -> list[Stretch]:
-    """The record without samples of steady thrust, which contain only vibration and gusts."""
+    """The record without samples of steady thrust, which contain only vibration and gusts.
+
+    A sample stays if it follows an excited command within `_LARGEST_DELAY`.
+    """
     if not record:
         return []
     thrust = np.concatenate([part.commanded for part in record])

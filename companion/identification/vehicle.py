@@ -29,7 +29,7 @@ class IdentifiedVehicle:
         roll: response of the roll rate.
         pitch: response of the pitch rate.
         yaw: response of the yaw rate.
-        thrust: the thrust map, or None if thrust never changed or was not measured.
+        thrust: the thrust map, or None if thrust hardly changed or was not measured.
     """
 
     roll: RateResponse
@@ -59,6 +59,9 @@ def identify_vehicle(setpoints: Rows, rates: Rows, specific_thrust: Rows) -> Ide
             the setpoint responds in s, roll, pitch and yaw rate in rad/s, normalised thrust.
         rates: (m, 4), vehicle time in s, measured roll, pitch and yaw rate in rad/s.
         specific_thrust: (k, 2), vehicle time in s, m/s²; may be empty.
+
+    Raises:
+        ValueError: rows have another number of columns.
     """
     commands, measured = _as_array(setpoints, 5), _as_array(rates, 4)
     accelerations = _as_array(specific_thrust, 2)

@@ -3,7 +3,7 @@
 import asyncio
 from typing import NamedTuple
 
-from companion.mavlink.errors import CommandRefused, CommandTimeout
+from companion.mavlink.errors import CommandRefused, CommandTimeout, CommandUnfinished
 from companion.mavlink.messages import Message, dialect
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.pending import Pending, PendingRegistry
@@ -84,7 +84,8 @@ class CommandClient:
 
         Raises:
             CommandRefused: The result is not ACCEPTED.
-            CommandTimeout: No final ACK came to any of the tries.
+            CommandTimeout: No final ACK came to any of the tries; it is a `CommandUnfinished` if
+                the last one was answered with "in progress".
             LinkLost: The connection dropped while waiting.
         """
         lock = self._locks.setdefault(command, asyncio.Lock())
@@ -111,13 +112,20 @@ class CommandClient:
     ) -> int:
         for confirmation in range(retries + 1):
             self._send_try(command, params, confirmation)
+            in_progress = False
             try:
                 result = await answers.next(timeout_s)
                 while result == _IN_PROGRESS:
+                    in_progress = True
                     result = await answers.next(_IN_PROGRESS_TIMEOUT_S)
             except TimeoutError:
                 continue
             return result
+        if in_progress:
+            raise CommandUnfinished(
+                f"{command_name(command)}: the autopilot said that it is in progress, and nothing "
+                f"more for {_IN_PROGRESS_TIMEOUT_S:g} s; look at its messages, and try again"
+            )
         raise CommandTimeout(
             f"{command_name(command)}: no answer after {retries + 1} tries of {timeout_s:g} s; "
             f"is system {self._settings.target_system} still there?"

@@ -49,6 +49,10 @@ class CommandTimeout(LinkTimeout):
     """No final COMMAND_ACK came for a command after all retries."""
 
 
+class CommandUnfinished(CommandTimeout):
+    """The autopilot answered that a command is in progress, and never that it is done."""
+
+
 class CommandRefused(LinkError):  # noqa: N818
     """The autopilot's final answer to a command is anything but ACCEPTED.
 

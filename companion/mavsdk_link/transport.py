@@ -89,12 +89,14 @@ class MavsdkTransport:
             endpoint does not know the vehicle's address before.
 
     Raises:
-        EndpointError: MAVSDK cannot open the endpoint; the message says why.
+        EndpointError: The endpoint cannot be parsed, or MAVSDK cannot open it; the message says
+            why.
     """
 
     reconnects = False
 
     def __init__(self, settings: LinkSettings, receive: Receive, *, speaks_first: bool) -> None:
+        url = connection_url(settings.endpoint)
         log_subscribe(lambda *_: True)  # otherwise MAVSDK logs to standard output
         component = settings.source_component % 255 + 1
         self._own = bytes((settings.source_system, component))
@@ -107,7 +109,7 @@ class MavsdkTransport:
         try:
             self._connect("raw://")
             self._mavsdk.subscribe_raw_bytes_to_be_sent(self._on_frame)
-            self._connect(connection_url(settings.endpoint))
+            self._connect(url)
         except MavsdkError as error:
             self._mavsdk.destroy()
             os.close(self._wakeup)

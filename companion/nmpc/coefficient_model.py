@@ -33,9 +33,9 @@ def coefficient_model(settings: Settings) -> Model:
 
     Limits: |c_d| ≤ sin(max_tilt), or ≤ |c| at the start if that is larger; the tilt rate of
     p·(c_d − c) is within W_M; the heading rate is within its own limit. Polygons inside the discs
-    make the constraints linear in the control, so that a single iteration from any start satisfies
-    them, and every quadratic program is feasible. The dead time is not part of the model:
-    `prediction` integrates the motion to its end.
+    make the constraints linear in the control at a given state. So the first control, which is the
+    one that is flown, satisfies them after a single iteration from any start. The dead time is not
+    part of the model: `prediction` integrates the motion to its end.
     """
     symbols = Symbols(size=11, own_constants=1)
     speed, turning = symbols.state[9:11], symbols.turning(settings)

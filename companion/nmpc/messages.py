@@ -66,8 +66,9 @@ class Request(NamedTuple):
         vehicle: state of the vehicle.
         at: time along the trajectory at `vehicle.time`, s.
         start: start of the trajectory.
-        inputs: latest control inputs, in order of time. They must cover the last dead time plus
-            lead; the first one is assumed to have been in force before.
+        inputs: latest control inputs, in order of time. They must cover the dead time before
+            `vehicle.time`; the first one is assumed to have been in force before. If there is none,
+            the attitude and the vertical speed are assumed to be held.
     """
 
     number: int
@@ -82,9 +83,10 @@ class Status(IntEnum):
 
     SOLVED = 0
     FAILED = 1
-    """The solver found no plan."""
+    """The solver found no plan, or a value is not finite."""
     TILTED_TOO_FAR = 2
-    """The tilt is larger than the models allow, or the attitude is not a unit quaternion."""
+    """The tilt is larger than the models allow, now or when the answer would take effect; or the
+    attitude is not a unit quaternion."""
 
 
 class Answer(NamedTuple):
@@ -92,13 +94,14 @@ class Answer(NamedTuple):
 
     Attributes:
         number: number of the request.
-        status: how the solve ended; unless it is `SOLVED`, the other fields mean nothing.
+        status: how the solve ended; unless it is `SOLVED`, the target, the thrust, `solving` and
+            `iterations` are 0.
         given_at: when the answer was computed, on the computer's monotonic clock, s.
         time: when to use the answer, on the clock of `Vehicle.time`, s.
         north, east: coefficients of the target.
         heading: heading of the target, rad, in (−π, π].
         thrust: specific thrust, m/s².
-        seconds: computing time, including prediction and reference, s.
+        seconds: wall time of the computation, including prediction and reference, s.
         solving: processor time of the solver alone, s.
         iterations: number of SQP iterations.
     """

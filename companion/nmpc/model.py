@@ -68,8 +68,10 @@ class Model:
         derivative: (n,), ẋ.
         aim: (k,), the values of the reference at a node to which heading and attitude rate are
             compared.
-        heading_error: heading of `state` minus that of `aim`, rad.
-        turning_error: commanded attitude rate minus that of `aim`.
+        heading_error: heading (in studies also yaw) of `state` minus that of `aim`, rad; a smooth
+            approximation in the quaternion model, 0 in a model of constant yaw.
+        turning_error: commanded attitude rate (of coefficients and heading, of the body, or of
+            Euler angles) minus that of `aim`.
         target: (4,), coefficients, tilt-yaw heading and specific thrust to send to the planner for
             `control`.
         bounded: terms that must be between −1 and 1 at every control.
@@ -118,7 +120,7 @@ def translation(
         velocity: (3,), NED, m/s.
         thrust: specific thrust, m/s².
         axis: (3,), coefficients north and east, and cos(tilt).
-        heading: heading of the body's forward axis, rad.
+        heading: tilt-yaw heading, rad, taken as that of the body's forward axis.
         constants: symbols that begin with `Conditions`.
         settings: settings, which contain gravity.
     """

@@ -1,7 +1,8 @@
 """The flight's interface to the solver's process: sends requests and takes the answers.
 
-Nothing here blocks or computes, and the solver runs in another process: a busy thread in the
-flight's process would delay the control loop by milliseconds.
+The solver runs in another process, since a busy thread in the flight's process would delay the
+control loop by milliseconds. In flight nothing here waits for it, except in lockstep, and up to
+20 ms when the process has ended.
 """
 
 import os
@@ -29,16 +30,20 @@ _LARGEST_MESSAGE = 4096
 _EXIT_TIME = 0.02
 """Time allowed for the process to exit after its socket has closed, s; it usually takes < 1 ms."""
 _TOLERANCE = 0.02
-"""Share by which an answer may exceed a limit through rounding."""
+"""Share by which an answer may exceed the tilt limit through rounding; for thrust, of gravity."""
 
 
 class Trouble(Enum):
     """Why the solver gave no usable answer."""
 
     DIED = "died"
+    """The process has ended."""
     LATE = "late"
+    """No answer came within the deadline, or before the next request."""
     FAILED = "failed"
+    """The answer says that the problem was not solved."""
     ABSURD = "absurd"
+    """The answer has a number that is not finite, or exceeds the limits of tilt or thrust."""
 
 
 Report = Callable[[Trouble, str], None]
@@ -71,7 +76,7 @@ class Solver:
         report: called for each trouble, from within the method that notices it.
 
     Attributes:
-        alive: False after the process was closed or has ended.
+        alive: False after `close`, or after the end of the process was noticed.
         pid: process id of the solver.
 
     Raises:
@@ -141,8 +146,8 @@ class Solver:
         """The answer to the last request if it has come and may be flown; it is returned once.
 
         Args:
-            wait: longest time to wait for the answer, s. With 0, as in real time, this call does
-                not block.
+            wait: longest time to wait for the answer, s; 0 in real time, where the call returns at
+                once.
         """
         until = monotonic() + wait
         while self.ready:

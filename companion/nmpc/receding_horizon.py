@@ -42,8 +42,8 @@ _NO_PLAN = Plan(False, False, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
 class RecedingHorizon:
     """Solves the optimal control problem at each request, starting from the previous plan.
 
-    The cost is the same for all models: deviations of position, velocity, heading, attitude rate
-    and thrust from the reference; see `Weights`.
+    The cost has the same weights for all models: on deviations of position, velocity, heading,
+    attitude rate and thrust from the reference; see `Weights`.
 
     Args:
         settings: vehicle, horizon and solver.
@@ -69,7 +69,8 @@ class RecedingHorizon:
         """Plan from `motion` on.
 
         Args:
-            time: time of `motion`, s; the previous plan is shifted to it.
+            time: time of `motion`, s; the previous plan is shifted to it. If it is before that
+                plan, the solve starts from the reference.
             motion: motion at the start of the horizon.
             nodes: the reference at the steps + 1 nodes.
             conditions: wind and drag.

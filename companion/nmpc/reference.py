@@ -36,12 +36,12 @@ class Node(NamedTuple):
 
 
 class Start(NamedTuple):
-    """Where a trajectory begins, and the rotation of its headings.
+    """Where a trajectory begins, and the angle added to its headings.
 
     Attributes:
         position: position where it begins, m, NED.
-        turned: angle added to its headings, rad; for a trajectory that holds its heading, this
-            heading.
+        turned: angle added to its headings, rad: the sum of the heading resets, and for a
+            trajectory that holds its heading, also this heading. Positions are not rotated.
     """
 
     position: Vector
@@ -59,7 +59,8 @@ def node_of(
 ) -> Node:
     """Attitude and thrust of a sample: differential flatness of a point mass with drag.
 
-    The rotors must provide f = a + d − w − g, with d the deceleration by drag. |f| is the specific
+    The rotors must provide f = a + d − w − g, with d the deceleration by drag; its upward part is
+    kept above a fifth of gravity. |f| is the specific
     thrust, the horizontal part of f/|f| the coefficients, and ḟ = jerk + ḋ gives their time
     derivative.
 

@@ -20,6 +20,9 @@ class Weights:
         turning: weight of the commanded attitude rate minus that of the reference, s²/rad².
         thrust: weight of the specific thrust minus that of the reference, s⁴/m².
         final: factor on the weights of position and velocity at the end of the horizon, s.
+
+    Raises:
+        ValueError: a weight is not positive and finite.
     """
 
     position: float = 20.0
@@ -53,7 +56,7 @@ class Settings:
         steps: number of steps of the horizon; the control is constant in each.
         iterations: largest number of SQP iterations per solve; 1 is the real-time iteration.
         lead: time from a request to the use of its answer, s.
-        deadline: time allowed for an answer, s.
+        deadline: time allowed for an answer, s of wall time.
         niceness: niceness of the solver's process relative to the flight's, 0 to 19.
 
     Raises:

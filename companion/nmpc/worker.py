@@ -40,8 +40,8 @@ _LARGEST_MESSAGE = 65536
 class Worker:
     """Answers requests about one trajectory.
 
-    The dead time is not part of the problem. The motion is predicted to the end of the dead time,
-    with the inputs that take effect until then, and the plan starts there.
+    The dead time is not part of the problem. The motion is predicted to the time at which the
+    answer takes effect, lead plus dead time after the given state. The plan starts there.
 
     Args:
         settings: vehicle, horizon and solver.
@@ -130,7 +130,7 @@ def _no_answer(request: Request, status: Status, use: float, seconds: float) -> 
 
 
 def main() -> None:
-    """Answer requests, one after the other, until the socket is closed."""
+    """Answer the newest request, time and again, until the socket is closed."""
     # Ctrl-C reaches this process too, but the flight handles it and then closes the socket.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     connection = socket.socket(fileno=int(sys.argv[1]))

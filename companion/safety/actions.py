@@ -6,12 +6,15 @@ from companion.attitude.within_limits import PlannerFaultError
 
 
 class Action(Enum):
-    """The actions by rising severity; the value is the word used in YAML."""
+    """The actions by rising severity; the value is the word used in messages and in YAML.
+
+    RELEASE cannot be configured.
+    """
 
     WARN = "warn"
     """Report the breach once and fly on."""
     HOLD = "hold"
-    """Give up the maneuver, brake and hold the place of the stop, still in offboard."""
+    """Give up the maneuver, brake and hold the place of the stop, still in offboard; then land."""
     HAND_BACK = "hand_back"
     """Command the autopilot to hold, and end offboard control."""
     LAND = "land"

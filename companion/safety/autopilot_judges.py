@@ -12,7 +12,7 @@ HORIZONTAL = 0x8 | 0x10
 
 
 def disarmed(snapshot: Snapshot, _: bool) -> str | None:
-    """The vehicle is disarmed although `companion` did not command it."""
+    """The vehicle is disarmed. No phase that disarms is monitored, so `companion` did not do it."""
     return None if snapshot.autopilot.armed else "the vehicle disarmed in flight"
 
 
@@ -51,7 +51,10 @@ def gps(snapshot: Snapshot, _: bool) -> str | None:
 
 
 def estimator_flags(snapshot: Snapshot, _: bool) -> str | None:
-    """The estimator's status lost flags that it had when control began, or is not received."""
+    """The estimator's status lost flags that it had when control began, or is no longer received.
+
+    Only the flags of attitude, velocity and horizontal position count.
+    """
     estimator, good = snapshot.autopilot.estimator, snapshot.good_flags
     if estimator is None:
         return None
@@ -66,7 +69,7 @@ def estimator_flags(snapshot: Snapshot, _: bool) -> str | None:
 
 
 def estimator_reset(snapshot: Snapshot, _: bool) -> str | None:
-    """The estimator was reset. References move with the estimate, so this is only a warning."""
+    """The estimator was reset within 30 s. References move with it, so this is only a warning."""
     found = snapshot.resets
     if found.recent == 0:
         return None
@@ -77,9 +80,10 @@ def estimator_reset(snapshot: Snapshot, _: bool) -> str | None:
 
 
 def estimator_resets(most: int, shift: float, turn: float) -> Judge:
-    """The estimator was reset more than `most` times, or by too much.
+    """The estimator was reset more than `most` times within 30 s, or by too much in this flight.
 
-    Too much is more than `shift` (m), more than `turn` (rad) of heading, or half as much of tilt.
+    Too much is a sum of more than `shift` (m) or more than `turn` (rad) of heading, or one jump of
+    the thrust axis by more than half of `turn`.
     """
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:

@@ -25,8 +25,8 @@ class Verdict(NamedTuple):
 class SafetyLadder:
     """Escalates to the action of the most severe breach, and never de-escalates.
 
-    The action HOLD gives up the maneuver. If the breach ends within `hold_time`, the vehicle lands.
-    Otherwise the monitor's action `then` follows.
+    The action HOLD gives up the maneuver. If all breaches with this action end within `hold_time`,
+    the vehicle lands. Otherwise the most severe action `then` of their monitors follows.
 
     Args:
         monitors: the table; among equally severe breaches the first row decides.
@@ -35,7 +35,7 @@ class SafetyLadder:
     Attributes:
         note: called with a message when an alarm is raised or ended.
         on_change: called at the same time with: whether it is raised, the name of the monitor, the
-            reason, the action.
+            reason, the action; reason and action are empty if it has ended.
         breaches: dict from the description of each breach so far to its monitor's name.
     """
 

@@ -7,8 +7,8 @@ from companion.safety.actions import Action
 from companion.safety.snapshot import Snapshot
 
 Judge = Callable[[Snapshot, bool], str | None]
-"""Returns the breach in words, or None. The flag tells whether the alarm is already raised; a judge
-with a limit then uses `released`, so that the alarm does not toggle at the limit.
+"""Returns the breach in words, or None. The flag tells whether the alarm is already raised; most
+judges with a limit then use `released`, so that the alarm does not toggle at the limit.
 """
 
 HYSTERESIS = 0.9

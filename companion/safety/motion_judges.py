@@ -1,7 +1,7 @@
 """Judges of the motion: tilt, body rates, speed, tracking error, thrust, and the fence.
 
-The judge `braking` warns before the vehicle leaves the fence. It judges where the vehicle would
-stop with the deceleration that it certainly reaches, if it still accelerates for the reaction time
+The judge `braking` acts before the vehicle leaves the fence. It judges where the vehicle would stop
+with the deceleration `safety.braking_m_s2`, if it still accelerates for the reaction time
 (`Fence.stop`).
 """
 
@@ -63,7 +63,7 @@ def tracking(limit: float) -> Judge:
 
 
 def thrust(lowest: float, highest: float) -> Judge:
-    """The thrust is at one of its limits (0..1), so the height is no longer held."""
+    """The thrust is at one of its limits (0..1), so the height may not be held any more."""
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
         sent = snapshot.motion.thrust
@@ -76,7 +76,7 @@ def thrust(lowest: float, highest: float) -> Judge:
 
 
 def outside(fence: Fence) -> Judge:
-    """The vehicle has left the fence."""
+    """The vehicle has left the fence, or a fence in latitude and longitude has no known place."""
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
         motion = snapshot.motion

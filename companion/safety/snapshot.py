@@ -25,7 +25,7 @@ class Motion(NamedTuple):
     """Motion of the vehicle, in the frame without estimator resets.
 
     Attributes:
-        q: attitude, or None.
+        q: attitude as the autopilot reports it, with estimator resets, or None.
         body_rates: rad/s.
         offset: position relative to the fence's centre, which is usually where control began, m, or
             None.
@@ -57,9 +57,8 @@ class Control(NamedTuple):
         answered: arrival of the last answered sample.
         sampled: arrival of the last attitude sample.
         reason: why the newest sample is unanswered, or None.
-        commanded: when guidance made its last command.
         placed: arrival of the last position that was newer than all before.
-        heard: arrival of the last frame of any kind from the vehicle.
+        heard: when the arrival of a frame of any kind from the vehicle was last noticed.
         position_fresh: whether the newest position is fresh.
         clock_change: jump or restart of the vehicle's clock since control began, in words, or None.
         stood_still: time for which this program did not run (a stall) since the last answer, s.
@@ -68,7 +67,6 @@ class Control(NamedTuple):
     answered: float = inf
     sampled: float = inf
     reason: Unanswered | None = None
-    commanded: float = inf
     placed: float = inf
     heard: float = inf
     position_fresh: bool = True
@@ -82,7 +80,7 @@ class Health(NamedTuple):
     Attributes:
         lost: share of the vehicle's frames that were lost.
         round_trip: round trip of TIMESYNC, s.
-        missed: share of setpoints that missed their deadline.
+        missed: share of setpoints that missed their deadline; None in lockstep.
         starved: share of the time by which the program's timer was late.
         answer_rate: effective rate of setpoints, Hz (`HeldRates`).
         gaps: number of gaps in the setpoints within the last 5 s.
@@ -103,8 +101,8 @@ class Resets(NamedTuple):
 
     Attributes:
         recent: number of resets within the last 30 s.
-        shift: sum of the position jumps, m.
-        turn: sum of the heading jumps, rad.
+        shift: length of the vector sum of the position jumps, m.
+        turn: sum of the heading jumps, with their signs, rad.
         tilt: largest jump of the thrust axis, rad.
     """
 

@@ -102,7 +102,7 @@ class SnapshotBuilder:
 
     @property
     def fence_centre(self) -> FenceCentre | None:
-        """Centre of the fence in the autopilot's frame, or None before control began."""
+        """Centre of the fence in the autopilot's frame; None before control or without position."""
         if self._start is None:
             return None
         back = minus((0.0, 0.0, 0.0), self._loop.resets.shift)
@@ -110,14 +110,15 @@ class SnapshotBuilder:
 
     @property
     def origin_ned(self) -> Vector | None:
-        """Centre of the fence in the frame without estimator resets, m NED, or None before control.
+        """Centre of the fence in the frame without estimator resets, m NED; else None.
 
-        It is where control began, unless `begin` got another centre.
+        It is known once control began with a known position. It is where control began, unless
+        `begin` got another centre.
         """
         return self._start
 
     def listen(self, now: float) -> None:
-        """Take the counters at `now`; `flight.watch` calls this 50 times a second."""
+        """Take the counters at `now`; the watch calls this at least 50 times a second."""
         stats, loop, record = self._link.stats, self._loop, self._loop.record
         if stats.frames != self._frames_heard:
             self._frames_heard, self._heard_at = stats.frames, now
@@ -143,7 +144,6 @@ class SnapshotBuilder:
         """The snapshot at `now`, s of event-loop time; call `listen` before."""
         state, loop, clock = self._link.state, self._loop, self._link.clock
         record = loop.record
-        command = loop.command
         return Snapshot(
             now,
             Autopilot(
@@ -159,7 +159,6 @@ class SnapshotBuilder:
                 record.last_answer,
                 record.last_sample,
                 record.reason,
-                -inf if command is None else command.made_at,
                 -inf if state.position is None else state.position.received,
                 self._heard_at,
                 self._guidance_loop.fresh_position() is not None,

@@ -1,6 +1,7 @@
 """The table of monitors: judge, action, and how long a breach must last.
 
-To add a monitor, write its judge beside the others (`*_judges.py`) and its row here.
+To add a monitor, write its judge beside the others (`*_judges.py`), its row here, and what to do in
+`companion.recording.what_to_do`.
 """
 
 from companion.config import Config
@@ -26,7 +27,7 @@ def monitors(config: Config) -> tuple[Monitor, ...]:
 
 
 def _fixed(config: Config) -> tuple[Monitor, ...]:
-    """Monitors whose action cannot be configured."""
+    """Monitors of silence, clock, arming, landing and failsafe; all their actions are fixed."""
     limit = config.deadman.silence_limit
     unheard = link_judges.silence(limit, heard=False)
     silence = link_judges.silence(limit, heard=True)

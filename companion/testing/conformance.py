@@ -42,8 +42,10 @@ def check_planner(planner: str | Law | type[Planner], seed: int = 0) -> None:
         seed: seed of the attitudes and targets.
 
     Raises:
-        AssertionError: it may not fly; the message gives attitude and target.
-        PluginError: there is no planner of that name.
+        AssertionError: it may not fly; the message gives the attitude or target at which it began,
+            and its target.
+        PluginError: the plug-in cannot be loaded, or two packages give it.
+        ValueError: there is no planner of that name.
     """
     if isinstance(planner, str) and planner in plugins.names(plugins.PLANNERS):
         planner = plugins.load(plugins.PLANNERS, planner)

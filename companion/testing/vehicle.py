@@ -51,8 +51,10 @@ class MockVehicle:
             `gcs_port` has no effect.
 
     Attributes:
+        autopilot: "px4" or "ardupilot".
+        settings: the whole section `mock`, with defaults.
         in_lockstep: whether `lockstep` was asked for.
-        delay_s: delay of each datagram, s.
+        delay_s: delay of each datagram, s; it has no effect in lockstep.
         setpoints: setpoints that reached the autopilot, oldest first. Clear the list to save
             memory.
         after_step: called after each step; `at` and `when` add to it.

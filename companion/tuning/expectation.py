@@ -82,7 +82,7 @@ class Expectation:
         outer: margins opened at the commanded acceleration.
         errors: tracking error and rate use.
         peak: largest position error after a gust that changes the velocity by 1 m/s at once, m.
-        settling: time until this error stays below a twentieth of its peak, s.
+        settling: time until this error stays below a twentieth of its peak, s; at most 10 s.
     """
 
     whole: Margins

@@ -89,7 +89,7 @@ def _states(
     """Responses (n, 3) of the observed position, velocity and disturbance.
 
     One array for each input: known acceleration, measured position, measured velocity. The observer
-    is z·x = (I − K·C)·(A·x + B·a) + K·y.
+    is x = (I − K·C)·(A·x/z + B·a) + K·y, where a is the mean over the past period.
     """
     # The largest trust, in motion, leaves the smallest margins.
     gains, pull = observer.gains(period, trust=1.0), observer.pull(period, trust=1.0)

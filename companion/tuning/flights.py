@@ -89,7 +89,7 @@ def flown(config: Config, course: Course, autopilot: str, seed: int = 3) -> Flow
     """Fly a course on the mock vehicle, with this configuration's gains and vehicle times.
 
     Limits of tilt and tilt rate are the configured ones: a course that needs more is slowed down.
-    Link, thrust, take-off and fence are those of the mock vehicle and the course.
+    Thrust, take-off and fence are those of the mock vehicle and the course, and nothing is signed.
 
     Args:
         config: the configuration.

@@ -58,8 +58,8 @@ class Loop:
             closed.
         rates: coefficient per commanded body rate, s.
         command: coefficient per coefficient that guidance commands, without feedback.
-        velocity: command of guidance per m/s of measured velocity.
-        position: command of guidance per m of measured position.
+        velocity: command of guidance per m/s of measured velocity, with the opposite sign.
+        position: command of guidance per m of measured position, with the opposite sign.
         drag: linear drag, 1/s.
     """
 
@@ -89,7 +89,7 @@ class Loop:
         return GRAVITY * tilt / (self.s * (self.s + self.drag)), tilt / self.rates
 
     def _tilt(self, asked: Complex) -> Complex:
-        """Closed-loop coefficient if `asked` is added to guidance's command."""
+        """Closed-loop coefficient if `asked` is subtracted from guidance's command."""
         return -self.command * asked / (1.0 + self.whole)
 
 

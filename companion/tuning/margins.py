@@ -27,13 +27,14 @@ def frequencies() -> Complex:
 
 
 class Margins(NamedTuple):
-    """Margins of one loop.
+    """Margins of one loop; infinite where its gain never crosses the limit.
 
     Attributes:
         gain_db: gain margin, the smaller of rise and fall, dB.
         phase_deg: phase margin, degrees.
         delay: delay margin, s.
-        stable: whether the closed loop is stable; the other values mean nothing if not.
+        stable: whether the closed loop is stable; if not, the other values are no margins, but say
+            how far it is from stability.
     """
 
     gain_db: float

@@ -21,7 +21,7 @@ _WHITE = 0.6
 _SEGMENT = 8.0
 """Duration of one segment of the record for a spectrum, s."""
 _LEAST_HEIGHT = 1.0
-"""Samples closer to the ground than this are left out, m."""
+"""Positions less than this above the first one of the log are left out, m."""
 _AUTOPILOTS = {autopilot.mav_autopilot for autopilot in AUTOPILOTS}
 
 
@@ -35,7 +35,7 @@ def measured_disturbances(log: Path, drag: float, usual: Disturbances) -> Distur
         log: a `.tlog` of this or another program.
         drag: linear drag of the vehicle, 1/s.
         usual: usual disturbances, which give the values that a log does not: gusts and the errors
-            on a path. They are returned unchanged if the flight is too short.
+            on a path. They are returned unchanged if the log has too little flight.
 
     Raises:
         LogError: the file cannot be read or is not a `.tlog`.

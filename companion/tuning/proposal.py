@@ -28,7 +28,8 @@ class Proposal:
         after: expectation of `tuned`.
         with_errors: margins of `tuned` if the vehicle's times differ from the identified ones.
         disturbances: disturbances of the vehicle.
-        aims: requirements that the proposal keeps.
+        aims: requirements of the search. The margins without model error are kept to within a
+            twentieth; the others may be missed a little.
     """
 
     untuned: Config
@@ -80,8 +81,8 @@ def propose(
             `companion.identification.second_order_keys`; they are proposed too.
 
     Raises:
-        ConfigError: lag and dead time are unknown, planner or guidance is not ours, or no values
-            keep the margins.
+        ConfigError: lag and dead time are unknown, the analysis does not support planner or
+            guidance, a key of `vehicle` is refused, or no values keep the margins.
     """
     if not config.vehicle.known:
         raise ConfigError(

@@ -20,13 +20,14 @@ _PENALTY = 30.0
 
 @dataclass(frozen=True, slots=True)
 class Aims:
-    """Requirements for a proposal.
+    """Requirements for a proposal; the search adds a penalty for each one that is missed.
 
     Attributes:
         gain_db: smallest gain margin, dB.
         phase_deg: smallest phase margin, degrees.
         mismatch: factor by which real lag and dead time may be larger or smaller than configured.
-        mismatch_gain_db: smallest gain margin in that case, dB.
+        mismatch_gain_db: smallest gain margin in that case, dB. While the rate loop slews, half of
+            this and of the next one must remain.
         mismatch_phase_deg: smallest phase margin in that case, degrees.
         rate_share: largest share of the rate limit that three standard deviations of the commanded
             roll and pitch rates may take.
@@ -100,7 +101,7 @@ def slewing_delay(config: Config) -> float:
 
 
 def largest_gain(config: Config) -> float:
-    """The largest sensible planner gain, as in `companion check-config`, 1/s."""
+    """The largest sensible planner gain, as in `companion check-config`, but at most 20, 1/s."""
     return min(_LARGEST.gain, sensible_gain(config))
 
 
@@ -112,7 +113,7 @@ def largest_design(config: Config) -> Design:
 
 
 def searched(config: Config, disturbances: Disturbances, aims: Aims) -> Design:
-    """The design with the smallest expected error that keeps the aims, by a pattern search.
+    """The design with the smallest cost (expected error, missed aims), by a pattern search.
 
     Args:
         config: a configuration with an identified vehicle.
@@ -145,9 +146,10 @@ def _improved(
 
 
 def _starts(config: Config) -> Iterator[Design]:
-    """Designs close to the program's rule (`hold_settings.hold_weights`), with lower gains.
+    """Designs near the program's rule (`hold_settings.hold_weights`) for a delay of any length.
 
-    The pattern search finds only the nearest minimum, therefore it has three starts.
+    Their velocity weights are lower and their observers quicker than by this rule. The pattern
+    search finds only the nearest minimum, so it has three starts.
     """
     for share, position, velocity, bandwidth in (
         (1.0, 1.0, 0.5, 2.0),
@@ -199,7 +201,7 @@ def _cost(
 
 
 def errors_to_bear(config: Config, aims: Aims) -> list[ModelError]:
-    """Errors of the vehicle's times for which the loop must stay stable."""
+    """Errors of the vehicle's times for which the loop must keep margins; see `Aims`."""
     errors = [ModelError(time_factor=each) for each in (aims.mismatch, 1.0 / aims.mismatch)]
     delay = slewing_delay(config)
     return [*errors, ModelError(delay=delay)] if delay > 0.0 else errors

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.control.hold_settings import disturbance_bandwidth, hold_weights
+from companion.control.inner_loop import LARGEST_PRODUCT, sensible_gain
 from companion.files import bounded_yaml
 from companion.tuning.expectation import Expectation
 from companion.tuning.flights import Flown
@@ -24,7 +25,8 @@ def proposal_text(
 
     Args:
         proposal: the proposal.
-        vehicle: vehicle file to include, relative to the file; or the section `vehicle` itself.
+        vehicle: vehicle file to include, relative to the file; or a mapping with the section
+            `vehicle` itself.
         flights: flights on the mock vehicle; empty if none was flown.
         where: source of the knowledge of the vehicle, for the reader.
     """
@@ -109,11 +111,13 @@ def _flight_line(name: str, before: Flown, after: Flown) -> str:
 def _reasons(proposal: Proposal) -> dict[str, str]:
     """The reason for each value."""
     untuned, tuned, design = proposal.untuned, proposal.tuned, proposal.design
-    limit, weights = largest_gain(untuned), hold_weights(untuned)
+    limit, weights = largest_gain(tuned), hold_weights(untuned)
     capped = design.gain > 0.97 * limit
     slewing = slewing_delay(tuned)
     if capped:
-        why = f"the largest sensible gain, 0.45 / (lag + dead time) = {limit:.2f}"
+        why = f"the largest sensible gain, {LARGEST_PRODUCT} / (lag + dead time) = {limit:.2f}"
+        if limit < sensible_gain(tuned):
+            why = f"the largest gain that is searched, {limit:g}"
     elif slewing:
         why = (
             f"below {limit:.1f}, the largest sensible gain, because the rate loop needs "

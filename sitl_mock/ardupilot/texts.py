@@ -6,6 +6,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.autopilot.events import Event, EventKind
 from sitl_mock.link.link import Link
+from sitl_mock.link.status_text import is_long, send_text
 
 INFO = dialect.MAV_SEVERITY_INFO
 WARNING = dialect.MAV_SEVERITY_WARNING
@@ -27,9 +28,6 @@ ARDUPILOT_EVENTS: dict[EventKind, Event] = {
     EventKind.BATTERY_CRITICAL: Event("Battery 1 is critical {}", CRITICAL),
 }
 
-_CHUNK = 50
-"""Length of STATUSTEXT.text, bytes."""
-
 
 class ArduPilotAnnouncer:
     """Sends the texts of events, and other texts, on every link with a client.
@@ -50,13 +48,8 @@ class ArduPilotAnnouncer:
 
     def say(self, text: str, severity: int) -> None:
         """Send a text; only a text of several chunks has an id (recorded)."""
-        data = text.encode()
-        chunks = [data[start : start + _CHUNK] for start in range(0, len(data), _CHUNK)]
-        if len(chunks) > 1:
+        text_id = 0
+        if is_long(text):
             self._long_texts += 1
-        text_id = self._long_texts if len(chunks) > 1 else 0
-        for link in self._links:
-            if not link.heard:
-                continue
-            for number, chunk in enumerate(chunks):
-                link.send(dialect.MAVLink_statustext_message(severity, chunk, text_id, number))
+            text_id = self._long_texts
+        send_text((link for link in self._links if link.heard), text, severity, text_id)

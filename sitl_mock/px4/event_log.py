@@ -7,8 +7,6 @@ from collections import deque
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from pymavlink.dialects.v20 import development as dialect
-
 from sitl_mock.autopilot.events import EventKind
 from sitl_mock.autopilot.personality import Personality
 from sitl_mock.autopilot.state import State
@@ -20,6 +18,7 @@ from sitl_mock.link.event_messages import (
 )
 from sitl_mock.link.framing import Message
 from sitl_mock.link.link import Link
+from sitl_mock.link.status_text import send_text
 
 _KEPT = 20
 """Number of events that can be requested again."""
@@ -29,8 +28,6 @@ _RESET = 1
 """MAV_EVENT_CURRENT_SEQUENCE_FLAGS: the sequence restarts; set before the first event."""
 _UNAVAILABLE = 0
 """Value of MAV_EVENT_ERROR_REASON: the event is not available."""
-_CHUNK = 50
-"""Length of STATUSTEXT.text, bytes."""
 
 
 class _Sent(NamedTuple):
@@ -149,14 +146,6 @@ class Announcer:
         self._send_text(event.text.format(detail), event.severity)
 
     def _send_text(self, text: str, severity: int) -> None:
-        """Send a text, in chunks if it is long, on links with a ground station."""
-        data = text.encode()
-        chunks = [data[start : start + _CHUNK] for start in range(0, len(data), _CHUNK)]
-        for link in self._links:
-            if not link.gcs_heard:
-                continue
-            for number, chunk in enumerate(chunks):
-                link.send(
-                    dialect.MAVLink_statustext_message(severity, chunk, self._text_id, number)
-                )
+        """Send a text on links with a ground station."""
+        send_text((link for link in self._links if link.gcs_heard), text, severity, self._text_id)
         self._text_id = (self._text_id + 1) & 0xFFFF

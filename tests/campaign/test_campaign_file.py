@@ -7,6 +7,7 @@ import pytest
 
 from companion.campaign import estimate, folder, loading
 from companion.campaign.design import samples_of, seed_of, too_few_samples
+from companion.campaign.estimate import duration
 from companion.campaign.swept import Swept
 from companion.cli.main import main
 from companion.files import bounded_yaml
@@ -207,3 +208,11 @@ def test_a_configuration_that_is_none_is_refused_in_words(tmp_path):
     assert "`config`: must name a file, or hold the keys of a configuration" in refusal(
         tmp_path, config=5
     )
+
+
+@pytest.mark.parametrize(
+    ("seconds", "told"),
+    [(3.14, "3.1 s"), (100.0, "1.7 min"), (123_456.0, "34 h"), (8_640_000.0, "100 days")],
+)
+def test_a_time_is_told_in_the_largest_unit_that_fits(seconds, told):
+    assert duration(seconds) == told

@@ -73,7 +73,7 @@ def retuned(values):
     guidance = LinearGuidance(linear_settings(CONFIG))
     guidance_loop = SimpleNamespace(
         maker=SimpleNamespace(guidance=guidance),
-        estimate=SimpleNamespace(retune=lambda settings: seen.update(observer=settings)),
+        estimate=SimpleNamespace(retune=lambda *settings: seen.update(estimate=settings)),
         hold=SimpleNamespace(),
     )
     loop = SimpleNamespace(retune=lambda *law: seen.update(law=law))
@@ -86,7 +86,7 @@ def test_a_change_of_values_reaches_both_loops():
     values = tuning(CONFIG.model_copy(update={"limits": limits}))
     assert retuned(values) == {
         "law": (values.constants, values.limits),
-        "observer": values.observer,
+        "estimate": (values.observer, values.correction),
         "guidance": values.guidance,
         "max_tilt": pytest.approx(radians(20.0)),
     }
@@ -277,7 +277,7 @@ class Observer:
 
 def estimate(observer=None, **drag):
     resets = []
-    correction = SimpleNamespace(reset=lambda: resets.append(1))
+    correction = SimpleNamespace(reset=lambda: resets.append(1), retune=resets.append)
     made = MotionEstimate(observer or Observer(), correction, SimpleNamespace(**drag))
     return made, resets
 
@@ -287,8 +287,8 @@ def test_only_a_new_reset_of_the_heading_turns_the_estimate():
     for turn in (0.0, 0.5, 0.5, 0.25):
         made.turn_to(turn)
     assert (observer.turns, len(resets)) == ([0.5, -0.25], 2)
-    made.retune("settings")
-    assert observer.settings == ["settings"]
+    made.retune("settings", "of the correction")
+    assert (observer.settings, resets[2:]) == (["settings"], ["of the correction"])
 
 
 def test_predictive_control_gets_the_newest_attitude_and_the_estimated_wind():

@@ -9,7 +9,7 @@ import pytest
 
 from companion.flight.commands import change_mode, command_if_ours, in_roles
 from companion.mavlink.commands import Command
-from companion.mavlink.errors import CommandRefused, CommandTimeout
+from companion.mavlink.errors import CommandRefused, CommandTimeout, CommandUnfinished
 from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import Role
 
@@ -106,6 +106,13 @@ def test_a_refusal_is_one():
 def test_it_is_given_four_times_at_most():
     vehicle = Vehicle(*[(LOST, Role.OFFBOARD)] * 9)
     with pytest.raises(CommandTimeout, match="no answer to 4 tries"):
+        run(vehicle)
+    assert vehicle.sent == 4
+
+
+def test_a_command_that_stays_in_progress_is_told_so():
+    vehicle = Vehicle(*[(CommandUnfinished("in progress"), Role.OFFBOARD)] * 9)
+    with pytest.raises(CommandUnfinished, match="in progress"):
         run(vehicle)
     assert vehicle.sent == 4
 

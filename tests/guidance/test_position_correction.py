@@ -61,6 +61,19 @@ def test_a_known_lateness_is_made_up_for():
     assert after <= 0.015
 
 
+def test_other_settings_count_from_the_next_position_on():
+    late = CorrectionSettings(0.7, 0.1, 0.2, lateness=0.02)
+    retuned, kept = PositionCorrection(SETTINGS), PositionCorrection(SETTINGS)
+    rows = wandering(6.0)
+    for time, _, measured in rows[:200]:
+        assert retuned.corrected(time, measured) == kept.corrected(time, measured)
+    retuned.retune(late)
+    for time, _, measured in rows[200:]:
+        (north, east, down), velocity = kept.corrected(time, measured)
+        later = (north + late.lateness * velocity[0], east, down)
+        assert retuned.corrected(time, measured).position_ned == pytest.approx(later)
+
+
 def test_at_rest_nothing_changes():
     correction = PositionCorrection(CorrectionSettings(0.7, 0.1, 0.2, lateness=0.05))
     rest = VehicleMotion((3.0, -2.0, -5.0), (0.0, 0.0, 0.0))

@@ -54,6 +54,14 @@ def test_a_clock_that_goes_back_starts_it_anew():
     assert history.mean(0.2, 0.3) == pytest.approx((0.2, 0.0))
 
 
+def test_after_a_heading_jump_one_attitude_counts_for_the_time_before_it():
+    history = fed(slope=lambda _: (0.5, 0.5))
+    history.forget()
+    history.add(1.2, (0.1, -0.2))
+    assert history.mean(1.1, 1.3) == pytest.approx((0.1, -0.2))
+    assert history.mean(1.0, 1.1) == pytest.approx((0.1, -0.2))
+
+
 def test_it_keeps_the_newest_only():
     history = fed(seconds=60.0, slope=lambda t: (t, 0.0))
     assert history.mean(59.5, 60.0)[0] == pytest.approx(59.75)

@@ -274,5 +274,5 @@ def test_without_the_extra_one_sentence_says_what_to_install(monkeypatch):
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name: None if name == "casadi" else found(name)
     )
-    with pytest.raises(MissingExtraError, match=r"pip install 'mavlink-companion\[nmpc\]'"):
+    with pytest.raises(MissingExtraError, match=r"-m pip install .*\[nmpc\]'"):
         Flight()

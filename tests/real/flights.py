@@ -24,8 +24,8 @@ SIMULATION = {
 
 ESTIMATORS = {
     "px4": {},
-    # Its simulated GPS is later than its estimator takes it to be: fitted to the truth of five
-    # flights. It belongs to this simulator, so the configuration that ships says 0.
+    # Its simulated GPS is later than its estimator takes it to be: fitted to the truth of circles
+    # and figure-eights. It belongs to this simulator, so the configuration that ships says 0.
     "ardupilot": {"guidance": {"position_lateness_ms": 20.0}},
 }
 """What is told of an autopilot's estimator in its simulation."""

@@ -49,7 +49,7 @@ class Flight:
             on_counter=lambda *seen: self.counted.append(seen),
         )
         self.record = LoopRecord(thrust=0.45)
-        command = SimpleNamespace(made_at=9.5, idle=False)
+        command = SimpleNamespace(idle=False)
         self.loop = SimpleNamespace(resets=self.resets, record=self.record, command=command)
         self.course = SimpleNamespace(position_ned=(5.0, -6.0, -7.0), velocity=(1.0, 2.0, 0.5))
         self.guidance = SimpleNamespace(
@@ -116,7 +116,7 @@ def test_motion_is_seen_from_where_control_began(flight):
     )
 
 
-@pytest.mark.parametrize("command", [None, SimpleNamespace(made_at=9.5, idle=True)])
+@pytest.mark.parametrize("command", [None, SimpleNamespace(idle=True)])
 def test_what_is_not_known_is_none(command):
     flight = Flight()
     flight.guidance.motion = None
@@ -128,7 +128,6 @@ def test_what_is_not_known_is_none(command):
     flight.guidance.fresh_position = lambda: None
     told = flight.snapshot()
     assert told.motion == Motion(height=12.5, off_course=0.9)
-    assert told.control.commanded == (-inf if command is None else 9.5)
     assert (told.control.placed, told.control.position_fresh) == (-inf, False)
     flight.guidance.motion = Motions((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
     assert flight.snapshot().motion[2:4] == (None, (4.0, 5.0, 6.0))
@@ -162,7 +161,7 @@ def test_every_stage_of_a_samples_way_has_its_time(flight):
     flight.listen(10.04)
     flight.listen(10.24)  # late by 0.17 s
     told = flight.snapshot(10.3).control
-    assert told[:6] == (9.9, 9.95, Unanswered.LATE, 9.5, 9.75, 10.02)
+    assert told[:5] == (9.9, 9.95, Unanswered.LATE, 9.75, 10.02)
     assert (told.position_fresh, told.clock_change) == (True, None)
     assert told.stood_still == pytest.approx(0.17)
     flight.clock.changes = 3

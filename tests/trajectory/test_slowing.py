@@ -23,6 +23,7 @@ from companion.guidance.trajectory import (
     evenly_slowed,
     from_samples,
     gerono_eight,
+    helix,
     line,
     slow_down,
     violations,
@@ -203,6 +204,17 @@ def test_what_is_too_long_is_slowed_evenly_and_says_so():
     assert violations(found.trajectory, ENVELOPE) == ()
     (note,) = slowing(laps, found)
     assert "because it is too long to be slowed down in parts; most by limits." in note
+
+
+def test_an_even_slowing_names_the_limit_that_asks_for_most():
+    climbing = helix(5.0, 3.0, Laps(5.0, 110.0))
+    envelope = Envelope(max_climb=0.1, max_speed=4.5)
+    (whole,) = slow_down(climbing, envelope).parts
+    assert whole.limit == "limits.max_climb_m_s"
+    slower = evenly_slowed(climbing, 0.99 * whole.factor)
+    (broken,) = violations(slower, envelope)
+    assert broken.limit == whole.limit
+    assert whole.time == pytest.approx(broken.time, rel=0.02)
 
 
 def test_what_slowness_does_not_mend_is_told_at_its_own_time():

@@ -56,6 +56,7 @@ def test_a_rate_loop_of_second_order_is_proposed_too_and_keeps_the_margins():
     assert stability(proposal.tuned, ModelError(time_factor=1.3)).stable
     text = proposal_text(proposal, Path("vehicle.yaml"), {}, "a flight")
     assert "second order" in text
+    assert f"{largest_gain(proposal.tuned):.2f}" in text  # not that of the configured times
     assert yaml.safe_load(text)["vehicle"] == nearer
     whole = proposal_text(proposal, {"vehicle": {"lag_ms": 74.0}}, {}, "a flight")
     assert yaml.safe_load(whole)["vehicle"] == {"lag_ms": 74.0}

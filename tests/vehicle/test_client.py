@@ -11,6 +11,7 @@ from companion.mavlink.commands import command_name, result_name
 from companion.mavlink.errors import (
     CommandRefused,
     CommandTimeout,
+    CommandUnfinished,
     LinkLost,
     LinkTimeout,
     ParameterRefused,
@@ -107,6 +108,19 @@ def test_in_progress_is_waited_for_and_not_repeated(run):
             vehicle.send(ack(ARM, 0))
             await task
             assert len(vehicle.of("COMMAND_LONG")) == 1
+
+    run(scene())
+
+
+def test_a_command_that_stays_in_progress_is_no_silence(run, monkeypatch):
+    monkeypatch.setattr("companion.mavlink.commands._IN_PROGRESS_TIMEOUT_S", 0.02)
+
+    async def scene():
+        async with linked() as (link, vehicle):
+            vehicle.answers["COMMAND_LONG"] = lambda message: [ack(message.command, 5)]
+            with pytest.raises(CommandUnfinished, match=r"ARM_DISARM: .* in progress, and nothing"):
+                await link.command(ARM, timeout_s=0.02, retries=1)
+            assert len(vehicle.of("COMMAND_LONG")) == 2
 
     run(scene())
 

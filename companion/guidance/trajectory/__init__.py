@@ -46,7 +46,8 @@ Checked
     Motion, judge    the same for a motion given as arrays
     turned_first     a turn on the spot before a trajectory that begins with a heading
     computable       turns numerical errors into a `TrajectoryError`
-    LONGEST, FARTHEST, FASTEST  bounds of every trajectory: s, m, m/s
+    LONGEST          longest duration that is checked, s
+    FARTHEST, FASTEST  bounds of coordinates and speeds in files, m and m/s
 """
 
 # Without `__all__`: with it, help() prints the methods of every tuple. A name imported as itself is

@@ -61,7 +61,7 @@ class Table:
         derivatives: velocity in m/s, then acceleration in m/s², (m, 3) each, if the file has them.
         yaw: tilt-yaw heading (m,), rad, unwrapped; None if the file has neither yaw nor quaternion.
         frame: the frame that the comment before the header names; None without such a comment.
-        unused: names of the columns that are not read.
+        unused: names of the columns that are not read, in lower case and without their units.
     """
 
     times: Floats
@@ -76,9 +76,10 @@ def read_csv(path: Path) -> Table:
     """Read a CSV file.
 
     Raises:
-        TrajectoryError: the file cannot be read or is too large, a column is missing or named
-            twice, a row has too many values, a value is not a number or is out of range,
-            or a time step or the number of samples is out of range.
+        TrajectoryError: the file cannot be read or is too large, its header lacks a column, names
+            one twice or names another unit, a row has too many values, a value is not a number or
+            is out of range, a quaternion has not the length 1, or the duration, a time step or the
+            number of samples is out of range.
     """
     try:
         text = read_text(path, _MOST_BYTES)
@@ -90,14 +91,16 @@ def read_csv(path: Path) -> Table:
 
 
 def table(lines: Iterable[str], name: str) -> Table:
-    """Parse lines of text; the first line is the header.
+    """Parse lines of text; the first one that is neither empty nor a comment is the header.
 
     Args:
-        lines: the text. Empty lines and lines that begin with # are skipped.
+        lines: the text. Empty lines are skipped, and so are lines that begin with #, except that a
+            frame before the header is read from them.
         name: the file's name, for error messages.
 
     Raises:
         TrajectoryError: the table is wrong; see `read_csv`.
+        csv.Error: the text is not CSV.
     """
     frames: list[str] = []
     rows = list(itertools.islice(rows_of(csv.reader(lines), frames), _MOST + 2))
@@ -172,7 +175,7 @@ def _numbers(
 
 
 def _require_steps(times: Floats, lines: Sequence[int], name: str) -> None:
-    """Check that each step in time is within `_LEAST_STEP` and `_LONGEST_STEP`."""
+    """Check each step in time (`_LEAST_STEP` to `_LONGEST_STEP`) and the duration."""
     steps = np.diff(times)
     wrong = np.flatnonzero(~((steps >= 0.999 * _LEAST_STEP) & (steps <= _LONGEST_STEP)))
     if wrong.size:

@@ -62,12 +62,12 @@ def columns_of(header: list[str], named: list[str], name: str) -> dict[str, tupl
 
     Args:
         header: names of the columns, without their units.
-        named: names of the columns as the file spells them.
+        named: names of the columns with their units, in lower case.
         name: the file's name, for error messages.
 
     Raises:
         TrajectoryError: time or position is missing, a column is named twice, or the first line is
-            not a header.
+            not a header, is not separated by commas, or names a unit that is not read.
     """
     _require_header(named, name)
     groups = {}

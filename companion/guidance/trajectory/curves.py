@@ -68,7 +68,11 @@ class Curve(Protocol):
         ...
 
     def sampling(self) -> PhaseSampling:
-        """The phases at which to check it."""
+        """The phases at which to check it.
+
+        Raises:
+            TrajectoryError: it takes too many checks.
+        """
         ...
 
 

@@ -1,4 +1,4 @@
-"""What a trajectory demands of the vehicle: tilt, rates and thrust."""
+"""What a trajectory demands of the vehicle: tilt, tilt rate and thrust."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -84,7 +84,7 @@ class Demand:
 
 
 def demand(motion: Motion, drag: Drag, gravity: float) -> Demand:
-    """Thrust, tilt and rates that a motion needs.
+    """Thrust, tilt and tilt rate that a motion needs.
 
     Args:
         motion: motion in still air.

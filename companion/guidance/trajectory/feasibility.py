@@ -29,7 +29,7 @@ class Violation(NamedTuple):
         time: time when it is broken most, s.
         text: the message for the user.
         remedy: what to do about it, as the end of a sentence.
-        slowing_helps: whether the trajectory keeps the limit if it is flown slowly enough.
+        slowing_helps: whether it makes sense to try the trajectory more slowly.
     """
 
     limit: str
@@ -117,7 +117,11 @@ def excess(motion: Motion, envelope: Envelope) -> dict[str, Floats]:
 
 
 def judge(motion: Motion, envelope: Envelope) -> tuple[Violation, ...]:
-    """All limits that a motion breaks, in order of time."""
+    """All limits that a motion breaks, in order of time.
+
+    Raises:
+        TrajectoryError: the motion cannot be computed with.
+    """
     with computable():
         return broken_limits(motion, envelope)
 
@@ -131,7 +135,7 @@ def broken_limits(motion: Motion, envelope: Envelope) -> tuple[Violation, ...]:
 
 
 def _needs(motion: Motion, envelope: Envelope) -> Iterator[_Need]:
-    """All quantities that an envelope can limit, over this motion."""
+    """All quantities that an envelope can limit, except the fence, over this motion."""
     e, climb = envelope, -motion.velocity[:, 2]
     rotors = demand(motion, e.drag, e.gravity)
     turn = np.abs(motion.heading_rate)

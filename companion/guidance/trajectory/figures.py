@@ -110,7 +110,8 @@ def circle(radius: float, laps: Laps) -> TimedCurve:
 def steady_circle(radius: float, speed: float, laps: float, longest: float) -> TimedCurve:
     """Laps of a circle north of the start. The vehicle leaves eastwards and holds its heading.
 
-    The speed rises and falls as a raised cosine, with a mean acceleration of 1 m/s².
+    The speed rises and falls as a raised cosine, with a mean acceleration of 1 m/s², or more if the
+    laps are too short for that.
 
     Args:
         radius: radius, m.

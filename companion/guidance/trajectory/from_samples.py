@@ -106,7 +106,7 @@ class SampleOptions(NamedTuple):
         heading: source of the heading.
         cutoff: cutoff frequency, Hz. Faster changes are smoothed away as noise.
         acceleration: largest acceleration along the path, m/s², of the ramp that is added where the
-            samples begin or end in motion.
+            samples begin or end in motion. Samples that last too short a time may need more.
     """
 
     frame: Frame = Frame.ENU
@@ -122,8 +122,9 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
     from or to rest. It then lasts longer than the samples.
 
     Raises:
-        TrajectoryError: velocity or acceleration is not the derivative of the position, or the
-            samples last too long.
+        TrajectoryError: velocity or acceleration is not the derivative of the position, the samples
+            last too long, or they never move horizontally and have no heading along the path.
+        ArithmeticError, numpy.linalg.LinAlgError: numerical errors; see `computable`.
     """
     _require_short(table, options.cutoff)
     to_ned = _TO_NED[options.frame]

@@ -11,13 +11,13 @@ Vector = tuple[float, float, float]
 
 
 LONGEST = 3600.0
-"""Longest trajectory, s."""
+"""Longest trajectory that is checked, s; the maneuver `circle` may last longer."""
 
 FARTHEST = 10_000.0
 """Largest coordinate that a file may hold, m from the start."""
 
 FASTEST = 100.0
-"""Largest velocity component that a file may hold, m/s."""
+"""Largest speed or velocity component that a file may hold, m/s."""
 
 LEAST_WAY = 1e-3
 """Points closer together than this are the same point, m."""

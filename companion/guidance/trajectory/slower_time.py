@@ -56,9 +56,9 @@ def _piece(p: Number, q: Number, r: Number, s: Number) -> _Piece:
 class SlowerTime:
     """The original time σ of a trajectory over the stretched time t: dt/dσ = w(σ).
 
-    The slowness w is a uniform cubic B-spline. Its second derivative is continuous, and so is the
-    jerk of the trajectory that it slows down. In each piece, w lies between the smallest and the
-    largest of the piece's four coefficients.
+    The slowness w is a uniform cubic B-spline. Its second derivative is continuous, so the slowed
+    trajectory has a continuous jerk if the original one has. In each piece, w lies between the
+    smallest and the largest of the piece's four coefficients.
 
     Attributes:
         length: duration of the original trajectory, s.

@@ -4,7 +4,7 @@ The path stays the same; only its timing changes. A moment is one of the times a
 checked.
 
 1. For each moment, find the factor by which the whole trajectory would have to be slowed down for
-   this moment to keep all limits.
+   this moment to keep all limits except the fence.
 2. Find a smooth slowness (`SlowerTime`) that is nowhere below that factor. It brakes before a slow
    part and speeds up after it.
 3. Braking needs acceleration, so check the limits again, and raise the slowness where they are
@@ -51,7 +51,7 @@ _WORTH = 0.98
 _NOTICEABLE = 1.02
 """Smallest factor that counts as slowing down."""
 _NEAR_SLOWEST = 0.9
-"""A moment counts as near the slowest if its factor is at least this share of the largest."""
+"""A moment is near the slowest if its factor minus 1 is at least this share of the largest."""
 _FILLED = 2.0
 """Time between filled-in moments, in usual gaps."""
 
@@ -93,23 +93,22 @@ def slow_down(trajectory: Trajectory, envelope: Envelope) -> SlowDown:
     """The trajectory unchanged if it keeps all limits, else slowed down until it does.
 
     Raises:
-        TrajectoryError: the trajectory breaks a limit at any speed.
+        TrajectoryError: the trajectory breaks a limit at any speed, cannot be computed, or is too
+            long to be checked.
     """
     with computable():
         motion = sampled(trajectory)
         broken = broken_limits(motion, envelope)
         if not broken:
             return SlowDown(trajectory)
-        factor = _even_factor(trajectory, motion, broken, envelope)
-        even = evenly_slowed(trajectory, factor)
-        worst = max(broken, key=lambda one: one.time)
-        whole = SlowedPart(0.0, even.duration, factor, factor * worst.time, worst.limit)
+        whole = _evenly(trajectory, motion, broken, envelope)
+        even = evenly_slowed(trajectory, whole.factor)
         moments = _moments(motion.times)
         if moments.size > _MOST_MOMENTS:
             reason = "it is too long to be slowed down in parts"
             return SlowDown(even, (whole,), True, reason)
         fine = sampled(trajectory, moments.tolist())
-        if broken_limits(fine.slowed(factor), envelope):  # a finer look found more
+        if broken_limits(fine.slowed(whole.factor), envelope):  # a finer look found more
             reason = "a finer check found more limits exceeded"
             return SlowDown(even, (whole,), True, reason)
         best = _best_law(fine, trajectory.duration, envelope)
@@ -120,31 +119,32 @@ def slow_down(trajectory: Trajectory, envelope: Envelope) -> SlowDown:
         return SlowDown(slower, tuple(_parts(fine, best, envelope)))
 
 
-def _even_factor(
+def _evenly(
     trajectory: Trajectory, motion: Motion, broken: tuple[Violation, ...], envelope: Envelope
-) -> float:
-    """The smallest single factor with which the whole trajectory keeps the limits."""
+) -> SlowedPart:
+    """The whole trajectory, with the smallest single factor that keeps the limits."""
     for one in broken:
         if not one.slowing_helps:
             raise TrajectoryError(f"{trajectory.name}: {one}; {one.remedy}")
-    too_fast, slow = 1.0, 2.0
+    too_fast, slow, last = 1.0, 2.0, broken[0]
     while found := broken_limits(motion.slowed(slow), envelope):
-        too_fast, slow = slow, 2.0 * slow
+        too_fast, slow, last = slow, 2.0 * slow, found[0]
         if slow > _SLOWEST:
             raise TrajectoryError(
                 f"{trajectory.name}: however slowly it is flown, {found[0]}; {found[0].remedy}"
             )
     while slow - too_fast > _PRECISION * too_fast:
         middle = 0.5 * (too_fast + slow)
-        if broken_limits(motion.slowed(middle), envelope):
-            too_fast = middle
+        if found := broken_limits(motion.slowed(middle), envelope):
+            too_fast, last = middle, found[0]
         else:
             slow = middle
-    return slow
+    end = trajectory.duration * slow
+    return SlowedPart(0.0, end, slow, last.time * slow / too_fast, last.limit)
 
 
 def _moments(times: Floats) -> Floats:
-    """The check times, and more in the laps that they omit because all laps are alike."""
+    """The check times, evenly spaced ones, and more in the laps without check times."""
     gaps = np.diff(times)
     usual = float(np.median(gaps[gaps > 0.0])) if gaps.size else 1.0
     length = float(times[-1])

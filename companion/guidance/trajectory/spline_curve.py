@@ -15,10 +15,10 @@ from companion.guidance.trajectory.sample import TrajectoryError
 from companion.guidance.trajectory.septic_spline import ORDER, Floats, SepticSpline
 
 _HEADING_CUTOFF = 2.0
-"""Cutoff frequency of the heading along a spline, Hz: no vehicle follows a faster one."""
+"""Cutoff frequency of every `heading_spline`, Hz: no vehicle follows a faster heading."""
 
 HEADING_CHECK_STEP = 1.0 / (32.0 * _HEADING_CUTOFF)
-"""Longest time between two checks of a trajectory whose heading is such a spline, s."""
+"""Longest time between two checks of a trajectory whose heading is a `heading_spline`, s."""
 
 _HEADING_STEP = 0.01
 """Sample period of the direction of flight, s."""
@@ -46,7 +46,11 @@ class SplineCurve:
     longest_step: float = np.inf
 
     def sampling(self) -> PhaseSampling:
-        """Evenly spaced checks in each piece, more in long and in fast pieces."""
+        """Evenly spaced checks in each piece, more in long and in fast pieces.
+
+        Raises:
+            TrajectoryError: it takes too many checks.
+        """
         knots = self.spline.knots
         spans = np.diff(knots)
         evenly = np.linspace(0.0, 1.0, 17)

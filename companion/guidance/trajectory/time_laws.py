@@ -139,7 +139,7 @@ class Cruise:
 
     @property
     def duration(self) -> float:
-        """Time at the steady rate, plus half of each ramp, s."""
+        """Time for the whole length at the steady rate, plus half of each ramp, s."""
         return self.length / self.rate + 0.5 * (self.gathering + self.losing)
 
     def pieces(self) -> list[Piece]:

@@ -153,7 +153,7 @@ class TimedCurve:
     """A trajectory: a curve, a time law along it and a heading.
 
     Attributes:
-        name: name in the configuration.
+        name: name for messages.
         curve: the path.
         law: progress along the path over time.
         heading: heading along the path.

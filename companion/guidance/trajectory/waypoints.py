@@ -44,12 +44,12 @@ def waypoints(
         acceleration: largest acceleration, m/s².
         along: face along the path instead of holding the heading.
         headings: heading at each point, rad from north, or None for any. The vehicle turns the
-            short way from one to the next.
+            short way from one to the next. The heading at the start follows from them.
 
     Raises:
         TrajectoryError: there are no points, two consecutive points are equal, a limit is not
-            positive, the number of headings is wrong, `along` and `headings` are both given, or the
-            trajectory lasts too long.
+            positive, the number of headings is wrong, `along` and `headings` are both given, all
+            points are above each other and `along` is set, or the trajectory lasts too long.
     """
     if min(speed, acceleration) <= 0.0:
         raise TrajectoryError("speed and acceleration of waypoints must be positive")
