@@ -22,16 +22,14 @@ _SAMPLES_PER_DELAY = 8
 
 
 class Residuals(NamedTuple):
-    """The two parts of a residual, and the standard errors of the unknowns.
+    """What a residual says of a fit: the misfit, and the standard errors of the unknowns.
 
     Attributes:
         misfit: root mean square of the part that the commands explain, in the measurements' unit.
-        noise: root mean square of the other part, in the same unit.
         errors: (k,), standard errors of the unknowns.
     """
 
     misfit: float
-    noise: float
     errors: Floats
 
 
@@ -62,9 +60,7 @@ def analyse(
         columns = np.column_stack([commands(delay) for delay in each.tolist()])
         _, noise = project(np.column_stack((columns, np.ones(residual.size))), residual)
     lost = excited / max(excited - delays, 1)
-    return Residuals(
-        _rms(residual - noise), _rms(noise), _errors(slopes, noise, correlated) * np.sqrt(lost)
-    )
+    return Residuals(_rms(residual - noise), _errors(slopes, noise, correlated) * np.sqrt(lost))
 
 
 def _errors(slopes: Floats, noise: Floats, correlated: int) -> Floats:

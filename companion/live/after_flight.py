@@ -18,6 +18,8 @@ _LONGEST = 3600.0
 async def until_alone(port: int, is_open: Callable[[], bool]) -> None:
     """Wait until nobody has the page or stream open any more, or the next flight needs its port.
 
+    It takes at most an hour.
+
     Args:
         port: port of the page or stream.
         is_open: returns whether somebody has it open.
@@ -49,7 +51,7 @@ async def _leave_request(port: int) -> AsyncGenerator[asyncio.Event, None]:
 
     try:
         server = await asyncio.start_unix_server(answer, leave_address(port))
-    except OSError:  # another one at the same number
+    except OSError:  # another process has this name, so nobody can ask us
         yield asked
         return
     async with server:

@@ -17,7 +17,7 @@ class Channel:
 
     Attributes:
         dropped: messages that were not sent: the buffer was full, the message too large, or the
-            other end gone.
+            other end found to be gone. Later messages to an end that is gone do not count.
         open: whether the other end existed at the last attempt.
 
     Args:

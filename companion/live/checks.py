@@ -16,7 +16,7 @@ from companion.guidance import ManeuverSequence
 from companion.tuning import stability
 
 _LEAST_GAIN_DB, _LEAST_PHASE_DEG = 4.0, 20.0
-"""Smallest stability margins after a change; a loop that began with less must not lose any."""
+"""Smallest stability margins after a change; a loop that began with less keeps at least those."""
 _ROUNDING = 1e-3
 """Relative error of computed margins that is ignored."""
 
@@ -64,8 +64,9 @@ class ChangeChecks:
         """Check new values: the rules between keys, their size, stability, and the maneuvers.
 
         Raises:
-            ConfigError: a key must not change in flight, a value is not valid, the change is too
-                large, the control loop would lose its margins, or the maneuvers cannot be flown.
+            ConfigError: this planner or guidance, or a key, must not change in flight, a value is
+                not valid, the change is too large, the control loop would lose its margins, or the
+                maneuvers cannot be flown or are not known.
         """
         wanted = changed_in_flight(self.start, self.now, values, name)
         fixed = fixed_because(self.start)

@@ -53,7 +53,7 @@ class Stream:
     """
 
     def __init__(self, host: str, port: int) -> None:
-        # Without it, the library would close the channels.
+        # Kept, because the library closes the channels of a context that nobody refers to.
         self._context = foxglove.Context()
         self._subscriptions = _Subscriptions()
         self._channels = [
@@ -102,7 +102,7 @@ class Stream:
 
 
 async def serve_stream(relay: Relay, feed: socket.socket) -> None:
-    """Serve the stream of a flight until the flight has ended and nobody has the stream open.
+    """Serve the stream of a flight until the flight has ended, and then as `until_alone` says.
 
     Args:
         relay: receives messages of the flight.

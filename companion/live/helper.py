@@ -44,7 +44,7 @@ class HelperTasks(NamedTuple):
 
 
 class Helper:
-    """An observer that passes everything to the helper process. Its methods return at once.
+    """An observer that passes phases, events and states on to the helper process without waiting.
 
     Args:
         tasks: tasks of the process.
@@ -77,7 +77,7 @@ class Helper:
 
     @property
     def dropped(self) -> int:
-        """Number of messages that could not be sent to the process."""
+        """Number of messages (not records for the stream) that could not be sent to the process."""
         return self._channel.dropped
 
     async def serve_beside(self, work: Coroutine[Any, Any, T]) -> T:
@@ -91,7 +91,7 @@ class Helper:
             loop.remove_reader(self._channel.fileno())
 
     def close(self, words: str) -> None:
-        """Tell the process how the flight ended; the live page stays while a browser shows it."""
+        """Tell the process that the flight has ended; page and stream may stay (`until_alone`)."""
         self._send("end", text=words)
         self._channel.close()
         if self.feed is not None:
@@ -188,7 +188,7 @@ def _helper_name(tasks: HelperTasks) -> str:
 def _started(
     sockets: tuple[socket.socket | None, ...], folder: Path | None
 ) -> "subprocess.Popen[bytes]":
-    """Start the process. It survives Ctrl-C, and the flight's end while its page is open."""
+    """Start the process. It survives Ctrl-C, and the flight's end while page or stream is open."""
     descriptors = [-1 if each is None else each.fileno() for each in sockets]
     command = [sys.executable, "-m", "companion.live.helper_process", *map(str, descriptors)]
     log = Path("/dev/null") if folder is None else folder / "live.log"

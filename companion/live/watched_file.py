@@ -15,7 +15,7 @@ _SETTLED = 3
 """Number of unchanged checks after which a file counts as complete; editors remove it briefly."""
 
 Signature = tuple[tuple[int, int, int] | None, ...]
-"""Inode, size and time of the file and of all its includes; None: the file does not exist."""
+"""Inode, size and time (ns) of the file and of all its includes; None: it cannot be found."""
 
 
 class Edit:
@@ -39,7 +39,8 @@ class WatchedFile:
         path: path of the file.
         read: configuration that was read from this file for the flight. A later change of the file
             is its first edit.
-        check: raises ConfigError if the values cannot be used; called with the name of the file.
+        check: called with changed values and the name of the file; raises ConfigError if they
+            cannot be used.
     """
 
     def __init__(self, path: Path, read: Config, check: Callable[[Values, str], None]) -> None:

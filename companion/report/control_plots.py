@@ -82,7 +82,7 @@ def _step_response(flight: FlightData) -> Plot:
 
 
 def _plane(flight: FlightData) -> Plot:
-    """The steps in the plane of the coefficients."""
+    """The first doublets in the plane of the coefficients."""
     traces = []
     for number, run in enumerate(flight.runs[:_STEPS_SHOWN]):
         colour = FLIGHTS[number % len(FLIGHTS)]

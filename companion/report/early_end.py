@@ -24,7 +24,7 @@ class CrossedLimit:
         curve: name of the curve that it bounds: "speed", "tilt", "error", "rate", "thrust",
             "latency", "height" or "track".
         key: configuration key of the limit.
-        levels: values that the curve must not cross, in the curve's unit.
+        levels: values that the curve must not cross ("latency": not often), in its unit.
         outline: (N, 2) north and east, m: the fence around the track; empty for other curves.
     """
 
@@ -59,7 +59,7 @@ def early_end(
     """The early end of a flight; None if it was flown to its end.
 
     Args:
-        figures: result of `Summary.as_dict`.
+        figures: the content of `summary.json`.
         record: record of the flight.
         config: configuration of the flight; None: unknown.
     """
@@ -93,7 +93,11 @@ def _levels(config: Config) -> dict[str, CrossedLimit]:
 
 
 def _fence(config: Config, reason: str, record: FlightRecord) -> CrossedLimit | None:
-    """The side of the fence that `reason` names, relative to where control began."""
+    """The side of the fence that `reason` names, in the coordinates of the plots.
+
+    Radius, ceiling and polygon count from where control began, the floor from home. None: nothing
+    was flown under control, or the polygon is given in degrees, which no plot shows.
+    """
     guidance, limits = record.rows("guidance"), config.limits
     flown = guidance[guidance["offboard_active"] == 1]
     if len(flown) == 0:

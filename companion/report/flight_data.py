@@ -57,11 +57,11 @@ class FlightData:
         curves: curves by name, without those that were not recorded. Columns: "position",
             "reference": north, east, height, m. "error": tracking error, m. "motion": height in m,
             speed in m/s, tilt in °. "coefficients", "target": north, east. "commanded", "measured":
-            roll, pitch, yaw rate, °/s. "thrust": sent, learned at hover. "latency": from a sample's
-            arrival to its setpoint, ms.
-        figures: result of `Summary.as_dict`; None for a `.tlog`.
+            roll, pitch, yaw rate, °/s. "thrust": sent, learned at hover (not of a `.tlog`).
+            "latency": from a sample's arrival to its setpoint, ms.
+        figures: the content of `summary.json`, or derived from the record; None for a `.tlog`.
         provisional: whether the flight wrote no summary, so that the figures come from its record.
-        phases: the phases, in order.
+        phases: the phases, in order; for a `.tlog` the autopilot's modes.
         maneuvers: the maneuvers, in order.
         events: the events, in order.
         differences: keys of the configuration that are not the default; None: unknown.
@@ -87,7 +87,7 @@ def recorded(folder: Path) -> FlightData:
     """The flight in a folder.
 
     Raises:
-        RecordError: the folder holds no record of a flight.
+        RecordError: the folder holds no record of a flight, or one that is not valid.
     """
     record = read_flight(folder)
     figures, provisional = summary_of(record)
@@ -119,7 +119,7 @@ def _maneuvers(record: FlightRecord) -> tuple[Span, ...]:
 
 
 def _configuration(folder: Path) -> Config | None:
-    """The configuration of the flight; None if an older program wrote it, or it is incomplete."""
+    """The configuration of the flight; None if it is missing, incomplete, or of another version."""
     try:
         return load(folder / "config.yaml")
     except ConfigError:

@@ -103,9 +103,12 @@ def _track(name: str, flight: FlightData, which: str, colour: str) -> dict[str, 
 
 
 def _height(flights: Sequence[FlightData]) -> Plot:
-    traces = _lines(flights, "motion", "height above home") + limit_lines(flights, "height")
+    traces = _lines(flights, "motion", "height") + limit_lines(flights, "height")
     layout = time_axis(flights, y="height, m")
-    return Plot("Height", "Height above home over the whole flight.", traces, layout)
+    note = "Height above home over the whole flight."
+    if any(flight.figures is None for flight in flights):
+        note += " That of a .tlog counts from the origin of its local position."
+    return Plot("Height", note, traces, layout)
 
 
 def _error(flights: Sequence[FlightData]) -> Plot:
@@ -115,7 +118,9 @@ def _error(flights: Sequence[FlightData]) -> Plot:
     largest = _largest_error(flights)
     if largest is not None:
         layout["yaxis"]["range"] = [0.0, 1.2 * largest]
-        note += " On the way back from open-loop steps it is larger: double-click to see it all."
+        note += (
+            " Elsewhere it is larger, as on the way back from steps: double-click to see it all."
+        )
     return Plot("Tracking error", note, traces, layout)
 
 

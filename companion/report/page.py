@@ -33,7 +33,8 @@ def write_report(path: Path, out: Path | None = None) -> Path:
 
     Args:
         path: folder of the flight, or a `.tlog`.
-        out: the page; None: `report.html` in the folder, or beside the log.
+        out: the page; None: `report.html` in the folder, or beside the log, with its name and the
+            suffix `.html`.
 
     Raises:
         MissingExtraError: the extra `report` is missing.
@@ -62,7 +63,7 @@ def write_comparison(paths: Sequence[Path], out: Path) -> Path:
     require_extra()
     flights = [read(path) for path in paths]
     title = " and ".join(flight.name for flight in flights)
-    with _of_this_version(paths[0]):
+    with _of_this_version(*paths):
         plots = [*compared_steps(flights), *motion_plots(flights)]
         page = _page(title, None, flights, beside_each_other(flights), plots, None)
     write_whole(out, page)
@@ -70,7 +71,7 @@ def write_comparison(paths: Sequence[Path], out: Path) -> Path:
 
 
 @contextmanager
-def _of_this_version(path: Path) -> Iterator[None]:
+def _of_this_version(*paths: Path) -> Iterator[None]:
     """Turn errors caused by figures of another version into an error for the user.
 
     Raises:
@@ -80,8 +81,8 @@ def _of_this_version(path: Path) -> Iterator[None]:
         yield
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise RecordError(
-            f"{path}: not as this version records a flight ({error!r}); rename its "
-            "summary.json, and the figures are computed from flight.mcap"
+            f"{' or '.join(map(str, paths))}: not as this version records a flight ({error!r}); "
+            "rename its summary.json, and the figures are computed from flight.mcap"
         ) from error
 
 
@@ -107,6 +108,6 @@ def _page(
 
 
 def _verdicts(flights: Sequence[FlightData]) -> list[tuple[str, ClosingWords]]:
-    """The closing words of each flight that has a summary, by flight name."""
+    """Name and closing words of each flight that is no `.tlog`."""
     known = [(flight.name, flight.figures) for flight in flights if flight.figures is not None]
     return [(name, closing_words(figures, None)) for name, figures in known]

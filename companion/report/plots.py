@@ -18,7 +18,7 @@ CROSSED = "#c1121f"
 FLIGHTS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """One colour for each flight of a comparison."""
 _MOST_POINTS = 2000
-"""Largest number of points in a line; a wide screen has fewer pixels."""
+"""Lines with more points are thinned to about as many; a wide screen has fewer pixels."""
 _SHADES = ("rgba(230,159,0,0.13)", "rgba(86,180,233,0.13)")
 """Colours of the maneuvers, used in turn."""
 _DIGITS = 5
@@ -30,7 +30,7 @@ class Plot:
 
     Attributes:
         title: shown above it.
-        note: one sentence on what to look for.
+        note: what is shown, and what to look for.
         traces: Plotly's traces.
         layout: Plotly's layout; the page adds fonts and colours.
         height: height, px.

@@ -43,7 +43,7 @@ def configuration(flight: FlightData) -> Table:
 
 
 def beside_each_other(flights: Sequence[FlightData]) -> list[Table]:
-    """The figures and configurations of several flights, one column for each flight."""
+    """The figures of several flights and the keys that differ, one column for each flight."""
     names = tuple(flight.name for flight in flights)
     known = [
         {**dict(_tracking(flight.figures)), **dict(_rows(flight.figures))} if flight.figures else {}

@@ -1,4 +1,4 @@
-"""Access to the live page: no other web site, and from another computer only with the token."""
+"""Access to the live page: no other web site; from other computers by the token or its cookie."""
 
 import hmac
 import socket
@@ -53,7 +53,7 @@ class Guard:
 
     def _refusal(self, scope: Scope, headers: dict[str, str], *, has_token: bool) -> str | None:
         host, origin = headers.get("host", ""), headers.get("origin")
-        if not _is_this_computer(host):
+        if not _is_address_or_own_name(host):
             return f"the live page does not accept the host {host!r}; open it by its IP address"
         if origin is not None and urlsplit(origin).netloc != host:
             return f"another site, {origin!r}, must not use the live page"
@@ -85,7 +85,7 @@ class Guard:
         return sending
 
 
-def _is_this_computer(host: str) -> bool:
+def _is_address_or_own_name(host: str) -> bool:
     """Whether a Host header has an address, or a name of ours that no other site can take."""
     name = urlsplit(f"//{host}").hostname or ""
     try:

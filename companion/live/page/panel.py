@@ -93,7 +93,7 @@ class Panel:
             self._say(str(error))
 
     async def _save(self) -> None:
-        """Send the changed values to the browser, and write them to the flight's folder."""
+        """Send the changed values to the browser; if unlocked, also write them to the folder."""
         text = self._store.changed_yaml()
         ui.download.content(text, _FILE)
         folder = self._relay.first["folder"]
@@ -109,7 +109,7 @@ class Panel:
             self._say(f"saved as {path}")
 
     def _follow(self) -> None:
-        """Show values that somebody else changed, except in a field in which the user is typing."""
+        """Show values that somebody else changed, except in fields edited here; enable the undo."""
         for key in self._store.values():
             name, value = (key.section, key.name), shown(key.value)
             field = self._inputs[name]

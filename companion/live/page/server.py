@@ -1,4 +1,4 @@
-"""Serves the live page until its flight has ended and no browser shows it any more."""
+"""Serves the live page during the flight, and after it as long as `until_alone` says."""
 
 import asyncio
 import os

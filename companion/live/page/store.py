@@ -20,8 +20,8 @@ class Store:
     Attributes:
         frames: states of the last `KEPT` seconds, oldest first.
         count: number of states so far.
-        events: the events, newest last, each {"time_s", "text"}.
-        phase: the running phase and what it waits for.
+        events: the newest events, newest last, each {"time_s", "text"}.
+        event_count: number of events so far.
         config: the configuration after the newest change.
         start: the configuration with which the flight began.
         can_undo: whether a change can be undone.
@@ -36,7 +36,6 @@ class Store:
         self.count = 0
         self.events: deque[dict[str, Any]] = deque(maxlen=_MOST_EVENTS)
         self.event_count = 0
-        self.phase = ("", "")
         self.config = self.start = config
         self.can_undo = False
         self.over: str | None = None
@@ -49,7 +48,6 @@ class Store:
             case "event":
                 self._add_event(message["time_s"], message["text"])
             case "phase":
-                self.phase = message["name"], message["waits_for"]
                 newest = self.frames[-1]["time_s"] if self.frames else 0.0
                 self._add_event(newest, f"phase: {message['name']}")
             case "config":
@@ -59,16 +57,16 @@ class Store:
                 self.over = str(message["text"])
 
     def end(self) -> None:
-        """Note that the flight has vanished without a last message."""
+        """Note that the flight has ended, if its last message has not come."""
         self.over = self.over or "the program that flew has ended"
 
     def since(self, count: int) -> list[Message]:
-        """The states after the first `count` states."""
+        """The states after the first `count` states, as far as they are kept."""
         new = min(self.count - count, len(self.frames))
         return list(self.frames)[len(self.frames) - new :]
 
     def events_since(self, count: int) -> list[dict[str, Any]]:
-        """The events after the first `count` events."""
+        """The events after the first `count` events, as far as they are kept."""
         new = min(self.event_count - count, len(self.events))
         return list(self.events)[len(self.events) - new :]
 
