@@ -179,7 +179,7 @@ class MockVehicle:
         return self._simulation.next_us / 1e6
 
     def set_clock(self, clock_ns: Callable[[], int]) -> None:
-        """Set the clock of vehicle time, ns, that TIMESYNC reports; it advances between two steps."""
+        """Set the clock of vehicle time (ns) for TIMESYNC; it advances between two steps."""
         simulation = self._simulation
 
         def told() -> int:
