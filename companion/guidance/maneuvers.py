@@ -104,7 +104,7 @@ class Corners:
     Attributes:
         north, east: absolute values of the corners' coefficients; the sine of the tilt is
             √(north² + east²). 0.4 and 0.5 give the step of the paper's figure 2.
-        step: duration of each corner, s; the last of the first round is that of the second, too.
+        step: duration of each corner, s; the one at which the second round begins lasts twice that.
         settle: time of position hold at the end, s.
     """
 
