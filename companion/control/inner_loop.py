@@ -22,18 +22,22 @@ def planner(config: Config) -> Planner:
     """The configured planner with its limits; `model-following` gets the vehicle's response too.
 
     Raises:
-        ConfigError: the planner of another package cannot be loaded.
+        ConfigError: the planner of another package cannot be loaded or made.
     """
     name, limits = config.planner_name, rate_limits(config)
     own = name in PLANNER_NAMES
-    made = make_planner(
-        name if own else plugin(plugins.PLANNERS, name),
-        gain=config.planner.gain_per_s,
-        yaw_gain=config.planner.yaw_gain_per_s,
-        limits=limits,
-        recovery_angle=config.limits.recovery_angle,
-        **(config.vehicle.response if name == MODEL_FOLLOWING else {}),
-    )
+    law = name if own else plugin(plugins.PLANNERS, name)
+    try:
+        made = make_planner(
+            law,
+            gain=config.planner.gain_per_s,
+            yaw_gain=config.planner.yaw_gain_per_s,
+            limits=limits,
+            recovery_angle=config.limits.recovery_angle,
+            **(config.vehicle.response if name == MODEL_FOLLOWING else {}),
+        )
+    except TypeError as error:
+        raise ConfigError(f"planner.name {name} cannot be made: {error}") from error
     return made if own else WithinLimits(made, limits)
 
 

@@ -31,7 +31,11 @@ class Maneuver(Protocol):
         ...
 
     def check_times(self) -> list[float]:
-        """Times at which the maneuver is checked against limits and fence, s, ascending."""
+        """Times at which the maneuver is checked against limits and fence, s, ascending.
+
+        Raises:
+            TrajectoryError: it is too long to be checked.
+        """
         ...
 
 
