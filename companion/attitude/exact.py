@@ -34,10 +34,10 @@ def exact(
     """The constant body rate that takes the vehicle in `dt` s to the state of the linear model.
 
     In that state the coefficients are c_d + (c − c_d)·e^(−p·dt), or as far along that line as the
-    limits allow. The heading error has shrunk to its e^(−k·dt)-fold, and the turn of the target at
-    its heading rate is added. The vehicle moves there by the shortest rotation, so at the samples
-    the response is exact at any sample rate. Beyond the recovery angle the law is faded into a
-    rotation towards level, as in `first-order`. Rates are in rad/s.
+    limits allow. The heading error has shrunk by the factor e^(−k·dt), and the turn of the target
+    at its heading rate is added. The vehicle moves there by the shortest rotation, so at the
+    samples the response is exact at any sample rate. Beyond the recovery angle the law is faded
+    into a rotation towards level, as in `first-order`. Rates are in rad/s.
     """
     gain, yaw_gain, max_rate, max_yaw_rate, max_speed, _, _, _, cos_recovery, slope = constants
     dt = dt if dt > SHORTEST_SAMPLE else SHORTEST_SAMPLE

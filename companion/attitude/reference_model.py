@@ -9,8 +9,8 @@ from companion.attitude.types import Coefficients, Target
 
 _LONGEST_REFERENCE = sin(1.4)
 """Largest norm of the coefficients at the start; towards 1 the body rates grow without bound."""
-_SMALLEST_DAMPING = 2.7
-"""Smallest 4·ζ² of the model, ζ its damping."""
+_FOUR_ZETA_SQUARED = 2.7
+"""Smallest 4·ζ² of the model, where ζ is its damping ratio."""
 _LONGEST_STEP = 0.1
 """Largest p·dt of one step of the model; a longer sample is divided into several steps."""
 _DIFFERENCE_STEP = 1e-4
@@ -48,7 +48,7 @@ def braking_lead(gain: float, lag: float) -> float:
 
     The damping of τ·c̈ + (1 + p·κ)·ċ + p·c is then 0.82, or more if κ is 0.
     """
-    return max(0.0, sqrt(_SMALLEST_DAMPING * lag / gain) - 1.0 / gain)
+    return max(0.0, sqrt(_FOUR_ZETA_SQUARED * lag / gain) - 1.0 / gain)
 
 
 def model_response(gain: float, lag: float) -> tuple[float, float]:

@@ -30,7 +30,8 @@ from companion.vehicle.clock_jumps import Misfit
 from companion.vehicle.records import AttitudeSample
 
 SendSetpoint = Callable[[int, BodyRates, float], bool]
-"""Sends the sample's time_boot_ms, body rates and thrust; False if the link does not accept it."""
+"""Sends the sample's time_boot_ms, body rates and thrust; False if the link does not accept it. In
+lockstep the link keeps them until the step ends, and sends only the last ones of a step."""
 
 _MISFITS = {Misfit.NOT_NEWER: Unanswered.NOT_NEWER, Misfit.AHEAD: Unanswered.AHEAD}
 
@@ -100,10 +101,7 @@ class ControlLoop:
         self._limits = limits
 
     def on_sample(self, sample: AttitudeSample) -> None:
-        """Answer `sample`, or count why not. The link calls this when the datagram arrives.
-
-        In lockstep it calls this at the end of the vehicle's step.
-        """
+        """Answer `sample` or count why not, when it arrives (in lockstep: when its step ends)."""
         if not self._recorder.on:
             self._take(sample)
             return

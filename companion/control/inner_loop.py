@@ -8,7 +8,8 @@ from companion.attitude import PLANNER_NAMES, Constants, Limits, Planner, Target
 from companion.attitude.limits import make_constants
 from companion.attitude.planner import MODEL_FOLLOWING
 from companion.attitude.reference_model import model_lag, model_response
-from companion.attitude.within_limits import WithinLimits
+from companion.attitude.types import AttitudeError
+from companion.attitude.within_limits import PlannerFaultError, WithinLimits
 from companion.config import Config
 from companion.config.known_drag import drag_prior
 from companion.files.yaml_file import ConfigError
@@ -44,13 +45,17 @@ def planner(config: Config) -> Planner:
     law = plugin(plugins.PLANNERS, name)
     try:
         # A planner may remember what it was asked, so the one that flies is another.
-        WithinLimits(made(law), limits).rates(*_QUESTION)
-        return WithinLimits(made(law), limits)
+        asked, flown = (WithinLimits(made(law), limits) for _ in range(2))
     except Exception as error:
+        raise ConfigError(f"planner.name: {name} cannot be made: {error!r}") from error
+    try:
+        asked.rates(*_QUESTION)
+    except (AttitudeError, PlannerFaultError) as error:
         raise ConfigError(
             f"planner.name: {name} cannot be flown: {error}; "
             "`companion.testing.check_planner` tries more attitudes"
         ) from error
+    return flown
 
 
 def law_constants(config: Config) -> Constants:

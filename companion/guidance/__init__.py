@@ -1,4 +1,7 @@
-"""Pure maths of the outer loop: maneuvers, the acceleration that follows them, and the thrust."""
+"""Maths of the outer loop: maneuvers, the acceleration that follows them, and the thrust.
+
+All of it is pure, except that `trajectory.csv_file` reads a file.
+"""
 
 from companion.guidance.doublets import Doublets
 from companion.guidance.drag_estimate import DragEstimate

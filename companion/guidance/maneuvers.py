@@ -31,7 +31,11 @@ class Maneuver(Protocol):
         ...
 
     def check_times(self) -> list[float]:
-        """Times at which the maneuver is checked against limits and fence, s, ascending."""
+        """Times at which the maneuver is checked against limits and fence, s, ascending.
+
+        Raises:
+            TrajectoryError: it is too long to be checked.
+        """
         ...
 
 
@@ -104,7 +108,7 @@ class Corners:
     Attributes:
         north, east: absolute values of the corners' coefficients; the sine of the tilt is
             √(north² + east²). 0.4 and 0.5 give the step of the paper's figure 2.
-        step: duration of each corner, s; the last of the first round is that of the second, too.
+        step: duration of each corner, s; the one at which the second round begins lasts twice that.
         settle: time of position hold at the end, s.
     """
 

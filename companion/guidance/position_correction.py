@@ -85,7 +85,7 @@ class PositionCorrection:
         return smoothness * self._moving
 
     def corrected(self, time: float, measured: VehicleMotion) -> VehicleMotion:
-        """A measured motion with its position corrected.
+        """A measured motion with its horizontal position corrected.
 
         Args:
             time: vehicle time of the measurement, s.

@@ -39,6 +39,9 @@ def predicted(part: Maneuver, heading: float = 0.0, drag: Drag = NO_DRAG) -> Ite
         part: the maneuver.
         heading: heading at the beginning, rad.
         drag: drag in still air.
+
+    Raises:
+        TrajectoryError: the maneuver is too long to be checked.
     """
     start = Pose((0.0, 0.0, 0.0), heading)
     before, open_loop = 0.0, _OpenLoop(heading, drag)

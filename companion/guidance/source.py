@@ -35,7 +35,7 @@ class Source(Protocol):
         ...
 
     def begin(self, now: float, pose: Pose) -> None:
-        """Start at `now` from `pose`, which the vehicle has held so far."""
+        """Start at `now` from `pose`: the held one, or that at which the vehicle would stop."""
         ...
 
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:

@@ -171,10 +171,11 @@ def _comment(name: str, response: RateResponse, kept: Mapping[str, AxisValues]) 
         )
     fit = response.fit
     slew = "" if response.slew is None else f", slew {response.slew:.1f} rad/s²"
-    nearer = "" if response.second_order is None else f"; nearer: {response.second_order.described}"
+    second = response.second_order
+    better = "" if second is None else f"; clearly better: {second.described}"
     return (
         f"# {name}: lag {1e3 * response.lag:.1f} ± {1e3 * fit.lag_error:.1f} ms, dead time "
         f"{1e3 * response.dead_time:.1f} ± {1e3 * fit.dead_time_error:.1f} ms, gain "
         f"{response.gain:.2f}{slew}, explains {fit.explained:.1%}, misfit {fit.misfit:.0%}, "
-        f"{fit.excited} samples{nearer}"
+        f"{fit.excited} samples{better}"
     )

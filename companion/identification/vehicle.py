@@ -95,7 +95,7 @@ def vehicle_table(vehicle: IdentifiedVehicle, gravity: float) -> RenderableType:
     for name, response in vehicle.axes.items():
         table.add_row(name, *_cells(response))
     nearer = [
-        Text(f"{name}: nearer to the flight is a {response.second_order.described}")
+        Text(f"{name}: clearly better: {response.second_order.described}")
         for name, response in vehicle.axes.items()
         if response.second_order is not None
     ]

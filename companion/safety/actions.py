@@ -14,7 +14,10 @@ class Action(Enum):
     WARN = "warn"
     """Report the breach once and fly on."""
     HOLD = "hold"
-    """Give up the maneuver, brake and hold the place of the stop, still in offboard; then land."""
+    """Give up the maneuver, brake and hold the place of the stop, still in offboard.
+
+    `SafetyLadder` says what follows.
+    """
     HAND_BACK = "hand_back"
     """Command the autopilot to hold, and end offboard control."""
     LAND = "land"

@@ -1,7 +1,7 @@
 """Whole flights in one process on one virtual clock, for tests and campaigns.
 
-The mock vehicle and the application are joined in memory. The application's event loop runs on the
-vehicle's time: when the application has nothing left to do, the vehicle simulates its next step.
+The mock vehicle and the program are joined in memory. The program's event loop runs on the
+vehicle's time: when the program has nothing left to do, the vehicle simulates its next step.
 Nothing sleeps, no socket is opened, and equal inputs give equal flights to the bit.
 
     from companion.testing import MockVehicle, fly

@@ -37,6 +37,7 @@ async def serving(
 
     Raises:
         ConfigError: the configuration is wrong.
+        EndpointError, LinkError, SigningError: see `ServeSession.run`.
     """
     here = changed(in_memory(known(config), vehicle), {"serve": {"clients": ()}}, "the test")
     session = ServeSession(here, note, None, environment, folder)
@@ -58,7 +59,8 @@ class Program(Client):
     Args:
         name: name in messages.
         ids: system and component of the program.
-        host: IP address that the program seems to have; a program outside loopback may only read.
+        host: IP address that the program seems to have. Outside loopback it may only read, unless
+            `serve.trusted` names it or it signs its frames.
 
     Attributes:
         heard: received messages, decoded by pymavlink, oldest first.

@@ -117,7 +117,9 @@ def fly(
         The content of `companion fly --json`, as an object.
 
     Raises:
-        ConfigError: the configuration is wrong.
+        ConfigError: the configuration is wrong, or a maneuver cannot be flown.
+        LinkError: the link cannot do what the configuration demands.
+        OSError: the folder cannot be written.
         UnseenError: a task or callback failed, and the error was not handled.
     """
     return run(vehicle, session(config, vehicle, folder, observer, ask_landing).fly())
@@ -140,7 +142,7 @@ async def connect(
 
     Raises:
         ConfigError: the configuration is wrong.
-        FlightEnded: see `companion.connect`.
+        FlightEnded, LinkError, OSError: see `companion.connect`.
     """
     whole = in_memory(known(config), vehicle)
     async with flying(whole, folder, observer, environment) as connected:

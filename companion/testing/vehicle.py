@@ -39,9 +39,9 @@ class MockVehicle:
     Args:
         autopilot: "px4" or "ardupilot"; None: that of `config`, by default PX4.
         config: a YAML file whose section `mock` is read.
-        lockstep: whether the application answers each step before the next one, as with
+        lockstep: whether the program answers each step before the next one, as with
             `link.lockstep`; a mapping sets more keys of `mock.lockstep`. Without lockstep the
-            application receives samples as over UDP: it answers each one on arrival, and its timers
+            program receives samples as over UDP: it answers each one on arrival, and its timers
             run between the vehicle's steps.
         delay_s: delay of each datagram, s; only without lockstep.
         compiled: whether the physics are compiled by numba. The flight is the same to the bit.
@@ -150,7 +150,7 @@ class MockVehicle:
 
         self.after_step.append(look)
 
-    # --- time without an application
+    # --- time without the program
 
     def run(self, seconds: float) -> None:
         """Run the vehicle for `seconds` s without the program."""
@@ -159,7 +159,7 @@ class MockVehicle:
             self.step()
 
     def until(self, condition: Callable[[Truth], bool], seconds: float = 60.0) -> Truth:
-        """Let time pass without an application until `condition` holds; return that state.
+        """Let time pass without the program until `condition` holds; return that state.
 
         Raises:
             AssertionError: the condition does not hold within `seconds` of vehicle time.
@@ -179,7 +179,7 @@ class MockVehicle:
         return self._simulation.next_us / 1e6
 
     def set_clock(self, clock_ns: Callable[[], int]) -> None:
-        """Set the vehicle time that TIMESYNC reports, ns; between two steps it advances."""
+        """Set the clock of vehicle time (ns) for TIMESYNC; it advances between two steps."""
         simulation = self._simulation
 
         def told() -> int:

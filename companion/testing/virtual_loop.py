@@ -39,7 +39,7 @@ class VirtualClock:
 
 
 class World(Protocol):
-    """Moves the clock when the application has nothing left to do."""
+    """Moves the clock when the program has nothing left to do."""
 
     def deliver_due(self) -> None:
         """Deliver the datagrams that arrive at the present time."""
@@ -51,7 +51,7 @@ class World(Protocol):
 
 
 class _VirtualSelector(SettlingSelector):
-    """Lets the vehicle advance, instead of waiting, until the application has something to do.
+    """Lets the vehicle advance, instead of waiting, until the program has something to do.
 
     Attributes:
         scheduled: number of callbacks and timers that were scheduled so far.
@@ -68,7 +68,7 @@ class _VirtualSelector(SettlingSelector):
         else:
             until = float("inf") if timeout is None else self._clock.now + timeout
             before = self.scheduled
-            # Most messages only call functions of the application, and schedule nothing.
+            # Most messages only call functions of the program, and schedule nothing.
             while self.scheduled == before and not self.settling and self._clock.now < until:
                 self._world.advance(until)
         return []

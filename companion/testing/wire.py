@@ -1,6 +1,6 @@
-"""Joins a mock vehicle and an application in memory.
+"""Joins a mock vehicle and the program in memory.
 
-The application's end is a transport that behaves like a listening UDP socket: it sends nothing
+The program's end is a transport that behaves like a listening UDP socket: it sends nothing
 before it has received a valid frame (`PeerRule`), and it forgets a silent peer.
 """
 
@@ -20,7 +20,7 @@ _NAME = "the mock vehicle"
 
 
 class MemoryTransport:
-    """The application's end of the wire.
+    """The program's end of the wire.
 
     Args:
         receiver: takes arriving datagrams.
@@ -52,7 +52,7 @@ class MemoryTransport:
         return True
 
     def close(self) -> None:
-        """Close the transport; datagrams on their way to the application are lost."""
+        """Close the transport; datagrams on their way to the program are lost."""
         self.is_open = False
         self._timer.cancel()
 
@@ -76,7 +76,7 @@ class Wire:
         self._transport: MemoryTransport | None = None
 
     def open(self, receiver: Receiver) -> MemoryTransport:
-        """Open the application's end.
+        """Open the program's end.
 
         Raises:
             EndpointError: it is already open.
@@ -87,7 +87,7 @@ class Wire:
         return self._transport
 
     def _take(self, frame: bytes) -> None:
-        """Take a frame of the application."""
+        """Take a frame of the program."""
         self._vehicle.receive(frame)
 
     def _deliver(self, datagram: bytes, at: float) -> None:
@@ -96,13 +96,13 @@ class Wire:
 
 
 class LockstepWire(Wire):
-    """In lockstep: the vehicle steps when the application has settled; a beacon moves the clock."""
+    """In lockstep: the vehicle steps when the program has settled; a beacon moves the clock."""
 
     def deliver_due(self) -> None:
         """Nothing arrives between two steps."""
 
     def advance(self, until: float) -> None:
-        """Let the vehicle make a step; the application's timers wait for it."""
+        """Let the vehicle make a step; the program's timers wait for it."""
         datagrams = self._vehicle.begin() or self._vehicle.step()
         for datagram in datagrams:  # the beacon comes last, and moves the clock to this time
             self._deliver(datagram, self._vehicle.time)
@@ -124,34 +124,34 @@ class FreeWire(Wire):
 
     def deliver_due(self) -> None:
         """Deliver what arrives at the present time, in the order of sending."""
-        self._reached_application()
+        self._reached_program()
 
     def advance(self, until: float) -> None:
-        """Advance until something reaches the application, but at most to `until`."""
+        """Advance until something reaches the program, but at most to `until`."""
         clock, under_way = self._clock, self._under_way
         step_at = self._next_step_at()
         while True:
             arrival = under_way[0][0] if under_way else step_at
             clock.now = max(clock.now, min(until, arrival, step_at))
-            reached = clock.now >= arrival and self._reached_application()
+            reached = clock.now >= arrival and self._reached_program()
             if clock.now >= step_at:
                 self._send(self._vehicle.begin())
                 self._send(self._vehicle.step())
                 self._slipped += self._vehicle.take_slip()
                 step_at = self._next_step_at()
-                reached = self._reached_application() or reached
+                reached = self._reached_program() or reached
             if reached or clock.now >= until:
                 return
 
     def _next_step_at(self) -> float:
         return in_burst(self._vehicle.next_step_at, self._burst) + self._slipped
 
-    def _reached_application(self) -> bool:
-        """Deliver what is due; return whether the application received something."""
+    def _reached_program(self) -> bool:
+        """Deliver what is due; return whether the program received something."""
         under_way, now, reached = self._under_way, self._clock.now, False
         while under_way and under_way[0][0] <= now:
-            _, to_application, datagram = under_way.popleft()
-            if to_application:
+            _, to_program, datagram = under_way.popleft()
+            if to_program:
                 reached = True
                 self._deliver(datagram, now)
             else:

@@ -187,6 +187,7 @@ def test_a_first_flight_teaches_a_vehicle_that_is_40_percent_off(tmp_path):
             "keys of the mock vehicle cannot be searched",
         ),
         ({"tune": {"search": {"planner.gain_per_s": [1, 2]}}}, "give uniform, loguniform or"),
+        ({"set": {"flight.maneuvers": ["corners", "steps"]}}, "set flight.maneuvers to"),
     ],
 )
 def test_a_search_that_cannot_be_is_refused(tmp_path, changes, message):

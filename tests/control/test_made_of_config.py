@@ -11,11 +11,17 @@ from companion.config import Config
 from companion.control.estimator_resets import EstimatorResets
 from companion.control.hold_settings import hold_weights
 from companion.control.hover_learning import HoverLearning
-from companion.control.inner_loop import hover_thrust, law_constants, plugin, thrust_limits
+from companion.control.inner_loop import (
+    hover_thrust,
+    law_constants,
+    planner,
+    plugin,
+    thrust_limits,
+)
 from companion.control.loop_record import Deadlines
 from companion.control.loops import make_loops
 from companion.control.motion_estimate import MotionEstimate
-from companion.control.outer_loop import linear_settings, predictive_settings
+from companion.control.outer_loop import linear_settings, make_guidance, predictive_settings
 from companion.control.planner_runner import PlannerRunner
 from companion.control.retuning import Retuning, between, fixed_because, tuning
 from companion.control.slew import Slew
@@ -250,6 +256,21 @@ def test_predictive_control():
 def test_a_plugin_that_is_not_installed_is_named():
     with pytest.raises(ConfigError, match="nobodys-planner"):
         plugin("companion.planners", "nobodys-planner")
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "make"),
+    [("planner", "name", planner), ("guidance", "kind", make_guidance)],
+)
+def test_a_plugin_that_takes_other_arguments_is_named(monkeypatch, section, key, make):
+    class Theirs:
+        def __init__(self, one, another):
+            pass
+
+    monkeypatch.setattr("companion.plugins.load", lambda *_: Theirs)
+    changed = getattr(CONFIG, section).model_copy(update={key: "theirs"})
+    with pytest.raises(ConfigError, match=f"{section}.{key}: theirs cannot be made: .*another"):
+        make(CONFIG.model_copy(update={section: changed}))
 
 
 def test_the_tilt_is_limited_to_what_the_thrust_can_hold():

@@ -156,8 +156,8 @@ def test_each_axis_says_how_good_it_is():
     ) in text
     assert "slew 19.2 rad/s²" in text
     assert (
-        "nearer: second order, natural frequency 19.4 rad/s, damping ratio 0.72, dead time 8 ms, "
-        "explains 99.8%"
+        "clearly better: second order, natural frequency 19.4 rad/s, damping ratio 0.72, "
+        "dead time 8 ms, explains 99.8%"
     ) in text
     assert "# thrust: T/m = 19.55·u +0.22 m/s²" in text
 
@@ -193,7 +193,7 @@ def test_the_table_tells_every_axis_within_80_columns():
         "good",
     ]
     assert " 270 " in rows["yaw"]
-    assert "yaw: nearer to the flight is a second order, natural frequency 5.6 rad/s" in text
+    assert "yaw: clearly better: second order, natural frequency 5.6 rad/s" in text
     assert "T/m = 19.55·u +0.22" in text
     assert "hovers at 0.490" in " ".join(text.split())
     assert max(map(len, text.splitlines())) <= 80

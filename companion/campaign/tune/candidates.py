@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 Values = Mapping[str, Any]
 """Value of each searched key."""
+_OPEN_LOOP = frozenset(("corners", "identify", "steps"))
+"""Maneuvers without a reference from which a distance is measured."""
 _UNSEEN = 1_000_003
 """Offset of the campaign's seed for the cases that the search does not see."""
 
@@ -46,8 +48,8 @@ def section_of(campaign: Campaign) -> Tune:
     """The section `tune` of a campaign.
 
     Raises:
-        ConfigError: the section is missing, the campaign is a batch, or a searched key is also
-            swept.
+        ConfigError: the section is missing, the campaign is a batch, a searched key is also swept,
+            or no flight follows a reference in closed loop.
     """
     tune = campaign.file.tune
     if tune is None:
@@ -57,6 +59,13 @@ def section_of(campaign: Campaign) -> Tune:
     swept = {key for name, each in campaign.file.sweep.items() for key in each.keys or (name,)}
     for key in tune.search.keys() & swept:
         raise ConfigError(f"{campaign.name}: `{key}` stands in sweep and in tune.search")
+    flown = (case.config.flight.maneuvers for case in campaign.cases())
+    if all(_OPEN_LOOP.issuperset(maneuvers) for maneuvers in flown):
+        raise ConfigError(
+            f"{campaign.name}: tune compares the distances from the reference, and the maneuvers "
+            f"{', '.join(sorted(_OPEN_LOOP))} have none; set flight.maneuvers to [circle] or "
+            "another that follows a reference"
+        )
     return tune
 
 

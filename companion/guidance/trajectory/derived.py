@@ -102,7 +102,11 @@ class TurnedFirst:
         return False
 
     def check_times(self) -> list[float]:
-        """Check times of the trajectory, s; the turn on the spot needs no check."""
+        """Check times of the trajectory, s; the turn on the spot needs no check.
+
+        Raises:
+            TrajectoryError: it is too long to be checked.
+        """
         return [0.0, *(self.turn.duration + time for time in self.trajectory.check_times())]
 
     def at(self, time: float) -> Sample:
