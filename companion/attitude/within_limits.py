@@ -12,6 +12,10 @@ class InvalidRatesError(AttitudeError):
     """A planner of another package returned body rates that are not finite."""
 
 
+class PlannerFaultError(Exception):
+    """A planner of another package raised an error; the message is for the user."""
+
+
 class WithinLimits:
     """Limits another planner's rates to the largest tilt rate and yaw rate.
 
@@ -32,9 +36,16 @@ class WithinLimits:
         Raises:
             InvalidRatesError: the planner's rates are not finite.
             AttitudeError: the planner cannot use this attitude or target.
+            PlannerFaultError: the planner raises another error, or returns no three numbers.
         """
-        roll, pitch, yaw = self._planner.rates(q, target, dt, body_rates)
-        if not (isfinite(roll) and isfinite(pitch) and isfinite(yaw)):
+        try:
+            roll, pitch, yaw = self._planner.rates(q, target, dt, body_rates)
+            finite = isfinite(roll) and isfinite(pitch) and isfinite(yaw)
+        except AttitudeError:
+            raise
+        except Exception as error:
+            raise PlannerFaultError(f"the planner of another package failed: {error!r}") from error
+        if not finite:
             raise InvalidRatesError(f"the planner returned {(roll, pitch, yaw)}")
         return BodyRates(*limit_rates(roll, pitch, yaw, self._tilt_rate, self._yaw_rate))
 

@@ -11,6 +11,8 @@ from companion.config.doubts import doubts
 from companion.config.files import json_schema, load, shipped
 from companion.config.reference import Key, as_markdown, as_yaml, differences, keys
 from companion.control.expected_response import expectations
+from companion.control.inner_loop import planner
+from companion.control.outer_loop import make_guidance
 from companion.demo import check_mock
 from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
@@ -96,6 +98,8 @@ def check(options: argparse.Namespace) -> int:
         except EndpointError as error:
             raise ConfigError(f"{options.file}: `{key}`: {error}") from error
     maneuvers = configured_maneuvers(config)
+    planner(config)
+    make_guidance(config)
     if config.mock is not None:
         check_mock(options.file)
     for part in maneuvers.parts:

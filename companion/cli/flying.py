@@ -14,7 +14,8 @@ from companion.cli.signals import fly_interruptibly
 from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
 from companion.config.files import assigned, changed, load
-from companion.control.outer_loop import predictive_settings
+from companion.control.inner_loop import planner as planner_of
+from companion.control.outer_loop import make_guidance, predictive_settings
 from companion.extras import MissingExtraError, require
 from companion.flight.maneuvers import configured_maneuvers
 from companion.flight.observer import Several
@@ -34,8 +35,8 @@ def as_told(config: Config, options: argparse.Namespace, planner: str | None = N
     """The configuration as changed by the options of the command line.
 
     Raises:
-        ConfigError: options and configuration contradict each other, or the trajectory cannot be
-            followed.
+        ConfigError: options and configuration contradict each other, or the trajectory, or a
+            planner or guidance of another package, cannot be flown.
         MissingExtraError: an extra that the configuration needs is not installed.
     """
     link: dict[str, Any] = {}
@@ -57,6 +58,8 @@ def as_told(config: Config, options: argparse.Namespace, planner: str | None = N
     told = changed(told, changes, "the command line")
     # What cannot be flown is to be found out before anything is begun.
     configured_maneuvers(told)
+    planner_of(told)
+    make_guidance(told)
     if told.guidance.kind == "nmpc":
         predictive_settings(told)
         require("casadi", "nmpc", "guidance.kind: nmpc")

@@ -74,6 +74,8 @@ def replay(options: argparse.Namespace) -> int:
         config = changed(config, assigned(options.set), "--set")
     flown = Replay(record, config)
     samples = flown.run()
+    if not samples:
+        raise ConfigError(f"{options.folder}: no attitude sample is recorded there to replay")
     for line in words(samples, record.began, follows_record=flown.follows_record):
         print(line)
     if options.csv is not None:

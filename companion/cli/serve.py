@@ -13,6 +13,7 @@ from companion.cli.signals import LEAVE_AFTER
 from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
 from companion.config.files import assigned, changed, load
+from companion.control.inner_loop import planner
 from companion.extras import require
 from companion.files.yaml_file import ConfigError
 from companion.flight.observer import Several
@@ -103,6 +104,7 @@ def _as_told(config: Config, options: argparse.Namespace) -> Config:
         raise ConfigError("link.lockstep: serve runs in real time; set link.lockstep: false")
     if told.serve.control:
         require("ruckig", "serve", "serve.control: true")
+        planner(told)
     for endpoint in told.serve.clients:
         try:
             parse_endpoint(endpoint)

@@ -4,15 +4,19 @@ from math import inf
 from typing import Any
 
 from companion import plugins
-from companion.attitude import PLANNER_NAMES, Constants, Limits, Planner, make_planner
+from companion.attitude import PLANNER_NAMES, Constants, Limits, Planner, Target, make_planner
 from companion.attitude.limits import make_constants
 from companion.attitude.planner import MODEL_FOLLOWING
 from companion.attitude.reference_model import model_lag, model_response
-from companion.attitude.within_limits import WithinLimits
+from companion.attitude.types import AttitudeError
+from companion.attitude.within_limits import PlannerFaultError, WithinLimits
 from companion.config import Config
 from companion.config.known_drag import drag_prior
 from companion.files.yaml_file import ConfigError
 from companion.guidance import GRAVITY, HoverThrust, InnerResponse, ThrustSettings
+
+_QUESTION = (1.0, 0.0, 0.0, 0.0), Target(0.1, 0.1, 0.0), 0.004
+"""What a planner of another package is asked before it may fly: a step to 8° of tilt from level."""
 
 LARGEST_PRODUCT = 0.45
 """Largest sensible gain · (lag + dead time); above it, the response overshoots."""
@@ -22,13 +26,12 @@ def planner(config: Config) -> Planner:
     """The configured planner with its limits; `model-following` gets the vehicle's response too.
 
     Raises:
-        ConfigError: the planner of another package cannot be loaded or made.
+        ConfigError: the planner of another package cannot be loaded, made or asked.
     """
     name, limits = config.planner_name, rate_limits(config)
-    own = name in PLANNER_NAMES
-    law = name if own else plugin(plugins.PLANNERS, name)
-    try:
-        made = make_planner(
+
+    def made(law: Any) -> Planner:
+        return make_planner(
             law,
             gain=config.planner.gain_per_s,
             yaw_gain=config.planner.yaw_gain_per_s,
@@ -36,9 +39,23 @@ def planner(config: Config) -> Planner:
             recovery_angle=config.limits.recovery_angle,
             **(config.vehicle.response if name == MODEL_FOLLOWING else {}),
         )
-    except TypeError as error:
-        raise ConfigError(f"planner.name {name} cannot be made: {error}") from error
-    return made if own else WithinLimits(made, limits)
+
+    if name in PLANNER_NAMES:
+        return made(name)
+    law = plugin(plugins.PLANNERS, name)
+    try:
+        # A planner may remember what it was asked, so the one that flies is another.
+        asked, flown = (WithinLimits(made(law), limits) for _ in range(2))
+    except Exception as error:
+        raise ConfigError(f"planner.name: {name} cannot be made: {error!r}") from error
+    try:
+        asked.rates(*_QUESTION)
+    except (AttitudeError, PlannerFaultError) as error:
+        raise ConfigError(
+            f"planner.name: {name} cannot be flown: {error}; "
+            "`companion.testing.check_planner` tries more attitudes"
+        ) from error
+    return flown
 
 
 def law_constants(config: Config) -> Constants:

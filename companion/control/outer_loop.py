@@ -47,10 +47,11 @@ def make_guidance(config: Config) -> Guidance:
     settings, kind = linear_settings(config), config.guidance.kind
     if kind in GUIDANCE_NAMES:
         return LinearGuidance(settings)
+    factory = plugin(plugins.GUIDANCE, kind)
     try:
-        made: Guidance = plugin(plugins.GUIDANCE, kind)(settings)
-    except TypeError as error:
-        raise ConfigError(f"guidance.kind {kind} cannot be made: {error}") from error
+        made: Guidance = factory(settings)
+    except Exception as error:
+        raise ConfigError(f"guidance.kind: {kind} cannot be made: {error!r}") from error
     return made
 
 

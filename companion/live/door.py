@@ -1,5 +1,6 @@
 """Addresses of the live page and the live stream: IP address, port and token."""
 
+import errno
 import secrets
 import socket
 import time
@@ -106,9 +107,11 @@ def _listening(address: str, option: str, usual: int) -> tuple[str, socket.socke
         listening.listen(50)
     except OSError as error:
         listening.close()
+        remedy = f"name another one, as {option} {port + 1}"
+        if error.errno == errno.EADDRNOTAVAIL:
+            remedy = f"no interface of this computer has that address; use {option} 0.0.0.0:{port}"
         raise ConfigError(
-            f"{option}: cannot listen at port {port} of {host}: {error.strerror}; name another "
-            f"one, as {option} {port + 1}"
+            f"{option}: cannot listen at port {port} of {host}: {error.strerror}; {remedy}"
         ) from error
     return host, listening
 

@@ -104,9 +104,11 @@ def _ended_early(figures: Figures) -> tuple[str, list[str]]:
     end = figures["early_end"]
     interrupted = figures["result"].startswith(_INTERRUPTED)
     remedy = "nothing needs fixing" if interrupted else what_to_do(end["monitor"], end["phase"])
-    if figures["at_the_end"]["armed"] and end["since_takeoff_s"] is not None:
+    if figures["at_the_end"]["armed"]:
+        on_ground = end["since_takeoff_s"] is None  # as far as it was heard
+        what = "disarm it, or take it over if it flies" if on_ground else "take it over or land it"
         then = "" if interrupted else f"; then: {remedy}"
-        remedy = f"the vehicle is armed: take it over or land it{then}"
+        remedy = f"the vehicle is armed: {what}{then}"
     result = figures["result"].rstrip(".")
     return f"The flight ended early: {result}{'' if result.endswith('?') else '.'}", [
         f"  when: {_when(end)}",

@@ -188,7 +188,7 @@ def read_flight(folder: Path) -> FlightRecord:
     try:
         content = read_mcap(path)
     except OSError as error:
-        if not killed_at_start:
+        if not (killed_at_start and isinstance(error, FileNotFoundError)):
             raise RecordError(
                 f"{path}: {error.strerror}; is this the folder of a flight?"
             ) from error

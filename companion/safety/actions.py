@@ -2,6 +2,8 @@
 
 from enum import Enum
 
+from companion.attitude.within_limits import PlannerFaultError
+
 
 class Action(Enum):
     """The actions by rising severity; the value is the word used in messages and in YAML.
@@ -62,5 +64,7 @@ class FlightEnded(Exception):  # noqa: N818 - it is how every flight that stops 
 
 
 def internal(error: Exception) -> str:
-    """The message for an unexpected exception, a bug in this program."""
+    """The message for an unexpected exception: a bug in this program or in a planner's package."""
+    if isinstance(error, PlannerFaultError):
+        return str(error)
     return f"internal error: {error!r}"

@@ -13,6 +13,7 @@ from companion.flight.changes import Changes
 from companion.flight.context import cancel
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.observer import Observer, Silent, StateLogger
+from companion.mavlink.errors import LinkError
 from companion.mavlink.framing import Frame
 from companion.mavlink.peer import HEARTBEAT
 from companion.realtime import Wishes
@@ -108,7 +109,7 @@ class ServeSession:
     async def _serve(self, link: Link, network: Network) -> dict[str, Any]:
         component = Component(link.settings, network, link.send)
         permission = Permission(self._config.serve.trusted, link.settings.signing)
-        beside: list[Coroutine[Any, Any, None]] = [component.run()]
+        beside: list[Coroutine[Any, Any, None]] = [component.run(), self._tell_silence(link)]
         if self._config.serve.control:
             from companion.serve.control import ServedControl  # noqa: PLC0415  needs the extra
 
@@ -141,6 +142,13 @@ class ServeSession:
             for task in tasks:
                 await cancel(task)
         return _counters(link, network)
+
+    async def _tell_silence(self, link: Link) -> None:
+        """Say once that no vehicle is heard; clients are served all the same."""
+        try:
+            await link.wait_connected(self._config.flight.connect_timeout_s)
+        except LinkError as error:
+            self._note(f"{error} (still listening)")
 
 
 class _Gate:

@@ -1,5 +1,6 @@
 """Planners and guidance of another package: found, checked, flown, limited."""
 
+import re
 import sys
 from importlib import invalidate_caches
 from math import hypot, isfinite, nan
@@ -8,6 +9,7 @@ import pytest
 
 from companion.attitude import BodyRates, InvalidTargetError, Limits, Target
 from companion.attitude.within_limits import InvalidRatesError, WithinLimits
+from companion.cli.main import main
 from companion.config import Config
 from companion.control.inner_loop import planner
 from companion.control.outer_loop import make_guidance
@@ -24,6 +26,19 @@ def mine(q, target, dt, constants):
 
 def nothing(q, target, dt, constants):
     return float("nan"), 0.0, 0.0
+
+def pair(q, target, dt, constants):
+    return 0.0, 0.0
+
+def raising(q, target, dt, constants):
+    raise RuntimeError("no")
+
+def later(q, target, dt, constants):
+    if q[1] > 0.02:
+        raise RuntimeError("not at this roll")
+    return first_order(q, target, dt, constants)
+
+number = 5
 
 def wild(q, target, dt, constants):
     roll, pitch, yaw = first_order(q, target, dt, constants)
@@ -67,6 +82,10 @@ ENTRY_POINTS = """
 [companion.planners]
 mine = theirs:mine
 nothing = theirs:nothing
+pair = theirs:pair
+raising = theirs:raising
+later = theirs:later
+number = theirs:number
 wild = theirs:wild
 lazy = theirs:lazy
 one-sided = theirs:one_sided
@@ -76,6 +95,7 @@ missing = theirs:not_there
 [companion.guidance]
 calm = theirs:Calm
 drifting = theirs:Drifting
+number = theirs:number
 broken = theirs:Broken
 """
 
@@ -113,9 +133,12 @@ def test_what_it_commands_is_limited():
 
 
 def test_rates_that_are_not_finite_are_refused():
-    made = planner(config("planner: {name: nothing}"))
+    class Nothing:
+        def rates(self, *_):
+            return nan, 0.0, 0.0
+
     with pytest.raises(InvalidRatesError):
-        made.rates((1.0, 0.0, 0.0, 0.0), Target(0.4, 0.3, 0.0), 0.004)
+        WithinLimits(Nothing(), Limits()).rates((1.0, 0.0, 0.0, 0.0), Target(0.4, 0.3, 0.0), 0.004)
     with pytest.raises(InvalidTargetError):
         planner(config("planner: {name: mine}")).rates(
             (1.0, 0.0, 0.0, 0.0), Target(nan, 0.0, 0.0), 0.004
@@ -169,6 +192,34 @@ def test_a_plug_in_that_cannot_be_loaded_is_one_sentence():
     told = config("planner: {name: missing}")
     with pytest.raises(ConfigError, match=r"'missing' \(theirs:not_there of their-package\)"):
         planner(told)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("planner: {name: nothing}", r"the planner returned \(nan"),
+        ("planner: {name: pair}", "expected 3, got 2"),
+        ("planner: {name: raising}", r"failed: RuntimeError\('no'\); `companion.testing.check_pl"),
+        ("planner: {name: number}", "unknown planner 5"),
+        ("guidance: {kind: number}", "guidance.kind: number cannot be made: TypeError"),
+    ],
+)
+def test_what_cannot_fly_is_found_before_the_vehicle_is_asked(text, why, tmp_path, capsys):
+    path = tmp_path / "c.yaml"
+    path.write_text(text)
+    for command in (["check-config", str(path)], ["fly", "--config", str(path)]):
+        assert main(command) == 2
+        assert re.search(why, " ".join(capsys.readouterr().err.split()))
+
+
+def test_a_planner_that_fails_in_flight_is_named_and_the_vehicle_is_landed():
+    vehicle = QuickVehicle("px4")
+    flight = {"planner": {"name": "later"}, "flight": {"maneuvers": ["steps"]}}
+    summary = fly(merged(QUICK_FLIGHT, flight), vehicle)
+    assert summary.result == (
+        "the planner of another package failed: RuntimeError('not at this roll')"
+    )
+    assert not vehicle.state()["crashed"]
 
 
 @pytest.mark.parametrize("name", ["first-order", "exact", "quaternion", "mine", "remembering"])

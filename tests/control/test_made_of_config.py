@@ -269,7 +269,7 @@ def test_a_plugin_that_takes_other_arguments_is_named(monkeypatch, section, key,
 
     monkeypatch.setattr("companion.plugins.load", lambda *_: Theirs)
     changed = getattr(CONFIG, section).model_copy(update={key: "theirs"})
-    with pytest.raises(ConfigError, match=f"{section}.{key} theirs cannot be made: .*another"):
+    with pytest.raises(ConfigError, match=f"{section}.{key}: theirs cannot be made: .*another"):
         make(CONFIG.model_copy(update={section: changed}))
 
 

@@ -83,6 +83,11 @@ def test_a_port_in_use_is_named():
             open_door(str(port))
 
 
+def test_an_address_of_another_computer_is_not_a_matter_of_the_port():
+    with pytest.raises(ConfigError, match=r"has that address; use --live 0\.0\.0\.0:8090"):
+        open_door("192.0.2.1")
+
+
 def test_the_door_is_of_this_computer_and_has_a_new_token_each_time():
     first, second = open_door(":0"), open_door("0")
     assert first.host == second.host == "127.0.0.1"

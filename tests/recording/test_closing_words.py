@@ -202,6 +202,13 @@ def test_a_vehicle_that_is_left_armed_in_the_air_comes_before_all_else():
     assert "what to do: the vehicle is armed: take it over or land it; then: make" in text
 
 
+def test_a_vehicle_that_was_lost_while_it_took_off_may_fly():
+    end = {**END, "since_takeoff_s": None, "phase": "takeoff", "maneuver": None, "monitor": None}
+    armed = {"armed": True, "mode": "AUTO.TAKEOFF"}
+    _, text = words({**GOOD, "result": "no heartbeat", "early_end": end, "at_the_end": armed})
+    assert "the vehicle is armed: disarm it, or take it over if it flies; then: " in text
+
+
 @pytest.mark.parametrize("phase", ["connect", "checks", "stream", "arm"])
 def test_before_take_off_the_doctor_is_next(phase):
     end = {**END, "since_takeoff_s": None, "phase": phase, "maneuver": None, "monitor": None}

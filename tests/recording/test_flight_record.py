@@ -6,6 +6,7 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from zstandard import ZstdError
 
+from companion.cli.main import main
 from companion.control.loop_record import Unanswered
 from companion.recording.flight_record import RecordError, read_flight
 from companion.recording.mcap_file import cdr, reader, writer
@@ -204,3 +205,18 @@ def test_a_summary_without_its_keys_is_derived_from_the_record(tmp_path, found):
     summary, provisional = summary_of(read_flight(tmp_path))
     assert provisional
     assert summary["setpoints"] == ROWS
+
+
+def test_only_a_missing_record_is_one_that_was_never_begun(tmp_path, monkeypatch, capsys):
+    """One that may not be read is not empty, and an empty one is not replayed with success."""
+    (tmp_path / "config.yaml").write_text("")
+    assert read_flight(tmp_path).content.order == []
+    assert main(["replay", str(tmp_path)]) == 2
+    assert "no attitude sample is recorded there" in " ".join(capsys.readouterr().err.split())
+
+    def refused(_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("companion.recording.flight_record.read_mcap", refused)
+    with pytest.raises(RecordError, match=r"flight\.mcap: Permission denied"):
+        read_flight(tmp_path)
