@@ -125,8 +125,9 @@ class FlightTrace:
             self.recorder.maneuver(time, vehicle_time, name)
 
     def lost_rows_warning(self) -> str | None:
-        """A warning for the user if rows of steps, tracking or rates were lost; None: none were."""
-        lost = sum(each.lost for each in (self.response, self.tracking, self.rates))
+        """A warning for the user if rows were lost; None: none were."""
+        kept = self.response, self.tracking, self.rates, self.latencies_ns, self.motion
+        lost = sum(series.lost for series in kept)
         if lost == 0:
             return None
         why = self._spool.failure or "the disk was too slow"

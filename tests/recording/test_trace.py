@@ -1,6 +1,9 @@
 """What is kept of a flight."""
 
+import pytest
+
 from companion.attitude import BodyRates
+from companion.recording.measurements.verdict import LOST_ROWS
 from companion.recording.trace import FlightTrace
 
 ROWS = [
@@ -21,3 +24,11 @@ def test_rows_can_be_had_from_one_on():
     assert noted().rates_rows().tolist() == [list(map(float, row)) for row in ROWS]
     assert noted().rates_rows(1).tolist() == [list(map(float, ROWS[1]))]
     assert noted().rates_rows(2).shape == (0, 10)
+
+
+@pytest.mark.parametrize("name", ["response", "tracking", "rates", "latencies_ns", "motion"])
+def test_lost_rows_of_each_kind_are_told(name):
+    trace = FlightTrace()
+    assert trace.lost_rows_warning() is None
+    getattr(trace, name).lost = 8
+    assert trace.lost_rows_warning() == f"8 {LOST_ROWS}: the disk was too slow"
