@@ -9,6 +9,7 @@ import selectors
 import socket
 import sys
 import time
+from contextlib import suppress
 
 from pymavlink.dialects.v20 import common as dialect
 
@@ -69,7 +70,8 @@ def main(port: int, count: int) -> None:
         for key, _ in selector.select(_BEAT_S):
             if key.data is None:
                 counts = [{"received": each.received, "lost": each.lost} for each in counters]
-                print(json.dumps(counts))
+                with suppress(BrokenPipeError):  # the benchmark was ended
+                    print(json.dumps(counts), flush=True)
                 return
             key.data.take(key.fileobj.recv(_LARGEST_READ))  # type: ignore[union-attr]
 

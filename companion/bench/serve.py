@@ -96,6 +96,7 @@ def _clients(stack: ExitStack, port: int, count: int) -> subprocess.Popen[str]:
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
+        start_new_session=True,  # Ctrl-C ends the benchmark, and that ends the clients
         preexec_fn=end_with_parent,  # noqa: PLW1509  the benchmark has one thread
     )
     stack.callback(process.communicate)

@@ -3,6 +3,7 @@
 import logging
 import os
 import signal
+import threading
 from collections.abc import Iterator, Mapping
 from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
@@ -94,7 +95,7 @@ def connected(scheduler: str | None, workers: int | None) -> "Iterator[Client]":
                 raise ConfigError(f"no Dask scheduler answers at {scheduler}: {error}") from error
             cluster = None
         else:
-            with _interrupts_blocked():
+            with _interrupts_blocked(), _terminations_later():
                 cluster = LocalCluster(
                     n_workers=workers or local_workers(),
                     threads_per_worker=1,  # flights are pure Python
@@ -131,6 +132,25 @@ def _interrupts_blocked() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _terminations_later() -> Iterator[None]:
+    """Handle SIGTERM at the end of the block: Dask cannot close a cluster that is half made.
+
+    The signal is not blocked, because Dask ends worker processes by it.
+    """
+    if threading.current_thread() is not threading.main_thread():  # signals are not handled here
+        yield
+        return
+    came: list[int] = []
+    handler = signal.signal(signal.SIGTERM, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, handler)
+        if came:
+            signal.raise_signal(signal.SIGTERM)
 
 
 def wait_for_workers(client: "Client") -> None:

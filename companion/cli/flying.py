@@ -133,11 +133,13 @@ def page_about(folder: Path) -> str:
         return f"Report: {write_report(folder)}"
     except MissingExtraError as error:
         return f"No report: {error}"
-    except (
-        Exception,
-        KeyboardInterrupt,
-    ) as error:  # The flight is over.
-        return f"No report: {str(error) or 'interrupted'}; `companion report {folder}` tries again"
+    except KeyboardInterrupt:
+        reason = "interrupted"
+    except OSError as error:
+        reason = error.strerror or str(error)
+    except Exception as error:  # The flight is over.
+        reason = str(error) or type(error).__name__
+    return f"No report: {reason}; `companion report {folder}` tries again"
 
 
 def fly_bundled(

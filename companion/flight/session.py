@@ -20,6 +20,9 @@ from companion.recording.measurements.summary import Summary
 from companion.safety.actions import internal
 from companion.vehicle.link import Link
 
+LEFT_BY_USER = "left at once by the user"
+"""Result of a flight that was cancelled, as by Ctrl-C in a program of the user's."""
+
 
 class Session:
     """One flight. Signal handlers of the event loop may call `interrupt`, `leave` and `note`.
@@ -130,7 +133,7 @@ class Session:
                 return await self._flying
             except asyncio.CancelledError:
                 flight.failed_in = flight.failed_in or flight.phase
-                return "left at once by the user"
+                return LEFT_BY_USER
             finally:
                 await cancel(reporting)
 

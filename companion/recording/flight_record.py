@@ -183,6 +183,8 @@ def read_flight(folder: Path) -> FlightRecord:
         RecordError: there is no record, it cannot be read, or another version wrote it with other
             columns.
     """
+    if folder.is_file():
+        raise RecordError(f"{folder} is a file; name the folder of the flight: {folder.parent}")
     path = folder / FILE
     killed_at_start = (folder / "config.yaml").is_file()
     try:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from companion.files.write_whole import write_whole
 from companion.recording.closing_words import ClosingWords, closing_words
-from companion.recording.flight_record import RecordError
+from companion.recording.flight_record import FILE, RecordError
 from companion.report import PAGE
 from companion.report.control_plots import compared_steps, control_plots
 from companion.report.flight_data import FlightData, recorded
@@ -25,7 +25,8 @@ def read(path: Path) -> FlightData:
         RecordError: the folder holds no record of a flight.
         LogError: the log cannot be used.
     """
-    return logged(path) if path.is_file() else recorded(path)
+    is_log = path.is_file() and path.name != FILE  # that one is read with its folder
+    return logged(path) if is_log else recorded(path)
 
 
 def write_report(path: Path, out: Path | None = None) -> Path:

@@ -10,6 +10,7 @@ import numpy as np
 
 from companion.config import Config
 from companion.config.files import changed, load, shipped
+from companion.flight.session import LEFT_BY_USER
 from companion.testing import MockVehicle, fly
 
 _Rows = np.ndarray[Any, np.dtype[np.float64]]
@@ -99,6 +100,7 @@ def flown(config: Config, course: Course, autopilot: str, seed: int = 3) -> Flow
 
     Raises:
         ConfigError: the configuration cannot be flown on the mock vehicle.
+        KeyboardInterrupt: Ctrl-C in the flight, which alone would end by it.
     """
     mock = load(shipped(f"mock-{autopilot}.yaml"))
     parameters = (mock.mock or {}).get("parameters", {})
@@ -114,6 +116,8 @@ def flown(config: Config, course: Course, autopilot: str, seed: int = 3) -> Flow
     told = _configured(config, course, mock)
     with _truth(vehicle) as rows:
         summary = fly(told, vehicle)
+    if summary.result == LEFT_BY_USER:
+        raise KeyboardInterrupt
     if summary.result != "ok":
         return Flown(summary.result)
     return _tracking(summary.trace.tracking_rows(), np.array(rows), vehicle, told)

@@ -78,12 +78,20 @@ def test_lockstep_with_a_vehicle_that_is_not_in_lockstep_is_refused(folder, caps
     assert "no lockstep beacon" in " ".join(capsys.readouterr().err.split())
 
 
-def test_a_page_that_ctrl_c_interrupts_is_said_to_be(tmp_path, monkeypatch):
-    def interrupted(*_):
-        raise KeyboardInterrupt
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (KeyboardInterrupt(), "interrupted"),
+        (MemoryError(), "MemoryError"),
+        (OSError(28, "No space left on device", "report.html"), "No space left on device"),
+    ],
+)
+def test_a_page_that_is_not_written_is_said_with_the_reason(tmp_path, monkeypatch, error, words):
+    def fails(*_):
+        raise error
 
-    monkeypatch.setattr("companion.report.page.write_report", interrupted)
-    assert page_about(tmp_path).startswith("No report: interrupted; `companion report ")
+    monkeypatch.setattr("companion.report.page.write_report", fails)
+    assert page_about(tmp_path).startswith(f"No report: {words}; `companion report ")
 
 
 def test_a_mock_vehicle_without_a_word_points_at_the_disk(tmp_path):

@@ -207,6 +207,14 @@ def test_a_summary_without_its_keys_is_derived_from_the_record(tmp_path, found):
     assert summary["setpoints"] == ROWS
 
 
+@pytest.mark.parametrize("command", ["plot", "report", "replay", "export --csv"])
+def test_a_file_of_a_flight_is_answered_with_its_folder(tmp_path, command, capsys):
+    (tmp_path / "flight.mcap").touch()
+    assert main([*command.split(), str(tmp_path / "flight.mcap")]) == 2
+    told = capsys.readouterr().err
+    assert told.endswith(f"flight.mcap is a file; name the folder of the flight: {tmp_path}\n")
+
+
 def test_only_a_missing_record_is_one_that_was_never_begun(tmp_path, monkeypatch, capsys):
     """One that may not be read is not empty, and an empty one is not replayed with success."""
     (tmp_path / "config.yaml").write_text("")
