@@ -35,8 +35,14 @@ FORMER_KEYS = {
     "flight.programme": "is now called `flight.maneuvers`",
     "nmpc": "was removed with the acados solver: delete this section; guidance.kind: nmpc needs"
     " no key of its own, only the extra `nmpc`",
+    **dict.fromkeys(
+        ("line", "helix", "figure_eight", "waypoints", "csv"),
+        "belongs in a trajectory file: name that file in flight.trajectory, or fly it with"
+        " --trajectory FILE",
+    ),
 }
-"""Keys that were renamed or removed, with what to do instead; see `Section.former_keys`."""
+"""Keys that were renamed or removed, or belong in another file, with what to do instead; see
+`Section.former_keys`."""
 
 _TILT_SHARE = 0.75
 """Share of max_tilt_deg that a doublet may use; wind and overshoot need the rest."""
