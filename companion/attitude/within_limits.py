@@ -43,7 +43,7 @@ class WithinLimits:
             finite = isfinite(roll) and isfinite(pitch) and isfinite(yaw)
         except AttitudeError:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:  # sys.exit must not end a flight
             raise PlannerFaultError(f"the planner of another package failed: {error!r}") from error
         if not finite:
             raise InvalidRatesError(f"the planner returned {(roll, pitch, yaw)}")

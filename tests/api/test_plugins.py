@@ -38,6 +38,11 @@ def later(q, target, dt, constants):
         raise RuntimeError("not at this roll")
     return first_order(q, target, dt, constants)
 
+def leaving(q, target, dt, constants):
+    if q[1] > 0.02:
+        raise SystemExit(3)
+    return first_order(q, target, dt, constants)
+
 number = 5
 
 def wild(q, target, dt, constants):
@@ -85,6 +90,7 @@ nothing = theirs:nothing
 pair = theirs:pair
 raising = theirs:raising
 later = theirs:later
+leaving = theirs:leaving
 number = theirs:number
 wild = theirs:wild
 lazy = theirs:lazy
@@ -179,7 +185,7 @@ def test_guidance_of_another_package_flies_by_its_name():
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("planner: {name: their}", "unknown planner 'their'; known: auto, .*, lazy, mine"),
+        ("planner: {name: their}", "unknown planner 'their'; known: auto, .*, lazy, leaving, mine"),
         ("guidance: {kind: their}", "unknown guidance 'their'; known: linear, nmpc, broken, calm"),
     ],
 )
@@ -212,13 +218,15 @@ def test_what_cannot_fly_is_found_before_the_vehicle_is_asked(text, why, tmp_pat
         assert re.search(why, " ".join(capsys.readouterr().err.split()))
 
 
-def test_a_planner_that_fails_in_flight_is_named_and_the_vehicle_is_landed():
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [("later", "RuntimeError('not at this roll')"), ("leaving", "SystemExit(3)")],
+)
+def test_a_planner_that_fails_in_flight_is_named_and_the_vehicle_is_landed(name, why):
     vehicle = QuickVehicle("px4")
-    flight = {"planner": {"name": "later"}, "flight": {"maneuvers": ["steps"]}}
+    flight = {"planner": {"name": name}, "flight": {"maneuvers": ["steps"]}}
     summary = fly(merged(QUICK_FLIGHT, flight), vehicle)
-    assert summary.result == (
-        "the planner of another package failed: RuntimeError('not at this roll')"
-    )
+    assert summary.result == f"the planner of another package failed: {why}"
     assert not vehicle.state()["crashed"]
 
 
