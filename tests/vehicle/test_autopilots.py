@@ -89,16 +89,16 @@ def test_a_family_is_complete(autopilot):
 @EVERY_AUTOPILOT
 def test_it_is_ready_only_when_nothing_is_missing(autopilot):
     assert autopilot.not_ready(GOOD) is None
-    for missing in (
-        {"prearm_good": False},
-        {"prearm_good": None},
-        {"estimator_flags": None},
-        {"estimator_flags": 0x33F & ~0x1},
-        {"estimator_flags": 0x33F & ~0x2},
-        {"position": False},
-        {"home": False},
+    for missing, told in (
+        ({"prearm_good": False}, "the autopilot's pre-arm checks"),
+        ({"prearm_good": None}, "the autopilot's pre-arm checks"),
+        ({"estimator_flags": None}, "the estimator's status ("),
+        ({"estimator_flags": 0x33F & ~0x1}, "the estimator ("),
+        ({"estimator_flags": 0x33F & ~0x2}, "the estimator ("),
+        ({"position": False}, "a local position (LOCAL_POSITION_NED)"),
+        ({"home": False}, "the home position (HOME_POSITION)"),
     ):
-        assert autopilot.not_ready(GOOD._replace(**missing)), missing
+        assert autopilot.not_ready(GOOD._replace(**missing)).startswith(told)
 
 
 def test_ardupilot_is_not_ready_with_a_position_it_only_assumes():
