@@ -17,6 +17,7 @@ from companion.config.files import assigned, changed, load
 from companion.control.inner_loop import planner as planner_of
 from companion.control.outer_loop import make_guidance, predictive_settings
 from companion.extras import MissingExtraError, require
+from companion.files.os_errors import reason_of
 from companion.flight.maneuvers import configured_maneuvers
 from companion.flight.observer import Several
 from companion.flight.session import Session
@@ -136,7 +137,7 @@ def page_about(folder: Path) -> str:
     except KeyboardInterrupt:
         reason = "interrupted"
     except OSError as error:
-        reason = error.strerror or str(error)
+        reason = reason_of(error)
     except Exception as error:  # The flight is over.
         reason = str(error) or type(error).__name__
     return f"No report: {reason}; `companion report {folder}` tries again"

@@ -12,6 +12,7 @@ from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_USAGE
 from companion.cli.text_streams import lost_output
 from companion.demo import VehicleStoppedError
 from companion.extras import MissingExtraError
+from companion.files.os_errors import reason_of
 from companion.files.yaml_file import ConfigError
 from companion.mavlink.errors import EndpointError, LinkError, LogError, SigningError
 from companion.realtime import RealtimeError
@@ -78,7 +79,7 @@ def run(command: Command, options: argparse.Namespace) -> int:
 
 def _in_words(error: OSError) -> str:
     """What the operating system refused, with the file if it names one."""
-    reason = error.strerror or str(error)
+    reason = reason_of(error)
     return reason if error.filename is None else f"{error.filename}: {reason}"
 
 

@@ -12,6 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from companion.files.ascii_text import ascii_for
+from companion.files.os_errors import reason_of
 
 _HANDLER = "companion.transliterated"
 
@@ -41,7 +42,7 @@ def lost_output() -> str | None:
             null = os.open(os.devnull, os.O_WRONLY)
             os.dup2(null, sys.stdout.fileno())
             os.close(null)
-        return "" if isinstance(error, BrokenPipeError) else error.strerror or str(error)
+        return "" if isinstance(error, BrokenPipeError) else reason_of(error)
     return None
 
 

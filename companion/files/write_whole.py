@@ -5,6 +5,8 @@ import threading
 from contextlib import suppress
 from pathlib import Path
 
+from companion.files.os_errors import reason_of
+
 LONGEST = 5.0
 """Time allowed for the disk, s."""
 
@@ -21,7 +23,7 @@ def write_in_time(path: Path, text: str) -> str | None:
         try:
             write_whole(path, text)
         except OSError as error:
-            outcome[0] = error.strerror or str(error)
+            outcome[0] = reason_of(error)
         else:
             outcome[0] = None
 

@@ -15,6 +15,8 @@ from time import monotonic, sleep
 from types import TracebackType
 from typing import Generic, Protocol, Self, TypeVar
 
+from companion.files.os_errors import reason_of
+
 T = TypeVar("T")
 Item_contra = TypeVar("Item_contra", contravariant=True)
 
@@ -168,7 +170,7 @@ class BackgroundFile(ABC, Generic[T]):
         try:
             work()
         except OSError as error:
-            self._fail(error.strerror or str(error))
+            self._fail(reason_of(error))
         except Exception as error:  # an item that cannot be written must not end the flight
             self._fail(f"internal error: {error!r}")
 

@@ -20,6 +20,8 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.files.os_errors import reason_of
+
 _CHUNK_ROWS = 1024
 """Number of rows that are written at a time."""
 _MOST_WAITING = 64
@@ -121,7 +123,7 @@ def _write(queue: "SimpleQueue[_Work]", failures: list[str]) -> None:
             try:
                 file.append(chunk)
             except OSError as error:
-                failures.append(error.strerror or str(error))
+                failures.append(reason_of(error))
 
 
 class Series:

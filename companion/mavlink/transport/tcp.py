@@ -5,6 +5,7 @@ import errno
 import socket
 import time
 
+from companion.files.os_errors import reason_of
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.peer import CLAIM_LASTS_S, NamedPeers, host_and_port, resolve
 from companion.mavlink.transport.base import OPEN_TIMEOUT_S, Lost, Receiver
@@ -62,7 +63,7 @@ async def open_tcp_server(endpoint: TcpServer, receiver: Receiver, lost: Lost) -
             errno.EADDRINUSE: "the port is in use by another program; end it or choose another",
             errno.EACCES: "not permitted; use a port of 1024 or above",
             errno.EADDRNOTAVAIL: "no interface of this computer has that address; use 0.0.0.0",
-        }.get(error.errno or 0, error.strerror or str(error))
+        }.get(error.errno or 0, reason_of(error))
         raise EndpointError(f"{where}: {hint}") from error
     transport.listen(server)
     return transport

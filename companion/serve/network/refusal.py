@@ -2,6 +2,7 @@
 
 import errno
 
+from companion.files.os_errors import reason_of
 from companion.mavlink.errors import EndpointError
 
 _HINTS = {
@@ -17,5 +18,5 @@ def refusal(where: str, error: OSError | EndpointError) -> str:
     if isinstance(error, EndpointError):
         hint = str(error)
     else:
-        hint = _HINTS.get(error.errno or 0, error.strerror or str(error))
+        hint = _HINTS.get(error.errno or 0, reason_of(error))
     return f"serve.clients: {where}: {hint}"
