@@ -16,12 +16,10 @@ from companion.flight.observer import Observer
 from companion.flight.plan import ConfiguredPlan, Plan
 from companion.flight.wiring import connected
 from companion.realtime import Wishes
+from companion.recording.closing_words import LEFT_BY_USER
 from companion.recording.measurements.summary import Summary
 from companion.safety.actions import internal
 from companion.vehicle.link import Link
-
-LEFT_BY_USER = "left at once by the user"
-"""Result of a flight that was cancelled, as by Ctrl-C in a program of the user's."""
 
 
 class Session:

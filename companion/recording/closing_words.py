@@ -9,7 +9,9 @@ from companion.recording.what_to_do import what_to_do
 
 _BEFORE_TAKEOFF = ("connect", "checks", "stream", "arm")
 _SHARED = ("--endpoint", "--set")
-_INTERRUPTED = ("interrupted by ", "left at once by the user")
+LEFT_BY_USER = "left at once by the user"
+"""Result of a flight that was cancelled, as by Ctrl-C in a program of the user's."""
+_INTERRUPTED = ("interrupted by ", LEFT_BY_USER)
 
 
 class Invocation(NamedTuple):

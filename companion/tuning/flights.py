@@ -10,7 +10,7 @@ import numpy as np
 
 from companion.config import Config
 from companion.config.files import changed, load, shipped
-from companion.flight.session import LEFT_BY_USER
+from companion.recording.closing_words import LEFT_BY_USER
 from companion.testing import MockVehicle, fly
 
 _Rows = np.ndarray[Any, np.dtype[np.float64]]
