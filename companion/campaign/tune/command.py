@@ -20,6 +20,7 @@ from companion.campaign.tune.candidates import cases, section_of, set_values, st
 from companion.campaign.tune.certainty import compared
 from companion.campaign.tune.scores import Row, scored
 from companion.campaign.tune.search import Fly, Found, Search
+from companion.campaign.tune.section import Tune
 from companion.campaign.tune.writing import Result, result_text, summary_lines
 from companion.campaign.versions import VersionError
 from companion.extras import require
@@ -57,8 +58,9 @@ def run(options: argparse.Namespace) -> int:
                 wait_for_workers(client)
                 console.print(f"Dask's dashboard: {client.dashboard_link}")
                 fly = _fly_on(client, campaign)
-                found = _searched(campaign, place, fly, options.trials or tune.trials, console)
-                return _concluded(campaign, place, fly, found, console)
+                search = Search(campaign, tune, place, fly)
+                found = _searched(search, options.trials or tune.trials, console)
+                return _concluded(campaign, tune, place, fly, found, console)
         except VersionError as error:
             raise ConfigError(str(error)) from error
         except (KeyboardInterrupt, ClusterError) as error:
@@ -88,8 +90,7 @@ def _fly_on(client: "Client", campaign: Campaign) -> Fly:
     return fly
 
 
-def _searched(campaign: Campaign, place: Path, fly: Fly, trials: int, console: Console) -> Found:
-    search = Search(campaign, section_of(campaign), place, fly)
+def _searched(search: Search, trials: int, console: Console) -> Found:
     with _progress(console, trials) as show:
         found = search.run(trials, show)
         show(found)
@@ -109,9 +110,10 @@ def _progress(console: Console, trials: int) -> Iterator[Callable[[Found], None]
         yield show
 
 
-def _concluded(campaign: Campaign, place: Path, fly: Fly, found: Found, console: Console) -> int:
+def _concluded(
+    campaign: Campaign, tune: Tune, place: Path, fly: Fly, found: Found, console: Console
+) -> int:
     """Check the best candidate on unseen cases, write it, and report the outcome."""
-    tune = section_of(campaign)
     if found.best is None:
         console.print(
             f"None of the {found.tried} candidates kept {tune.inside_share:.1%} of the flights "
