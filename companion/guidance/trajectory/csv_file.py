@@ -137,16 +137,17 @@ def _require_no_more_values(rows: Sequence[tuple[int, Sequence[str]]], name: str
     Published files do have values without a name in the header: as many in each row, with points.
     """
     columns = len(rows[0][1])
-    more = {line: len(row) for line, row in rows[1:] if any(row[columns:])}
-    as_published = len({len(row) for _, row in rows[1:]}) == 1 and any(
-        "." in cell for _, row in rows[1:] for cell in row
+    more = next(((line, len(row)) for line, row in rows[1:] if any(row[columns:])), None)
+    if more is None:
+        return
+    as_many = len({len(row) for _, row in rows[1:]}) == 1
+    if as_many and any("." in cell for _, row in rows[1:] for cell in row):
+        return
+    line, values = more
+    raise TrajectoryError(
+        f"{name}, line {line}: {values} values for {columns} columns; "
+        "write decimals with a point, and as many values as the header has names"
     )
-    if more and not as_published:
-        line, values = next(iter(more.items()))
-        raise TrajectoryError(
-            f"{name}, line {line}: {values} values for {columns} columns; "
-            "write decimals with a point, and as many values as the header has names"
-        )
 
 
 def _numbers(

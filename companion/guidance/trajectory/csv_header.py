@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from itertools import chain
 from typing import Any
 
 from companion.guidance.trajectory.sample import TrajectoryError
@@ -79,7 +80,7 @@ def columns_of(header: list[str], named: list[str], name: str) -> dict[str, tupl
             raise TrajectoryError(f"{name}: {_missing(group, header)}")
     if "velocity" not in groups:
         groups.pop("acceleration", None)
-    for column in (column for names in groups.values() for column in names):
+    for column in chain.from_iterable(groups.values()):
         if header.count(column) > 1:
             raise TrajectoryError(
                 f"{name}: the header names the column {column} more than once; keep one of them"
