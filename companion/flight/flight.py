@@ -1,7 +1,7 @@
 """One flight from the first heartbeat to the last: runs the phases and the exit after a failure."""
 
 import asyncio
-from collections.abc import Callable, Coroutine
+from collections.abc import Awaitable, Callable, Coroutine
 from contextlib import aclosing
 from math import inf
 from typing import Any
@@ -60,8 +60,8 @@ class Flight:
     async def run(self) -> str:
         """Fly; returns "ok" or the reason why the flight ended early."""
         helpers = [
-            asyncio.create_task(work())
-            for work in (self._guide, self._watch_over, self._report_progress)
+            asyncio.create_task(self._guarded(work))
+            for work in (self._context.guidance_loop.run, self._watch_over, self._report_progress)
         ]
         try:
             await self._fly_all()
@@ -219,22 +219,17 @@ class Flight:
         finally:
             self._asking = False
 
-    async def _guide(self) -> None:
-        """Run guidance; an exception in it ends the flight.
-
-        Guidance goes on, because the exit holds the vehicle until the autopilot has it.
-        """
+    async def _guarded(self, work: Callable[[], Awaitable[None]]) -> None:
+        """Run a task beside the phases again and again; an exception in it ends the flight."""
         while True:
             try:
-                await self._context.guidance_loop.run()
-            except Exception as error:
+                await work()
+            except Exception as error:  # guidance goes on: it holds until the autopilot has control
                 self.fail(error)
             await asyncio.sleep(_WATCH_PERIOD)
 
     async def _watch_over(self) -> None:
-        while True:
-            self._judge(self._watch.judge)
-            await asyncio.sleep(_WATCH_PERIOD)
+        self._judge(self._watch.judge)
 
     def _judge(self, judge: Callable[[Phase], None]) -> None:
         try:
