@@ -160,6 +160,20 @@ def test_a_battery_that_drops_at_once_costs_little_height():
     assert error[time > 6.5].max() < 0.08
 
 
+def test_a_moving_vehicle_whose_thrust_is_used_up_is_landed_under_control():
+    """The hold that precedes the landing must not fail because no tilt is left to brake with."""
+    drop = {"kind": "low_battery", "remaining": 0.35, "after_offboard_s": 5.0}
+    with mock_vehicle(faults=[drop]) as mock:
+        summary = fly(
+            mock,
+            limits={"max_thrust": 0.63, "min_battery_percent": 0.0},
+            flight={"maneuvers": ["circle"], "takeoff_height_m": 6.0},
+            circle={"radius_m": 5.0, "speed_m_s": 3.0, "laps": 2.0},
+        )
+    assert "leaves nothing to steer with" in summary.result
+    assert not [text for _, text in summary.events if "internal error" in text]
+
+
 @pytest.mark.slow
 def test_vertical_gusts_cost_little_height():
     with mock_vehicle(wind={"vertical_gust_m_s": 0.5}, **SPARSE) as mock:
