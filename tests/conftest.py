@@ -2,12 +2,16 @@
 
 import gc
 import os
+import signal
 
 import pytest
 from hypothesis import settings
 
 # As the command line does: with more threads the tests of fits take 2.4 times the CPU time.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# Under `nohup`, programs that the tests start would keep flying when their terminal goes.
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 settings.register_profile("same", derandomize=True, deadline=None)
 settings.load_profile("same")

@@ -1,29 +1,17 @@
 """A process that runs one of the programs to measure."""
 
-import ctypes
-import signal
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
+from companion.child_process import end_with_parent
 from companion.mavlink.errors import LinkError
 from companion.mavlink.transport.free_port import free_port
-
-_PR_SET_PDEATHSIG = 1
-_libc = ctypes.CDLL(None)
 
 
 class ContestantError(LinkError):
     """A program of the benchmark failed."""
-
-
-def end_with_parent() -> None:
-    """Have the kernel kill this process when its parent ends (Linux only).
-
-    The programs run until they are killed, and a benchmark that was killed cannot do that.
-    """
-    _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 class Contestant:

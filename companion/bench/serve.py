@@ -18,8 +18,9 @@ from rich.console import Console
 from rich.table import Table
 
 from companion.bench.figures import ROUND_S, figures_of, no_garbage_collection
-from companion.bench.process import Contestant, ContestantError, end_with_parent
+from companion.bench.process import Contestant, ContestantError
 from companion.bench.sender import Sender, stamp_by_time
+from companion.child_process import end_with_parent
 from companion.mavlink.transport.free_port import free_port
 
 _CLIENTS = 3

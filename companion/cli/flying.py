@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from companion import demo
+from companion.cli import interrupts
 from companion.cli.helping import environment, helper
 from companion.cli.signals import fly_interruptibly
 from companion.cli.terminal import FlightConsole, TerminalObserver
@@ -112,6 +113,7 @@ def fly(
             shutil.rmtree(folder)  # nothing was flown, so there is nothing to keep
             raise
     # From here on the vehicle is in other hands, and all is on the disk.
+    interrupts.raise_interrupt(interrupts.unhandled())
     with suppress(OSError):
         console.print(flight_table(summary))
         console.print(f"Recorded in {folder}", soft_wrap=True)

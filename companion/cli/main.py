@@ -1,6 +1,6 @@
 """The program's entry. Exit codes: 0 success, 1 failed or interrupted, 2 usage or configuration.
 
-It imports almost nothing before it handles Ctrl-C, because the other imports take most of a second.
+It imports almost nothing before it handles signals: the other imports take most of a second.
 """
 
 from __future__ import annotations
@@ -9,13 +9,12 @@ import os
 import signal
 import sys
 
+from companion.cli import interrupts
 from companion.cli.exit_codes import EXIT_FLIGHT
 
 TYPE_CHECKING = False  # as typing's, which is not worth its 5 ms here
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from types import FrameType
-    from typing import NoReturn
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -24,21 +23,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Args:
         arguments: arguments of the command line; None: those of this process.
     """
-    by_default = signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    if by_default:  # not where a shell ignores it, nor where a test has its own
-        signal.signal(signal.SIGINT, _leave)
+    ours = interrupts.unhandled()
+    interrupts.leave_at_once(ours)
     try:
         try:
             run = _loaded(arguments)
         finally:
-            if by_default:
-                signal.signal(signal.SIGINT, signal.default_int_handler)
+            interrupts.raise_interrupt(ours)
         return run()
     except KeyboardInterrupt:
         sys.stderr.write("companion: interrupted\n")
         return EXIT_FLIGHT
     finally:
-        if by_default and arguments is None:  # the command is done: Ctrl-C may end the rest at once
+        interrupts.restore(ours)
+        if arguments is None and signal.SIGINT in ours:  # the rest may be ended at once
             signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
@@ -59,9 +57,3 @@ def _loaded(arguments: Sequence[str] | None) -> Callable[[], int]:
 
     command = command_of(options)
     return lambda: run(command, options)
-
-
-def _leave(_signal: int, _frame: FrameType | None) -> NoReturn:
-    """End the process at once; an exception could be swallowed or printed by an import."""
-    os.write(2, b"companion: interrupted before anything was sent\n")
-    os._exit(EXIT_FLIGHT)

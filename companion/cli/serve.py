@@ -9,7 +9,7 @@ from typing import Any
 
 from companion.cli.exit_codes import EXIT_OK
 from companion.cli.helping import environment, helper
-from companion.cli.signals import LEAVE_AFTER
+from companion.cli.signals import LEAVE_AFTER, hang_up
 from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
 from companion.config.files import assigned, changed, load
@@ -82,7 +82,7 @@ async def _until_stopped(session: ServeSession, pages: ReportPages) -> dict[str,
             pages.leave()
 
     loop.add_signal_handler(signal.SIGINT, interrupt)
-    for number in (signal.SIGTERM, signal.SIGHUP):
+    for number in (signal.SIGTERM, *hang_up()):
         loop.add_signal_handler(number, stop)
     return await session.run()
 

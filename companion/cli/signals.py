@@ -67,6 +67,8 @@ class Signals:
 async def fly_interruptibly(session: Session) -> Summary:
     """Fly a session; `Signals` handles SIGINT (Ctrl-C), SIGTERM and SIGHUP.
 
+    Under `nohup` a terminal that closes changes nothing.
+
     Raises:
         CancelledError: interrupted before there was a flight; nothing was sent.
         LinkError, OSError, RealtimeError: see `Session.fly`.
@@ -74,6 +76,12 @@ async def fly_interruptibly(session: Session) -> Summary:
     flight = asyncio.ensure_future(session.fly())
     signals = Signals(session, flight.cancel)
     loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    for number in (signal.SIGINT, signal.SIGTERM, *hang_up()):
         loop.add_signal_handler(number, signals.take, number)
     return await flight
+
+
+def hang_up() -> list[signal.Signals]:
+    """SIGHUP, unless whoever started this process ignores it, as `nohup` does."""
+    ignored = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    return [] if ignored else [signal.SIGHUP]

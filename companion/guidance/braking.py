@@ -36,14 +36,17 @@ def braking_time(speed: float, acceleration: float, assumed: Assumed) -> float:
 
     Args:
         speed: horizontal speed, m/s.
-        acceleration: largest horizontal acceleration, m/s².
+        acceleration: largest horizontal acceleration, m/s²; 0 if the thrust allows no tilt.
         assumed: what the monitor of the fence assumes.
     """
     if speed < _AT_REST:
         return 0.0
-    smooth = max(speed / (_DECELERATION_SHARE * acceleration), sqrt(6.0 * speed / _JERK))
     reaction = max(0.0, assumed.reaction - _NOTICED)
-    return min(smooth, 2.0 * reaction + speed / assumed.deceleration)
+    longest = 2.0 * reaction + speed / assumed.deceleration
+    if acceleration <= 0.0:
+        return longest
+    smooth = max(speed / (_DECELERATION_SHARE * acceleration), sqrt(6.0 * speed / _JERK))
+    return min(smooth, longest)
 
 
 class Braking(NamedTuple):

@@ -22,7 +22,7 @@ def landed(snapshot: Snapshot, _: bool) -> str | None:
 
 
 def failsafe(snapshot: Snapshot, _: bool) -> str | None:
-    """HEARTBEAT's system_status is MAV_STATE_CRITICAL."""
+    """HEARTBEAT's system_status is that of a failsafe: critical, emergency or termination."""
     return "the autopilot reports a failsafe" if snapshot.autopilot.failsafe else None
 
 

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from multiprocessing import get_context
 from typing import Any, NamedTuple
 
+from companion.child_process import end_with_parent
 from companion.study.outcome import Outcome, Tick
 
 RunStudy = Callable[[str, Tick], Outcome]
@@ -111,6 +112,7 @@ def _follow(
 
 def _begin(channels: _Channels) -> None:
     """Keep the channels of a worker process that begins."""
+    end_with_parent()
     _shared.append(channels)
 
 

@@ -12,7 +12,8 @@ from companion.vehicle.registry import MULTIROTORS, autopilot_for
 
 _ARMED = 128
 _AUTOPILOT_INVALID = 8
-_STATE_CRITICAL = 5
+_FAILSAFES = frozenset({5, 6, 8})
+"""MAV_STATE of an autopilot in a failsafe: critical, emergency, flight termination."""
 
 
 class ModeState:
@@ -66,8 +67,8 @@ class ModeState:
 
     @property
     def failsafe(self) -> bool:
-        """Whether the autopilot reports a failsafe (MAV_STATE_CRITICAL)."""
-        return self.heartbeat is not None and self.heartbeat.system_status == _STATE_CRITICAL
+        """Whether the autopilot reports a failsafe by HEARTBEAT's system_status."""
+        return self.heartbeat is not None and self.heartbeat.system_status in _FAILSAFES
 
     @property
     def mode_by_failsafe(self) -> bool:

@@ -58,7 +58,7 @@ class Heartbeat(NamedTuple):
         mode: The autopilot's name for the mode.
         custom_mode: The autopilot's number for the mode.
         armed: Whether the vehicle is armed.
-        system_status: MAV_STATE: 3 standby, 4 active, 5 critical (failsafe).
+        system_status: MAV_STATE: 3 standby, 4 active; 5 critical, 6 emergency, 8 termination.
     """
 
     received: float

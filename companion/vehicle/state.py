@@ -193,6 +193,7 @@ class VehicleState(ModeState, _Values):
             return
         # A battery without known cells reports its whole voltage in parts of 65534 mV.
         cells = [cell for cell in message.voltages if cell != _UNKNOWN_U16]
+        cells += [cell for cell in message.voltages_ext if cell not in (0, _UNKNOWN_U16)]
         self._take_battery(sum(cells) / 1000.0 if cells else None, message.battery_remaining)
 
     def _take_battery(self, voltage_v: float | None, percent: int) -> None:

@@ -117,6 +117,39 @@ def test_ctrl_c_while_the_program_starts_is_one_sentence(tmp_path, module, later
     assert process.returncode == 1
 
 
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        (("doctor", "--config", "c.yaml", "--wait", "60"), "Interrupted; every parameter"),
+        (("bench", "flight", "--seconds", "100"), "companion: interrupted"),
+    ],
+)
+def test_a_command_that_is_ended_by_a_signal_says_so(tmp_path, command, words, number):
+    (tmp_path / "c.yaml").write_text(
+        "flight: {connect_timeout_s: 60}\nlink: {endpoint: 'udpin://127.0.0.1:0'}\n"
+    )
+    process = Program("companion.cli.main", *command, folder=tmp_path)
+    time.sleep(0.5)  # earlier, it says that it was interrupted before anything was sent
+    process.send_signal(number)
+    out, err = process.communicate(timeout=60)
+    assert "Traceback" not in out + err
+    assert words in out + err
+    assert process.returncode == 1
+
+
+def test_nohup_keeps_a_flight_when_its_terminal_goes():
+    code = (
+        "import signal; from companion.cli.signals import hang_up; from companion.cli import "
+        "interrupts; print(hang_up() == [], signal.SIGHUP in interrupts.unhandled())"
+    )
+    done = subprocess.run(
+        ["nohup", sys.executable, "-c", code],
+        stdin=subprocess.DEVNULL, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout.split() == ["True", "False"]
+
+
 def vehicle_of(process):
     """The bundled vehicle that a program has started and that is ready."""
     for _ in range(6000):

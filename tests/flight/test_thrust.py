@@ -1,5 +1,6 @@
 """Thrust in flight: a wrong hover thrust, a battery that sags, gusts up and down."""
 
+import re
 from math import cos, sin
 from types import SimpleNamespace
 
@@ -158,6 +159,21 @@ def test_a_battery_that_drops_at_once_costs_little_height():
     time, error = height_errors(summary)
     assert error.max() < 0.15
     assert error[time > 6.5].max() < 0.08
+
+
+def test_a_moving_vehicle_whose_thrust_is_used_up_is_landed_under_control():
+    """The hold that precedes the landing must not fail because no tilt is left to brake with."""
+    drop = {"kind": "low_battery", "remaining": 0.35, "after_offboard_s": 5.0}
+    with mock_vehicle(faults=[drop]) as mock:
+        summary = fly(
+            mock,
+            limits={"max_thrust": 0.63, "min_battery_percent": 0.0},
+            flight={"maneuvers": ["circle"], "takeoff_height_m": 6.0},
+            circle={"radius_m": 5.0, "speed_m_s": 3.0, "laps": 2.0},
+        )
+    told = re.match(r"the vehicle hovers at a thrust of (.+): .* leaves nothing", summary.result)
+    assert float(told[1]) > 0.98 * 0.95 * 0.63, "the thrust at the present voltage"
+    assert not [text for _, text in summary.events if "internal error" in text]
 
 
 @pytest.mark.slow

@@ -53,6 +53,10 @@ def test_a_vehicle_at_rest_is_held_where_it_is():
     assert braking.at(BEGUN + 1.0).position_ned == HERE
 
 
+def test_a_vehicle_whose_thrust_allows_no_tilt_brakes_as_the_monitor_of_the_fence_assumes():
+    assert braking_time(5.0, 0.0, Assumed(0.3, 2.5)) == pytest.approx(2.0 * 0.2 + 5.0 / 2.5)
+
+
 @pytest.mark.parametrize("velocity", [(3.0, 4.0, -2.0), (5.0, 0.0, 1.0), (0.0, -5.0, 0.0)])
 def test_the_braking_that_begins_now_is_as_long_as_the_horizontal_speed_needs(velocity):
     motion, assumed = VehicleMotion((1.0, 2.0, -9.0), velocity), Assumed(0.3, 2.5)

@@ -141,8 +141,13 @@ def test_current_mode_does_not_hide_that_ardupilot_obeys_rates(bench):
     assert bench.state.mode == "GUIDED by rates"
 
 
-def test_failsafe_is_seen(bench):
-    assert bench.take(dialect.MAVLink_heartbeat_message(2, 12, 157, 0x05040000, 5, 3)).failsafe
+@pytest.mark.parametrize(
+    ("status", "failsafe"), [(3, False), (4, False), (5, True), (6, True), (7, False), (8, True)]
+)
+def test_failsafe_is_seen(bench, status, failsafe):
+    """Critical, emergency and flight termination, in which the motors have stopped."""
+    beat = dialect.MAVLink_heartbeat_message(2, 12, 157, 0x05040000, status, 3)
+    assert bench.take(beat).failsafe is failsafe
 
 
 def test_another_parts_heartbeat_is_not_the_autopilots(bench):
@@ -226,6 +231,11 @@ def test_battery(bench):
     cells = [4100, 4000, 3900, *[65535] * 7]
     message = dialect.MAVLink_battery_status_message(0, 0, 0, 0, cells, -1, -1, -1, 55)
     assert bench.take(message).battery == (10.0, 12.0, 0.55)
+    more = [4000, 4000, 0, 0]  # 12 cells: SYS_STATUS would tell 48 V, and both must agree
+    message = dialect.MAVLink_battery_status_message(
+        0, 0, 0, 0, [4000] * 10, -1, -1, -1, 55, voltages_ext=more
+    )
+    assert bench.take(message).battery == (10.0, 48.0, 0.55)
 
 
 def test_prearm_check_comes_with_sys_status(bench):

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from companion import demo
+from companion.child_process import end_with_parent
 from companion.config import Config
 from companion.config.files import changed, load
 from companion.files import bounded_yaml
@@ -96,7 +97,8 @@ def fly_all(tasks: Sequence[Task], tick: Tick) -> Flown:
     """
     count = cores()
     flown: dict[Task, Future[Tracked]] = {}
-    with ProcessPoolExecutor(min(count, len(tasks)), get_context("spawn")) as pool:
+    workers = min(count, len(tasks))
+    with ProcessPoolExecutor(workers, get_context("spawn"), end_with_parent) as pool:
         for task in tasks:
             _await_a_free_core(list(flown.values()), count)
             tick(str(task))

@@ -1,0 +1,67 @@
+"""Ctrl-C, SIGTERM and SIGHUP outside a flight: each ends a command, with exit code 1.
+
+A flight and `serve` handle them by themselves (`companion.cli.signals`).
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+
+from companion.cli.exit_codes import EXIT_FLIGHT
+
+TYPE_CHECKING = False  # as typing's, which is not worth its 5 ms at the start of each command
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import FrameType
+    from typing import Any, NoReturn
+
+    Handler = Callable[[int, FrameType | None], Any] | int | None
+
+_DEFAULTS: dict[signal.Signals, Handler] = {
+    signal.SIGINT: signal.default_int_handler,
+    signal.SIGTERM: signal.SIG_DFL,
+    signal.SIGHUP: signal.SIG_DFL,
+}
+
+
+def unhandled() -> list[signal.Signals]:
+    """The signals that nobody handles and nobody ignores, as `nohup` ignores SIGHUP."""
+    return [number for number, handler in _DEFAULTS.items() if signal.getsignal(number) is handler]
+
+
+def leave_at_once(numbers: list[signal.Signals]) -> None:
+    """Have these signals end the process without an exception.
+
+    During imports an exception could be swallowed or printed.
+    """
+    for number in numbers:
+        signal.signal(number, _leave)
+
+
+def raise_interrupt(numbers: list[signal.Signals]) -> None:
+    """Have these signals raise KeyboardInterrupt in the main thread.
+
+    The event loop of a flight drops all handlers when it is closed; call this again then.
+    """
+    for number in numbers:
+        # asyncio ends its tasks in good order only if SIGINT has Python's own handler
+        signal.signal(number, _DEFAULTS[number] if number == signal.SIGINT else _interrupt)
+
+
+def restore(numbers: list[signal.Signals]) -> None:
+    """Have these signals do again what they do in any Python program."""
+    for number in numbers:
+        signal.signal(number, _DEFAULTS[number])
+
+
+def _leave(_number: int, _frame: FrameType | None) -> NoReturn:
+    os.write(2, b"companion: interrupted before anything was sent\n")
+    os._exit(EXIT_FLIGHT)
+
+
+def _interrupt(_number: int, _frame: FrameType | None) -> NoReturn:
+    """Raise KeyboardInterrupt; a second signal does not disturb what the first one began."""
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda *_: None)  # programs we start would inherit SIG_IGN
+    raise KeyboardInterrupt
