@@ -8,7 +8,8 @@ from companion.attitude.reference import Lag
 from companion.attitude.types import Coefficients, Target
 
 _LONGEST_REFERENCE = sin(1.4)
-"""Largest norm of the coefficients at the start; towards 1 the body rates grow without bound."""
+"""Longest vector of coefficients at which the reference starts. Towards length 1 (90° of tilt) the
+body rates grow without bound."""
 _FOUR_ZETA_SQUARED = 2.7
 """Smallest 4·ζ² of the model, where ζ is its damping ratio."""
 _LONGEST_STEP = 0.1

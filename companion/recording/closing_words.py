@@ -46,17 +46,21 @@ class ClosingWords(NamedTuple):
     flown: bool
 
 
-def closing_words(figures: Figures, called: Invocation | None) -> ClosingWords:
+def closing_words(figures: Figures, invocation: Invocation | None) -> ClosingWords:
     """The summary in words for the figures of a flight.
 
     Args:
         figures: result of `Summary.as_dict`.
-        called: this call; None: no next command is suggested.
+        invocation: this call; None: no next command is suggested.
     """
     flown, good = figures["result"] == "ok", is_good(figures)
     headline, lines = _headline_and_reasons(figures) if flown else _ended_early(figures)
     return ClosingWords(
-        headline, tuple(lines), None if called is None else _next(figures, called), good, flown
+        headline,
+        tuple(lines),
+        None if invocation is None else _next(figures, invocation),
+        good,
+        flown,
     )
 
 
@@ -140,12 +144,12 @@ def _vehicle(state: dict[str, Any]) -> str:
     return armed if state["mode"] is None else f"{armed}, in mode {state['mode']}"
 
 
-def _next(figures: Figures, called: Invocation) -> str | None:
+def _next(figures: Figures, invocation: Invocation) -> str | None:
     def command(*words: str) -> str:
-        return f"{called.program} {shlex.join(words)}"
+        return f"{invocation.program} {shlex.join(words)}"
 
-    again = called.arguments
-    own = None if called.config is None else ["--config", called.config, *_changes(again)]
+    again = invocation.arguments
+    own = None if invocation.config is None else ["--config", invocation.config, *_changes(again)]
     if figures["result"].startswith(_INTERRUPTED):
         return command(*again)
     end = figures["early_end"]

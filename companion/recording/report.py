@@ -103,7 +103,7 @@ def _milliseconds(value: float | None) -> str:
 
 
 def _tracking(summary: Summary) -> RenderableType:
-    """Level and height errors of the maneuvers."""
+    """Horizontal and vertical errors of the maneuvers."""
     table = _table("Tracking by maneuver", "level RMS", "largest", "height RMS", "largest")
     for flown in summary.maneuvers():
         level = (
