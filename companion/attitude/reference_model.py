@@ -115,7 +115,7 @@ class ReferenceModel:
         self._tilt_rate_weight = max(constants.tilt_rate_weight, slowed_in_time**-2)
 
     def start_at(self, c: Coefficients, speed: Coefficients) -> None:
-        """Start at these coefficients, moving at this speed (1/s)."""
+        """Start at these coefficients, shortened to `_LONGEST_REFERENCE`, at this speed (1/s)."""
         length = hypot(c.north, c.east)
         scale = _LONGEST_REFERENCE / length if length > _LONGEST_REFERENCE else 1.0
         self.north, self.east = scale * c.north, scale * c.east
