@@ -10,7 +10,7 @@ from companion.recording.what_to_do import what_to_do
 _BEFORE_TAKEOFF = ("connect", "checks", "stream", "arm")
 _SHARED = ("--endpoint", "--set")
 LEFT_BY_USER = "left at once by the user"
-"""Result of a flight that was cancelled, as by Ctrl-C in a program of the user's."""
+"""Result of a flight that was cancelled, for example by Ctrl-C in a user's program."""
 _INTERRUPTED = ("interrupted by ", LEFT_BY_USER)
 
 

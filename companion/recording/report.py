@@ -104,7 +104,7 @@ def _milliseconds(value: float | None) -> str:
 
 def _tracking(summary: Summary) -> RenderableType:
     """Horizontal and vertical errors of the maneuvers."""
-    table = _table("Tracking by maneuver", "level RMS", "largest", "height RMS", "largest")
+    table = _table("Tracking by maneuver", "horizontal RMS", "largest", "height RMS", "largest")
     for flown in summary.maneuvers():
         level = (
             ("open loop", f"{flown.drift:.2f} m away")

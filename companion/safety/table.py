@@ -16,7 +16,8 @@ _GAPS = 2
 """Largest number of gaps in the setpoints within 5 s."""
 _ESTIMATE_LATE = 0.08
 """Time by which the estimated motion is behind the vehicle, s. In a run-up on the mock vehicles:
-ArduPilot's position 0.055 s and velocity up to 0.09 s, PX4's 0.02 s. Braking begins later by it."""
+ArduPilot's position 0.055 s and velocity up to 0.09 s, PX4's 0.02 s. Braking begins that much
+later."""
 _RELEASE, _HAND_BACK, _HOLD, _LAND = Action.RELEASE, Action.HAND_BACK, Action.HOLD, Action.LAND
 
 
