@@ -93,7 +93,7 @@ class _TiltMargin:
             FlightEnded: the thrust allows less than 5° of tilt.
         """
         limits, learning = self._context.config.limits, self._context.guidance_loop.learning
-        tilt, hover = degrees(learning.largest_tilt()), learning.hover
+        tilt, hover = degrees(learning.largest_tilt()), learning.present_hover
         if tilt < _LEAST_TILT:
             raise FlightEnded(
                 f"the vehicle hovers at a thrust of {hover:.2f}: limits.max_thrust "

@@ -220,16 +220,16 @@ class Flight:
             self._asking = False
 
     async def _guarded(self, work: Callable[[], Awaitable[None]]) -> None:
-        """Run a task beside the phases; an exception in it ends the flight."""
-        try:
-            await work()
-        except Exception as error:
-            self.fail(error)
+        """Run a task beside the phases again and again; an exception in it ends the flight."""
+        while True:
+            try:
+                await work()
+            except Exception as error:  # guidance goes on: it holds until the autopilot has control
+                self.fail(error)
+            await asyncio.sleep(_WATCH_PERIOD)
 
     async def _watch_over(self) -> None:
-        while True:
-            self._judge(self._watch.judge)
-            await asyncio.sleep(_WATCH_PERIOD)
+        self._judge(self._watch.judge)
 
     def _judge(self, judge: Callable[[Phase], None]) -> None:
         try:

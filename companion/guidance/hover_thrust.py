@@ -82,6 +82,11 @@ class HoverThrust:
         return self._curve.signal(GRAVITY / self._filter.gain)
 
     @property
+    def present(self) -> float:
+        """Learned normalised thrust at hover, at the present battery voltage."""
+        return self._normalised(GRAVITY)
+
+    @property
     def largest(self) -> float:
         """Largest specific thrust that is sent, m/s²."""
         return self._specific(self._settings.highest)

@@ -104,7 +104,7 @@ class ThrustCurve:
     def signal(self, share: float) -> float:
         """The signal that gives a share of full thrust; the inverse of `share`."""
         factor = self._factor
-        if factor == 0.0:
+        if factor == 0.0 or share <= 0.0:  # for a parabola the root at 0 would be 0/0
             return share
         linear = 1.0 - factor
         # The root of the quadratic in the form that stays exact for a small factor.

@@ -9,6 +9,7 @@ from pymavlink import mavutil
 from companion.control.guidance_loop import GuidanceLoop
 from companion.flight import control_phases, takeoff
 from companion.flight.observer import Silent
+from companion.guidance.source import ManeuverSource
 from companion.mavlink.commands import (
     MAV_CMD_COMPONENT_ARM_DISARM,
     MAV_CMD_DO_SET_MODE,
@@ -125,6 +126,33 @@ def test_an_error_of_ours_in_flight_hands_back_and_lands(monkeypatch):
         state = mock.state()
     assert summary.result == "internal error: ZeroDivisionError('a fault of ours')"
     assert (state["armed"], state["on_ground"], state["crashed"]) == (False, True, False)
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_guidance_that_fails_once_holds_the_vehicle_until_the_autopilot_has_it(
+    monkeypatch, autopilot
+):
+    """A slow link: without commands the last rates would be held until the landing is accepted."""
+
+    def broken(*_):
+        raise ZeroDivisionError("a fault of ours")
+
+    steered = [0.0]
+
+    def look():
+        state = mock.state()
+        if state["armed"] and state["mode"] in ("OFFBOARD", "GUIDED"):
+            steered[0] = mock.time
+
+    with mock_vehicle(autopilot=autopilot, delay_s=0.03) as mock:
+        mock.after_step.append(look)
+        observer = When(
+            "maneuvers", lambda: monkeypatch.setattr(ManeuverSource, "reference", broken), after=1.0
+        )
+        session = session_for(mock, None, observer, deadman={"target_stale_ms": 40.0})
+        summary = run(mock, session.fly())
+    assert summary.result == "internal error: ZeroDivisionError('a fault of ours')"
+    assert steered[0] - mock.setpoints[-1].time < 0.1
 
 
 def test_a_false_landing_in_control_is_not_made_true(tmp_path):

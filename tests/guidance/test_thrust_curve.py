@@ -28,6 +28,12 @@ def test_a_straight_line_is_left_alone():
     assert ThrustCurve(1.0).signal(0.49) == pytest.approx(0.7)
 
 
+@pytest.mark.parametrize("factor", [0.0, 0.5, 1.0])
+def test_no_thrust_needs_no_signal(factor):
+    """A vehicle tilted by 90 degrees or more asks for none; for a parabola that was 0/0."""
+    assert ThrustCurve(factor).signal(0.0) == 0.0
+
+
 def test_thrust_falls_with_the_square_of_the_voltage():
     battery = BatterySag(2.0)
     battery.note(10.0, 16.0)
