@@ -238,6 +238,7 @@ def test_a_summary_with_values_of_another_kind_is_one_sentence(copied, capsys):
 
 
 def test_what_is_marked_as_code_is_shown_as_code(failed):
+    assert main(["report", str(failed)]) == 0
     text = body(failed / PAGE)
     assert "in phase <code>maneuvers</code>" in text
     assert "`" not in text
