@@ -458,6 +458,17 @@ def test_a_hold_that_is_refused_becomes_a_landing(monkeypatch):
     assert (state["armed"], state["on_ground"], state["crashed"]) == (False, True, False)
 
 
+def test_a_landing_that_nobody_answers_is_asked_for_until_it_is():
+    """ArduPilot stays in GUIDED and drifts: the program must not give up while it may land it."""
+    outage = {"kind": "drop", "direction": "from_companion", "duration_s": 14.0}
+    with mock_vehicle(autopilot="ardupilot") as mock:
+        observer = When("maneuvers", lambda: mock.inject(outage), after=1.0)
+        summary = run(mock, session_for(mock, None, observer, hover={"duration_s": 1.5}).fly())
+        state = mock.state()
+    assert "no answer to 4 tries; does the uplink work?" in summary.result
+    assert (state["armed"], state["on_ground"], state["crashed"]) == (False, True, False)
+
+
 def test_an_error_at_every_sample_does_not_stop_the_landing(monkeypatch):
     """Guidance and the sample's path are broken for good: the autopilot still is asked to land."""
 
