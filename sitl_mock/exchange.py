@@ -1,6 +1,6 @@
 """The datagrams that one vehicle receives and sends, with the faults of its companion link.
 
-It has no sockets and no clock. `Server` joins it to sockets, `companion.testing` to an application
+It has no sockets and no clock. `Server` joins it to sockets, `companion.testing` to a program
 in the same process.
 In each slot both call `step` and send `outgoing` of each link. In lockstep they hand the datagrams
 that arrived since the last slot to `step`; in real time they `deliver` each one as it arrives.

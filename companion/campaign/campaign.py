@@ -63,7 +63,7 @@ class Campaign:
         """Build one case.
 
         Raises:
-            ConfigError: the application or the mock vehicle refuses its configuration; the message
+            ConfigError: the program or the mock vehicle refuses its configuration; the message
                 names the case and the key.
         """
         factors = {name: _shown(name, value) for name, value in sample.values.items()}

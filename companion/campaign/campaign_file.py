@@ -87,7 +87,7 @@ class CampaignFile(Section):
     name: Name
     """Name of the campaign, and of its folder."""
     kind: Literal["flights", "batch"] = "flights"
-    """flights: whole flights of the application and the mock vehicle on one virtual clock. batch:
+    """flights: whole flights of the program and the mock vehicle on one virtual clock. batch:
     only the attitude kinematics of a vehicle in each case."""
     config: PathKey | dict[str, Any]
     """Base configuration of every case, including its section `mock`. Either the path of a file,
@@ -110,7 +110,7 @@ class CampaignFile(Section):
     """Keys that differ from `config` in every case, dotted: limits.max_tilt_deg,
     mock.wind.gust_m_s."""
     sweep: Annotated[dict[str, Swept], Field(default_factory=dict, max_length=50)]
-    """Swept keys, dotted, of the application and of the mock vehicle (`mock.`). Also fault,
+    """Swept keys, dotted, of the program and of the mock vehicle (`mock.`). Also fault,
     fault.phase and fault.after_s, and files for flight.trajectory, relative to this one."""
     faults: Annotated[dict[Word, FaultScenario], Field(default_factory=dict, max_length=100)]
     """Fault scenarios by the name that the factor `fault` uses."""

@@ -35,7 +35,7 @@ class Case:
         index: number in the campaign, from 0.
         seed: seed of noise and gusts.
         factors: value of each swept key, as the results hold it.
-        config: configuration of the application. If a trajectory is flown, `flight.trajectory` is a
+        config: configuration of the program. If a trajectory is flown, `flight.trajectory` is a
             key of `files`.
         mock: the complete section `mock`, the seed included.
         fault: fault scenario; None: no fault.

@@ -1,4 +1,4 @@
-"""Dotted keys of a campaign: of the application's configuration, and of the mock vehicle's."""
+"""Dotted keys of a campaign: of the program's configuration, and of the mock vehicle's."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -25,14 +25,12 @@ from companion.batch.step_figures import StepFigures, step_figures
 from companion.campaign.case import Case
 from companion.campaign.swept import Value
 from companion.config import Config
+from companion.config.flight import ACCELERATION_STEPS
 from companion.control.inner_loop import planner
 from companion.files.yaml_file import ConfigError
 from companion.guidance import Corners, Steps
 from companion.guidance.reference import Pose
 from companion.recording.measurements.verdict import STRAIGHTNESS
-
-MANEUVERS = ("steps", "corners")
-"""Maneuvers that have open-loop steps."""
 
 
 def run_cases(cases: Sequence[Case]) -> list[dict[str, Value]]:
@@ -66,7 +64,7 @@ def _unflyable(case: Case) -> str | None:
             f"kind: batch flies planners without memory ({', '.join(LAW_NAMES)}), not "
             f"{config.planner_name}; set planner.name, or kind: flights"
         )
-    if not set(MANEUVERS) & set(config.flight.maneuvers):
+    if not set(ACCELERATION_STEPS) & set(config.flight.maneuvers):
         return "kind: batch flies open-loop steps; set flight.maneuvers to [corners] or [steps]"
     if STEP_HZ % config.link.attitude_rate_hz:
         return (
@@ -144,7 +142,7 @@ def rate_loop(config: Config) -> list[AxisResponse]:
 
 def _targets(config: Config, longest: float, heading: float) -> Array:
     """(samples, 4) targets of the open-loop steps, each limited as the planner limits it."""
-    name = next(each for each in config.flight.maneuvers if each in MANEUVERS)
+    name = next(each for each in config.flight.maneuvers if each in ACCELERATION_STEPS)
     scale: tuple[float, float]
     if name == "corners":
         corners = config.corners

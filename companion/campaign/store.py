@@ -66,6 +66,7 @@ _OUTCOMES = {
     ),
     "batch": (
         ("ok", "bool"),
+        ("result", "string"),
         ("model_deviation_max", "float64"),
         ("time_constant_s", "float64"),
         ("cross_axis_max", "float64"),

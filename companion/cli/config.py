@@ -11,16 +11,12 @@ from companion.config.doubts import doubts
 from companion.config.files import json_schema, load, shipped
 from companion.config.reference import Key, as_markdown, as_yaml, differences, keys
 from companion.control.expected_response import expectations
-from companion.control.inner_loop import planner
-from companion.control.outer_loop import make_guidance
 from companion.demo import check_mock
 from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
-from companion.flight.assembly import link_settings
 from companion.flight.maneuvers import configured_maneuvers
+from companion.flight.start_checks import check_control, check_link
 from companion.guidance.follow import Follow
-from companion.mavlink.errors import EndpointError
-from companion.mavlink.transport.endpoint import parse_endpoint
 
 
 def show(options: argparse.Namespace) -> int:
@@ -87,19 +83,15 @@ def check(options: argparse.Namespace) -> int:
 
     Raises:
         ConfigError: the file cannot be used.
+        SigningError: the signing key cannot be used.
     """
     config = load(options.file)
-    for key, endpoint in (
-        ("link.endpoint", link_settings(config).endpoint),
-        *(("serve.clients", client) for client in config.serve.clients),
-    ):
-        try:
-            parse_endpoint(endpoint)
-        except EndpointError as error:
-            raise ConfigError(f"{options.file}: `{key}`: {error}") from error
+    try:
+        check_link(config)
+    except ConfigError as error:
+        raise ConfigError(f"{options.file}: {error}") from error
     maneuvers = configured_maneuvers(config)
-    planner(config)
-    make_guidance(config)
+    check_control(config)
     if config.mock is not None:
         check_mock(options.file)
     for part in maneuvers.parts:

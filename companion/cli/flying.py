@@ -15,13 +15,12 @@ from companion.cli.signals import fly_interruptibly
 from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
 from companion.config.files import assigned, changed, load
-from companion.control.inner_loop import planner as planner_of
-from companion.control.outer_loop import make_guidance, predictive_settings
-from companion.extras import MissingExtraError, require
+from companion.extras import MissingExtraError
 from companion.files.os_errors import reason_of
 from companion.flight.maneuvers import configured_maneuvers
 from companion.flight.observer import Several
 from companion.flight.session import Session
+from companion.flight.start_checks import check_control, check_link, require_extras
 from companion.live.helper import Helper
 from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
@@ -40,6 +39,7 @@ def as_told(config: Config, options: argparse.Namespace, planner: str | None = N
         ConfigError: options and configuration contradict each other, or the trajectory, or a
             planner or guidance of another package, cannot be flown.
         MissingExtraError: an extra that the configuration needs is not installed.
+        SigningError: the signing key cannot be used.
     """
     link: dict[str, Any] = {}
     flight: dict[str, Any] = {}
@@ -59,14 +59,10 @@ def as_told(config: Config, options: argparse.Namespace, planner: str | None = N
     told = changed(config, assigned(options.set), "--set")
     told = changed(told, changes, "the command line")
     # What cannot be flown is to be found out before anything is begun.
+    check_link(told)
     configured_maneuvers(told)
-    planner_of(told)
-    make_guidance(told)
-    if told.guidance.kind == "nmpc":
-        predictive_settings(told)
-        require("casadi", "nmpc", "guidance.kind: nmpc")
-    if told.link.backend == "mavsdk":
-        require("mavsdk", "mavsdk", "link.backend: mavsdk")
+    check_control(told)
+    require_extras(told)
     return told
 
 

@@ -13,14 +13,12 @@ from companion.cli.signals import LEAVE_AFTER, hang_up
 from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
 from companion.config.files import assigned, changed, load
-from companion.control.inner_loop import planner
 from companion.extras import require
 from companion.files.yaml_file import ConfigError
 from companion.flight.observer import Several
+from companion.flight.start_checks import check_control, check_link, require_extras
 from companion.flight.status import FlightStatus
 from companion.mavlink import loop as link_loop
-from companion.mavlink.errors import EndpointError
-from companion.mavlink.transport.endpoint import parse_endpoint
 from companion.serve.report_pages import ReportPages
 from companion.serve.session import ServeSession
 
@@ -95,6 +93,7 @@ def _as_told(config: Config, options: argparse.Namespace) -> Config:
     Raises:
         ConfigError: options and configuration contradict each other.
         MissingExtraError: an extra that the configuration needs is not installed.
+        SigningError: the signing key cannot be used.
     """
     told = changed(config, assigned(options.set), "--set")
     link = {"endpoint": options.endpoint} if options.endpoint else {}
@@ -104,10 +103,7 @@ def _as_told(config: Config, options: argparse.Namespace) -> Config:
         raise ConfigError("link.lockstep: serve runs in real time; set link.lockstep: false")
     if told.serve.control:
         require("ruckig", "serve", "serve.control: true")
-        planner(told)
-    for endpoint in told.serve.clients:
-        try:
-            parse_endpoint(endpoint)
-        except EndpointError as error:
-            raise ConfigError(f"serve.clients: {error}") from error
+        check_control(told)
+    check_link(told)
+    require_extras(told)
     return told

@@ -9,6 +9,11 @@ from companion.files.yaml_file import PathKey, Section
 
 Seconds = Annotated[float, Field(gt=0.0, le=3600.0)]
 
+ACCELERATION_STEPS = ("steps", "corners")
+"""Maneuvers that are steps of the acceleration, flown by the attitude without feedback."""
+OPEN_LOOP = (*ACCELERATION_STEPS, "identify")
+"""Maneuvers without a reference from which a distance is measured."""
+
 
 class FlightConfig(Section):
     """Maneuvers, and the time limit of each phase."""

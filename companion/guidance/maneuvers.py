@@ -152,7 +152,11 @@ class Corners:
 
 @dataclass(frozen=True, slots=True)
 class ManeuverSequence:
-    """Maneuvers one after the other, all from the same starting pose."""
+    """Maneuvers one after the other, all from the same starting pose.
+
+    Attributes:
+        parts: the maneuvers; empty: none is known before the flight, and the sequence is not flown.
+    """
 
     parts: Sequence[Maneuver]
 
@@ -167,7 +171,15 @@ class ManeuverSequence:
         return sum(part.duration for part in self.parts)
 
     def part_at(self, time: float) -> tuple[Maneuver, float]:
-        """The part that is flown at `time`, and the time since that part began."""
+        """The part that is flown at `time`, and the time since that part began.
+
+        Before the beginning it is the first part, after the end the last one.
+
+        Raises:
+            ValueError: the sequence is empty.
+        """
+        if not self.parts:
+            raise ValueError("a sequence without maneuvers has no part")
         for part in self.parts[:-1]:
             if time < part.duration:
                 return part, time

@@ -68,7 +68,7 @@ class Solver:
     """Starts the process, sends requests, returns answers that may be flown.
 
     An answer that is late, failed or implausible is reported and not returned. The end of the
-    process is reported at the next call; watch `fileno` to notice it at once.
+    process is reported at the next call.
 
     Args:
         settings: vehicle, horizon and solver.
@@ -115,13 +115,6 @@ class Solver:
         if not self._ready and self.alive:
             self._ready = self._receive() == READY
         return self._ready and self.alive
-
-    def fileno(self) -> int:
-        """File descriptor that is readable when an answer has come or the process has ended.
-
-        Call `take` then.
-        """
-        return self._ours.fileno()
 
     def request(self, request: Request) -> None:
         """Send a request without waiting; an earlier request without an answer counts as late.

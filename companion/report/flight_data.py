@@ -61,7 +61,8 @@ class FlightData:
             "latency": from a sample's arrival to its setpoint, ms.
         figures: the content of `summary.json`, or derived from the record; None for a `.tlog`.
         provisional: whether the flight wrote no summary, so that the figures come from its record.
-        phases: the phases, in order; for a `.tlog` the autopilot's modes.
+        phases: the phases, in order; empty for a `.tlog`.
+        modes: the autopilot's modes, in order, for a `.tlog`.
         maneuvers: the maneuvers, in order.
         events: the events, in order.
         differences: keys of the configuration that are not the default; None: unknown.
@@ -75,12 +76,19 @@ class FlightData:
     figures: Mapping[str, Any] | None = None
     provisional: bool = False
     phases: tuple[Span, ...] = ()
+    modes: tuple[Span, ...] = ()
     maneuvers: tuple[Span, ...] = ()
     events: tuple[Event, ...] = ()
     differences: tuple[Key, ...] | None = None
     runs: list[StepRun] = field(default_factory=list)
     gain: float = float("nan")
     end: EarlyEnd | None = None
+
+    @property
+    def last(self) -> float | None:
+        """Time at which the phases or modes end, s since the flight began; None: there are none."""
+        lane = self.phases or self.modes
+        return lane[-1].end if lane else None
 
 
 def recorded(folder: Path) -> FlightData:

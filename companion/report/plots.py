@@ -104,7 +104,7 @@ def time_axis(flights: Sequence[FlightData], **titles: str) -> dict[str, Any]:
     marked.
     """
     layout = axes(x="time, s", **titles)
-    ends = [flight.phases[-1].end for flight in flights if flight.phases]
+    ends = [flight.last for flight in flights if flight.last is not None]
     if ends:
         layout["xaxis"]["range"] = [0.0, max(ends)]
     if len(flights) > 1:
@@ -130,7 +130,7 @@ def limit_lines(flights: Sequence[FlightData], curve: str, **more: Any) -> list[
     end = flights[0].end if len(flights) == 1 else None
     if end is None or end.limit is None or end.limit.curve != curve:
         return []
-    limit, last = end.limit, flights[0].phases[-1].end if flights[0].phases else end.time
+    limit, last = end.limit, end.time if flights[0].last is None else flights[0].last
     if limit.outline:
         north, east = np.array(limit.outline).T
         return [line(f"limit: {limit.key}", east, north, CROSSED, dash="dash", **more)]

@@ -1,4 +1,4 @@
-"""The timeline of a flight: phases, maneuvers and events."""
+"""The timeline of a flight: phases or modes, maneuvers and events."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -8,14 +8,15 @@ from companion.report.plots import IDEAL, MEASURED, REFERENCE, Plot, axes, end_m
 
 _COLOURS = {2: MEASURED, 3: "#e69f00", 4: REFERENCE}
 """Colour of an event, by its level."""
-_LANES = ("events", "maneuvers", "phases")
+_LANES = ("events", "maneuvers", "phases", "modes")
+"""Lanes of events, maneuvers and phases or modes, from the bottom up."""
 
 
 def timeline(flight: FlightData) -> Iterator[Plot]:
-    """The timeline of a flight; empty without phases."""
-    if not flight.phases:
+    """The timeline of a flight; empty without phases and modes."""
+    if flight.last is None:
         return
-    lanes = {"phases": flight.phases, "maneuvers": flight.maneuvers}
+    lanes = {"modes": flight.modes, "phases": flight.phases, "maneuvers": flight.maneuvers}
     traces = [_bars(lane, spans) for lane, spans in lanes.items() if spans]
     if flight.events:
         traces.append(

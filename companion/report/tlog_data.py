@@ -39,7 +39,7 @@ def logged(path: Path) -> FlightData:
     return FlightData(
         name=path.name,
         curves={name: curve for name, curve in curves.items() if len(curve.time)},
-        phases=reader.modes(),
+        modes=reader.modes(),
         events=tuple(reader.events),
     )
 

@@ -21,7 +21,7 @@ from companion.attitude.reference import Lag
 from companion.attitude.rotation import clamp, turned
 from companion.batch.rate_loop import fly_steps
 from companion.batch.step_figures import step_figures
-from companion.campaign import loading
+from companion.campaign import loading, store
 from companion.campaign.kinematics import check_case, run_cases
 from companion.files.yaml_file import ConfigError
 from companion.recording.measurements.response import measure_response
@@ -129,7 +129,8 @@ def campaign(folder, **changes):
 
 
 def test_each_case_of_a_batch_is_flown_with_its_own_vehicle_and_target(tmp_path):
-    cases = list(campaign(tmp_path).cases())
+    told = campaign(tmp_path)
+    cases = list(told.cases())
     rows = run_cases(cases)
     assert [row["case"] for row in rows] == list(range(6))
     assert len({row["digest"] for row in rows}) == 6
@@ -141,6 +142,8 @@ def test_each_case_of_a_batch_is_flown_with_its_own_vehicle_and_target(tmp_path)
         assert quick["flight_s"] == pytest.approx(8 * 0.4)
     assert {row["result"] for row in rows} <= {"ok", "not straight"}
     assert all(row["ok"] == (row["result"] == "ok") for row in rows)
+    stored = store.table(told.file, rows).to_pylist()
+    assert [row["result"] for row in stored] == [row["result"] for row in rows]
 
 
 @pytest.mark.parametrize(

@@ -153,7 +153,7 @@ def test_a_wrong_endpoint_is_told_with_its_file_and_key(text, key, tmp_path, cap
     path = tmp_path / "c.yaml"
     path.write_text(text)
     assert main(["check-config", str(path)]) == 2
-    assert f"{path}: `{key}`: endpoint '" in " ".join(capsys.readouterr().err.split())
+    assert f"{path}: {key}: endpoint '" in " ".join(capsys.readouterr().err.split())
 
 
 def test_a_file_that_changes_nothing_says_so(tmp_path, capsys):

@@ -37,6 +37,11 @@ def test_maneuvers_count_from_their_beginning():
     assert (source.finished(end - 0.01), source.finished(end)) == (False, True)
 
 
+def test_an_empty_sequence_is_not_flown():
+    with pytest.raises(ValueError, match="without maneuvers"):
+        ManeuverSequence(()).at(0.0, POSE)
+
+
 def test_the_pose_is_held_until_the_first_reference():
     source = commanded()
     assert (source.name, source.pose, source.finished(10.0)) == ("the program", POSE, False)

@@ -187,6 +187,11 @@ def test_a_tlog_alone_makes_a_page(folder, tmp_path):
         for each in (plots, own)
     )
     assert theirs == pytest.approx(ours, rel=1e-3), "the same commands from both recordings"
+    lanes, own_lanes = (
+        {trace["name"] for trace in each["Timeline"]["traces"]} for each in (plots, own)
+    )
+    assert lanes == {"modes"}, "a .tlog knows the autopilot's modes, not our phases"
+    assert own_lanes == {"phases", "maneuvers", "events"}
 
 
 def test_flights_stand_beside_each_other(folder, copied, tmp_path):

@@ -27,7 +27,7 @@ def names_used(path):
 
 
 def users(names):
-    """The files of the application that use one of `names`."""
+    """The files of the program that use one of `names`."""
     return {path for path in ROOT.rglob("*.py") if names & set(names_used(path))}
 
 

@@ -164,9 +164,10 @@ def what_to_look_at(results: Results, found: dict[str, list[Influence]]) -> Iter
 
 def _reason(results: Results, row: int) -> str:
     columns = results.columns
-    result = str(columns["result"][row]) if "result" in columns else "ok"
-    checks = str(columns["failed_checks"][row] or "") if "failed_checks" in columns else ""
-    return checks if result == "ok" and checks else "not straight" if result == "ok" else result
+    result = str(columns["result"][row])
+    if result != "ok":
+        return result
+    return str(columns["failed_checks"][row] or "") or "crashed"
 
 
 def _most_influential(results: Results, found: dict[str, list[Influence]]) -> Iterator[str]:

@@ -12,6 +12,7 @@ from companion.campaign.keys import with_keys
 from companion.campaign.swept import Swept
 from companion.campaign.tune.section import Tune
 from companion.config import Config
+from companion.config.flight import OPEN_LOOP
 from companion.config.known_drag import drag_prior
 from companion.control.hold_settings import disturbance_bandwidth, hold_weights
 from companion.files.yaml_file import ConfigError
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
 
 Values = Mapping[str, Any]
 """Value of each searched key."""
-_OPEN_LOOP = frozenset(("corners", "identify", "steps"))
-"""Maneuvers without a reference from which a distance is measured."""
 _UNSEEN = 1_000_003
 """Offset of the campaign's seed for the cases that the search does not see."""
 
@@ -60,10 +59,10 @@ def section_of(campaign: Campaign) -> Tune:
     for key in tune.search.keys() & swept:
         raise ConfigError(f"{campaign.name}: `{key}` stands in sweep and in tune.search")
     flown = (case.config.flight.maneuvers for case in campaign.cases())
-    if all(_OPEN_LOOP.issuperset(maneuvers) for maneuvers in flown):
+    if all(set(OPEN_LOOP).issuperset(maneuvers) for maneuvers in flown):
         raise ConfigError(
             f"{campaign.name}: tune compares the distances from the reference, and the maneuvers "
-            f"{', '.join(sorted(_OPEN_LOOP))} have none; set flight.maneuvers to [circle] or "
+            f"{', '.join(sorted(OPEN_LOOP))} have none; set flight.maneuvers to [circle] or "
             "another that follows a reference"
         )
     return tune

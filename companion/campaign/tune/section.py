@@ -12,7 +12,7 @@ class Tune(Section):
     """The search of `companion campaign tune`. Running the campaign ignores this section."""
 
     search: Annotated[dict[str, Swept], Field(min_length=1, max_length=30)]
-    """Searched keys of the application: dotted, each with uniform, loguniform or choice."""
+    """Searched keys of the program: dotted, each with uniform, loguniform or choice."""
     trials: Annotated[int, Field(ge=1, le=100_000)] = 100
     """Number of candidates that are tried; `--trials` replaces it."""
     envelope_m: Annotated[float, Field(gt=0.0, le=1000.0)] | None = 1.0

@@ -23,7 +23,8 @@ class Event(NamedTuple):
     Attributes:
         time: time since the flight began, s.
         text: text as shown to the user.
-        level: 3 (warning) if the source is "safety", else 2 (information); foxglove_msgs/msg/Log.
+        level: as in foxglove_msgs/msg/Log: 2 (information), 3 (warning) or 4 (error). A recorded
+            flight has 3 for the source "safety", else 2. A `.tlog` has the autopilot's severity.
         source: "flight", "safety", "autopilot" or "phase".
     """
 

@@ -1,0 +1,50 @@
+"""Checks of a configuration before anything is begun: what cannot be used is refused."""
+
+from companion.config import Config
+from companion.control.inner_loop import planner
+from companion.control.outer_loop import make_guidance, predictive_settings
+from companion.extras import require
+from companion.files.yaml_file import ConfigError
+from companion.flight.assembly import link_settings
+from companion.mavlink.errors import EndpointError
+from companion.mavlink.transport.endpoint import parse_endpoint
+
+
+def check_link(config: Config) -> None:
+    """Check the endpoints of the vehicle and of the clients, and the signing key.
+
+    Raises:
+        ConfigError: an endpoint is not understood; the message names its key.
+        SigningError: the key cannot be used.
+    """
+    vehicle = link_settings(config).endpoint
+    clients = [("serve.clients", client) for client in config.serve.clients]
+    for key, endpoint in [("link.endpoint", vehicle), *clients]:
+        try:
+            parse_endpoint(endpoint)
+        except EndpointError as error:
+            raise ConfigError(f"{key}: {error}") from error
+
+
+def check_control(config: Config) -> None:
+    """Check that the planner and the guidance can be made.
+
+    Raises:
+        ConfigError: they do not fit the vehicle or the limits, or those of another package fail.
+    """
+    planner(config)
+    make_guidance(config)
+    if config.guidance.kind == "nmpc":
+        predictive_settings(config)
+
+
+def require_extras(config: Config) -> None:
+    """Check that the optional packages are installed that the configuration needs.
+
+    Raises:
+        MissingExtraError: one is not.
+    """
+    if config.guidance.kind == "nmpc":
+        require("casadi", "nmpc", "guidance.kind: nmpc")
+    if config.link.backend == "mavsdk":
+        require("mavsdk", "mavsdk", "link.backend: mavsdk")
