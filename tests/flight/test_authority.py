@@ -144,7 +144,7 @@ def test_guidance_that_fails_once_holds_the_vehicle_until_the_autopilot_has_it(
         if state["armed"] and state["mode"] in ("OFFBOARD", "GUIDED"):
             steered[0] = mock.time
 
-    with mock_vehicle(autopilot=autopilot, delay_s=0.03) as mock:
+    with mock_vehicle(autopilot=autopilot, delay_s=0.025) as mock:
         mock.after_step.append(look)
         observer = When(
             "maneuvers", lambda: monkeypatch.setattr(ManeuverSource, "reference", broken), after=1.0
