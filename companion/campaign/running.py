@@ -33,6 +33,7 @@ from companion.campaign.cluster import (
 from companion.campaign.design import too_few_samples
 from companion.campaign.folder import Description
 from companion.campaign.loading import load
+from companion.campaign.report.results import Results
 from companion.campaign.unit import check_cases, ranges, size_of_units
 from companion.campaign.versions import VersionError
 from companion.files.yaml_file import ConfigError
@@ -174,8 +175,12 @@ class _Run:
                 f"{times} of the {self._noun} failed by the program's own fault: {error}",
                 markup=False,
             )
-        good = sum(store.read(self._place)["ok"].to_pylist())
-        say(f"{good} of {progress.flown} {self._noun} were good. All are in {self._place};")
+        results = Results.read(self._place)
+        say(f"{results.good.sum()} of {progress.flown} {self._noun} were good.")
+        if results.documented.size:
+            kept, faulty = results.documented.sum(), results.documented.size
+            say(f"{kept} of {faulty} flights with a fault ended as documented.")
+        say(f"All are in {self._place};")
         say("see them with")
         say(f"  companion campaign report {shlex.quote(str(self._place))}")
         return FAILED if errors else DONE

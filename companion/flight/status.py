@@ -16,11 +16,13 @@ from companion.flight.view import view
 from companion.recording.trace import FlightTrace
 from companion.safety import SafetyLadder
 from companion.safety.actions import internal
-from companion.vehicle.records import Battery
+from companion.vehicle.records import Battery, LocalPosition
 
 _PERIOD = 0.1
 _WINDOW = 1.0
 """Time over which the rate of setpoints is counted, s."""
+_OUT_OF_DATE = 1.0
+"""A position or attitude that was received longer ago is unknown by now, s."""
 
 
 class FlightStatus(NamedTuple):
@@ -155,12 +157,11 @@ class StatusReporter:
             self.takeoff = now
             self.battery_at_takeoff = None if state.battery is None else state.battery.remaining
         self._rows.record(now)
-        speed, tilt = self._speed(), self._tilt()
-        vehicle_time = context.loop.record.last_vehicle_time
+        vehicle_time, tilt = context.loop.record.last_vehicle_time, self._tilt(now)
         row = (
             None if vehicle_time == -inf else vehicle_time,
-            state.height,
-            speed,
+            self._height(now),
+            self._speed(now),
             None if tilt is None else degrees(tilt),
             self._error(),
         )
@@ -182,9 +183,9 @@ class StatusReporter:
             maneuver=None if flown is None else flown.name,
             maneuver_elapsed=0.0 if flown is None else flown.elapsed,
             maneuver_duration=None if flown is None else flown.duration,
-            height=context.link.state.height,
-            speed=self._speed(),
-            tilt=self._tilt(),
+            height=self._height(now),
+            speed=self._speed(now),
+            tilt=self._tilt(now),
             error=self._error(),
             rate=self._rate(now, record),
             latency=1e-9 * record.latency_ns if self.real_time and context.loop.on else None,
@@ -205,13 +206,22 @@ class StatusReporter:
         sent = record.setpoints - before
         return sent / (now - since) if sent and now > since else None
 
-    def _speed(self) -> float | None:
+    def _position(self, now: float) -> LocalPosition | None:
         position = self._context.link.state.position
+        return position if position and now - position.received <= _OUT_OF_DATE else None
+
+    def _height(self, now: float) -> float | None:
+        return self._context.link.state.height if self._position(now) else None
+
+    def _speed(self, now: float) -> float | None:
+        position = self._position(now)
         return None if position is None else hypot(*position.velocity_ned)
 
-    def _tilt(self) -> float | None:
+    def _tilt(self, now: float) -> float | None:
         sample = self._context.loop.resets.newest
-        return None if sample is None else tilt_angle(sample.q[1], sample.q[2])
+        if sample is None or now - sample.received > _OUT_OF_DATE:
+            return None
+        return tilt_angle(sample.q[1], sample.q[2])
 
     def _error(self) -> float | None:
         loop = self._context.loop

@@ -100,13 +100,14 @@ def recorded(folder: Path) -> FlightData:
     record = read_flight(folder)
     figures, provisional = summary_of(record)
     config = _configuration(folder)
+    phases = spans([(each.time, each.name) for each in record.phases], record.duration)
     return FlightData(
         name=folder.resolve().name,
         curves={name: curve for name, curve in _curves(record).items() if len(curve.time)},
         figures=figures,
         provisional=provisional,
-        phases=spans([(each.time, each.name) for each in record.phases], record.duration),
-        maneuvers=_maneuvers(record),
+        phases=phases,
+        maneuvers=_maneuvers(record, phases),
         events=tuple(each for each in record.events if each.source != "phase"),
         differences=None if config is None else tuple(differences(config)),
         runs=step_runs(trace_of(record).response_rows()),
@@ -121,9 +122,15 @@ def spans(begins: list[tuple[float, str]], end: float) -> tuple[Span, ...]:
     return tuple(Span(time, until, name) for (time, name), (until, _) in pairwise(bounds))
 
 
-def _maneuvers(record: FlightRecord) -> tuple[Span, ...]:
+def _maneuvers(record: FlightRecord, phases: tuple[Span, ...]) -> tuple[Span, ...]:
+    """The maneuvers; the last one of a flight that ended early ends with its phase."""
     marks = [(mark.time - record.began, mark.name or "") for mark in record.maneuvers]
-    return tuple(span for span in spans(marks, record.duration) if span.name)
+    found = [span for span in spans(marks, record.duration) if span.name]
+    ends = [phase.end for phase in phases]
+    return tuple(
+        span._replace(end=min([span.end, *(end for end in ends if end > span.begin)]))
+        for span in found
+    )
 
 
 def _configuration(folder: Path) -> Config | None:

@@ -1,15 +1,19 @@
 """Renders a page with plots as one HTML file that needs no network."""
 
 import json
+import re
 from base64 import b64encode
 from collections.abc import Sequence
 from gzip import compress
 from importlib.metadata import version
 from importlib.resources import files
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from companion.extras import require
 from companion.report.plots import Plot
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
 
 
 def require_extra() -> None:
@@ -41,6 +45,7 @@ def rendered(package: str, template: str, title: str, plots: Sequence[Plot], **s
     environment = jinja2.Environment(
         loader=jinja2.ChoiceLoader(folders), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
+    environment.filters["with_code"] = _with_code
     plotly = files("plotly") / "package_data" / "plotly.min.js"
     return environment.get_template(template).render(
         title=title,
@@ -50,6 +55,13 @@ def rendered(package: str, template: str, title: str, plots: Sequence[Plot], **s
         version=version("mavlink-companion"),
         **shown,
     )
+
+
+def _with_code(text: str) -> "Markup":
+    """A text for the page: what stands between two `…` is set as code."""
+    from markupsafe import Markup, escape  # noqa: PLC0415  comes with jinja2
+
+    return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
 
 def _packed(data: bytes) -> str:

@@ -4,15 +4,19 @@ import argparse
 import json
 import re
 from math import isnan
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import pyarrow
 import pyarrow.csv
 import pyarrow.parquet
 import pytest
 
 from companion.campaign import folder, loading, store
+from companion.campaign.report import page
 from companion.campaign.report.page import _few_samples, run
+from companion.campaign.report.results import Results
 from companion.campaign.report.statistics import levels, pareto_front, share_of
 from companion.files.yaml_file import ConfigError
 
@@ -75,8 +79,8 @@ def test_the_page_says_what_was_flown_how_it_went_and_what_to_look_at(flown, cap
     good = 150 - len(crashed)
     assert f"planners: {good} of 150 flights good: " in said
     assert "30 of 180 flights are missing" in said
-    page = (place / "report.html").read_text("utf-8")
-    body = re.sub(r"<script.*?</script>", "", page, flags=re.S)
+    html = (place / "report.html").read_text("utf-8")
+    body = re.sub(r"<script.*?</script>", "", html, flags=re.S)
     assert f"{good} of 150 flights good" in body
     assert f"{len(crashed)} flights crashed" in body
     assert "Success is lowest with mock.wind.speed_m_s = " in body
@@ -95,8 +99,23 @@ def test_the_page_says_what_was_flown_how_it_went_and_what_to_look_at(flown, cap
     shares = dict(re.findall(r"<td>(\S+)</td><td>(-?\d+)%", influence))
     assert int(shares["planner.name"]) > int(shares["mock.wind.speed_m_s"]) > 5
     assert int(shares["mock.airframe.mass_kg"]) < 5
-    plots = json.loads(re.search(r'type="application/json">(.*?)</script>', page, re.S)[1])
+    plots = json.loads(re.search(r'type="application/json">(.*?)</script>', html, re.S)[1])
     assert len(plots) == len(re.findall(r'<div id="plot\d+"', body))
+
+
+@pytest.mark.parametrize(
+    ("documented", "words", "first"),
+    [
+        ([True, True], "c: 2 of 2 flights with a fault ended as documented: 100 %", "1 of them"),
+        ([False, True], "c: 1 of 2 flights with a fault ended as documented: 50", "1 of them"),
+        ([None, True], "c: 1 of 2 flights good: 50", "1 of 1 flights with a fault ended"),
+    ],
+)
+def test_with_a_fault_in_each_flight_the_ending_counts(documented, words, first):
+    columns = {"ok": [True, False], "as_documented": documented, "result": ["ok", "GPS lost"]}
+    results = Results(Path(), "c", "flights", 2, {}, pyarrow.table(columns))
+    assert page.headline(results).startswith(words)
+    assert first in " ".join(page.what_to_look_at(results, {}))
 
 
 def test_all_results_stand_in_one_table(flown):

@@ -183,3 +183,16 @@ def test_a_failure_of_the_recording_at_its_close_is_an_event(tmp_path, monkeypat
         [each["text"] for each in written["events"]],
     ):
         assert [text for text in texts if "recording stopped: No space left" in text] == texts[-1:]
+
+
+def test_height_and_speed_are_unknown_when_no_position_comes():
+    """Shown or drawn on, the last ones would say that a vehicle on the ground is in the air."""
+    vehicle, observer = QuickVehicle(), Watching()
+    silent = {"kind": "stop_telemetry", "messages": ["LOCAL_POSITION_NED"]}
+    vehicle.when(lambda: vehicle.state()["mode"] == "LAND", lambda: vehicle.inject(silent))
+    summary = fly(QUICK_FLIGHT, vehicle, None, observer)
+    last = observer.states[-1]
+    assert last.height is None
+    assert last.speed is None
+    assert last.tilt is not None
+    assert np.isnan(summary.trace.motion.rows()[-1, 2:4]).all()

@@ -133,6 +133,12 @@ def test_a_failed_flight_shows_where_it_ended_and_the_limit_it_crossed(failed):
     assert re.search(r"The flight ended early at \d+\.\d s: \S", body(failed / PAGE))
 
 
+def test_the_last_maneuver_of_a_failed_flight_ends_with_its_phase(failed):
+    flight = recorded(failed)
+    (phase,) = (each for each in flight.phases if each.name == "maneuvers")
+    assert flight.maneuvers[-1].end == phase.end < flight.phases[-1].end
+
+
 def test_weights_that_are_too_large_make_a_swing_and_no_good_flight(failed):
     """The stranger's flight: 16° of tilt back and forth, and it was called good."""
     checks = json.loads((failed / "summary.json").read_text())["verdict"]["checks"]
@@ -229,6 +235,13 @@ def test_a_summary_with_values_of_another_kind_is_one_sentence(copied, capsys):
     path.write_text(json.dumps({**json.loads(path.read_text()), "maneuvers": [5]}))
     assert main(["report", str(copied)]) == 2
     assert "rename its summary.json" in capsys.readouterr().err
+
+
+def test_what_is_marked_as_code_is_shown_as_code(failed):
+    assert main(["report", str(failed)]) == 0
+    text = body(failed / PAGE)
+    assert "in phase <code>maneuvers</code>" in text
+    assert "`" not in text
 
 
 def test_text_of_a_log_cannot_become_a_tag():

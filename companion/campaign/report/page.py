@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 from rich.console import Console
 
 from companion.campaign.campaign import Campaign
@@ -113,7 +114,7 @@ def page_text(results: Results, campaign: Campaign) -> str:
         f"Campaign {results.name}",
         shown,
         headline=headline(results),
-        good=not results.true_cases("crashed") and bool(results.good.all()),
+        good=not results.true_cases("crashed") and bool(_judged(results).all()),
         lines=[*missing(results), *what_to_look_at(results, found)],
         tables=[each for each in first if each is not None],
         last=[tables.configuration(campaign), tables.all_cases(results)],
@@ -121,9 +122,17 @@ def page_text(results: Results, campaign: Campaign) -> str:
 
 
 def headline(results: Results) -> str:
-    """One sentence: what was flown, and the success rate with its interval."""
-    share = share_of(results.good)
-    return f"{results.name}: {share.chosen} of {share.of} {results.noun} good: {share}"
+    """One sentence: what was flown, and the success rate with its interval.
+
+    Where each case has a fault, success is that the flight ended as documented for the fault.
+    """
+    share = share_of(_judged(results))
+    what = "with a fault ended as documented" if results.all_faulty else "good"
+    return f"{results.name}: {share.chosen} of {share.of} {results.noun} {what}: {share}"
+
+
+def _judged(results: Results) -> NDArray[np.bool_]:
+    return results.documented if results.all_faulty else results.good
 
 
 def missing(results: Results) -> list[str]:
@@ -140,13 +149,13 @@ def missing(results: Results) -> list[str]:
 def what_to_look_at(results: Results, found: dict[str, list[Influence]]) -> Iterator[str]:
     """A summary: what was flown, and which results deserve attention first."""
     yield f"Swept: {', '.join(results.factors) or 'nothing but noise and gusts'}."
-    columns = results.columns
     if crashed := results.true_cases("crashed"):
         yield f"{crashed} {results.noun} crashed; they stand first in the table of worst cases."
-    documented = [value for value in columns.get("as_documented", ()) if value is not None]
-    if documented:
-        kept = sum(documented)
-        yield f"{kept} of {len(documented)} flights with a fault ended as documented."
+    if results.all_faulty:
+        yield f"{results.good.sum()} of them were good in spite of the fault."
+    elif results.documented.size:
+        kept, faulty = results.documented.sum(), results.documented.size
+        yield f"{kept} of {faulty} flights with a fault ended as documented."
     reasons = Counter(
         _reason(results, row) for row in range(results.count) if not results.good[row]
     )

@@ -107,6 +107,17 @@ class Results:
         """(cases,): whether each case was good."""
         return np.array(self.columns["ok"], dtype=bool)
 
+    @cached_property
+    def documented(self) -> NDArray[np.bool_]:
+        """(k,): whether each of the k cases with a fault ended as documented for that fault."""
+        told = self.columns.get("as_documented", ())
+        return np.array([value for value in told if value is not None], dtype=bool)
+
+    @property
+    def all_faulty(self) -> bool:
+        """Whether each case has a fault: then a flight that is not good may be what was wanted."""
+        return self.documented.size == self.count > 0
+
     @property
     def noun(self) -> str:
         """Plural noun for the cases, such as `flights`."""

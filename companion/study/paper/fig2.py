@@ -89,7 +89,7 @@ def run(tick: Tick) -> Outcome:
         caption=(
             "Every method at one heading, for Euler angles the worst: both coefficients, distance"
             " from the first-order reference, and the path in the plane of the coefficients. In the"
-            " panels `Response, east` and `Path` the axis of a_E is magnified."
+            ' panels "Response, east" and "Path" the axis of a_E is magnified.'
         ),
         tables=(
             Table(

@@ -73,7 +73,7 @@ def _finding(worst: dict[tuple[Method, float], float]) -> Finding:
         "The deviation of the proposed method comes from discretisation.",
         worst[PROPOSED, slowest] > 10.0 * worst[PROPOSED, quickest] and largest <= _ROUNDING,
         f"It grows from {worst[PROPOSED, quickest]:.2g} at {quickest:.0f} Hz to"
-        f" {worst[PROPOSED, slowest]:.2g} at {slowest:.0f} Hz. With `exact`, which solves"
+        f" {worst[PROPOSED, slowest]:.2g} at {slowest:.0f} Hz. With exact, which solves"
         f" each sample in closed form, it is at most {largest:.1g} at every rate.",
     )
 
