@@ -57,7 +57,18 @@ def serve(options: argparse.Namespace) -> int:
 
 
 class _Events(TerminalObserver):
-    """Shows phases and events, without live lines: they would stay visible between flights."""
+    """Shows phases and events, all on the clock of this command, which may see several flights.
+
+    There are no live lines: they would stay visible between flights.
+    """
+
+    def __init__(self, console: FlightConsole) -> None:
+        super().__init__(console)
+        self._began = time.monotonic()
+
+    def event(self, _: float, text: str) -> None:
+        """Show an event of a flight or of the command."""
+        super().event(time.monotonic() - self._began, text)
 
     def status(self, status: FlightStatus) -> None:
         """Ignore it."""

@@ -26,6 +26,43 @@ def print_anything() -> None:
         stream = getattr(sys, name)
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors=_HANDLER)
+    if sys.stdout is sys.__stdout__ and isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout = _Output(sys.stdout)
+
+
+class _Output(io.TextIOWrapper):
+    """Standard output that remembers a failed write.
+
+    A later flush does not fail if the text was too long for a buffer, or if there is none, as with
+    PYTHONUNBUFFERED or `python -u`.
+
+    Attributes:
+        failure: the first failure, or None.
+    """
+
+    failure: OSError | None = None
+
+    def __init__(self, stream: io.TextIOWrapper) -> None:
+        buffer, each_line = stream.buffer, stream.line_buffering
+        if isinstance(buffer, io.RawIOBase):  # without one, a long text may be written in part
+            buffer, each_line = io.BufferedWriter(buffer), True
+        super().__init__(buffer, stream.encoding, stream.errors, line_buffering=each_line)
+
+    def write(self, text: str) -> int:
+        """Write text, and remember a failure."""
+        try:
+            return super().write(text)
+        except OSError as error:
+            self.failure = self.failure or error
+            raise
+
+    def flush(self) -> None:
+        """Flush, and remember a failure."""
+        try:
+            super().flush()
+        except OSError as error:
+            self.failure = self.failure or error
+            raise
 
 
 def lost_output() -> str | None:
@@ -35,15 +72,18 @@ def lost_output() -> str | None:
         None if it does; empty if nobody reads on, as after `| head`; else the reason in words. What
         is printed later is then discarded: Python would complain about it at the end.
     """
+    failure: OSError | None = getattr(sys.stdout, "failure", None)
     try:
         sys.stdout.flush()
     except OSError as error:
-        with suppress(OSError, ValueError):
-            null = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(null, sys.stdout.fileno())
-            os.close(null)
-        return "" if isinstance(error, BrokenPipeError) else reason_of(error)
-    return None
+        failure = failure or error
+    if failure is None:
+        return None
+    with suppress(OSError, ValueError):
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, sys.stdout.fileno())
+        os.close(null)
+    return "" if isinstance(failure, BrokenPipeError) else reason_of(failure)
 
 
 def _transliterated(error: UnicodeError) -> tuple[str, int]:

@@ -1,7 +1,10 @@
 """Atomic writing of a file: at any time a reader finds either the old or the new content."""
 
 import os
+import tempfile
 import threading
+import weakref
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -9,6 +12,25 @@ from companion.files.os_errors import reason_of
 
 LONGEST = 5.0
 """Time allowed for the disk, s."""
+
+
+class ReservedRoom:
+    """Room on a disk for a file that is written later, however full the disk is then.
+
+    A file without a name holds the room, so nothing is left of it when the process is killed.
+
+    Args:
+        folder: folder of the later file. If there is no room, or the file system cannot reserve
+            any, nothing is reserved.
+        size: bytes.
+    """
+
+    def __init__(self, folder: Path, size: int) -> None:
+        self.free: Callable[[], object] = lambda: None
+        with suppress(OSError):
+            file = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115  closed by `free`
+            self.free = weakref.finalize(self, file.close)
+            os.posix_fallocate(file.fileno(), 0, size)
 
 
 def write_in_time(path: Path, text: str) -> str | None:

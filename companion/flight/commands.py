@@ -74,10 +74,10 @@ async def command_if_ours(context: FlightContext, command: Command, ours: Ours, 
     Raises:
         FlightEnded: somebody else has the vehicle, or another vehicle answers.
         CommandRefused: the autopilot refused.
-        CommandTimeout: no try was answered, or the last one only with "in progress".
+        CommandTimeout: no try was answered.
+        CommandUnfinished: the autopilot answered "in progress", and did not finish in time.
         LinkLost: the connection dropped while waiting.
     """
-    unfinished: CommandUnfinished | None = None
     for given in range(_TRIES):
         await context.fresh_heartbeat()
         context.same_vehicle.require()
@@ -87,8 +87,13 @@ async def command_if_ours(context: FlightContext, command: Command, ours: Ours, 
         try:
             await context.link.command(*command, retries=0)
             return
-        except CommandTimeout as error:
-            unfinished = error if isinstance(error, CommandUnfinished) else None
+        except CommandUnfinished:  # another try would only take as long again
+            await context.fresh_heartbeat()
+            if not done():
+                raise
+            return
+        except CommandTimeout:
+            pass
         except CommandRefused:
             # A vehicle that has obeyed the first try refuses the second one.
             if given == 0 or not await _takes_effect(context, done):
@@ -96,8 +101,6 @@ async def command_if_ours(context: FlightContext, command: Command, ours: Ours, 
             return
     await context.fresh_heartbeat()
     if not done():
-        if unfinished:
-            raise unfinished
         name = command_name(command.command)
         raise CommandTimeout(f"{name}: no answer to {_TRIES} tries; does the uplink work?")
 

@@ -52,12 +52,13 @@ def course_of(
     """
     flight, context, reporter = assembled.flight, assembled.context, assembled.reporter
     state, began, config = context.link.state, flight.began, context.config
+    now = asyncio.get_running_loop().time()
     end = None if state.battery is None else state.battery.remaining
     takeoff = None if reporter.takeoff is None else reporter.takeoff - began
     early_end = None
     if flight.failed_in is not None:
-        now = asyncio.get_running_loop().time() - began  # of a flight that was left, without event
-        time = next((at for at, text in flight.events if text == result), now)
+        # A flight that was left has no such event.
+        time = next((at for at, text in flight.events if text == result), now - began)
         early_end = _early_end(
             time,
             began,
@@ -75,6 +76,7 @@ def course_of(
         vehicle_uid=context.same_vehicle.uid,
         armed=state.armed,
         mode=state.mode,
+        unheard=_unheard(context, now),
         battery=(reporter.battery_at_takeoff, end),
         min_battery=config.limits.min_battery,
         deadline=config.deadman.deadline,
@@ -84,6 +86,15 @@ def course_of(
         settings=_settings(context),
         changes=tuple(change.as_dict(began) for change in assembled.changes.made_in_flight),
     )
+
+
+def _unheard(context: FlightContext, now: float) -> float | None:
+    """How long the vehicle, or its heartbeat, was not heard at `now`, s; None: it is heard."""
+    heartbeat = context.link.state.heartbeat
+    if heartbeat is None:
+        return None
+    since = now - heartbeat.received
+    return since if since > context.heartbeat_limit else context.snapshot_builder.unheard(now)
 
 
 def _early_end(

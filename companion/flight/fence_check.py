@@ -83,9 +83,7 @@ class FenceCheck:
         offset, velocity = _vector(motion.position[k]), _vector(motion.velocity[k])
         fence = self.fence
         if fence.places and self.origin is None:
-            fence = Fence(
-                fence.radius, fence.ceiling, fence.floor, (), (), fence.deceleration, fence.reaction
-            )
+            fence = replace(fence, places=())
         north, east, _ = _vector(motion.acceleration[k])
         height = self.height - offset[2]
         return fence.stop_breach(offset, velocity, height, self.origin, MARGIN, (north, east))

@@ -10,7 +10,7 @@ from types import TracebackType
 
 from companion import realtime
 from companion.config import Config
-from companion.files.write_whole import write_in_time
+from companion.files.write_whole import ReservedRoom, write_in_time
 from companion.flight import flown_config
 from companion.flight.assembled import Assembled
 from companion.flight.course import advice, course_of
@@ -21,6 +21,9 @@ from companion.mavlink.texts import TextFrames
 from companion.recording.measurements.summary import Summary
 from companion.recording.recorder import FlightRecorder
 from companion.recording.tlog import TlogWriter
+
+_SUMMARY_ROOM = 1 << 18
+"""Room kept for `summary.json`, bytes; most take less than 10 kB, and every event adds to them."""
 
 
 class FlightFiles:
@@ -63,6 +66,7 @@ class FlightFiles:
         self.mcap: FlightRecorder | None = None
         if folder is not None:
             flown_config.record(config, folder, follows=follows)
+            self._room = ReservedRoom(folder, _SUMMARY_ROOM)
             loop = asyncio.get_running_loop()
             in_vehicle_time = config.link.lockstep or not environment.realtime
             epoch = 0.0 if in_vehicle_time else time.time() - loop.time()
@@ -193,7 +197,9 @@ class FlightFiles:
         folder = self.folder
         if folder is None:
             return whole
-        failure = write_in_time(folder / "summary.json", whole.as_json() + "\n")
+        text = whole.as_json() + "\n"
+        self._room.free()
+        failure = write_in_time(folder / "summary.json", text)
         if failure is not None:
             self._note(f"{folder}: summary.json was not written: {failure}")
         return whole

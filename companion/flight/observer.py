@@ -149,6 +149,8 @@ class EventRecorder:
 class StateLogger:
     """Notes each change of mode and arming state, and each text of the autopilot, as an event.
 
+    The first call notes the present mode and arming state, but no text from before.
+
     Args:
         state: telemetry of the vehicle.
         note: called with each change as a sentence.
@@ -159,7 +161,7 @@ class StateLogger:
         self._note = note
         self._mode: str | None = None
         self._armed: bool | None = None
-        self._last_text: StatusText | None = None
+        self._last_text: StatusText | None = state.texts[-1] if state.texts else None
 
     def log_changes(self) -> None:
         """Note every change since the last call."""

@@ -58,6 +58,7 @@ class Fence:
         places: corners as (latitude, longitude) in degrees, instead of `polygon`.
         deceleration: deceleration that the vehicle certainly reaches, m/s².
         reaction: time until braking begins, s.
+        late: time by which the estimated horizontal motion is behind the vehicle, s.
     """
 
     radius: float
@@ -67,6 +68,7 @@ class Fence:
     places: tuple[Corner, ...]
     deceleration: float
     reaction: float
+    late: float = 0.0
 
     def breach(
         self, offset: Vector, height: float | None, origin: Place | None, margin: float = 0.0
@@ -109,9 +111,10 @@ class Fence:
         """Where the vehicle stops if it brakes now, m NED from where control began.
 
         For the horizontal and for the vertical velocity v the way is v·t + v²/(2b), with the
-        reaction time t and the deceleration b. A horizontal acceleration a that makes the vehicle
-        faster lasts for the reaction time: the way is v·t + a·t²/2 + (v + a·t)²/(2b). One that
-        brakes does not count, since it may end at any moment.
+        deceleration b and the reaction time t, to which `late` is added horizontally. A horizontal
+        acceleration a that makes the vehicle faster lasts for t: the way is
+        v·t + a·t²/2 + (v + a·t)²/(2b). One that brakes does not count, since it may end at any
+        moment.
 
         Args:
             offset: position of the vehicle relative to where control began, m NED; numbers, or
@@ -119,7 +122,8 @@ class Fence:
             velocity: m/s NED; numbers, or arrays of them.
             acceleration: north and east, m/s²; numbers, or arrays of them.
         """
-        (north, east, down), reaction, twice = velocity, self.reaction, 2.0 * self.deceleration
+        (north, east, down), twice = velocity, 2.0 * self.deceleration
+        reaction = self.reaction + self.late
         gain_north, gain_east = reaction * acceleration[0], reaction * acceleration[1]
         # The square of the speed after the reaction time, minus the square of the present speed.
         gained = gain_north * (2.0 * north + gain_north) + gain_east * (2.0 * east + gain_east)
@@ -130,7 +134,7 @@ class Fence:
         return (
             offset[0] + reaction * (north + 0.5 * gain_north) + braking * later_north,
             offset[1] + reaction * (east + 0.5 * gain_east) + braking * later_east,
-            offset[2] + (reaction + abs(down) / twice) * down,
+            offset[2] + (self.reaction + abs(down) / twice) * down,
         )
 
     def stop_breach(

@@ -34,7 +34,7 @@ class Command(NamedTuple):
 
 _ACCEPTED = 0
 _IN_PROGRESS = 5
-_IN_PROGRESS_TIMEOUT_S = 30.0  # until the next ACK of a command in progress
+_IN_PROGRESS_TIMEOUT_S = 30.0  # from the ACK "in progress" to the final one
 _REASON_DELAY_S = 0.3  # the reason of a refusal may come as a STATUSTEXT this long after the ACK
 
 
@@ -78,14 +78,14 @@ class CommandClient:
         Args:
             command: MAV_CMD.
             params: Up to seven parameters; the rest are 0.
-            timeout_s: Time allowed for the ACK of each try, s; 30 s for the next ACK after one that
-                the command is in progress.
+            timeout_s: Time allowed for the ACK of each try, s. A command that is in progress is not
+                repeated; it may take 30 s.
             retries: Number of repetitions after the first try.
 
         Raises:
             CommandRefused: The result is not ACCEPTED.
-            CommandTimeout: No final ACK came to any of the tries; it is a `CommandUnfinished` if
-                the last one was answered with "in progress".
+            CommandTimeout: No ACK came to any of the tries.
+            CommandUnfinished: The autopilot answered "in progress", and not more within 30 s.
             LinkLost: The connection dropped while waiting.
         """
         lock = self._locks.setdefault(command, asyncio.Lock())
@@ -112,24 +112,30 @@ class CommandClient:
     ) -> int:
         for confirmation in range(retries + 1):
             self._send_try(command, params, confirmation)
-            in_progress = False
             try:
                 result = await answers.next(timeout_s)
-                while result == _IN_PROGRESS:
-                    in_progress = True
-                    result = await answers.next(_IN_PROGRESS_TIMEOUT_S)
             except TimeoutError:
                 continue
-            return result
-        if in_progress:
-            raise CommandUnfinished(
-                f"{command_name(command)}: the autopilot said that it is in progress, and nothing "
-                f"more for {_IN_PROGRESS_TIMEOUT_S:g} s; look at its messages, and try again"
-            )
+            return await self._final(command, answers) if result == _IN_PROGRESS else result
         raise CommandTimeout(
             f"{command_name(command)}: no answer after {retries + 1} tries of {timeout_s:g} s; "
             f"is system {self._settings.target_system} still there?"
         )
+
+    async def _final(self, command: int, answers: Pending[int]) -> int:
+        """The final result of a command in progress, however often that is repeated."""
+        try:
+            async with asyncio.timeout(_IN_PROGRESS_TIMEOUT_S):
+                while True:
+                    result = await answers.next(_IN_PROGRESS_TIMEOUT_S)
+                    if result != _IN_PROGRESS:
+                        return result
+        except TimeoutError:
+            raise CommandUnfinished(
+                f"{command_name(command)}: the autopilot said that it is in progress, and did not "
+                f"finish it within {_IN_PROGRESS_TIMEOUT_S:g} s; look at its messages, and try "
+                "again"
+            ) from None
 
     def _send_try(self, command: int, params: tuple[float, ...], confirmation: int) -> None:
         padded = (*params, *(0.0,) * 7)[:7]

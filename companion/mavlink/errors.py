@@ -46,7 +46,7 @@ class NonFiniteSetpoint(InvalidSetpoint):
 
 
 class CommandTimeout(LinkTimeout):
-    """No final COMMAND_ACK came for a command after all retries."""
+    """No COMMAND_ACK came for a command after all retries."""
 
 
 class CommandUnfinished(CommandTimeout):

@@ -110,11 +110,12 @@ def _ended_early(figures: Figures) -> tuple[str, list[str]]:
         on_ground = end["since_takeoff_s"] is None  # as far as it was heard
         what = "disarm it, or take it over if it flies" if on_ground else "take it over or land it"
         then = "" if interrupted else f"; then: {remedy}"
-        remedy = f"the vehicle is armed: {what}{then}"
+        armed = "is armed" if _unheard(figures) is None else "was armed when last heard"
+        remedy = f"the vehicle {armed}: {what}{then}"
     result = figures["result"].rstrip(".")
     return f"The flight ended early: {result}{'' if result.endswith('?') else '.'}", [
         f"  when: {_when(end)}",
-        f"  vehicle now: {_vehicle(figures['at_the_end'])}",
+        f"  {_vehicle(figures)}",
         f"  what to do: {remedy}",
         *(f"! {text}" for text in (*figures["advice"], *_gain_warning(figures))),
     ]
@@ -135,9 +136,18 @@ def _when(end: dict[str, Any]) -> str:
     return words
 
 
-def _vehicle(state: dict[str, Any]) -> str:
+def _unheard(figures: Figures) -> float | None:
+    """How long the vehicle was silent at the end of the flight, s; None: it was heard."""
+    silence: float | None = figures["at_the_end"].get("unheard_s")
+    return silence
+
+
+def _vehicle(figures: Figures) -> str:
+    state, silence = figures["at_the_end"], _unheard(figures)
+    heard = "now" if silence is None else f"when last heard, {silence:.1f} s before the end"
     armed = {True: "ARMED", False: "disarmed", None: "not known whether armed"}[state["armed"]]
-    return armed if state["mode"] is None else f"{armed}, in mode {state['mode']}"
+    mode = "" if state["mode"] is None else f", in mode {state['mode']}"
+    return f"vehicle {heard}: {armed}{mode}"
 
 
 def _next(figures: Figures, called: Invocation) -> str | None:

@@ -2,11 +2,7 @@
 
 from companion.control.loop_record import Unanswered
 from companion.safety.monitor import Judge, released, released_minimum
-from companion.safety.snapshot import Control, Snapshot
-
-_HEARD = 0.3
-"""Time without a frame, s, after which the vehicle counts as not heard: a takeover would not be
-noticed either."""
+from companion.safety.snapshot import HEARD, Control, Snapshot
 
 _STALL_SHARE = 0.5
 """If this program did not run for more than this share of the time since its last setpoint, this
@@ -21,7 +17,7 @@ def silence(limit: float, *, heard: bool) -> Judge:
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
         now, control = snapshot.now, snapshot.control
-        if now - control.answered <= limit or (now - control.heard < _HEARD) is not heard:
+        if now - control.answered <= limit or (now - control.heard < HEARD) is not heard:
             return None
         return _silence_cause(now, control, limit)
 

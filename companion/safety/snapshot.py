@@ -9,6 +9,10 @@ from companion.guidance.fence import Place
 from companion.guidance.reference import Horizontal, Vector
 from companion.vehicle.records import Battery, Estimator, Gps
 
+HEARD = 0.3
+"""Time without a frame, s, after which the vehicle counts as not heard: a takeover would not be
+noticed either."""
+
 
 class Autopilot(NamedTuple):
     """The autopilot's status; None: not received."""

@@ -10,7 +10,7 @@ from companion.control.guidance_loop import GuidanceLoop
 from companion.guidance.fence import Place
 from companion.guidance.reference import Vector, minus
 from companion.mavlink.stats import share_lost
-from companion.safety.snapshot import Autopilot, Control, Health, Motion, Resets, Snapshot
+from companion.safety.snapshot import HEARD, Autopilot, Control, Health, Motion, Resets, Snapshot
 from companion.vehicle.held_rates import HeldRates
 from companion.vehicle.link import Link
 
@@ -116,6 +116,12 @@ class SnapshotBuilder:
         `begin` got another centre.
         """
         return self._start
+
+    def unheard(self, now: float) -> float | None:
+        """How long no frame has come from the vehicle at `now`, s; None: it is heard."""
+        self.listen(now)
+        silence = now - self._heard_at
+        return silence if silence > HEARD else None
 
     def listen(self, now: float) -> None:
         """Take the counters at `now`; the watch calls this at least 50 times a second."""

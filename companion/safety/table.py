@@ -15,8 +15,8 @@ _BACKLOG = 0.2
 _GAPS = 2
 """Largest number of gaps in the setpoints within 5 s."""
 _ESTIMATE_LATE = 0.08
-"""Time by which the estimated motion is behind the vehicle, s. In a run-up on the mock vehicles:
-ArduPilot's position 0.055 s and velocity up to 0.09 s, PX4's 0.02 s. Braking begins later by it."""
+"""Time by which the estimated horizontal motion is behind the vehicle, s. In a run-up on the mock
+vehicles: ArduPilot's position 0.055 s and velocity up to 0.09 s, PX4's 0.02 s."""
 _RELEASE, _HAND_BACK, _HOLD, _LAND = Action.RELEASE, Action.HAND_BACK, Action.HOLD, Action.LAND
 
 
@@ -114,5 +114,6 @@ def fence_of(config: Config) -> Fence:
         safety.fence_polygon_m,
         safety.fence_polygon_deg,
         safety.braking_m_s2,
-        safety.reaction_s + _ESTIMATE_LATE,
+        safety.reaction_s,
+        _ESTIMATE_LATE,
     )

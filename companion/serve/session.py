@@ -100,11 +100,21 @@ class ServeSession:
     async def _run_open(self) -> dict[str, Any]:
         config, opener = self._config, self._environment.open_transport
         async with open_link(config, self.records, self._note, opener) as link:
-            state_logger = StateLogger(link.state, self._note)
-            link.subscribe("HEARTBEAT", lambda _: state_logger.log_changes())
+            self._log_state(link)
             link.clock.on_event = self._note
             async with Network(link, config.serve.clients, self._note) as network:
                 return await self._serve(link, network)
+
+    def _log_state(self, link: Link) -> None:
+        """Note changes of the vehicle's state; a flight, while connected, notes them itself."""
+
+        def note(text: str) -> None:
+            if link.on_attitude is None:
+                self._note(text)
+
+        state_logger = StateLogger(link.state, note)
+        for name in ("HEARTBEAT", "CURRENT_MODE", "STATUSTEXT"):  # as a flight: none is told twice
+            link.subscribe(name, lambda _: state_logger.log_changes())
 
     async def _serve(self, link: Link, network: Network) -> dict[str, Any]:
         component = Component(link.settings, network, link.send)

@@ -38,15 +38,17 @@ async def serving(
     Raises:
         ConfigError: the configuration is wrong.
         EndpointError, LinkError, SigningError: see `ServeSession.run`.
+        RuntimeError: the session ended before its network was open.
     """
     here = changed(in_memory(known(config), vehicle), {"serve": {"clients": ()}}, "the test")
     session = ServeSession(here, note, None, environment, folder)
     running = asyncio.ensure_future(session.run())
-    while session.network is None:
-        await asyncio.sleep(_LOOK_PERIOD)
-        if running.done():
-            running.result()
     try:
+        while session.network is None:
+            if running.done():
+                running.result()
+                raise RuntimeError("the session ended before its network was open")
+            await asyncio.sleep(_LOOK_PERIOD)
         yield session
     finally:
         session.stop()

@@ -105,11 +105,12 @@ def test_the_doctor_is_told_on_any_terminal(tmp_path):
     assert_said(done, 1, b"no heartbeat", b"+---")
 
 
+FULL = "companion: standard output cannot be written: No space left on device\n"
+
+
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 @pytest.mark.parametrize("command", ["config", "check-config c.yaml", "--version"])
-@pytest.mark.parametrize(
-    ("output", "words"), [(">&-", ""), (">/dev/full", "No space left on device"), ("| true", "")]
-)
+@pytest.mark.parametrize(("output", "words"), [(">&-", ""), (">/dev/full", FULL), ("| true", "")])
 def test_output_that_cannot_be_written_is_no_traceback(
     tmp_path, command, output, words, unbuffered
 ):
@@ -128,6 +129,7 @@ def test_output_that_cannot_be_written_is_no_traceback(
     if command == "--version":  # printed by argparse, which goes on without an output
         return
     assert words in done.stderr
+    assert done.stderr.count("No space left on device") == bool(words), "it is told once"
     if output != "| true":  # that is the code of `true`
         assert done.returncode == (1 if words else 0)
 

@@ -1,14 +1,21 @@
 """A file is written whole or not at all."""
 
+import contextlib
+import errno
 import os
 import stat
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
 from companion.files import write_whole as module
-from companion.files.write_whole import write_whole
+from companion.files.write_whole import ReservedRoom, write_whole
+from companion.flight import flight_files
+from companion.flight.observer import Silent
+from companion.testing import fly
+from tests.flight.fly import QUICK_FLIGHT, QuickVehicle, merged
 
 
 def test_it_makes_a_file_and_replaces_it(tmp_path):
@@ -90,3 +97,54 @@ def test_an_error_names_the_file_and_not_the_temporary_one(tmp_path, monkeypatch
     with pytest.raises(OSError, match="No space") as unwritten:
         write_whole(tmp_path / "page.html", "")
     assert unwritten.value.filename == str(tmp_path / "page.html")
+
+
+def reserved(folder):
+    """Bytes on the disk that open files without a name hold in a folder."""
+    held = 0
+    for link in Path("/proc/self/fd").iterdir():
+        with contextlib.suppress(OSError):
+            path = str(link.readlink())
+            if path.startswith(f"{folder}/") and path.endswith("(deleted)"):
+                held += 512 * link.stat().st_blocks
+    return held
+
+
+def test_room_is_kept_without_a_name_and_freed(tmp_path):
+    room = ReservedRoom(tmp_path, 1 << 16)
+    assert reserved(tmp_path) >= 1 << 16
+    assert not list(tmp_path.iterdir())
+    room.free()
+    room.free()
+    assert reserved(tmp_path) == 0
+    forgotten = ReservedRoom(tmp_path, 1 << 16)
+    del forgotten
+    assert reserved(tmp_path) == 0
+
+
+def test_a_disk_that_cannot_keep_room_is_no_error(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    ReservedRoom(tmp_path / "missing", 1).free()
+    monkeypatch.setattr(os, "posix_fallocate", full)
+    ReservedRoom(tmp_path, 1).free()
+
+
+def test_a_flight_keeps_room_for_its_summary_until_it_writes_it(tmp_path, monkeypatch):
+    held, written = [], flight_files.write_in_time
+
+    class Watching(Silent):
+        def phase(self, name, waits_for):
+            held.append(reserved(tmp_path))
+
+    def write(path, text):
+        held.append(reserved(tmp_path))
+        return written(path, text)
+
+    monkeypatch.setattr(flight_files, "write_in_time", write)
+    summary = fly(merged(QUICK_FLIGHT, {}), QuickVehicle(), tmp_path, Watching())
+    assert summary.result == "ok"
+    *flying, writing = held
+    assert min(flying) >= flight_files._SUMMARY_ROOM > 10 * len(summary.as_json())
+    assert writing < flight_files._SUMMARY_ROOM, "nothing but the rows of the figures"

@@ -181,6 +181,7 @@ def test_a_mode_that_is_not_told_any_more_lets_the_vehicle_go(tmp_path):
         summary = fly(mock, tmp_path / "log", hover={"duration_s": 5.0})
         assert mock.state()["mode"] == "POSCTL"
     assert "no heartbeat" in summary.result
+    assert summary.as_dict()["at_the_end"]["unheard_s"] > 1.0
     took_over = next(at for at, text in summary.events if text == "mode OFFBOARD")
     assert not [command for at, command, _ in commands(summary) if at > took_over + 1.0]
 
@@ -191,6 +192,7 @@ def test_without_heartbeats_the_vehicle_is_let_go_though_its_mode_is_told():
     with mock_vehicle(faults=[fault]) as mock:
         summary = fly(mock, hover={"duration_s": 9.0})
     assert "whether it is armed is not known" in summary.result
+    assert summary.as_dict()["at_the_end"]["unheard_s"] > 4.0
     assert summary.events[-1][1] == Exit.RELEASE.value
 
 

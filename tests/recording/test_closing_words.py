@@ -202,6 +202,14 @@ def test_a_vehicle_that_is_left_armed_in_the_air_comes_before_all_else():
     assert "what to do: the vehicle is armed: take it over or land it; then: make" in text
 
 
+def test_a_vehicle_that_fell_silent_is_not_told_as_it_is_now():
+    lost = {**GOOD, **ENDED, "at_the_end": {"armed": True, "mode": "OFFBOARD", "unheard_s": 0.42}}
+    _, text = words(lost)
+    assert "vehicle when last heard, 0.4 s before the end: ARMED, in mode OFFBOARD" in text
+    assert "vehicle now" not in text
+    assert "what to do: the vehicle was armed when last heard: take it over or land it" in text
+
+
 def test_a_vehicle_that_was_lost_while_it_took_off_may_fly():
     end = {**END, "since_takeoff_s": None, "phase": "takeoff", "maneuver": None, "monitor": None}
     armed = {"armed": True, "mode": "AUTO.TAKEOFF"}

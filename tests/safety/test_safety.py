@@ -108,7 +108,7 @@ BREACHES = [
     ("fence", motion(offset=(0.0, 0.0, -30.1), velocity=(0, 0, 0)), LAND, 0.0, "ceiling"),
     ("fence", motion(height=0.9, velocity=(0, 0, 0)), LAND, 0.0, "0.9 m above home"),
     ("braking", motion(offset=(0.0, 50.0, 0.0), velocity=(0.0, 6.5, 0.0)), HOLD, 0.04, "60.9 m"),
-    ("braking", motion(velocity=(0.0, 0.0, 4.5), height=6.0), HOLD, 0.04, "0.2 m above home"),
+    ("braking", motion(velocity=(0.0, 0.0, 4.5), height=6.0), HOLD, 0.04, "0.6 m above home"),
     ("speed", motion(velocity=(11.0, 11.0, 0.0)), HOLD, 0.3, "15.6 m/s"),
     ("tracking", motion(off_course=5.1), HOLD, 1.0, "5.1 m off"),
     ("thrust", motion(thrust=0.9), HOLD, 2.0, "limits.max_thrust"),

@@ -11,7 +11,17 @@ from companion.files.yaml_file import ConfigError
 from companion.flight.observer import Silent
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.settings import LinkSettings
-from companion.testing import MockVehicle, UnseenError, environment, fly, open_wire, run, session
+from companion.serve.session import ServeSession
+from companion.testing import (
+    MockVehicle,
+    UnseenError,
+    environment,
+    fly,
+    open_wire,
+    run,
+    serving,
+    session,
+)
 from companion.vehicle.link import Link
 from sitl_mock.config.section import ConfigError as MockConfigError
 from tests.flight.fly import QUICK_PARAMETERS, QuickVehicle, attitude_rate_hz, quick_flight
@@ -208,3 +218,18 @@ def test_many_flights_leave_nothing_behind():
     assert len(list(Path("/proc/self/fd").iterdir())) == files
     assert set(threading.enumerate()) <= threads  # one of an earlier test may have ended
     assert len(gc.get_objects()) - objects < 200
+
+
+def test_a_session_of_serve_that_ends_before_its_network_is_told(monkeypatch):
+    async def ended(_):
+        return {}
+
+    async def main():
+        async with asyncio.timeout(5.0):
+            async with serving(config(mock), mock):
+                pass
+
+    mock = vehicle()
+    monkeypatch.setattr(ServeSession, "run", ended)
+    with pytest.raises(RuntimeError, match="before its network was open"):
+        run(mock, main())

@@ -56,6 +56,15 @@ def test_recorded_events_in_words(number, levels, arguments, words):
     assert scene.said == [(levels & 15, words)]
 
 
+def test_an_unknown_value_is_shown_as_a_number_and_an_unknown_event_as_its_number():
+    scene = Scene()
+    scene.event(29547634, 0x42, bytes.fromhex("00000406ee"))
+    scene.event(123, 0x44)
+    (_, failsafe), (severity, unknown) = scene.said
+    assert "238" in failsafe
+    assert (severity, unknown) == (4, "event 123")
+
+
 def test_failsafes_say_why_and_what():
     scene = Scene()
     offboard = (0x00060000).to_bytes(4, "little")

@@ -50,6 +50,8 @@ class Course:
         vehicle_uid: hardware id of the vehicle's autopilot; None: unknown.
         armed: whether the vehicle is armed at the end; None: unknown.
         mode: mode of the vehicle at the end; None: unknown.
+        unheard: how long the vehicle was silent at the end, s, so that `armed` and `mode` may have
+            changed since; None: it was heard.
         battery: remaining charge, 0..1, at take-off and at the end; None: unknown.
         min_battery: smallest share allowed, `limits.min_battery_percent`.
         deadline: longest latency allowed, `deadman.deadline_ms`, s.
@@ -69,6 +71,7 @@ class Course:
     vehicle_uid: str | None = None
     armed: bool | None = None
     mode: str | None = None
+    unheard: float | None = None
     battery: tuple[float | None, float | None] = (None, None)
     min_battery: float = 0.0
     deadline: float = 0.004
@@ -88,7 +91,11 @@ class Course:
             "takeoff_s": _rounded(self.takeoff),
             "early_end": None if self.early_end is None else self.early_end.as_dict(),
             "vehicle_uid": self.vehicle_uid,
-            "at_the_end": {"armed": self.armed, "mode": self.mode},
+            "at_the_end": {
+                "armed": self.armed,
+                "mode": self.mode,
+                "unheard_s": _rounded(self.unheard),
+            },
             "battery": {"takeoff": begin, "end": end, "min": self.min_battery},
             "advice": list(self.advice),
             "gain_warning": self.gain_warning,
