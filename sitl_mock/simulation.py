@@ -93,7 +93,7 @@ class Simulation:
 
     @property
     def next_us(self) -> int:
-        """Vehicle time of the next slot, us."""
+        """Vehicle time of the next slot, us, rounded down to a whole ms."""
         next_us = (self._slots + 1) * self._slot_us
         return next_us - next_us % 1000
 

@@ -38,8 +38,8 @@ async def connect(
 ) -> AsyncGenerator[Vehicle, None]:
     """Connect, run the preflight checks, and yield the vehicle; the flight is recorded meanwhile.
 
-    The flight runs in its own thread, in lockstep in the program's. When the block ends in the air,
-    the vehicle is handed back: the autopilot holds it.
+    The flight runs in a thread of its own; in lockstep it runs in the program's thread. When the
+    block ends in the air, the vehicle is handed back: the autopilot holds it.
 
     Args:
         config: configuration of the flight, or the path of its file.

@@ -56,7 +56,7 @@ class _Reaction:
         self._loop, self._interrupt, self._came = loop, interrupt, False
 
     def expect(self) -> None:
-        """Begin to wait."""
+        """Begin to wait for the program's loop to run."""
         self._loop.tell(self._come)
         asyncio.get_running_loop().call_later(REACTS_WITHIN, self._judge)
 

@@ -1,4 +1,4 @@
-"""The event loop of a program's flight: in its own thread, or in lockstep the program's own loop.
+"""The event loop of a program's flight: a loop in its own thread, or in lockstep the program's.
 
 With its own thread, a program that computes, blocks or never yields delays only its own commands.
 The flight continues to answer samples, notices the missing commands, and hands the vehicle back.
@@ -62,7 +62,10 @@ class FlightLoop(Protocol):
 
 
 class SharedLoop:
-    """Program and flight share the running loop: in lockstep and in memory the vehicle waits."""
+    """Runs the flight in the program's own loop, if the vehicle waits for each answer.
+
+    It waits in lockstep, and when `companion.testing` runs it on a virtual clock.
+    """
 
     def __init__(self) -> None:
         self.time = asyncio.get_running_loop().time
@@ -188,8 +191,8 @@ def quick_switches() -> Iterator[None]:
 def flight_loop() -> FlightLoop:
     """The loop for a flight of the running program.
 
-    In lockstep and in memory it is the program's own loop, because the vehicle waits for the
-    program. A thread would only make the order of events random.
+    In lockstep and on a virtual clock it is the program's own loop, because the vehicle waits for
+    the program. A thread would only make the order of events random.
     """
     if isinstance(asyncio.get_running_loop(), LockstepEventLoop):
         return SharedLoop()

@@ -242,8 +242,8 @@ class Vehicle:
 async def beside_the_loop(function: Callable[[*Arguments], T], *arguments: *Arguments) -> T:
     """Call a slow function in a thread, so that samples are still answered.
 
-    In lockstep and in memory the vehicle waits for us, so the function is called directly. A thread
-    would only make the order of events random.
+    In lockstep and on a virtual clock the vehicle waits for us, so the function is called directly.
+    A thread would only make the order of events random.
     """
     if isinstance(asyncio.get_running_loop(), LockstepEventLoop):
         return function(*arguments)

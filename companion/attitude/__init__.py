@@ -11,13 +11,13 @@ world.
 Each name below has its own page: `help(companion.attitude.make_planner)`.
 
 Planners
-    make_planner    a planner by its name, or of a law of your own
+    make_planner    a planner by its name, or from your own law
     Planner         what each planner can do: `rates`, `reset`, `note_attitude_target`
     Limits          the largest tilt, tilt rate and yaw rate
     PLANNER_NAMES   all planners; LAW_NAMES: those without memory, which `companion.batch` maps
-    Law, Constants  a law of your own: a function on plain floats, and its gains and limits
+    Law, Constants  the form of your own law: a function on plain floats, and its gains and limits
     LawPlanner      the planner that applies a law
-    limit_rates     body rates within their limits, for a law of your own
+    limit_rates     body rates within their limits, for your own law
 
 In and out
     Quaternion      (w, x, y, z), a tuple of floats

@@ -121,7 +121,7 @@ def make_planner(
     limits: Limits = Limits(),  # noqa: B008  (frozen)
     **options: Any,
 ) -> Planner:
-    """Make a planner by its name, or of a law of your own.
+    """Make a planner by its name, or from your own law or class.
 
     Args:
         name: one of `PLANNER_NAMES`, a function of the type `Law`, or a class of planners that is

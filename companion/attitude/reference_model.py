@@ -8,7 +8,8 @@ from companion.attitude.reference import Lag
 from companion.attitude.types import Coefficients, Target
 
 _LONGEST_REFERENCE = sin(1.4)
-"""Largest norm of the coefficients at the start; towards 1 the body rates grow without bound."""
+"""Longest vector of coefficients at which the reference starts. Towards length 1 (90° of tilt) the
+body rates grow without bound."""
 _FOUR_ZETA_SQUARED = 2.7
 """Smallest 4·ζ² of the model, where ζ is its damping ratio."""
 _LONGEST_STEP = 0.1
@@ -114,7 +115,7 @@ class ReferenceModel:
         self._tilt_rate_weight = max(constants.tilt_rate_weight, slowed_in_time**-2)
 
     def start_at(self, c: Coefficients, speed: Coefficients) -> None:
-        """Start at these coefficients, moving at this speed (1/s)."""
+        """Start at these coefficients, shortened to `_LONGEST_REFERENCE`, at this speed (1/s)."""
         length = hypot(c.north, c.east)
         scale = _LONGEST_REFERENCE / length if length > _LONGEST_REFERENCE else 1.0
         self.north, self.east = scale * c.north, scale * c.east

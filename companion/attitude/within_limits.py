@@ -36,7 +36,7 @@ class WithinLimits:
         Raises:
             InvalidRatesError: the planner's rates are not finite.
             AttitudeError: the planner cannot use this attitude or target.
-            PlannerFaultError: the planner raises another error, or returns no three numbers.
+            PlannerFaultError: the planner raises another error, or does not return three numbers.
         """
         try:
             roll, pitch, yaw = self._planner.rates(q, target, dt, body_rates)

@@ -76,7 +76,8 @@ class CampaignLimits(Section):
     max_cases: Annotated[int, Field(ge=1, le=100_000_000)] | None = None
     """Largest number of cases. null: 2000 flights, or 100000 vehicles of batch kinematics."""
     max_hours: Annotated[float, Field(gt=0.0, le=10_000.0)] = 4.0
-    """Longest estimated time of the campaign; without effect on at most two cases per worker."""
+    """Longest estimated duration of the campaign. It is not checked if each worker has at most two
+    cases."""
     flight_s: Annotated[float, Field(ge=1.0, le=36_000.0)] = 600.0
     """Longest flight, s of vehicle time from boot. A longer one is ended, and is not good."""
 

@@ -100,6 +100,6 @@ def check(options: argparse.Namespace) -> int:
     for text in expectations(config):
         print(text)
     for doubt in doubts(config):
-        print(f"look again: {doubt.sentence()}")
+        print(f"warning: {doubt.sentence()}")
     print(f"{options.file}: ok")
     return EXIT_OK

@@ -18,18 +18,18 @@ def fly(options: argparse.Namespace) -> int:
     read = load(options.config)
     config = flying.as_told(read, options)
     folder = flight_folder(config.recording.directory)
-    called = flying.invocation(options)
+    invocation = flying.invocation(options)
     console = _console(options)
     with helper(options, config, options.config, read, folder, console, follows=True) as beside:
-        summary = flying.fly(config, folder, console, called, beside)
+        summary = flying.fly(config, folder, console, invocation, beside)
     return _ended(summary, options)
 
 
 def demo(options: argparse.Namespace) -> int:
     """Start the bundled vehicle and fly it."""
-    called = flying.invocation(options)._replace(config=None)
+    invocation = flying.invocation(options)._replace(config=None)
     path, console = options.config, _console(options)
-    summary = flying.fly_bundled(path, options, console, called=called)
+    summary = flying.fly_bundled(path, options, console, invocation=invocation)
     if options.open and summary.log is not None and (page := summary.log / PAGE).is_file():
         webbrowser.open(page.resolve().as_uri())
     return _ended(summary, options)

@@ -80,7 +80,7 @@ def fly(
     config: Config,
     folder: Path,
     console: FlightConsole,
-    called: Invocation | None = None,
+    invocation: Invocation | None = None,
     beside: Helper | None = None,
 ) -> Summary:
     """Fly as configured, record in `folder`, and print phases, tables and summary to `console`.
@@ -89,7 +89,7 @@ def fly(
         config: configuration of the flight.
         folder: folder for the flight's files.
         console: console for messages.
-        called: this call, for the suggested next command; None: no suggestion.
+        invocation: this call, for the suggested next command; None: no suggestion.
         beside: helper process that watches a file or serves the live page, or None.
 
     Raises:
@@ -117,7 +117,7 @@ def fly(
     with suppress(OSError):
         console.print(flight_table(summary))
         console.print(f"Recorded in {folder}", soft_wrap=True)
-        words = closing_words(summary.as_dict(), called)
+        words = closing_words(summary.as_dict(), invocation)
         console.print(words_text(words), soft_wrap=True)
         if config.recording.report:
             console.print(page_about(folder), soft_wrap=True, markup=False)
@@ -146,7 +146,7 @@ def fly_bundled(
     options: argparse.Namespace,
     console: FlightConsole,
     planner: str | None = None,
-    called: Invocation | None = None,
+    invocation: Invocation | None = None,
 ) -> Summary:
     """Start the bundled vehicle of a configuration (None: the shipped one), and fly it.
 
@@ -168,4 +168,4 @@ def fly_bundled(
             helper(options, config, path, read, folder, console, follows=True) as beside,
             demo.bundled_vehicle(path, wire, folder / "mock.log", lockstep=in_lockstep),
         ):
-            return fly(config, folder, console, called, beside)
+            return fly(config, folder, console, invocation, beside)

@@ -44,7 +44,7 @@ class SafetyConfig(Section):
     braking_m_s2: Annotated[float, Field(ge=0.1, le=20.0)] = 2.5
     """Assumed braking deceleration: the vehicle brakes in time to stay inside the fence."""
     reaction_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.3
-    """Assumed time until braking begins."""
+    """Assumed delay before the vehicle brakes at the fence; it may still accelerate meanwhile."""
     fence_action: Ending = "land"
     """Action outside the fence. Within braking distance the maneuver ends in a hold."""
     battery_action: Literal["warn", "hand_back", "land"] = "land"

@@ -229,7 +229,7 @@ class GuidanceLoop:
         return StepOutput(measured_at, self._q, inputs, reference, self.off_course)
 
     def _write_command(self, now: float, inputs: GuidanceInput) -> Reference:
-        """Write the command for `now`; return the reference from which it was made."""
+        """Write the command for `now`, if one can be made; return the reference of this step."""
         reference, command = self.maker.make(
             now,
             inputs,

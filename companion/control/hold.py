@@ -56,7 +56,7 @@ class Hold:
     def begin_if_tilted(
         self, now: float, motion: VehicleMotion, q: Quaternion, heading: float
     ) -> None:
-        """Give the source up if it steers by rates, and the attitude `q` is tilted too far."""
+        """Give up a source that steers by rates and hold, if the attitude `q` is tilted too far."""
         name = self._flown.steers_by_rates(now, motion)
         if name is None:
             return

@@ -148,7 +148,7 @@ def attitude_delay(config: Config) -> float:
 
 
 def _hold_delay(config: Config) -> float:
-    """The delay T from which the weights and the wind estimate follow, s."""
+    """The delay that sets the weights and the wind estimate, s: at least `_SHORTEST_DELAY`."""
     return max(_SHORTEST_DELAY, attitude_delay(config))
 
 

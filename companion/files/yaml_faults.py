@@ -103,7 +103,8 @@ def explained(detail: Any, model: type[BaseModel], former: Mapping[str, str]) ->
 def _remedy(detail: Any, key: str) -> str | None:
     """A suggestion to replace a value of the wrong type."""
     kind, value = detail["type"], detail["input"]
-    if kind == "value_error" and "must be a number" in detail["msg"]:
+    message = detail["msg"].removeprefix("Value error, ")
+    if kind == "value_error" and message.startswith("must be a number") and isinstance(value, str):
         return f"must be a number: {_number_in(key, value)} (got {shortened(value)})"
     if kind in ("float_parsing", "int_parsing"):
         return f"must be a number: {_number_in(key, str(value))} (got {shortened(value)})"

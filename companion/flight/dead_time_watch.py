@@ -17,7 +17,7 @@ from companion.safety.actions import internal
 _PERIOD = 2.0
 """Time between two measurements, s; the axes take turns."""
 _PERIODS = 4
-"""Length of a measurement in these periods; the first one is a period shorter."""
+"""Length of a measurement in these periods; the first measurement is a period shorter."""
 _UNSURE = 1.5
 """Rows newer than this are not used, s: the autopilot may already have left offboard."""
 _LONGEST = 75_000

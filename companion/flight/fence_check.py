@@ -31,8 +31,8 @@ class FenceCheck:
     Attributes:
         fence: the fence that the monitors watch in flight.
         height: height above home where control begins, m.
-        origin: geographic position where control begins, or None; then a fence on the map is not
-            checked.
+        origin: geographic position where control begins, or None; then a fence in latitude and
+            longitude is not checked.
     """
 
     fence: Fence

@@ -56,7 +56,7 @@ def require_flyable(config: Config, part: Maneuver, drag: KnownDrag) -> None:
 def require_inside(
     config: Config, parts: Iterable[Maneuver], origin: Place | None, drag: KnownDrag
 ) -> None:
-    """Check that all maneuvers stay inside the fence, a polygon on the map included.
+    """Check that all maneuvers stay inside the fence, also one in latitude and longitude.
 
     Args:
         config: configuration of the flight.

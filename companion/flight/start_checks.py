@@ -30,7 +30,8 @@ def check_control(config: Config) -> None:
     """Check that the planner and the guidance can be made.
 
     Raises:
-        ConfigError: they do not fit the vehicle or the limits, or those of another package fail.
+        ConfigError: they do not fit the vehicle or the limits, or one from another
+            package fails.
     """
     planner(config)
     make_guidance(config)
@@ -42,7 +43,7 @@ def require_extras(config: Config) -> None:
     """Check that the optional packages are installed that the configuration needs.
 
     Raises:
-        MissingExtraError: one is not.
+        MissingExtraError: one is not installed.
     """
     if config.guidance.kind == "nmpc":
         require("casadi", "nmpc", "guidance.kind: nmpc")

@@ -105,7 +105,10 @@ class SameVehicle:
         raise ChecksVoid(reason)
 
     def _reason(self) -> str | None:
-        """The sign of a replacement; None in a silence after which the vehicle may be the same."""
+        """The sign of a replacement, in words.
+
+        None: there is none, or a silence still lasts, which is judged when it ends.
+        """
         if self._peers != self._link.stats.peers:
             return "the vehicle is heard from another address or connection than before"
         if self._restarts != self._link.clock.restarts:

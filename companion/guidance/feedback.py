@@ -74,9 +74,8 @@ def chain_gains(weights: Weights, lag: float, drag: float = 0.0) -> ChainGains:
     return gains
 
 
-_LARGEST_DOWN = 0.5 * GRAVITY
-_LARGEST_UP = 0.5 * GRAVITY
-"""Largest vertical accelerations that are commanded, m/s²."""
+_LARGEST_DOWN, _LARGEST_UP = 0.5 * GRAVITY, 0.5 * GRAVITY
+"""Largest accelerations that are commanded downwards and upwards, m/s²."""
 
 
 @dataclass(frozen=True, slots=True)

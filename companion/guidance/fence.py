@@ -57,7 +57,7 @@ class Fence:
         polygon: corners, m north and east of where control began; empty: only the cylinder.
         places: corners as (latitude, longitude) in degrees, instead of `polygon`.
         deceleration: deceleration that the vehicle certainly reaches, m/s².
-        reaction: time until braking begins, s.
+        reaction: assumed delay before the vehicle brakes, s.
         late: time by which the estimated horizontal motion is behind the vehicle, s.
     """
 

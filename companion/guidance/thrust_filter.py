@@ -75,8 +75,8 @@ class ThrustFilter:
 
         Args:
             span: duration of the measurement, s.
-            share: mean share of thrust, 0..1.
-            specific_thrust: mean specific thrust along the same axis, m/s².
+            share: mean share of thrust, 0..1; its component along the measured axis.
+            specific_thrust: mean specific thrust along that axis, measured, m/s².
             extra_variance: variance to add to that of the noise, (m/s²)².
         """
         self._variance = min(self._variance + self._drift * span, self._first_variance)

@@ -65,7 +65,7 @@ def dead_time(config: Config, evidence: Evidence) -> Iterator[Finding]:
         Key.DEAD_TIME,
         INEFFECTIVE,
         f"in {folder.name} the {found}",
-        "the planner foresees the wrong attitude",
+        "the planner predicts the wrong attitude",
         fix,
         str(folder),
     )

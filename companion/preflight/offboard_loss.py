@@ -26,9 +26,9 @@ from companion.vehicle.parameter_checks import LONGEST_HELD, shortest_hold
 from companion.vehicle.parameter_rules import CheckResult
 
 _PERIOD = 0.05
-"""Time between the points of the maneuvers that are checked, s."""
+"""Shortest time between the points of the maneuvers that are checked, s."""
 _MOST = 1500
-"""Largest number of these points."""
+"""Largest number of these points; longer maneuvers are checked at longer intervals."""
 _AHEAD = 0.02
 """Time over which the rate of change of the thrust is taken, s."""
 _START = Pose((0.0, 0.0, 0.0), 0.0)

@@ -132,7 +132,7 @@ async def apply_fixes(
     findings: Iterable[Finding],
     ask: Ask,
     undo: UndoFile,
-    told: Callable[[Outcome], None],
+    report: Callable[[Outcome], None],
 ) -> None:
     """Propose each change, and make those that the user accepts.
 
@@ -141,7 +141,7 @@ async def apply_fixes(
         findings: The findings; those without a change are skipped.
         ask: Asks the user before each change, until the answer is ALL.
         undo: Stores the old value before it is overwritten.
-        told: Called with the outcome of each accepted change.
+        report: Called with the outcome of each accepted change.
 
     Raises:
         VehicleArmedError: The vehicle is armed, or that is unknown; no more was set.
@@ -161,10 +161,10 @@ async def apply_fixes(
             continue
         require_disarmed(link)
         undo.add(change.parameter, change.old)
-        told(await _set(link, change))
+        report(await _set(link, change))
 
 
-async def restore(link: Link, undo: Undo, told: Callable[[Outcome], None]) -> None:
+async def restore(link: Link, undo: Undo, report: Callable[[Outcome], None]) -> None:
     """Restore the values of the undo file, the last change first.
 
     Raises:
@@ -175,9 +175,9 @@ async def restore(link: Link, undo: Undo, told: Callable[[Outcome], None]) -> No
         try:
             now = float(await link.read_parameter(parameter))
         except ParameterError as error:
-            told(Outcome(Change(parameter, old, old, reboot=False), str(error)))
+            report(Outcome(Change(parameter, old, old, reboot=False), str(error)))
             continue
-        told(await _set(link, Change(parameter, now, old, reboot=False)))
+        report(await _set(link, Change(parameter, now, old, reboot=False)))
 
 
 def require_disarmed(link: Link) -> None:

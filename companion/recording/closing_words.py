@@ -10,7 +10,7 @@ from companion.recording.what_to_do import what_to_do
 _BEFORE_TAKEOFF = ("connect", "checks", "stream", "arm")
 _SHARED = ("--endpoint", "--set")
 LEFT_BY_USER = "left at once by the user"
-"""Result of a flight that was cancelled, as by Ctrl-C in a program of the user's."""
+"""Result of a flight that was cancelled, for example by Ctrl-C in a user's program."""
 _INTERRUPTED = ("interrupted by ", LEFT_BY_USER)
 
 
@@ -46,17 +46,21 @@ class ClosingWords(NamedTuple):
     flown: bool
 
 
-def closing_words(figures: Figures, called: Invocation | None) -> ClosingWords:
+def closing_words(figures: Figures, invocation: Invocation | None) -> ClosingWords:
     """The summary in words for the figures of a flight.
 
     Args:
         figures: result of `Summary.as_dict`.
-        called: this call; None: no next command is suggested.
+        invocation: this call; None: no next command is suggested.
     """
     flown, good = figures["result"] == "ok", is_good(figures)
     headline, lines = _headline_and_reasons(figures) if flown else _ended_early(figures)
     return ClosingWords(
-        headline, tuple(lines), None if called is None else _next(figures, called), good, flown
+        headline,
+        tuple(lines),
+        None if invocation is None else _next(figures, invocation),
+        good,
+        flown,
     )
 
 
@@ -150,12 +154,12 @@ def _vehicle(figures: Figures) -> str:
     return f"vehicle {heard}: {armed}{mode}"
 
 
-def _next(figures: Figures, called: Invocation) -> str | None:
+def _next(figures: Figures, invocation: Invocation) -> str | None:
     def command(*words: str) -> str:
-        return f"{called.program} {shlex.join(words)}"
+        return f"{invocation.program} {shlex.join(words)}"
 
-    again = called.arguments
-    own = None if called.config is None else ["--config", called.config, *_changes(again)]
+    again = invocation.arguments
+    own = None if invocation.config is None else ["--config", invocation.config, *_changes(again)]
     if figures["result"].startswith(_INTERRUPTED):
         return command(*again)
     end = figures["early_end"]

@@ -9,8 +9,8 @@ with their units. A channel without messages has 0 rows. NaN: not known, or does
 
 Three clocks: our clock (event-loop time; `began` is when the flight began on it), the vehicle's
 clock (`vehicle_time_s`), and the time since the flight began, which phases, events, alarms and the
-channel `motion` are in. `since_start` converts from our clock. A flight in lockstep or in memory
-has its clock in vehicle time; then `epoch` is 0.
+channel `motion` are in. `since_start` converts from our clock. A flight in lockstep or on a virtual
+clock has its clock in vehicle time; then `epoch` is 0.
 """
 
 import json

@@ -103,8 +103,8 @@ def _milliseconds(value: float | None) -> str:
 
 
 def _tracking(summary: Summary) -> RenderableType:
-    """Level and height errors of the maneuvers."""
-    table = _table("Tracking by maneuver", "level RMS", "largest", "height RMS", "largest")
+    """Horizontal and vertical errors of the maneuvers."""
+    table = _table("Tracking by maneuver", "horizontal RMS", "largest", "height RMS", "largest")
     for flown in summary.maneuvers():
         level = (
             ("open loop", f"{flown.drift:.2f} m away")

@@ -118,7 +118,7 @@ def _rows(figures: Any) -> Iterator[tuple[str, str]]:
 def _tracking(figures: Any) -> Iterator[tuple[str, str]]:
     """Label and text of each maneuver's RMS errors."""
     for maneuver in figures.get("maneuvers", ()):
-        for key, what in (("level_rms_m", "level RMS"), ("height_rms_m", "height RMS")):
+        for key, what in (("level_rms_m", "horizontal RMS"), ("height_rms_m", "height RMS")):
             if maneuver.get(key) is not None:
                 yield f"{maneuver['name']}, {what}", f"{maneuver[key]:.3f} m"
 
@@ -132,8 +132,8 @@ def _maneuvers(figures: Any) -> Table:
         ("name", "maneuver", "{}"),
         ("duration_s", "duration, s", "{:.1f}"),
         ("reference_speed_max_m_s", "largest speed of the reference, m/s", "{:.1f}"),
-        ("level_rms_m", "level RMS, m", "{:.3f}"),
-        ("level_max_m", "level max, m", "{:.3f}"),
+        ("level_rms_m", "horizontal RMS, m", "{:.3f}"),
+        ("level_max_m", "horizontal max, m", "{:.3f}"),
         ("height_rms_m", "height RMS, m", "{:.3f}"),
         ("height_max_m", "height max, m", "{:.3f}"),
         ("swing_rms_deg", "swing of roll and pitch, ° RMS", "{:.1f}"),

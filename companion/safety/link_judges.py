@@ -106,7 +106,7 @@ def gaps(most: int) -> Judge:
         if found <= most:
             return None
         return (
-            f"{found} times within 5 s no setpoint could be sent for longer than "
+            f"setpoints paused {found} times within 5 s, each time for longer than "
             "deadman.telemetry_stale_ms"
         )
 

@@ -100,7 +100,7 @@ def flown(config: Config, course: Course, autopilot: str, seed: int = 3) -> Flow
 
     Raises:
         ConfigError: the configuration cannot be flown on the mock vehicle.
-        KeyboardInterrupt: Ctrl-C in the flight, which alone would end by it.
+        KeyboardInterrupt: the user pressed Ctrl-C; the flight itself only ends and returns.
     """
     mock = load(shipped(f"mock-{autopilot}.yaml"))
     parameters = (mock.mock or {}).get("parameters", {})

@@ -12,7 +12,7 @@ from companion.tuning.margins import Margins
 from companion.tuning.search import Aims, Design, errors_to_bear, searched
 
 _ANALYSED = ("hover",)
-"""Maneuvers of the analysed configuration, because `identify` has its own, low gains."""
+"""The analysis assumes a hover: a configuration for `identify` would be analysed with low gains."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,9 +13,10 @@ from companion.tuning.loop import ModelError, control_loop
 from companion.tuning.margins import Margins, frequencies, margins, smaller
 
 _FIRST_STEP, _LAST_STEP = 0.4, 0.08
-"""First and last step of the search, in natural logarithms of the values."""
+"""First and last step of the search: changes of the natural logarithm of a value."""
 _PENALTY = 30.0
-"""Cost of a violated aim, in natural logarithms of the error per unit of violation."""
+"""Cost of a missed aim, per unit by which it is missed (`_missed`). The expected error counts by
+its natural logarithm."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +74,9 @@ class Design(NamedTuple):
 
 
 _LARGEST = Design(20.0, 10000.0, 10000.0, 14.0)
+"""Largest values that are searched."""
 _SMALLEST = Design(1.0, 0.01, 0.01, 0.3)
-"""Largest and smallest values that are searched."""
+"""Smallest values that are searched."""
 _LARGEST_BANDWIDTH_SLEWING = 8.0
 """Largest bandwidth for a rate loop with a slew limit (ArduPilot), rad/s.
 

@@ -124,7 +124,12 @@ class TelemetryDelay:
         self._odd: _Exchange | None = None
 
     def compare(self, now: float, half: float, delay: float) -> float | None:
-        """Take an exchange; ignore one whose delay is implausible.
+        """Take an exchange whose delay is plausible; judge two implausible ones that agree.
+
+        A single implausible one is ignored. Two in a row that agree show that a clock has changed.
+        If the delay was known and is negative now, TIMESYNC has fallen behind the samples' stamps,
+        and the caller judges why. Otherwise TIMESYNC uses another clock, and the known delay is
+        forgotten.
 
         Args:
             now: Event-loop time, s.
@@ -132,8 +137,7 @@ class TelemetryDelay:
             delay: TIMESYNC's offset minus the quickest sample's, s.
 
         Returns:
-            How far TIMESYNC now lags the samples' stamps, s, if it did not before and two exchanges
-            in a row show it. Otherwise None.
+            How far TIMESYNC has fallen behind the samples' stamps, s; None: it has not.
         """
         taken = _Exchange(now, half, delay)
         if -(half + _TOLERATED) <= delay <= _LONGEST:

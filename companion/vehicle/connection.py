@@ -98,7 +98,7 @@ class Connection:
             try:
                 await self.open()
             except EndpointError as error:
-                _LOG.info("not yet back: %s", error)
+                _LOG.info("reconnecting failed, the next try follows: %s", error)
                 pause = min(2.0 * pause, _BACKOFF_MAX_S)
         self._stats.reconnects += 1
         _LOG.info("link is back")

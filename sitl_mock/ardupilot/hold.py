@@ -18,7 +18,8 @@ LAND)."""
 _HEIGHT_INTEGRAL = 1.0
 """Acceleration per climb rate error and second; chosen for a steady hover, not measured."""
 _STEEP_CLIMB = 10.0
-"""Limit of the height loop, m/s; the climb rate itself is limited before."""
+"""Largest climb and descent of the height controller, m/s. It is high, because the callers limit
+the climb rate that they ask for."""
 
 
 class ClimbProfile:

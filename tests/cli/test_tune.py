@@ -8,6 +8,7 @@ import yaml
 
 from companion.cli.main import main
 from companion.config.files import load, shipped
+from tests.tuning.test_noise import Log, flown, white
 
 
 def run(capsys, *arguments):
@@ -73,3 +74,25 @@ def test_what_cannot_be_tuned_is_said_in_a_sentence(vehicle, tmp_path, capsys):
     code, _, error = run(capsys, vehicle, "--output", tmp_path / "missing" / "x.yaml")
     assert code == 2
     assert "there is no folder" in error
+
+
+def test_the_noise_of_the_flight_in_the_folder_counts(vehicle, capsys):
+    folder = vehicle.parent
+    (folder / "config.yaml").write_text("guidance: {drag_per_s: 1.0}\n")
+    expected = {}
+    for name, noise in (("quiet", 0.002), ("loud", 0.2)):
+        log = Log(folder / "flight.tlog")
+        log.heartbeat()
+        flown(log, white(noise, 1), white(noise, 2))
+        log.closed()
+        code, told, error = run(capsys, folder, "--no-flights", "--json", "--force")
+        assert code == 0, error
+        expected[name] = json.loads(told.splitlines()[-1])["expected"]["before"]
+    noise = [expected[name]["error_by_noise_m"] for name in ("quiet", "loud")]
+    assert noise[1] > 20.0 * noise[0]
+
+
+def test_a_folder_is_no_file_to_write(vehicle, tmp_path, capsys):
+    code, _, error = run(capsys, vehicle, "--output", tmp_path, "--no-flights")
+    assert code == 2
+    assert f"{tmp_path} is a folder; name a file in it with --output" in error

@@ -63,8 +63,7 @@ def test_check_config_says_what_to_expect_and_what_to_look_at_again(tmp_path, ca
     assert "5.2 is the largest sensible one" in out
     assert "the hold has gains of " in out
     assert (
-        "look again: vehicle.lag_ms and vehicle.dead_time_ms were not measured on this vehicle"
-        in out
+        "warning: vehicle.lag_ms and vehicle.dead_time_ms were not measured on this vehicle" in out
     )
     assert out.endswith(f"{path}: ok\n")
 

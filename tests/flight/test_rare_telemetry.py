@@ -50,7 +50,7 @@ def test_attitude_lowered_once_is_asked_for_again_and_flown_on(autopilot, hz):
 @pytest.mark.parametrize(
     ("message", "hz", "words"),
     [
-        (ATTITUDE_QUATERNION, 5.0, "3 times within 5 s no setpoint"),
+        (ATTITUDE_QUATERNION, 5.0, "setpoints paused 3 times within 5 s"),
         (ATTITUDE_QUATERNION, 12.0, "below link.min_attitude_rate_hz"),
         (LOCAL_POSITION_NED, 2.0, "below link.min_position_rate_hz"),
     ],

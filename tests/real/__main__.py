@@ -24,7 +24,7 @@ DISTURBED = (
     "comes too rarely",
     "clock went back",
     "jumped ahead",
-    "no setpoint could be sent",
+    "setpoints paused",
 )
 """What a flight says that was ended by a busy computer, which stalls the simulator, too."""
 

@@ -140,7 +140,7 @@ SAID = [
     (
         lambda: link_judges.gaps(2),
         at(health=Health(gaps=3)),
-        "3 times within 5 s no setpoint could be sent for longer than deadman.telemetry_stale_ms",
+        "setpoints paused 3 times within 5 s, each time for longer than deadman.telemetry_stale_ms",
     ),
 ]
 """A judge, the breach that it sees, its words. The tests make the judge, so that mutants count."""

@@ -78,8 +78,8 @@ def read_csv(path: Path) -> Table:
     Raises:
         TrajectoryError: the file cannot be read or is too large, its header lacks a column, names
             one twice or names another unit, a row has too many values, a value is not a number or
-            is out of range, a quaternion has not the length 1, or the duration, a time step or the
-            number of samples is out of range.
+            is out of range, a quaternion does not have length 1, or the duration, a time step or
+            the number of samples is out of range.
     """
     try:
         text = read_text(path, _MOST_BYTES)

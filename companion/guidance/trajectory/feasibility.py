@@ -120,7 +120,7 @@ def judge(motion: Motion, envelope: Envelope) -> tuple[Violation, ...]:
     """All limits that a motion breaks, in order of time.
 
     Raises:
-        TrajectoryError: the motion cannot be computed with.
+        TrajectoryError: a numerical error; see `computable`.
     """
     with computable():
         return broken_limits(motion, envelope)

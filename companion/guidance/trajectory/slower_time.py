@@ -96,35 +96,38 @@ class SlowerTime:
         last = len(self.coefficients) - 4
         if time >= self.duration:
             return self._progress(_piece(*self.coefficients[last:]), 1.0, last)
-        which = min(bisect_right(self._ends, time) - 1, last)
-        piece = _piece(*self.coefficients[which : which + 4])
-        area = (time - self._ends[which]) / self._width
+        index = min(bisect_right(self._ends, time) - 1, last)
+        piece = _piece(*self.coefficients[index : index + 4])
+        area = (time - self._ends[index]) / self._width
         u = area / float(piece.area(1.0))
         for _ in range(_NEWTON_STEPS):
             step = (float(piece.area(u)) - area) / float(piece.factor(u))
             u = min(max(u - step, 0.0), 1.0)
             if abs(step) < _NEAR:
                 break
-        return self._progress(piece, u, which)
+        return self._progress(piece, u, index)
 
     def of(self, moments: Floats) -> tuple[Floats, Progress]:
         """Stretched times and progress (m,) at the original times `moments` (m,), s."""
         count = len(self.coefficients) - 3
-        which = np.clip((moments / self._width).astype(int), 0, count - 1)
+        index = np.clip((moments / self._width).astype(int), 0, count - 1)
         c = np.array(self.coefficients)
-        piece = _piece(c[which], c[which + 1], c[which + 2], c[which + 3])
-        u = moments / self._width - which
-        times = np.array(self._ends)[which] + self._width * np.asarray(piece.area(u))
-        return times, self._progress(piece, u, which)
+        piece = _piece(c[index], c[index + 1], c[index + 2], c[index + 3])
+        u = moments / self._width - index
+        times = np.array(self._ends)[index] + self._width * np.asarray(piece.area(u))
+        return times, self._progress(piece, u, index)
 
-    def _progress(self, piece: _Piece, u: Number, which: Number) -> Progress:
-        """With r = 1/w: ṙ = −w'/w³ and r̈ = −w''/w⁴ + 3w'²/w⁵."""
+    def _progress(self, piece: _Piece, u: Number, index: Number) -> Progress:
+        """Original time and its derivatives at `u` (0..1) of the piece with this index.
+
+        With r = 1/w: ṙ = −w'/w³ and r̈ = −w''/w⁴ + 3w'²/w⁵.
+        """
         width = self._width
         w, slope, bend = piece.factor(u), piece.slope(u) / width, piece.bend(u) / (width * width)
         rate = 1.0 / w
         cube = rate * rate * rate
         return Progress(
-            width * (which + u),
+            width * (index + u),
             rate,
             -slope * cube,
             cube * rate * (3.0 * slope * slope * rate - bend),

@@ -153,7 +153,10 @@ class UdpTransport:
             return
 
     def _take_unconnected(self, data: bytes, received_ns: int, address: Any) -> bool:
-        """Take a datagram of an unconnected socket; return whether its sender is now the peer."""
+        """Take a datagram of an unconnected socket; return whether its sender becomes the peer.
+
+        It does if its claim is valid, or if its answer may still prove it (`may_answer`).
+        """
         who = host_and_port(address)
         if not self._named.admit(address):
             self._receiver.note_stranger(who)

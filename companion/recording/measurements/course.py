@@ -55,7 +55,7 @@ class Course:
         battery: remaining charge, 0..1, at take-off and at the end; None: unknown.
         min_battery: smallest share allowed, `limits.min_battery_percent`.
         deadline: longest latency allowed, `deadman.deadline_ms`, s.
-        lockstep: whether the flight ran in vehicle time (in lockstep or in memory), so that
+        lockstep: whether the flight ran in vehicle time (in lockstep or on a virtual clock); then
             latencies are meaningless.
         advice: sentences on what differs from the configuration (hover thrust, drag, dead time),
             and on rows of the figures that were lost.

@@ -27,8 +27,8 @@ _AT_REST = 0.05
 class ManeuverFigures:
     """Tracking figures of one maneuver; NaN: not measured.
 
-    Level means north and east. In open loop there is no reference position: `level_rms` and
-    `level_max` are NaN, and `drift` says how far the vehicle moved away.
+    `level` means horizontal (north and east). In open loop there is no reference position:
+    `level_rms` and `level_max` are NaN, and `drift` says how far the vehicle moved away.
 
     Attributes:
         name: name of the maneuver.
@@ -36,12 +36,12 @@ class ManeuverFigures:
         duration: its duration, s.
         open_loop: whether a part of it is open loop.
         beginning: time left out of RMS and largest errors, s.
-        level_rms: RMS of the level error, m.
-        level_max: largest level error, m.
+        level_rms: RMS of the horizontal error, m.
+        level_max: largest horizontal error, m.
         height_rms: RMS of the height error, m.
         height_max: largest height error, m.
         beginning_max: largest distance in the part left out, m.
-        drift: largest level distance from its starting point, m.
+        drift: largest horizontal distance from its starting point, m.
         speed: largest speed of the reference (95th percentile), m/s; NaN without a reference.
         swing: oscillation of roll and pitch; not measured in open loop.
     """

@@ -7,8 +7,8 @@ Figures = Mapping[str, Any]
 """The figures; the result of `Summary.as_dict`."""
 
 LEVEL_RMS, LEVEL_RMS_PER_SPEED = 0.15, 0.02
-"""Largest RMS of the level error of a maneuver: with the reference at rest, m; and what is added
-for each m/s of its speed, m."""
+"""Largest RMS of the horizontal error of a maneuver: with the reference at rest, m; and the
+increase for each m/s of its speed, m."""
 HEIGHT_RMS = 0.15
 """Largest RMS error of the height, m."""
 SWING_RMS = 3.0
@@ -28,7 +28,7 @@ BATTERY_MARGIN = 0.10
 
 
 LOST_ROWS = "rows of the flight's figures were lost"
-"""Words of the advice that says so; it blames the disk, not the configuration."""
+"""Words that mark the advice about lost rows; their cause is the disk, not the configuration."""
 
 
 class Check(NamedTuple):

@@ -137,7 +137,7 @@ def _masked(
         if value is not None and not (isfinite(value) and abs(value) <= largest):
             raise RefusedSetpoint(f"{name} is not finite or too large: {value:g}")
     if (used[0] is None) != (used[1] is None):
-        raise RefusedSetpoint(f"{name} of x without y, or y without x")
+        raise RefusedSetpoint(f"{name} is incomplete: give both x and y, or neither")
     return used
 
 

@@ -70,7 +70,7 @@ def _loop_rate(value: float, _: Values, settings: CompanionSettings) -> Problem 
     if value >= settings.attitude_rate_hz:
         return None
     wanted = f"link.attitude_rate_hz {settings.attitude_rate_hz:g}"
-    return Problem(INEFFECTIVE, f"the loop is slower, so {wanted} is denied; lower that key")
+    return Problem(INEFFECTIVE, f"the main loop is slower, so {wanted} is denied; lower that key")
 
 
 def _fence(value: float, values: Values, _: CompanionSettings) -> Problem | None:
