@@ -1,4 +1,4 @@
-"""Checks before the flight that a maneuver keeps a distance to the fence that triggers no monitor.
+"""Checks before the flight that a maneuver stays far enough from the fence to trigger no monitor.
 
 `Fence.stop_breach` judges each moment of the reference with the monitor's formula. `MARGIN` allows
 for the tracking error. A vehicle that follows an accepted reference within this margin triggers no

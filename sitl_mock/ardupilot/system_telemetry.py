@@ -17,8 +17,8 @@ from sitl_mock.physics.vehicle import Vehicle
 _SENSORS_PRESENT = 1399979055
 _SENSORS_ENABLED = 1382128687
 _SENSORS_HEALTHY = 1467063343
-"""From _SENSORS_PRESENT on: bits of SYS_STATUS, recorded disarmed and without height or position
-control."""
+"""`_SENSORS_PRESENT` to here: bits of SYS_STATUS, recorded disarmed, without control of height or
+position."""
 _HEIGHT_CONTROL = dialect.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL
 _POSITION_CONTROL = dialect.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
 _LOGGING = dialect.MAV_SYS_STATUS_LOGGING

@@ -1,4 +1,4 @@
-"""Access to the live page: no other web site; from other computers by the token or its cookie."""
+"""Access to the live page: other web sites have none; other computers need the token or cookie."""
 
 import hmac
 import socket

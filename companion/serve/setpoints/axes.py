@@ -212,7 +212,10 @@ def _blend(old: Values, new: Values) -> Values:
 
 
 def _near(current: State, actual: AxisMotion | None, demand: AxisDemand) -> State:
-    """The state; quantities that are not commanded and too far ahead are set to the vehicle's."""
+    """The state, with values that are too far from the vehicle's replaced by the vehicle's.
+
+    This applies to the position, and to a velocity that is not commanded.
+    """
     if actual is None:
         return current
     position, velocity, acceleration = current
