@@ -5,6 +5,8 @@ from collections.abc import Callable
 from math import degrees
 
 from companion.flight.commands import (
+    Done,
+    Ours,
     change_mode,
     command_if_ours,
     in_role,
@@ -15,6 +17,8 @@ from companion.flight.commands import (
 from companion.flight.context import FlightContext
 from companion.guidance import ManeuverSequence
 from companion.guidance.source import ManeuverSource, Source
+from companion.mavlink.commands import Command
+from companion.mavlink.errors import CommandTimeout
 from companion.safety.actions import Exit, FlightEnded, internal
 from companion.vehicle.autopilot import Role
 
@@ -111,27 +115,22 @@ class _TiltMargin:
 
 async def hand_back(context: FlightContext) -> None:
     """Stop the motion, and send setpoints until the autopilot holds by itself."""
-    _stop_moving(context)
     context.detail = "the autopilot to hold"
     ours = in_roles(context.link, _OURS)
-    await change_mode(
+    await _hand_over(
         context, context.link.autopilot.hold(), ours, lambda: in_role(context.link, Role.HOLD)
     )
-    context.release()
 
 
 async def land(context: FlightContext) -> None:
     """Command the landing, send setpoints until the autopilot lands, and wait for touchdown."""
-    _stop_moving(context)
     context.detail = "the autopilot to accept the landing"
 
     def landing() -> bool:
         return in_role(context.link, Role.LAND) or not context.armed()
 
-    await change_mode(
-        context, context.link.autopilot.land(), in_roles(context.link, _OURS | {Role.LAND}), landing
-    )
-    context.release()
+    ours = in_roles(context.link, _OURS | {Role.LAND})
+    await _hand_over(context, context.link.autopilot.land(), ours, landing)
 
     def down() -> bool:
         height = context.link.state.height
@@ -170,6 +169,23 @@ def _require_landing(context: FlightContext) -> None:
     """
     if context.armed() and context.link.state.heartbeat_is_newest:
         require_role(context.link, {Role.LAND})
+
+
+async def _hand_over(context: FlightContext, command: Command, ours: Ours, done: Done) -> None:
+    """Stop the motion, and command a mode until the autopilot has entered it; then release.
+
+    A command without an answer is sent again until the phase is over: a vehicle whose uplink loses
+    frames must not be left in the air. It is held where it is then, because it may have drifted.
+    """
+    while True:
+        _stop_moving(context)
+        try:
+            await change_mode(context, command, ours, done)
+        except CommandTimeout as error:
+            context.detail = str(error)
+        else:
+            break
+    context.release()
 
 
 def _stop_moving(context: FlightContext) -> None:

@@ -1,8 +1,9 @@
-"""Checks of the vehicle's clock: the age of samples at arrival, and the clock's rate."""
+"""Checks of time: the age of samples at arrival, the round trip, and the vehicle's clock."""
 
 from collections.abc import Iterator
 from math import inf
 
+from companion.attitude import PLANNER_NAMES
 from companion.config import Config
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
@@ -13,6 +14,10 @@ SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.IN
 
 _MANY_NOT_NEWER = 0.2
 _SAMPLES_NEEDED = 10
+_SHAKES, _MAY_SHAKE = 0.3, 0.15
+"""Products of planner.gain_per_s and the round trip: from the first on, the attitude oscillates at
+the limit of the roll-pitch rate; from the second on, that of a slow vehicle may (mock vehicles).
+"""
 
 
 def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
@@ -38,6 +43,26 @@ def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
         "such samples would not be answered" if late else "",
         "find what holds the messages up: a router, a full queue, a slow link" if late else "",
         "TIMESYNC and ATTITUDE_QUATERNION time_boot_ms",
+    )
+
+
+def round_trip(config: Config, seconds: float) -> Finding:
+    """Judge a round trip for the gain: the planner's answers come that late.
+
+    In lockstep the vehicle waits, and the gain of a planner of another package means anything.
+    """
+    gain = config.planner.gain_per_s
+    ours = config.planner_name in PLANNER_NAMES and not config.link.lockstep
+    product = gain * seconds if ours else 0.0
+    late = product > _MAY_SHAKE
+    return Finding(
+        Key.ROUND_TRIP,
+        UNSAFE if product > _SHAKES else INEFFECTIVE if late else SAFE,
+        f"the link's round trip takes {1e3 * seconds:.1f} ms"
+        + (f", long for planner.gain_per_s {gain:g}" if late else ""),
+        "the vehicle shakes, because the attitude is corrected too late" if late else "",
+        f"use a faster link, or a gain of at most {_MAY_SHAKE / seconds:.1f}" if late else "",
+        "TIMESYNC",
     )
 
 

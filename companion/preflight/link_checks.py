@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator
 from companion.config import Config
 from companion.mavlink.peer import PEER_NOTICE
 from companion.mavlink.stats import SOME_LOST
+from companion.preflight import clock_checks
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
 from companion.vehicle.parameter_rules import CheckResult
@@ -160,12 +161,7 @@ def delays(config: Config, evidence: Evidence) -> Iterator[Finding]:
             source="TIMESYNC",
         )
     else:
-        yield Finding(
-            Key.ROUND_TRIP,
-            SAFE,
-            f"the link's round trip takes {1e3 * round_trip:.1f} ms",
-            source="TIMESYNC",
-        )
+        yield clock_checks.round_trip(config, round_trip)
         uneven = jitter > 0.5 * stale
         yield Finding(
             Key.JITTER,

@@ -144,7 +144,7 @@ def test_guidance_that_fails_once_holds_the_vehicle_until_the_autopilot_has_it(
         if state["armed"] and state["mode"] in ("OFFBOARD", "GUIDED"):
             steered[0] = mock.time
 
-    with mock_vehicle(autopilot=autopilot, delay_s=0.03) as mock:
+    with mock_vehicle(autopilot=autopilot, delay_s=0.025) as mock:
         mock.after_step.append(look)
         observer = When(
             "maneuvers", lambda: monkeypatch.setattr(ManeuverSource, "reference", broken), after=1.0
@@ -457,6 +457,17 @@ def test_a_hold_that_is_refused_becomes_a_landing(monkeypatch):
         state = mock.state()
     said = [text for _, text in summary.events]
     assert said.index(Exit.HOLD.value) < said.index(Exit.LAND.value)
+    assert (state["armed"], state["on_ground"], state["crashed"]) == (False, True, False)
+
+
+def test_a_landing_that_nobody_answers_is_asked_for_until_it_is():
+    """ArduPilot stays in GUIDED and drifts: the program must not give up while it may land it."""
+    outage = {"kind": "drop", "direction": "from_companion", "duration_s": 14.0}
+    with mock_vehicle(autopilot="ardupilot") as mock:
+        observer = When("maneuvers", lambda: mock.inject(outage), after=1.0)
+        summary = run(mock, session_for(mock, None, observer, hover={"duration_s": 1.5}).fly())
+        state = mock.state()
+    assert "no answer to 4 tries; does the uplink work?" in summary.result
     assert (state["armed"], state["on_ground"], state["crashed"]) == (False, True, False)
 
 

@@ -71,7 +71,7 @@ ELSE = {
 }
 """Where a family differs."""
 SHORT = {
-    "flight": {"takeoff_height_m": 4.0, "takeoff_timeout_s": 8.0},
+    "flight": {"takeoff_height_m": 4.0, "takeoff_timeout_s": 8.0, "landing_timeout_s": 15.0},
     "hover": {"duration_s": 1.0},
 }
 CLIMB = 3.0

@@ -99,7 +99,10 @@ def test_what_is_lost_on_the_way(quality, key, verdict):
 @pytest.mark.parametrize(
     ("quality", "pause", "expected"),
     [
-        ({"round_trip": 0.099}, 0.099, {}),
+        ({"round_trip": 0.029}, 0.099, {}),
+        ({"round_trip": 0.031}, 0.0, {Key.ROUND_TRIP: INEFFECTIVE}),
+        ({"round_trip": 0.059}, 0.0, {Key.ROUND_TRIP: INEFFECTIVE}),
+        ({"round_trip": 0.061}, 0.0, {Key.ROUND_TRIP: UNSAFE}),
         ({"round_trip": 0.101}, 0.0, {Key.ROUND_TRIP: UNSAFE}),
         ({"round_trip": None, "jitter": None}, 0.0, {Key.ROUND_TRIP: INEFFECTIVE}),
         ({"jitter": 0.051}, 0.0, {Key.JITTER: INEFFECTIVE}),
@@ -107,10 +110,21 @@ def test_what_is_lost_on_the_way(quality, key, verdict):
     ],
 )
 def test_what_comes_late(quality, pause, expected):
-    """The limit is deadman.telemetry_stale_ms, 100 ms; jitter may take half of it."""
+    """The limit is deadman.telemetry_stale_ms, 100 ms; jitter may take half of it.
+
+    With a gain of 5/s the vehicle shakes from a round trip of 60 ms on, and may from 30 ms on.
+    """
     samples = GOOD.samples._replace(longest_pause=pause)
     evidence = replace(GOOD, link=QUALITY._replace(**quality), samples=samples)
     assert found(link_checks.delays, evidence) == expected
+
+
+@pytest.mark.parametrize(
+    "section", [{"planner": {"gain_per_s": 2.4}}, {"link": {"lockstep": True}}]
+)
+def test_a_round_trip_may_be_longer_with_less_gain_and_in_lockstep(section):
+    evidence = replace(GOOD, link=QUALITY._replace(round_trip=0.061))
+    assert found(link_checks.delays, evidence, changed(CONFIG, section, "test")) == {}
 
 
 @pytest.mark.parametrize(("unusable", "expected"), [(0, {}), (2, INEFFECTIVE), (3, UNSAFE)])
