@@ -10,8 +10,10 @@ from hypothesis import settings
 # As the command line does: with more threads the tests of fits take 2.4 times the CPU time.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# Under `nohup`, programs that the tests start would keep flying when their terminal goes.
+# Started by `nohup` or in the background of a script, this process ignores them, and so would all
+# programs that the tests start and interrupt.
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 settings.register_profile("same", derandomize=True, deadline=None)
 settings.load_profile("same")

@@ -27,20 +27,24 @@ def problem(check, value):
     return check(value, {}, SETTINGS)
 
 
+# Made within the test: `make mutants` changes the code between two tests.
 @pytest.mark.parametrize(
-    ("check", "good", "bad", "set_to"),
+    ("make", "told", "good", "bad", "set_to"),
     [
-        (checks.forbidden(UNSAFE, {3.0: WORSE}, 1.0), (0.0, 2.0), (3.0,), 1.0),
-        (checks.forbidden(UNSAFE, {3.0: WORSE}), (0.0, 2.0), (3.0,), None),
-        (checks.action((1.0, 2.0), {3.0: WORSE}, 2.0), (1.0, 2.0), (3.0,), 2.0),
-        (checks.required(UNSAFE, 4.0, WORSE), (4.0,), (0.0, 5.0), 4.0),
-        (checks.positive(UNSAFE, WORSE, 7.0), (0.1, 9.0), (0.0, -1.0), 7.0),
-        (checks.at_most(UNSAFE, 5.0, WORSE, 1.5), (5.0, -2.0), (5.1,), 1.5),
-        (checks.bit_set(UNSAFE, 8, WORSE), (8.0, 9.0), (1.0,), 9.0),
-        (checks.bit_clear(UNSAFE, 8, WORSE), (0.0, 7.0), (9.0,), 1.0),
+        (checks.forbidden, (UNSAFE, {3.0: WORSE}, 1.0), (0.0, 2.0), (3.0,), 1.0),
+        (checks.forbidden, (UNSAFE, {3.0: WORSE}), (0.0, 2.0), (3.0,), None),
+        (checks.action, ((1.0, 2.0), {3.0: WORSE}, 2.0), (1.0, 2.0), (3.0,), 2.0),
+        (checks.required, (UNSAFE, 4.0, WORSE), (4.0,), (0.0, 5.0), 4.0),
+        (checks.positive, (UNSAFE, WORSE, 7.0), (0.1, 9.0), (0.0, -1.0), 7.0),
+        (checks.at_most, (UNSAFE, 5.0, WORSE, 1.5), (5.0, -2.0), (5.1,), 1.5),
+        (checks.bit_set, (UNSAFE, 8, WORSE), (8.0, 9.0), (1.0,), 9.0),
+        (checks.bit_clear, (UNSAFE, 8, WORSE), (0.0, 7.0), (9.0,), 1.0),
     ],
 )
-def test_a_bad_value_is_named_with_its_consequence_and_the_value_to_set(check, good, bad, set_to):
+def test_a_bad_value_is_named_with_its_consequence_and_the_value_to_set(
+    make, told, good, bad, set_to
+):
+    check = make(*told)
     for value in good:
         assert problem(check, value) is None
     for value in bad:
