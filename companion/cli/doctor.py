@@ -21,6 +21,7 @@ from companion.files.yaml_file import ConfigError
 from companion.files.yaml_file import load as load_yaml
 from companion.flight.assembly import open_link
 from companion.flight.maneuvers import configured_maneuvers
+from companion.flight.start_checks import check_link, require_backend
 from companion.guidance import ManeuverSequence
 from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
@@ -73,11 +74,21 @@ def doctor(options: argparse.Namespace) -> int:
 
 
 def _as_told(config: Config, options: argparse.Namespace) -> Config:
+    """The configuration as changed by the options of the command line.
+
+    Raises:
+        ConfigError: an option or an endpoint is wrong.
+        MissingExtraError: the package of the link's backend is not installed.
+        SigningError: the signing key cannot be used.
+    """
     config = changed(config, assigned(options.set), "--set")
     link: dict[str, Any] = {"endpoint": options.endpoint} if options.endpoint else {}
     if options.lockstep:
         link["lockstep"] = True
-    return changed(config, {"link": link}, "the command line")
+    told = changed(config, {"link": link}, "the command line")
+    check_link(told)
+    require_backend(told)
+    return told
 
 
 def _maneuvers(config: Config, drag: KnownDrag) -> tuple[ManeuverSequence | None, list[Finding]]:

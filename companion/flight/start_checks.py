@@ -40,12 +40,21 @@ def check_control(config: Config) -> None:
 
 
 def require_extras(config: Config) -> None:
-    """Check that the optional packages are installed that the configuration needs.
+    """Check that the optional packages are installed that a flight needs.
 
     Raises:
-        MissingExtraError: one is not installed.
+        MissingExtraError: one is not.
     """
     if config.guidance.kind == "nmpc":
         require("casadi", "nmpc", "guidance.kind: nmpc")
+    require_backend(config)
+
+
+def require_backend(config: Config) -> None:
+    """Check that the package of the link's backend is installed.
+
+    Raises:
+        MissingExtraError: it is not.
+    """
     if config.link.backend == "mavsdk":
         require("mavsdk", "mavsdk", "link.backend: mavsdk")

@@ -249,3 +249,10 @@ def test_wrong_usage_is_told(capsys, tmp_path, monkeypatch, arguments, words):
         code, _, err = doctor(capsys, "--config", config, *arguments)
     assert code == 2
     assert words in err
+
+
+def test_a_missing_extra_is_named_before_anything_is_opened(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("importlib.util.find_spec", lambda *_: None)
+    (tmp_path / "my.yaml").write_text("link: {backend: mavsdk}\n")
+    assert main(["doctor", "--config", str(tmp_path / "my.yaml")]) == 2
+    assert "[mavsdk]'" in capsys.readouterr().err
