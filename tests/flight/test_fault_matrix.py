@@ -68,6 +68,8 @@ ELSE = {
     # when the judgement before it is a second old, so before the take-over.
     ("ardupilot", "stream", "freeze clock"): LANDED,
     ("ardupilot", "stream", "NaN attitude"): LANDED,
+    # Its failsafe comes after a second of stale samples, before the hold is answered.
+    ("px4", "hand back", "delay"): HELD,
 }
 """Where a family differs."""
 SHORT = {
