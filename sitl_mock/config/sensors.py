@@ -25,6 +25,11 @@ class EkfConfig(Section):
     """Unmodelled delay of a fix's position."""
     velocity_late_ms: Finite = 0.0
     """Unmodelled delay of a fix's velocity."""
+    fix_slip_ms: NonNegative = 0.0
+    """Range over which the unmodelled delay of a fix slips about its mean: it falls steadily, and
+    then jumps back. The moment of the first jump is random."""
+    fix_slip_time_s: Positive = 14.0
+    """Time between two such jumps."""
     position_noise_m: NonNegative = 0.0246
     """Standard deviation of the noise of a fix's horizontal position, on each axis."""
     velocity_noise_m_s: NonNegative = 0.0238
@@ -33,6 +38,9 @@ class EkfConfig(Section):
     """Correlation time of the noise of position and velocity."""
     tilt_noise_deg: NonNegative = 0.028
     """Random walk of roll and pitch within one second; the fixes limit it."""
+    tilt_bias_deg: tuple[Finite, Finite] = (0.0, 0.0)
+    """Constant error of the attitude, as a rotation about north and east. The estimated bias of the
+    accelerometer hides it in level flight; a horizontal acceleration makes the climb wrong."""
     yaw_error_deg: NonNegative = 0.3
     """Error of the heading; it rotates the integrated acceleration."""
     yaw_time_s: Positive = 15.0
@@ -85,9 +93,14 @@ EKFS: dict[str, EkfConfig | None] = {
         fix_delay_ms=447.0,
         position_late_ms=32.2,
         velocity_late_ms=20.5,
+        # In circles the position's lateness falls by 10 ms and rises again, every 13 to 15 s.
+        fix_slip_ms=12.5,
         position_noise_m=0.005,
         velocity_noise_m_s=0.005,
         tilt_noise_deg=0.006,
+        # The length is 0.14 here, 0.25 to 0.3 in some real flights, and 0.05 to 0.1 in others. So
+        # the height is wrong by as much as in circles at 5 and 8 m/s, where it was 0.25 to 0.3.
+        tilt_bias_deg=(0.12, 0.07),
         yaw_error_deg=0.1,
         turn_yaw_ms=22.7,
         compass_error_deg=1.03,
@@ -98,7 +111,7 @@ EKFS: dict[str, EkfConfig | None] = {
         height_offset_m=0.1,
         height_sag_s4_per_m=0.0004,
         sink_per_acceleration_ms=0.0,
-        height_noise_m=0.013,
+        height_noise_m=0.014,
         height_noise_time_s=6.0,
         position_gains=(0.0347, 0.1052),
         velocity_gains=(0.1096, 0.1649),

@@ -58,6 +58,7 @@ class ErrorLaw(NamedTuple):
 
     lead: float  # s, position error per velocity, and velocity error per acceleration
     scale: float  # relative error of the acceleration
+    tilt: complex  # constant rotation about north + j east, rad
     height_offset: float  # m
     predictor_ms: float
     heading_predictor_ms: float
@@ -90,6 +91,24 @@ def propagated(law: ErrorLaw, state: FilterState, truth: TrailRow, elapsed: floa
     )
 
 
+def propagated_upright(
+    law: ErrorLaw, state: FilterState, truth: TrailRow, elapsed: float
+) -> Errors:
+    """Return the vertical errors ``elapsed`` s after the fix.
+
+    The filter takes a part of the horizontal acceleration for a vertical one: tilt times
+    acceleration.
+    """
+    down, sink, tilt = extrapolated(state.upright.errors, elapsed)
+    turn, before = law.tilt.conjugate(), state.velocity
+    way = complex(truth[10], truth[11]) - state.position
+    return (
+        down + (turn * (way - elapsed * before)).imag,
+        sink + (turn * (complex(truth[0], truth[1]) - before)).imag,
+        tilt,
+    )
+
+
 def error_at(law: ErrorLaw, state: FilterState, truth: TrailRow, now: float) -> NavigationError:
     """Return the error at ``now`` (s), at which the true motion is ``truth`` (pure)."""
     elapsed = now - state.at
@@ -99,12 +118,16 @@ def error_at(law: ErrorLaw, state: FilterState, truth: TrailRow, now: float) -> 
     pending = state.level.pending
     place += law.lead * complex(truth[0], truth[1]) - unsettled * pending[0]
     speed += law.lead * complex(truth[13], truth[14]) - unsettled * pending[1]
-    down, sink, _ = extrapolated(state.upright.errors, elapsed)
+    down, sink, _ = propagated_upright(law, state, truth, elapsed)
     pending = state.upright.pending
     down += law.height_offset + state.sag - unsettled * pending[0]
     return NavigationError(
         (place.real, place.imag, down.real),
         (speed.real, speed.imag, (sink - unsettled * pending[1]).real + state.sink),
         # A wrong attitude rotates the thrust, which makes the acceleration wrong.
-        (tilt.imag / _GRAVITY, -tilt.real / _GRAVITY, state.yaw - turning * state.yaw_pending),
+        (
+            tilt.imag / _GRAVITY + law.tilt.real,
+            -tilt.real / _GRAVITY + law.tilt.imag,
+            state.yaw - turning * state.yaw_pending,
+        ),
     )

@@ -15,9 +15,9 @@ from sitl_mock.physics.navigation_error import (
     FilterState,
     TrackState,
     TrailRow,
-    extrapolated,
     pending_share,
     propagated,
+    propagated_upright,
 )
 
 _GRAVITY = 9.80665
@@ -58,6 +58,7 @@ class NavigationFilter:
         self.law = ErrorLaw(
             config.acceleration_lead_ms * 1e-3,
             config.acceleration_scale,
+            complex(*map(radians, config.tilt_bias_deg)),
             config.height_offset_m,
             config.predictor_ms,
             config.heading_predictor_ms,
@@ -65,6 +66,7 @@ class NavigationFilter:
         self._uncertainty = _UNCERTAINTY
         self._random = Random(f"{seed}/navigation")
         self._height_random = Random(f"{seed}/height")
+        self._slipped = Random(f"{seed}/slip").random()
         yaw = self._random.gauss(0.0, radians(config.yaw_error_deg))
         level, upright = self._initial(1.0), self._initial(config.vertical_share)
         way, speed = complex(start[10], start[11]), complex(start[0], start[1])
@@ -101,15 +103,16 @@ class NavigationFilter:
         speed, pull = complex(delayed[0], delayed[1]), complex(delayed[13], delayed[14])
         moved = propagated(law, state, delayed, elapsed)
         noise = self._next_noise(state.level.noise, 1.0)
+        slip = config.fix_slip_ms * (0.5 - (at / config.fix_slip_time_s + self._slipped) % 1.0)
         seen = (
-            noise[0] - (config.position_late_ms * late + law.lead) * speed,
-            noise[1] - (config.velocity_late_ms * late + law.lead) * pull,
+            noise[0] - ((config.position_late_ms + slip) * late + law.lead) * speed,
+            noise[1] - ((config.velocity_late_ms + slip) * late + law.lead) * pull,
         )
         kick = _GRAVITY * radians(config.tilt_noise_deg) * sqrt(elapsed)
         level = self._corrected_state(moved, seen, noise, kick)
         share = config.vertical_share
         noise = self._next_noise(state.upright.noise, share)
-        still = extrapolated(state.upright.errors, elapsed)
+        still = propagated_upright(law, state, delayed, elapsed)
         upright = self._corrected_state(still, noise, noise, share * kick)
         aligned = self._next_alignment(speed, pull, elapsed)
         yaw = self._next_yaw_noise() + aligned
@@ -142,8 +145,8 @@ class NavigationFilter:
         upright = _settling(
             state.upright,
             corrected.upright,
-            extrapolated(state.upright.errors, since),
-            extrapolated(corrected.upright.errors, ago),
+            propagated_upright(law, state, present, since),
+            propagated_upright(law, corrected, present, ago),
             unsettled,
         )
         return corrected._replace(level=level, upright=upright)

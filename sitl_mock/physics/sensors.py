@@ -180,7 +180,7 @@ class Estimator:
             round(config.position_delay_ms * 1e-3 / dt),
             dt,
             filter_ is not None,
-            ErrorLaw(0.0, 0.0, 0.0, 0.0, 0.0) if filter_ is None else filter_.law,
+            ErrorLaw(0.0, 0.0, 0j, 0.0, 0.0, 0.0) if filter_ is None else filter_.law,
             0.0 if config.ekf is None else radians(config.ekf.yaw_rate_bias_deg_s),
         )
         horizon = 0 if config.ekf is None else round(config.ekf.fix_delay_ms * 1e-3 / dt)

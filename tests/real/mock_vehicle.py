@@ -16,7 +16,18 @@ from tests.real.build import ROOT
 from tests.real.truth import NoTruthError, Truth, truth_from
 from tests.real.vehicle import merged
 
-_WIND = {"speed_m_s": 3.0, "from_deg": 180.0, "gust_m_s": 0.5}
+_WIND = {
+    "px4": {"speed_m_s": 3.0, "from_deg": 180.0},
+    # SIM_WIND_TURB 1: ArduPilot draws the direction of its horizontal gusts anew in each step of
+    # 1/1200 s, so only the vertical ones last, 50 steps.
+    "ardupilot": {
+        "speed_m_s": 3.0,
+        "from_deg": 180.0,
+        "vertical_gust_m_s": 1.0,
+        "gust_time_s": 0.04,
+    },
+}
+"""The wind that `WIND` of tests/real/vehicle.py makes."""
 
 
 class FlownInMemory:
@@ -64,7 +75,7 @@ class MockInMemory:
 
     def blow(self, on: bool) -> None:
         """Wind in the next flight, or none."""
-        self._wind = {"wind": _WIND} if on else {}
+        self._wind = {"wind": _WIND[self.autopilot]} if on else {}
 
     def launch(self, config: dict, *, command: str = "fly", folder: Path) -> FlownInMemory:
         """Fly to the end; record in `folder`."""

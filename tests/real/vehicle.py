@@ -22,7 +22,13 @@ TUNED = {
 }
 WIND = {
     "px4": {"SIH_WIND_N": 3.0},
-    "ardupilot": {"SIM_WIND_SPD": 3.0, "SIM_WIND_DIR": 180.0, "SIM_WIND_TURB": 1.0},
+    # Without SIM_WIND_T 1 its wind grows with the root of the height, to its full speed at 60 m.
+    "ardupilot": {
+        "SIM_WIND_SPD": 3.0,
+        "SIM_WIND_DIR": 180.0,
+        "SIM_WIND_TURB": 1.0,
+        "SIM_WIND_T": 1.0,
+    },
 }
 """Parameters of the simulators; PX4's has no turbulence."""
 _HEARTBEATS_S = 1.2
