@@ -125,10 +125,10 @@ def _rates(flight: FlightData) -> Iterator[Plot]:
 def _thrust(flight: FlightData) -> Plot:
     if "thrust" not in flight.curves:
         return Plot("", "", [])
-    curve = flight.curves["thrust"]
-    traces = [over_time("sent", curve, 0, MEASURED)]
-    if curve.values.shape[1] > 1:
-        traces.append(over_time("learned at hover", curve, 1, NEAREST, dash="dash"))
+    traces = [over_time("sent", flight.curves["thrust"], 0, MEASURED)]
+    if "hover_thrust" in flight.curves:
+        learned = flight.curves["hover_thrust"]
+        traces.append(over_time("learned at hover", learned, 0, NEAREST, dash="dash"))
     traces += limit_lines([flight], "thrust")
     layout = time_axis([flight], y="thrust, 0..1")
     return Plot("Thrust", "Normalised collective thrust.", traces, layout, 280)

@@ -57,7 +57,7 @@ class FlightData:
         curves: curves by name, without those that were not recorded. Columns: "position",
             "reference": north, east, height, m. "error": tracking error, m. "motion": height in m,
             speed in m/s, tilt in °. "coefficients", "target": north, east. "commanded", "measured":
-            roll, pitch, yaw rate, °/s. "thrust": sent, learned at hover (not of a `.tlog`).
+            roll, pitch, yaw rate, °/s. "thrust": sent, 0..1. "hover_thrust": as learned, 0..1.
             "latency": from a sample's arrival to its setpoint, ms.
         figures: the content of `summary.json`, or derived from the record; None for a `.tlog`.
         provisional: whether the flight wrote no summary, so that the figures come from its record.
@@ -143,7 +143,8 @@ def _configuration(folder: Path) -> Config | None:
 
 def _curves(record: FlightRecord) -> dict[str, Curve]:
     guidance, setpoint, sample = map(record.rows, ("guidance", "setpoint", "sample"))
-    setpoint = setpoint[setpoint["idle"] == 0]
+    sent = setpoint
+    setpoint = sent[sent["idle"] == 0]
     motion, thrust = record.rows("motion"), record.rows("thrust")
     stepped = record.since_start(guidance["time_s"])
     answered = record.since_start(setpoint["received_s"])
@@ -156,8 +157,9 @@ def _curves(record: FlightRecord) -> dict[str, Curve]:
         "target": Curve(answered, _columns(setpoint, "target_north", "target_east")),
         "commanded": Curve(answered, _rates(setpoint, "commanded")),
         "measured": Curve(record.since_start(sample["received_s"]), _rates(sample, "measured")),
-        "thrust": Curve(
-            record.since_start(thrust["time_s"]), _columns(thrust, "sent", "hover_thrust")
+        "thrust": Curve(record.since_start(sent["received_s"]), _columns(sent, "thrust")),
+        "hover_thrust": Curve(
+            record.since_start(thrust["time_s"]), _columns(thrust, "hover_thrust")
         ),
         "latency": Curve(answered, 1e-3 * _columns(setpoint, "latency_us")),
     }

@@ -1,10 +1,11 @@
 """Plots of the motion: track, height, tracking error, speed and tilt."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from companion.config.flight import OPEN_LOOP
 from companion.report.flight_data import FlightData
 from companion.report.plots import (
     CROSSED,
@@ -24,6 +25,8 @@ from companion.report.plots import (
 _NORTH, _EAST, _HEIGHT = range(3)
 _EYE = {"x": 1.3, "y": -1.7, "z": 1.0}
 """Position of the camera: from the south-east and above, far enough to show the axis titles."""
+_LONGEST_EDGE = 1.2
+"""Longest edge of the box around the track, in Plotly's units: the camera sees all of it."""
 
 
 def motion_plots(flights: Sequence[FlightData]) -> Iterator[Plot]:
@@ -54,7 +57,9 @@ def _plan(flights: Sequence[FlightData]) -> Plot:
     traces += [*_place_of_end(flights), *limit_lines(flights, "track")]
     layout = axes(x="east, m", y="north, m")
     layout["yaxis"]["scaleanchor"] = "x"
-    note = "The track from above. In open-loop steps the vehicle has no reference and drifts."
+    note = "The track from above."
+    if any(span.name in OPEN_LOOP for flight in flights for span in flight.maneuvers):
+        note += " In open-loop maneuvers the vehicle has no reference and drifts."
     return Plot("Track", note, traces, layout, 420)
 
 
@@ -80,12 +85,35 @@ def _space(flights: Sequence[FlightData]) -> Plot:
             traces.append(_track(_name(flights, flight, "flown"), flight, "position", colour))
         if "reference" in flight.curves and len(flights) == 1:
             traces.append(_track("reference", flight, "reference", REFERENCE))
-    scene = {
+    scene: dict[str, Any] = {
         **axes(x="east, m", y="north, m", z="height, m"),
-        "aspectmode": "data",
         "camera": {"eye": _EYE, "center": {"x": 0.0, "y": 0.0, "z": -0.15}},
     }
+    ranges = _cube_ranges(traces)
+    for axis, (low, high) in ranges.items():
+        scene[f"{axis}axis"]["range"] = [low, high]
+    longest = max((high - low for low, high in ranges.values()), default=1.0)
+    # Plotly's own aspect "data" makes a narrow box so long that it leaves the picture.
+    scene["aspectmode"] = "manual"
+    scene["aspectratio"] = {
+        axis: _LONGEST_EDGE * (high - low) / longest for axis, (low, high) in ranges.items()
+    }
     return Plot("Track in space", "Drag to turn it.", traces, {"scene": scene}, 520)
+
+
+def _cube_ranges(traces: Sequence[Mapping[str, Any]]) -> dict[str, tuple[float, float]]:
+    """Range of each axis around the tracks, m; a short axis has half the longest one's length."""
+    shown = {
+        axis: [value for trace in traces for value in trace[axis] if value is not None]
+        for axis in "xyz"
+    }
+    ends = {axis: (min(values), max(values)) for axis, values in shown.items() if values}
+    longest = max((high - low for low, high in ends.values()), default=0.0) or 1.0
+    ranges = {}
+    for axis, (low, high) in ends.items():
+        middle, half = 0.5 * (low + high), 0.52 * max(high - low, 0.5 * longest)
+        ranges[axis] = (middle - half, middle + half)
+    return ranges
 
 
 def _track(name: str, flight: FlightData, which: str, colour: str) -> dict[str, Any]:
@@ -114,12 +142,13 @@ def _height(flights: Sequence[FlightData]) -> Plot:
 def _error(flights: Sequence[FlightData]) -> Plot:
     traces = _lines(flights, "error", "distance from the reference") + limit_lines(flights, "error")
     layout = time_axis(flights, y="error, m")
-    note = "Distance from the reference by the autopilot's estimate; a gap has no reference."
+    note = "Distance from the reference by the autopilot's estimate. In gaps there is no reference."
     largest = _largest_error(flights)
     if largest is not None:
         layout["yaxis"]["range"] = [0.0, 1.2 * largest]
         note += (
-            " Elsewhere it is larger, as on the way back from steps: double-click to see it all."
+            " Outside of the tracked maneuvers, as on the way back from steps, it is larger: "
+            "double-click to see all of it."
         )
     return Plot("Tracking error", note, traces, layout)
 
@@ -157,7 +186,8 @@ def _speed(flights: Sequence[FlightData]) -> Plot:
             motion, colour = flight.curves["motion"], _colour(flights, number)
             traces.append(over_time(_name(flights, flight, "speed, m/s"), motion, 1, colour))
             tilt = _name(flights, flight, "tilt, °")
-            traces.append(over_time(tilt, motion, 2, colour, dash="dot", yaxis="y2"))
+            second = REFERENCE if len(flights) == 1 else colour
+            traces.append(over_time(tilt, motion, 2, second, dash="dot", yaxis="y2"))
     traces += limit_lines(flights, "speed") + limit_lines(flights, "tilt", yaxis="y2")
     layout = time_axis(flights, y="speed, m/s", y2="tilt, °")
     layout["yaxis2"] |= {"overlaying": "y", "side": "right", "showgrid": False, "tickmode": "auto"}

@@ -13,7 +13,14 @@ from companion.report.flight_data import FlightData, recorded
 from companion.report.html_page import rendered, require_extra
 from companion.report.motion_plots import motion_plots
 from companion.report.plots import Plot
-from companion.report.tables import Table, beside_each_other, configuration, flight_tables
+from companion.report.tables import (
+    Table,
+    beside_each_other,
+    configuration,
+    events_at_end,
+    extremes,
+    flight_tables,
+)
 from companion.report.timeline import timeline
 from companion.report.tlog_data import logged
 
@@ -49,7 +56,7 @@ def write_report(path: Path, out: Path | None = None) -> Path:
     with _of_this_version(path):
         words = None if flight.figures is None else closing_words(flight.figures, None)
         plots = [*timeline(flight), *motion_plots([flight]), *control_plots(flight)]
-        tables = flight_tables(flight)
+        tables = [*events_at_end(flight), *flight_tables(flight)]
         page = _page(flight.name, words, [flight], tables, plots, configuration(flight))
     write_whole(out, page)
     return out
@@ -105,6 +112,7 @@ def _page(
         flights=flights,
         tables=tables,
         settings=settings,
+        told_by_telemetry=extremes(flights[0]),
     )
 
 

@@ -5,10 +5,15 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from companion.config.reference import Key
 from companion.report.flight_data import FlightData
 
 _EMPTY = "–"
+_AROUND_END = 5.0
+"""Events this long before and after an early end stand at the top of the page, s."""
+_MOST_EVENTS = 20
 _PORT = re.compile(r":\d+$")
 
 
@@ -31,6 +36,30 @@ def flight_tables(flight: FlightData) -> list[Table]:
     figures = flight.figures
     tables = [] if figures is None else [_maneuvers(figures), _figures(figures)]
     return [table for table in tables if table.rows]
+
+
+def events_at_end(flight: FlightData) -> list[Table]:
+    """The events around the early end of a flight; no table without any."""
+    if flight.end is None:
+        return []
+    around = [each for each in flight.events if abs(each.time - flight.end.time) <= _AROUND_END]
+    rows = [(f"{each.time:.1f}", each.source, each.text) for each in around[:_MOST_EVENTS]]
+    title = f"Events within {_AROUND_END:.0f} s of the end"
+    return [Table(title, ("time, s", "from", "what happened"), rows)] if rows else []
+
+
+def extremes(flight: FlightData) -> str:
+    """Duration, largest height, speed and tilt of a flight, in words; empty without positions."""
+    motion = flight.curves.get("motion")
+    if motion is None or flight.last is None:
+        return ""
+    texts = "{:.1f} m high", "{:.1f} m/s fast", "{:.0f}° tilted"
+    told = [
+        text.format(np.nanmax(values))
+        for text, values in zip(texts, motion.values.T, strict=True)
+        if not np.isnan(values).all()
+    ]
+    return f"{flight.last:.0f} s" + (f", up to {', '.join(told)}" if told else "")
 
 
 def configuration(flight: FlightData) -> Table:

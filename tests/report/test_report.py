@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from companion.cli.main import main
 from companion.config import Config
 from companion.recording.flight_record import read_flight
-from companion.report import PAGE, html_page, page
+from companion.report import PAGE, flight_data, html_page, page
 from companion.report.control_plots import control_plots
 from companion.report.early_end import early_end
 from companion.report.flight_data import recorded
@@ -83,6 +83,10 @@ def test_the_page_says_first_whether_the_flight_was_good_and_shows_all_of_it(fol
     assert not re.search(r'(src|href)="', text), "the page needs no network"
     plots = plots_of(path)
     assert {"Track", "Step response", "Tracking error", "Body rate, yaw", "Thrust"} <= set(plots)
+    phases = {phase.name: phase for phase in recorded(folder).phases}
+    sent = plots["Thrust"]["traces"][0]["x"]
+    assert sent[0] > phases["checks"].begin + 1.0, "nothing is sent before the stream begins"
+    assert sent[-1] < phases["land"].begin + 1.0, "nothing is sent after the hand-back"
     heights = [y for y in plots["Height"]["traces"][0]["y"] if y is not None]
     assert 1.8 < max(heights) < 2.3
     error = plots["Tracking error"]
@@ -130,7 +134,28 @@ def test_a_failed_flight_shows_where_it_ended_and_the_limit_it_crossed(failed):
     assert speeds["y"] == [1.2, 1.2]
     cross = next(t for t in plots["Track"]["traces"] if t["name"] == "ended early")
     assert cross["mode"] == "markers"
-    assert re.search(r"The flight ended early at \d+\.\d s: \S", body(failed / PAGE))
+    text = body(failed / PAGE)
+    assert re.search(r"The flight ended early at \d+\.\d s: \S", text)
+    events = text.index("Events within 5 s of the end")
+    assert text.index("<h1") < events < text.index("Tracking by maneuver")
+    assert told["result"] in text[events : text.index("Tracking by maneuver")]
+
+
+def test_the_track_in_space_fits_its_picture_also_where_the_vehicle_only_climbs(folder):
+    flight = recorded(folder)
+    climb = np.column_stack([np.zeros(50), np.full(50, 0.01), np.linspace(0.0, 60.0, 50)])
+    curves = {"position": flight_data.Curve(np.arange(50.0), climb)}
+    plot = next(
+        plot
+        for plot in motion_plots([dataclasses.replace(flight, curves=curves)])
+        if plot.title == "Track in space"
+    )
+    scene = plot.layout["scene"]
+    assert max(scene["aspectratio"].values()) < 1.3
+    assert min(scene["aspectratio"].values()) > 0.5, "no axis is too short to be read"
+    low, high = scene["zaxis"]["range"]
+    assert low < climb[0, 2]
+    assert climb[-1, 2] < high
 
 
 def test_the_last_maneuver_of_a_failed_flight_ends_with_its_phase(failed):
@@ -185,6 +210,8 @@ def test_a_record_that_was_cut_off_makes_a_page_that_says_so(copied):
 
 def test_a_tlog_alone_makes_a_page(folder, tmp_path):
     out = page.write_report(folder / "flight.tlog", tmp_path / "page.html")
+    assert re.search(r"<h1>flight.tlog: \d+ s, up to 2\.\d m high, .*° tilted</h1>", body(out))
+    assert "open-loop" not in body(out), "a .tlog knows no maneuvers"
     plots = plots_of(out)
     assert {"Track", "Height", "Body rate, roll", "Acceleration coefficient, north"} <= set(plots)
     own = plots_of(page.write_report(folder, tmp_path / "own.html"))
