@@ -186,7 +186,7 @@ class FaultEffects:
                 self._commander.take_over(Mode[fault.mode])
             case EstimatorReset():
                 step = radians(fault.yaw_deg)
-                self._vehicle.shift_estimate(yaw=step, position_ned=fault.position_ned_m)
+                self._vehicle.estimator.shift(yaw=step, position_ned=fault.position_ned_m)
                 self._control.shift(step, fault.position_ned_m)
             case RefuseArming():
                 self._commander.refusal = fault.reason

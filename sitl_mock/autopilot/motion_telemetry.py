@@ -128,7 +128,7 @@ class MotionTelemetry:
             *estimate.body_rates,
             _POSE_COVARIANCE,
             _VELOCITY_COVARIANCE,
-            self._vehicle.reset_counter & 0xFF,
+            self._vehicle.estimator.reset_counter & 0xFF,
             dialect.MAV_ESTIMATOR_TYPE_AUTOPILOT,
             100,
         )
