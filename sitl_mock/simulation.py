@@ -16,7 +16,7 @@ from sitl_mock.link.framing import Framer, Message
 from sitl_mock.link.link import Link
 from sitl_mock.link.signing import link_signing
 from sitl_mock.personalities import PERSONALITIES
-from sitl_mock.physics.geodesy import Origin
+from sitl_mock.physics.geodesy import Geodetic
 from sitl_mock.physics.vehicle import Vehicle
 from sitl_mock.physics.vehicle_step import Plant, PythonPlant
 from sitl_mock.settings import MockSettings
@@ -73,7 +73,7 @@ class Simulation:
                 self.parameters,
                 self.vehicle,
                 self.stream,
-                Origin(home.latitude_deg, home.longitude_deg, home.altitude_m),
+                Geodetic(home.latitude_deg, home.longitude_deg, home.altitude_m),
                 self.links,
                 round(settings.prearm_delay_s * 1e6),
                 StampSlips(settings.sensors.stamp_slips_hz, settings.seed),
