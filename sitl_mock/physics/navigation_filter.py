@@ -120,11 +120,7 @@ class NavigationFilter:
         turning = pending_share(law.heading_predictor_ms, state, now)
         turned = turning * state.yaw_pending + yaw - state.yaw
         height_noise = self._next_height_noise(elapsed)
-        sag = config.height_sag_s4_per_m * abs(acceleration) ** 2 + height_noise
-        lagged = 1.0 - exp(-elapsed / _SAG_S)
-        sag = state.sag + lagged * (sag - state.sag)
-        sink = config.sink_per_acceleration_ms * 1e-3 * abs(acceleration)
-        sink = state.sink + lagged * (sink - state.sink)
+        sag, sink = self._next_sag(abs(acceleration), height_noise, elapsed)
         corrected = FilterState(
             horizontal,
             vertical,
@@ -186,6 +182,16 @@ class NavigationFilter:
         left = self._uncertainty / (1.0 + shown * elapsed)
         self._uncertainty = min(left + _UNCERTAINTY_GROWTH * elapsed, _UNCERTAINTY)
         return rest + (self.state.aligned - rest) * exp(-rate * elapsed)
+
+    def _next_sag(
+        self, acceleration: float, height_noise: float, elapsed: float
+    ) -> tuple[float, float]:
+        """Return the slow errors of the down position (m) and velocity (m/s) at the next fix."""
+        config, state = self._config, self.state
+        sag = config.height_sag_s4_per_m * acceleration**2 + height_noise
+        sink = config.sink_per_acceleration_ms * 1e-3 * acceleration
+        share = 1.0 - exp(-elapsed / _SAG_S)
+        return state.sag + share * (sag - state.sag), state.sink + share * (sink - state.sink)
 
     def _next_height_noise(self, elapsed: float) -> float:
         """Return the slow noise of the height at the next fix, m."""
