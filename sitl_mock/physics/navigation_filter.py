@@ -90,7 +90,7 @@ class NavigationFilter:
         return at - self.state.at >= self._period - 1e-9
 
     def advance(self, delayed: TrailRow, at: float, present: TrailRow, now: float) -> None:
-        """Correct the errors by a fix; the output does not jump, but follows.
+        """Correct the errors by a fix; the output follows gradually, without a jump.
 
         Args:
             delayed: the true motion at the fusion time.
