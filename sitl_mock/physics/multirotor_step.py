@@ -118,7 +118,9 @@ def drive(
     thrust_factor: float,
     wind: Vector,
 ) -> tuple[Load, Actuation]:
-    """Run controller, allocation and rotors for one step; return the load on the body.
+    """Run controller, allocation and rotors for one step.
+
+    Return the load on the body, and the new state of controller and rotors.
 
     Args:
         law: constants.
@@ -166,7 +168,7 @@ def _shaped(
     setpoint: Vector,
     controlled: bool,
 ) -> tuple[Vector, Shaped]:
-    """Return the delayed and shaped setpoint; uncontrolled, return it as it is, shaping reset."""
+    """Return the delayed, shaped setpoint, without control the given one; and the shaping."""
     goals = delayed(rings.arrived, law.shaping.delays, step, setpoint)
     if controlled:
         return shape(law.shaping, shaped, goals, q)
