@@ -118,9 +118,7 @@ def drive(
     thrust_factor: float,
     wind: Vector,
 ) -> tuple[Load, Actuation]:
-    """Run controller, allocation and rotors for one step.
-
-    Return the load on the body, and the new state of controller and rotors.
+    """Run controller, allocation and rotors for one step; return the load and their new state.
 
     Args:
         law: constants.
