@@ -6,7 +6,7 @@ import socket
 import pytest
 
 from companion.files.yaml_file import ConfigError
-from companion.live.door import open_door
+from companion.live.door import Door, open_door
 from companion.live.page.guard import Guard
 
 TOKEN = "secret"
@@ -96,6 +96,12 @@ def test_the_door_is_of_this_computer_and_has_a_new_token_each_time():
     assert f"127.0.0.1:{first.port}" in first.words()
     for door in (first, second):
         door.listening.close()
+
+
+def test_a_door_for_other_computers_is_told_with_its_name_and_token():
+    told = Door("0.0.0.0", 8090, "secret", None).words()
+    assert told == f"Live page: http://{socket.gethostname()}:8090/?token=secret"
+    assert "http://[2001:db8::1]:8090/?token=" in Door("2001:db8::1", 8090, "s", None).words()
 
 
 def test_a_cookie_that_cannot_be_read_admits_nobody():

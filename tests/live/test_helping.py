@@ -1,4 +1,4 @@
-"""The options `--watch`, `--live` and `--foxglove`: what they start beside a flight, and its end."""
+"""The options `--watch`, `--live` and `--foxglove`: the process they start, and its end."""
 
 import argparse
 import asyncio
@@ -7,6 +7,7 @@ import re
 import signal
 import sys
 from importlib.util import find_spec
+from pathlib import Path
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
 
@@ -16,6 +17,8 @@ from rich.console import Console
 from companion.cli.helping import environment, helper
 from companion.config import Config
 from companion.config.files import load
+from companion.config.known_drag import KnownDrag
+from companion.drag import Drag
 from companion.extras import MissingExtraError
 from companion.files.yaml_file import ConfigError
 from companion.flight.environment import THIS_COMPUTER
@@ -82,36 +85,36 @@ def test_a_stream_that_lost_its_port_is_noted_and_the_flight_goes_on(monkeypatch
         )  # fmt: skip
         with started(foxglove="127.0.0.1:0") as beside:
             assert environment(beside).stream == beside.feed.send
-            notes = noted(beside, 1)
-    assert notes[0].startswith("there is no live stream: ")
-    assert notes[0].endswith("; the flight goes on without it")
+            note = noted(beside)
+    assert note.startswith("there is no live stream: ")
+    assert note.endswith("; the flight goes on without it")
     assert beside._process.wait(20.0) == 0
 
 
-def noted(beside, count, work=lambda: None):
-    """The first notes of the process."""
-    notes = []
-    beside.note = notes.append
+def noted(beside, work=lambda: None):
+    """The next note of the process."""
+    notes = asyncio.Queue()
+    beside.note = notes.put_nowait
 
     async def until():
         work()
-        while len(notes) < count:
-            await asyncio.sleep(0.01)
+        return await notes.get()
 
-    asyncio.run(asyncio.wait_for(beside.serve_beside(until()), 30.0))
-    return notes
+    return asyncio.run(asyncio.wait_for(beside.serve_beside(until()), 30.0))
 
 
 def test_a_process_that_is_killed_is_noted_once_and_the_flight_goes_on(tmp_path):
     path = tmp_path / "flown.yaml"
     path.write_text("{}\n")
     with started(path=path, watch=True) as beside:
-        (begins,) = noted(beside, 1)
-        assert begins == "edits of flown.yaml are applied from now on"
-        ended = noted(beside, 1, lambda: beside._process.send_signal(signal.SIGKILL))
+        assert noted(beside) == "edits of flown.yaml are applied from now on"
+        ended = noted(beside, lambda: beside._process.send_signal(signal.SIGKILL))
+        assert ended == "the file watcher has ended by itself; the flight goes on without it"
+        again = []
+        beside.note = again.append
         beside.event(1.0, "the flight goes on")
         beside.status(status(1.0))
-        assert ended == ["the file watcher has ended by itself; the flight goes on without it"]
+        assert again == []
         beside._process.wait()
 
 
@@ -146,6 +149,12 @@ def test_requests_of_the_process_are_answered():
             beside._handle(message)
 
     asyncio.run(handle())
+    beside._tell_drag(KnownDrag(Drag(0.2, 0.1), Path("learned-aa.json")))
+    beside._tell_drag(KnownDrag(None, None))
+    assert sent[-2:] == [
+        ("drag", {"drag": [0.2, 0.1], "source": "learned-aa.json"}),
+        ("drag", {"drag": None, "source": None}),
+    ]
     beside._process.kill()
     beside._process.wait()
     answers = [content for kind, content in sent if kind == "answer"]

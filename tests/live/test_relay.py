@@ -1,4 +1,4 @@
-"""The helper process's end of the channel, in this process: requests, refusals, the file's edits."""
+"""The helper process's end of the channel, in this process: requests, refusals, edits."""
 
 import asyncio
 import socket
@@ -11,7 +11,7 @@ from companion.files.yaml_file import ConfigError
 from companion.flight.changes import ChangeRefusedError
 from companion.live import after_flight, helper_process
 from companion.live.after_flight import until_alone
-from companion.live.channel import Channel, NoAnswerError, datagrams
+from companion.live.channel import Channel, datagrams
 from companion.live.checks import ChangeChecks
 from companion.live.door import ask_to_leave, leave_address
 from companion.live.watched_file import Edit
@@ -66,7 +66,7 @@ def test_a_change_is_checked_and_then_asked_of_the_flight():
             await relay.change({"planner": {"gain_per_s": 50.0}}, "a test")
         assert len(flight.told) == 1
         flight.answer = {"refusal": "not while landing"}
-        with pytest.raises(ChangeRefusedError, match="^not while landing$"):
+        with pytest.raises(ChangeRefusedError, match=r"^not while landing$"):
             await relay.undo("a test")
 
     used(use)
@@ -74,13 +74,12 @@ def test_a_change_is_checked_and_then_asked_of_the_flight():
 
 def test_messages_of_the_flight_reach_the_checks_and_the_listeners():
     async def use(relay, flight):
-        heard = []
-        relay.listen(heard.append)
+        heard = asyncio.Queue()
+        relay.listen(heard.put_nowait)
         now = changed(Config(), SLOWER, "a test").model_dump(mode="json")
         flight.end.send({"kind": "config", "config": now, "can_undo": True})
         flight.end.send({"kind": "drag", "drag": [0.3, 0.0], "source": "learned-aa.json"})
-        while len(heard) < 2:
-            await asyncio.sleep(0.001)
+        assert [(await heard.get())["kind"] for _ in range(2)] == ["config", "drag"]
         assert relay.checks.now.planner.gain_per_s == 4.0
         assert relay.checks._drag.drag.linear == 0.3
 
@@ -158,6 +157,19 @@ def test_an_end_that_broke_counts_as_closed():
     assert list(channel.waiting()) == [None]
     assert not channel.open
     assert list(datagrams(Broken(), 1)) == [b""]
+
+
+def test_a_turn_takes_no_more_than_it_may():
+    channel, theirs = Channel.pair()
+    theirs.setblocking(False)
+    for number in range(3):
+        channel.send({"number": number})
+    told = Channel(theirs)
+    assert [message["number"] for message in told.waiting(2)] == [0, 1]
+    assert len(list(datagrams(theirs, 0))) == 0
+    assert len(list(datagrams(theirs, 5))) == 1
+    channel.close()
+    theirs.close()
 
 
 def test_maneuvers_that_are_no_longer_known_forbid_a_change(tmp_path):
