@@ -106,7 +106,7 @@ def test_another_trajectory_is_another_campaign(begun, damage):
 
 
 def test_only_the_limits_on_its_size_may_change(begun, tmp_path):
-    campaign, out = begun
+    _campaign, out = begun
     told = {"sweep": TILT, "set": {"flight.trajectory": "path.yaml"}}
     folder.resume(out, load(tmp_path, **told, limits={"max_hours": 9.0, "max_cases": 7}))
     with pytest.raises(ConfigError, match="another campaign: limits differ"):
@@ -138,7 +138,7 @@ def test_results_that_cannot_be_read_are_named(begun, capsys):
     path.write_bytes(whole[: len(whole) // 2])
     assert main(["campaign", "report", str(out)]) == 2
     assert f"{path}: cannot be read: " in capsys.readouterr().err
-    with pytest.raises(ConfigError, match="unit-00001.*cannot be read"):
+    with pytest.raises(ConfigError, match=r"unit-00001.*cannot be read"):
         again._row(out, campaign, SimpleNamespace(unit=1), 1)
     pyarrow.parquet.write_table(pyarrow.table({"a": [1]}), path)
     with pytest.raises(ConfigError, match="are not of one campaign"):
