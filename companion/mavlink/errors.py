@@ -30,7 +30,7 @@ class UnknownMessage(LinkError):  # noqa: N818
 
 
 class LogError(LinkError):
-    """A recording cannot be used; the message says why."""
+    """A `.tlog` cannot be used; the message says why."""
 
 
 class SigningError(LinkError):

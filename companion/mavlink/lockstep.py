@@ -191,8 +191,8 @@ class LockstepEventLoop(LinkEventLoop):
     ) -> asyncio.TimerHandle:
         """Schedule a timer; timers due at the same time run in the order of scheduling.
 
-        In asyncio the order of such timers depends on the shape of its heap, and so on timers from
-        the time before the first beacon, when wall time counted.
+        In asyncio the order of such timers depends on the shape of its heap, which still depends on
+        timers that were scheduled in wall time, before the first beacon.
         """
         self._scheduled_so_far += 1
         order = self._scheduled_so_far % _TIMERS_IN_ORDER * _TIMER_SPACING_S

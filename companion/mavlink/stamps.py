@@ -20,7 +20,7 @@ _MINUTE = 60 * TICKS_PER_S
 _PROGRAM_DATE = (1_788_220_800 - EPOCH_UNIX_S) * TICKS_PER_S
 """2026-09-01, ticks. A correct clock is never earlier; raise this date with a release."""
 _FURTHEST = 5 * 365 * _DAY
-"""A stamp further ahead of the date is refused, ticks."""
+"""Furthest that an accepted stamp may be ahead of the date, ticks."""
 
 MOST_TICKS = 2**48 - 2 * _FURTHEST
 """Latest date that is used (2094), ticks, so that every stamp fits into 48 bits."""
@@ -37,7 +37,7 @@ class SignatureResult(Enum):
     GOOD = "signed with the configured key, and newer than all before it on its stream"
     UNSIGNED = "not signed"
     WRONG_KEY = "signed with another key"
-    REPLAYED = "not newer than an earlier frame or the date: repeated by the link, or a recording"
+    REPLAYED = "not newer than an earlier frame, or too old: repeated by the link, or a recording"
     AHEAD = "signed with the configured key, but dated too far in the future"
 
 

@@ -85,7 +85,7 @@ class TextAssembler:
 
 
 def _recent(texts: deque[StatusText], words: str, now: float) -> bool:
-    """Whether `texts` has the same words from the last second."""
+    """Whether one of `texts` from the last second has the same words."""
     return any(one.text == words for one in texts if one.time >= now - _SAME_WITHIN_S)
 
 

@@ -25,7 +25,7 @@ class Timed(Section):
     """Start and duration of a fault, in vehicle time; without a start it begins at once."""
 
     at_s: NonNegative | None = None
-    """Time after boot when the fault begins."""
+    """Vehicle time at which the fault begins; a fault that is injected later begins at once."""
     after_offboard_s: NonNegative | None = None
     """Time from the first control by setpoints to the fault. On PX4 that is the first time armed in
     OFFBOARD; on ArduPilot the first time in the air in GUIDED under SET_ATTITUDE_TARGET."""
@@ -41,6 +41,8 @@ class Timed(Section):
 
 class LinkFault(Timed):
     """Datagrams of the companion link are dropped, delayed, duplicated, reordered or corrupted.
+
+    ``reorder`` holds a datagram back until the next one has passed. ``corrupt`` changes one byte.
 
     In the direction to the companion, each frame counts as a datagram, and a lockstep beacon is
     never affected.

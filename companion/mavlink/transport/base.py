@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 Receive = Callable[[bytes, int], bool]
-"""Called with bytes and the `perf_counter_ns` of their arrival; returns whether a frame was
+"""Called with bytes and the `perf_counter_ns` of their arrival; returns whether a frame in them was
 accepted.
 """
 
@@ -27,7 +27,7 @@ class Receiver(Protocol):
     def may_answer(self, who: str) -> bool:
         """Whether frames are sent to `who` although its claim was refused.
 
-        The frames of `who` are refused, but its answer may prove that it is no recording.
+        Its signature is good but its date is not proven; an answer to TIMESYNC would prove it.
         """
 
     def claim_lapsed(self) -> bool:

@@ -155,7 +155,8 @@ class UdpTransport:
     def _take_unconnected(self, data: bytes, received_ns: int, address: Any) -> bool:
         """Take a datagram of an unconnected socket; return whether its sender becomes the peer.
 
-        It does if its claim is valid, or if its answer may still prove it (`may_answer`).
+        The sender becomes the peer if its claim is valid, or if it must receive frames in order to
+        prove its claim (`Receiver.may_answer`).
         """
         who = host_and_port(address)
         if not self._named.admit(address):
