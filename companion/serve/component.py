@@ -52,14 +52,17 @@ class Component:
             await asyncio.sleep(_HEARTBEAT_PERIOD)
 
     def tell(self, text: str, severity: int = NOTICE) -> None:
-        """Send a text to all clients, and over the link to stations connected to the autopilot."""
+        """Send a text to all clients, and over the link to stations connected to the autopilot.
+
+        A text that was sent within the last 5 s is not sent again.
+        """
         if self._not_sent_lately(None, text):
             for piece in self._pieces(text, severity):
                 self._network.send(self._frame(piece))
                 self._to_vehicle(piece)
 
     def answer(self, client: Client, text: str, severity: int = WARNING) -> None:
-        """Send a text to one client, for example the reason of a refusal."""
+        """Send a text to one client, such as the reason of a refusal, but not twice within 5 s."""
         if self._not_sent_lately(client, text):
             for piece in self._pieces(text, severity):
                 self._network.send_to(client, self._frame(piece))

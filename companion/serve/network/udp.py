@@ -45,7 +45,7 @@ async def open_udp(endpoint: UdpIn | UdpOut, clients: Clients) -> "UdpPort":
         raise EndpointError(refusal(where, error)) from error
     port = UdpPort(opened, clients, named)
     if isinstance(endpoint, UdpOut):
-        port.call(address)
+        port.send_only_to(address)
     return port
 
 
@@ -67,7 +67,7 @@ class UdpPort:
         self._timer = self._loop.call_later(_SILENT, self._expire)
         self._loop.add_reader(opened.fileno(), self._read)
 
-    def call(self, address: Any) -> None:
+    def send_only_to(self, address: Any) -> None:
         """Send to one client, which need not send first; ignore all others."""
         self._only = address
         self._attach(address)
@@ -84,13 +84,16 @@ class UdpPort:
         self._by_address.clear()
 
     def send(self, data: bytes, address: Any) -> bool:
-        """Send a datagram; return false if the kernel does not take it now."""
+        """Send a datagram; return False if the kernel's buffer is full.
+
+        After another error it is lost, and True is returned: the next one may arrive.
+        """
         try:
             self._socket.sendto(data, address)
         except BlockingIOError:
             return False
         except OSError:
-            return True  # nobody listens there now; the next datagram may find somebody
+            pass  # such as an ICMP refusal: nobody listens there now
         return True
 
     def _read(self) -> None:
