@@ -107,13 +107,13 @@ class ServedControl:
         if steers_in_our_mode(frame, autopilot):
             self._component.answer(client, f"refused: {owner} is in control; change the mode first")
             self._answer(client, frame, REJECTED)
-            return True
-        if starves_control(frame, wanted_rates(self._config, self._link)):
+        elif starves_control(frame, wanted_rates(self._config, self._link)):
             self._answer(client, frame, ACCEPTED)
-            return True
-        if isinstance(owner, Program) and owner.client is client:
-            flight.released = flight.released or leaves_control(frame)
-        return False
+        else:
+            if isinstance(owner, Program) and owner.client is client:
+                flight.released = flight.released or leaves_control(frame)
+            return False
+        return True
 
     async def close(self, reason: str) -> None:
         """Hand the vehicle back if a client has it; wait until that is done and recorded."""

@@ -93,9 +93,9 @@ class Network:
         try:
             for endpoint in self._endpoints:
                 self.ports.append(await self._open(endpoint))
-        except EndpointError:
+        except EndpointError as error:
             await self.__aexit__()
-            raise
+            raise EndpointError(f"serve.clients: {error}") from error
         self._link.on_frame = self._queue_frame
         return self
 

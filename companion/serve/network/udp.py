@@ -6,10 +6,10 @@ from typing import Any
 
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.peer import NamedPeers, host_and_port, plain_host
+from companion.mavlink.transport.base import why_not_opened
 from companion.mavlink.transport.endpoint import UdpIn, UdpOut
 from companion.mavlink.transport.udp import udp_address
 from companion.serve.network.client import Client, Clients, Flood
-from companion.serve.network.refusal import refusal
 
 _LARGEST_READ = 4_096
 _LARGEST_SENT = 1_400
@@ -28,11 +28,7 @@ async def open_udp(endpoint: UdpIn | UdpOut, clients: Clients) -> "UdpPort":
         EndpointError: the port is in use, a host is unknown, the address is not that of an
             interface of this computer, or permission is missing.
     """
-    where = f"UDP {endpoint.host}:{endpoint.port}"
-    try:
-        family, address, named = await udp_address(endpoint)
-    except EndpointError as error:
-        raise EndpointError(refusal(where, error)) from error
+    family, address, named = await udp_address(endpoint)
     opened = socket.socket(family, socket.SOCK_DGRAM)
     opened.setblocking(False)
     try:
@@ -42,7 +38,8 @@ async def open_udp(endpoint: UdpIn | UdpOut, clients: Clients) -> "UdpPort":
             opened.bind(("", 0) if family == socket.AF_INET else ("::", 0))
     except OSError as error:
         opened.close()
-        raise EndpointError(refusal(where, error)) from error
+        where = f"UDP {endpoint.host}:{endpoint.port}"
+        raise EndpointError(f"{where}: {why_not_opened(error)}") from error
     port = UdpPort(opened, clients, named)
     if isinstance(endpoint, UdpOut):
         port.send_only_to(address)
