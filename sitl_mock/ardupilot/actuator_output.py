@@ -57,10 +57,6 @@ class ActuatorOutput:
         """Cosine of the angle between the body's down axis and the vertical."""
         return body_z(self._state.estimate.q)[2]
 
-    def hover_throttle(self) -> float:
-        """Return the rotors' throttle at MOT_THST_HOVER."""
-        return self._throttle(specific_thrust(float(self._parameters["MOT_THST_HOVER"])))
-
     def follow(self, output: PositionOutput, dt: float) -> ActuatorCommand:
         """Return the command for the output of the position controller, valid for ``dt`` s."""
         self.thrust = output.thrust

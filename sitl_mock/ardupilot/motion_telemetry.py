@@ -4,8 +4,8 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.autopilot.motion_telemetry import MAGNETIC_FIELD_NED, Builder, MotionTelemetry
 from sitl_mock.link.framing import Message
+from sitl_mock.physics.rigid_body import GRAVITY
 
-_GRAVITY = 9.80665
 _ALIKE = (
     dialect.MAVLINK_MSG_ID_ATTITUDE,
     dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
@@ -56,7 +56,7 @@ class ArduPilotMotionTelemetry(MotionTelemetry):
         estimate = self._state.estimate
         return dialect.MAVLink_raw_imu_message(
             self._state.shown_us,
-            *(round(1e3 * force / _GRAVITY) for force in estimate.specific_force_frd),
+            *(round(1e3 * force / GRAVITY) for force in estimate.specific_force_frd),
             *(round(1e3 * rate) for rate in estimate.gyro),
             *(round(1e3 * field) for field in MAGNETIC_FIELD_NED),
         )

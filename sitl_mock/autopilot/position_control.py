@@ -8,8 +8,8 @@ from typing import NamedTuple
 from sitl_mock.autopilot.setpoints import PositionSetpoint
 from sitl_mock.autopilot.state import NAN_VECTOR
 from sitl_mock.physics.quaternion import Quaternion, Vector, along_heading, normalise
+from sitl_mock.physics.rigid_body import GRAVITY
 
-GRAVITY = 9.80665
 _STEEPEST = radians(80.0)
 """Upper bound of the tilt limit."""
 

@@ -20,7 +20,7 @@ class EkfConfig(Section):
     fix_period_ms: Annotated[float, Field(ge=20.0, le=1000.0)] = 125.0
     """Time between two satellite fixes."""
     fix_delay_ms: Annotated[float, Field(ge=0.0, le=500.0)] = 110.0
-    """Delay of the filter's fusion time; a value below ``position_delay_ms`` means that one."""
+    """Delay of the filter's fusion time; a value below ``position_delay_ms`` counts as that."""
     position_late_ms: Finite = 0.0
     """Unmodelled delay of a fix's position."""
     velocity_late_ms: Finite = 0.0
@@ -147,7 +147,8 @@ class SensorConfig(Section):
     """Age of the estimated position and velocity."""
     stamp_slips_hz: Annotated[float, Field(ge=0.0, le=20.0)] = 0.0
     """How often the stamp of LOCAL_POSITION_NED slips by 1 ms against its position, back or forth:
-    ArduPilot takes the time, in whole milliseconds, when it writes the message."""
+    ArduPilot takes the time, in whole milliseconds, when it writes the message. Its default is
+    1.6."""
 
     @field_validator("ekf", mode="before")
     @classmethod

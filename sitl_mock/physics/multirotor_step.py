@@ -118,7 +118,7 @@ def drive(
     thrust_factor: float,
     wind: Vector,
 ) -> tuple[Load, Actuation]:
-    """Run controller, allocation and rotors for one step; return the load on the body.
+    """Run controller, allocation and rotors for one step; return the load and their new state.
 
     Args:
         law: constants.
@@ -166,7 +166,7 @@ def _shaped(
     setpoint: Vector,
     controlled: bool,
 ) -> tuple[Vector, Shaped]:
-    """Return the delayed and shaped setpoint; uncontrolled, return it as it is, shaping reset."""
+    """Return the delayed, shaped setpoint, without control the given one; and the shaping."""
     goals = delayed(rings.arrived, law.shaping.delays, step, setpoint)
     if controlled:
         return shape(law.shaping, shaped, goals, q)

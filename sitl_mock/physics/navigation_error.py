@@ -7,9 +7,8 @@ from math import exp
 from typing import NamedTuple
 
 from sitl_mock.physics.quaternion import Vector
-from sitl_mock.physics.rigid_body import Motion
+from sitl_mock.physics.rigid_body import GRAVITY, Motion
 
-_GRAVITY = 9.80665
 Errors = tuple[complex, complex, complex]
 """Errors of position (m), velocity (m/s), acceleration (m/s^2, from errors of roll and pitch)."""
 TrailRow = tuple[*Motion, *Vector, *Vector]
@@ -128,8 +127,8 @@ def error_at(law: ErrorLaw, state: FilterState, truth: TrailRow, now: float) -> 
         (speed.real, speed.imag, (sink - unsettled * pending[1]).real + state.sink),
         # A wrong attitude rotates the thrust, which makes the acceleration wrong.
         (
-            tilt.imag / _GRAVITY + law.tilt.real,
-            -tilt.real / _GRAVITY + law.tilt.imag,
+            tilt.imag / GRAVITY + law.tilt.real,
+            -tilt.real / GRAVITY + law.tilt.imag,
             state.yaw - turning * state.yaw_pending,
         ),
     )

@@ -19,8 +19,8 @@ from sitl_mock.physics.navigation_error import (
     propagated_horizontal,
     propagated_vertical,
 )
+from sitl_mock.physics.rigid_body import GRAVITY
 
-_GRAVITY = 9.80665
 _SAG_S = 2.0
 """Time constant with which errors of height and climb follow the acceleration, s."""
 _MIN_COURSE_SPEED = 0.5
@@ -90,7 +90,7 @@ class NavigationFilter:
         return at - self.state.at >= self._period - 1e-9
 
     def advance(self, delayed: TrailRow, at: float, present: TrailRow, now: float) -> None:
-        """Correct the errors by a fix; the output does not jump, but follows.
+        """Correct the errors by a fix; the output follows gradually, without a jump.
 
         Args:
             delayed: the true motion at the fusion time.
@@ -109,7 +109,7 @@ class NavigationFilter:
             noise[0] - ((config.position_late_ms + slip) * 1e-3 + law.lead) * velocity,
             noise[1] - ((config.velocity_late_ms + slip) * 1e-3 + law.lead) * acceleration,
         )
-        kick = _GRAVITY * radians(config.tilt_noise_deg) * sqrt(elapsed)
+        kick = GRAVITY * radians(config.tilt_noise_deg) * sqrt(elapsed)
         horizontal = self._corrected_state(errors, seen, noise, kick)
         share = config.vertical_share
         noise = self._next_noise(state.vertical.noise, share)

@@ -73,7 +73,7 @@ def white_noise(numbers: list[float], deviations: tuple[float, ...]) -> None:
 
 
 def rotated_estimate(yaw: Quaternion, rotation: Vector, q: Quaternion) -> Quaternion:
-    """Return attitude `q` turned by the small `rotation` (rad, NED), then by `yaw`, all resets."""
+    """Return `q` turned by the small `rotation` (rad, NED), then by `yaw`, of all resets."""
     roll, pitch, heading = rotation
     return multiply(yaw, multiply((1.0, 0.5 * roll, 0.5 * pitch, 0.5 * heading), q))
 
@@ -144,7 +144,7 @@ class Estimator:
 
     Attributes:
         law: constants of `estimate`.
-        state: changed by fixes and resets.
+        state: errors after the latest fix, and all resets.
         rotation: small rotation of the attitude by the filter's error at the latest estimate, rad,
             NED.
         reset_counter: estimator resets since boot.

@@ -49,7 +49,6 @@ class TruthState(NamedTuple):
     touchdown_speed: float  # m/s down at the latest touchdown, NaN before the first
     rotor_thrusts: Four  # N, PX4's rotor order
     throttles: Four  # commanded to each rotor, 0..1
-    wind_ned: Vector
 
 
 class Vehicle:
@@ -136,7 +135,6 @@ class Vehicle:
             touchdown_speed,
             thrusts,
             mixed.throttles,
-            self._wind.velocity,
         )
 
     @property

@@ -3,10 +3,11 @@
 from math import hypot, nan, radians, tan
 
 from sitl_mock.autopilot.parameters import ParameterTable
-from sitl_mock.autopilot.position_control import GRAVITY, PositionDemand, setpoint_demand
+from sitl_mock.autopilot.position_control import PositionDemand, setpoint_demand
 from sitl_mock.autopilot.setpoints import PositionSetpoint
 from sitl_mock.autopilot.state import NAN_VECTOR, Mode, State
 from sitl_mock.physics.quaternion import Vector, yaw
+from sitl_mock.physics.rigid_body import GRAVITY
 
 CRAWL_HEIGHT_M = 0.65
 """Below this height LAND descends at MPC_LAND_CRWL (recorded with a distance sensor)."""
