@@ -134,8 +134,6 @@ def test_the_next_command_names_the_program_as_it_was_called(monkeypatch, progra
     ("error", "said"),
     [
         (MissingExtraError("needs plotly"), "No report: needs plotly"),
-        (KeyboardInterrupt(), "No report: interrupted; `companion report f` tries again"),
-        (ENOSPC, "No report: No space left on device; `companion report f` tries again"),
         (ValueError("x"), "No report: x; `companion report f` tries again"),
         (ValueError(), "No report: ValueError; `companion report f` tries again"),
     ],
