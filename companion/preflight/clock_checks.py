@@ -15,8 +15,8 @@ SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.IN
 _MANY_NOT_NEWER = 0.2
 _SAMPLES_NEEDED = 10
 _SHAKES, _MAY_SHAKE = 0.3, 0.15
-"""Products of planner.gain_per_s and the round trip (measured on mock vehicles). Above the first, the
-attitude oscillates at the limit of the roll-pitch rate; above the second, a slow vehicle may do so.
+"""Products of planner.gain_per_s and the round trip, from mock vehicles. Above the first, attitude
+oscillates at the limit of the roll-pitch rate; above the second, that of a slow vehicle may.
 """
 
 

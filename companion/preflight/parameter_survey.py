@@ -131,7 +131,7 @@ class _Questions:
         self._none.update(names)
 
     def unread(self, rules: Iterable[ParameterRule]) -> list[ParameterRule]:
-        """The rules without a value, except for parameters that the autopilot reported as unknown."""
+        """The rules without a value, except parameters that the autopilot reported as unknown."""
         return [
             rule
             for rule in rules
