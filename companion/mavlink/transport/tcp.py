@@ -1,14 +1,12 @@
 """MAVLink over TCP, as client or as a server for one vehicle."""
 
 import asyncio
-import errno
 import socket
 import time
 
-from companion.files.os_errors import reason_of
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.peer import CLAIM_LASTS_S, NamedPeers, host_and_port, resolve
-from companion.mavlink.transport.base import OPEN_TIMEOUT_S, Lost, Receiver
+from companion.mavlink.transport.base import OPEN_TIMEOUT_S, Lost, Receiver, why_not_opened
 from companion.mavlink.transport.endpoint import TcpClient, TcpServer
 
 _MAX_UNSENT_BYTES = 2048
@@ -59,12 +57,7 @@ async def open_tcp_server(endpoint: TcpServer, receiver: Receiver, lost: Lost) -
             lambda: _Connection(transport), endpoint.host, endpoint.port
         )
     except OSError as error:
-        hint = {
-            errno.EADDRINUSE: "the port is in use by another program; end it or choose another",
-            errno.EACCES: "not permitted; use a port of 1024 or above",
-            errno.EADDRNOTAVAIL: "no interface of this computer has that address; use 0.0.0.0",
-        }.get(error.errno or 0, reason_of(error))
-        raise EndpointError(f"{where}: {hint}") from error
+        raise EndpointError(f"{where}: {why_not_opened(error)}") from error
     transport.listen(server)
     return transport
 

@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import errno
 import logging
 import socket
 import struct
@@ -12,7 +11,7 @@ from typing import Any, NamedTuple
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.loop import unwatch, watch
 from companion.mavlink.peer import NamedPeers, host_and_port, resolve
-from companion.mavlink.transport.base import Receiver
+from companion.mavlink.transport.base import Receiver, why_not_opened
 from companion.mavlink.transport.endpoint import UdpIn, UdpOut
 
 _LOG = logging.getLogger(__name__)
@@ -122,7 +121,8 @@ class UdpTransport:
                 opened.connect(self._address)
         except OSError as error:
             opened.close()
-            raise EndpointError(_open_error(self._endpoint, error)) from error
+            where = f"UDP {self._endpoint.host}:{self._endpoint.port}"
+            raise EndpointError(f"{where}: {why_not_opened(error)}") from error
         self._connected = isinstance(self._endpoint, UdpOut)
         if self._connected:
             self._peer = opened.getpeername()
@@ -210,17 +210,3 @@ def _arrival_ns(stamps: list[tuple[int, int, bytes]]) -> int:
     seconds, nanoseconds = _STAMP.unpack(stamps[0][2])
     age = time.time_ns() - (seconds * 1_000_000_000 + nanoseconds)
     return now - age if 0 <= age < _OLDEST_NS else now
-
-
-def _open_error(endpoint: UdpIn | UdpOut, error: OSError) -> str:
-    where = f"UDP {endpoint.host}:{endpoint.port}"
-    if error.errno == errno.EADDRINUSE:
-        return (
-            f"{where}: the port is in use by another program (another companion, a ground "
-            "station?); end it or choose another port on both sides"
-        )
-    if error.errno == errno.EADDRNOTAVAIL:
-        return f"{where}: no interface of this computer has that address; use udpin://0.0.0.0:PORT"
-    if error.errno in (errno.EACCES, errno.EPERM):
-        return f"{where}: not permitted; use a port of 1024 or above"
-    return f"{where} cannot be opened: {error.strerror}"

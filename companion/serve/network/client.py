@@ -53,7 +53,7 @@ class Client(ABC):
         streaming: whether a frame may continue in the bytes of the next `scan`.
 
     Attributes:
-        name, host, device: as given.
+        name, host, device: see the arguments.
         stats: counters.
     """
 

@@ -5,10 +5,10 @@ import socket
 
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.peer import NamedPeers, host_and_port, plain_host, resolve
+from companion.mavlink.transport.base import why_not_opened
 from companion.mavlink.transport.endpoint import TcpClient as TcpOut
 from companion.mavlink.transport.endpoint import TcpServer
 from companion.serve.network.client import Client, Clients, Flood
-from companion.serve.network.refusal import refusal
 
 _MOST_CLIENTS = 16
 _MOST_UNSENT = 65_536
@@ -37,7 +37,7 @@ async def open_tcp_server(endpoint: TcpServer, clients: Clients) -> "TcpPort":
         )
     except OSError as error:
         where = f"TCP {endpoint.host}:{endpoint.port}"
-        raise EndpointError(refusal(where, error)) from error
+        raise EndpointError(f"{where}: {why_not_opened(error)}") from error
     port.listen(server)
     return port
 

@@ -6,10 +6,10 @@ from typing import Any
 
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.peer import NamedPeers, host_and_port, plain_host
+from companion.mavlink.transport.base import why_not_opened
 from companion.mavlink.transport.endpoint import UdpIn, UdpOut
 from companion.mavlink.transport.udp import udp_address
 from companion.serve.network.client import Client, Clients, Flood
-from companion.serve.network.refusal import refusal
 
 _LARGEST_READ = 4_096
 _LARGEST_SENT = 1_400
@@ -28,11 +28,7 @@ async def open_udp(endpoint: UdpIn | UdpOut, clients: Clients) -> "UdpPort":
         EndpointError: the port is in use, a host is unknown, the address is not that of an
             interface of this computer, or permission is missing.
     """
-    where = f"UDP {endpoint.host}:{endpoint.port}"
-    try:
-        family, address, named = await udp_address(endpoint)
-    except EndpointError as error:
-        raise EndpointError(refusal(where, error)) from error
+    family, address, named = await udp_address(endpoint)
     opened = socket.socket(family, socket.SOCK_DGRAM)
     opened.setblocking(False)
     try:
@@ -42,10 +38,11 @@ async def open_udp(endpoint: UdpIn | UdpOut, clients: Clients) -> "UdpPort":
             opened.bind(("", 0) if family == socket.AF_INET else ("::", 0))
     except OSError as error:
         opened.close()
-        raise EndpointError(refusal(where, error)) from error
+        where = f"UDP {endpoint.host}:{endpoint.port}"
+        raise EndpointError(f"{where}: {why_not_opened(error)}") from error
     port = UdpPort(opened, clients, named)
     if isinstance(endpoint, UdpOut):
-        port.call(address)
+        port.send_only_to(address)
     return port
 
 
@@ -67,7 +64,7 @@ class UdpPort:
         self._timer = self._loop.call_later(_SILENT, self._expire)
         self._loop.add_reader(opened.fileno(), self._read)
 
-    def call(self, address: Any) -> None:
+    def send_only_to(self, address: Any) -> None:
         """Send to one client, which need not send first; ignore all others."""
         self._only = address
         self._attach(address)
@@ -84,13 +81,16 @@ class UdpPort:
         self._by_address.clear()
 
     def send(self, data: bytes, address: Any) -> bool:
-        """Send a datagram; return false if the kernel does not take it now."""
+        """Send a datagram; return False if the kernel's buffer is full.
+
+        After another error it is lost, and True is returned: the next one may arrive.
+        """
         try:
             self._socket.sendto(data, address)
         except BlockingIOError:
             return False
         except OSError:
-            return True  # nobody listens there now; the next datagram may find somebody
+            pass  # such as an ICMP refusal: nobody listens there now
         return True
 
     def _read(self) -> None:
