@@ -67,7 +67,7 @@ class ModeState:
 
     @property
     def failsafe(self) -> bool:
-        """Whether HEARTBEAT's system_status reports a failsafe; False before the first heartbeat."""
+        """Whether HEARTBEAT's system_status reports a failsafe; False without any heartbeat."""
         return self.heartbeat is not None and self.heartbeat.system_status in _FAILSAFES
 
     @property
