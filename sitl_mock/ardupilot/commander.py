@@ -230,7 +230,10 @@ class ArduPilotCommander:
             self._guided.hold()
 
     def _act(self, mode: Mode) -> None:
-        """Enter a failsafe's mode, or LAND if it lacks the position it needs; landed, disarm."""
+        """Enter a failsafe's mode, or LAND if that mode needs a position and there is none.
+
+        On the ground, disarm instead.
+        """
         state = self._state
         if state.landed:
             self._stop_motors(EventKind.DISARMED_ON_GROUND)
