@@ -152,7 +152,10 @@ class TelemetryDelay:
         return None
 
     def largest_possible(self, before: float) -> float:
-        """The largest delay possible by the exchanges until the event-loop time `before`, s."""
+        """The largest delay possible by the exchanges until the event-loop time `before`, s.
+
+        Without such an exchange it is 0.
+        """
         earlier = [each for each in self._exchanges if each.at <= before]
         if not earlier:
             return 0.0
