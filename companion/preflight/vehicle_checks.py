@@ -193,11 +193,11 @@ def estimator(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 def fence(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """Whether the vehicle stands inside a fence given by latitude and longitude."""
-    corners, told = config.safety.fence_polygon_deg, evidence.state.global_position
+    corners, position = config.safety.fence_polygon_deg, evidence.state.global_position
     if not corners:
         return
     source = "GLOBAL_POSITION_INT"
-    if told is None:
+    if position is None:
         yield Finding(
             Key.FENCE,
             NOT_READY if evidence.awaits_position else UNSAFE,
@@ -207,7 +207,7 @@ def fence(config: Config, evidence: Evidence) -> Iterator[Finding]:
             source,
         )
         return
-    here = Place(told.latitude_deg, told.longitude_deg)
+    here = Place(position.latitude_deg, position.longitude_deg)
     if inside(0.0, 0.0, local_polygon(corners, here)):
         yield Finding(Key.FENCE, SAFE, "the vehicle stands inside its fence", source=source)
         return

@@ -77,9 +77,9 @@ class UdpTransport:
     A listening socket connects to the first sender that makes a valid claim (`PeerRule`). The
     kernel then drops datagrams of other senders, and a round trip is about 8 us shorter. The
     kernel's queue may still hold earlier datagrams of other senders, so the source of each datagram
-    is checked. If the peer is silent for 2 to 4 s, or its claim has lapsed, a new socket is opened,
-    so that a vehicle is heard that returns at another port. ICMP refusals (the vehicle has not
-    started yet) are ignored.
+    is checked. If the peer of a listening socket is silent for 2 to 4 s, or its claim has lapsed, a
+    new socket is opened, so that a vehicle is heard that returns at another port. ICMP refusals
+    (the vehicle has not started yet) are ignored.
 
     A datagram counts as received when the kernel received it, not when this process read it. So
     latency includes a late wake-up of this process.

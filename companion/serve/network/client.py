@@ -47,7 +47,7 @@ class Client(ABC):
     """A client's channel. It queues frames until `flush`; it may drop whole frames, never parts.
 
     Args:
-        name: name for messages.
+        name: name for messages, such as `udp 127.0.0.1:14550`.
         host: IP address of the client, or None.
         device: its serial device, or None.
         streaming: whether a frame may continue in the bytes of the next `scan`.

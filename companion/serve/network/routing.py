@@ -20,11 +20,6 @@ _MOST_REMEMBERED = 4096
 class Channel(Protocol):
     """The connection of a client; several nodes may be behind it."""
 
-    @property
-    def name(self) -> str:
-        """Name for messages, such as `udp 127.0.0.1:14550`."""
-        ...
-
     def put(self, frame: bytes) -> None:
         """Queue one whole frame, or drop and count it. It never blocks and never raises."""
         ...
@@ -94,11 +89,6 @@ class Routing:
         self._clients: tuple[Channel, ...] = ()
         self._repeats = _Repeats(clock)
 
-    @property
-    def clients(self) -> tuple[Channel, ...]:
-        """The channels of the clients."""
-        return self._clients
-
     def attach(self, client: Channel) -> None:
         """Add a client; frames are forwarded to it from now on."""
         self._heard[client] = set()
@@ -108,10 +98,6 @@ class Routing:
         """Remove a client and the addresses heard on its channel."""
         self._heard.pop(client, None)
         self._clients = tuple(each for each in self._clients if each is not client)
-
-    def addresses(self, channel: Channel) -> frozenset[Address]:
-        """The addresses heard on a channel."""
-        return frozenset(self._heard.get(channel, ()))
 
     def is_at_client(self, target: Address, origin: Channel) -> bool:
         """Whether a target was heard on the channel of a client other than `origin`."""
