@@ -151,7 +151,7 @@ def fence(reason, *, controlled=True, **safety):
 
 
 def test_the_fence_lies_around_the_place_where_control_began():
-    assert fence("40 m up, above limits.fence_ceiling_m").values == (12.5,)
+    assert fence("40 m up, above limits.fence_ceiling_m").levels == (12.5,)
     polygon = {"fence_polygon_m": ((0.0, 0.0), (0.0, 5.0), (5.0, 0.0))}
     drawn = fence("outside the polygon", **polygon)
     assert drawn.outline == ((3.0, 4.0), (3.0, 9.0), (8.0, 4.0), (3.0, 4.0))
