@@ -29,7 +29,7 @@ class VehicleChannel(Protocol):
     """The channel to the vehicle, and to the nodes connected to its autopilot."""
 
     def put(self, frame: bytes, origin: Channel) -> None:
-        """Queue one whole frame of the client `origin`, or drop and count it; never block or raise."""
+        """Queue one whole frame of client `origin`, or drop and count it. Never block or raise."""
         ...
 
 
