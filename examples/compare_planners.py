@@ -2,7 +2,8 @@
 
 Each planner flies the corners of the paper's figure 2 on the mock vehicle, whose rate loop is as
 slow as PX4's. Printed: the largest distance from the straight line of a step. In the ideal case of
-`batch_study.py` the paper's law is straight; here only the planner that knows the rate loop is.
+`batch_study.py` the paper's law flies straight; here only the planner that knows the rate loop
+does.
 
 Run: python examples/compare_planners.py
 """

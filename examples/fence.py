@@ -1,7 +1,7 @@
-"""See the fence hold: own code flies north at 4 m/s, and the program stops the vehicle within 8 m.
+"""See the fence hold: your code flies north at 4 m/s, and the program stops it within 8 m.
 
-The fence stands above all guidance, your own as well. The program brakes early enough to stop
-inside and then lands the vehicle (docs/safety.md). The autopilot's own fence should be larger.
+The fence limits all guidance, your own as well. The program brakes early enough to stop inside and
+then lands the vehicle (docs/safety.md). The autopilot's own fence should be larger.
 
 Run: python examples/fence.py
 """

@@ -1,18 +1,18 @@
 """Identify a vehicle from a recorded flight: lag and dead time of each axis, and the thrust map.
 
-Any `.tlog` will do in which body rates were commanded and obeyed; doublets tell the most.
+Any `.tlog` will do in which the autopilot followed commanded body rates; doublets fit best.
 `companion identify --log FOLDER` does the same and writes a file for your configuration.
 
 Run: python examples/identify_from_log.py [FOLDER]
 """
 
-from recorded import flight
+from recorded import flight_folder
 
 from companion.identification import identify_vehicle
 from companion.vehicle.flight_log import read_flight_log
 
-log = read_flight_log(flight() / "flight.tlog")
-print(f"{len(log.setpoints)} setpoints were obeyed, {len(log.rates)} body rates were measured")
+log = read_flight_log(flight_folder() / "flight.tlog")
+print(f"{len(log.setpoints)} setpoints were followed, {len(log.rates)} body rates were measured")
 vehicle = identify_vehicle(log.setpoints, log.rates, log.specific_thrust)
 for axis, response in vehicle.axes.items():
     print(

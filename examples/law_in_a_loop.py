@@ -18,7 +18,7 @@ planner = make_planner("first-order", gain=GAIN, limits=Limits(max_tilt=radians(
 target = Target(north=0.3, east=-0.2, heading=radians(90.0))
 
 
-def turned(q: np.ndarray, omega: np.ndarray) -> np.ndarray:
+def rotated(q: np.ndarray, omega: np.ndarray) -> np.ndarray:
     """The attitude (w, x, y, z) after `DT` s at the body rates `omega`, rad/s (FRD)."""
     w, x, y, z = q
     matrix = np.array([[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]])
@@ -37,4 +37,4 @@ for k in range(301):
         )
     wanted = np.array(planner.rates(tuple(q), target, DT))
     omega += (wanted - omega) * (1.0 - exp(-DT / LAG))
-    q = turned(q, omega)
+    q = rotated(q, omega)

@@ -1,7 +1,7 @@
 """A policy shaped like a learned one: observations in, body rates out, 50 times a second.
 
 The network here is one linear layer, fitted below to a hand-written controller; put your own
-weights in. Its rates are limited, the height is held for it, and the safety monitors judge.
+weights in. The program limits its rates, holds the height, and watches by its safety monitors.
 
 Run: python examples/learned_policy.py
 """

@@ -1,4 +1,4 @@
-"""Write a control law of your own, and compare it with the one of the paper.
+"""Write a control law of your own, and compare it with the paper's.
 
 This law turns the thrust axis the shortest way to where the target wants it, and leaves the heading
 alone. A law is arithmetic on plain floats: one function flies a vehicle and is mapped over many.

@@ -30,7 +30,7 @@ class Hop:
         return Sample(*(tuple(float(axis(t)) for axis in row) for row in self._axes), 0.0, 0.0)
 
     def check_times(self) -> list[float]:
-        """Times at which it is checked, s."""
+        """Times at which the limits are checked, s."""
         return [self.duration * k / 500 for k in range(501)]
 
 

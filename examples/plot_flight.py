@@ -1,6 +1,6 @@
 """Plot what a flight recorded: the position beside its reference, and the tracking error.
 
-`companion plot FOLDER` draws more. Begin here for a figure of your own: `read_flight` gives each
+`companion plot FOLDER` draws more. Begin here for a figure of your own: `read_flight` returns each
 channel of a flight as a NumPy array with named columns. Needs the extra `plot`.
 
 Run: python examples/plot_flight.py [FOLDER]   (writes flight.png)
@@ -8,14 +8,14 @@ Run: python examples/plot_flight.py [FOLDER]   (writes flight.png)
 
 import matplotlib as mpl
 import numpy as np
-from recorded import flight
+from recorded import flight_folder
 
 from companion.recording.flight_record import read_flight
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
 
-folder = flight()
+folder = flight_folder()
 rows = read_flight(folder).rows("guidance")
 rows = rows[rows["offboard_active"] == 1]
 time = rows["vehicle_time_s"] - rows["vehicle_time_s"][0]

@@ -9,9 +9,9 @@ Run: python examples/read_tlog.py [FOLDER]
 from collections import Counter
 
 from pymavlink import mavutil
-from recorded import flight
+from recorded import flight_folder
 
-log = mavutil.mavlink_connection(str(flight() / "flight.tlog"), dialect="common")
+log = mavutil.mavlink_connection(str(flight_folder() / "flight.tlog"), dialect="common")
 counts: Counter[str] = Counter()
 first = last = mode = None
 while (message := log.recv_match()) is not None:

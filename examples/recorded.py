@@ -11,8 +11,8 @@ from companion.config.files import changed, load, shipped
 from companion.testing import MockVehicle, fly
 
 
-def flight() -> Path:
-    """The folder of a flight."""
+def flight_folder() -> Path:
+    """Return the folder of a flight, with `flight.tlog` in it."""
     if len(sys.argv) > 1:
         return Path(sys.argv[1])
     if not list(Path("flights").glob("*/flight.tlog")):

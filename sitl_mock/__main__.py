@@ -23,7 +23,7 @@ EXIT_OK = 0
 EXIT_USAGE = 2
 _STATUS_PERIOD_S = 0.25
 
-_ENDING = (signal.SIGINT, signal.SIGTERM)
+_END_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 """Signals that end the vehicles."""
 
 
@@ -42,8 +42,8 @@ def main(arguments: list[str] | None = None) -> int:
     except ConfigError as error:
         sys.stderr.write(f"sitl_mock: {error}\n")
         return EXIT_USAGE
-    for number in _ENDING:  # a shell may start us with SIGINT ignored
-        signal.signal(number, _interrupt)
+    for end_signal in _END_SIGNALS:  # a shell may start us with SIGINT ignored
+        signal.signal(end_signal, _interrupt)
     if options.end_with_stdin:
         threading.Thread(target=_end_with_stdin, name="stdin", daemon=True).start()
     for server in servers:
@@ -64,7 +64,7 @@ def main(arguments: list[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m sitl_mock",
-        description="A multirotor with its autopilot.",
+        description="A simulated multirotor with its autopilot.",
     )
     parser.add_argument("--config", type=Path, help="YAML file; its `mock` section is read")
     parser.add_argument("--port", type=int, help="UDP port of the companion (default 14540)")
@@ -112,13 +112,13 @@ def _run_all(servers: list[Server]) -> None:
         context.Process(target=_run_one, args=(server,), daemon=True) for server in servers
     ]
     # A signal within `start` would leave a vehicle that nobody ends.
-    signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING)
+    signal.pthread_sigmask(signal.SIG_BLOCK, _END_SIGNALS)
     for process in processes:
         process.start()
     for server in servers:
         server.close()
     try:
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _END_SIGNALS)
         for process in processes:
             process.join()
     finally:
@@ -129,7 +129,7 @@ def _run_all(servers: list[Server]) -> None:
 
 def _run_one(server: Server) -> None:
     try:
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _END_SIGNALS)
         server.run()
     except KeyboardInterrupt:
         sys.exit(EXIT_OK)
@@ -153,7 +153,7 @@ class StatusLine:
         self._next = 0.0
 
     def show(self, simulation: Simulation) -> None:
-        """Write the line if the last one is old enough."""
+        """Write the line, unless the last one is less than a quarter of a second old."""
         now = time.monotonic()
         if now < self._next:
             return

@@ -16,15 +16,15 @@ from sitl_mock.simulation import Simulation
 
 
 class Connections:
-    """The endpoints and their links.
-
-    Attributes:
-        companion: the companion's endpoint.
+    """The endpoints, each with its link, and the control channel.
 
     Args:
         settings: settings of this vehicle.
-        simulation: the vehicle. What its links queue is sent; the control channel acts on it.
+        simulation: the vehicle, on which the control channel acts.
         exchange: takes arriving datagrams, and provides datagrams to send.
+
+    Attributes:
+        companion: the companion's endpoint.
 
     Raises:
         ConfigError: a port cannot be used, or a pseudo-terminal or its link cannot be made.
@@ -52,12 +52,15 @@ class Connections:
             self._control.close()
 
     def ready(self, timeout_s: float) -> list[Endpoint]:
-        """Wait for input, serve the control channel, and return the endpoints with input."""
+        """Wait at most ``timeout_s`` for input; return the endpoints that have some.
+
+        Requests on the control channel are answered here.
+        """
         by_descriptor = {fd: endpoint for endpoint in self._links for fd in endpoint.readable}
         control = self._control
-        asking = [] if control is None else control.readable
-        readable, _, _ = select.select([*by_descriptor, *asking], (), (), timeout_s)
-        if control is not None and asking[0] in readable:
+        control_fds = [] if control is None else control.readable
+        readable, _, _ = select.select([*by_descriptor, *control_fds], (), (), timeout_s)
+        if control is not None and control_fds[0] in readable:
             self._serve(control)
         return [by_descriptor[fd] for fd in readable if fd in by_descriptor]
 

@@ -4,7 +4,7 @@ Requests, one object each:
 
 - ``{"fault": {"kind": "drop", "probability": 0.5, "duration_s": 3}}``: any fault of the
   configuration; without a start it begins at once -> ``{"ok": true}``
-- ``{"clear": true}``: end all faults -> ``{"ok": true}``
+- ``{"clear": true}``: end all faults, and cancel those to come -> ``{"ok": true}``
 - ``{"state": true}``: return the true state -> see `Truth`
 
 Anything else -> ``{"error": "..."}``.
@@ -12,6 +12,7 @@ Anything else -> ``{"error": "..."}``.
 
 import json
 from collections.abc import Mapping
+from math import isnan
 from typing import Any, TypedDict
 
 from pydantic import ValidationError
@@ -25,7 +26,10 @@ _USAGE = 'send {"fault": {...}}, {"clear": true} or {"state": true}'
 
 
 class Truth(TypedDict):
-    """The true state of a vehicle: SI, NED (origin: where it booted), FRD, q body to world."""
+    """The true state of a vehicle, and what its autopilot reports.
+
+    SI; position and velocity NED (origin: where it booted), body rates FRD, q body to world.
+    """
 
     time: float
     """Vehicle time since boot, s."""
@@ -88,7 +92,11 @@ def _answer(simulation: Simulation, request: bytes) -> Mapping[str, Any]:
         return {"error": f"not JSON; {_USAGE}"}
     match requested:
         case {"fault": dict(fault)} if len(requested) == 1:
-            return _try_fault(simulation, fault)
+            try:
+                add_fault(simulation, fault)
+            except ConfigError as error:
+                return {"error": str(error)}
+            return {"ok": True}
         case {"clear": True} if len(requested) == 1:
             simulation.clear_faults()
             return {"ok": True}
@@ -97,20 +105,11 @@ def _answer(simulation: Simulation, request: bytes) -> Mapping[str, Any]:
     return {"error": _USAGE}
 
 
-def _try_fault(simulation: Simulation, fault: dict[str, Any]) -> dict[str, Any]:
-    try:
-        add_fault(simulation, fault)
-    except ConfigError as error:
-        return {"error": str(error)}
-    return {"ok": True}
-
-
 def truth(simulation: Simulation) -> Truth:
-    """Return the true state."""
+    """Return the true state of the vehicle, and what its autopilot reports."""
     state, stream = simulation.state, simulation.stream
-    now = simulation.vehicle.truth
+    true = simulation.vehicle.truth
     signing = simulation.companion.signing
-    touched = now.touchdown_speed == now.touchdown_speed  # not NaN
     return {
         "time": state.time_s,
         "armed": state.armed,
@@ -119,13 +118,13 @@ def truth(simulation: Simulation) -> Truth:
         "failsafe": state.failsafe,
         "landed": state.landed,
         "aborted": state.aborted,
-        "position": now.position_ned,
-        "velocity": now.velocity_ned,
-        "q": now.q,
-        "rates": now.body_rates,
-        "on_ground": now.on_ground,
-        "crashed": now.crashed,
-        "touchdown_speed": now.touchdown_speed if touched else None,
+        "position": true.position_ned,
+        "velocity": true.velocity_ned,
+        "q": true.q,
+        "rates": true.body_rates,
+        "on_ground": true.on_ground,
+        "crashed": true.crashed,
+        "touchdown_speed": None if isnan(true.touchdown_speed) else true.touchdown_speed,
         "battery": simulation.vehicle.battery.remaining,
         "setpoints": stream.received,
         "last_setpoint": None if stream.last_us is None else stream.last_us / 1e6,

@@ -175,6 +175,7 @@ class Server:
             self._connections.ready(BEACON_AGAIN_S)
 
     def _rebase(self) -> None:
+        """Count real time from now on."""
         self._base_wall = time.monotonic()
         self._base_us = self._simulation.time_us
 
@@ -184,10 +185,9 @@ class Server:
         A lag above `MAX_LAG_S` is dropped, and so is the time of a ``slip_clock`` fault.
         """
         self._base_wall += self._simulation.effects.take_slip()
-        elapsed_s = self._elapsed_us(self._simulation.next_us) / 1e6
-        due = self._base_wall + in_burst(
-            elapsed_s, self._settings.burst_ms * 1e-3 / self._settings.speed
-        )
+        speed = self._settings.speed
+        elapsed_s = (self._simulation.next_us - self._base_us) / speed / 1e6
+        due = self._base_wall + in_burst(elapsed_s, self._settings.burst_ms * 1e-3 / speed)
         left = due - time.monotonic()
         if left < -MAX_LAG_S:
             self._rebase()
@@ -197,9 +197,6 @@ class Server:
             left = due - time.monotonic()
             if left <= 0.0 or self._lockstep:
                 return
-
-    def _elapsed_us(self, vehicle_us: float) -> float:
-        return (vehicle_us - self._base_us) / self._settings.speed
 
     def _serve(self, endpoint: Endpoint) -> None:
         """Read and handle all waiting datagrams of an endpoint, and send the answers."""
@@ -216,7 +213,8 @@ class Server:
     def _clock_ns(self) -> int:
         """Return vehicle time for TIMESYNC, ns.
 
-        In real time it advances between slots with the wall clock, up to the next slot.
+        In real time it advances between slots with the wall clock, up to the next slot. While a
+        fault freezes the clock, it stands still.
         """
         simulation = self._simulation
         if self._lockstep or simulation.effects.clock_frozen:

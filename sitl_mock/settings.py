@@ -12,8 +12,9 @@ from sitl_mock.config.settings import VehicleSettings
 from sitl_mock.config.yaml_file import Document, FileRefusedError, explain_yaml, load_yaml
 from sitl_mock.personalities import PERSONALITIES
 
-SMOOTH = {"position_noise_m": 0.0, "velocity_noise_m_s": 0.0, "position_delay_ms": 0.0}
-"""Defaults of ``sensors`` with a navigation filter: no white noise or delay of the position."""
+WITH_FILTER = {"position_noise_m": 0.0, "velocity_noise_m_s": 0.0, "position_delay_ms": 0.0}
+"""Defaults of ``sensors`` with a navigation filter, whose output is smooth, and as recent as the
+attitude."""
 
 
 class MockSettings(VehicleSettings):
@@ -51,8 +52,7 @@ def _with_ekf(section: dict[str, Any]) -> object:
     if not isinstance(sensors, dict):
         return sensors
     filled = {"ekf": section.get("autopilot", "px4"), **sensors}
-    # The output of a navigation filter is smooth, and as recent as the attitude.
-    return filled if filled["ekf"] in (None, "none") else {**SMOOTH, **filled}
+    return filled if filled["ekf"] in (None, "none") else {**WITH_FILTER, **filled}
 
 
 def load_settings(path: Path | None, overrides: dict[str, Any]) -> MockSettings:
@@ -68,7 +68,7 @@ def load_settings(path: Path | None, overrides: dict[str, Any]) -> MockSettings:
     where = "the command line" if path is None else str(path)
     document = Document(None, None) if path is None else _document(path)
     section = {} if path is None else _mock_section(document.value, path)
-    lockstep = {**section.get("lockstep", {}), **overrides.pop("lockstep", {})}
+    lockstep = {**section.get("lockstep", {}), **overrides.get("lockstep", {})}
     merged = {**section, **overrides} | ({"lockstep": lockstep} if lockstep else {})
     try:
         return MockSettings.model_validate(merged)

@@ -16,7 +16,7 @@ from sitl_mock.link.framing import Framer, Message
 from sitl_mock.link.link import Link
 from sitl_mock.link.signing import link_signing
 from sitl_mock.personalities import PERSONALITIES
-from sitl_mock.physics.geodesy import Origin
+from sitl_mock.physics.geodesy import Geodetic
 from sitl_mock.physics.vehicle import Vehicle
 from sitl_mock.physics.vehicle_step import Plant, PythonPlant
 from sitl_mock.settings import MockSettings
@@ -34,6 +34,18 @@ class Simulation:
         settings: settings of this vehicle.
         system_id: MAVLink system id.
         plant: computes the physics, see `Vehicle`.
+
+    Attributes:
+        vehicle: the true vehicle.
+        state: what its autopilot estimates and does.
+        parameters: parameters of the autopilot.
+        stream: the offboard setpoints that it accepted.
+        commander: its arming and modes.
+        companion: link to the companion.
+        gcs: link to the ground station; nothing is sent on it if ``gcs_port`` is 0.
+        links: the links that are used.
+        faults: schedule of the faults.
+        effects: what the present faults do.
     """
 
     def __init__(
@@ -73,7 +85,7 @@ class Simulation:
                 self.parameters,
                 self.vehicle,
                 self.stream,
-                Origin(home.latitude_deg, home.longitude_deg, home.altitude_m),
+                Geodetic(home.latitude_deg, home.longitude_deg, home.altitude_m),
                 self.links,
                 round(settings.prearm_delay_s * 1e6),
                 StampSlips(settings.sensors.stamp_slips_hz, settings.seed),
@@ -98,16 +110,19 @@ class Simulation:
         return next_us - next_us % 1000
 
     def clear_faults(self) -> None:
-        """End all faults."""
+        """End all faults, and cancel those that have not begun."""
         self.effects.apply([], self.faults.clear())
 
     def handle(self, message: Message, link: Link) -> None:
-        """Handle one message received on a link; answers are queued on that link."""
+        """Handle one message received on a link; answers are queued on that link.
+
+        An autopilot whose process has ended (`State.aborted`) ignores it.
+        """
         if not self.state.aborted:
             self._receiver.handle(message, link)
 
     def set_clock(self, clock_ns: Callable[[], int]) -> None:
-        """Set the clock of vehicle time for TIMESYNC, which is finer than the slots."""
+        """Set the clock that answers TIMESYNC: vehicle time, ns, also between slots."""
         self._receiver.clock_ns = clock_ns
 
     def tick(self) -> None:

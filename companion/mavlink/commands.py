@@ -39,13 +39,13 @@ _REASON_DELAY_S = 0.3  # the reason of a refusal may come as a STATUSTEXT this l
 
 
 def command_name(command: int) -> str:
-    """Name of a MAV_CMD, or its number if the dialect does not have it."""
+    """Name of a MAV_CMD; such as `MAV_CMD 123` if the dialect does not have it."""
     entry = dialect.enums["MAV_CMD"].get(command)
     return entry.name if entry is not None else f"MAV_CMD {command}"
 
 
 def result_name(result: int) -> str:
-    """Name of a MAV_RESULT without its prefix."""
+    """Name of a MAV_RESULT without its prefix; such as `RESULT 42` if the dialect lacks it."""
     entry = dialect.enums["MAV_RESULT"].get(result)
     return entry.name.removeprefix("MAV_RESULT_") if entry is not None else f"RESULT {result}"
 
@@ -53,7 +53,7 @@ def result_name(result: int) -> str:
 class CommandClient:
     """Sends commands and waits for their ACKs.
 
-    An ACK names only the command, so a call with the same command waits until the one before ends.
+    An ACK names only the command, so a call waits until an earlier call with the same command ends.
     """
 
     def __init__(
@@ -85,7 +85,8 @@ class CommandClient:
         Raises:
             CommandRefused: The result is not ACCEPTED.
             CommandTimeout: No ACK came to any of the tries.
-            CommandUnfinished: The autopilot answered "in progress", and not more within 30 s.
+            CommandUnfinished: The autopilot answered "in progress", and gave no final result
+                within 30 s.
             LinkLost: The connection dropped while waiting.
         """
         lock = self._locks.setdefault(command, asyncio.Lock())
@@ -123,7 +124,7 @@ class CommandClient:
         )
 
     async def _final(self, command: int, answers: Pending[int]) -> int:
-        """The final result of a command in progress, however often that is repeated."""
+        """Wait for the final result of a command that is in progress."""
         try:
             async with asyncio.timeout(_IN_PROGRESS_TIMEOUT_S):
                 while True:
@@ -132,9 +133,9 @@ class CommandClient:
                         return result
         except TimeoutError:
             raise CommandUnfinished(
-                f"{command_name(command)}: the autopilot said that it is in progress, and did not "
-                f"finish it within {_IN_PROGRESS_TIMEOUT_S:g} s; look at its messages, and try "
-                "again"
+                f"{command_name(command)}: the autopilot answered that the command is in progress, "
+                f"but gave no result within {_IN_PROGRESS_TIMEOUT_S:g} s; look at the autopilot's "
+                "messages, and try again"
             ) from None
 
     def _send_try(self, command: int, params: tuple[float, ...], confirmation: int) -> None:

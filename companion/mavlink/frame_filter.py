@@ -41,7 +41,7 @@ class FrameFilter:
 
     @property
     def awaits_answer(self) -> bool:
-        """Whether the frame checked last was refused because no TIMESYNC request was answered."""
+        """Whether the last frame was refused until the vehicle answers a TIMESYNC request."""
         return self._signing is not None and self._signing.awaits_answer
 
     def is_vehicle(self, frame: Frame) -> bool:
@@ -58,7 +58,7 @@ class FrameFilter:
         return False
 
     def signature_good(self, frame: Frame) -> bool:
-        """Whether a frame is signed as it must be; without a key every frame is good."""
+        """Whether a frame is signed as required; without a key every frame is good."""
         if self._signing is None:
             if frame.signed:
                 self.notice_once(_KEY_MISSING)
@@ -78,7 +78,7 @@ class FrameFilter:
             self.notice_once(self._signing.remarks.pop(0))
 
     def notice_once(self, text: str) -> None:
-        """Tell the user, unless the same text was told before."""
+        """Pass a notice to the user, unless the same text was passed before."""
         if text not in self._noticed:
             self._noticed.add(text)
             self._notice(text)

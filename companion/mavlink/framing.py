@@ -138,10 +138,11 @@ class FrameScanner:
         return end - at
 
     def _fault(self, data: bytes, at: int, check_at: int, end: int, message_id: int) -> int | None:
-        """Why the bytes `at`..`end` are not an intact frame of a known message; None: they are.
+        """Check that the bytes `at`..`end` are an intact frame of a known message.
 
         Returns:
-            `_NOT_A_FRAME`, `_INCOMPLETE`, or the length of a frame of an unknown message.
+            None if they are; else `_NOT_A_FRAME`, `_INCOMPLETE`, or the length of a frame of an
+            unknown message.
         """
         extra = self._crc_extra.get(message_id)
         if extra is None:
@@ -166,7 +167,7 @@ class FrameScanner:
 
 
 def _is_plausible(data: bytes, at: int) -> bool:
-    """Whether this looks like a version 2 header: two of its bytes are 0, as they usually are."""
+    """Whether this may be a version 2 header: no compatibility flags, message id below 65536."""
     return data[at] == V2 and data[at + 3] == 0 and data[at + 9] == 0
 
 

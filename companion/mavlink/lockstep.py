@@ -94,9 +94,9 @@ class SettlingSelector(HotSelector, ABC):
         self._when_idle: Callable[[], None] | None = None
         self._iterations = 0
 
-    def settle(self, then: Callable[[], None]) -> None:
-        """Call `then` once no callback or timer of the loop is ready; no I/O happens before."""
-        self._when_idle, self._iterations = then, 0
+    def settle(self, callback: Callable[[], None]) -> None:
+        """Call `callback`, without I/O, once no other callback or timer of the loop is ready."""
+        self._when_idle, self._iterations = callback, 0
 
     @property
     def settling(self) -> bool:
@@ -110,8 +110,8 @@ class SettlingSelector(HotSelector, ABC):
         # The loop polls with timeout 0 exactly when callbacks or timers are ready.
         self._iterations += 1
         if timeout != 0 or self._iterations > _MAX_ITERATIONS:
-            then, self._when_idle = self._when_idle, None
-            then()
+            callback, self._when_idle = self._when_idle, None
+            callback()
         return []
 
     @abstractmethod
@@ -191,8 +191,8 @@ class LockstepEventLoop(LinkEventLoop):
     ) -> asyncio.TimerHandle:
         """Schedule a timer; timers due at the same time run in the order of scheduling.
 
-        In asyncio the order of such timers depends on the shape of its heap, and so on timers from
-        the time before the first beacon, when wall time counted.
+        In asyncio the order of such timers depends on the shape of its heap, which still depends on
+        timers that were scheduled in wall time, before the first beacon.
         """
         self._scheduled_so_far += 1
         order = self._scheduled_so_far % _TIMERS_IN_ORDER * _TIMER_SPACING_S
@@ -204,9 +204,9 @@ class LockstepEventLoop(LinkEventLoop):
         """Move the clock to a beacon's time, s; return False for a repeated beacon."""
         return self._clock.advance(vehicle_time)
 
-    def settle(self, then: Callable[[], None]) -> None:
-        """Run all that is ready and due, without I/O, and then call `then`."""
-        self._stepping.settle(then)
+    def settle(self, callback: Callable[[], None]) -> None:
+        """Run all that is ready and due, without I/O, and then call `callback`."""
+        self._stepping.settle(callback)
 
 
 def run(main: Coroutine[Any, Any, T]) -> T:

@@ -16,7 +16,7 @@ class LockstepClient:
         answer: Sends the answer that closes the step of `time_boot_ms`.
 
     Attributes:
-        first_beacon: Done when the first beacon has come.
+        first_beacon: A future that is done when the first beacon has come.
     """
 
     def __init__(
@@ -34,7 +34,7 @@ class LockstepClient:
 
     @property
     def step_ms(self) -> int | None:
-        """Vehicle time of the open step, ms; `None` between an answer and the next beacon."""
+        """Vehicle time of the open step, ms; `None` while no step is open."""
         return self._step_ms
 
     def beacon(self, time_boot_ms: int) -> None:
@@ -51,7 +51,7 @@ class LockstepClient:
         self._loop.settle(self._after_tasks)
 
     def close(self) -> None:
-        """Stop: the open step gets no answer, nor samples that were not delivered yet."""
+        """Stop: the open step is not answered, and its samples are not delivered any more."""
         self._closed = True
 
     def _after_tasks(self) -> None:

@@ -51,7 +51,7 @@ _CLASSES: dict[int, Any] = {**dialect.mavlink_map, CURRENT_MODE: CurrentModeMess
 """Message classes by number."""
 
 UNDECODED = {"EVENT": 410, "CURRENT_EVENT_SEQUENCE": 411}
-"""Messages of MAVLink common that pymavlink lacks; only their payloads are passed on."""
+"""Numbers of messages of MAVLink common that pymavlink lacks; their payloads are not decoded."""
 
 MESSAGE_IDS: dict[str, int] = {kind.msgname: number for number, kind in _CLASSES.items()}
 CRC_EXTRA: dict[int, bytes] = {
@@ -86,7 +86,7 @@ def message_id(name: str) -> int:
 
 
 def decode(number: int, payload: bytes) -> Message:
-    """Build pymavlink's message object from a payload whose checksum was already checked."""
+    """Build the message object from a payload whose checksum was already checked."""
     kind = _CLASSES[number]
     size = kind.unpacker.size
     flat = kind.unpacker.unpack(payload[:size].ljust(size, b"\0"))

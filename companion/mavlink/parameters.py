@@ -23,7 +23,6 @@ _READ = struct.Struct("<hBB16s")
 _BY_NAME = -1
 _MAX_NAME = 16
 
-_REAL32 = 9
 _INTEGERS = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}
 _ERRORS = {
     1: "the autopilot has no such parameter",

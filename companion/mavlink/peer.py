@@ -13,7 +13,7 @@ from companion.mavlink.stats import LinkStats
 from companion.mavlink.transport.endpoint import PeerAddress
 
 
-async def resolve(named: Sequence[PeerAddress], kind: socket.SocketKind) -> "NamedPeers":
+async def resolve(peers: Sequence[PeerAddress], kind: socket.SocketKind) -> "NamedPeers":
     """Look up the addresses of the peers that the endpoint names.
 
     Raises:
@@ -21,7 +21,7 @@ async def resolve(named: Sequence[PeerAddress], kind: socket.SocketKind) -> "Nam
     """
     loop = asyncio.get_running_loop()
     admitted: set[tuple[str, int | None]] = set()
-    for peer in named:
+    for peer in peers:
         try:
             found = await loop.getaddrinfo(peer.host, None, type=kind)
         except OSError as error:
@@ -52,7 +52,10 @@ class NamedPeers:
 
 
 def plain_host(host: str) -> str:
-    """An IP address in its normal form; an IPv4 address mapped into IPv6 as IPv4."""
+    """An IP address in its normal form, without zone; IPv4 mapped into IPv6 becomes IPv4.
+
+    A host name is returned unchanged.
+    """
     try:
         address = ipaddress.ip_address(host.partition("%")[0])
     except ValueError:
@@ -93,7 +96,7 @@ class PeerRule:
         stats: Counts the changes of the peer.
         notice: Called with a sentence for the user at each change, and at each `ignore`.
         clock: Returns the event-loop time, s.
-        last_setpoint: Returns the event-loop time of the last setpoint, s.
+        last_setpoint: Returns the event-loop time of the last setpoint, s; −inf before the first.
         every_frame_claims: Signing is on, or the link runs in lockstep.
     """
 
@@ -135,7 +138,7 @@ class PeerRule:
         return now - self._claimed_at > CLAIM_LASTS_S
 
     def set_peer(self, who: str) -> None:
-        """Make `who` the peer."""
+        """Make `who`, given as HOST:PORT, the peer; count a change and report it to the user."""
         before, self._peer = self._peer, who
         self.renew()
         if before is not None and before != who:

@@ -14,7 +14,8 @@ class LinkSettings:
     """The endpoint, and the ids of the vehicle and of this program.
 
     Attributes:
-        endpoint: See `companion.mavlink.transport.endpoint`.
+        endpoint: Such as `udpin://0.0.0.0:14540` or `serial:///dev/ttyAMA0:921600`; see
+            `parse_endpoint`.
         target_system: System id of the vehicle; frames of other systems are ignored.
         target_component: Component id of the vehicle; 1 is the autopilot.
         source_system: System id of this program; a companion computer has that of its vehicle.

@@ -6,7 +6,6 @@ SHA-256(key + frame + link id + time stamp); the time stamp counts 10 us since 2
 
 import hashlib
 import hmac
-import re
 import threading
 import time
 from collections import deque
@@ -29,7 +28,7 @@ _TIMESYNC = _TIMESYNC_ID.to_bytes(3, "little")
 _REQUESTS_KEPT = 16
 
 PERIOD_S = 10.0
-"""Time between two writes of the stamps, s. The guide demands one a minute."""
+"""Time between two writes of the stamps, s. The guide demands one write a minute."""
 _RESERVE = 15 * TICKS_PER_S
 """How far the stamps in the file are ahead of the newest stamps while the link is open, ticks.
 
@@ -39,17 +38,6 @@ until their stamps are newer than those in the file, for 15 s at most.
 """
 _LAST_WRITE_S = 2.0
 """Time allowed for the last write, s."""
-
-
-def key_from_hex(text: str) -> bytes:
-    """Convert 64 hexadecimal digits to a key.
-
-    Raises:
-        SigningError: The text is not 64 hexadecimal digits.
-    """
-    if not re.fullmatch(r"[0-9a-fA-F]{64}", text.strip()):
-        raise SigningError("a signing key is 64 hexadecimal digits (32 bytes)")
-    return bytes.fromhex(text.strip())
 
 
 def key_from_passphrase_file(path: Path) -> bytes:
@@ -75,12 +63,12 @@ class Signing:
     Args:
         key: 32 bytes shared with the vehicle.
         link_id: Link id in the signatures that are sent, 0..255.
-        clock: Returns Unix time in s; called once, see `StampJudge`.
+        clock: Returns Unix time in s; called once, at the start.
         elapsed: Returns monotonic time in s; the stamps sent rise with it.
         file: Keeps the newest stamps from one run to the next; `None` keeps nothing.
 
     Attributes:
-        file: The argument `file`.
+        file: Keeps the newest stamps; `None` keeps nothing.
         remarks: Sentences about time stamps for the user; whoever shows them removes them.
         changed: Set when the time stamps should be written to the file soon.
 
@@ -141,7 +129,7 @@ class Signing:
 
     @property
     def awaits_answer(self) -> bool:
-        """Whether the frame checked last was refused because no TIMESYNC request was answered."""
+        """Whether the last frame was refused until the vehicle answers a TIMESYNC request."""
         return self._unproven_stamp != 0
 
     def stamps(self) -> Stamps:
@@ -149,7 +137,7 @@ class Signing:
         return Stamps(self._judge.date(), self._stamp, self._judge.streams())
 
     def _answers_timesync(self, frame: Frame) -> bool:
-        """Whether a frame answers a TIMESYNC request of this run; no recording can contain that."""
+        """Whether a frame answers a TIMESYNC request of this run, which no recording can do."""
         if frame.message_id != _TIMESYNC_ID:
             return False
         answer_at, question = _timesync_fields(frame.payload)

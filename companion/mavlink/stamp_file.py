@@ -36,9 +36,11 @@ class StampFile:
         self.path = _state_directory() / _FOLDER / f"{name}.json"
 
     def load(self) -> tuple[Stamps, str | None]:
-        """The kept stamps, and a sentence for the user if they cannot be read.
+        """Read the stamps that were kept; never raises.
 
-        No file counts as no stamps. Never raises.
+        Returns:
+            The stamps, empty if there is no file; and a sentence for the user if the file cannot
+            be read, else None.
         """
         try:
             with self.path.open("rb") as file:

@@ -20,7 +20,7 @@ _MINUTE = 60 * TICKS_PER_S
 _PROGRAM_DATE = (1_788_220_800 - EPOCH_UNIX_S) * TICKS_PER_S
 """2026-09-01, ticks. A correct clock is never earlier; raise this date with a release."""
 _FURTHEST = 5 * 365 * _DAY
-"""A stamp further ahead of the date is refused, ticks."""
+"""Furthest that an accepted stamp may be ahead of the date, ticks."""
 
 MOST_TICKS = 2**48 - 2 * _FURTHEST
 """Latest date that is used (2094), ticks, so that every stamp fits into 48 bits."""
@@ -37,7 +37,7 @@ class SignatureResult(Enum):
     GOOD = "signed with the configured key, and newer than all before it on its stream"
     UNSIGNED = "not signed"
     WRONG_KEY = "signed with another key"
-    REPLAYED = "not newer than an earlier frame or the date: repeated by the link, or a recording"
+    REPLAYED = "not newer than an earlier frame, or too old: repeated by the link, or a recording"
     AHEAD = "signed with the configured key, but dated too far in the future"
 
 
@@ -91,7 +91,7 @@ class StampJudge:
     ) -> None:
         self.remarks: list[str] = []
         self.changed = Event()
-        self._told: set[str] = set()
+        self._remarked: set[str] = set()
         self._elapsed = elapsed
         start = int((clock() - EPOCH_UNIX_S) * TICKS_PER_S)
         self._check_clock(start, kept.date)
@@ -196,15 +196,15 @@ class StampJudge:
                 f"released, so {_date(_PROGRAM_DATE)} is used; {SET_CLOCK}"
             )
 
-    def _remark_ahead(self, ticks: int, what: str) -> None:
+    def _remark_ahead(self, ticks: int, rest: str) -> None:
         days = _days(ticks)
         self._remark(
-            f"the vehicle's signatures are dated {days} ahead of this computer's date, {what}"
+            f"the vehicle's signatures are dated {days} ahead of this computer's date, {rest}"
         )
 
     def _remark(self, text: str) -> None:
-        if text not in self._told:
-            self._told.add(text)
+        if text not in self._remarked:
+            self._remarked.add(text)
             self.remarks.append(text)
 
 

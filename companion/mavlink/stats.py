@@ -13,7 +13,7 @@ def share_lost(frames: int, lost: int) -> float:
 
 @dataclass
 class LinkStats:
-    """Counters of one link. All but the last four count frames.
+    """Counters of one link.
 
     Attributes:
         frames: Frames accepted from the vehicle.
@@ -81,7 +81,7 @@ class SequenceTracker:
         return step - 1
 
     def reset(self) -> None:
-        """Restart, after a reconnect."""
+        """Forget the last sequence number, after a reconnect."""
         self._last = None
 
 
@@ -112,5 +112,5 @@ class FrameCounter:
         stats.by_message[message_id] = stats.by_message.get(message_id, 0) + 1
 
     def reset(self) -> None:
-        """Restart, after a reconnect."""
+        """Count no gap before the next frame, after a reconnect."""
         self._sequence.reset()

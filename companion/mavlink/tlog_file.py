@@ -16,7 +16,7 @@ _V1_OVERHEAD, _V2_OVERHEAD, _SIGNATURE = 8, 12, 13
 
 
 def messages(path: Path, names: Set[str]) -> Iterator[tuple[Frame, Message]]:
-    """The intact frames of the messages with these names, in the order of the log.
+    """The intact frames of the messages with these names, each with its message, in order.
 
     An incomplete record at the end is left out.
 

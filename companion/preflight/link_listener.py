@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from math import isfinite
 from statistics import median
-from types import TracebackType
 
 from companion.attitude.representation import is_unit
 from companion.mavlink.framing import Frame
@@ -64,12 +63,7 @@ class LinkListener:
         ]
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._link.on_foreign = self._before
         for unsubscribe in self._unsubscribe:
             unsubscribe()

@@ -49,7 +49,7 @@ def parameters(config: Config, evidence: Evidence) -> Iterator[Finding]:
     for rule in rules:
         if rule.vital and rule.name not in survey.values:
             yield _missing(rule, evidence.autopilot.name)
-    yield from _untold(evidence)
+    yield from _unread(evidence)
     for found in judge(rules, survey.values, companion_settings(config)):
         yield _finding(found, survey.names[found.rule.name])
 
@@ -65,10 +65,11 @@ def _missing(rule: ParameterRule, autopilot: str) -> Finding:
     )
 
 
-def _untold(evidence: Evidence) -> Iterator[Finding]:
+def _unread(evidence: Evidence) -> Iterator[Finding]:
     """Findings about parameters that were not received.
 
-    On a link that loses frames, one that every version has is unsafe. The others are only named.
+    On a link that loses frames, a missing parameter that every version has is unsafe. The other
+    missing parameters are only named.
     """
     survey = evidence.survey
     lossy = survey.lossy or evidence.link.loss > SOME_LOST
@@ -85,7 +86,7 @@ def _untold(evidence: Evidence) -> Iterator[Finding]:
                 "fix the link",
                 rule.source,
             )
-        others = (rule.name for rule in rules if rule.name in survey.untold)
+        others = (rule.name for rule in rules if rule.name in survey.unread)
         unread = [name for name in others if name not in unread]
     if unread:
         yield Finding(
@@ -100,9 +101,9 @@ def _untold(evidence: Evidence) -> Iterator[Finding]:
 
 
 def _hidden(rule: ParameterRule, survey: Survey) -> bool:
-    """Whether the parameter may exist unread, perhaps under another version's name."""
+    """Whether the parameter, or the one that other versions have instead, may exist unread."""
     places = {rule.name, rule.instead}
-    return places.isdisjoint(survey.values) and not places.isdisjoint(survey.untold)
+    return places.isdisjoint(survey.values) and not places.isdisjoint(survey.unread)
 
 
 def _finding(found: ParameterFinding, name: str) -> Finding:

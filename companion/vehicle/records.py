@@ -181,7 +181,7 @@ class Gps(NamedTuple):
 
 
 def gps_fault(gps: Gps | None, now: float) -> str | None:
-    """Fault of a GPS that had a 3D fix, at event-loop time `now` (s), or `None`."""
+    """Fault of a GPS that had a 3D fix, in words, at loop time `now` (s); `None`: no fault."""
     if gps is None or outdated(gps.received, now):
         return "GPS is not reported any more"
     return "GPS position lost" if gps.fix_type < GPS_FIX_3D else None

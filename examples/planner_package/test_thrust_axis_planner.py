@@ -1,6 +1,6 @@
-"""The tests that such a package has: may its planner fly, and does it fly by its name?
+"""The tests of a planner package: is its planner fit to fly, and is it found by its name?
 
-`mock_vehicle` is a fixture that mavlink-companion brings.
+`mock_vehicle` is a pytest fixture of mavlink-companion.
 """
 
 from collections.abc import Callable
@@ -15,7 +15,7 @@ def test_it_conforms() -> None:
 def test_it_flies(mock_vehicle: Callable[..., MockVehicle]) -> None:
     vehicle = mock_vehicle("px4")
     flight = {"arm": True, "maneuvers": ["hover", "circle"]}
-    told = {"planner": {"name": "thrust-axis"}, "flight": flight}
-    summary = fly({**told, "thrust": {"hover_thrust": 0.49}}, vehicle)
+    config = {"planner": {"name": "thrust-axis"}, "flight": flight}
+    summary = fly({**config, "thrust": {"hover_thrust": 0.49}}, vehicle)
     assert (summary.result, summary.planner) == ("ok", "thrust-axis")
     assert summary.tracking()["position_max_m"] < 1.0

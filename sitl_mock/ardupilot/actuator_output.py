@@ -45,7 +45,7 @@ class ActuatorOutput:
         self._hold = hold
         self._throttle = throttle
         self.thrust = 0.0
-        """Latest command, 0..1, without the angle boost."""
+        """Latest normalised thrust, 0..1, without the angle boost."""
 
     @property
     def taking_off(self) -> bool:
@@ -57,12 +57,8 @@ class ActuatorOutput:
         """Cosine of the angle between the body's down axis and the vertical."""
         return body_z(self._state.estimate.q)[2]
 
-    def hover_throttle(self) -> float:
-        """Return the rotors' throttle at MOT_THST_HOVER."""
-        return self._throttle(specific_thrust(float(self._parameters["MOT_THST_HOVER"])))
-
     def follow(self, output: PositionOutput, dt: float) -> ActuatorCommand:
-        """Return the command for what the position controller computed for the last ``dt`` s."""
+        """Return the command for the output of the position controller, valid for ``dt`` s."""
         self.thrust = output.thrust
         self._learn_hover(output, dt)
         return self.attitude(output.q, output.thrust)

@@ -133,7 +133,8 @@ BATTERY: dict[str, Any] = {
 def _with_rotor_lag(gains: AxisGains, inertia: float) -> AxisGains:
     """Return gains that give the same poles and the same steady state with ROTOR_LAG_MS.
 
-    With inertia J, damping b and rotor lag T an axis without a torque filter answers as
+    The given gains were fitted on the default airframe. With gains P, D and feed-forward F, inertia
+    J, aerodynamic damping b and rotor lag T an axis without a torque filter answers as
     (P + F) / (J T s^2 + (J + b T + D) s + P + b). An axis with a torque filter gets a slower filter
     instead: two lags in series respond almost as their sum.
     """

@@ -1,6 +1,6 @@
 """ArduCopter's failsafes: loss of ground station or position, low battery."""
 
-from typing import Protocol
+from collections.abc import Callable
 
 from sitl_mock.ardupilot.modes import NEEDS_POSITION, PILOTED
 from sitl_mock.autopilot.events import Announce, EventKind
@@ -17,10 +17,6 @@ _PILOT_CONTINUES = 16
 """Bit of FS_OPTIONS: the loss of the ground station has no effect in a pilot's mode."""
 
 
-class _Act(Protocol):
-    def __call__(self, mode: Mode) -> None: ...
-
-
 class ArduPilotFailsafe:
     """Detects a lost ground station, a lost position and a low battery, and acts while armed.
 
@@ -31,7 +27,7 @@ class ArduPilotFailsafe:
         parameters: its parameters.
         vehicle: for the battery's voltage.
         announce: sends texts.
-        act: enters a mode, or disarms a vehicle on the ground.
+        act: enters a failsafe's mode, or disarms a vehicle that is on the ground.
     """
 
     def __init__(
@@ -40,7 +36,7 @@ class ArduPilotFailsafe:
         parameters: ParameterTable,
         vehicle: Vehicle,
         announce: Announce,
-        act: _Act,
+        act: Callable[[Mode], None],
     ) -> None:
         self._state = state
         self._parameters = parameters

@@ -66,8 +66,8 @@ class Guided:
         """Height of TAKE_OFF, m above home."""
         self.angle: AttitudeSetpoint | None = None
         self.position: PositionSetpoint | None = None
-        self.since_us = 0
-        """Vehicle time of the latest setpoint."""
+        self.setpoint_us = 0
+        """Vehicle time of the latest setpoint, us."""
         self.changed = True
         """Whether the task has just begun; `GuidedFlight` clears this."""
 
@@ -86,19 +86,19 @@ class Guided:
 
     def follow_angle(self, setpoint: AttitudeSetpoint, now_us: int) -> None:
         """Follow rates or an attitude, with thrust."""
-        self.angle, self.since_us = setpoint, now_us
+        self.angle, self.setpoint_us = setpoint, now_us
         if self.task is not Task.ANGLE:
             self._begin(Task.ANGLE)
 
     def follow_position(self, setpoint: PositionSetpoint, now_us: int) -> None:
         """Follow a position, a velocity or an acceleration."""
-        self.position, self.since_us = setpoint, now_us
+        self.position, self.setpoint_us = setpoint, now_us
         if self.task is not Task.POSITION:
             self._begin(Task.POSITION)
 
     def silent(self, now_us: int, timeout_s: float) -> bool:
         """Whether the latest setpoint is older than GUID_TIMEOUT."""
-        return now_us - self.since_us > timeout_s * 1e6
+        return now_us - self.setpoint_us > timeout_s * 1e6
 
     def _begin(self, task: Task) -> None:
         self.task = task

@@ -7,10 +7,10 @@ from sitl_mock.ardupilot.guided import Guided, Task
 from sitl_mock.ardupilot.hold import PositionHold, approach_speed
 from sitl_mock.ardupilot.thrust import angle_boosted, climb_rate_of_setpoint, thrust_of_setpoint
 from sitl_mock.autopilot.parameters import ParameterTable
-from sitl_mock.autopilot.position_control import PositionDemand
+from sitl_mock.autopilot.position_control import setpoint_demand
 from sitl_mock.autopilot.setpoints import AttitudeSetpoint
 from sitl_mock.autopilot.state import State
-from sitl_mock.physics.quaternion import along_heading, from_yaw
+from sitl_mock.physics.quaternion import from_yaw
 from sitl_mock.physics.vehicle import ActuatorCommand
 
 THRUST_IS_THRUST = 8
@@ -124,21 +124,11 @@ class GuidedFlight:
             guided.hold()
             return self._output.follow(self._hold.step(0.0, dt), dt)
         hold = self._hold
-        if not isnan(setpoint.yaw):
-            hold.yaw = setpoint.yaw
-        elif not isnan(setpoint.yaw_rate):
-            hold.yaw += setpoint.yaw_rate * dt
-        velocity, acceleration = setpoint.velocity, setpoint.acceleration
-        if setpoint.in_body_heading:
-            q = self._state.estimate.q
-            velocity, acceleration = along_heading(q, velocity), along_heading(q, acceleration)
-        demand = PositionDemand(
-            setpoint.position,
-            velocity,
-            acceleration,
-            hold.yaw,
+        speeds = (
             0.01 * parameters["WPNAV_SPEED"],
             0.01 * parameters["WPNAV_SPEED_UP"],
             0.01 * parameters["WPNAV_SPEED_DN"],
         )
+        demand = setpoint_demand(setpoint, self._state.estimate.q, hold.yaw, speeds, dt)
+        hold.yaw = demand.yaw
         return self._output.follow(hold.follow(demand, dt), dt)

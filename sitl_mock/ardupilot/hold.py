@@ -1,6 +1,6 @@
 """Position hold: a point and a heading are held, a climb rate is followed."""
 
-from math import radians, sqrt
+from math import nan, radians, sqrt
 
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.position_control import (
@@ -9,7 +9,7 @@ from sitl_mock.autopilot.position_control import (
     PositionGains,
     PositionOutput,
 )
-from sitl_mock.autopilot.state import NAN, PositionTargetEcho, State
+from sitl_mock.autopilot.state import PositionTargetEcho, State
 from sitl_mock.physics.quaternion import Vector, yaw
 
 STOPPING_S = 0.65
@@ -95,11 +95,11 @@ class PositionHold:
         """
         parameters, climb = self._parameters, self.climb
         climb.step(climb_rate, 0.01 * parameters["WPNAV_ACCEL_Z"], dt)
-        north, east = (NAN, NAN) if level else self.point
+        north, east = (nan, nan) if level else self.point
         demand = PositionDemand(
             (north, east, -climb.height),
-            (NAN, NAN, -climb.rate),
-            (*((0.0, 0.0) if level else (NAN, NAN)), -climb.acceleration),
+            (nan, nan, -climb.rate),
+            (*((0.0, 0.0) if level else (nan, nan)), -climb.acceleration),
             self.yaw,
             0.01 * parameters["WPNAV_SPEED"],
             _STEEP_CLIMB,

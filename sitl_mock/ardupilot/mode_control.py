@@ -7,7 +7,7 @@ from sitl_mock.ardupilot.guided import Guided
 from sitl_mock.ardupilot.guided_flight import GuidedFlight
 from sitl_mock.ardupilot.hold import PositionHold, approach_speed
 from sitl_mock.ardupilot.return_home import Leg, Return
-from sitl_mock.ardupilot.thrust import angle_boosted
+from sitl_mock.ardupilot.thrust import angle_boosted, specific_thrust
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.state import Mode, State
 from sitl_mock.physics.quaternion import Vector, from_yaw
@@ -39,6 +39,7 @@ class ArduPilotModeControl:
         self._state = state
         self._parameters = parameters
         self._guided = guided
+        self._throttle = throttle
         self._hold = PositionHold(state, parameters)
         self._output = ActuatorOutput(state, parameters, guided, self._hold, throttle)
         self._guided_flight = GuidedFlight(state, parameters, guided, self._hold, self._output)
@@ -70,7 +71,7 @@ class ArduPilotModeControl:
 
     def hover_throttle(self) -> float:
         """Return the rotors' throttle at MOT_THST_HOVER."""
-        return self._output.hover_throttle()
+        return self._throttle(specific_thrust(float(self._parameters["MOT_THST_HOVER"])))
 
     def command(self, dt: float) -> ActuatorCommand:
         """Return the command for the next ``dt`` s."""
@@ -112,12 +113,12 @@ class ArduPilotModeControl:
         return self._output.follow(self._hold.step(0.0, dt, level=mode is Mode.ALT_HOLD), dt)
 
     def _return_home(self, dt: float) -> ActuatorCommand:
-        parameters, way = self._parameters, self._return
-        way.step()
-        if way.leg is not Leg.CLIMB:
+        parameters, flight = self._parameters, self._return
+        flight.step()
+        if flight.leg is not Leg.CLIMB:
             home = self._state.home_ned
             self._hold.point = (home[0], home[1])
-        left = way.height - self._hold.climb.height
+        left = flight.height - self._hold.climb.height
         acceleration = 0.01 * parameters["WPNAV_ACCEL_Z"]
         fastest = 0.01 * parameters["WPNAV_SPEED_UP"]
         return self._output.follow(

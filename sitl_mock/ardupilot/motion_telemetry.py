@@ -4,9 +4,9 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.autopilot.motion_telemetry import MAGNETIC_FIELD_NED, Builder, MotionTelemetry
 from sitl_mock.link.framing import Message
+from sitl_mock.physics.rigid_body import GRAVITY
 
-_GRAVITY = 9.80665
-_SENT = (
+_ALIKE = (
     dialect.MAVLINK_MSG_ID_ATTITUDE,
     dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
     dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
@@ -16,19 +16,19 @@ _SENT = (
     dialect.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW,
     dialect.MAVLINK_MSG_ID_VIBRATION,
 )
-"""Messages that ArduCopter builds as PX4 does; ATTITUDE_TARGET differs if rates are shaped. It has
-no ODOMETRY and no ALTITUDE."""
+"""Messages that ArduCopter builds as PX4 does; ATTITUDE_TARGET differs if rates are shaped.
+ArduCopter has no ODOMETRY and no ALTITUDE."""
 
 
 class ArduPilotMotionTelemetry(MotionTelemetry):
-    """Builds messages from the estimate."""
+    """Builds messages from the estimate, as ArduCopter does."""
 
     airspeed = 0.0
 
     def builders(self) -> dict[int, Builder]:
         """Return message id -> builder."""
-        alike = super().builders()
-        return {message_id: alike[message_id] for message_id in _SENT} | {
+        builders = super().builders()
+        return {message_id: builders[message_id] for message_id in _ALIKE} | {
             dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self.position_or_zeros,
             dialect.MAVLINK_MSG_ID_VFR_HUD: self.vfr_hud,
             dialect.MAVLINK_MSG_ID_RAW_IMU: self.raw_imu,
@@ -56,7 +56,7 @@ class ArduPilotMotionTelemetry(MotionTelemetry):
         estimate = self._state.estimate
         return dialect.MAVLink_raw_imu_message(
             self._state.shown_us,
-            *(round(1e3 * force / _GRAVITY) for force in estimate.specific_force_frd),
+            *(round(1e3 * force / GRAVITY) for force in estimate.specific_force_frd),
             *(round(1e3 * rate) for rate in estimate.gyro),
             *(round(1e3 * field) for field in MAGNETIC_FIELD_NED),
         )

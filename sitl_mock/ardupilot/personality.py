@@ -1,6 +1,6 @@
 """ArduCopter's personality: its numbers and its behaviour (recorded from 4.7.0-dev)."""
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega
@@ -20,9 +20,8 @@ from sitl_mock.ardupilot.modes import MODES_BY_NUMBER
 from sitl_mock.ardupilot.motion_telemetry import ArduPilotMotionTelemetry
 from sitl_mock.ardupilot.streams import ArduPilotStreams
 from sitl_mock.ardupilot.system_telemetry import ArduPilotSystemTelemetry
-from sitl_mock.ardupilot.texts import ARDUPILOT_EVENTS, ArduPilotAnnouncer
+from sitl_mock.ardupilot.texts import ArduPilotAnnouncer
 from sitl_mock.autopilot.commands import Commands
-from sitl_mock.autopilot.events import Event, EventKind
 from sitl_mock.autopilot.land_detector import LandDetector
 from sitl_mock.autopilot.motion_telemetry import Builder
 from sitl_mock.autopilot.parameter_protocol import ParameterProtocol
@@ -74,7 +73,6 @@ _SUPPORTED = frozenset(
 class ArduPilot:
     """The ArduPilot personality (ArduCopter)."""
 
-    events: Mapping[EventKind, Event] = ARDUPILOT_EVENTS
     boot_mode = Mode.STABILIZE
     any_component = True
     system_id_parameter = "MAV_SYSID"
@@ -94,15 +92,15 @@ class ArduPilot:
 
     def slot_us(self, settings: VehicleSettings) -> int:
         """Return the period of the main loop, us."""
-        return self._loop_us(settings)
+        return round(1e6 / settings.parameters.get("SCHED_LOOP_RATE", DEFAULT_LOOP_HZ))
 
     def streams(self, link: str, settings: VehicleSettings) -> StreamSchedule:
-        """Return the streams of a link: until a client requests more, those of the boot."""
+        """Return the streams of a link: those of the boot, until a client requests others."""
         booting_s = settings.prearm_delay_s * INITIALISED_S / RECORDED_READY_S
         return ArduPilotStreams(
             _BOOT_RATES,
             _SUPPORTED,
-            loop_us=self._loop_us(settings),
+            loop_us=self.slot_us(settings),
             booting_until_us=booting_s * 1e6,
         )
 
@@ -157,11 +155,6 @@ class ArduPilot:
             origin_set=lambda: boot.origin_set,
         )
         return motion.builders() | system.builders()
-
-    @staticmethod
-    def _loop_us(settings: VehicleSettings) -> int:
-        rate = settings.parameters.get("SCHED_LOOP_RATE", DEFAULT_LOOP_HZ)
-        return round(1e6 / rate)
 
 
 def _send_once(commands: Commands, messages: Iterable[int], links: Iterable[Link]) -> None:

@@ -1,24 +1,24 @@
 """Telemetry of the autopilot's state in ArduCopter's conventions."""
 
 from collections.abc import Callable
+from math import nan
 
 from pymavlink.dialects.v20 import ardupilotmega
 from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.ardupilot.modes import MODE_NUMBERS, base_mode
-from sitl_mock.autopilot.motion_telemetry import Builder, clip
+from sitl_mock.autopilot.motion_telemetry import Builder
 from sitl_mock.autopilot.personality import Identity
-from sitl_mock.autopilot.state import NAN, State
+from sitl_mock.autopilot.state import State
 from sitl_mock.autopilot.system_telemetry import NO_VALUE, SystemTelemetry
 from sitl_mock.link.framing import Message
-from sitl_mock.physics.geodesy import Origin
+from sitl_mock.physics.geodesy import Geodetic
 from sitl_mock.physics.vehicle import Vehicle
 
+# Bits of SYS_STATUS, recorded disarmed, without control of height or position.
 _SENSORS_PRESENT = 1399979055
 _SENSORS_ENABLED = 1382128687
 _SENSORS_HEALTHY = 1467063343
-"""`_SENSORS_PRESENT` to here: bits of SYS_STATUS, recorded disarmed, without control of height or
-position."""
 _HEIGHT_CONTROL = dialect.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL
 _POSITION_CONTROL = dialect.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
 _LOGGING = dialect.MAV_SYS_STATUS_LOGGING
@@ -48,15 +48,14 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
     def __init__(
         self,
         state: State,
-        origin: Origin,
+        origin: Geodetic,
         identity: Identity,
         vehicle: Vehicle,
         *,
         initialised: Callable[[], bool],
         origin_set: Callable[[], bool],
     ) -> None:
-        super().__init__(state, origin, identity)
-        self._vehicle = vehicle
+        super().__init__(state, origin, identity, vehicle)
         self._initialised = initialised
         self._origin_set = origin_set
         self._used_as = 0.0
@@ -96,38 +95,23 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
         return int(dialect.MAV_STATE_STANDBY if state.landed else dialect.MAV_STATE_ACTIVE)
 
     def sys_status(self) -> Message:
-        """Return SYS_STATUS; clients read its prearm bit as armable."""
-        state, battery = self._state, self._vehicle.battery
+        """Return SYS_STATUS."""
+        state = self._state
         working = _HEIGHT_CONTROL if state.height_controlled else 0
         working |= _POSITION_CONTROL if state.position_controlled else 0
-        return dialect.MAVLink_sys_status_message(
-            _SENSORS_PRESENT,
-            _SENSORS_ENABLED | working | (_LOGGING if state.armed else 0),
-            self._healthy(_SENSORS_HEALTHY | working),
-            0,
-            clip(battery.voltage_v * 1e3, 15),
-            clip(battery.current_a * 1e2, 15),
-            round(100 * battery.remaining),
-            *(0,) * 6,
-        )
+        enabled = _SENSORS_ENABLED | working | (_LOGGING if state.armed else 0)
+        return self._sys_status(_SENSORS_PRESENT, enabled, _SENSORS_HEALTHY | working, 0)
 
     def battery_status(self) -> Message:
-        """Return BATTERY_STATUS."""
-        battery, state = self._vehicle.battery, self._state
-        self._used_as += battery.current_a * (state.time_us - self._used_at_us) / 1e6
-        self._used_at_us = state.time_us
-        return dialect.MAVLink_battery_status_message(
-            0,
+        """Return BATTERY_STATUS, with the charge used since boot."""
+        now_us = self._state.time_us
+        self._used_as += self._vehicle.battery.current_a * (now_us - self._used_at_us) / 1e6
+        self._used_at_us = now_us
+        return self._battery_status(
             dialect.MAV_BATTERY_FUNCTION_UNKNOWN,
             dialect.MAV_BATTERY_TYPE_UNKNOWN,
-            32767,
-            [round(battery.voltage_v * 1e3)] + [NO_VALUE] * 9,
-            clip(battery.current_a * 1e2, 15),
             round(self._used_as / 3.6),
             0,
-            round(100 * battery.remaining),
-            0,
-            int(state.battery_warning),
         )
 
     def gps_raw_int(self) -> Message:
@@ -154,7 +138,7 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
 
     def home_position(self) -> Message | None:
         """Return HOME_POSITION, without attitude (recorded); None before home is set."""
-        return self._home_position((NAN, NAN, NAN, NAN)) if self._origin_set() else None
+        return self._home_position((nan, nan, nan, nan)) if self._origin_set() else None
 
     def gps_global_origin(self) -> Message | None:
         """Return GPS_GLOBAL_ORIGIN; None before it is set."""

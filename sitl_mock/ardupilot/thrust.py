@@ -6,7 +6,7 @@ Measured on 4.7.0-dev's built-in quadrotor, with GUID_OPTIONS bit 3 set.
 from itertools import pairwise
 from math import isnan
 
-GRAVITY = 9.80665
+from sitl_mock.physics.rigid_body import GRAVITY
 
 HOVER = 0.364
 """Thrust that hovers."""

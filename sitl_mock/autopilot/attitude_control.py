@@ -6,7 +6,7 @@ from typing import NamedTuple
 from sitl_mock.physics.quaternion import Quaternion, Vector, multiply, normalise
 
 _OPPOSITE = 1e-5
-"""Below -1 plus this cosine, two axes count as opposite: their shortest arc is not defined."""
+"""Two axes with a cosine below -1 plus this count as opposite: no arc between them is shortest."""
 
 
 class AttitudeGains(NamedTuple):

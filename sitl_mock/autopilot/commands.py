@@ -62,7 +62,10 @@ class Commands:
         return UNSUPPORTED if handler is None else handler(command, link)
 
     def send(self, message_id: int, link: Link) -> int:
-        """Send a message once on a link, and return a MAV_RESULT."""
+        """Send a message once on a link, and return a MAV_RESULT.
+
+        DENIED if there is no such message, or nothing valid to send.
+        """
         builder = self._builders.get(message_id)
         message = None if builder is None else builder()
         if message is None:

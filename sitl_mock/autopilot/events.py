@@ -1,7 +1,5 @@
 """The events that an autopilot announces."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from enum import Enum, auto
 from typing import NamedTuple

@@ -136,7 +136,7 @@ class FaultEffects:
         self._control = control
         self._links = links
         self._silences: list[StopTelemetry] = []
-        self._nan: list[NanField] = []
+        self._nan_fields: list[NanField] = []
         self._gps_lost_us = 0
         self._slipped_s = 0.0
 
@@ -161,10 +161,10 @@ class FaultEffects:
         return any(not fault.messages or name in fault.messages for fault in self._silences)
 
     def watch_position(self, converged_us: float, timeout_us: float) -> None:
-        """Update ``position_valid``: true from ``converged_us`` on, unless GPS is lost for long.
+        """Update ``position_valid``.
 
         Args:
-            converged_us: vehicle time at which the position becomes valid.
+            converged_us: vehicle time from which on the position is valid.
             timeout_us: time for which it stays valid without GPS.
         """
         state = self._state
@@ -180,13 +180,13 @@ class FaultEffects:
             case SlipClock():
                 self._slipped_s += fault.slip_ms * 1e-3
             case NanField():
-                self._nan.append(fault)
+                self._nan_fields.append(fault)
                 self._hook_links()
             case PilotTakeover():
                 self._commander.take_over(Mode[fault.mode])
             case EstimatorReset():
                 step = radians(fault.yaw_deg)
-                self._vehicle.shift_estimate(yaw=step, position_ned=fault.position_ned_m)
+                self._vehicle.estimator.shift(yaw=step, position_ned=fault.position_ned_m)
                 self._control.shift(step, fault.position_ned_m)
             case RefuseArming():
                 self._commander.refusal = fault.reason
@@ -203,7 +203,7 @@ class FaultEffects:
             case FreezeClock():
                 self.clock_frozen = False
             case NanField():
-                self._nan.remove(fault)
+                self._nan_fields.remove(fault)
                 self._hook_links()
             case PilotTakeover():
                 self._commander.pilot = False
@@ -216,10 +216,10 @@ class FaultEffects:
 
     def _hook_links(self) -> None:
         for link in self._links:
-            link.tamper = self._tamper if self._nan else None
+            link.tamper = self._tamper if self._nan_fields else None
 
     def _tamper(self, message: Message) -> None:
-        for fault in self._nan:
+        for fault in self._nan_fields:
             if message.get_type() == fault.message:
                 value = getattr(message, fault.field)
                 corrupted = [nan] * len(value) if isinstance(value, Sequence) else nan

@@ -1,6 +1,6 @@
 """Land detector: landed after contact with low thrust for a time (disarmed: at once).
 
-Without contact or with more thrust the vehicle has taken off at once.
+Without contact, or with more thrust, the vehicle counts as taken off at once.
 """
 
 from collections.abc import Callable
@@ -20,7 +20,7 @@ class LandDetector:
         announce: announces take-off and landing.
         hover_thrust: returns the thrust command that hovers, 0..1.
         landed_after_us: contact with low thrust for this time is a landing.
-        climbing: returns whether a take-off has not reached its height.
+        climbing: returns whether a take-off is under way and has not reached its height.
     """
 
     def __init__(
@@ -52,14 +52,14 @@ class LandDetector:
     def _update(self, *, contact: bool) -> None:
         state = self._state
         state.contact = contact
-        if not contact or self._pushing():
+        if not contact or self._thrust_is_high():
             self._quiet_since_us = state.time_us
             state.landed = False
             state.flown = state.flown or not contact
         elif not state.armed or state.time_us - self._quiet_since_us >= self._landed_after_us:
             state.landed = True
 
-    def _pushing(self) -> bool:
+    def _thrust_is_high(self) -> bool:
         state = self._state
         # A NaN thrust, which means none, fails this comparison and counts as low.
         return state.armed and state.command.thrust > LOW_THRUST_SHARE * self._hover_thrust()

@@ -44,7 +44,9 @@ class MissionProtocol:
 
     def _send_count(self, message: Message, link: Link) -> None:
         count = len(self.plans.get(message.mission_type, ()))
-        link.send(dialect.MAVLink_mission_count_message(*_to(message), count, message.mission_type))
+        link.send(
+            dialect.MAVLink_mission_count_message(*_sender(message), count, message.mission_type)
+        )
 
     def _send_item(self, message: Message, link: Link) -> None:
         plan = self.plans.get(message.mission_type, [])
@@ -53,7 +55,7 @@ class MissionProtocol:
             return
         item = plan[message.seq]
         fields = {name: getattr(item, name) for name in item.get_fieldnames()}
-        fields["target_system"], fields["target_component"] = _to(message)
+        fields["target_system"], fields["target_component"] = _sender(message)
         link.send(dialect.MAVLink_mission_item_int_message(**fields))
 
     def _begin_upload(self, message: Message, link: Link) -> None:
@@ -65,12 +67,12 @@ class MissionProtocol:
             self.plans[message.mission_type] = []
             _acknowledge(message, link, _ACCEPTED)
         else:
-            self._upload = _Upload(message.mission_type, message.count, _to(message), [])
+            self._upload = _Upload(message.mission_type, message.count, _sender(message), [])
             self._request_item(link, self._upload)
 
     def _take_item(self, message: Message, link: Link) -> None:
         upload = self._upload
-        if upload is None or upload.client != _to(message):
+        if upload is None or upload.client != _sender(message):
             _acknowledge(message, link, dialect.MAV_MISSION_ERROR)
             return
         if message.seq != len(upload.items):
@@ -89,16 +91,18 @@ class MissionProtocol:
         link.send(dialect.MAVLink_mission_request_int_message(*upload.client, number, kind))
 
     def _clear(self, message: Message, link: Link) -> None:
-        all_of_them = message.mission_type == dialect.MAV_MISSION_TYPE_ALL
-        for kind in _TYPES if all_of_them else (message.mission_type,):
+        everything = message.mission_type == dialect.MAV_MISSION_TYPE_ALL
+        cleared = _TYPES if everything else self.plans.keys() & {message.mission_type}
+        for kind in cleared:
             self.plans[kind] = []
-        _acknowledge(message, link, _ACCEPTED)
+        result = _ACCEPTED if cleared else dialect.MAV_MISSION_UNSUPPORTED
+        _acknowledge(message, link, result)
 
 
-def _to(message: Message) -> tuple[int, int]:
-    """The address of a message's sender, as the target of the answer."""
+def _sender(message: Message) -> tuple[int, int]:
+    """System and component of a message's sender."""
     return message.get_srcSystem(), message.get_srcComponent()
 
 
 def _acknowledge(message: Message, link: Link, result: int) -> None:
-    link.send(dialect.MAVLink_mission_ack_message(*_to(message), result, message.mission_type))
+    link.send(dialect.MAVLink_mission_ack_message(*_sender(message), result, message.mission_type))

@@ -1,7 +1,7 @@
 """Telemetry of position and motion; the defaults follow PX4's conventions."""
 
 from collections.abc import Callable, Sequence
-from math import degrees, hypot, isnan
+from math import degrees, hypot, isnan, nan
 
 from pymavlink.dialects.v20 import development as dialect
 
@@ -12,15 +12,15 @@ from sitl_mock.autopilot.setpoints import (
     YAW_IGNORED,
 )
 from sitl_mock.autopilot.stamp_slips import StampSlips
-from sitl_mock.autopilot.state import NAN, PositionTargetEcho, State
+from sitl_mock.autopilot.state import PositionTargetEcho, State
 from sitl_mock.link.framing import Message
-from sitl_mock.physics.geodesy import Geodetic, Origin, to_geodetic
+from sitl_mock.physics.geodesy import Geodetic, to_geodetic
 from sitl_mock.physics.quaternion import euler, yaw
 from sitl_mock.physics.vehicle import Vehicle
 
 Builder = Callable[[], Message | None]
 _SEA_LEVEL_HPA = 1013.25
-MAGNETIC_FIELD_NED = (0.21, 0.01, 0.42)
+MAGNETIC_FIELD_NED = (0.21, 0.01, 0.42)  # gauss; the body is taken as level, heading north
 _POSE_VARIANCES = (0.041, 0.041, 0.074, 3.3e-4, 3.5e-4, 5.9e-3)
 _VELOCITY_VARIANCES = (0.0095, 0.0086, 0.0052, 0.0, 0.0, 0.0)
 
@@ -35,13 +35,13 @@ class MotionTelemetry:
         slips: slips of the stamp of LOCAL_POSITION_NED.
     """
 
-    def __init__(self, state: State, vehicle: Vehicle, origin: Origin, slips: StampSlips) -> None:
+    def __init__(self, state: State, vehicle: Vehicle, origin: Geodetic, slips: StampSlips) -> None:
         self._state = state
         self._vehicle = vehicle
         self._origin = origin
         self._slips = slips
 
-    airspeed = NAN
+    airspeed = nan
     """Airspeed in VFR_HUD; there is no airspeed sensor."""
 
     def builders(self) -> dict[int, Builder]:
@@ -64,10 +64,6 @@ class MotionTelemetry:
     @property
     def _boot_ms(self) -> int:
         return self._state.shown_us // 1000
-
-    def place(self) -> Geodetic:
-        """Return the estimated geodetic position."""
-        return to_geodetic(self._origin, self._state.estimate.position_ned)
 
     def attitude(self) -> Message:
         """Return ATTITUDE."""
@@ -100,7 +96,7 @@ class MotionTelemetry:
         state = self._state
         if not state.position_valid:
             return None
-        place = self.place()
+        place = to_geodetic(self._origin, state.estimate.position_ned)
         vx, vy, vz = state.estimate.velocity_ned
         height = state.home_ned[2] - state.estimate.position_ned[2]
         return dialect.MAVLink_global_position_int_message(
@@ -128,7 +124,7 @@ class MotionTelemetry:
             *estimate.body_rates,
             _POSE_COVARIANCE,
             _VELOCITY_COVARIANCE,
-            self._vehicle.reset_counter & 0xFF,
+            self._vehicle.estimator.reset_counter & 0xFF,
             dialect.MAV_ESTIMATOR_TYPE_AUTOPILOT,
             100,
         )

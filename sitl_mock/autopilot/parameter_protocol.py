@@ -35,7 +35,7 @@ class ParameterProtocol:
         self._listing: dict[str, tuple[Link, int]] = {}
 
     def request_list(self, _: Message, link: Link) -> None:
-        """PARAM_REQUEST_LIST: send PX4's hash, then every parameter, a few each slot."""
+        """PARAM_REQUEST_LIST: send every parameter, a few each slot; PX4 sends its hash first."""
         if self._encoding.hashed:
             self._send_hash(link)
         self._listing[link.name] = (link, 0)
@@ -61,7 +61,10 @@ class ParameterProtocol:
             self._refuse(message, link, dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST)
 
     def set(self, message: Message, link: Link) -> None:
-        """PARAM_SET: change the value and send the new one, or send PARAM_ERROR."""
+        """PARAM_SET: change the value and send the new one, or send PARAM_ERROR.
+
+        PX4's hash cannot be set; such a message is ignored.
+        """
         name = message.param_id
         if name == HASH_NAME:
             return

@@ -4,12 +4,11 @@ A personality has its own numbers and texts. It builds its behaviour (`Rules`) f
 every vehicle has (`VehicleParts`).
 """
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection
 from typing import Any, NamedTuple, Protocol
 
 from sitl_mock.autopilot.commander import Commander, ModeControl
 from sitl_mock.autopilot.commands import Commands
-from sitl_mock.autopilot.events import Event, EventKind
 from sitl_mock.autopilot.land_detector import LandDetector
 from sitl_mock.autopilot.motion_telemetry import Builder
 from sitl_mock.autopilot.parameter_protocol import ParameterProtocol
@@ -20,7 +19,7 @@ from sitl_mock.autopilot.state import Mode, State
 from sitl_mock.config.settings import VehicleSettings
 from sitl_mock.link.framing import Message
 from sitl_mock.link.link import Link, StreamSchedule
-from sitl_mock.physics.geodesy import Origin
+from sitl_mock.physics.geodesy import Geodetic
 from sitl_mock.physics.vehicle import Vehicle
 
 
@@ -41,10 +40,10 @@ class VehicleParts(NamedTuple):
     parameters: ParameterTable
     vehicle: Vehicle
     stream: OffboardStream
-    origin: Origin
+    origin: Geodetic
     links: list[Link]
     ready_us: int
-    """Vehicle time of `mock.prearm_delay_s`, from which arming in any mode is possible."""
+    """Vehicle time of `mock.prearm_delay_s`, us, from which arming in any mode is possible."""
     slips: StampSlips
 
 
@@ -69,8 +68,6 @@ class Rules(NamedTuple):
 class Personality(Protocol):
     """One autopilot."""
 
-    events: Mapping[EventKind, Event]
-    """Text and id of each event that it announces."""
     boot_mode: Mode
     system_id_parameter: str
     """Name of the parameter with the system id."""

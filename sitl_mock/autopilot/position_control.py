@@ -2,13 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import atan2, copysign, cos, hypot, isnan, pi, radians, sin, sqrt, tan
+from math import atan2, copysign, cos, hypot, isnan, nan, pi, radians, sin, sqrt, tan
 from typing import NamedTuple
 
-from sitl_mock.autopilot.state import NAN, NAN_VECTOR
-from sitl_mock.physics.quaternion import Quaternion, Vector, normalise
+from sitl_mock.autopilot.setpoints import PositionSetpoint
+from sitl_mock.autopilot.state import NAN_VECTOR
+from sitl_mock.physics.quaternion import Quaternion, Vector, along_heading, normalise
+from sitl_mock.physics.rigid_body import GRAVITY
 
-GRAVITY = 9.80665
 _STEEPEST = radians(80.0)
 """Upper bound of the tilt limit."""
 
@@ -16,17 +17,39 @@ _STEEPEST = radians(80.0)
 class PositionDemand(NamedTuple):
     """Setpoint: position, velocity, acceleration (NED, SI; NaN = not controlled) and yaw (rad).
 
-    The yaw must be finite. ``speed`` limits the horizontal velocity setpoint, ``down_speed`` and
-    ``up_speed`` the vertical one, m/s.
+    The yaw must be finite. ``speed`` limits the horizontal velocity setpoint, ``up_speed`` and
+    ``down_speed`` the vertical one, m/s.
     """
 
     position: Vector
     velocity: Vector
     acceleration: Vector = NAN_VECTOR
-    yaw: float = NAN
+    yaw: float = nan
     speed: float = 12.0
     up_speed: float = 3.0
     down_speed: float = 1.5
+
+
+def setpoint_demand(
+    setpoint: PositionSetpoint, q: Quaternion, yaw: float, speeds: Vector, dt: float
+) -> PositionDemand:
+    """Return the demand of an offboard setpoint for the next ``dt`` s.
+
+    Args:
+        setpoint: its yaw rate turns the yaw, unless it has a yaw.
+        q: present attitude, for a setpoint along the heading.
+        yaw: yaw of the demand before this one, rad.
+        speeds: limits of the speed: horizontal, up, down, m/s.
+        dt: the period, s.
+    """
+    if not isnan(setpoint.yaw):
+        yaw = setpoint.yaw
+    elif not isnan(setpoint.yaw_rate):
+        yaw += setpoint.yaw_rate * dt
+    velocity, acceleration = setpoint.velocity, setpoint.acceleration
+    if setpoint.in_body_heading:
+        velocity, acceleration = along_heading(q, velocity), along_heading(q, acceleration)
+    return PositionDemand(setpoint.position, velocity, acceleration, yaw, *speeds)
 
 
 class PositionOutput(NamedTuple):
@@ -39,17 +62,14 @@ class PositionOutput(NamedTuple):
 
 
 class PositionGains(NamedTuple):
-    """Gains and limits: velocity per position error (1/s), acceleration per velocity error.
+    """Gains and limits; thrusts are normalised, 0..1."""
 
-    Thrusts are normalised: hover, minimum and maximum.
-    """
-
-    horizontal: float
+    horizontal: float  # velocity per position error, 1/s
     vertical: float
-    horizontal_speed: float  # 1/s
-    vertical_speed: float  # 1/s
-    horizontal_integral: float  # 1/s^2
-    vertical_integral: float  # 1/s^2
+    horizontal_speed: float  # acceleration per velocity error, 1/s
+    vertical_speed: float
+    horizontal_integral: float  # acceleration per velocity error and second, 1/s^2
+    vertical_integral: float
     max_tilt: float  # rad
     hover_thrust: float
     min_thrust: float

@@ -39,6 +39,7 @@ class Receiver:
         self, state: State, rules: Rules, personality: Personality, system_id: int
     ) -> None:
         self.clock_ns: Callable[[], int] = lambda: state.shown_us * 1000
+        """Clock that answers TIMESYNC: vehicle time, ns."""
         self._commander = commander = rules.commander
         self._commands = rules.commands
         self._personality = personality

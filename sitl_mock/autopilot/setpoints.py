@@ -1,6 +1,6 @@
 """Offboard setpoints, the type masks of their messages, and the stream that they form."""
 
-import math
+from math import isfinite, isnan, nan
 from typing import NamedTuple
 
 from pymavlink.dialects.v20 import development as dialect
@@ -8,20 +8,19 @@ from pymavlink.dialects.v20 import development as dialect
 from sitl_mock.link.framing import Message
 from sitl_mock.physics.quaternion import Quaternion, Vector
 
-NAN = float("nan")
+# Bits of type_mask in SET_ATTITUDE_TARGET.
 ROLL_OR_PITCH_RATE_IGNORED = 1 | 2
 YAW_RATE_IGNORED = 4
 THRUST_BODY = 32
 THROTTLE_IGNORED = 64
 ATTITUDE_IGNORED = 128
-"""From ROLL_OR_PITCH_RATE_IGNORED on: bits of type_mask in SET_ATTITUDE_TARGET."""
+# Bits of type_mask in SET_POSITION_TARGET_LOCAL_NED; those of axes: ignored, north first.
 POSITION_BITS = (1, 2, 4)
 VELOCITY_BITS = (8, 16, 32)
 ACCELERATION_BITS = (64, 128, 256)
 FORCE = 512
 YAW_IGNORED = 1024
 POSITION_YAW_RATE_IGNORED = 2048
-"""From POSITION_BITS on: bits of type_mask in SET_POSITION_TARGET_LOCAL_NED."""
 _BODY_FRAMES = (dialect.MAV_FRAME_BODY_NED, dialect.MAV_FRAME_BODY_FRD)
 DETECTION_US = 60_000
 """Delay beyond COM_OF_LOSS_T after which the loss is noticed, us (measured: 60 to 110 ms)."""
@@ -42,9 +41,9 @@ class AttitudeSetpoint(NamedTuple):
 
 
 class PositionSetpoint(NamedTuple):
-    """Position, velocity, acceleration (NED, SI) and yaw; NaN = not controlled.
+    """Position, velocity, acceleration (NED, SI), yaw and yaw rate (rad); NaN = not controlled.
 
-    ``in_body_heading``: the horizontal components are along the heading, not north and east.
+    ``in_body_heading``: horizontal components are forward and right, not north and east.
     """
 
     position: Vector
@@ -72,29 +71,29 @@ def position_setpoint(message: Message) -> PositionSetpoint | None:
     velocity = _masked(mask, VELOCITY_BITS, (message.vx, message.vy, message.vz))
     acceleration = _masked(mask, ACCELERATION_BITS, (message.afx, message.afy, message.afz))
     if in_body:
-        position = (NAN, NAN, NAN)
-    if all(map(math.isnan, (*position, *velocity, *acceleration))):
+        position = (nan, nan, nan)
+    if all(map(isnan, (*position, *velocity, *acceleration))):
         return None
     return PositionSetpoint(
         position,
         velocity,
         acceleration,
-        NAN if mask & YAW_IGNORED else message.yaw,
-        NAN if mask & POSITION_YAW_RATE_IGNORED else message.yaw_rate,
+        nan if mask & YAW_IGNORED else message.yaw,
+        nan if mask & POSITION_YAW_RATE_IGNORED else message.yaw_rate,
         in_body,
     )
 
 
 def _masked(mask: int, bits: tuple[int, int, int], values: Vector) -> Vector:
     x, y, z = (
-        NAN if mask & bit or not math.isfinite(value) else value
+        nan if mask & bit or not isfinite(value) else value
         for bit, value in zip(bits, values, strict=True)
     )
     return (x, y, z)
 
 
 class OffboardStream:
-    """The accepted setpoints, and the vehicle time of the latest one, us."""
+    """The latest accepted setpoint, its vehicle time (us), and the number accepted so far."""
 
     def __init__(self) -> None:
         self.setpoint: Setpoint | None = None

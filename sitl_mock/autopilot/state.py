@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum, auto
+from math import nan
 
 from sitl_mock.physics.quaternion import Quaternion, Vector
 from sitl_mock.physics.vehicle import ActuatorCommand, Estimate
 
-NAN = float("nan")
-NAN_VECTOR = (NAN, NAN, NAN)
+NAN_VECTOR = (nan, nan, nan)
 
 
 class Mode(Enum):
@@ -63,7 +63,7 @@ class PositionTargetEcho:
     position: Vector = NAN_VECTOR
     velocity: Vector = NAN_VECTOR
     acceleration: Vector = NAN_VECTOR
-    yaw: float = NAN
+    yaw: float = nan
 
 
 @dataclass

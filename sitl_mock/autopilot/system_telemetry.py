@@ -8,8 +8,9 @@ from sitl_mock.autopilot.motion_telemetry import Builder, clip
 from sitl_mock.autopilot.personality import Identity
 from sitl_mock.autopilot.state import State
 from sitl_mock.link.framing import Message
-from sitl_mock.physics.geodesy import Origin, to_geodetic
+from sitl_mock.physics.geodesy import Geodetic, to_geodetic
 from sitl_mock.physics.quaternion import Quaternion
+from sitl_mock.physics.vehicle import Vehicle
 
 UNIX_AT_BOOT_US = 1_795_236_148_441_838
 """Unix time of SYSTEM_TIME at boot; fixed, so that a run is reproducible to the bit."""
@@ -26,12 +27,16 @@ class SystemTelemetry:
         state: the autopilot's state.
         origin: origin of the local frame.
         identity: content of AUTOPILOT_VERSION.
+        vehicle: the vehicle, for its battery.
     """
 
-    def __init__(self, state: State, origin: Origin, identity: Identity) -> None:
+    def __init__(
+        self, state: State, origin: Geodetic, identity: Identity, vehicle: Vehicle
+    ) -> None:
         self._state = state
         self._origin = origin
         self._identity = identity
+        self._vehicle = vehicle
 
     def builders(self) -> dict[int, Builder]:
         """Return message id -> builder."""
@@ -49,13 +54,43 @@ class SystemTelemetry:
         """Return EXTENDED_SYS_STATE."""
         return dialect.MAVLink_extended_sys_state_message(0, int(self._state.landed_state))
 
-    def _healthy(self, sensors: int) -> int:
-        """Return the health bits of SYS_STATUS: ``sensors`` without those that fail now."""
+    def _sys_status(self, present: int, enabled: int, healthy: int, load: int) -> Message:
+        """Return SYS_STATUS, without the health of what fails now; ``load`` in 0.1 %.
+
+        Clients read its prearm bit as armable.
+        """
         if self._state.prearm_problem is not None:
-            sensors &= ~_PREARM_CHECK
+            healthy &= ~_PREARM_CHECK
         if not self._state.gps_ok:
-            sensors &= ~_GPS_SENSOR
-        return sensors
+            healthy &= ~_GPS_SENSOR
+        battery = self._vehicle.battery
+        return dialect.MAVLink_sys_status_message(
+            present,
+            enabled,
+            healthy,
+            load,
+            clip(battery.voltage_v * 1e3, 15),
+            clip(battery.current_a * 1e2, 15),
+            round(100 * battery.remaining),
+            *(0,) * 6,
+        )
+
+    def _battery_status(self, function: int, kind: int, used_mah: int, used_hj: int) -> Message:
+        """Return BATTERY_STATUS; as in both autopilots the first cell has the voltage of all."""
+        battery = self._vehicle.battery
+        return dialect.MAVLink_battery_status_message(
+            0,
+            function,
+            kind,
+            32767,
+            [round(battery.voltage_v * 1e3)] + [NO_VALUE] * 9,
+            clip(battery.current_a * 1e2, 15),
+            used_mah,
+            used_hj,
+            round(100 * battery.remaining),
+            0,
+            int(self._state.battery_warning),
+        )
 
     def _gps_fix(
         self, fix: int, dilutions: tuple[int, int], course: int, accuracies: tuple[int, ...]

@@ -52,7 +52,7 @@ class AirframeConfig(Section):
     thrust_offset_m_s2: NonNegative = 0.22
     """Specific thrust of the linear part, extrapolated to throttle 0."""
     thrust_linear_from: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.15
-    """Above this throttle the thrust is linear; below it, a straight line through 0."""
+    """From this throttle on, slope and offset give the thrust; below it, a straight line from 0."""
     rotor_lag_ms: Positive = 50.0
     """Time constant of each rotor's thrust (first order)."""
     rotor_arm_m: Positive = 0.2

@@ -12,7 +12,7 @@ _HELP = "write udp, tcpin://127.0.0.1:5760 or serial:///tmp/vehicle"
 
 @dataclass(frozen=True)
 class Udp:
-    """UDP; ``port`` sets the ports."""
+    """UDP; the key ``port`` sets the ports."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,8 @@ EndpointAddress = Udp | TcpIn | SerialLine
 
 def parse_endpoint(text: str) -> EndpointAddress:
     """Read ``udp``, ``tcpin://HOST:PORT``, ``serial://`` or ``serial:///PATH``.
+
+    An empty HOST means 127.0.0.1.
 
     Raises:
         ValueError: the text is none of these.

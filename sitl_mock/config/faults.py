@@ -25,7 +25,7 @@ class Timed(Section):
     """Start and duration of a fault, in vehicle time; without a start it begins at once."""
 
     at_s: NonNegative | None = None
-    """Time after boot when the fault begins."""
+    """Vehicle time at which the fault begins; a fault that is injected later begins at once."""
     after_offboard_s: NonNegative | None = None
     """Time from the first control by setpoints to the fault. On PX4 that is the first time armed in
     OFFBOARD; on ArduPilot the first time in the air in GUIDED under SET_ATTITUDE_TARGET."""
@@ -35,12 +35,14 @@ class Timed(Section):
     @model_validator(mode="after")
     def _one_start(self) -> Self:
         if self.at_s is not None and self.after_offboard_s is not None:
-            raise ValueError("give either at_s or after_offboard_s")
+            raise ValueError("give at_s or after_offboard_s, not both")
         return self
 
 
 class LinkFault(Timed):
     """Datagrams of the companion link are dropped, delayed, duplicated, reordered or corrupted.
+
+    ``reorder`` holds a datagram back until the next one has passed. ``corrupt`` changes one byte.
 
     In the direction to the companion, each frame counts as a datagram, and a lockstep beacon is
     never affected.
@@ -89,7 +91,10 @@ class NanField(Timed):
         types = dict(zip(kind.fieldnames, kind.fieldtypes, strict=True))
         floats = [name for name in types if types[name] in ("float", "double")]
         if self.field not in floats:
-            raise ValueError(f"{self.message} has no float field {self.field!r}; it has {floats}")
+            known = ", ".join(floats) or "none"
+            raise ValueError(
+                f"{self.message} has no float field {self.field!r}; its float fields: {known}"
+            )
         return self
 
 

@@ -84,7 +84,7 @@ def error_path(error: ValidationError) -> list[str]:
 
 
 def _number_in(text: str) -> str:
-    """Return what to write instead of a text."""
+    """Return the advice to write a number without its unit, or digits, instead of this text."""
     found = _NUMBER_AND_UNIT.fullmatch(text.strip())
     if found is None:
         return f"write digits, not {text!r:.60}"

@@ -20,7 +20,7 @@ class EkfConfig(Section):
     fix_period_ms: Annotated[float, Field(ge=20.0, le=1000.0)] = 125.0
     """Time between two satellite fixes."""
     fix_delay_ms: Annotated[float, Field(ge=0.0, le=500.0)] = 110.0
-    """Delay of the filter's fusion time; at least ``position_delay_ms``."""
+    """Delay of the filter's fusion time; a value below ``position_delay_ms`` counts as that."""
     position_late_ms: Finite = 0.0
     """Unmodelled delay of a fix's position."""
     velocity_late_ms: Finite = 0.0
@@ -37,7 +37,7 @@ class EkfConfig(Section):
     noise_time_s: Positive = 0.25
     """Correlation time of the noise of position and velocity."""
     tilt_noise_deg: NonNegative = 0.028
-    """Random walk of roll and pitch within one second; the fixes limit it."""
+    """Standard deviation of the random walk of roll and pitch in 1 s; the fixes limit it."""
     tilt_bias_deg: tuple[Finite, Finite] = (0.0, 0.0)
     """Constant error of the attitude, as a rotation about north and east. The estimated bias of the
     accelerometer hides it in level flight; a horizontal acceleration makes the climb wrong."""
@@ -61,7 +61,8 @@ class EkfConfig(Section):
     height_offset_m: Finite = 0.0
     """Constant error of the height: true minus estimated."""
     height_sag_s4_per_m: Finite = 0.0009
-    """Error of the height per squared horizontal acceleration; it lags by seconds."""
+    """Error of the height (true minus estimated) per squared horizontal acceleration; it lags by
+    seconds."""
     sink_per_acceleration_ms: Finite = 4.0
     """Error of the vertical velocity per horizontal acceleration: the velocity says that the
     vehicle sinks while its position stays. It lags by seconds."""
@@ -126,7 +127,7 @@ class SensorConfig(Section):
     """Errors of the autopilot's estimate: white noise (standard deviations) and delays.
 
     With a navigation filter the defaults of ``position_noise_m``, ``velocity_noise_m_s`` and
-    ``position_delay_ms`` are 0 (`settings.SMOOTH`).
+    ``position_delay_ms`` are 0 (`settings.WITH_FILTER`).
     """
 
     ekf: EkfConfig | None = None
@@ -146,7 +147,8 @@ class SensorConfig(Section):
     """Age of the estimated position and velocity."""
     stamp_slips_hz: Annotated[float, Field(ge=0.0, le=20.0)] = 0.0
     """How often the stamp of LOCAL_POSITION_NED slips by 1 ms against its position, back or forth:
-    ArduPilot takes the time, in whole milliseconds, when it writes the message."""
+    ArduPilot takes the time, in whole milliseconds, when it writes the message. Its default is
+    1.6."""
 
     @field_validator("ekf", mode="before")
     @classmethod

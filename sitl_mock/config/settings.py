@@ -62,8 +62,8 @@ class VehicleSettings(Section):
 
     autopilot: Literal["px4", "ardupilot"] = "px4"
     """The autopilot simulated. It sets the default of ``sensors.ekf``; ArduPilot also sets those of
-    ``airframe``, ``battery``, ``rate_loop``, ``sensors.rate_lag_ms``, ``burst_ms`` and
-    ``prearm_delay_s``."""
+    ``airframe``, ``battery``, ``rate_loop``, ``sensors.rate_lag_ms``, ``sensors.stamp_slips_hz``,
+    ``burst_ms`` and ``prearm_delay_s``."""
     port: Annotated[int, Field(ge=1, le=65535 - PORT_OFFSET)] = 14540
     endpoint: str = "udp"
     """The companion link: udp (see ``port``); tcpin://HOST:PORT, for one client, boots when the
@@ -71,7 +71,7 @@ class VehicleSettings(Section):
     gcs_port: Annotated[int, Field(ge=0, le=65535 - GCS_PORT_OFFSET)] = 14550
     """0 = no ground station link."""
     control_port: Port = 0
-    """JSON control channel on 127.0.0.1; 0 = none."""
+    """UDP port of the JSON control channel on 127.0.0.1; 0 = none."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
     speed: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
     """Vehicle seconds per wall second; lockstep ignores it."""
@@ -81,8 +81,8 @@ class VehicleSettings(Section):
     simulate.
     """
     exact_rates: bool | None = None
-    """Send at every slot. PX4's 250 Hz loop skips some slots at the full rate. Null: only in
-    lockstep. ArduPilot and the other inner loop rates skip none anyway."""
+    """Whether a stream at the full rate is sent in every slot. If not, PX4's 250 Hz loop skips
+    some; ArduPilot and the other inner loop rates skip none anyway. Null: only in lockstep."""
     burst_ms: NonNegative = 0.0
     """In real time the vehicle runs in bursts with this period of vehicle time, as ArduPilot's
     simulator does; 0 = no bursts. The default for ArduPilot is 5.6."""
@@ -110,7 +110,7 @@ class VehicleSettings(Section):
         return endpoint
 
     def for_vehicle(self, index: int) -> Self:
-        """Return the settings of the vehicle with this index: its own ports and its own seed.
+        """Return the settings of the vehicle with this index: its own ports, path and seed.
 
         Raises:
             ConfigError: its TCP port would be above 65535.

@@ -36,7 +36,10 @@ class ByteStream:
         return self._frames.popleft() if self._frames else None
 
     def send(self, frames: list[bytes]) -> None:
-        """Send the frames; drop them all if the kernel does not take a part of them now."""
+        """Send the frames; drop them all if the kernel takes none of their bytes now.
+
+        While an earlier batch is not written to its end, they are dropped, too.
+        """
         if self._unsent:
             self._unsent = self._unsent[self._write(self._unsent) :]
         if not self._unsent:

@@ -3,7 +3,7 @@
 from typing import Protocol
 
 MAX_BUNDLE = 1400
-"""Largest datagram that bundled frames make, bytes."""
+"""Largest datagram into which frames are joined, bytes."""
 
 
 class Endpoint(Protocol):

@@ -31,7 +31,9 @@ class DatagramPipe:
     ) -> list[bytes]:
         """Accept datagrams; return those to deliver now, delayed ones first."""
         mine = [fault for fault in faults if fault.direction in (self._direction, "both")]
-        out = [heapq.heappop(self._late)[2] for _ in range(self._due(now_us))]
+        out = []
+        while self._late and self._late[0][0] <= now_us:
+            out.append(heapq.heappop(self._late)[2])
         for datagram in datagrams:
             survivors = [datagram]
             for fault in mine:
@@ -41,9 +43,6 @@ class DatagramPipe:
                 self._held = None
             out.extend(survivors)
         return out
-
-    def _due(self, now_us: int) -> int:
-        return sum(1 for due, _, _ in self._late if due <= now_us)
 
     def _apply(self, datagram: bytes, fault: LinkFault, now_us: int) -> list[bytes]:
         """Apply one fault to one datagram; return the datagrams to deliver now."""

@@ -14,21 +14,22 @@ class BatteryState(NamedTuple):
 
 
 class Battery:
-    """Integrates the current. Voltage = open-circuit voltage (linear in the charge) - R I."""
+    """Integrates the current. Voltage = open-circuit voltage (linear in the charge) - R I.
 
-    __slots__ = ("_charge_as", "_config", "_hover_thrust", "_reference_v", "state", "thrust_factor")
+    Attributes:
+        state: measurements after the latest step.
+        thrust_factor: factor on the thrust of every rotor; 1 with a full battery in a hover.
+    """
 
     def __init__(self, config: BatteryConfig, airframe: AirframeConfig) -> None:
         self._config = config
-        self._charge_as = config.capacity_ah * 3600.0
+        self._capacity_as = config.capacity_ah * 3600.0
         self._hover_thrust = airframe.mass_kg * airframe.gravity_m_s2
         self._reference_v = (
             config.cells * config.full_cell_v
             - (config.idle_current_a + config.hover_current_a) * config.resistance_ohm
         )
         self.state = BatteryState(0.0, 0.0, config.initial_remaining)
-        self.thrust_factor = 1.0
-        """Factor on the thrust of every rotor; 1 with a full battery in a hover."""
         self.step(0.0, 0.0)
 
     def set_remaining(self, remaining: float) -> None:
@@ -42,7 +43,7 @@ class Battery:
         if current is None:
             load = thrust / self._hover_thrust
             current = config.idle_current_a + config.hover_current_a * load**1.5
-        remaining = max(0.0, self.state.remaining - current * dt / self._charge_as)
+        remaining = max(0.0, self.state.remaining - current * dt / self._capacity_as)
         cell = config.empty_cell_v + (config.full_cell_v - config.empty_cell_v) * remaining
         voltage = max(0.0, config.cells * cell - config.resistance_ohm * current)
         self.state = BatteryState(voltage, current, remaining)

@@ -9,9 +9,7 @@ from sitl_mock.physics.quaternion import Quaternion, Vector, normalise
 
 
 class Wind:
-    """Velocity of the air at the vehicle, NED, m/s; `step` advances it by `dt` seconds."""
-
-    __slots__ = ("_calm", "_decay", "_gust", "_kick", "_kick_down", "_mean", "_random", "velocity")
+    """Wind with gusts: `velocity` is that of the air (NED, m/s); each `step` lasts `dt` seconds."""
 
     def __init__(self, config: WindConfig, dt: float, seed: int) -> None:
         direction = radians(config.from_deg)
@@ -52,11 +50,11 @@ class Wind:
 class GroundLaw(NamedTuple):
     """Constants of the contact with the ground: no penetration, no sliding.
 
-    The vehicle levels while it stands there, unless it has crashed.
+    The vehicle levels while it stands on the ground, unless it has crashed.
     """
 
-    crash_cosine: float  # of the tilt
-    crash_speed: float  # m/s
+    crash_cosine: float  # cosine of the tilt above which a touchdown is a crash
+    crash_speed: float  # sink speed above which a touchdown is a crash, m/s
     levelling: float  # factor on the tilt in one step
 
 

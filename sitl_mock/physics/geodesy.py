@@ -8,14 +8,6 @@ from sitl_mock.physics.quaternion import Vector
 EARTH_RADIUS_M = 6371000.0
 
 
-class Origin(NamedTuple):
-    """The local frame's origin: degrees, and m above mean sea level."""
-
-    latitude_deg: float
-    longitude_deg: float
-    altitude_m: float
-
-
 class Geodetic(NamedTuple):
     """A geodetic position: degrees, and m above mean sea level."""
 
@@ -24,7 +16,7 @@ class Geodetic(NamedTuple):
     altitude_m: float
 
 
-def to_geodetic(origin: Origin, position: Vector) -> Geodetic:
+def to_geodetic(origin: Geodetic, position: Vector) -> Geodetic:
     """Return the geodetic position of a local NED position (m)."""
     north, east, down = position
     parallel = EARTH_RADIUS_M * cos(radians(origin.latitude_deg))
@@ -35,7 +27,7 @@ def to_geodetic(origin: Origin, position: Vector) -> Geodetic:
     )
 
 
-def to_local(origin: Origin, place: Geodetic) -> Vector:
+def to_local(origin: Geodetic, place: Geodetic) -> Vector:
     """Return the local NED position (m) of a geodetic position."""
     parallel = EARTH_RADIUS_M * cos(radians(origin.latitude_deg))
     return (

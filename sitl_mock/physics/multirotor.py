@@ -7,18 +7,18 @@ from sitl_mock.physics.multirotor_step import (
     at_rest,
     drive,
     empty_rings,
+    initial_actuation,
     move,
     multirotor_law,
-    sinks,
-    started,
+    steady_throttle,
 )
 from sitl_mock.physics.quaternion import Quaternion, Vector
 from sitl_mock.physics.rigid_body import Load
-from sitl_mock.physics.rotors import Mix, throttle_of
+from sitl_mock.physics.rotors import Mix
 
 
 class Multirotor:
-    """The inner loop in fixed steps: each step is `drive`, then `move` or `rest`.
+    """The inner loop in fixed steps: each step is `drive`, then `move`.
 
     It starts at rest, with rotors at a steady speed.
 
@@ -30,7 +30,7 @@ class Multirotor:
 
     Attributes:
         law: constants.
-        body: motion after the latest step.
+        body: motion after the latest step; `at_rest` makes one at rest.
         actuation: state of controller and rotors after the latest step.
     """
 
@@ -43,7 +43,7 @@ class Multirotor:
     ) -> None:
         self.law = multirotor_law(airframe, rate_loop)
         self.body = at_rest(q)
-        self.actuation = started(self.law, self.throttle(specific_thrust))
+        self.actuation = initial_actuation(self.law, self.throttle(specific_thrust))
         self._rings = empty_rings(self.law)
         self._steps = 0
 
@@ -69,7 +69,7 @@ class Multirotor:
 
     def throttle(self, specific_thrust: float) -> float:
         """Return the collective throttle for a steady specific thrust (m/s^2), at most 1."""
-        return throttle_of(self.law.rotors, 0.25 * self.law.mass * specific_thrust)
+        return steady_throttle(self.law, specific_thrust)
 
     def drive(self, setpoint: Vector, throttle: float, *, controlled: bool = True) -> Load:
         """Run controller, allocation and rotors for one step in still air; return the load.
@@ -94,15 +94,7 @@ class Multirotor:
         self._steps += 1
         return load
 
-    def sinks(self, load: Load) -> bool:
-        """Whether the vertical acceleration under this load is not upward."""
-        return sinks(self.law, self.body, load)
-
     def move(self, load: Load) -> Vector:
         """Integrate one step under this load; return the displacement, NED, m."""
         self.body, moved = move(self.law, self.body, load)
         return moved
-
-    def rest(self, q: Quaternion) -> None:
-        """Set the body at rest with this attitude."""
-        self.body = at_rest(q)

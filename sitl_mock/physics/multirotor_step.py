@@ -28,6 +28,7 @@ from sitl_mock.physics.rotors import (
     rotor_law,
     rotor_step,
     steady_thrust,
+    throttle_of,
 )
 
 ZERO: Vector = (0.0, 0.0, 0.0)
@@ -43,7 +44,7 @@ class MultirotorLaw(NamedTuple):
     body: Body
     rotors: RotorLaw
     rates: RateLaw
-    shapes: bool  # whether setpoints are shaped, by the law that follows
+    shapes: bool  # whether setpoints are shaped, by the law `shaping`
     shaping: ShapingLaw
 
 
@@ -82,7 +83,12 @@ def multirotor_law(airframe: AirframeConfig, rate_loop: RateLoopConfig) -> Multi
     )
 
 
-def started(law: MultirotorLaw, throttle: float) -> Actuation:
+def steady_throttle(law: MultirotorLaw, specific_thrust: float) -> float:
+    """Return the collective throttle for a steady specific thrust (m/s^2), at most 1."""
+    return throttle_of(law.rotors, 0.25 * law.mass * specific_thrust)
+
+
+def initial_actuation(law: MultirotorLaw, throttle: float) -> Actuation:
     """Return the state of controller and rotors at the start, with rotors at a steady speed."""
     thrust = steady_thrust(law.rotors, throttle)
     mixed = mix(throttle, 0.0, 0.0, 0.0)
@@ -112,7 +118,7 @@ def drive(
     thrust_factor: float,
     wind: Vector,
 ) -> tuple[Load, Actuation]:
-    """Run controller, allocation and rotors for one step; return the load on the body.
+    """Run controller, allocation and rotors for one step; return the load and their new state.
 
     Args:
         law: constants.
@@ -160,7 +166,7 @@ def _shaped(
     setpoint: Vector,
     controlled: bool,
 ) -> tuple[Vector, Shaped]:
-    """Delay and shape a setpoint; without control return it as it is, and reset the shaping."""
+    """Return the delayed, shaped setpoint, without control the given one; and the shaping."""
     goals = delayed(rings.arrived, law.shaping.delays, step, setpoint)
     if controlled:
         return shape(law.shaping, shaped, goals, q)

@@ -7,9 +7,8 @@ from math import exp
 from typing import NamedTuple
 
 from sitl_mock.physics.quaternion import Vector
-from sitl_mock.physics.rigid_body import Motion
+from sitl_mock.physics.rigid_body import GRAVITY, Motion
 
-_GRAVITY = 9.80665
 Errors = tuple[complex, complex, complex]
 """Errors of position (m), velocity (m/s), acceleration (m/s^2, from errors of roll and pitch)."""
 TrailRow = tuple[*Motion, *Vector, *Vector]
@@ -19,7 +18,7 @@ Trail = list[TrailRow]
 
 
 class NavigationError(NamedTuple):
-    """Error of the estimate: m, m/s, and a small rotation of the attitude, rad, NED."""
+    """Estimate minus truth: m, m/s, and a small rotation of the attitude, rad, NED."""
 
     position: Vector
     velocity: Vector
@@ -39,18 +38,18 @@ class TrackState(NamedTuple):
 class FilterState(NamedTuple):
     """All errors after a fix, and the true motion at its fusion time."""
 
-    level: TrackState
-    upright: TrackState
+    horizontal: TrackState
+    vertical: TrackState
     yaw: float  # heading error, rad
-    yaw_pending: float  # its change that the output does not yet contain, rad
-    aligned: float  # the heading error without its noise, rad
-    sag: float  # of the height, m
-    sink: float  # of the vertical velocity, m/s
+    yaw_pending: float  # part of `yaw` that the output does not yet contain, rad
+    noiseless_yaw: float  # heading error without its noise, rad
+    sag: float  # slow error of the down position, m
+    sink: float  # slow error of the down velocity, m/s
     height_noise: float  # slow noise that the height follows, m
-    at: float  # fusion time of the fix, s
-    corrected: float  # time of the fix, s
-    position: complex  # true position, m
-    velocity: complex  # true velocity, m/s
+    fused_at: float  # fusion time of the fix, s
+    corrected_at: float  # time at which the fix corrected the errors, s
+    position: complex  # true position at the fusion time, m
+    velocity: complex  # true velocity at the fusion time, m/s
 
 
 class ErrorLaw(NamedTuple):
@@ -59,9 +58,9 @@ class ErrorLaw(NamedTuple):
     lead: float  # s, position error per velocity, and velocity error per acceleration
     scale: float  # relative error of the acceleration
     tilt: complex  # constant rotation about north + j east, rad
-    height_offset: float  # m
-    predictor_ms: float
-    heading_predictor_ms: float
+    height_offset: float  # m, true minus estimated height
+    predictor_ms: float  # time constant with which the output follows a correction
+    heading_predictor_ms: float  # the same for the heading
 
 
 def extrapolated(errors: Errors, elapsed: float) -> Errors:
@@ -72,15 +71,17 @@ def extrapolated(errors: Errors, elapsed: float) -> Errors:
 
 def pending_share(predictor_ms: float, state: FilterState, now: float) -> float:
     """Return the share of the latest corrections that the output does not contain at ``now``."""
-    return exp((state.corrected - now) * 1e3 / predictor_ms)
+    return exp((state.corrected_at - now) * 1e3 / predictor_ms)
 
 
-def propagated(law: ErrorLaw, state: FilterState, truth: TrailRow, elapsed: float) -> Errors:
+def propagated_horizontal(
+    law: ErrorLaw, state: FilterState, truth: TrailRow, elapsed: float
+) -> Errors:
     """Return the horizontal errors ``elapsed`` s after the fix.
 
     The filter integrated an acceleration that was rotated and scaled.
     """
-    place, speed, tilt = extrapolated(state.level.errors, elapsed)
+    place, speed, tilt = extrapolated(state.horizontal.errors, elapsed)
     wrong = complex(law.scale, state.yaw)
     before = state.velocity
     way = complex(truth[10], truth[11]) - state.position
@@ -91,15 +92,15 @@ def propagated(law: ErrorLaw, state: FilterState, truth: TrailRow, elapsed: floa
     )
 
 
-def propagated_upright(
+def propagated_vertical(
     law: ErrorLaw, state: FilterState, truth: TrailRow, elapsed: float
 ) -> Errors:
-    """Return the vertical errors ``elapsed`` s after the fix.
+    """Return the vertical errors (down) ``elapsed`` s after the fix; only the real parts count.
 
     The filter takes a part of the horizontal acceleration for a vertical one: tilt times
     acceleration.
     """
-    down, sink, tilt = extrapolated(state.upright.errors, elapsed)
+    down, sink, tilt = extrapolated(state.vertical.errors, elapsed)
     turn, before = law.tilt.conjugate(), state.velocity
     way = complex(truth[10], truth[11]) - state.position
     return (
@@ -110,24 +111,24 @@ def propagated_upright(
 
 
 def error_at(law: ErrorLaw, state: FilterState, truth: TrailRow, now: float) -> NavigationError:
-    """Return the error at ``now`` (s), at which the true motion is ``truth`` (pure)."""
-    elapsed = now - state.at
+    """Return the error at time ``now`` (s), when the true motion is ``truth`` (pure)."""
+    elapsed = now - state.fused_at
     unsettled = pending_share(law.predictor_ms, state, now)
     turning = pending_share(law.heading_predictor_ms, state, now)
-    place, speed, tilt = propagated(law, state, truth, elapsed)
-    pending = state.level.pending
+    place, speed, tilt = propagated_horizontal(law, state, truth, elapsed)
+    pending = state.horizontal.pending
     place += law.lead * complex(truth[0], truth[1]) - unsettled * pending[0]
     speed += law.lead * complex(truth[13], truth[14]) - unsettled * pending[1]
-    down, sink, _ = propagated_upright(law, state, truth, elapsed)
-    pending = state.upright.pending
+    down, sink, _ = propagated_vertical(law, state, truth, elapsed)
+    pending = state.vertical.pending
     down += law.height_offset + state.sag - unsettled * pending[0]
     return NavigationError(
         (place.real, place.imag, down.real),
         (speed.real, speed.imag, (sink - unsettled * pending[1]).real + state.sink),
         # A wrong attitude rotates the thrust, which makes the acceleration wrong.
         (
-            tilt.imag / _GRAVITY + law.tilt.real,
-            -tilt.real / _GRAVITY + law.tilt.imag,
+            tilt.imag / GRAVITY + law.tilt.real,
+            -tilt.real / GRAVITY + law.tilt.imag,
             state.yaw - turning * state.yaw_pending,
         ),
     )

@@ -16,22 +16,22 @@ from sitl_mock.physics.navigation_error import (
     TrackState,
     TrailRow,
     pending_share,
-    propagated,
-    propagated_upright,
+    propagated_horizontal,
+    propagated_vertical,
 )
+from sitl_mock.physics.rigid_body import GRAVITY
 
-_GRAVITY = 9.80665
 _SAG_S = 2.0
 """Time constant with which errors of height and climb follow the acceleration, s."""
-_SLOW = 0.5
-"""Smallest speed by which the turn rate of the course is computed, m/s: the course of a slower
+_MIN_COURSE_SPEED = 0.5
+"""Smallest speed for which the turn rate of the course is computed, m/s; the course of a slower
 vehicle would seem to turn infinitely fast."""
 _COMPASS_S = 20.0
 """Time constant with which the heading follows the compass without acceleration, s."""
 _UNCERTAINTY = 0.1
-"""Uncertainty of the heading after a long time without acceleration: the rate, 1/s, at which the
-course of an acceleration of 1 m/s^2 corrects it. The rate grows with the acceleration's square,
-the uncertainty falls as in a Kalman filter."""
+"""Uncertainty of the heading after a long time without acceleration. Uncertainty times squared
+acceleration, (m/s^2)^2, is the rate, 1/s, at which fixes correct the heading; they reduce the
+uncertainty as in a Kalman filter."""
 _UNCERTAINTY_GROWTH = 0.0002
 """Growth of the uncertainty, per s."""
 
@@ -68,11 +68,11 @@ class NavigationFilter:
         self._height_random = Random(f"{seed}/height")
         self._slipped = Random(f"{seed}/slip").random()
         yaw = self._random.gauss(0.0, radians(config.yaw_error_deg))
-        level, upright = self._initial(1.0), self._initial(config.vertical_share)
-        way, speed = complex(start[10], start[11]), complex(start[0], start[1])
+        horizontal, vertical = self._initial(1.0), self._initial(config.vertical_share)
+        place, speed = complex(start[10], start[11]), complex(start[0], start[1])
         noise = self._height_random.gauss(0.0, config.height_noise_m)
         self.state = FilterState(
-            level, upright, yaw, 0.0, 0.0, noise, 0.0, noise, 0.0, 0.0, way, speed
+            horizontal, vertical, yaw, 0.0, 0.0, noise, 0.0, noise, 0.0, 0.0, place, speed
         )
 
     def _initial(self, share: float) -> TrackState:
@@ -87,10 +87,10 @@ class NavigationFilter:
 
     def is_due(self, at: float) -> bool:
         """Whether a fix is due at a fusion time, s."""
-        return at - self.state.at >= self._period - 1e-9
+        return at - self.state.fused_at >= self._period - 1e-9
 
     def advance(self, delayed: TrailRow, at: float, present: TrailRow, now: float) -> None:
-        """Correct the errors by a fix; the output does not jump, but follows.
+        """Correct the errors by a fix; the output follows gradually, without a jump.
 
         Args:
             delayed: the true motion at the fusion time.
@@ -98,66 +98,73 @@ class NavigationFilter:
             present: the true motion now.
             now: the present time, s.
         """
-        config, law, state, late = self._config, self.law, self.state, 1e-3
-        elapsed = at - state.at
-        speed, pull = complex(delayed[0], delayed[1]), complex(delayed[13], delayed[14])
-        moved = propagated(law, state, delayed, elapsed)
-        noise = self._next_noise(state.level.noise, 1.0)
+        config, law, state = self._config, self.law, self.state
+        elapsed = at - state.fused_at
+        velocity = complex(delayed[0], delayed[1])
+        acceleration = complex(delayed[13], delayed[14])
+        errors = propagated_horizontal(law, state, delayed, elapsed)
+        noise = self._next_noise(state.horizontal.noise, 1.0)
         slip = config.fix_slip_ms * (0.5 - (at / config.fix_slip_time_s + self._slipped) % 1.0)
         seen = (
-            noise[0] - ((config.position_late_ms + slip) * late + law.lead) * speed,
-            noise[1] - ((config.velocity_late_ms + slip) * late + law.lead) * pull,
+            noise[0] - ((config.position_late_ms + slip) * 1e-3 + law.lead) * velocity,
+            noise[1] - ((config.velocity_late_ms + slip) * 1e-3 + law.lead) * acceleration,
         )
-        kick = _GRAVITY * radians(config.tilt_noise_deg) * sqrt(elapsed)
-        level = self._corrected_state(moved, seen, noise, kick)
+        kick = GRAVITY * radians(config.tilt_noise_deg) * sqrt(elapsed)
+        horizontal = self._corrected_state(errors, seen, noise, kick)
         share = config.vertical_share
-        noise = self._next_noise(state.upright.noise, share)
-        still = propagated_upright(law, state, delayed, elapsed)
-        upright = self._corrected_state(still, noise, noise, share * kick)
-        aligned = self._next_alignment(speed, pull, elapsed)
-        yaw = self._next_yaw_noise() + aligned
+        noise = self._next_noise(state.vertical.noise, share)
+        errors = propagated_vertical(law, state, delayed, elapsed)
+        vertical = self._corrected_state(errors, noise, noise, share * kick)
+        noiseless_yaw = self._next_alignment(velocity, acceleration, elapsed)
+        yaw = self._next_yaw_noise() + noiseless_yaw
         turning = pending_share(law.heading_predictor_ms, state, now)
-        turned = turning * state.yaw_pending + yaw - state.yaw
+        yaw_pending = turning * state.yaw_pending + yaw - state.yaw
         height_noise = self._next_height_noise(elapsed)
-        sag = config.height_sag_s4_per_m * abs(pull) ** 2 + height_noise
-        lagged = 1.0 - exp(-elapsed / _SAG_S)
-        sag = state.sag + lagged * (sag - state.sag)
-        sink = config.sink_per_acceleration_ms * 1e-3 * abs(pull)
-        sink = state.sink + lagged * (sink - state.sink)
-        way = complex(delayed[10], delayed[11])
+        sag, sink = self._next_sag(abs(acceleration), height_noise, elapsed)
         corrected = FilterState(
-            level, upright, yaw, turned, aligned, sag, sink, height_noise, at, now, way, speed
+            horizontal,
+            vertical,
+            yaw,
+            yaw_pending,
+            noiseless_yaw,
+            sag,
+            sink,
+            height_noise,
+            at,
+            now,
+            complex(delayed[10], delayed[11]),
+            velocity,
         )
         self.state = self._without_jump(corrected, present)
 
     def _without_jump(self, corrected: FilterState, present: TrailRow) -> FilterState:
         """Return the corrected state with pending corrections that keep the output as it was."""
-        law, state, now = self.law, self.state, corrected.corrected
-        since, ago = now - state.at, now - corrected.at
+        law, state, now = self.law, self.state, corrected.corrected_at
+        since, ago = now - state.fused_at, now - corrected.fused_at
         unsettled = pending_share(law.predictor_ms, state, now)
-        level = _settling(
-            state.level,
-            corrected.level,
-            propagated(law, state, present, since),
-            propagated(law, corrected, present, ago),
+        horizontal = _settling(
+            state.horizontal,
+            corrected.horizontal,
+            propagated_horizontal(law, state, present, since),
+            propagated_horizontal(law, corrected, present, ago),
             unsettled,
         )
-        upright = _settling(
-            state.upright,
-            corrected.upright,
-            propagated_upright(law, state, present, since),
-            propagated_upright(law, corrected, present, ago),
+        vertical = _settling(
+            state.vertical,
+            corrected.vertical,
+            propagated_vertical(law, state, present, since),
+            propagated_vertical(law, corrected, present, ago),
             unsettled,
         )
-        return corrected._replace(level=level, upright=upright)
+        return corrected._replace(horizontal=horizontal, vertical=vertical)
 
     def _next_yaw_noise(self) -> float:
         """Return the slow noise of the heading at the next fix, rad."""
         config, kept = self._config, self._yaw_decay
         spread = radians(config.yaw_error_deg) * sqrt(1.0 - kept * kept)
-        return kept * (self.state.yaw - self.state.aligned) + self._random.gauss(0.0, spread)
+        return kept * (self.state.yaw - self.state.noiseless_yaw) + self._random.gauss(0.0, spread)
 
-    def _next_alignment(self, speed: complex, pull: complex, elapsed: float) -> float:
+    def _next_alignment(self, velocity: complex, acceleration: complex, elapsed: float) -> float:
         """Return the next heading error without its noise, rad.
 
         Without acceleration the heading rests on the compass. A horizontal acceleration shows it
@@ -165,15 +172,26 @@ class NavigationFilter:
         are behind this direction.
         """
         config, slow = self._config, 1.0 / _COMPASS_S
-        turn_rate = (speed.conjugate() * pull).imag / max(abs(speed) ** 2, _SLOW**2)
-        shown = self._uncertainty * abs(pull) ** 2
+        across = (velocity.conjugate() * acceleration).imag
+        turn_rate = across / max(abs(velocity) ** 2, _MIN_COURSE_SPEED**2)
+        shown = self._uncertainty * abs(acceleration) ** 2
         rate = slow + shown
         wrong = slow * radians(config.compass_error_deg)
         wrong -= shown * turn_rate * config.turn_yaw_ms * 1e-3
         rest = wrong / rate
         left = self._uncertainty / (1.0 + shown * elapsed)
         self._uncertainty = min(left + _UNCERTAINTY_GROWTH * elapsed, _UNCERTAINTY)
-        return rest + (self.state.aligned - rest) * exp(-rate * elapsed)
+        return rest + (self.state.noiseless_yaw - rest) * exp(-rate * elapsed)
+
+    def _next_sag(
+        self, acceleration: float, height_noise: float, elapsed: float
+    ) -> tuple[float, float]:
+        """Return the slow errors of the down position (m) and velocity (m/s) at the next fix."""
+        config, state = self._config, self.state
+        sag = config.height_sag_s4_per_m * acceleration**2 + height_noise
+        sink = config.sink_per_acceleration_ms * 1e-3 * acceleration
+        share = 1.0 - exp(-elapsed / _SAG_S)
+        return state.sag + share * (sag - state.sag), state.sink + share * (sink - state.sink)
 
     def _next_height_noise(self, elapsed: float) -> float:
         """Return the slow noise of the height at the next fix, m."""

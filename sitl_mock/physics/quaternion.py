@@ -52,7 +52,7 @@ def yaw(q: Quaternion) -> float:
 
 
 def along_heading(q: Quaternion, vector: Vector) -> Vector:
-    """Rotate a vector from the heading of ``q`` to world axes.
+    """Return a vector (forward, right, down), level along the yaw of ``q``, in world axes (NED).
 
     A NaN in one horizontal component makes both NaN; a NaN vertical component stays NaN.
     """

@@ -12,14 +12,16 @@ from sitl_mock.physics.quaternion import Quaternion, Vector, multiply, normalise
 from sitl_mock.physics.rate_loop import Delays, delay_steps
 
 Closing = tuple[float, float]
-"""Body rate per angle, 1/s, and the acceleration that stops the rotation in time, rad/s^2."""
+"""How an axis closes an angle, as `sqrt_controller` takes it: body rate per angle, 1/s, and limit
+of the deceleration, rad/s^2."""
 
 
 class Shaped(NamedTuple):
     """State of the shaping."""
 
     active: bool
-    """Whether rates are shaped now: not without control, and not in a loop without shaping."""
+    """Whether rates are shaped now. False on the ground, disarmed, and in a loop that does not
+    shape."""
     rates: Vector
     """Shaped rates along the axes of the attitude target, rad/s."""
     target: Quaternion
@@ -29,8 +31,8 @@ class Shaped(NamedTuple):
 NOT_SHAPED = Shaped(False, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
 
 
-def slew(goal: float, rate: float, most: float) -> float:
-    """Return the rate changed towards its goal by at most `most`.
+def slew(goal: float, rate: float, limit: float) -> float:
+    """Return the rate changed towards its goal by at most `limit`.
 
     A NaN goal holds the rate. With an infinite goal the rate grows without limit, as measured on
     ArduPilot.
@@ -38,11 +40,11 @@ def slew(goal: float, rate: float, most: float) -> float:
     if isnan(goal):
         return rate
     change = goal - rate
-    return rate + (most if change > most else -most if change < -most else change)
+    return rate + (limit if change > limit else -limit if change < -limit else change)
 
 
 def rotated(q: Quaternion, rates: Vector, dt: float) -> Quaternion:
-    """Return the attitude after `dt` s of body rates (rad/s); its error is (rate dt)^3 / 12."""
+    """Return the attitude after `dt` s of body rates (rad/s), to within (rate dt)^3 / 12 rad."""
     half = 0.5 * dt
     return normalise(multiply(q, (1.0, half * rates[0], half * rates[1], half * rates[2])))
 
@@ -62,8 +64,8 @@ def sqrt_controller(angle: float, gain: float, acceleration: float) -> float:
 
     Args:
         angle: angle to close, rad.
-        gain: rate per angle, 1/s.
-        acceleration: limit, rad/s^2.
+        gain: rate per small angle, 1/s.
+        acceleration: limit of the deceleration, rad/s^2.
     """
     linear = acceleration / (gain * gain) if gain > 0.0 else inf
     if abs(angle) <= linear:
@@ -74,7 +76,7 @@ def sqrt_controller(angle: float, gain: float, acceleration: float) -> float:
 class ShapingLaw(NamedTuple):
     """Constants of the shaping."""
 
-    most: Vector
+    max_change: Vector
     """Largest change of each rate in one step, rad/s."""
     closing: tuple[Closing, Closing, Closing]
     """How roll, pitch and yaw close an angle."""
@@ -85,7 +87,7 @@ class ShapingLaw(NamedTuple):
 def shaping_law(axes: tuple[AxisShaping, AxisShaping, AxisShaping] | None, dt: float) -> ShapingLaw:
     """Return the shaping of roll, pitch and yaw for steps of `dt` seconds.
 
-    Without axes it is an unused law of the same type, which the compiler needs.
+    For None return an unused law, because the compiler needs a value of this type.
     """
     if axes is None:
         return ShapingLaw((0.0, 0.0, 0.0), ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0)), (0, 0, 0), dt)
@@ -120,7 +122,7 @@ def shape(law: ShapingLaw, shaped: Shaped, goals: Vector, q: Quaternion) -> tupl
     Returns:
         The setpoint of the rate loop, rad/s, FRD, and the state after the step.
     """
-    most = law.most
+    most = law.max_change
     before = shaped.rates
     rates = (
         slew(goals[0], before[0], most[0]),

@@ -15,8 +15,10 @@ Motion = tuple[float, float, float, float, float, float, float, float, float, fl
 Load = tuple[float, float, float, float, float, float, float]
 """(specific thrust [m/s^2], torque x, y, z [N m, FRD], wind n, e, d [m/s])."""
 
+GRAVITY = 9.80665
+"""Standard gravity, m/s^2: autopilots and their filters assume it, whatever the airframe's is."""
 NO_AXIS_DRAG = 0.0, 0.0, 0.0
-"""Drag along the body axes of a body without any."""
+"""Coefficients of a body that has no drag along its own axes."""
 
 
 class Body(NamedTuple):

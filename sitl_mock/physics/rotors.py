@@ -68,10 +68,10 @@ def mix(throttle: float, roll: float, pitch: float, yaw: float) -> Mix:
 
 
 class RotorLaw(NamedTuple):
-    """Constants of the rotors. Each is a first-order lag behind its throttle."""
+    """Constants of the rotors. A rotor's thrust follows its throttle with a first-order lag."""
 
     slope: float  # N of one rotor per throttle, from `linear_from` on
-    offset: float  # N, of this line at throttle 0
+    offset: float  # N, thrust of this line at throttle 0
     low_slope: float  # N per throttle, below `linear_from`
     linear_from: float  # throttle
     decay: float  # of the lag in one step
@@ -109,7 +109,9 @@ def throttle_of(law: RotorLaw, thrust: float) -> float:
     return thrust / law.low_slope
 
 
-def rotor_step(law: RotorLaw, thrusts: Four, throttles: Four, sag: float) -> tuple[Four, Four]:
+def rotor_step(
+    law: RotorLaw, thrusts: Four, throttles: Four, thrust_factor: float
+) -> tuple[Four, Four]:
     """Advance the rotors by one step towards the throttles.
 
     The discretisation is exact for a throttle that is constant over the step. The mean of the
@@ -119,7 +121,7 @@ def rotor_step(law: RotorLaw, thrusts: Four, throttles: Four, sag: float) -> tup
         law: the rotors.
         thrusts: thrusts of each rotor before the step, N.
         throttles: 0..1 each.
-        sag: thrust factor of the battery voltage.
+        thrust_factor: factor of the battery voltage on the thrust of every rotor.
 
     Returns:
         The thrusts after the step. Total thrust (N) and torques about body x, y, z (N m), means
@@ -128,13 +130,13 @@ def rotor_step(law: RotorLaw, thrusts: Four, throttles: Four, sag: float) -> tup
     t0, t1, t2, t3 = throttles
     old0, old1, old2, old3 = thrusts
     decay = law.decay
-    goal = sag * steady_thrust(law, t0)
+    goal = thrust_factor * steady_thrust(law, t0)
     new0 = goal + decay * (old0 - goal)
-    goal = sag * steady_thrust(law, t1)
+    goal = thrust_factor * steady_thrust(law, t1)
     new1 = goal + decay * (old1 - goal)
-    goal = sag * steady_thrust(law, t2)
+    goal = thrust_factor * steady_thrust(law, t2)
     new2 = goal + decay * (old2 - goal)
-    goal = sag * steady_thrust(law, t3)
+    goal = thrust_factor * steady_thrust(law, t3)
     new3 = goal + decay * (old3 - goal)
     f0 = 0.5 * (old0 + new0)
     f1 = 0.5 * (old1 + new1)

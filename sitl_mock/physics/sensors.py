@@ -44,7 +44,7 @@ class SensorLaw(NamedTuple):
     rate_delay: int  # steps
     position_delay: int  # steps
     dt: float  # length of a step, s
-    filtered: bool  # whether there is a navigation filter, with the law that follows
+    filtered: bool  # whether there is a navigation filter, whose law is `errors`
     errors: ErrorLaw
     yaw_rate_bias: float  # rad/s
 
@@ -73,7 +73,7 @@ def white_noise(numbers: list[float], deviations: tuple[float, ...]) -> None:
 
 
 def rotated_estimate(yaw: Quaternion, rotation: Vector, q: Quaternion) -> Quaternion:
-    """Return an attitude with a small rotation (rad, NED), then rotated by estimator resets."""
+    """Return `q` turned by the small `rotation` (rad, NED), then by `yaw`, of all resets."""
     roll, pitch, heading = rotation
     return multiply(yaw, multiply((1.0, 0.5 * roll, 0.5 * pitch, 0.5 * heading), q))
 
@@ -90,11 +90,11 @@ def estimate(
 
     Args:
         law: constants.
-        state: after the latest fix and reset.
+        state: errors after the latest fix, and all resets.
         trail: the true motion of the latest steps.
         steps: steps since boot.
         time: now, s.
-        noise: 15 numbers: of attitude, rates, position, velocity and force.
+        noise: 15 numbers, three each for attitude, rates, position, velocity and force.
     """
     attitude = trail[(steps - law.attitude_delay) % len(trail)]
     place = trail[(steps - law.position_delay) % len(trail)]
@@ -144,7 +144,7 @@ class Estimator:
 
     Attributes:
         law: constants of `estimate`.
-        state: changed by fixes and resets.
+        state: errors after the latest fix, and all resets.
         rotation: small rotation of the attitude by the filter's error at the latest estimate, rad,
             NED.
         reset_counter: estimator resets since boot.
@@ -196,18 +196,14 @@ class Estimator:
         self.rotation: Vector = (0.0, 0.0, 0.0)
         self.reset_counter = 0
 
-    def shift(self, yaw: float, position_ned: Vector) -> None:
-        """Reset the estimator: rotate (rad) and shift (m) the estimate from now on."""
+    def shift(self, *, yaw: float = 0.0, position_ned: Vector = (0.0, 0.0, 0.0)) -> None:
+        """Reset the estimator: the estimate jumps by this yaw (rad) and position (m)."""
         n, e, d = self.state.offset
         self.state = self.state._replace(
             yaw=multiply(from_yaw(yaw), self.state.yaw),
             offset=(n + position_ned[0], e + position_ned[1], d + position_ned[2]),
         )
         self.reset_counter += 1
-
-    def as_estimated(self, q: Quaternion) -> Quaternion:
-        """Return a true attitude with the attitude error of the latest estimate."""
-        return rotated_estimate(self.state.yaw, self.rotation, q)
 
     def correct(self, time: float, before: Callable[[int], TrailRow]) -> None:
         """Correct the errors if a fix of the navigation filter is due.

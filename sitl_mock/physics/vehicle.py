@@ -11,13 +11,14 @@ from sitl_mock.physics.environment import Wind, ground_law
 from sitl_mock.physics.multirotor_step import (
     ZERO,
     at_rest,
+    initial_actuation,
     multirotor_law,
-    started,
+    steady_throttle,
 )
 from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw
 from sitl_mock.physics.rate_shaping import Shaped
-from sitl_mock.physics.rotors import Four, throttle_of
-from sitl_mock.physics.sensors import Estimate, Estimator
+from sitl_mock.physics.rotors import Four
+from sitl_mock.physics.sensors import Estimate, Estimator, rotated_estimate
 from sitl_mock.physics.vehicle_step import (
     ActuatorCommand,
     Air,
@@ -48,7 +49,6 @@ class TruthState(NamedTuple):
     touchdown_speed: float  # m/s down at the latest touchdown, NaN before the first
     rotor_thrusts: Four  # N, PX4's rotor order
     throttles: Four  # commanded to each rotor, 0..1
-    wind_ned: Vector
 
 
 class Vehicle:
@@ -96,7 +96,7 @@ class Vehicle:
         self._slow_dt = self._slow_steps * dt
         self._wind = Wind(wind or WindConfig(), self._slow_dt, seed)
         self._battery = Battery(battery or BatteryConfig(), airframe)
-        body, stopped = at_rest(from_yaw(heading)), started(self._multirotor, 0.0)
+        body, stopped = at_rest(from_yaw(heading)), initial_actuation(self._multirotor, 0.0)
         self.estimator = Estimator(
             sensors or SensorConfig(),
             trail_row(body, ZERO),
@@ -135,7 +135,6 @@ class Vehicle:
             touchdown_speed,
             thrusts,
             mixed.throttles,
-            self._wind.velocity,
         )
 
     @property
@@ -149,12 +148,7 @@ class Vehicle:
 
     def throttle(self, specific_thrust: float) -> float:
         """Return the collective throttle for a steady specific thrust (m/s^2), at most 1."""
-        return throttle_of(self._multirotor.rotors, 0.25 * self._multirotor.mass * specific_thrust)
-
-    @property
-    def reset_counter(self) -> int:
-        """Estimator resets since boot."""
-        return self.estimator.reset_counter
+        return steady_throttle(self._multirotor, specific_thrust)
 
     def estimate(self) -> Estimate:
         """Return the autopilot's estimate now; every call draws fresh noise."""
@@ -167,15 +161,15 @@ class Vehicle:
 
     @property
     def attitude_target(self) -> Shaped | None:
-        """The shaped attitude target, with the error of the estimate; None if not shaped."""
+        """ArduPilot's shaped rates and attitude target; None if rates are not shaped now.
+
+        The attitude target has the error of the latest estimated attitude.
+        """
         *_, shaped = self.plant.state.actuation
         if not shaped.active:
             return None
-        return shaped._replace(target=self.estimator.as_estimated(shaped.target))
-
-    def shift_estimate(self, *, yaw: float = 0.0, position_ned: Vector = ZERO) -> None:
-        """Reset the estimator: the estimate jumps by this yaw (rad) and position (m)."""
-        self.estimator.shift(yaw, position_ned)
+        yaw, rotation = self.estimator.state.yaw, self.estimator.rotation
+        return shaped._replace(target=rotated_estimate(yaw, rotation, shaped.target))
 
     def step(self, command: ActuatorCommand, count: int = 1) -> None:
         """Advance by `count` physics steps of `step_s` seconds under one command."""

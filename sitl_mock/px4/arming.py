@@ -10,8 +10,8 @@ from sitl_mock.px4.modes import PILOTED
 NOT_ARMABLE = frozenset({Mode.RTL, Mode.LAND})
 """PX4 cannot be armed in these modes, and does not return to them when it disarms."""
 PREFLIGHT_MARGIN_US = 1_000_000
-"""Armed but not flown, PX4 disarms COM_DISARM_PRFLT + this, us, after arming (measured: 11 s for
-10 s)."""
+"""A vehicle that was armed and does not take off disarms after COM_DISARM_PRFLT plus this, us
+(measured: 11 s for 10 s)."""
 
 
 class ArmingChecks:
@@ -42,7 +42,7 @@ class ArmingChecks:
 
     @property
     def offboard_alive(self) -> bool:
-        """Whether the setpoints are not lost: see `OffboardStream.alive`."""
+        """Whether offboard setpoints arrive, as `OffboardStream.alive` judges."""
         return self._stream.alive(self._state.time_us, self._parameters["COM_OF_LOSS_T"])
 
     def problem(self, *, gcs_alive: bool, pilot: bool, refusal: str | None) -> str | None:

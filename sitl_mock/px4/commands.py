@@ -9,7 +9,7 @@ from sitl_mock.autopilot.commands import Command, Commands
 from sitl_mock.autopilot.motion_telemetry import Builder
 from sitl_mock.autopilot.state import Mode, State
 from sitl_mock.link.link import Link
-from sitl_mock.physics.geodesy import Geodetic, Origin, to_local
+from sitl_mock.physics.geodesy import Geodetic, to_local
 from sitl_mock.physics.quaternion import Vector
 from sitl_mock.px4.commander import Px4Commander
 from sitl_mock.px4.modes import MODES_BY_COMMAND
@@ -37,10 +37,10 @@ class Px4Commands(Commands):
         state: State,
         commander: Px4Commander,
         builders: dict[int, Builder],
-        origin: Origin,
+        origin: Geodetic,
     ) -> None:
         super().__init__(state, commander, builders)
-        self._px4 = commander
+        self._px4_commander = commander
         self._origin = origin
         self.handlers |= {
             dialect.MAV_CMD_DO_SET_MODE: self._set_mode,
@@ -70,19 +70,19 @@ class Px4Commands(Commands):
         if not int(base) & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
             return TEMPORARILY_REJECTED
         mode = MODES_BY_COMMAND.get((int(main), int(sub)))
-        return TEMPORARILY_REJECTED if mode is None else self._px4.request_mode(mode)
+        return TEMPORARILY_REJECTED if mode is None else self._px4_commander.request_mode(mode)
 
     def _takeoff(self, command: Command, _: Link) -> int:
         altitude_amsl = command.parameters[6]
         takeoff_z = None if isnan(altitude_amsl) else self._origin.altitude_m - altitude_amsl
-        return self._px4.request_mode(Mode.TAKEOFF, takeoff_z=takeoff_z)
+        return self._px4_commander.request_mode(Mode.TAKEOFF, takeoff_z=takeoff_z)
 
     def _reposition(self, command: Command, _: Link) -> int:
         flags = command.parameters[1]
         changes = isfinite(flags) and int(flags) & _CHANGE_MODE
         if not changes and self._state.mode is not Mode.LOITER:
             return TEMPORARILY_REJECTED
-        return self._px4.request_mode(Mode.LOITER, hold=self._position(command))
+        return self._px4_commander.request_mode(Mode.LOITER, hold=self._position(command))
 
     def _position(self, command: Command) -> Vector:
         """Return the local position in parameters 5 to 7; NaN keeps the present value."""

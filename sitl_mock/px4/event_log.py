@@ -8,7 +8,6 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from sitl_mock.autopilot.events import EventKind
-from sitl_mock.autopilot.personality import Personality
 from sitl_mock.autopilot.state import State
 from sitl_mock.link.event_messages import (
     CURRENT_EVENT_SEQUENCE,
@@ -18,7 +17,7 @@ from sitl_mock.link.event_messages import (
 )
 from sitl_mock.link.framing import Message
 from sitl_mock.link.link import Link
-from sitl_mock.link.status_text import send_text
+from sitl_mock.px4.events import PX4_EVENTS
 
 _KEPT = 20
 """Number of events that can be requested again."""
@@ -116,16 +115,14 @@ def _send(link: Link, layout: Layout, payload: bytes) -> None:
 
 
 class Announcer:
-    """Announces events on all links.
+    """Announces events: as EVENT on all links, as text on those with a ground station.
 
     Args:
-        personality: provides texts and ids.
-        links: links to send on.
+        links: links for the texts.
         events: sends the events.
     """
 
-    def __init__(self, personality: Personality, links: Iterable[Link], events: EventLog) -> None:
-        self._personality = personality
+    def __init__(self, links: Iterable[Link], events: EventLog) -> None:
         self._links = list(links)
         self._events = events
         self._text_id = 0
@@ -138,14 +135,12 @@ class Announcer:
             detail: replaces the placeholder in the event's text.
             arguments: packed arguments that replace the constant ones of the event.
         """
-        event = self._personality.events[kind]
+        event = PX4_EVENTS[kind]
         if event.event_id:
             self._events.send(
                 event.event_id, event.severity, event.internal, arguments or event.arguments
             )
-        self._send_text(event.text.format(detail), event.severity)
-
-    def _send_text(self, text: str, severity: int) -> None:
-        """Send a text on links with a ground station."""
-        send_text((link for link in self._links if link.gcs_heard), text, severity, self._text_id)
+        for link in self._links:
+            if link.gcs_heard:
+                link.send_text(event.text.format(detail), event.severity, self._text_id)
         self._text_id = (self._text_id + 1) & 0xFFFF

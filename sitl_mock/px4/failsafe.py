@@ -15,7 +15,6 @@ from sitl_mock.px4.failsafe_actions import (
     RETURN,
     AnnounceEvent,
     Cause,
-    EnterMode,
     FailsafeActions,
 )
 from sitl_mock.px4.modes import NEEDS_POSITION, PILOTED, custom_mode
@@ -56,7 +55,7 @@ class Failsafe:
         parameters: ParameterTable,
         stream: OffboardStream,
         announce: AnnounceEvent,
-        enter: EnterMode,
+        enter: Callable[[Mode], None],
         stop: Callable[[EventKind], None],
     ) -> None:
         self._state = state

@@ -74,13 +74,6 @@ class AnnounceEvent(Protocol):
         """Announce an event, with a detail for its text and packed arguments."""
 
 
-class EnterMode(Protocol):
-    """Enters a mode and leaves the intended mode as it is."""
-
-    def __call__(self, mode: Mode) -> None:
-        """Enter the mode."""
-
-
 class FailsafeActions:
     """Executes the action of the failsafe with the most severe cause.
 
@@ -97,7 +90,7 @@ class FailsafeActions:
         state: State,
         parameters: ParameterTable,
         announce: AnnounceEvent,
-        enter: EnterMode,
+        enter: Callable[[Mode], None],
         stop: Callable[[EventKind], None],
     ) -> None:
         self._state = state

@@ -1,18 +1,19 @@
 """PX4's flight tasks: the setpoints of the position controller in each mode."""
 
-from math import hypot, isnan, radians, tan
+from math import hypot, nan, radians, tan
 
 from sitl_mock.autopilot.parameters import ParameterTable
-from sitl_mock.autopilot.position_control import GRAVITY, PositionDemand
+from sitl_mock.autopilot.position_control import PositionDemand, setpoint_demand
 from sitl_mock.autopilot.setpoints import PositionSetpoint
-from sitl_mock.autopilot.state import NAN, NAN_VECTOR, Mode, State
-from sitl_mock.physics.quaternion import Vector, along_heading, yaw
+from sitl_mock.autopilot.state import NAN_VECTOR, Mode, State
+from sitl_mock.physics.quaternion import Vector, yaw
+from sitl_mock.physics.rigid_body import GRAVITY
 
 CRAWL_HEIGHT_M = 0.65
 """Below this height LAND descends at MPC_LAND_CRWL (recorded with a distance sensor)."""
 BRAKING_S = 0.7
 """The held point lies ahead of the position by the velocity times this, s."""
-LEVEL_DEMAND_ACCELERATION: Vector = (0.0, 0.0, NAN)
+LEVEL_DEMAND_ACCELERATION: Vector = (0.0, 0.0, nan)
 """Acceleration demand of a vehicle that stays level without holding its horizontal position."""
 
 
@@ -40,9 +41,9 @@ class FlightTasks:
         """Begin a mode at the present estimate.
 
         Args:
-            mode: entered.
-            takeoff_z: where TAKEOFF ends, m down.
-            hold: position of LOITER, NED; None = stop here.
+            mode: the mode to begin.
+            takeoff_z: where TAKEOFF ends, m down; None = as before.
+            hold: position of LOITER, m NED; None = stop here.
         """
         estimate = self._state.estimate
         self._entered_us = self._state.time_us
@@ -86,7 +87,7 @@ class FlightTasks:
         if mode is Mode.RTL:
             return self._return()
         if mode is Mode.ALTCTL:
-            level = (NAN, NAN, self._hold[2])
+            level = (nan, nan, self._hold[2])
             return PositionDemand(level, NAN_VECTOR, LEVEL_DEMAND_ACCELERATION, self.yaw)
         parameters = self._parameters
         return PositionDemand(
@@ -111,15 +112,15 @@ class FlightTasks:
         lowest = -GRAVITY / parameters["MPC_Z_VEL_P_ACC"]
         climb = lowest + (speed - lowest) * max(0.0, min(1.0, ramp))
         return PositionDemand(
-            NAN_VECTOR, (NAN, NAN, -climb), LEVEL_DEMAND_ACCELERATION, self.yaw, down_speed=3.0
+            NAN_VECTOR, (nan, nan, -climb), LEVEL_DEMAND_ACCELERATION, self.yaw, down_speed=3.0
         )
 
     def _land(self) -> PositionDemand:
         x, y, _ = self._hold
-        velocity = (NAN, NAN, self._descent_speed())
+        velocity = (nan, nan, self._descent_speed())
         if not self._state.position_valid:
             return PositionDemand(NAN_VECTOR, velocity, LEVEL_DEMAND_ACCELERATION, self.yaw)
-        return PositionDemand((x, y, NAN), velocity, yaw=self.yaw, down_speed=10.0)
+        return PositionDemand((x, y, nan), velocity, yaw=self.yaw, down_speed=10.0)
 
     def _descent_speed(self) -> float:
         parameters = self._parameters
@@ -158,7 +159,7 @@ class FlightTasks:
                 self._hold = (home[0], home[1], self._hold[2])
             self._descending = hypot(x - home[0], y - home[1]) < parameters["NAV_ACC_RAD"] / 2.0
         if self._descending:
-            self._hold = (home[0], home[1], NAN)
+            self._hold = (home[0], home[1], nan)
             return self._land()
         return PositionDemand(
             self._hold,
@@ -171,20 +172,11 @@ class FlightTasks:
     def offboard_demand(self, setpoint: PositionSetpoint, dt: float) -> PositionDemand:
         """Return the demand of an offboard setpoint; its yaw rate turns the held heading."""
         parameters = self._parameters
-        if not isnan(setpoint.yaw):
-            self.yaw = setpoint.yaw
-        elif not isnan(setpoint.yaw_rate):
-            self.yaw += setpoint.yaw_rate * dt
-        velocity, acceleration = setpoint.velocity, setpoint.acceleration
-        if setpoint.in_body_heading:
-            q = self._state.estimate.q
-            velocity, acceleration = along_heading(q, velocity), along_heading(q, acceleration)
-        return PositionDemand(
-            setpoint.position,
-            velocity,
-            acceleration,
-            self.yaw,
+        speeds = (
             parameters["MPC_XY_VEL_MAX"],
             parameters["MPC_Z_VEL_MAX_UP"],
             parameters["MPC_Z_VEL_MAX_DN"],
         )
+        demand = setpoint_demand(setpoint, self._state.estimate.q, self.yaw, speeds, dt)
+        self.yaw = demand.yaw
+        return demand

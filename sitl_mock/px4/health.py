@@ -14,7 +14,7 @@ from sitl_mock.px4.events import event_id
 _CRITICAL, _ERROR, _WARNING, _INFO, _PROTOCOL = 2, 3, 4, 6, 8
 
 _ALL_MODES = 0xFFFFFFFF
-_ARMABLE = 0x807F7AB0
+_ARMABLE_MODES = 0x807F7AB0
 """Bit mask of the modes in which PX4 arms without a transmitter, if no check fails."""
 _PRESENT = 0x38020D02
 _GPS_PRESENT = 1 << 3
@@ -71,7 +71,7 @@ class HealthReport:
         """Send a report if it changed and is due; also step the events (`EventLog.step`).
 
         Args:
-            offboard_alive: whether the setpoints are not lost.
+            offboard_alive: whether offboard setpoints arrive.
             pilot: whether a pilot holds the sticks.
             gcs_alive: whether a ground station is connected.
             gcs_required: whether arming needs a ground station.
@@ -106,7 +106,7 @@ class HealthReport:
     def _send(self, failing: tuple[_Check, ...], present: int) -> None:
         errors = [check for check in failing if check.severity <= _ERROR]
         warnings = [check for check in failing if check.severity == _WARNING]
-        modes = _ARMABLE
+        modes = _ARMABLE_MODES
         for check in errors:
             modes &= ~check.modes
         summary = _SUMMARY.pack(0, _components(errors), _components(warnings), modes, modes)

@@ -58,9 +58,9 @@ def mode_of(custom: int) -> Mode | None:
 
 
 def base_mode(mode: Mode, *, armed: bool, attitude_controlled: bool) -> int:
-    """Return the recorded flags: 29 auto; offboard 1 by rates, else 17; 81 by a pilot.
+    """Return HEARTBEAT.base_mode (recorded): 29 in automatic modes, 81 in those of a pilot.
 
-    Armed, they are 128 more.
+    In OFFBOARD it is 1 under body rates, else 17. Armed, it is 128 more.
 
     Args:
         mode: the flight mode.

@@ -1,12 +1,11 @@
 """PX4's personality: its numbers and its behaviour (recorded from PX4 main, SIH)."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from random import Random
 from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.autopilot.events import Event, EventKind
 from sitl_mock.autopilot.land_detector import LandDetector
 from sitl_mock.autopilot.motion_telemetry import MotionTelemetry
 from sitl_mock.autopilot.parameter_protocol import ParameterProtocol
@@ -19,7 +18,6 @@ from sitl_mock.px4.arming import ArmingChecks
 from sitl_mock.px4.commander import Px4Commander
 from sitl_mock.px4.commands import Px4Commands
 from sitl_mock.px4.event_log import Announcer, EventLog
-from sitl_mock.px4.events import PX4_EVENTS
 from sitl_mock.px4.health import HealthReport
 from sitl_mock.px4.mode_control import Px4ModeControl
 from sitl_mock.px4.modes import mode_of
@@ -82,7 +80,6 @@ _GCS_RATES: dict[int, float] = {
 class Px4:
     """The PX4 personality."""
 
-    events: Mapping[EventKind, Event] = PX4_EVENTS
     boot_mode = Mode.LOITER
     any_component = False
     system_id_parameter = "MAV_SYS_ID"
@@ -122,18 +119,11 @@ class Px4:
         """Build PX4's behaviour for one vehicle."""
         state, parameters, vehicle = parts.state, parts.parameters, parts.vehicle
         events = EventLog(state, parts.links)
-        announce = Announcer(self, parts.links, events)
+        announce = Announcer(parts.links, events)
         control = Px4ModeControl(state, parameters, parts.stream)
         health = HealthReport(state, events, parts.ready_us)
         checks = ArmingChecks(state, parameters, parts.stream, health, parts.ready_us)
-        commander = Px4Commander(
-            state,
-            parameters,
-            control,
-            parts.stream,
-            announce,
-            checks,
-        )
+        commander = Px4Commander(state, parameters, control, parts.stream, announce, checks)
         builders = {
             **MotionTelemetry(state, vehicle, parts.origin, parts.slips).builders(),
             **Px4SystemTelemetry(

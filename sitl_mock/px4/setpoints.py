@@ -1,7 +1,7 @@
 """Decodes offboard setpoints by PX4's type-mask rules (docs/mock-vehicle.md)."""
 
-import math
 import struct
+from math import isnan, nan
 
 from sitl_mock.autopilot.setpoints import (
     ATTITUDE_IGNORED,
@@ -14,8 +14,6 @@ from sitl_mock.autopilot.setpoints import (
     position_setpoint,
 )
 from sitl_mock.link.framing import Message
-
-NAN = float("nan")
 
 _THRUST_BODY_FIELD = struct.Struct("<3f")
 _FULL_LENGTH = 51
@@ -42,14 +40,14 @@ def attitude_setpoint(message: Message) -> AttitudeSetpoint | None:
     with_attitude = not mask & ATTITUDE_IGNORED
     if not with_rates and not with_attitude:
         return None
-    yaw_rate = NAN if mask & YAW_RATE_IGNORED else message.body_yaw_rate
+    yaw_rate = nan if mask & YAW_RATE_IGNORED else message.body_yaw_rate
     rates = (message.body_roll_rate, message.body_pitch_rate, yaw_rate) if with_rates else None
     w, x, y, z = message.q
     thrust = -_thrust_body_down(message) if mask & THRUST_BODY else message.thrust
     return AttitudeSetpoint(
         (w, x, y, z) if with_attitude else None,
         rates,
-        0.0 if math.isnan(yaw_rate) else yaw_rate,
+        0.0 if isnan(yaw_rate) else yaw_rate,
         thrust,
     )
 

@@ -1,25 +1,27 @@
 """Telemetry of the autopilot's state in PX4's conventions."""
 
+from math import nan
+
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.autopilot.motion_telemetry import Builder, clip
+from sitl_mock.autopilot.motion_telemetry import Builder
 from sitl_mock.autopilot.personality import Identity
 from sitl_mock.autopilot.setpoints import AttitudeSetpoint, OffboardStream
-from sitl_mock.autopilot.state import NAN, State
+from sitl_mock.autopilot.state import State
 from sitl_mock.autopilot.system_telemetry import NO_VALUE, SystemTelemetry
 from sitl_mock.link.framing import Message
-from sitl_mock.physics.geodesy import Origin
+from sitl_mock.physics.geodesy import Geodetic
 from sitl_mock.physics.vehicle import Vehicle
 from sitl_mock.px4.modes import base_mode, custom_mode, standard_mode
 
+# Bits of SYS_STATUS, recorded.
 _SENSORS_PRESENT = 50380847
 _SENSORS_ENABLED = 50446383
 _SENSORS_HEALTHY = 320915519
-"""From _SENSORS_PRESENT on: bits of SYS_STATUS, recorded."""
-_ESTIMATOR_GOOD = 895
+# Flags of ESTIMATOR_STATUS, recorded.
+_ESTIMATOR_IN_AIR = 895
 _ESTIMATOR_ON_GROUND = 1023
 _ESTIMATOR_NO_POSITION = 164
-"""From _ESTIMATOR_GOOD (in the air) on: flags of ESTIMATOR_STATUS, recorded."""
 
 
 class Px4SystemTelemetry(SystemTelemetry):
@@ -36,13 +38,12 @@ class Px4SystemTelemetry(SystemTelemetry):
     def __init__(
         self,
         state: State,
-        origin: Origin,
+        origin: Geodetic,
         identity: Identity,
         vehicle: Vehicle,
         stream: OffboardStream,
     ) -> None:
-        super().__init__(state, origin, identity)
-        self._vehicle = vehicle
+        super().__init__(state, origin, identity, vehicle)
         self._stream = stream
         self._ping = 0
 
@@ -95,34 +96,13 @@ class Px4SystemTelemetry(SystemTelemetry):
         )
 
     def sys_status(self) -> Message:
-        """Return SYS_STATUS; clients read its prearm bit as armable."""
-        battery = self._vehicle.battery
-        return dialect.MAVLink_sys_status_message(
-            _SENSORS_PRESENT,
-            _SENSORS_ENABLED,
-            self._healthy(_SENSORS_HEALTHY),
-            100,
-            clip(battery.voltage_v * 1e3, 15),
-            clip(battery.current_a * 1e2, 15),
-            round(100 * battery.remaining),
-            *(0,) * 6,
-        )
+        """Return SYS_STATUS."""
+        return self._sys_status(_SENSORS_PRESENT, _SENSORS_ENABLED, _SENSORS_HEALTHY, 100)
 
     def battery_status(self) -> Message:
-        """Return BATTERY_STATUS; as in PX4, the first cell has the voltage of all cells."""
-        battery = self._vehicle.battery
-        return dialect.MAVLink_battery_status_message(
-            0,
-            dialect.MAV_BATTERY_FUNCTION_ALL,
-            dialect.MAV_BATTERY_TYPE_LIPO,
-            32767,
-            [round(battery.voltage_v * 1e3)] + [NO_VALUE] * 9,
-            clip(battery.current_a * 1e2, 15),
-            0,
-            -1,
-            round(100 * battery.remaining),
-            0,
-            int(self._state.battery_warning),
+        """Return BATTERY_STATUS, without the used energy."""
+        return self._battery_status(
+            dialect.MAV_BATTERY_FUNCTION_ALL, dialect.MAV_BATTERY_TYPE_LIPO, 0, -1
         )
 
     def gps_raw_int(self) -> Message:
@@ -139,12 +119,12 @@ class Px4SystemTelemetry(SystemTelemetry):
         """Return ESTIMATOR_STATUS with the recorded flags and typical ratios."""
         state = self._state
         if not state.position_valid:
-            ratios = (NAN, NAN, 0.004, 0.05, NAN, NAN, 14.0, 1.25)
+            ratios = (nan, nan, 0.004, 0.05, nan, nan, 14.0, 1.25)
             return dialect.MAVLink_estimator_status_message(
                 state.shown_us, _ESTIMATOR_NO_POSITION, *ratios
             )
-        flags = _ESTIMATOR_ON_GROUND if state.landed else _ESTIMATOR_GOOD
-        ratios = (0.015, 0.008, 0.004, 0.08, 0.001, NAN, 0.295, 0.275)
+        flags = _ESTIMATOR_ON_GROUND if state.landed else _ESTIMATOR_IN_AIR
+        ratios = (0.015, 0.008, 0.004, 0.08, 0.001, nan, 0.295, 0.275)
         return dialect.MAVLink_estimator_status_message(state.shown_us, flags, *ratios)
 
     def ping(self) -> Message:

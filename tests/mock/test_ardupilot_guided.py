@@ -292,7 +292,7 @@ def test_attitude_target_tells_the_axes_along_which_the_rates_are_taken():
     assert told[-1].body_yaw_rate == pytest.approx(0.5)
     lead = yaw(tuple(told[-1].q)) - yaw(rig.truth.q)
     assert 0.5 * 0.08 < lead < 0.5 * 0.2
-    rig.simulation.vehicle.shift_estimate(yaw=0.5)
+    rig.simulation.vehicle.estimator.shift(yaw=0.5)
     rig.run(0.02)
     assert yaw(tuple(rig.messages("ATTITUDE_TARGET")[-1].q)) - yaw(rig.truth.q) == pytest.approx(
         lead + 0.5, abs=0.02

@@ -8,14 +8,13 @@ import pytest
 from sitl_mock.ardupilot.defaults import AIRFRAME
 from sitl_mock.ardupilot.hold import ClimbProfile, approach_speed
 from sitl_mock.ardupilot.thrust import (
-    GRAVITY,
     angle_boosted,
     climb_rate_of_setpoint,
     specific_thrust,
     thrust_of_setpoint,
 )
 from sitl_mock.config.airframe import AirframeConfig
-from sitl_mock.physics.rigid_body import advance, body_of
+from sitl_mock.physics.rigid_body import GRAVITY, advance, body_of
 from sitl_mock.physics.rotors import rotor_law, throttle_of
 
 CLIMBS = {0.2: 0.57, 0.3: 0.82, 0.36: 0.99, 0.4: 1.09, 0.5: 1.33, 0.6: 1.58, 0.8: 2.03, 1.0: 2.30}

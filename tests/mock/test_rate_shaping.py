@@ -16,6 +16,7 @@ from sitl_mock.ardupilot.defaults import RATE_LAG_MS
 from sitl_mock.config.airframe import AirframeConfig
 from sitl_mock.config.rate_loop import AxisShaping, RateLoopConfig
 from sitl_mock.physics.multirotor import Multirotor
+from sitl_mock.physics.multirotor_step import at_rest
 from sitl_mock.physics.rate_shaping import NOT_SHAPED, shape, shaping_law, sqrt_controller
 from sitl_mock.physics.vehicle import ActuatorCommand, Vehicle
 from sitl_mock.settings import MockSettings, load_settings
@@ -202,7 +203,7 @@ def test_the_body_lags_its_attitude_target_as_recorded():
         for name in ("roll", "pitch", "yaw")
     }  # what is recorded is already delayed and slewed
     multirotor = hovering(RateLoopConfig(**ready))
-    multirotor.rest(tuple(map(float, log["body"][0, 1:5])))
+    multirotor.body = at_rest(tuple(map(float, log["body"][0, 1:5])))
     rows = []
     for before, after in pairwise(log["target"]):
         for share in (np.arange(10) + 0.5) / 10:
@@ -223,7 +224,7 @@ def left_of_a_push(rate_loop):
     multirotor = hovering(rate_loop)
     fly(multirotor, REST, 0.1)
     x, y, z, w = Rotation.from_rotvec([20.0, 0.0, 0.0], degrees=True).as_quat()
-    multirotor.rest((w, x, y, z))
+    multirotor.body = at_rest((w, x, y, z))
     fly(multirotor, REST, 2.0)
     return degrees(rotation(multirotor.q).magnitude())
 

@@ -106,18 +106,18 @@ def test_noise_has_the_configured_spread():
 def test_an_estimator_reset_moves_the_estimate_and_not_the_vehicle():
     vehicle, other = airborne(sensing(), heading=0.3), airborne(sensing(), heading=0.3)
     before = vehicle.estimate()
-    vehicle.shift_estimate(yaw=0.5, position_ned=(1.0, -2.0, 0.25))
+    vehicle.estimator.shift(yaw=0.5, position_ned=(1.0, -2.0, 0.25))
     after = vehicle.estimate()
-    assert vehicle.reset_counter == 1
+    assert vehicle.estimator.reset_counter == 1
     assert np.subtract(after.position_ned, before.position_ned) == pytest.approx((1.0, -2.0, 0.25))
     assert yaw(after.q) - yaw(before.q) == pytest.approx(0.5)
     assert after.velocity_ned == before.velocity_ned
     assert after.specific_force_frd == before.specific_force_frd
-    vehicle.shift_estimate(yaw=-0.5, position_ned=(1.0, 1.0, 1.0))
+    vehicle.estimator.shift(yaw=-0.5, position_ned=(1.0, 1.0, 1.0))
     again = vehicle.estimate()
     assert again.q == pytest.approx(before.q)
     assert np.subtract(again.position_ned, before.position_ned) == pytest.approx((2.0, -1.0, 1.25))
-    assert vehicle.reset_counter == 2
+    assert vehicle.estimator.reset_counter == 2
     vehicle.step(TURNING)
     other.step(TURNING)
     assert vehicle.truth == other.truth

@@ -126,7 +126,7 @@ def test_a_command_that_stays_in_progress_is_no_silence(run, monkeypatch):
             vehicle.answers["COMMAND_LONG"] = lambda message: [ack(message.command, 5)]
             repeating = asyncio.create_task(repeat(vehicle))
             async with asyncio.timeout(5.0):
-                with pytest.raises(CommandUnfinished, match=r"ARM_DISARM: .* did not finish it"):
+                with pytest.raises(CommandUnfinished, match=r"ARM_DISARM: .* gave no result"):
                     await link.command(ARM, timeout_s=0.5, retries=1)
             repeating.cancel()
             assert len(vehicle.of("COMMAND_LONG")) == 1

@@ -54,11 +54,11 @@ def run(options: argparse.Namespace) -> int:
     page = options.out or options.folder / PAGE
     write_whole(page, page_text(results, load(options.folder / FILE)))
     write_tables(results.table, options.folder)
-    console = Console(highlight=False, soft_wrap=True)
-    console.print(headline(results), markup=False)
+    console = Console(highlight=False, soft_wrap=True, markup=False)
+    console.print(headline(results))
     for line in missing(results):
-        console.print(line, markup=False)
-    console.print(f"Open {page}", markup=False)
+        console.print(line)
+    console.print(f"Open {page}")
     return _DONE
 
 

@@ -12,19 +12,22 @@ _FIRST, _COUNT = 20_000, 12_000
 _BLOCK = 50
 """Processes with neighboring numbers start this many ports apart."""
 
-_asked = itertools.count()
+_counter = itertools.count()
 
 
 def free_port(*offsets: int) -> int:
-    """A UDP and TCP port that is free on 127.0.0.1, as is the port at each of the offsets above it.
+    """Find a port for UDP and TCP that is free on 127.0.0.1.
 
-    Until the caller opens it, another program could. So a process is not given the same port again
-    until it has tried all others, and two processes with neighboring numbers begin 50 ports apart.
+    The ports that lie above it by one of the `offsets` are free, too.
+
+    Another program could open the port before the caller does. So a process gets the same port
+    again only after it has tried all others, and processes with neighboring numbers begin 50 ports
+    apart.
 
     Raises:
         LinkError: all ports are in use.
     """
-    for number in itertools.islice(_asked, _COUNT):
+    for number in itertools.islice(_counter, _COUNT):
         port = _FIRST + (os.getpid() * _BLOCK + number) % _COUNT
         if all(_is_free(port + offset) for offset in (0, *offsets)):
             return port
