@@ -1,7 +1,7 @@
 """The flight context: the parts of one flight that every phase and the watch use."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
@@ -76,7 +76,16 @@ class FlightContext:
         self.loop.offboard_active = self.loop.taking_over = False
         self.guidance_loop.stand_by()
 
-    async def stop_turning(self) -> None:
+    async def stop(self, tasks: Iterable[asyncio.Task[Any]]) -> None:
+        """Stop the tasks beside the phases, then the setpoints, the last with zero body rates."""
+        try:
+            for task in tasks:
+                await cancel(task)
+            await self._stop_turning()
+        finally:
+            self.release()
+
+    async def _stop_turning(self) -> None:
         """If the autopilot still obeys us, send zero body rates, because it keeps the last ones.
 
         They answer the next sample; without one within `_LAST_SETPOINT`, nothing is sent. Guidance

@@ -71,7 +71,7 @@ class Flight:
             await self._leave(ended.exit or self._usual_exit())
             return ended.reason
         finally:
-            await self._stop(helpers)
+            await self._context.stop(helpers)
         return "ok"
 
     def end(self, ended: FlightEnded) -> None:
@@ -120,15 +120,6 @@ class Flight:
         time = self._clock() - self.began
         self.events.append((time, text))
         self._observer.event(time, text)
-
-    async def _stop(self, helpers: list[asyncio.Task[None]]) -> None:
-        """Stop the tasks beside the phases, then the setpoints; the last one has zero body rates."""
-        try:
-            for task in helpers:
-                await cancel(task)
-            await self._context.stop_turning()
-        finally:
-            self._context.release()
 
     async def _fly_all(self) -> None:
         """Run all phases; start again if another vehicle may have replaced the checked one.

@@ -42,7 +42,8 @@ def test_who_leaves_in_a_turn_leaves_a_vehicle_that_turns_no_further(tmp_path, a
         state = mock.state()
     assert summary.result == "left at once by the user"
     assert state["last_setpoint"] == left["last_setpoint"]
-    assert turning(left) > 0.8 > 0.02 > turning(state)
+    assert turning(left) > 0.8
+    assert turning(state) < 0.02
     assert tilt_deg(state) < tilt_deg(left) + 15.0  # what the vehicle's lag takes it through
     samples = Replay(read_flight(tmp_path), load(tmp_path / "config.yaml")).run()
     assert [each for each in samples if not each.same] == []
