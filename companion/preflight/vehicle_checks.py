@@ -71,7 +71,7 @@ def motors(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def power(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether the battery allows a flight; see `battery`."""
+    """Whether the battery has enough charge; not ready while a booting vehicle reports none."""
     if evidence.booting and evidence.state.battery is None:
         yield Finding(
             Key.BATTERY, NOT_READY, "the vehicle has not reported its battery's charge yet"
