@@ -53,8 +53,8 @@ def round_trip(config: Config, seconds: float) -> Finding:
     waits, and with a planner of another package, whose gain may mean something else.
     """
     gain = config.planner.gain_per_s
-    ours = config.planner_name in PLANNER_NAMES and not config.link.lockstep
-    product = gain * seconds if ours else 0.0
+    gain_matters = config.planner_name in PLANNER_NAMES and not config.link.lockstep
+    product = gain * seconds if gain_matters else 0.0
     late = product > _MAY_SHAKE
     return Finding(
         Key.ROUND_TRIP,

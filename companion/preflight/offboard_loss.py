@@ -103,37 +103,37 @@ def worst_reach(
     before: MotionAtLoss | None = None
     for time, flown in _flown(config, maneuvers, drag):
         if flown != before:  # in a hover the motion stays the same
-            before, there = flown, reach(flown, loss)
+            before, reached = flown, reach(flown, loss)
         breach, at = worst.breach, worst.time
         if breach is None:
-            breach, at = _breach(config, flown.offset, there, loss.fence), time
+            breach, at = _breach(config, flown.offset, reached, loss.fence), time
         worst = Worst(
-            max(worst.away, there.away),
-            max(worst.up, there.up),
-            max(worst.down, there.down),
+            max(worst.away, reached.away),
+            max(worst.up, reached.up),
+            max(worst.down, reached.down),
             breach,
             at,
         )
     return worst
 
 
-def _breach(config: Config, offset: Vector, there: Reach, fence: Fence) -> str | None:
+def _breach(config: Config, offset: Vector, reached: Reach, fence: Fence) -> str | None:
     """The breach of the fence at a place that the vehicle can reach from `offset`.
 
     Returns:
         The breach, as the end of a sentence; `None`: none.
     """
-    north, east = offset[0] + there.place[0], offset[1] + there.place[1]
+    north, east = offset[0] + reached.place[0], offset[1] + reached.place[1]
     distance = hypot(north, east)
-    outward = 1.0 + there.spread / distance if distance > 0.0 else 1.0
-    far: Vector = (north * outward, east * outward, offset[2])
+    outward = 1.0 + reached.spread / distance if distance > 0.0 else 1.0
+    farthest: Vector = (north * outward, east * outward, offset[2])
     if distance == 0.0:
-        far = (there.spread, 0.0, offset[2])
+        farthest = (reached.spread, 0.0, offset[2])
     height = config.flight.takeoff_height_m - offset[2]
     for place, its_height in (
-        (far, height),
-        ((north, east, offset[2] - there.up), height),
-        ((north, east, offset[2]), height - there.down),
+        (farthest, height),
+        ((north, east, offset[2] - reached.up), height),
+        ((north, east, offset[2]), height - reached.down),
     ):
         breach = fence.breach(place, its_height, None)
         if breach is not None:

@@ -74,14 +74,14 @@ class Component:
         message = dialect.MAVLink_named_value_float_message(boot_ms, name.encode(), value)
         self._network.send(self._frame(message))
 
-    def acknowledge(self, client: Client, frame: Frame, result: int, by: Address) -> None:
+    def acknowledge(self, client: Client, frame: Frame, result: int, sender: Address) -> None:
         """Answer a client's command with a MAV_RESULT.
 
         Args:
             client: sender of the command.
             frame: COMMAND_LONG, COMMAND_INT or SET_MODE.
             result: result of the command.
-            by: component that answers; clients accept only an answer from the component they
+            sender: component that answers; clients accept only an answer from the component they
                 commanded.
         """
         command = decode(frame.message_id, frame.payload)
@@ -91,7 +91,7 @@ class Component:
             target_system=frame.system,
             target_component=frame.component,
         )
-        self._network.send_to(client, self._frame(message, by))
+        self._network.send_to(client, self._frame(message, sender))
 
     def on_own(self, client: Channel, frame: Frame) -> None:
         """Refuse a command addressed only to our component, which carries out no commands."""
@@ -110,9 +110,9 @@ class Component:
         self._text_id = self._text_id % MOST_TEXT_NUMBER + 1
         return status_texts(ascii_for(text)[:_LONGEST_TEXT], severity, self._text_id)
 
-    def _frame(self, message: Message, by: Address | None = None) -> bytes:
+    def _frame(self, message: Message, sender: Address | None = None) -> bytes:
         number, signing = message.get_msgId(), self._settings.signing
-        system, component = by or self._own
+        system, component = sender or self._own
         frame = build_frame(
             number,
             encode(message),

@@ -36,7 +36,7 @@ from companion.serve.situation import SituationKeeper
 from companion.vehicle.autopilot import ControlEntry, Role
 from companion.vehicle.link import Link
 
-_ENDS = "the vehicle is held, and control ends"
+_ENDS = "the vehicle is held, and control ends; then request control again"
 _TRY_AGAIN = 2.0
 """After a failed takeover, time in which setpoints alone do not begin another one, s."""
 

@@ -135,14 +135,14 @@ class TelemetryDelay:
         Returns:
             How far TIMESYNC has fallen behind the samples' stamps, s; None: it has not.
         """
-        taken = _Exchange(now, half, delay)
+        exchange = _Exchange(now, half, delay)
         if -(half + _TOLERATED) <= delay <= _LONGEST:
             self._odd = None
             self.unknown = DelayUnknown.UNANSWERED
-            self._exchanges.append(taken)
+            self._exchanges.append(exchange)
             self.expire(now)
             return None
-        before, self._odd = self._odd, taken
+        before, self._odd = self._odd, exchange
         if before is None or abs(before.delay - delay) > before.half + half + _TOLERATED:
             return None
         self._odd = None

@@ -183,6 +183,13 @@ def test_other_columns_are_refused_with_the_channel_and_the_version(tmp_path, mo
     monkeypatch.setattr(writer.McapWriter, "_register", register)
     monkeypatch.setattr(writer.McapWriter, "changed", (b"# When", b"# At what time"), raising=False)
     assert write_one(tmp_path, "/action", row(ACTION, 1.0, 0)).rows("action")["time_s"] == 1.0
+    without_last = (b"uint8 ACTION_STOP_TURNING=8\n", b"")  # as before this action existed
+    monkeypatch.setattr(writer.McapWriter, "changed", without_last)
+    assert write_one(tmp_path, "/action", row(ACTION, 1.0, 0)).rows("action")["time_s"] == 1.0
+    other_meaning = (b"ACTION_FOLLOW=4", b"ACTION_FOLLOW=5")
+    monkeypatch.setattr(writer.McapWriter, "changed", other_meaning)
+    with pytest.raises(RecordError, match="of /action have other columns"):
+        write_one(tmp_path, "/action", row(ACTION, 1.0, 0))
     monkeypatch.setattr(writer.McapWriter, "changed", (b"float64 age_s", b"float64 age_ms"))
     with pytest.raises(RecordError, match=r"of /sample have other columns .* companion 0\.0\.7"):
         write_one(tmp_path, "/action", row(ACTION, 1.0, 0))

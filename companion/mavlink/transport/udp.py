@@ -44,12 +44,12 @@ class UdpAddress(NamedTuple):
     Attributes:
         family: address family of the socket.
         address: socket address to bind or to send to.
-        named: the senders that the endpoint names.
+        named_peers: the senders that the endpoint names.
     """
 
     family: socket.AddressFamily
     address: Any
-    named: NamedPeers
+    named_peers: NamedPeers
 
 
 async def udp_address(endpoint: UdpIn | UdpOut) -> UdpAddress:
@@ -67,8 +67,8 @@ async def udp_address(endpoint: UdpIn | UdpOut) -> UdpAddress:
             "IP address"
         ) from error
     family, _, _, _, address = found[0]
-    named = await resolve(endpoint.peers if isinstance(endpoint, UdpIn) else (), kind)
-    return UdpAddress(family, address, named)
+    named_peers = await resolve(endpoint.peers if isinstance(endpoint, UdpIn) else (), kind)
+    return UdpAddress(family, address, named_peers)
 
 
 class UdpTransport:
@@ -93,11 +93,11 @@ class UdpTransport:
     def __init__(
         self,
         endpoint: UdpIn | UdpOut,
-        at: UdpAddress,
+        addresses: UdpAddress,
         receiver: Receiver,
     ) -> None:
         self._endpoint, self._receiver = endpoint, receiver
-        self._family, self._address, self._named = at
+        self._family, self._address, self._named_peers = addresses
         self._loop = asyncio.get_running_loop()
         self._heard = False
         self._connected = False
@@ -110,24 +110,24 @@ class UdpTransport:
         self._timer = self._loop.call_later(PEER_SILENCE_S, self._check_peer)
 
     def _open(self) -> socket.socket:
-        opened = socket.socket(self._family, socket.SOCK_DGRAM)
+        sock = socket.socket(self._family, socket.SOCK_DGRAM)
         try:
-            opened.setblocking(False)
+            sock.setblocking(False)
             with contextlib.suppress(OSError):  # without stamps, the time of reading is used
-                opened.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
+                sock.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
             if isinstance(self._endpoint, UdpIn):
-                opened.bind(self._address)
+                sock.bind(self._address)
             else:
-                opened.connect(self._address)
+                sock.connect(self._address)
         except OSError as error:
-            opened.close()
+            sock.close()
             where = f"UDP {self._endpoint.host}:{self._endpoint.port}"
             raise EndpointError(f"{where}: {why_not_opened(error)}") from error
         self._connected = isinstance(self._endpoint, UdpOut)
         if self._connected:
-            self._peer = opened.getpeername()
-        watch(self._loop, opened.fileno(), self._read)
-        return opened
+            self._peer = sock.getpeername()
+        watch(self._loop, sock.fileno(), self._read)
+        return sock
 
     def _read(self) -> None:
         if not self._connected:
@@ -159,14 +159,14 @@ class UdpTransport:
         prove its claim (`Receiver.may_answer`).
         """
         who = host_and_port(address)
-        if not self._named.admit(address):
+        if not self._named_peers.admit(address):
             self._receiver.note_stranger(who)
             return False
         if address == self._peer and not self._receiver.claim_lapsed():
-            taken = self._receiver.receive(data, received_ns)  # it was only silent
+            accepted = self._receiver.receive(data, received_ns)  # it was only silent
         else:
-            taken = self._receiver.claim(data, received_ns, who)
-        return taken or self._receiver.may_answer(who)
+            accepted = self._receiver.claim(data, received_ns, who)
+        return accepted or self._receiver.may_answer(who)
 
     def _check_peer(self) -> None:
         self._timer = self._loop.call_later(PEER_SILENCE_S, self._check_peer)

@@ -105,13 +105,13 @@ class Client(ABC):
         Returns:
             The bytes, and the number of frames in them.
         """
-        taken = [self._waiting.popleft()]
-        size = len(taken[0])
+        frames = [self._waiting.popleft()]
+        size = len(frames[0])
         while self._waiting and size + len(self._waiting[0]) <= most:
             size += len(self._waiting[0])
-            taken.append(self._waiting.popleft())
+            frames.append(self._waiting.popleft())
         self._bytes -= size
-        return b"".join(taken), len(taken)
+        return b"".join(frames), len(frames)
 
     def _drop_waiting(self) -> None:
         """Drop all queued frames."""

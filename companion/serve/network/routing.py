@@ -29,7 +29,7 @@ class VehicleChannel(Protocol):
     """The channel to the vehicle, and to the nodes connected to its autopilot."""
 
     def put(self, frame: bytes, origin: Channel) -> None:
-        """Queue one whole frame of a client; see `Channel.put`."""
+        """Queue one whole frame of client `origin`, or drop and count it. Never block or raise."""
         ...
 
 
@@ -74,7 +74,8 @@ class Routing:
 
     Attributes:
         stats: counters of frames.
-        intercept: see `Intercept`; until it is set, nothing of a client is forwarded.
+        intercept: called with a client's frame before it is forwarded; returns whether it must not
+            be. Until it is set, nothing of a client is forwarded.
         on_own: called with each client's frame that only our component should receive, or None.
     """
 
@@ -126,7 +127,7 @@ class Routing:
     def from_client(self, client: Channel, frame: Frame) -> None:
         """Forward a client's frame, unless it is looped, for our component, or intercepted.
 
-        A looped frame (see `RoutingStats`) is dropped; one for our component goes to `on_own`.
+        A looped frame (`RoutingStats`) is dropped; a frame for our component goes to `on_own`.
         """
         source = source_of(frame)
         if (

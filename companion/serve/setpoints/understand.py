@@ -27,7 +27,8 @@ def understand(
         frame: frame of one of `SETPOINTS`.
         situation: present situation of the vehicle.
         targets: the autopilot and our component; a setpoint may be addressed to either.
-        body_yaw_is_relative: see `local_target`.
+        body_yaw_is_relative: whether a yaw in a body frame is relative to the present yaw
+            (ArduPilot) or to north (PX4).
 
     Raises:
         RefusedSetpoint: the setpoint is for another vehicle, contradictory, incomplete, not finite,
