@@ -1,6 +1,7 @@
 """The page of a flight, drawn and used in this process by NiceGUI's own simulated user."""
 
 import asyncio
+import sys
 from importlib.util import find_spec
 
 import pytest
@@ -105,20 +106,23 @@ class Page:
 
 def used(use, folder=None, path="/"):
     """Opens the page in this process and calls `use` with it."""
+    from nicegui.testing import user_simulation  # noqa: PLC0415  an extra
+
+    from companion.live.page.layout import add_page  # noqa: PLC0415  needs it
 
     async def serve():
-        from nicegui.testing import user_simulation  # noqa: PLC0415  an extra
-
         async with user_simulation() as user:
-            from companion.live.page.layout import add_page  # noqa: PLC0415  after the reset
-
             store = Store(Config())
             relay = Relay(store, folder)
             add_page(relay, store, Guard(None, TOKEN))
             await user.open(path)
             await use(Page(user, relay, store))
 
-    asyncio.run(serve())
+    ours = {name: each for name, each in sys.modules.items() if name.split(".")[0] == "companion"}
+    try:
+        asyncio.run(serve())
+    finally:
+        sys.modules.update(ours)  # the simulation takes out the module of the page and its parents
 
 
 def test_without_the_token_nothing_changes_and_nothing_is_saved_on_this_computer(tmp_path):
@@ -208,19 +212,19 @@ def test_changed_values_are_saved_in_the_folder_or_the_reason_is_told(tmp_path):
     assert "  max_climb_m_s: 1.5  # was 2.0\n" in (tmp_path / "changed.yaml").read_text()
 
 
-def test_new_states_and_events_are_pushed_once():
+def test_new_states_and_events_are_pushed_once(monkeypatch):
     pushed = []
 
     async def use(page):
         client = page.user.client
         client.run_javascript = pushed.append
-        client.on_air = True
-        type(client).has_socket_connection = property(lambda _: True)
+        monkeypatch.setattr(type(client), "has_socket_connection", property(lambda _: True))
         page.store.take({"kind": "status", "time_s": 1.0, "phase": "hover"})
         page.store.take({"kind": "event", "time_s": 1.0, "text": "maneuver: hover"})
         await page.until(lambda: len(pushed) > 2)
         page.store.take({"kind": "end", "text": "the flight is over"})
         await page.until(lambda: '"over": "the flight is over"' in pushed[-1])
+        monkeypatch.undo()
 
     used(use)
     assert sum('"phase": "hover"' in each for each in pushed) == 1
