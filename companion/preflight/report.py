@@ -30,7 +30,7 @@ _RESULTS = {
 
 
 def tables(config: Config, findings: Sequence[Finding]) -> RenderableType:
-    """One table for each result that occurred, the worst first, and a summary line."""
+    """A table for each result that occurred, the worst first, and a summary line."""
     parts: list[RenderableType] = []
     for result, (title, style) in _TITLES.items():
         matching = [finding for finding in findings if finding.result is result]

@@ -38,7 +38,7 @@ from companion.vehicle.link import Link
 
 _ENDS = "the vehicle is held, and control ends; then request control again"
 _TRY_AGAIN = 2.0
-"""After a failed takeover, time in which setpoints alone do not begin another one, s."""
+"""Time after a failed takeover in which setpoints alone begin no other takeover, s."""
 
 
 class ServedControl:

@@ -21,7 +21,7 @@ from companion.vehicle.link import Link
 
 _CHECK_PERIOD = 1.0
 _COUNTED = 0.1
-"""Time over which messages are counted after a request, s; short, as nobody uses the count."""
+"""Time over which messages are counted after a request, s; short, as nothing uses the count."""
 _STALE = 0.5
 """Largest age of a position or attitude that is used, s."""
 _MOST_APART = 0.3

@@ -11,7 +11,7 @@ _ATTITUDE = dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET
 _LOCAL = dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED
 _GLOBAL = dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT
 SETPOINTS = frozenset({_ATTITUDE, _LOCAL, _GLOBAL})
-"""The messages that command a motion."""
+"""Numbers of the messages that command a motion, an attitude or body rates."""
 
 
 def understand(
