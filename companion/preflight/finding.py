@@ -79,8 +79,7 @@ class Finding:
     """Result of one check.
 
     Attributes:
-        key: A `Key`, a parameter's newest name, or the key of a message rate (`companion.preflight.
-            finding`).
+        key: A `Key`, the newest name of a parameter, or the key of a message rate.
         result: Severity of the finding.
         found: The fact, as a clause.
         because: The consequence, or the effect of the parameter; may be empty.

@@ -84,10 +84,7 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
 def worst_reach(
     config: Config, maneuvers: ManeuverSequence, held: float, drag: Drag, *, brakes: bool
 ) -> Worst:
-    """The largest reach over the maneuvers, and the first breach of the fence.
-
-    `held`, `drag` and `brakes` are those of `LossFailsafe`.
-    """
+    """The largest reach over the maneuvers; `held`, `drag` and `brakes` as in `LossFailsafe`."""
     limits, safety = config.limits, config.safety
     fence = Fence(
         limits.fence_radius_m,
@@ -158,8 +155,9 @@ def _flown(
         reference = maneuvers.at(time, _START)
         if reference.closed_loop:
             place, velocity = reference.position_ned, reference.velocity_ned
-            thrust = _thrust(reference, drag)
-            later = _thrust(maneuvers.at(time + _AHEAD, _START), drag)
+            thrust = path_thrust(reference.acceleration_ned, velocity, drag)
+            ahead = maneuvers.at(time + _AHEAD, _START)
+            later = path_thrust(ahead.acceleration_ned, ahead.velocity_ned, drag)
             turn = tuple((b - a) / _AHEAD for a, b in zip(thrust, later, strict=True))
             size = hypot(*thrust)
             tilt = (thrust[0] / size, thrust[1] / size)
@@ -178,10 +176,6 @@ def _flown(
             0.0,
         )
         place = (place[0] + velocity[0] * period, place[1] + velocity[1] * period, place[2])
-
-
-def _thrust(reference: Reference, drag: Drag) -> Vector:
-    return path_thrust(reference.acceleration_ned, reference.velocity_ned, drag)
 
 
 def _tilt_step(
