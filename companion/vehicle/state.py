@@ -198,7 +198,8 @@ class VehicleState(ModeState, _Values):
 
     def _take_battery(self, voltage_v: float | None, percent: int) -> None:
         remaining = None if percent < 0 else percent / 100.0
-        self.battery = Battery(self._clock(), voltage_v, remaining)
+        newest = Battery(self._clock(), voltage_v, remaining)
+        self.battery = newest if self.battery is None else self.battery.replaced_by(newest)
 
     def _on_attitude_target(self, message: Message) -> None:
         if 0.0 <= message.thrust <= 1.0:
