@@ -1,17 +1,21 @@
 """The parts of a campaign's page, from small tables of results."""
 
+from math import isnan, nan
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pyarrow
 import pytest
 
+from companion.campaign import outcomes
 from companion.campaign.case import Fault
 from companion.campaign.flight import _BeginFault, _ending
 from companion.campaign.report import page, plots, tables
 from companion.campaign.report.results import Results
 from companion.campaign.report.sensitivity import Influence, influences
 from companion.campaign.report.statistics import choices
+from tests.campaign.test_campaign_file import load
 
 SAMPLED = {"sampled": True}
 
@@ -202,3 +206,39 @@ def test_a_fault_of_the_stream_begins_in_the_first_of_its_phases_once(phases):
 def test_how_a_flight_ended(mode, armed, touchdown, result, ending):
     state = {"mode": mode, "armed": armed, "touchdown_speed": touchdown}
     assert _ending(state, result) == ending
+
+
+def test_missing_cases_are_told_with_the_command_that_goes_on():
+    told = {"ok": [True]}
+    assert page.missing(results(told)) == []
+    assert page.missing(results(told, planned=3)) == [
+        "2 of 3 flights are missing. `companion campaign 'a [b]'` goes on with them."
+    ]
+
+
+def test_a_campaign_of_noise_alone_has_a_page_without_factors(tmp_path):
+    told = {"ok": [True, True], "position_rms_m": [0.1, 0.2], "rate_rms_rad_s": [0.5, 0.6]}
+    text = page.page_text(results(told), load(tmp_path, samples=2))
+    assert "Swept: nothing but noise and gusts." in text
+    assert "Success by factor" not in text
+    assert "Share of the variance" not in text
+
+
+def test_steps_without_a_time_constant_have_none():
+    class Summary:
+        def __init__(self, measured=None, marks=()):
+            self._measured, self.trace = measured, SimpleNamespace(maneuvers=marks)
+
+        def response(self):
+            return self._measured
+
+    assert outcomes.response(Summary()) == {}
+    axis = {"time_constant_north_s": 0.3, "time_constant_east_s": nan}
+    both = {"cross_axis_max": 0.01, "model_deviation_max": 0.02}
+    measured = SimpleNamespace(**axis, **both)
+    assert outcomes.response(Summary(measured)) == both | {"time_constant_s": 0.3}
+    measured.time_constant_north_s = nan
+    assert isnan(outcomes.response(Summary(measured))["time_constant_s"])
+    marks = (SimpleNamespace(vehicle_time=5.0, name="hover"),)
+    assert outcomes.activity([], Summary(), None) == {}
+    assert outcomes.activity([SimpleNamespace(time=4.0)], Summary(marks=marks), None) == {}

@@ -1,17 +1,19 @@
 """A run of a campaign on Dask: lost units, other versions, no worker yet, interruptions."""
 
 import os
+import re
 import signal
+import threading
 from contextlib import contextmanager
 
 import pytest
 from distributed import Client, KilledWorker, LocalCluster
 from distributed.client import FutureCancelledError
 
-from companion.campaign import cluster, engine, estimate, folder, outcomes, running, unit
+from companion.campaign import cluster, engine, estimate, folder, outcomes, running, store, unit
 from companion.campaign.cluster import ClusterError
 from companion.campaign.engine import Progress
-from companion.campaign.versions import VersionError, versions
+from companion.campaign.versions import VersionError, _version, versions
 from companion.cli.main import main
 from companion.files.yaml_file import ConfigError
 from tests.campaign.test_campaign_file import load, written
@@ -290,3 +292,65 @@ def test_progress_counts_what_earlier_runs_flew(tmp_path, dask, on_dask, capsys)
     assert shown[0] == 0
     assert sorted(shown[1:])[-1] == 3
     assert engine.run(dask, campaign, description, out) == Progress(flown=3)
+
+
+def test_a_termination_waits_until_the_cluster_is_made():
+    handled = []
+    before = signal.signal(signal.SIGTERM, lambda *_: handled.append("ended"))
+    try:
+        with cluster._terminations_later():
+            signal.raise_signal(signal.SIGTERM)
+            assert handled == []
+        assert handled == ["ended"]
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def test_outside_the_main_thread_signals_are_left_alone():
+    before, seen = signal.getsignal(signal.SIGTERM), []
+
+    def work():
+        with cluster._terminations_later():
+            seen.append(signal.getsignal(signal.SIGTERM))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert seen == [before]
+
+
+def test_a_new_campaign_has_a_folder_with_its_name_and_time_and_tells_of_few_samples(
+    tmp_path, on_dask, monkeypatch, capsys
+):
+    file = written(tmp_path, sweep={"mock.wind.speed_m_s": {"uniform": [2, 6]}}, samples=1)
+    monkeypatch.chdir(tmp_path)
+    assert main(["campaign", str(file), "--workers", "2"]) == 0
+    (out,) = (tmp_path / "runs" / "campaigns").iterdir()
+    assert re.fullmatch(r"test-\d{4}-\d\d-\d\dT\d\d-\d\d-\d\dZ", out.name)
+    told = capsys.readouterr().out
+    assert "samples is 1, so a single value of mock.wind.speed_m_s will be flown" in told
+
+
+def test_lists_and_truths_are_columns_of_their_own_kind(tmp_path):
+    campaign = load(
+        tmp_path,
+        sweep={
+            "flight.maneuvers": [["hover"], ["hover", "circle"]],
+            "flight.slow_down": [True, False],
+        },
+    )
+    rows = [row_of(case) for case in campaign.cases()]
+    table = store.table(campaign.file, rows)
+    assert table["flight.maneuvers"].to_pylist() == [
+        "hover",
+        "hover",
+        "hover,circle",
+        "hover,circle",
+    ]
+    assert table["flight.slow_down"].to_pylist() == [True, False] * 2
+    assert str(table.schema.field("flight.slow_down").type) == "bool"
+
+
+def test_a_package_that_is_not_there_is_a_version_too():
+    assert _version("no-such-package") == "not installed"
+    assert _version("numpy")[0].isdigit()

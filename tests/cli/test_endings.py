@@ -2,7 +2,9 @@
 
 import argparse
 import asyncio
+import contextlib
 import errno
+import io
 import json
 import os
 import signal
@@ -13,13 +15,15 @@ import pytest
 
 from companion.bench import flight, link, planner
 from companion.bench import serve as bench_serve
-from companion.cli import flights, flying
+from companion.cli import flights, flying, identify
 from companion.cli import main as entry
 from companion.cli import serve as serving
 from companion.cli.flying import page_about
 from companion.cli.main import main
 from companion.cli.run import run
 from companion.cli.text_streams import _transliterated
+from companion.config import Config
+from companion.config.files import changed, load, shipped
 from companion.extras import MissingExtraError
 from companion.files.yaml_file import ConfigError
 from companion.mavlink.errors import LinkError
@@ -236,3 +240,85 @@ def test_the_handlers_are_those_of_before_after_a_command():
     with pytest.raises(SystemExit):
         main(["--help"])
     assert {number: signal.getsignal(number) for number in before} == before
+
+
+class Beside:
+    """Stands for the helper process."""
+
+    feed = None
+
+    def serve_beside(self, work):
+        return "beside", work
+
+
+@pytest.mark.parametrize("beside", [None, Beside()])
+def test_a_flight_is_served_beside_its_helper(monkeypatch, tmp_path, beside):
+    ran = []
+    session = SimpleNamespace(changes="changes", note="note")
+    monkeypatch.setattr(flying, "Session", lambda *_, **__: session)
+    monkeypatch.setattr(flying, "fly_interruptibly", lambda each: ("flight", each))
+    monkeypatch.setattr(flying, "flight_table", lambda _: "table")
+    monkeypatch.setattr(flying, "words_text", lambda _: "words")
+    monkeypatch.setattr(flying, "closing_words", lambda *_: None)
+    summary = SimpleNamespace(as_dict=dict)
+    monkeypatch.setattr(flying.link_loop, "run", lambda work: (ran.append(work), summary)[1])
+    console = flying.FlightConsole(file=io.StringIO(), highlight=False)
+    config = changed(Config(), {"recording": {"report": False}}, "a test")
+    folder = tmp_path / "a [b]"
+    assert flying.fly(config, folder, console, beside=beside) is summary
+    flight = ("flight", session)
+    assert ran == [flight if beside is None else ("beside", flight)]
+    assert console.file.getvalue() == f"table\nRecorded in {folder}\nwords\n"
+    if beside is not None:
+        assert (beside.changes, beside.note) == ("changes", "note")
+
+
+@pytest.mark.parametrize("report", [True, False])
+@pytest.mark.parametrize("beside", [None, Beside()])
+def test_serve_writes_pages_if_asked_to_and_tells_its_counters(
+    monkeypatch, tmp_path, capsys, report, beside
+):
+    session = SimpleNamespace(changes="changes", records=SimpleNamespace(on_recorded=None))
+    monkeypatch.setattr(serving, "ServeSession", lambda *_: session)
+    monkeypatch.setattr(serving, "_until_stopped", lambda *told: ("serving", told[0]))
+    monkeypatch.setattr(serving, "helper", lambda *_, **__: contextlib.nullcontext(beside))
+    ran = []
+    monkeypatch.setattr(serving.link_loop, "run", lambda work: (ran.append(work), {"in": 7})[1])
+    config = tmp_path / "c.yaml"
+    config.write_text(f"recording: {{report: {str(report).lower()}}}\n")
+    assert main(["serve", "--config", str(config), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"in": 7}
+    assert (session.records.on_recorded is not None) is report
+    work = ("serving", session)
+    assert ran == [work if beside is None else ("beside", work)]
+    if beside is not None:
+        assert beside.changes == "changes"
+
+
+def test_a_folder_that_this_user_cannot_write_is_refused_before_the_flight(monkeypatch, tmp_path):
+    monkeypatch.setattr(identify.os, "access", lambda *_: False)
+    with pytest.raises(ConfigError, match=r"the folder .* cannot be written; name another one"):
+        identify._writable(tmp_path / "vehicle.yaml", force=False)
+    monkeypatch.setattr(identify.os, "access", lambda *_: True)
+    identify._writable(tmp_path / "vehicle.yaml", force=False)
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ([], {}),
+        (["--lockstep"], {"link": {"lockstep": True}}),
+        (["--slow-down"], {"flight": {"slow_down": True}}),
+        (["--arm"], {"flight": {"arm": True}}),
+        (["--endpoint", "udpin://127.0.0.1:1"], {"link": {"endpoint": "udpin://127.0.0.1:1"}}),
+    ],
+)
+def test_an_option_of_fly_replaces_its_key(monkeypatch, options, told):
+    flown = []
+    monkeypatch.setattr(flights, "flight_folder", lambda _: None)
+    monkeypatch.setattr(flights, "helper", lambda *_, **__: contextlib.nullcontext(None))
+    monkeypatch.setattr(flights, "_ended", lambda *_: 0)
+    monkeypatch.setattr(flying, "fly", lambda config, *_: flown.append(config))
+    config = shipped("px4.yaml")
+    assert main(["fly", "--config", str(config), *options]) == 0
+    assert flown == [changed(load(config), told, "a test")]

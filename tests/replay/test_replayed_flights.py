@@ -6,6 +6,7 @@ import subprocess
 import sys
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +17,9 @@ from pymavlink import mavutil
 from companion.attitude import BodyRates
 from companion.cli.main import main
 from companion.config.files import changed, load
+from companion.config.known_drag import prior_of
+from companion.drag import Drag
+from companion.guidance.drag_estimate import ANY_VEHICLE
 from companion.recording.flight_record import read_flight
 from companion.recording.mcap_file.channels import CHANNELS, WORDS
 from companion.recording.mcap_file.happenings import ValuesChange
@@ -295,6 +299,7 @@ class Loops:
     def __init__(self):
         self.asked = []
         self.command, self.offboard_active = None, False
+        self.estimate = SimpleNamespace(drag=self)
 
     def __getattr__(self, name):
         def asked(*told):
@@ -313,6 +318,8 @@ class Loops:
         ("hold_reference", None, "hold_reference"),
         ("follow", None, "follow"),
         ("give_up", None, "give_up"),
+        ("drag_prior", Drag(0.2, 0.1), "begin"),
+        ("drag_prior", None, "begin"),
     ],
 )
 def test_each_action_of_the_record_is_repeated(good, name, drag, asked):
@@ -320,7 +327,10 @@ def test_each_action_of_the_record_is_repeated(good, name, drag, asked):
     made = Replay(read_flight(folder), load(folder / "config.yaml"))
     made._loop = made._guidance = loops = Loops()
     made._act(RecordedAction(5.0, name, 0.25, drag))
-    assert [each[0] for each in loops.asked] == [asked]
+    ((found, *told),) = loops.asked
+    assert found == asked
+    if asked == "begin":
+        assert told == [ANY_VEHICLE if drag is None else prior_of(drag)]
     assert made._vehicle.offset == 0.25
 
 

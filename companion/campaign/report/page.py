@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import shlex
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -142,7 +143,7 @@ def missing(results: Results) -> list[str]:
         return []
     return [
         f"{left} of {results.planned} {results.noun} are missing. `companion campaign "
-        f"{results.folder}` goes on with them."
+        f"{shlex.quote(str(results.folder))}` goes on with them."
     ]
 
 
