@@ -1,5 +1,6 @@
 """A run of a campaign on Dask: lost units, other versions, no worker yet, interruptions."""
 
+import logging
 import os
 import re
 import signal
@@ -29,7 +30,7 @@ def row_of(case):
 @pytest.fixture(scope="module")
 def dask():
     """A client of a worker in this process."""
-    options = {"processes": False, "dashboard_address": None, "protocol": "inproc://"}
+    options = {"processes": False, "dashboard_address": "127.0.0.1:0", "protocol": "inproc://"}
     with (
         LocalCluster(n_workers=1, threads_per_worker=1, **options) as made,
         Client(made) as client,
@@ -354,3 +355,11 @@ def test_lists_and_truths_are_columns_of_their_own_kind(tmp_path):
 def test_a_package_that_is_not_there_is_a_version_too():
     assert _version("no-such-package") == "not installed"
     assert _version("numpy")[0].isdigit()
+
+
+def test_only_the_loggers_of_dask_are_silenced():
+    dasks, other = logging.getLogger("distributed.of_a_test"), logging.getLogger("of_a_test")
+    other.setLevel(logging.INFO)
+    cluster._silence()
+    assert not dasks.isEnabledFor(logging.CRITICAL)
+    assert other.level == logging.INFO

@@ -32,7 +32,7 @@ TUNE = FILE["tune"]
 
 @pytest.fixture(scope="module")
 def dask():
-    options = {"processes": False, "dashboard_address": None, "protocol": "inproc://"}
+    options = {"processes": False, "dashboard_address": "127.0.0.1:0", "protocol": "inproc://"}
     with (
         LocalCluster(n_workers=1, threads_per_worker=1, **options) as made,
         Client(made) as client,

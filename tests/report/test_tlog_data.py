@@ -9,7 +9,8 @@ from pymavlink.dialects.v20 import common as dialect
 from companion.config import Config
 from companion.mavlink.errors import LogError
 from companion.report.early_end import early_end
-from companion.report.flight_data import FlightData
+from companion.report.flight_data import FlightData, Span
+from companion.report.plots import time_axis
 from companion.report.tables import events_at_end, extremes
 from companion.report.timeline import timeline
 from companion.report.tlog_data import logged
@@ -160,3 +161,10 @@ def test_the_fence_lies_around_the_place_where_control_began():
 def test_a_fence_that_no_plot_shows_is_no_limit():
     assert fence("outside the polygon") is None  # it is given in degrees
     assert fence("40 m up, above limits.fence_ceiling_m", controlled=False) is None
+
+
+def test_a_time_axis_covers_the_longest_flight():
+    long, short = (FlightData("a", {}, phases=(Span(0.0, end, "hover"),)) for end in (9.0, 5.0))
+    empty = FlightData("b", {})
+    assert time_axis([short, long, empty])["xaxis"]["range"] == [0.0, 9.0]
+    assert "range" not in time_axis([empty])["xaxis"]
