@@ -13,7 +13,7 @@ from companion.tuning import ModelError, propose, stability
 from companion.tuning.flights import Flown
 from companion.tuning.margins import Margins
 from companion.tuning.search import largest_gain
-from companion.tuning.writing import proposal_text, summary_lines
+from companion.tuning.writing import _error, proposal_text, summary_lines
 
 
 def vehicle(lag, dead_time, slew=None):
@@ -124,3 +124,9 @@ def test_the_reason_of_a_gain_names_what_limits_it():
     capped = replace(quick, design=quick.design._replace(gain=20.0))
     assert "the largest gain that is searched, 20" in reason(capped)
     assert "because the rate loop needs " in reason(propose(vehicle(20.0, 15.0, 500.0)))
+
+
+def test_each_error_of_the_model_has_its_words():
+    assert _error(ModelError(delay=0.02)).startswith("with 20 ms of added delay, as while ")
+    assert _error(ModelError(time_factor=1.3)) == "with lag and dead time 30 % larger"
+    assert _error(ModelError(time_factor=0.7)) == "with lag and dead time 30 % smaller"
