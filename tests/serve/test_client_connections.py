@@ -198,7 +198,7 @@ def test_reading_from_a_tcp_client_that_floods_pauses_and_goes_on(run):
 
 def test_one_udp_client_too_many_is_ignored_until_a_silent_one_is_forgotten(run, monkeypatch):
     monkeypatch.setattr(udp, "_MOST_CLIENTS", 1)
-    monkeypatch.setattr(udp, "_SILENT", 0.2)
+    monkeypatch.setattr(udp, "_SILENT", 0.5)
 
     async def scene():
         async with network() as (net, _, _):
