@@ -8,7 +8,7 @@ import threading
 from contextlib import contextmanager
 
 import pytest
-from distributed import Client, KilledWorker, LocalCluster
+from distributed import KilledWorker
 from distributed.client import FutureCancelledError
 
 from companion.campaign import cluster, engine, estimate, folder, outcomes, running, store, unit
@@ -27,24 +27,9 @@ def row_of(case):
     return row | outcomes.unflown("ok") | {"ok": True}
 
 
-@pytest.fixture(scope="module")
-def dask():
-    """A client of a worker in this process."""
-    options = {"processes": False, "dashboard_address": "127.0.0.1:0", "protocol": "inproc://"}
-    with (
-        LocalCluster(n_workers=1, threads_per_worker=1, **options) as made,
-        Client(made) as client,
-    ):
-        yield client
-
-
 @pytest.fixture
-def on_dask(dask, monkeypatch):
+def on_dask(connected, monkeypatch):
     """Lets campaigns run on this worker; their flights take no time."""
-
-    @contextmanager
-    def connected(*_):
-        yield dask
 
     monkeypatch.setattr(running, "connected", connected)
     monkeypatch.setattr(unit, "fly_case", row_of)

@@ -1,12 +1,10 @@
 """The command `companion campaign tune`, with flights that take no time; and the first flights."""
 
-from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
 
 import pytest
-from distributed import Client, LocalCluster
 
 from companion.campaign import unit
 from companion.campaign.cluster import ClusterError
@@ -30,23 +28,9 @@ from tests.identification.test_fragment import PITCH, ROLL, VEHICLE
 TUNE = FILE["tune"]
 
 
-@pytest.fixture(scope="module")
-def dask():
-    options = {"processes": False, "dashboard_address": "127.0.0.1:0", "protocol": "inproc://"}
-    with (
-        LocalCluster(n_workers=1, threads_per_worker=1, **options) as made,
-        Client(made) as client,
-    ):
-        yield client
-
-
 @pytest.fixture
-def quick(dask, monkeypatch):
+def quick(connected, monkeypatch):
     """Candidates are flown by `row_of` on a worker in this process."""
-
-    @contextmanager
-    def connected(*_):
-        yield dask
 
     monkeypatch.setattr(command, "connected", connected)
     monkeypatch.setattr(command, "Search", partial(Search, learn=lambda _: None))
