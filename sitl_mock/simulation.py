@@ -34,6 +34,18 @@ class Simulation:
         settings: settings of this vehicle.
         system_id: MAVLink system id.
         plant: computes the physics, see `Vehicle`.
+
+    Attributes:
+        vehicle: the true vehicle.
+        state: what its autopilot estimates and does.
+        parameters: parameters of the autopilot.
+        stream: the offboard setpoints that it accepted.
+        commander: its arming and modes.
+        companion: link to the companion.
+        gcs: link to the ground station; nothing is sent on it if ``gcs_port`` is 0.
+        links: the links that are used.
+        faults: schedule of the faults.
+        effects: what the present faults do.
     """
 
     def __init__(

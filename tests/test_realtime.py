@@ -160,3 +160,35 @@ def test_the_priority_is_taken_last():
     """Else what takes long (the collection before the freeze) would be done at that priority."""
     taken = [name for name, *_ in realtime._requested_settings(Wishes(1, (0,), True, True))]
     assert taken[-1] == "scheduler"
+
+
+def test_another_error_of_the_kernel_is_told_without_the_permission(monkeypatch):
+    class Libc:
+        def mlockall(self, flags):
+            ctypes.set_errno(errno.EAGAIN)
+            return -1
+
+    def refuse(*_):
+        raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
+
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: Libc())
+    monkeypatch.setattr(os, "sched_setscheduler", refuse)
+    monkeypatch.setattr(os, "sched_setaffinity", refuse)
+    here = min(os.sched_getaffinity(0))
+    for wishes, words in (
+        (Wishes(lock_memory=True), os.strerror(errno.EAGAIN)),
+        (Wishes(fifo_priority=50), os.strerror(errno.EINVAL)),
+        (Wishes(processors=(here,)), os.strerror(errno.EINVAL)),
+    ):
+        assert refusals(wishes) == [words]
+
+
+def test_a_collector_that_the_caller_stopped_stays_stopped():
+    gc.disable()
+    try:
+        with asked_for(Wishes(freeze_gc=True)):
+            assert not gc.isenabled()
+        assert not gc.isenabled()
+    finally:
+        gc.enable()

@@ -140,11 +140,6 @@ class CampaignFile(Section):
             raise ValueError("faults need kind: flights")
         return self
 
-    @property
-    def has_samples(self) -> bool:
-        """Whether a factor is sampled."""
-        return any(swept.sampled for swept in self.sweep.values())
-
 
 def _swept_keys(sweep: dict[str, Swept]) -> "frozenset[str]":
     return frozenset(key for name, swept in sweep.items() for key in swept.keys or (name,))

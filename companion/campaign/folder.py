@@ -99,11 +99,14 @@ def read_description(folder: Path) -> Description:
     path = folder / _DESCRIPTION
     try:
         told = json.loads(read_text(path, _MOST_BYTES))
-        return Description(**{**told, "versions": as_versions(told["versions"])})
+        description = Description(**{**told, "versions": as_versions(told["versions"])})
+        if not (range(description.cases) and range(description.unit)):
+            raise ValueError("cases and unit must be positive")
     except FileRefusedError as error:
         raise ConfigError(f"{folder}: no campaign was begun here: {error}") from error
     except (ValueError, TypeError, KeyError, RecursionError) as error:
         raise ConfigError(f"{path}: is damaged") from error
+    return description
 
 
 def resume(folder: Path, campaign: Campaign) -> Description:

@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
         path, out = path / folder.FILE, path
     campaign = load(path)
     place = out or folder.new_path(campaign)
-    console = Console(highlight=False, soft_wrap=True)
+    console = Console(highlight=False, soft_wrap=True, markup=False)
     try:
         return _Run(campaign, place, options, console).run()
     except VersionError as error:
@@ -148,7 +148,7 @@ class _Run:
             words = estimate.size_in_words(self._campaign, cases * case_s / workers, workers)
         self._console.print(f"{words}; results in {self._place}")
         if warning := too_few_samples(self._campaign.file):
-            self._console.print(warning, markup=False)
+            self._console.print(warning)
         return description
 
     def _run_with_progress(self, client: "Client", description: Description) -> int:
@@ -166,15 +166,12 @@ class _Run:
         """Report how the run ended; return the exit code."""
         say = self._console.print
         for sentence in progress.lost[:_TOLD]:
-            say(f"not flown: {sentence}", markup=False)
+            say(f"not flown: {sentence}")
         if progress.flown < description.cases:
             return self._stopped(f"{len(progress.lost)} units were given up")
         errors = engine.internal_errors(self._place, self._campaign.file)
         for error, times in errors.most_common(_TOLD):
-            say(
-                f"{times} of the {self._noun} failed by the program's own fault: {error}",
-                markup=False,
-            )
+            say(f"{times} of the {self._noun} failed by the program's own fault: {error}")
         results = Results.read(self._place)
         say(f"{results.good.sum()} of {progress.flown} {self._noun} were good.")
         if results.documented.size:
@@ -188,7 +185,7 @@ class _Run:
     def _stopped(self, why: str) -> int:
         """Tell how to continue; return the exit code."""
         if not folder.begun(self._place):
-            self._console.print(f"{why}; nothing was begun", markup=False)
+            self._console.print(f"{why}; nothing was begun")
             return FAILED
         description = folder.read_description(self._place)
         units = ranges(description.cases, description.unit)
@@ -198,8 +195,7 @@ class _Run:
             command += f" --scheduler {self._options.scheduler}"
         self._console.print(
             f"{why}; the results of {kept} of {description.cases} {self._noun} are kept. Go on "
-            f"with\n  {command}",
-            markup=False,
+            f"with\n  {command}"
         )
         return FAILED
 

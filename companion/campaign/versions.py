@@ -63,9 +63,10 @@ def difference(ours: Versions, others: Versions) -> str:
     """The differences between two sets of versions, in words; empty if they are equal."""
     names = {"source": "the source of companion", "python": "Python"}
     return ", ".join(
-        f"{names.get(name, name)} {others.get(name, 'unknown')} instead of {ours[name]}"
-        for name in ours
-        if others.get(name) != ours[name]
+        f"{names.get(name, name)} {others.get(name, 'unknown')} instead of "
+        f"{ours.get(name, 'unknown')}"
+        for name in ours | others
+        if others.get(name) != ours.get(name)
     )
 
 

@@ -65,9 +65,11 @@ def study(options: argparse.Namespace) -> int:
     try:
         page, rows = runner.run(options.name, options.case, options.out, console, count)
     except KeyboardInterrupt:
-        console.print(f"Interrupted; the files in {options.out} are complete.", highlight=False)
+        console.print(
+            f"Interrupted; the files in {options.out} are complete.", highlight=False, markup=False
+        )
         return EXIT_FLIGHT
-    console.print(f"Open {page}", soft_wrap=True, highlight=False)
+    console.print(f"Open {page}", soft_wrap=True, highlight=False, markup=False)
     if options.json:
         print(json.dumps(rows, allow_nan=False))
     return EXIT_OK

@@ -33,7 +33,7 @@ _SECTIONS = ("vehicle", "thrust")
 
 def tune(options: argparse.Namespace) -> int:
     """Propose values, fly the proposal on the mock vehicle, and write it."""
-    console = Console(stderr=options.json, highlight=False, soft_wrap=True)
+    console = Console(stderr=options.json, highlight=False, soft_wrap=True, markup=False)
     source: Path = options.vehicle
     vehicle = source / _VEHICLE if source.is_dir() else source
     output = options.output or vehicle.with_name(_OUTPUT)

@@ -204,11 +204,7 @@ class ControlLoop:
         return BodyRates(*limit_rates(*command.body_rates, limits.tilt_rate, limits.yaw_rate))
 
     def _note_answer(
-        self,
-        sample: AttitudeSample,
-        command: GuidanceCommand,
-        rates: BodyRates,
-        thrust: float,
+        self, sample: AttitudeSample, command: GuidanceCommand, rates: BodyRates, thrust: float
     ) -> None:
         """Count and record a setpoint that was sent."""
         record, deadlines = self.record, self._deadlines
@@ -236,6 +232,12 @@ class ControlLoop:
         """Drop the newest command, so that nothing is sent until guidance makes another one."""
         self.command = None
         self._recorder.action("drop_command")
+
+    def stop_turning(self) -> None:
+        """Replace the rates of the newest command by zero, until guidance makes another one."""
+        if self.command is not None:
+            self.command = self.command.without_turning()
+        self._recorder.action("stop_turning")
 
     def restart_planner(self) -> None:
         """Reset the planner at the next sample, because its state is not valid any more."""

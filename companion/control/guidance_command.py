@@ -36,6 +36,10 @@ class GuidanceCommand(NamedTuple):
     later: Target | None = None
     period: float = 0.0
 
+    def without_turning(self) -> "GuidanceCommand":
+        """This command with zero body rates in place of the planner's."""
+        return self._replace(body_rates=BodyRates(0.0, 0.0, 0.0), is_step=False)
+
     def target_at(self, time: float) -> Target:
         """The target at `time`, s of event-loop time, interpolated from `target` to `later`."""
         before, after, elapsed = self.target, self.later, time - self.made_at

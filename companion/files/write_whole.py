@@ -80,7 +80,8 @@ def write_whole(path: Path, text: str, mode: int = 0o666) -> None:
     except OSError as error:  # it names the temporary file, or none where the disk is full
         raise OSError(error.errno, error.strerror, str(path)) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):  # what matters has been told above
+            temporary.unlink()
 
 
 def sync_folder(folder: Path) -> None:

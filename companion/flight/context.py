@@ -1,7 +1,7 @@
 """The flight context: the parts of one flight that every phase and the watch use."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
@@ -25,6 +25,9 @@ SLOWEST_HEARTBEAT = 3.0
 
 _POLL = 0.02
 """Period with which a condition is checked, s; telemetry is slower."""
+
+_LAST_SETPOINT = 0.1
+"""Longest wait for a sample that the last setpoint of a flight can answer, s."""
 
 _BACKLOG = 0.5
 """After a stall the backlog is drained within this time, s."""
@@ -72,6 +75,30 @@ class FlightContext:
         self.loop.on = False
         self.loop.offboard_active = self.loop.taking_over = False
         self.guidance_loop.stand_by()
+
+    async def stop(self, tasks: Iterable[asyncio.Task[Any]]) -> None:
+        """Stop the tasks beside the phases, then the setpoints, the last with zero body rates."""
+        try:
+            for task in tasks:
+                await cancel(task)
+            await self._stop_turning()
+        finally:
+            self.release()
+
+    async def _stop_turning(self) -> None:
+        """If the autopilot still obeys us, send zero body rates, because it keeps the last ones.
+
+        They answer the next sample; without one within `_LAST_SETPOINT`, nothing is sent. Guidance
+        must have stopped, because its next command would replace the zero rates.
+        """
+        loop = self.loop
+        if not (loop.on and loop.offboard_active):
+            return
+        loop.stop_turning()
+        sent = loop.record.setpoints
+        with suppress(TimeoutError):
+            async with asyncio.timeout(_LAST_SETPOINT):
+                await self.until(lambda: loop.record.setpoints > sent)
 
     async def until(self, condition: Callable[[], bool], detail: str | None = None) -> None:
         """Wait until `condition` holds; `detail` tells the user what the phase waits for."""

@@ -71,9 +71,7 @@ class Flight:
             await self._leave(ended.exit or self._usual_exit())
             return ended.reason
         finally:
-            self._context.release()
-            for task in helpers:
-                await cancel(task)
+            await self._context.stop(helpers)
         return "ok"
 
     def end(self, ended: FlightEnded) -> None:

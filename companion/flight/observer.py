@@ -56,22 +56,22 @@ class Several:
         self._observers = observers
 
     def phase(self, name: str, waits_for: str) -> None:
-        """Pass on."""
+        """Pass the phase on to each observer."""
         for observer in self._observers:
             observer.phase(name, waits_for)
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
-        """Pass on."""
+        """Pass the progress on to each observer."""
         for observer in self._observers:
             observer.waiting(name, detail, elapsed, timeout)
 
     def status(self, status: FlightStatus) -> None:
-        """Pass on."""
+        """Pass the state on to each observer."""
         for observer in self._observers:
             observer.status(status)
 
     def event(self, time: float, text: str) -> None:
-        """Pass on."""
+        """Pass the event on to each observer."""
         for observer in self._observers:
             observer.event(time, text)
 
@@ -121,7 +121,7 @@ class EventRecorder:
         self._tell(lambda observer: observer.phase(name, waits_for))
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
-        """Pass on."""
+        """Pass the progress on to the observer."""
         self._tell(lambda observer: observer.waiting(name, detail, elapsed, timeout))
 
     @property

@@ -181,7 +181,7 @@ def report_offboard_loss(context: FlightContext, values: Values) -> None:
     how_long = "an unknown time" if seconds is None else f"{seconds:g} s"
     context.note(
         f"offboard loss: if our setpoints stop, {autopilot.name} holds the last rates for "
-        f"{how_long} ({failsafe.parameter}); then {failsafe.then}"
+        f"{how_long} ({failsafe.parameter}); then {failsafe.action}"
     )
 
 

@@ -54,7 +54,7 @@ def require_backend(config: Config) -> None:
     """Check that the package of the link's backend is installed.
 
     Raises:
-        MissingExtraError: it is not.
+        MissingExtraError: the package is not installed.
     """
     if config.link.backend == "mavsdk":
         require("mavsdk", "mavsdk", "link.backend: mavsdk")

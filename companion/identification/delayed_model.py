@@ -52,11 +52,11 @@ class FirstOrder:
     lowest, highest = np.log([0.001]), np.log([1.0])
 
     def response(self, shape: Floats, commands: Knots, at: Floats) -> Floats:
-        """See `Model`."""
+        """The response of this lag; see `Model.response`."""
         return lagged(commands, exp(shape[0]), at)
 
     def decay(self, shape: Floats, since: Floats) -> Floats:
-        """See `Model`."""
+        """The free responses of this lag; see `Model.decay`."""
         return np.asarray(np.exp(-since / exp(shape[0])))[:, np.newaxis]
 
 
@@ -69,11 +69,11 @@ class SecondOrder:
     lowest, highest = np.log([0.002, 0.2]), np.log([1.0, 4.0])
 
     def response(self, shape: Floats, commands: Knots, at: Floats) -> Floats:
-        """See `Model`."""
+        """The response of this lag; see `Model.response`."""
         return second_order(commands, *frequency_damping(shape), at)
 
     def decay(self, shape: Floats, since: Floats) -> Floats:
-        """See `Model`."""
+        """The free responses of this lag; see `Model.decay`."""
         return second_order_decay(since, *frequency_damping(shape))
 
 

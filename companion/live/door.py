@@ -12,6 +12,8 @@ from companion.files.yaml_file import ConfigError
 PORT = 8090
 STREAM_PORT = 8765
 """Port of the live stream; Foxglove and Lichtblick propose this one."""
+_ANSWERS = 0.5
+"""Time allowed for the process of a flight that has just ended to answer, s."""
 _GIVES_WAY = 8.0
 """Time allowed for the process of an ended flight to release its port, s."""
 
@@ -145,13 +147,14 @@ def _bind(listening: socket.socket, host: str, port: int) -> None:
     Raises:
         OSError: another program uses the port.
     """
-    deadline, leaving = time.monotonic() + _GIVES_WAY, False
+    deadline, leaving = time.monotonic() + _ANSWERS, False
     while True:
         try:
             listening.bind((host, port))
-        except OSError:
-            leaving = leaving or ask_to_leave(port)
-            if not leaving or time.monotonic() > deadline:
+        except OSError as error:
+            if not leaving and ask_to_leave(port):
+                deadline, leaving = time.monotonic() + _GIVES_WAY, True
+            if error.errno != errno.EADDRINUSE or time.monotonic() > deadline:
                 raise
             time.sleep(0.05)
         else:

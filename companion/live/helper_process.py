@@ -59,7 +59,7 @@ class Relay:
 
         Raises:
             ConfigError: the values cannot be used.
-            ChangeRefusedError: the flight refuses them, or has ended.
+            ChangeRefusedError: the flight refuses them, cannot take them, or has ended.
             NoAnswerError: the flight did not answer in time; the change may be in force.
         """
         async with self._one_at_a_time:
@@ -81,14 +81,16 @@ class Relay:
         """Send a request and wait for the answer in words.
 
         Raises:
-            ChangeRefusedError: the flight refuses the request, or has ended.
+            ChangeRefusedError: the flight refuses the request, cannot take it, or has ended.
             NoAnswerError: the flight did not answer in time; the request may be in force.
         """
         number = next(self._ids)
         answer = self._asked[number] = asyncio.get_running_loop().create_future()
         try:
             if self.over.is_set() or not self._channel.send({**message, "id": number}):
-                raise ChangeRefusedError("the flight has ended; nothing has changed")
+                ended = self.over.is_set() or not self._channel.open
+                why = "the flight has ended" if ended else "the flight is too busy to take it"
+                raise ChangeRefusedError(f"{why}; nothing has changed")
             async with asyncio.timeout(_ANSWER):
                 told = await answer
         except TimeoutError as error:

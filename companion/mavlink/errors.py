@@ -69,8 +69,8 @@ class CommandRefused(LinkError):  # noqa: N818
         self.result = result
         self.result_name = result_name
         self.words = words
-        said = "; ".join(words) if words else "the autopilot gave no reason"
-        super().__init__(f"{command} was refused ({result_name}): {said}")
+        reason = "; ".join(words) if words else "the autopilot gave no reason"
+        super().__init__(f"{command} was refused ({result_name}): {reason}")
 
 
 class ParameterError(LinkError):

@@ -94,9 +94,9 @@ class SettlingSelector(HotSelector, ABC):
         self._when_idle: Callable[[], None] | None = None
         self._iterations = 0
 
-    def settle(self, then: Callable[[], None]) -> None:
-        """Call `then` once no callback or timer of the loop is ready; no I/O happens before."""
-        self._when_idle, self._iterations = then, 0
+    def settle(self, callback: Callable[[], None]) -> None:
+        """Call `callback`, without I/O, once no other callback or timer of the loop is ready."""
+        self._when_idle, self._iterations = callback, 0
 
     @property
     def settling(self) -> bool:
@@ -110,8 +110,8 @@ class SettlingSelector(HotSelector, ABC):
         # The loop polls with timeout 0 exactly when callbacks or timers are ready.
         self._iterations += 1
         if timeout != 0 or self._iterations > _MAX_ITERATIONS:
-            then, self._when_idle = self._when_idle, None
-            then()
+            callback, self._when_idle = self._when_idle, None
+            callback()
         return []
 
     @abstractmethod
@@ -204,9 +204,9 @@ class LockstepEventLoop(LinkEventLoop):
         """Move the clock to a beacon's time, s; return False for a repeated beacon."""
         return self._clock.advance(vehicle_time)
 
-    def settle(self, then: Callable[[], None]) -> None:
-        """Run all that is ready and due, without I/O, and then call `then`."""
-        self._stepping.settle(then)
+    def settle(self, callback: Callable[[], None]) -> None:
+        """Run all that is ready and due, without I/O, and then call `callback`."""
+        self._stepping.settle(callback)
 
 
 def run(main: Coroutine[Any, Any, T]) -> T:

@@ -61,25 +61,20 @@ class LinkEventLoop(asyncio.SelectorEventLoop):
 
     A hot callback runs between two iterations of the loop. Like any callback it may send, set
     futures or use `call_soon`. It must not raise and must not block.
+
+    Attributes:
+        hot_selector: Calls the hot readers.
     """
 
     def __init__(self, selector: HotSelector | None = None) -> None:
-        self._hot_selector = selector or HotSelector()
-        super().__init__(self._hot_selector)
-
-    def add_hot_reader(self, fd: int, callback: Callable[[], None]) -> None:
-        """Call `callback` as soon as `fd` is readable."""
-        self._hot_selector.serve(fd, callback)
-
-    def remove_hot_reader(self, fd: int) -> None:
-        """Stop watching `fd`."""
-        self._hot_selector.release(fd)
+        self.hot_selector = selector or HotSelector()
+        super().__init__(self.hot_selector)
 
 
 def watch(loop: asyncio.AbstractEventLoop, fd: int, callback: Callable[[], None]) -> None:
     """Call `callback` when `fd` is readable, in the fastest way that the loop has."""
     if isinstance(loop, LinkEventLoop):
-        loop.add_hot_reader(fd, callback)
+        loop.hot_selector.serve(fd, callback)
     else:
         loop.add_reader(fd, callback)
 
@@ -87,7 +82,7 @@ def watch(loop: asyncio.AbstractEventLoop, fd: int, callback: Callable[[], None]
 def unwatch(loop: asyncio.AbstractEventLoop, fd: int) -> None:
     """Undo `watch`."""
     if isinstance(loop, LinkEventLoop):
-        loop.remove_hot_reader(fd)
+        loop.hot_selector.release(fd)
     else:
         loop.remove_reader(fd)
 

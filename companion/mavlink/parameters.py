@@ -23,7 +23,6 @@ _READ = struct.Struct("<hBB16s")
 _BY_NAME = -1
 _MAX_NAME = 16
 
-_REAL32 = 9
 _INTEGERS = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}
 _ERRORS = {
     1: "the autopilot has no such parameter",
@@ -37,10 +36,6 @@ _ERRORS = {
 class _Value(NamedTuple):
     raw: bytes
     kind: int
-
-
-class _Refusal(NamedTuple):
-    code: int
 
 
 class ParameterClient:
@@ -63,8 +58,9 @@ class ParameterClient:
         registry: PendingRegistry,
         bytewise: Callable[[], bool],
     ) -> None:
-        self._settings, self._outbox, self._registry = settings, outbox, registry
-        self._waiting: dict[str, Pending[_Value | _Refusal]] = {}
+        self._outbox, self._registry = outbox, registry
+        self._target = settings.target_system, settings.target_component
+        self._waiting: dict[str, Pending[_Value | int]] = {}  # a value, or a MAV_PARAM_ERROR
         self._locks: dict[str, asyncio.Lock] = {}
         self._bytewise = bytewise
         router.subscribe_raw("PARAM_VALUE", self._on_value)
@@ -97,13 +93,7 @@ class ParameterClient:
         async with self._locks.setdefault(name, asyncio.Lock()):
             kind = (await self._ask(name, timeout_s, retries)).kind
             wanted = _Value(self._bytes(name, value, kind), kind)
-            payload = _SET.pack(
-                wanted.raw,
-                self._settings.target_system,
-                self._settings.target_component,
-                name.encode(),
-                kind,
-            )
+            payload = _SET.pack(wanted.raw, *self._target, name.encode(), kind)
             held = await self._exchange("PARAM_SET", payload, name, timeout_s, retries)
             if held != wanted:
                 raise ParameterRefused(
@@ -112,18 +102,13 @@ class ParameterClient:
             return self._number(held)
 
     async def _ask(self, name: str, timeout_s: float, retries: int) -> _Value:
-        payload = _READ.pack(
-            _BY_NAME,
-            self._settings.target_system,
-            self._settings.target_component,
-            name.encode(),
-        )
+        payload = _READ.pack(_BY_NAME, *self._target, name.encode())
         return await self._exchange("PARAM_REQUEST_READ", payload, name, timeout_s, retries)
 
     async def _exchange(
         self, message: str, payload: bytes, name: str, timeout_s: float, retries: int
     ) -> _Value:
-        with Pending[_Value | _Refusal](self._registry) as answers:
+        with Pending[_Value | int](self._registry) as answers:
             self._waiting[name] = answers
             try:
                 for _ in range(retries + 1):
@@ -132,8 +117,8 @@ class ParameterClient:
                         answer = await answers.next(timeout_s)
                     except TimeoutError:
                         continue
-                    if isinstance(answer, _Refusal):
-                        raise _refused(name, answer.code)
+                    if isinstance(answer, int):
+                        raise _refused(name, answer)
                     return answer
             finally:
                 del self._waiting[name]
@@ -170,21 +155,18 @@ class ParameterClient:
 
     def _on_value(self, payload: bytes) -> None:
         raw, _, _, name, kind = _VALUE.unpack_from(payload.ljust(_VALUE.size, b"\0"))
-        answers = self._waiting.get(_text(name))
+        text = name.split(b"\0", 1)[0].decode("ascii", errors="replace")
+        answers = self._waiting.get(text)
         if answers is not None:
             answers.put(_Value(raw, kind))
 
     def _on_error(self, message: Message) -> None:
         answers = self._waiting.get(message.param_id)
         if answers is not None:
-            answers.put(_Refusal(message.error))
+            answers.put(message.error)
 
 
 def _refused(name: str, code: int) -> UnknownParameter | ParameterRefused:
     reason = _ERRORS.get(code, f"error {code}")
     kind = UnknownParameter if code == 1 else ParameterRefused
     return kind(f"{name}: {reason}")
-
-
-def _text(raw: bytes) -> str:
-    return raw.split(b"\0", 1)[0].decode("ascii", errors="replace")

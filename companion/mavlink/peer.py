@@ -13,7 +13,7 @@ from companion.mavlink.stats import LinkStats
 from companion.mavlink.transport.endpoint import PeerAddress
 
 
-async def resolve(named: Sequence[PeerAddress], kind: socket.SocketKind) -> "NamedPeers":
+async def resolve(peers: Sequence[PeerAddress], kind: socket.SocketKind) -> "NamedPeers":
     """Look up the addresses of the peers that the endpoint names.
 
     Raises:
@@ -21,7 +21,7 @@ async def resolve(named: Sequence[PeerAddress], kind: socket.SocketKind) -> "Nam
     """
     loop = asyncio.get_running_loop()
     admitted: set[tuple[str, int | None]] = set()
-    for peer in named:
+    for peer in peers:
         try:
             found = await loop.getaddrinfo(peer.host, None, type=kind)
         except OSError as error:

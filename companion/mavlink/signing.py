@@ -6,7 +6,6 @@ SHA-256(key + frame + link id + time stamp); the time stamp counts 10 us since 2
 
 import hashlib
 import hmac
-import re
 import threading
 import time
 from collections import deque
@@ -39,17 +38,6 @@ until their stamps are newer than those in the file, for 15 s at most.
 """
 _LAST_WRITE_S = 2.0
 """Time allowed for the last write, s."""
-
-
-def key_from_hex(text: str) -> bytes:
-    """Convert 64 hexadecimal digits to a key.
-
-    Raises:
-        SigningError: The text is not 64 hexadecimal digits.
-    """
-    if not re.fullmatch(r"[0-9a-fA-F]{64}", text.strip()):
-        raise SigningError("a signing key is 64 hexadecimal digits (32 bytes)")
-    return bytes.fromhex(text.strip())
 
 
 def key_from_passphrase_file(path: Path) -> bytes:

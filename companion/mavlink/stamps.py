@@ -91,7 +91,7 @@ class StampJudge:
     ) -> None:
         self.remarks: list[str] = []
         self.changed = Event()
-        self._told: set[str] = set()
+        self._remarked: set[str] = set()
         self._elapsed = elapsed
         start = int((clock() - EPOCH_UNIX_S) * TICKS_PER_S)
         self._check_clock(start, kept.date)
@@ -196,15 +196,15 @@ class StampJudge:
                 f"released, so {_date(_PROGRAM_DATE)} is used; {SET_CLOCK}"
             )
 
-    def _remark_ahead(self, ticks: int, what: str) -> None:
+    def _remark_ahead(self, ticks: int, rest: str) -> None:
         days = _days(ticks)
         self._remark(
-            f"the vehicle's signatures are dated {days} ahead of this computer's date, {what}"
+            f"the vehicle's signatures are dated {days} ahead of this computer's date, {rest}"
         )
 
     def _remark(self, text: str) -> None:
-        if text not in self._told:
-            self._told.add(text)
+        if text not in self._remarked:
+            self._remarked.add(text)
             self.remarks.append(text)
 
 

@@ -63,30 +63,8 @@ class LinkStats:
     foreign_sources: set[tuple[int, int]] = field(default_factory=set)
 
 
-class SequenceTracker:
-    """Counts the gaps in one sender's sequence numbers (0..255, wrapping)."""
-
-    def __init__(self) -> None:
-        self._last: int | None = None
-
-    def missing(self, sequence: int) -> int:
-        """Number of frames missing before this one; −1 if it is repeated or up to 127 late."""
-        if self._last is None:
-            self._last = sequence
-            return 0
-        step = (sequence - self._last) & 0xFF
-        if step == 0 or step > 128:
-            return -1
-        self._last = sequence
-        return step - 1
-
-    def reset(self) -> None:
-        """Forget the last sequence number, after a reconnect."""
-        self._last = None
-
-
 class FrameCounter:
-    """Counts the vehicle's accepted frames and the gaps in its sequence numbers.
+    """Counts the vehicle's accepted frames and the gaps in its sequence numbers (0..255, wrapping).
 
     Args:
         stats: Takes the counts.
@@ -94,13 +72,13 @@ class FrameCounter:
 
     def __init__(self, stats: LinkStats) -> None:
         self._stats = stats
-        self._sequence = SequenceTracker()
+        self._last: int | None = None
         self._explained = 0
 
     def count(self, message_id: int, sequence: int) -> None:
         """Count one accepted frame."""
         stats = self._stats
-        missing = self._sequence.missing(sequence)
+        missing = self._missing(sequence)
         if missing < 0:
             stats.repeated += 1
         elif missing:
@@ -113,4 +91,12 @@ class FrameCounter:
 
     def reset(self) -> None:
         """Count no gap before the next frame, after a reconnect."""
-        self._sequence.reset()
+        self._last = None
+
+    def _missing(self, sequence: int) -> int:
+        """Number of frames missing before this one; −1 if it is repeated or up to 127 late."""
+        step = 1 if self._last is None else (sequence - self._last) & 0xFF
+        if step == 0 or step > 128:
+            return -1
+        self._last = sequence
+        return step - 1

@@ -8,7 +8,7 @@ from companion.mavlink.framing import build_frame
 from companion.mavlink.messages import CRC_EXTRA, Message, dialect, encode
 
 _CHUNK_CHARACTERS = 50
-_MOST_ID = 0xFFFF
+MOST_TEXT_NUMBER = 0xFFFF
 _KEPT = 100
 _SAME_WITHIN_S = 1.0
 
@@ -89,6 +89,24 @@ def _recent(texts: deque[StatusText], words: str, now: float) -> bool:
     return any(one.text == words for one in texts if one.time >= now - _SAME_WITHIN_S)
 
 
+def status_texts(text: str, severity: int, number: int) -> list[Message]:
+    """The STATUSTEXTs of an ASCII text: a long one in pieces of 50 characters, the last shorter.
+
+    Args:
+        text: the text.
+        severity: MAV_SEVERITY.
+        number: joins the pieces of one text, 1..65535; not used for a text of one piece.
+    """
+    if len(text) <= _CHUNK_CHARACTERS:
+        return [dialect.MAVLink_statustext_message(severity, text.encode("ascii"))]
+    return [
+        dialect.MAVLink_statustext_message(
+            severity, text[at : at + _CHUNK_CHARACTERS].encode("ascii"), number, order
+        )
+        for order, at in enumerate(range(0, len(text) + 1, _CHUNK_CHARACTERS))
+    ]
+
+
 class TextFrames:
     """Makes STATUSTEXT frames with texts of this program, for a log; they are not sent.
 
@@ -105,20 +123,11 @@ class TextFrames:
 
     def frames(self, words: str) -> list[bytes]:
         """The frames of a text, in ASCII, with at most 50 characters each, in order."""
-        text = ascii_for(words)
-        pieces = [
-            text[at : at + _CHUNK_CHARACTERS] for at in range(0, len(text) + 1, _CHUNK_CHARACTERS)
-        ]
-        # A piece with a zero byte ends a text; a text of one piece has no number.
-        number = 0
-        if len(pieces) > 1:
-            number = self._id = self._id % _MOST_ID + 1
-        return [self._frame(piece, number, order) for order, piece in enumerate(pieces)]
+        self._id = self._id % MOST_TEXT_NUMBER + 1
+        texts = status_texts(ascii_for(words), dialect.MAV_SEVERITY_INFO, self._id)
+        return [self._frame(message) for message in texts]
 
-    def _frame(self, piece: str, number: int, order: int) -> bytes:
-        message = dialect.MAVLink_statustext_message(
-            dialect.MAV_SEVERITY_INFO, piece.encode("ascii"), number, order
-        )
+    def _frame(self, message: Message) -> bytes:
         kind = message.get_msgId()
         self._sequence = (self._sequence + 1) & 0xFF
         return build_frame(

@@ -12,6 +12,16 @@ from companion.vehicle.parameter_rules import CheckResult
 
 Check = Callable[[Config, Evidence], Iterator[Finding]]
 
+ONCE: tuple[Check, ...] = (
+    offboard_loss,
+    configuration_checks.planner,
+    configuration_checks.dead_time,
+    configuration_checks.doubtful,
+    configuration_checks.tilt_compensation,
+    configuration_checks.accepted,
+)
+"""Checks that a flight runs only once, because the vehicle's state does not change their result."""
+
 CHECKS: tuple[Check, ...] = (
     link_checks.signing,
     vehicle_checks.version,
@@ -30,28 +40,12 @@ CHECKS: tuple[Check, ...] = (
     clock_checks.age,
     clock_checks.clocks,
     parameters,
-    offboard_loss,
-    configuration_checks.planner,
-    configuration_checks.dead_time,
-    configuration_checks.doubtful,
-    configuration_checks.tilt_compensation,
-    configuration_checks.accepted,
+    *ONCE,
 )
-
-
-ONCE: tuple[Check, ...] = (
-    offboard_loss,
-    configuration_checks.planner,
-    configuration_checks.dead_time,
-    configuration_checks.doubtful,
-    configuration_checks.tilt_compensation,
-    configuration_checks.accepted,
-)
-"""Checks that a flight runs only once, because the vehicle's state does not change their result."""
 
 
 def run_checks(config: Config, evidence: Evidence, *, again: bool = False) -> list[Finding]:
-    """Run all checks; return every finding, including safe ones; `again` skips those in `ONCE`."""
+    """Run all checks, but with `again` not those in `ONCE`; return all findings, also safe ones."""
     return [
         finding
         for check in CHECKS
@@ -73,7 +67,7 @@ def not_accepted(config: Config, findings: Iterable[Finding]) -> list[Finding]:
 
 
 def overall_result(config: Config, findings: Iterable[Finding]) -> CheckResult:
-    """The worst result that would stop `companion fly`; safe if there is none."""
+    """The worst result that would stop `companion fly`; SAFE if there is none."""
     findings = tuple(findings)
     results = {finding.result for finding in findings}
     if CheckResult.NOT_CONNECTED in results:

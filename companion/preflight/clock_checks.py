@@ -15,8 +15,8 @@ SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.IN
 _MANY_NOT_NEWER = 0.2
 _SAMPLES_NEEDED = 10
 _SHAKES, _MAY_SHAKE = 0.3, 0.15
-"""Products of planner.gain_per_s and the round trip: from the first on, the attitude oscillates at
-the limit of the roll-pitch rate; from the second on, that of a slow vehicle may (mock vehicles).
+"""Products of planner.gain_per_s and the round trip, from mock vehicles. Above the first, attitude
+oscillates at the limit of the roll-pitch rate; above the second, that of a slow vehicle may.
 """
 
 
@@ -47,13 +47,14 @@ def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def round_trip(config: Config, seconds: float) -> Finding:
-    """Judge a round trip for the gain: the planner's answers come that late.
+    """Judge whether the gain is too high for a round trip of this many seconds.
 
-    In lockstep the vehicle waits, and the gain of a planner of another package means anything.
+    Setpoints reach the vehicle that late. Every round trip is safe in lockstep, where the vehicle
+    waits, and with a planner of another package, whose gain may mean something else.
     """
     gain = config.planner.gain_per_s
-    ours = config.planner_name in PLANNER_NAMES and not config.link.lockstep
-    product = gain * seconds if ours else 0.0
+    gain_matters = config.planner_name in PLANNER_NAMES and not config.link.lockstep
+    product = gain * seconds if gain_matters else 0.0
     late = product > _MAY_SHAKE
     return Finding(
         Key.ROUND_TRIP,

@@ -20,8 +20,8 @@ SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.IN
 
 def planner(config: Config, _: Evidence) -> Iterator[Finding]:
     """Whether `planner.name: auto` chose the planner for an identified vehicle."""
-    name, told = config.planner_name, config.planner.name
-    if told == AUTO and name == FIRST_ORDER:
+    name = config.planner_name
+    if config.planner.name == AUTO and name == FIRST_ORDER:
         yield Finding(
             Key.PLANNER,
             INEFFECTIVE,
@@ -35,10 +35,10 @@ def planner(config: Config, _: Evidence) -> Iterator[Finding]:
 
 
 def dead_time(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether this vehicle's newest flight with this planner and gain measured the configured one.
+    """Compare the configured dead times with those of this vehicle's newest flight.
 
-    With another gain the response of the same vehicle differs, and an oscillating hold gives a
-    wrong dead time.
+    Only flights with the same planner and gain count: with another gain the response of the same
+    vehicle differs, and an oscillating hold gives a wrong dead time.
     """
     if not config.vehicle.known:
         return
@@ -113,18 +113,18 @@ def accepted(config: Config, _: Evidence) -> Iterator[Finding]:
 
 
 def _newest_dead_times(config: Config, uid: str | None) -> tuple[Path | None, dict[str, float]]:
-    """The newest flight of this kind with dead times: folder, dead times in s.
+    """Folder of the newest comparable flight, and the dead times in s that it measured, by axis.
 
-    A flight counts if vehicle (hardware id), planner and gain are the same. Flights of vehicles
-    without an id count for each other.
+    A flight counts if vehicle (hardware id), planner and gain are the same. All vehicles without an
+    id count as the same. Without such a flight: None and no dead times.
     """
     kind = uid, config.planner_name, config.planner.gain_per_s
     for summary in sorted(config.recording.directory.glob("*/summary.json"), reverse=True):
         try:
-            told = json.loads(summary.read_text(encoding="utf-8"))
-            if (told.get("vehicle_uid"), told["planner"], told["gain_per_s"]) != kind:
+            flight = json.loads(summary.read_text(encoding="utf-8"))
+            if (flight.get("vehicle_uid"), flight["planner"], flight["gain_per_s"]) != kind:
                 continue
-            axes = {name: told["dead_time_s"][name] for name in ("roll", "pitch", "yaw")}
+            axes = {name: flight["dead_time_s"][name] for name in ("roll", "pitch", "yaw")}
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             continue  # of another program, or of a flight that was cut off
         known = {

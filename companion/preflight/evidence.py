@@ -31,12 +31,12 @@ class Stage(Enum):
 
 
 class Identity(NamedTuple):
-    """AUTOPILOT_VERSION; `None` where it was not received, or the hardware has no id.
+    """AUTOPILOT_VERSION; all `None` if it was not received.
 
     Attributes:
         version: Version of the flight software, such as 4.7.0-dev.
         capabilities: MAV_PROTOCOL_CAPABILITY.
-        uid: Hardware id.
+        uid: Hardware id in hexadecimal digits; `None` if the hardware has none.
     """
 
     version: str | None = None
@@ -162,7 +162,7 @@ class Evidence:
 
     @property
     def booting(self) -> bool:
-        """Whether no estimator status came lately; until the first, ArduPilot sends little else."""
+        """Whether no estimator status came lately: before its first one, ArduPilot sends little."""
         return self.state.readiness.estimator_flags is None
 
     @property

@@ -1,7 +1,8 @@
 """Findings of the preflight checks: fact, consequence, remedy, and source.
 
-A finding about a parameter has its name as key. A finding about a message rate has the key
-`link.streams.MESSAGE`, or that of the limit in section `link`. All other keys are listed here.
+A finding about a parameter has the parameter's name as key. A finding about a message rate has the
+key `link.streams.MESSAGE`, or, below a limit, the limit's: `link.min_attitude_rate_hz` or
+`link.min_position_rate_hz`. All other keys are listed here.
 """
 
 from dataclasses import dataclass
@@ -78,7 +79,7 @@ class Finding:
     """Result of one check.
 
     Attributes:
-        key: A `Key`, a parameter's (newest) name, or the key about a message rate (see above).
+        key: A `Key`, the newest name of a parameter, or the key of a message rate.
         result: Severity of the finding.
         found: The fact, as a clause.
         because: The consequence, or the effect of the parameter; may be empty.

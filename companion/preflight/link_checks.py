@@ -50,7 +50,7 @@ def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
                 f"link.{key}",
                 UNSAFE,
                 f"{name} {arrives}, less than link.{key} = {limit:g}",
-                "the flight would be controlled on data that is too old",
+                "the flight would be controlled with data that is too old",
                 trouble[1] if trouble else "raise the link's speed",
                 source="counted",
             )
@@ -76,7 +76,7 @@ def _even_rate(name: str, rate: StreamRate, evidence: Evidence) -> float:
 
 
 def _trouble(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, str] | None:
-    """The fault of a message's rate, and its remedy; None: no fault."""
+    """The fault of a message's rate, and the remedy; None: no fault."""
     asked, achieved = rate.asked, rate.achieved
     if rate.refusal:
         return f"{name} is refused ({rate.refusal})", "a newer version of the autopilot may send it"

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from math import isfinite
 from statistics import median
-from types import TracebackType
 
 from companion.attitude.representation import is_unit
 from companion.mavlink.framing import Frame
@@ -64,12 +63,7 @@ class LinkListener:
         ]
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._link.on_foreign = self._before
         for unsubscribe in self._unsubscribe:
             unsubscribe()
@@ -82,7 +76,7 @@ class LinkListener:
             return SampleTimes(len(self._stamps), unusable=self._unusable)
         (first, first_stamp), (last, last_stamp) = self._stamps[0], self._stamps[-1]
         known = len(self._stamps) >= _ENOUGH and last > first
-        held = HeldRates()
+        held, clock = HeldRates(), self._link.clock
         for earlier, later in pairs:
             held.add(later[0] - earlier[0])
         return SampleTimes(
@@ -91,8 +85,8 @@ class LinkListener:
             not_newer=sum(later[1] <= earlier[1] for earlier, later in pairs),
             unusable=self._unusable,
             clock_rate=(last_stamp - first_stamp) / (last - first) if known else None,
-            age=median(self._ages) if self._ages and self._link.clock.age_known else None,
-            clock_change=self._clock_change,
+            age=median(self._ages) if self._ages and clock.age_known else None,
+            clock_change=clock.last_change if clock.changes != self._clock_changes else "",
             rate=held.rate_since(HeldRates()) if known else None,
         )
 
@@ -116,11 +110,6 @@ class LinkListener:
             and frame.payload[_TYPE_AT : _TYPE_AT + 1] == _ONBOARD_CONTROLLER
         ):
             self._companions.add(source)
-
-    @property
-    def _clock_change(self) -> str:
-        clock = self._link.clock
-        return clock.last_change if clock.changes != self._clock_changes else ""
 
     def _on_attitude(self, message: Message) -> None:
         now, clock = self._clock(), self._link.clock

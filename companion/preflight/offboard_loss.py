@@ -100,39 +100,39 @@ def worst_reach(
     before: MotionAtLoss | None = None
     for time, flown in _flown(config, maneuvers, drag):
         if flown != before:  # in a hover the motion stays the same
-            before, there = flown, reach(flown, loss)
+            before, reached = flown, reach(flown, loss)
         breach, at = worst.breach, worst.time
         if breach is None:
-            breach, at = _breach(config, flown.offset, there, loss.fence), time
+            breach, at = _breach(config, flown.offset, reached, loss.fence), time
         worst = Worst(
-            max(worst.away, there.away),
-            max(worst.up, there.up),
-            max(worst.down, there.down),
+            max(worst.away, reached.away),
+            max(worst.up, reached.up),
+            max(worst.down, reached.down),
             breach,
             at,
         )
     return worst
 
 
-def _breach(config: Config, offset: Vector, there: Reach, fence: Fence) -> str | None:
+def _breach(config: Config, offset: Vector, reached: Reach, fence: Fence) -> str | None:
     """The breach of the fence at a place that the vehicle can reach from `offset`.
 
     Returns:
         The breach, as the end of a sentence; `None`: none.
     """
-    north, east = offset[0] + there.place[0], offset[1] + there.place[1]
+    north, east = offset[0] + reached.place[0], offset[1] + reached.place[1]
     distance = hypot(north, east)
-    outward = 1.0 + there.spread / distance if distance > 0.0 else 1.0
-    far: Vector = (north * outward, east * outward, offset[2])
+    outward = 1.0 + reached.spread / distance if distance > 0.0 else 1.0
+    farthest: Vector = (north * outward, east * outward, offset[2])
     if distance == 0.0:
-        far = (there.spread, 0.0, offset[2])
+        farthest = (reached.spread, 0.0, offset[2])
     height = config.flight.takeoff_height_m - offset[2]
-    for place, level in (
-        (far, height),
-        ((north, east, offset[2] - there.up), height),
-        ((north, east, offset[2]), height - there.down),
+    for place, its_height in (
+        (farthest, height),
+        ((north, east, offset[2] - reached.up), height),
+        ((north, east, offset[2]), height - reached.down),
     ):
-        breach = fence.breach(place, level, None)
+        breach = fence.breach(place, its_height, None)
         if breach is not None:
             return str(breach)
     return None
@@ -152,17 +152,18 @@ def _flown(
     tilt = (0.0, 0.0)
     for index in range(int(maneuvers.duration / period) + 1):
         time = index * period
-        told = maneuvers.at(time, _START)
-        if told.closed_loop:
-            place, velocity = told.position_ned, told.velocity_ned
-            thrust = _thrust(told, drag)
-            later = _thrust(maneuvers.at(time + _AHEAD, _START), drag)
+        reference = maneuvers.at(time, _START)
+        if reference.closed_loop:
+            place, velocity = reference.position_ned, reference.velocity_ned
+            thrust = path_thrust(reference.acceleration_ned, velocity, drag)
+            ahead = maneuvers.at(time + _AHEAD, _START)
+            later = path_thrust(ahead.acceleration_ned, ahead.velocity_ned, drag)
             turn = tuple((b - a) / _AHEAD for a, b in zip(thrust, later, strict=True))
             size = hypot(*thrust)
             tilt = (thrust[0] / size, thrust[1] / size)
             yield time, MotionAtLoss(place, velocity, thrust, (turn[0], turn[1], turn[2]))
             continue
-        rates, tilt_after = _answer(told, tilt, gain, period)
+        rates, tilt_after = _tilt_step(reference, tilt, gain, period)
         thrust = tilted_thrust(*tilt)
         turn_north, turn_east = (hypot(*thrust) * rate for rate in rates)
         yield time, MotionAtLoss(place, velocity, thrust, (turn_north, turn_east, 0.0))
@@ -177,20 +178,21 @@ def _flown(
         place = (place[0] + velocity[0] * period, place[1] + velocity[1] * period, place[2])
 
 
-def _thrust(told: Reference, drag: Drag) -> Vector:
-    return path_thrust(told.acceleration_ned, told.velocity_ned, drag)
-
-
-def _answer(
-    told: Reference, tilt: tuple[float, float], gain: float, period: float
+def _tilt_step(
+    reference: Reference, tilt: tuple[float, float], gain: float, period: float
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Rates of the coefficients (north, east) now, 1/s, and the coefficients a period later."""
-    if told.coefficients is not None:
-        aim = told.coefficients
+    """Follow the tilt of an open-loop step for one period (s).
+
+    Returns:
+        Rates of change of the acceleration coefficients (north, east) now, 1/s; and the
+        coefficients at the end of the period.
+    """
+    if reference.coefficients is not None:
+        aim = reference.coefficients
         left = exp(-gain * period)
         north, east = (goal - now for goal, now in zip(aim, tilt, strict=True))
         after = (aim[0] - north * left, aim[1] - east * left)
         return (gain * north, gain * east), after
-    assert told.body_rates is not None
-    north, east = -told.body_rates.pitch, told.body_rates.roll
+    assert reference.body_rates is not None
+    north, east = -reference.body_rates.pitch, reference.body_rates.roll
     return (north, east), (tilt[0] + north * period, tilt[1] + east * period)

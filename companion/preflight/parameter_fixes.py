@@ -38,10 +38,13 @@ class Undo(Section):
     """Old value of each parameter, in the order in which they were set."""
 
     def meant_for(self, link: Link, identity: Identity) -> bool:
-        """Whether this is the vehicle whose parameters were changed."""
+        """Whether the vehicle on the link is the one whose parameters were changed.
+
+        A hardware id that either side does not know is not compared.
+        """
         same_hardware = None in (self.uid, identity.uid) or self.uid == identity.uid
-        told = self.autopilot, self.system
-        return same_hardware and told == (link.autopilot.name, link.settings.target_system)
+        vehicle = link.autopilot.name, link.settings.target_system
+        return same_hardware and (self.autopilot, self.system) == vehicle
 
 
 class UndoFile:
@@ -51,6 +54,9 @@ class UndoFile:
         directory: Folder for the file.
         link: Link to the vehicle.
         identity: The vehicle's AUTOPILOT_VERSION.
+
+    Attributes:
+        path: The file; it does not exist before the first `add`.
     """
 
     def __init__(self, directory: Path, link: Link, identity: Identity) -> None:
@@ -65,7 +71,7 @@ class UndoFile:
         )
 
     def add(self, parameter: str, old: float) -> None:
-        """Add an old value, unless the parameter has one; when this returns, it is on the disk.
+        """Write a parameter's old value to the file, unless the file has one of it already.
 
         Raises:
             ConfigError: the file cannot be written, so no parameter must be set.
@@ -167,8 +173,14 @@ async def apply_fixes(
 async def restore(link: Link, undo: Undo, report: Callable[[Outcome], None]) -> None:
     """Restore the values of the undo file, the last change first.
 
+    Args:
+        link: Link to the vehicle.
+        undo: Contents of the undo file.
+        report: Called with the outcome of each parameter.
+
     Raises:
-        VehicleArmedError, LinkLost: See `apply_fixes`.
+        VehicleArmedError: The vehicle is armed, or that is unknown; no more was set.
+        LinkLost: The connection was lost.
     """
     for parameter, old in reversed(undo.parameters.items()):
         require_disarmed(link)
@@ -199,6 +211,7 @@ def require_disarmed(link: Link) -> None:
 
 
 async def _set(link: Link, change: Change) -> Outcome:
+    """Set a parameter and read it back. Raises `LinkLost`."""
     try:
         await link.write_parameter(change.parameter, change.new)
         held = await link.read_parameter(change.parameter)

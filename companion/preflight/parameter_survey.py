@@ -43,14 +43,14 @@ class Survey(NamedTuple):
     Attributes:
         values: Values by newest name.
         names: Name of each in this autopilot, by newest name.
-        untold: Newest names of parameters without a value that the autopilot may have all the same:
+        unread: Newest names of the parameters that the autopilot may have although no value came:
             it did not report them as unknown.
         lossy: Whether the link lost frames during the survey, in either direction.
     """
 
     values: Values
     names: Mapping[str, str]
-    untold: frozenset[str] = frozenset()
+    unread: frozenset[str] = frozenset()
     lossy: bool = False
 
 
@@ -64,9 +64,9 @@ async def survey(
 ) -> Survey:
     """Read the rules' parameters, several at a time; ask again if the link loses frames.
 
-    An old name is requested only if the new one gave no value. A parameter without any answer is
-    requested in a second round, for longer, but only if frames were lost: on a good link this
-    autopilot does not have it, and the request only costs time.
+    An old name is requested only if the new one gave no value. Parameters without any answer are
+    requested in a second round, for longer, but only if frames were lost. Without losses, no answer
+    means that the autopilot lacks the parameter.
 
     Args:
         link: Link to the vehicle.
@@ -80,9 +80,9 @@ async def survey(
         LinkLost: The connection was lost.
     """
     rules, questions = tuple(rules), _Questions(link)
-    untold: frozenset[str] = frozenset()
+    unread: frozenset[str] = frozenset()
     if before is not None:
-        untold = before.untold
+        unread = before.unread
         rules = tuple(rule for rule in rules if rule.name in before.values)
         questions.leave_out(
             name for rule in rules for name in rule.names if name != before.names[rule.name]
@@ -90,11 +90,11 @@ async def survey(
     await questions.ask(rules, at_first)
     # An autopilot that answered nothing at all is a finding of its own.
     if questions.values and questions.lossy:
-        await questions.ask(questions.untold(rules), once_more)
+        await questions.ask(questions.unread(rules), once_more)
     return Survey(
         questions.values,
         questions.names,
-        untold.union(rule.name for rule in questions.untold(rules)),
+        unread.union(rule.name for rule in questions.unread(rules)),
         questions.lossy,
     )
 
@@ -130,8 +130,8 @@ class _Questions:
         """Do not request these names: the parameters have other names in this autopilot."""
         self._none.update(names)
 
-    def untold(self, rules: Iterable[ParameterRule]) -> list[ParameterRule]:
-        """The rules without a value, except those that the autopilot said it lacks."""
+    def unread(self, rules: Iterable[ParameterRule]) -> list[ParameterRule]:
+        """The rules without a value, except parameters that the autopilot reported as unknown."""
         return [
             rule
             for rule in rules

@@ -48,27 +48,27 @@ def parameters(config: Config, evidence: Evidence) -> Iterator[Finding]:
         return
     for rule in rules:
         if rule.vital and rule.name not in survey.values:
-            yield _missing(rule, evidence.autopilot.name)
-    yield from _untold(evidence)
+            yield _unknown(
+                rule,
+                f"the autopilot has no parameter {rule.name}, or did not send it",
+                "fix the link; if the autopilot really has no such parameter, update "
+                + evidence.autopilot.name,
+            )
+    yield from _unread(evidence)
     for found in judge(rules, survey.values, companion_settings(config)):
         yield _finding(found, survey.names[found.rule.name])
 
 
-def _missing(rule: ParameterRule, autopilot: str) -> Finding:
-    return Finding(
-        rule.name,
-        CheckResult.UNSAFE,
-        f"the autopilot has no parameter {rule.name}, or did not send it",
-        f"it is unknown {rule.meaning}",
-        f"fix the link; if the autopilot really has no such parameter, update {autopilot}",
-        rule.source,
-    )
+def _unknown(rule: ParameterRule, found: str, fix: str) -> Finding:
+    because = f"it is unknown {rule.meaning}"
+    return Finding(rule.name, CheckResult.UNSAFE, found, because, fix, rule.source)
 
 
-def _untold(evidence: Evidence) -> Iterator[Finding]:
+def _unread(evidence: Evidence) -> Iterator[Finding]:
     """Findings about parameters that were not received.
 
-    On a link that loses frames, one that every version has is unsafe. The others are only named.
+    On a link that loses frames, a missing parameter that every version has is unsafe. The other
+    missing parameters are only named.
     """
     survey = evidence.survey
     lossy = survey.lossy or evidence.link.loss > SOME_LOST
@@ -77,15 +77,9 @@ def _untold(evidence: Evidence) -> Iterator[Finding]:
     unread = [rule.name for rule in hidden]
     if lossy:
         for rule in hidden:
-            yield Finding(
-                rule.name,
-                CheckResult.UNSAFE,
-                f"{rule.name} was not received, and the link loses frames",
-                f"it is unknown {rule.meaning}",
-                "fix the link",
-                rule.source,
-            )
-        others = (rule.name for rule in rules if rule.name in survey.untold)
+            found = f"{rule.name} was not received, and the link loses frames"
+            yield _unknown(rule, found, "fix the link")
+        others = (rule.name for rule in rules if rule.name in survey.unread)
         unread = [name for name in others if name not in unread]
     if unread:
         yield Finding(
@@ -100,9 +94,9 @@ def _untold(evidence: Evidence) -> Iterator[Finding]:
 
 
 def _hidden(rule: ParameterRule, survey: Survey) -> bool:
-    """Whether the parameter may exist unread, perhaps under another version's name."""
+    """Whether the parameter, or the one that other versions have instead, may exist unread."""
     places = {rule.name, rule.instead}
-    return places.isdisjoint(survey.values) and not places.isdisjoint(survey.untold)
+    return places.isdisjoint(survey.values) and not places.isdisjoint(survey.unread)
 
 
 def _finding(found: ParameterFinding, name: str) -> Finding:

@@ -30,12 +30,12 @@ _RESULTS = {
 
 
 def tables(config: Config, findings: Sequence[Finding]) -> RenderableType:
-    """One table for each result that occurred, the worst first, and a summary line."""
+    """A table for each result that occurred, the worst first, and a summary line."""
     parts: list[RenderableType] = []
     for result, (title, style) in _TITLES.items():
-        of_it = [finding for finding in findings if finding.result is result]
-        if of_it:
-            parts.append(_table(title, style, of_it, config.flight.accept))
+        matching = [finding for finding in findings if finding.result is result]
+        if matching:
+            parts.append(_table(title, style, matching, config.flight.accept))
     return Group(*parts, _last_line(config, findings))
 
 
@@ -82,7 +82,7 @@ def outcome_line(outcome: Outcome) -> str:
 
 
 def as_dict(config: Config, findings: Sequence[Finding]) -> dict[str, Any]:
-    """The findings as JSON."""
+    """The findings for JSON; `doctor --json` prints them."""
     counts = {
         result.value: sum(finding.result is result for finding in findings) for result in _TITLES
     }
@@ -94,7 +94,7 @@ def as_dict(config: Config, findings: Sequence[Finding]) -> dict[str, Any]:
 
 
 def outcome_as_dict(outcome: Outcome) -> dict[str, Any]:
-    """The outcome of a change as JSON."""
+    """The outcome of a change for JSON."""
     return {**outcome.change._asdict(), "refusal": outcome.refusal or None}
 
 

@@ -100,17 +100,21 @@ def _warnings(link: Link, since: float) -> tuple[str, ...]:
 
 
 async def identify(link: Link) -> Identity:
-    """Request AUTOPILOT_VERSION; empty if it does not come. Raises `LinkLost`."""
+    """Request AUTOPILOT_VERSION; return an empty `Identity` if it does not come.
+
+    Raises:
+        LinkLost: The connection was lost.
+    """
     try:
-        told = await link.request_message("AUTOPILOT_VERSION")
+        received = await link.request_message("AUTOPILOT_VERSION")
     except (CommandRefused, LinkTimeout):
         return Identity()
-    number = told.flight_sw_version
+    number, uid, uid2 = received.flight_sw_version, received.uid, received.uid2
     version = ".".join(str(number >> shift & 0xFF) for shift in (24, 16, 8))
     return Identity(
         version=version + _RELEASES.get(number & 0xFF, ""),
-        capabilities=told.capabilities,
-        uid=bytes(told.uid2).hex() if any(told.uid2) else f"{told.uid:016x}" if told.uid else None,
+        capabilities=received.capabilities,
+        uid=bytes(uid2).hex() if any(uid2) else f"{uid:016x}" if uid else None,
     )
 
 
@@ -162,7 +166,7 @@ class PreflightSession:
         except LinkTimeout as error:
             return self.unanswered(error)
         except UnsupportedAutopilot as error:
-            return [_from_words(Key.SUPPORTED, CheckResult.UNSAFE, str(error))]
+            return [_from_error(Key.SUPPORTED, CheckResult.UNSAFE, error)]
         return []
 
     def unanswered(self, error: LinkError) -> list[Finding]:
@@ -170,7 +174,7 @@ class PreflightSession:
         hints = signing_findings(self._notices, CheckResult.NOT_CONNECTED)
         state = self.link.state
         if state.heartbeat is None:
-            return [*hints, _from_words(Key.HEARTBEAT, CheckResult.NOT_CONNECTED, str(error))]
+            return [*hints, _from_error(Key.HEARTBEAT, CheckResult.NOT_CONNECTED, error)]
         silence = Finding(
             Key.ANSWERS,
             CheckResult.NOT_CONNECTED,
@@ -205,13 +209,13 @@ class PreflightSession:
 
 @asynccontextmanager
 async def open_session(
-    config: Config, link_to: Callable[[Notice], Link]
+    config: Config, make_link: Callable[[Notice], Link]
 ) -> AsyncIterator[PreflightSession]:
     """Open the link. Until the session requests something, we send only heartbeats and TIMESYNC.
 
     Args:
         config: Configuration of the flight.
-        link_to: Makes the link; its argument is called with the link's notices.
+        make_link: Makes the link; its argument takes the link's notices.
 
     Raises:
         EndpointError: the endpoint cannot be opened.
@@ -219,10 +223,10 @@ async def open_session(
         LinkTimeout: the configuration demands lockstep, and the vehicle is not in lockstep.
     """
     notices: list[str] = []
-    async with link_to(notices.append) as link:
+    async with make_link(notices.append) as link:
         yield PreflightSession(config, link, notices)
 
 
-def _from_words(key: Key, result: CheckResult, words: str) -> Finding:
-    found, _semicolon, fix = words.partition("; ")
+def _from_error(key: Key, result: CheckResult, error: LinkError) -> Finding:
+    found, _semicolon, fix = str(error).partition("; ")
     return Finding(key, result, found, fix=fix, source="HEARTBEAT")

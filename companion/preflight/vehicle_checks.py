@@ -71,7 +71,7 @@ def motors(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def power(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether the battery allows a flight; see `battery`."""
+    """Whether the battery has enough charge; not ready while a booting vehicle reports none."""
     if evidence.booting and evidence.state.battery is None:
         yield Finding(
             Key.BATTERY, NOT_READY, "the vehicle has not reported its battery's charge yet"
@@ -101,7 +101,7 @@ def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
     if stage is Stage.AIRBORNE:  # its checks before arming are over
         ready = ready._replace(prearm_good=True)
     missing = evidence.autopilot.not_ready(ready)
-    said = "; ".join(dict.fromkeys(evidence.words))
+    texts = "; ".join(dict.fromkeys(evidence.words))
     if missing is not None:
         silent = evidence.awaited
         unsent = f", and does not send {', '.join(silent)} yet" if silent else ""
@@ -109,7 +109,7 @@ def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.READY,
             NOT_READY,
             f"not ready {stage.value}, it lacks {missing}{unsent}",
-            f"the autopilot says: {said}" if said else "",
+            f"the autopilot says: {texts}" if texts else "",
             "wait, or correct what the autopilot reports, and try again",
             "SYS_STATUS, estimator flags",
         )
@@ -117,8 +117,8 @@ def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
     flags = state.estimator.flags if state.estimator else 0
     found = f"ready {stage.value}, estimator flags 0x{flags:x}"
     yield Finding(Key.READY, SAFE, found, source="SYS_STATUS, estimator flags")
-    if said:
-        yield Finding(Key.WORDS, SAFE, f"the autopilot says: {said}", source="STATUSTEXT, EVENT")
+    if texts:
+        yield Finding(Key.WORDS, SAFE, f"the autopilot says: {texts}", source="STATUSTEXT, EVENT")
 
 
 def gps(_: Config, evidence: Evidence) -> Iterator[Finding]:
@@ -193,11 +193,11 @@ def estimator(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 def fence(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """Whether the vehicle stands inside a fence given by latitude and longitude."""
-    corners, told = config.safety.fence_polygon_deg, evidence.state.global_position
+    corners, position = config.safety.fence_polygon_deg, evidence.state.global_position
     if not corners:
         return
     source = "GLOBAL_POSITION_INT"
-    if told is None:
+    if position is None:
         yield Finding(
             Key.FENCE,
             NOT_READY if evidence.awaits_position else UNSAFE,
@@ -207,7 +207,7 @@ def fence(config: Config, evidence: Evidence) -> Iterator[Finding]:
             source,
         )
         return
-    here = Place(told.latitude_deg, told.longitude_deg)
+    here = Place(position.latitude_deg, position.longitude_deg)
     if inside(0.0, 0.0, local_polygon(corners, here)):
         yield Finding(Key.FENCE, SAFE, "the vehicle stands inside its fence", source=source)
         return

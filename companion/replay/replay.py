@@ -158,6 +158,8 @@ class Replay:
                 self._loop.drop_command()
             case "restart_planner":
                 self._loop.restart_planner()
+            case "stop_turning":
+                self._loop.stop_turning()
             case "drag_prior":
                 prior = ANY_VEHICLE if entry.drag is None else prior_of(entry.drag)
                 guidance.estimate.drag.begin(prior)

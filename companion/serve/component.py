@@ -4,19 +4,20 @@ import asyncio
 import time
 from collections.abc import Callable
 
+from companion.files.ascii_text import ascii_for
 from companion.mavlink.commands import MAV_CMD_DO_SET_MODE
 from companion.mavlink.framing import Frame, build_frame
 from companion.mavlink.messages import CRC_EXTRA, Message, decode, dialect, encode
 from companion.mavlink.settings import MAV_TYPE_ONBOARD_CONTROLLER, LinkSettings
+from companion.mavlink.texts import MOST_TEXT_NUMBER, status_texts
 from companion.serve.network.addresses import Address
 from companion.serve.network.client import Client
 from companion.serve.network.network import Network
 from companion.serve.network.routing import Channel
 
 _HEARTBEAT_PERIOD = 1.0
-_TEXT_BYTES = 50
-"""Number of bytes of text in one STATUSTEXT; longer texts come in pieces."""
 _LONGEST_TEXT = 200
+"""Number of characters after which a text is cut."""
 _SAME_TEXT = 5.0
 """Shortest time between two equal texts to the same client, s."""
 _AUTOPILOT_INVALID, _STATE_ACTIVE, _VERSION = 8, 4, 3
@@ -52,14 +53,17 @@ class Component:
             await asyncio.sleep(_HEARTBEAT_PERIOD)
 
     def tell(self, text: str, severity: int = NOTICE) -> None:
-        """Send a text to all clients, and over the link to stations connected to the autopilot."""
+        """Send a text to all clients, and over the link to stations connected to the autopilot.
+
+        A text that was sent within the last 5 s is not sent again.
+        """
         if self._not_sent_lately(None, text):
             for piece in self._pieces(text, severity):
                 self._network.send(self._frame(piece))
                 self._to_vehicle(piece)
 
     def answer(self, client: Client, text: str, severity: int = WARNING) -> None:
-        """Send a text to one client, for example the reason of a refusal."""
+        """Send a text to one client, such as the reason of a refusal, but not twice within 5 s."""
         if self._not_sent_lately(client, text):
             for piece in self._pieces(text, severity):
                 self._network.send_to(client, self._frame(piece))
@@ -70,14 +74,14 @@ class Component:
         message = dialect.MAVLink_named_value_float_message(boot_ms, name.encode(), value)
         self._network.send(self._frame(message))
 
-    def acknowledge(self, client: Client, frame: Frame, result: int, by: Address) -> None:
+    def acknowledge(self, client: Client, frame: Frame, result: int, sender: Address) -> None:
         """Answer a client's command with a MAV_RESULT.
 
         Args:
             client: sender of the command.
             frame: COMMAND_LONG, COMMAND_INT or SET_MODE.
             result: result of the command.
-            by: component that answers; clients accept only an answer from the component they
+            sender: component that answers; clients accept only an answer from the component they
                 commanded.
         """
         command = decode(frame.message_id, frame.payload)
@@ -87,7 +91,7 @@ class Component:
             target_system=frame.system,
             target_component=frame.component,
         )
-        self._network.send_to(client, self._frame(message, by))
+        self._network.send_to(client, self._frame(message, sender))
 
     def on_own(self, client: Channel, frame: Frame) -> None:
         """Refuse a command addressed only to our component, which carries out no commands."""
@@ -103,22 +107,12 @@ class Component:
         return True
 
     def _pieces(self, text: str, severity: int) -> list[Message]:
-        """STATUSTEXTs of one text; a long text becomes numbered pieces, the last one short."""
-        words = text.encode("ascii", "replace")[:_LONGEST_TEXT]
-        if len(words) <= _TEXT_BYTES:
-            return [dialect.MAVLink_statustext_message(severity, words)]
-        self._text_id = self._text_id % 0xFFFF + 1
-        cuts = range(0, len(words) + 1, _TEXT_BYTES)
-        return [
-            dialect.MAVLink_statustext_message(
-                severity, words[at : at + _TEXT_BYTES], self._text_id, number
-            )
-            for number, at in enumerate(cuts)
-        ]
+        self._text_id = self._text_id % MOST_TEXT_NUMBER + 1
+        return status_texts(ascii_for(text)[:_LONGEST_TEXT], severity, self._text_id)
 
-    def _frame(self, message: Message, by: Address | None = None) -> bytes:
+    def _frame(self, message: Message, sender: Address | None = None) -> bytes:
         number, signing = message.get_msgId(), self._settings.signing
-        system, component = by or self._own
+        system, component = sender or self._own
         frame = build_frame(
             number,
             encode(message),

@@ -8,6 +8,7 @@ from companion.flight.changes import Changes
 from companion.flight.environment import Environment
 from companion.flight.observer import Observer
 from companion.mavlink.framing import Frame
+from companion.preflight.session import wanted_rates
 from companion.serve.component import Component
 from companion.serve.flight_records import FlightRecords
 from companion.serve.kept_fence import KeptFence
@@ -21,17 +22,23 @@ from companion.serve.network.addresses import Address, source_of, target_of
 from companion.serve.network.client import Client
 from companion.serve.ownership import Ownership
 from companion.serve.programs import Program, Programs
-from companion.serve.served_flight import ACCEPTED, IN_PROGRESS, REJECTED, Asked, ServedFlight
+from companion.serve.served_flight import (
+    ACCEPTED,
+    IN_PROGRESS,
+    REJECTED,
+    ControlRequest,
+    ServedFlight,
+)
 from companion.serve.setpoints.approach import UnplannableError
 from companion.serve.setpoints.request import RefusedSetpoint, Request
-from companion.serve.setpoints.understand import SETPOINTS, Setpoints
+from companion.serve.setpoints.understand import SETPOINTS, understand
 from companion.serve.situation import SituationKeeper
 from companion.vehicle.autopilot import ControlEntry, Role
 from companion.vehicle.link import Link
 
-_ENDS = "the vehicle is held, and control ends"
+_ENDS = "the vehicle is held, and control ends; then request control again"
 _TRY_AGAIN = 2.0
-"""After a failed takeover, time in which setpoints alone do not begin another one, s."""
+"""Time after a failed takeover in which setpoints alone begin no other takeover, s."""
 
 
 class ServedControl:
@@ -70,7 +77,7 @@ class ServedControl:
         self._unfinished: set[asyncio.Task[None]] = set()
         ids = link.settings
         self._autopilot = Address(ids.target_system, ids.target_component)
-        self._own = Address(ids.source_system, ids.source_component)
+        self._targets = self._autopilot, Address(ids.source_system, ids.source_component)
 
     @property
     def in_control(self) -> bool:
@@ -83,7 +90,7 @@ class ServedControl:
         return None if self._flight is None else self._flight.tracking_error
 
     def intercept(self, client: Client, frame: Frame) -> bool:
-        """Whether a client's frame, such as a setpoint, is handled here and not forwarded."""
+        """Handle a client's frame, such as a setpoint; return whether it must not be forwarded."""
         if frame.message_id in SETPOINTS:
             self._take_setpoint(client, frame)
             return True
@@ -94,19 +101,19 @@ class ServedControl:
         if for_autopilot and asks_for_control(frame, autopilot):
             self._take_control_request(client, frame)
             return True
-        if self._flight is not None and steers_in_our_mode(frame, autopilot):
-            self._component.answer(
-                client, f"refused: {self.ownership.owner} is in control; change the mode first"
-            )
+        flight, owner = self._flight, self.ownership.owner
+        if flight is None:
+            return False
+        if steers_in_our_mode(frame, autopilot):
+            self._component.answer(client, f"refused: {owner} is in control; change the mode first")
             self._answer(client, frame, REJECTED)
-            return True
-        if self._flight is not None and starves_control(frame, self.needed_rates()):
+        elif starves_control(frame, wanted_rates(self._config, self._link)):
             self._answer(client, frame, ACCEPTED)
-            return True
-        owner = self.ownership.owner
-        if self._flight is not None and isinstance(owner, Program) and owner.client is client:
-            self._flight.let_go = self._flight.let_go or leaves_control(frame)
-        return False
+        else:
+            if isinstance(owner, Program) and owner.client is client:
+                flight.released = flight.released or leaves_control(frame)
+            return False
+        return True
 
     async def close(self, reason: str) -> None:
         """Hand the vehicle back if a client has it; wait until that is done and recorded."""
@@ -120,15 +127,6 @@ class ServedControl:
         if self._task is not None:
             self._task.cancel()
 
-    def needed_rates(self) -> dict[str, float]:
-        """Rates that control needs, Hz by message name; the autopilot must be known."""
-        link = self._config.link
-        return {
-            **self._link.autopilot.wanted_rates,
-            "ATTITUDE_QUATERNION": link.attitude_rate_hz,
-            "LOCAL_POSITION_NED": link.position_rate_hz,
-        }
-
     def _take_setpoint(self, client: Client, frame: Frame) -> None:
         autopilot = self._link.state.autopilot
         if autopilot is None:
@@ -141,10 +139,9 @@ class ServedControl:
         now, owner = self._clock(), Program(client, source_of(frame))
         before = self.ownership.owner
         try:
-            setpoints = Setpoints(
-                self._autopilot, self._own, body_yaw_is_relative=autopilot.body_yaw_is_relative
+            request = understand(
+                frame, situation, self._targets, body_yaw_is_relative=autopilot.body_yaw_is_relative
             )
-            request = setpoints.understand(frame, situation)
             refusal = self.ownership.setpoint(owner, now)
             if refusal is None:
                 refusal = self._fly_request(owner, request, now)
@@ -157,10 +154,10 @@ class ServedControl:
             self._component.answer(client, f"setpoint refused: {refusal}")
 
     def _fly_request(self, owner: Program, request: Request, now: float) -> str | None:
-        """Pass a request to the flight, or begin one; return why it is not flown, or None.
+        """Pass a request to the flight, or begin a flight; return why it is refused, or None.
 
         Raises:
-            UnplannableError: no motion leads to it; the previous request stays in force.
+            UnplannableError: no motion leads to the request; the previous one stays in force.
         """
         flight = self._flight
         if flight is not None and not flight.ends and self.ownership.owner == owner:
@@ -169,11 +166,14 @@ class ServedControl:
         if flight is not None and flight.ends:
             return _ENDS
         if self._flight is None and self._may_begin(owner, now):
-            self._begin(owner, None)
+            self._begin(owner, None, from_ground=False)
         return None
 
     def _may_begin(self, owner: Program, now: float) -> bool:
-        """Whether setpoints alone give control: in ArduPilot's GUIDED, in the air."""
+        """Whether setpoints alone begin a flight now: in ArduPilot's GUIDED, in the air.
+
+        If the owner must do something first, this tells the owner.
+        """
         autopilot, state = self._link.autopilot, self._link.state
         if autopilot.control_entry is not ControlEntry.BY_FIRST_SETPOINT or now < self._not_before:
             return False
@@ -184,7 +184,7 @@ class ServedControl:
             return False
         if not self.ownership.streams(owner, now):
             return False
-        refusal = self._fence.refusal() or self.ownership.ask(owner, now)
+        refusal = self._fence.refusal() or self.ownership.request_control(owner, now)
         if refusal is not None:
             self._component.answer(owner.client, f"control refused: {refusal}")
         return refusal is None
@@ -192,7 +192,7 @@ class ServedControl:
     def _take_control_request(self, client: Client, frame: Frame) -> None:
         """Answer a command that requests control: by a takeover or a refusal."""
         now, owner = self._clock(), self._programs.sender_of(client, frame)
-        refusal, standing = self.ownership.ask(owner, now), not self._link.state.flying
+        refusal, standing = self.ownership.request_control(owner, now), not self._link.state.flying
         if refusal is None and self._flight is not None and self._flight.ends:
             refusal = _ENDS
         elif refusal is None and self._flight is None:
@@ -205,11 +205,11 @@ class ServedControl:
             self._component.answer(client, f"control refused: {refusal}")
             self._answer(client, frame, REJECTED)
         elif self._flight is None:
-            self._begin(owner, Asked(client, frame), from_ground=standing)
+            self._begin(owner, ControlRequest(client, frame), from_ground=standing)
         else:
             self._answer(client, frame, ACCEPTED if self.in_control else IN_PROGRESS)
 
-    def _begin(self, owner: Program, asked: Asked | None, *, from_ground: bool = False) -> None:
+    def _begin(self, owner: Program, command: ControlRequest | None, *, from_ground: bool) -> None:
         """Begin a flight under a client's control."""
         self._flight = flight = ServedFlight(
             str(owner),
@@ -225,15 +225,15 @@ class ServedControl:
             from_ground=from_ground,
         )
         flight.give(self._programs.newest(owner))
-        self._task = task = asyncio.create_task(self._fly(flight, asked))
+        self._task = task = asyncio.create_task(self._fly(flight, command))
         self._unfinished.add(task)
         task.add_done_callback(self._unfinished.discard)
 
-    async def _fly(self, flight: ServedFlight, asked: Asked | None) -> None:
+    async def _fly(self, flight: ServedFlight, command: ControlRequest | None) -> None:
         """Fly; complete the record while the next flight may already begin."""
         begun = False
         try:
-            begun = await flight.run(asked)
+            begun = await flight.run(command)
         finally:
             self.ownership.release()
             self._fence.keep(flight.fence_centre)

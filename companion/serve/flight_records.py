@@ -54,7 +54,7 @@ class FlightRecords:
             self._tap(time, frame)
 
     def new(self, config: Config) -> FlightFiles:
-        """The open record of a new flight; if it cannot be created, the flight has none.
+        """The open record of a new flight; if it cannot be created, it is a record without folder.
 
         Args:
             config: configuration at the beginning of the flight.
@@ -106,7 +106,7 @@ class FlightRecords:
         return FlightFiles(config, folder, self._environment, note, follows=False)
 
     async def _beside(self, work: Callable[[Argument], Result], argument: Argument) -> Result:
-        """Call `work` in a thread, so that a slow disk blocks nothing."""
+        """Call `work` in a thread, so that a slow disk blocks nothing; return its result."""
         if not self._environment.realtime:  # a virtual clock knows no threads
             return work(argument)
         return await asyncio.to_thread(work, argument)

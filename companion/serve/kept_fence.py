@@ -54,7 +54,10 @@ class KeptFence:
             self._kept, self._shift_when_kept = centre, self._resets.shift
 
     def refusal(self) -> str | None:
-        """Why control must not begin: outside the fence, or its place is not certain; else None."""
+        """Why control must not begin; None if it may.
+
+        The vehicle is outside the fence, or the place of the fence is not certain.
+        """
         position, kept = self._state.position, self.centre
         if kept is None or position is None:
             return None

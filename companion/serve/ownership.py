@@ -55,7 +55,7 @@ class Ownership:
         owner = self.owner
         if owner is not None and client != owner:
             if self._is_live(owner, now):
-                return f"{_name(owner)} is in control"
+                return f"{owner} is in control"
             self.owner = client
         stream = self._streams.setdefault(client, _Stream())
         stream.before, stream.newest = stream.newest, now
@@ -74,11 +74,11 @@ class Ownership:
         stream = self._streams[client]
         stream.newest = stream.before
 
-    def ask(self, client: Hashable, now: float) -> str | None:
+    def request_control(self, client: Hashable, now: float) -> str | None:
         """Give control to a client that requests it; return the reason of a refusal, or None."""
         owner = self.owner
         if owner is not None and owner != client and self._is_live(owner, now):
-            return f"{_name(owner)} is in control"
+            return f"{owner} is in control"
         if not self._is_live(client, now):
             return f"send setpoints first, every {1e3 * self._timeout:.0f} ms or more often"
         self.owner = client
@@ -116,7 +116,3 @@ class Ownership:
             for client, stream in self._streams.items()
             if client == self.owner or self._is_live(client, now)
         }
-
-
-def _name(client: Hashable) -> str:
-    return str(client)

@@ -28,7 +28,7 @@ class Programs:
         self._newest: dict[Program, Request] = {}  # in the order of their newest requests
 
     def keep(self, program: Program, request: Request) -> None:
-        """Keep a program's newest request; drop those of programs silent for longest."""
+        """Keep a program's newest request; of too many, drop those of programs silent longest."""
         self._newest.pop(program, None)
         self._newest[program] = request
         while len(self._newest) > _MOST:

@@ -28,7 +28,11 @@ class ReportPages:
         self._left = False
 
     def write(self, folder: Path) -> str:
-        """Write `report.html` about the flight in `folder`; return its path or fault, in words."""
+        """Write `report.html` about the flight in `folder`.
+
+        Returns:
+            A sentence with the path of the page, or with the reason why there is none.
+        """
         with self._turn:
             try:
                 return f"Report: {self._written(folder)}"

@@ -38,8 +38,8 @@ _LOOK_PERIOD = 0.05
 _VALUES_PERIOD = 0.5
 
 
-class Asked(NamedTuple):
-    """A command that requests control, and is not yet answered."""
+class ControlRequest(NamedTuple):
+    """A client's command that requests control, and is not yet answered."""
 
     client: Client
     frame: Frame
@@ -47,9 +47,6 @@ class Asked(NamedTuple):
 
 class ServedFlight:
     """Takes over, flies the requests of the owner, and hands back.
-
-    Attributes:
-        let_go: whether the owner has commanded another mode and so released control.
 
     Args:
         name: name of the owner.
@@ -61,8 +58,12 @@ class ServedFlight:
         environment: environment of the flight.
         records: makes the record of the flight.
         changes: changes of values in flight.
-        fence_centre: see `FlightContext`.
+        fence_centre: centre of the fence of an earlier flight; None: the fence is centred where
+            control begins.
         from_ground: whether the vehicle stands armed, and takes off first.
+
+    Attributes:
+        released: whether the owner has commanded another mode and so released control.
     """
 
     def __init__(
@@ -80,7 +81,7 @@ class ServedFlight:
         *,
         from_ground: bool = False,
     ) -> None:
-        self.let_go = False
+        self.released = False
         self._records, self._record = records, records.new(changes.begin_flight())
         self._recorder = self._record.recorder(observer)
         self._summary: Summary | None = None
@@ -146,17 +147,17 @@ class ServedFlight:
         """Hand the vehicle back."""
         self._assembled.flight.interrupt(reason)
 
-    async def run(self, asked: Asked | None) -> bool:
+    async def run(self, command: ControlRequest | None) -> bool:
         """Fly; return whether control had begun."""
         limited = self._changes.limited_by(change_refusal)
         with self._records.recording(self._record), limited:
             result = "left at once"
             self._record.begin_counting(self._link.stats)
             try:
-                result = await self._fly(asked)
+                result = await self._fly(command)
             finally:
                 self._assembled.close()
-                self._tell_end(asked, result)
+                self._tell_end(command, result)
                 self._summary = self._record.summary(
                     self._link.stats, self._assembled, self._recorder, result, self._records.grants
                 )
@@ -169,10 +170,14 @@ class ServedFlight:
         else:
             await self._records.keep(self._record, self._summary)
 
-    async def _fly(self, asked: Asked | None) -> str:
+    async def _fly(self, command: ControlRequest | None) -> str:
         """Fly and inform clients; return the result."""
-        beside = [self._follow_up(asked), self._send_values(), self._assembled.reporter.run()]
-        tasks = [asyncio.create_task(self._guarded(work)) for work in beside]
+        background = [
+            self._follow_up(command),
+            self._send_values(),
+            self._assembled.reporter.run(),
+        ]
+        tasks = [asyncio.create_task(self._guarded(work)) for work in background]
         try:
             with connected(self._link, self._assembled):
                 return await self._assembled.flight.run()
@@ -192,30 +197,30 @@ class ServedFlight:
         self._note_alarm(text)
         self._component.tell(text, WARNING)
 
-    def _tell_end(self, asked: Asked | None, result: str) -> None:
+    def _tell_end(self, command: ControlRequest | None, result: str) -> None:
         name = self._source.name
         if self._source.start_pose is not None:
             ended = "handed back" if result == "ok" else result
-            if self.let_go:
+            if self.released:
                 ended = "released by the client"
             self._component.tell(f"control by {name} has ended: {ended}")
             return
         self._component.tell(f"control was not given to {name}: {result}")
-        self._answer(asked, REJECTED)
+        self._answer(command, REJECTED)
 
-    async def _follow_up(self, asked: Asked | None) -> None:
+    async def _follow_up(self, command: ControlRequest | None) -> None:
         """Answer the client until control begins; then tell all clients when it falls silent."""
         while self._source.start_pose is None:
-            self._answer(asked, IN_PROGRESS)
+            self._answer(command, IN_PROGRESS)
             await asyncio.sleep(_PROGRESS_PERIOD)
-        self._answer(asked, ACCEPTED)
+        self._answer(command, ACCEPTED)
         self._component.tell(f"{self._source.name} is in control")
-        told = Control.LIVE
+        reported = Control.LIVE
         while True:
             now = self._ownership.control(self._clock())
-            if now is not told and now in (Control.LIVE, Control.HOLDING):
+            if now is not reported and now in (Control.LIVE, Control.HOLDING):
                 self._component.tell(f"{self._source.name}: {now.value}")
-                told = now
+                reported = now
             await asyncio.sleep(_LOOK_PERIOD)
 
     async def _send_values(self) -> None:
@@ -228,9 +233,9 @@ class ServedFlight:
                 self._component.value("trk_err_m", self.tracking_error)
             self._component.value("answer_ms", 1e-6 * self._assembled.trace.newest_latency_ns)
 
-    def _answer(self, asked: Asked | None, result: int) -> None:
-        if asked is not None:
-            self._component.acknowledge(*asked, result, self._autopilot)
+    def _answer(self, command: ControlRequest | None, result: int) -> None:
+        if command is not None:
+            self._component.acknowledge(*command, result, self._autopilot)
 
     def _heading(self) -> float:
         """The vehicle's heading without the jumps of estimator resets, rad."""

@@ -16,6 +16,7 @@ from companion.flight.observer import Observer, Silent, StateLogger
 from companion.mavlink.errors import LinkError
 from companion.mavlink.framing import Frame
 from companion.mavlink.peer import HEARTBEAT
+from companion.preflight.session import wanted_rates
 from companion.realtime import Wishes
 from companion.serve.component import Component
 from companion.serve.flight_records import FlightRecords
@@ -113,13 +114,13 @@ class ServeSession:
                 self._note(text)
 
         state_logger = StateLogger(link.state, note)
-        for name in ("HEARTBEAT", "CURRENT_MODE", "STATUSTEXT"):  # as a flight: none is told twice
+        for name in ("HEARTBEAT", "CURRENT_MODE", "STATUSTEXT"):  # the same as in a flight
             link.subscribe(name, lambda _: state_logger.log_changes())
 
     async def _serve(self, link: Link, network: Network) -> dict[str, Any]:
         component = Component(link.settings, network, link.send)
         permission = Permission(self._config.serve.trusted, link.settings.signing)
-        beside: list[Coroutine[Any, Any, None]] = [component.run(), self._tell_silence(link)]
+        background: list[Coroutine[Any, Any, None]] = [component.run(), self._tell_silence(link)]
         if self._config.serve.control:
             from companion.serve.control import ServedControl  # noqa: PLC0415  needs the extra
 
@@ -134,7 +135,7 @@ class ServeSession:
                 self.records,
                 self.changes,
             )
-            beside.append(keeper.keep_telemetry(self.control.needed_rates))
+            background.append(keeper.keep_telemetry(lambda: wanted_rates(self._config, link)))
         gate = _Gate(
             permission, component, self.control, network.routing, link.settings.target_system
         )
@@ -143,7 +144,7 @@ class ServeSession:
         for endpoint in self._config.serve.clients:
             self._note(f"clients at {endpoint}")
         self.network = network
-        tasks = [asyncio.create_task(each) for each in beside]
+        tasks = [asyncio.create_task(each) for each in background]
         try:
             await self._stop.wait()
         finally:
@@ -194,7 +195,7 @@ class _Gate:
         return self._control.intercept(client, frame)
 
     def on_own(self, client: Channel, frame: Frame) -> None:
-        """Take a frame addressed only to our component; setpoints are flown too."""
+        """Take a frame addressed only to our component: fly a setpoint, refuse a command."""
         if frame.message_id not in SETPOINTS or not self.intercept(client, frame):
             self._component.on_own(client, frame)
 

@@ -1,26 +1,35 @@
-"""The vehicle's position, yaw and local origin, for setpoints relative to the vehicle."""
+"""The vehicle's position and yaw, and the origin of its local frame, for clients' setpoints.
+
+The origin is estimated from pairs of local and global positions.
+"""
 
 import asyncio
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from math import cos, degrees, hypot, radians
 
 from companion.attitude import is_unit
 from companion.attitude.rotation import euler_angles
+from companion.guidance.fence import EARTH_RADIUS
+from companion.guidance.reference import Vector
 from companion.mavlink.codec import decode_attitude
 from companion.mavlink.errors import LinkError
 from companion.mavlink.messages import Message
 from companion.serve.network.network import Network
-from companion.serve.setpoints.origin import OriginEstimate
-from companion.serve.setpoints.request import Request, Situation, climbs
+from companion.serve.setpoints.request import Origin, Request, Situation, climbs
 from companion.vehicle.link import Link
 
 _CHECK_PERIOD = 1.0
 _COUNTED = 0.1
-"""Time over which messages are counted after a request, s; short, as nobody uses the count."""
+"""Time over which messages are counted after a request, s; short, as nothing uses the count."""
 _STALE = 0.5
 """Largest age of a position or attitude that is used, s."""
 _MOST_APART = 0.3
 """Largest time between a local and a global position of a pair, s."""
+_NEW_ORIGIN_WEIGHT = 0.05
+"""Weight of a new pair of positions; each pair is off by some centimetres."""
+_ORIGIN_MOVED = 2.0
+"""An origin this far from the estimate counts as newly set, m."""
 
 
 class SituationKeeper:
@@ -93,3 +102,52 @@ class SituationKeeper:
             message.alt * 1e-3,
             message.relative_alt * 1e-3,
         )
+
+
+class OriginEstimate:
+    """Averages the origin of the local frame over pairs of simultaneous positions.
+
+    Attributes:
+        origin: the estimate, or None before the first pair.
+    """
+
+    def __init__(self) -> None:
+        self.origin: Origin | None = None
+
+    def note(
+        self,
+        position_ned: Vector,
+        latitude: float,
+        longitude: float,
+        altitude: float,
+        height: float,
+    ) -> None:
+        """Take a pair of positions.
+
+        Args:
+            position_ned: position in the local frame, m.
+            latitude: latitude of the same place, degrees.
+            longitude: longitude of the same place, degrees.
+            altitude: altitude above mean sea level, m.
+            height: height above home, m.
+        """
+        north, east, down = position_ned
+        seen = Origin(
+            latitude - degrees(north / EARTH_RADIUS),
+            longitude - degrees(east / (EARTH_RADIUS * cos(radians(latitude)))),
+            altitude + down,
+            altitude - height,
+        )
+        known = self.origin
+        if known is None or _distance(known, seen) > _ORIGIN_MOVED:
+            self.origin = seen
+            return
+        self.origin = Origin(
+            *(a + _NEW_ORIGIN_WEIGHT * (b - a) for a, b in zip(known, seen, strict=True))
+        )
+
+
+def _distance(a: Origin, b: Origin) -> float:
+    north = radians(a.latitude - b.latitude) * EARTH_RADIUS
+    east = radians(a.longitude - b.longitude) * EARTH_RADIUS * cos(radians(a.latitude))
+    return hypot(north, east, a.altitude - b.altitude)

@@ -28,6 +28,7 @@ class ServedSource:
     Attributes:
         name: shown to the user.
         start_pose: pose of the vehicle when control began; None before.
+        resets: jumps of the autopilot's estimate, which are taken out of requests.
         failure: always None; a silent client does not count as a failure.
 
     Args:
@@ -88,7 +89,7 @@ class ServedSource:
         self._stopped = False
 
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
-        """The reference over time."""
+        """The reference over time; if the client is silent, the reference comes to rest."""
         self._vehicle = motion
         if self._ownership.control(now) is not Control.LIVE and not self._stopped:
             self._leave_direct(now)
@@ -98,7 +99,7 @@ class ServedSource:
         return self._motion.reference if direct is None else lambda _: direct
 
     def finished(self, now: float) -> bool:
-        """Whether nobody is in control any more."""
+        """Whether no client is in control any more: it released control, or was silent too long."""
         return self._ownership.control(now) not in _FLOWN
 
     def _leave_direct(self, now: float) -> None:

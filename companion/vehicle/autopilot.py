@@ -55,12 +55,12 @@ class OffboardLossFailsafe(NamedTuple):
 
     Attributes:
         parameter: Name of the parameter that sets how long it holds the last rates, s.
-        then: What it does after that time, in words.
+        action: What it does after that time, in words.
         brakes: Whether it then brakes the vehicle to a stop.
     """
 
     parameter: str
-    then: str
+    action: str
     brakes: bool
 
 

@@ -31,8 +31,8 @@ class VehicleClient:
         vehicle_clock: Computes how old a position is.
 
     Attributes:
-        settings: The argument `settings`.
-        stats: The argument `stats`.
+        settings: The endpoint, and the ids of the vehicle and of this program.
+        stats: Counters of the link.
         state: The vehicle's telemetry.
     """
 
@@ -68,7 +68,7 @@ class VehicleClient:
         return self.state.autopilot
 
     def subscribe(self, name: str, callback: Callable[[Message], None]) -> Unsubscribe:
-        """Call `callback` with each message of that name; call the result to unsubscribe.
+        """Call `callback` with each message of that name; return a function that ends this.
 
         Raises:
             UnknownMessage: The dialect has no such message.

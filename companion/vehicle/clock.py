@@ -63,11 +63,11 @@ class VehicleClock:
         self._quickest = self._newest = -inf
         self._received = self._late = 0.0
         self._misfits = MisfitRun()
-        self._told_unknown = self._told_outlier = False
+        self._reported_unknown = self._reported_outlier = False
 
     @property
     def age_known(self) -> bool:
-        """Whether ages are absolute. Otherwise an age is the delay beyond the quickest sample's."""
+        """Whether ages are absolute; otherwise they are relative to the quickest sample's age."""
         return self._lockstep or self.delay.known
 
     @property
@@ -161,10 +161,10 @@ class VehicleClock:
             now: Event-loop time, s.
         """
         self.delay.expire(now)
-        if now - self._began < _UNKNOWN_AFTER or self.age_known is not self._told_unknown:
+        if now - self._began < _UNKNOWN_AFTER or self.age_known is not self._reported_unknown:
             return
-        self._told_unknown = not self.age_known
-        if self._told_unknown:
+        self._reported_unknown = not self.age_known
+        if self._reported_unknown:
             self.on_event(
                 f"the age of telemetry is not known, because {self.delay.unknown.value}; "
                 "samples are judged late only by comparison with the quickest one"
@@ -227,8 +227,8 @@ class VehicleClock:
     def _drop_misfits(self) -> None:
         """Drop the misfits as outliers: the clock continues as before, or changes again."""
         ahead = sum(stamp.time > self._newest for stamp in self._misfits.stamps)
-        if ahead and not self._told_outlier:
-            self._told_outlier = True
+        if ahead and not self._reported_outlier:
+            self._reported_outlier = True
             by = self._misfits.most_ahead() - self._quickest
             self.on_event(
                 f"a sample stamped {by:.1f} s ahead of the vehicle's clock was dropped; such "

@@ -16,8 +16,8 @@ _UNSURE = 0.005
 """Uncertainty of a measured rate, s per s."""
 _NO_DRIFT = 0.005
 """If the offset rises by this (s) more than drift explains, the earlier samples were late, and the
-measurement of the rate restarts. Otherwise a backlog of 68 ms at the start (measured on PX4)
-would give a rate of 1.4 %, and samples would seem up to 79 ms old for 40 s.
+measurement of the rate restarts. Without a restart, a backlog of 68 ms at the start (measured on
+PX4) would give a rate of 1.4 %, and samples would seem up to 79 ms old for 40 s.
 """
 _PERIOD = 1.0
 _LEAST, _MOST = 5, 20
@@ -50,12 +50,6 @@ class ClockRate:
         self.slowest = -self._unsure
         self._noted: deque[tuple[float, float]] = deque(maxlen=_MOST + 1)
 
-    def _restart(self) -> None:
-        """Restart the measurement, because the noted offsets are of late samples."""
-        self._noted.clear()
-        self.rate, self._unsure = 0.0, MOST_DRIFT
-        self.slowest = -MOST_DRIFT
-
     def spread(self, seconds: float) -> float:
         """Difference between the fastest and the slowest possible clock after `seconds`, s."""
         return 2.0 * self._unsure * seconds
@@ -72,7 +66,9 @@ class ClockRate:
         if self._noted:
             then, before = self._noted[-1]
             if offset - before > MOST_DRIFT * (now - then) + _NO_DRIFT:
-                self._restart()
+                self._noted.clear()  # the noted offsets are of late samples
+                self.rate, self._unsure = 0.0, MOST_DRIFT
+                self.slowest = -MOST_DRIFT
         self.due = now + _PERIOD
         self._noted.append((now, offset))
         then, before = self._noted[0]
@@ -106,8 +102,8 @@ class _Exchange(NamedTuple):
 class TelemetryDelay:
     """The delay of the quickest sample, from the TIMESYNC exchange with the smallest error.
 
-    The error of an exchange is half its round trip. It grows with age: what looks like a slower
-    clock in the samples may be a growing queue.
+    The error of an exchange is half its round trip, and grows by `MOST_DRIFT` with its age, because
+    in the samples a growing queue looks like a slower clock.
 
     Attributes:
         known: Whether the delay is known.
@@ -139,14 +135,14 @@ class TelemetryDelay:
         Returns:
             How far TIMESYNC has fallen behind the samples' stamps, s; None: it has not.
         """
-        taken = _Exchange(now, half, delay)
+        exchange = _Exchange(now, half, delay)
         if -(half + _TOLERATED) <= delay <= _LONGEST:
             self._odd = None
             self.unknown = DelayUnknown.UNANSWERED
-            self._exchanges.append(taken)
+            self._exchanges.append(exchange)
             self.expire(now)
             return None
-        before, self._odd = self._odd, taken
+        before, self._odd = self._odd, exchange
         if before is None or abs(before.delay - delay) > before.half + half + _TOLERATED:
             return None
         self._odd = None
@@ -156,7 +152,10 @@ class TelemetryDelay:
         return None
 
     def largest_possible(self, before: float) -> float:
-        """The largest delay possible by the exchanges until the event-loop time `before`, s."""
+        """The largest delay possible by the exchanges until the event-loop time `before`, s.
+
+        Without such an exchange it is 0.
+        """
         earlier = [each for each in self._exchanges if each.at <= before]
         if not earlier:
             return 0.0

@@ -4,7 +4,7 @@ from enum import Enum
 from typing import NamedTuple
 
 JUMP = 0.05
-"""A stamp further ahead than this, s, is not drift; the simulators' clocks slip by up to 0.016."""
+"""A stamp further ahead of the clock than this, s, is no drift; simulators slip by up to 0.016."""
 TOGETHER = 0.1
 """Largest difference of offsets of samples that may belong to one clock, s."""
 _CONFIRMED_BY = 3

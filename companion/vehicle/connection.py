@@ -19,7 +19,7 @@ _BACKOFF_FIRST_S, _BACKOFF_MAX_S = 0.2, 3.0
 class Connection:
     """A connection that is opened again when it drops, with growing pauses.
 
-    When it drops, unsent frames are discarded, an incomplete frame is forgotten, and `dropped` is
+    When it drops, unsent frames and an incomplete frame received are discarded, and `dropped` is
     called.
 
     Args:

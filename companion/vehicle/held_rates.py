@@ -1,4 +1,4 @@
-"""The effective rate of setpoints, from the time for which the vehicle holds each of them."""
+"""The effective rate of setpoints or samples, from the time until each is replaced by the next."""
 
 _UNEVEN = 2.0
 """Largest ratio of the time-weighted mean interval Σg²/Σg to the mean interval for which the
@@ -7,7 +7,7 @@ effective rate equals the mean rate. With a larger ratio it is lower.
 
 
 class HeldRates:
-    """Sums over the intervals between consecutive setpoints.
+    """Sums over the intervals between consecutive setpoints or samples.
 
     Attributes:
         intervals: Number of intervals.
@@ -21,7 +21,7 @@ class HeldRates:
         self.intervals, self.seconds, self.squares = intervals, seconds, squares
 
     def add(self, interval: float) -> None:
-        """Add the time between two setpoints, s."""
+        """Add the time between one and the next, s."""
         self.intervals += 1
         self.seconds += interval
         self.squares += interval * interval
@@ -34,7 +34,7 @@ class HeldRates:
         """Effective rate since `before`, Hz; None if there was no interval since then.
 
         It is the number of intervals per second, but at most 2·Σg/Σg², summed over the intervals g.
-        Long intervals dominate Σg², so pauses between bursts of setpoints lower the rate.
+        Long intervals dominate Σg², so pauses between bursts lower the rate.
         """
         intervals = self.intervals - before.intervals
         seconds, squares = self.seconds - before.seconds, self.squares - before.squares

@@ -47,7 +47,7 @@ class Inbox:
         on_frame: Called with each frame of the peer, whatever its source and message, after the
             control loop and all subscribers; not with beacons, nor with frames of the vehicle whose
             signature is refused.
-        lockstep: Handles beacons in lockstep; otherwise None.
+        lockstep: Handles beacons in lockstep; None without lockstep.
     """
 
     def __init__(
@@ -143,7 +143,8 @@ class Inbox:
     def may_answer(self, who: str) -> bool:
         """Whether frames are sent to `who` although its claim was refused.
 
-        If so, its answer to a TIMESYNC request would make its signatures acceptable.
+        They are if its answer to a TIMESYNC request would make its signatures acceptable. Then the
+        next frame that `receive` accepts makes `who` the peer.
         """
         if not self._filter.awaits_answer:
             return False
@@ -196,11 +197,10 @@ class Inbox:
                 self._router.report(error)
         self._counter.count(frame.message_id, frame.sequence)
         self._router.route(frame.message_id, frame.payload)
-        if self.on_frame is not None:
-            self._router.guard(self.on_frame, frame)
+        self._show(frame)
 
     def _show(self, frame: Frame) -> None:
-        """Pass to `on_frame` a frame that is not the vehicle's or whose message is unknown."""
+        """Pass a frame to `on_frame`."""
         if self.on_frame is not None:
             self._router.guard(self.on_frame, frame)
 

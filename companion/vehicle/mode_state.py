@@ -24,8 +24,8 @@ class ModeState:
         clock: Returns the event-loop time, s.
 
     Attributes:
-        heartbeat: See `Heartbeat`.
-        current_mode: See `CurrentMode`. The property `mode` takes the newer of the two messages.
+        heartbeat: The newest HEARTBEAT of the autopilot.
+        current_mode: The newest CURRENT_MODE. The property `mode` takes the newer of the two.
         heartbeat_is_newest: Whether HEARTBEAT is newer than CURRENT_MODE; `armed` is then as new as
             `mode`.
         armings: Number of times that a heartbeat showed a newly armed vehicle.
@@ -67,7 +67,7 @@ class ModeState:
 
     @property
     def failsafe(self) -> bool:
-        """Whether the autopilot reports a failsafe by HEARTBEAT's system_status."""
+        """Whether HEARTBEAT's system_status reports a failsafe; False without any heartbeat."""
         return self.heartbeat is not None and self.heartbeat.system_status in _FAILSAFES
 
     @property

@@ -103,21 +103,21 @@ def shortest_hold(silence_limit: float) -> float:
 
 def rates_held(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
     """Check that the last rates are held longer than `silence_limit`, at most `LONGEST_HELD`."""
-    right = shortest_hold(settings.silence_limit)
+    set_to = shortest_hold(settings.silence_limit)
     if value <= settings.silence_limit:
         return Problem(
             UNSAFE,
             f"the autopilot's failsafe begins before companion releases control "
             f"(deadman.silence_limit_ms {1e3 * settings.silence_limit:g}), so a short gap in the "
             "setpoints triggers it",
-            right,
+            set_to,
         )
     if value > LONGEST_HELD:
         return Problem(
             UNSAFE,
             f"when setpoints stop, the last rates are held for {value:g} s: 0.4 rad/s become "
             f"{degrees(0.4 * value):.0f}° of tilt",
-            right,
+            set_to,
         )
     return None
 

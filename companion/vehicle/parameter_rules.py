@@ -121,7 +121,8 @@ class ParameterFinding(NamedTuple):
         value: The autopilot's value.
         result: Severity.
         because: Consequence of the value; empty if it is safe.
-        set_to: Value to which the parameter should be set, or `None`; see `Problem`.
+        set_to: Value to which the parameter should be set; `None` if the value is safe, only the
+            user can know a better one, or the configuration must change.
     """
 
     rule: ParameterRule

@@ -6,7 +6,6 @@ Sources: the MAVLink heartbeat and time synchronisation protocols.
 import asyncio
 from collections import deque
 from collections.abc import Callable
-from typing import NamedTuple
 
 from companion.mavlink.messages import Message, dialect
 from companion.mavlink.outbox import Outbox
@@ -46,11 +45,6 @@ async def send_heartbeats(settings: LinkSettings, outbox: Outbox) -> None:
         await asyncio.sleep(1.0 / settings.heartbeat_rate_hz)
 
 
-class _Exchange(NamedTuple):
-    round_trip_s: float
-    at: float
-
-
 class TimeSync:
     """Sends TIMESYNC requests, gives the answers to `VehicleClock`, and answers the vehicle's own.
 
@@ -70,18 +64,18 @@ class TimeSync:
     ) -> None:
         self._outbox, self._clock, self._vehicle_clock = outbox, clock, vehicle_clock
         self._requests: deque[int] = deque(maxlen=_WINDOW)
-        self._exchanges: deque[_Exchange] = deque(maxlen=_WINDOW)
+        self._round_trips: deque[tuple[float, float]] = deque(maxlen=_WINDOW)  # received, took; s
         router.subscribe("TIMESYNC", self._on_timesync)
 
     @property
     def round_trip_s(self) -> float | None:
         """The shortest recent round trip, s; `None` if no recent request was answered."""
-        return min(self._round_trips(), default=None)
+        return min(self._recent(), default=None)
 
     @property
     def jitter_s(self) -> float | None:
         """Range of the recent round trips, s; `None` if no recent request was answered."""
-        trips = self._round_trips()
+        trips = self._recent()
         return max(trips) - min(trips) if trips else None
 
     def ask(self) -> None:
@@ -93,7 +87,7 @@ class TimeSync:
     def reset(self) -> None:
         """Forget all requests and answers, after a reconnect: the vehicle may have restarted."""
         self._requests.clear()
-        self._exchanges.clear()
+        self._round_trips.clear()
 
     def _on_timesync(self, message: Message) -> None:
         now = self._now_ns()
@@ -101,12 +95,12 @@ class TimeSync:
             self._outbox.message(dialect.MAVLink_timesync_message(tc1=now, ts1=message.ts1))
         elif message.ts1 in self._requests:  # otherwise it answers another station
             self._requests.remove(message.ts1)
-            self._exchanges.append(_Exchange((now - message.ts1) * _NS, now * _NS))
+            self._round_trips.append((now * _NS, (now - message.ts1) * _NS))
             self._vehicle_clock.exchange(message.ts1 * _NS, now * _NS, message.tc1)
 
-    def _round_trips(self) -> list[float]:
+    def _recent(self) -> list[float]:
         oldest = self._clock() - LIFETIME
-        return [each.round_trip_s for each in self._exchanges if each.at >= oldest]
+        return [took for received, took in self._round_trips if received >= oldest]
 
     def _now_ns(self) -> int:
         # Never 0: a zero in tc1 marks a request.

@@ -10,6 +10,9 @@ Vector = tuple[float, float, float]
 _LASTS = 5.0
 """Age from which telemetry counts as unknown, s; every message should come at 1 Hz or faster."""
 
+_CHARGE_LASTS = 1.5
+"""Age up to which a charge is kept although a newer message lacks it, s; both come at 1 Hz."""
+
 
 def outdated(received: float, now: float) -> bool:
     """Whether telemetry received at `received` is too old at `now`; both are loop times, s."""
@@ -139,6 +142,16 @@ class Battery(NamedTuple):
     voltage_v: float | None
     remaining: float | None
 
+    def replaced_by(self, newer: "Battery") -> "Battery":
+        """`newer`, or this battery with its voltage if only this one knows the charge.
+
+        Some vehicles send the charge in one of the two messages only.
+        """
+        age = newer.received - self.received
+        if newer.remaining is not None or self.remaining is None or age > _CHARGE_LASTS:
+            return newer
+        return self if newer.voltage_v is None else self._replace(voltage_v=newer.voltage_v)
+
 
 class AttitudeTargetThrust(NamedTuple):
     """ATTITUDE_TARGET: the thrust setpoint of the autopilot, whatever its source.
@@ -181,7 +194,7 @@ class Gps(NamedTuple):
 
 
 def gps_fault(gps: Gps | None, now: float) -> str | None:
-    """Fault of a GPS that had a 3D fix, at event-loop time `now` (s), or `None`."""
+    """Fault of a GPS that had a 3D fix, in words, at loop time `now` (s); `None`: no fault."""
     if gps is None or outdated(gps.received, now):
         return "GPS is not reported any more"
     return "GPS position lost" if gps.fix_type < GPS_FIX_3D else None

@@ -59,11 +59,11 @@ class VehicleState(ModeState, _Values):
     Mode and arming are in the base class `ModeState`.
 
     Attributes:
-        landed_state: See `Landed`; `landed`, `flying` and `taking_off` ignore an outdated one.
-        position: See `LocalPosition`; the newest by the vehicle's time stamp.
-        attitude_target: See `AttitudeTarget`; only for an autopilot with `rates_along_target`. It
-            is ignored if it is not a unit quaternion.
-        global_position: See `GlobalPosition`; `None` while the vehicle does not know it.
+        landed_state: `Landed`; `landed`, `flying` and `taking_off` ignore an outdated one.
+        position: `LocalPosition` with the newest time stamp of the vehicle.
+        attitude_target: `AttitudeTarget`; only of an autopilot with `rates_along_target`, and only
+            with a unit quaternion.
+        global_position: `GlobalPosition`; `None` until the vehicle knows it.
         attitude_target_thrust, battery, gps, home, estimator, prearm: See the record of each.
         positions: Number of positions taken.
         gps_was_good: Whether GPS has had a 3D fix since the link was opened.
@@ -198,7 +198,8 @@ class VehicleState(ModeState, _Values):
 
     def _take_battery(self, voltage_v: float | None, percent: int) -> None:
         remaining = None if percent < 0 else percent / 100.0
-        self.battery = Battery(self._clock(), voltage_v, remaining)
+        newest = Battery(self._clock(), voltage_v, remaining)
+        self.battery = newest if self.battery is None else self.battery.replaced_by(newest)
 
     def _on_attitude_target(self, message: Message) -> None:
         if 0.0 <= message.thrust <= 1.0:

@@ -96,7 +96,11 @@ async def _request(
 
 
 async def measure(stats: LinkStats, names: Iterable[str], window_s: float) -> dict[str, float]:
-    """Rates in Hz at which messages arrive, counted over `window_s` seconds."""
+    """Rates in Hz at which messages arrive, by name, counted over `window_s` seconds.
+
+    Raises:
+        UnknownMessage: A name is not in the dialect.
+    """
     numbers = {name: message_id(name) for name in names}
     before = dict(stats.by_message)
     began = asyncio.get_running_loop().time()

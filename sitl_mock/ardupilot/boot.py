@@ -7,8 +7,8 @@ from sitl_mock.ardupilot.texts import INFO, ArduPilotAnnouncer
 from sitl_mock.autopilot.state import State
 
 RECORDED_READY_S = 41.6
-"""Recorded time after boot until the position estimate allows arming in GUIDED, s. The other times
-are scaled with it."""
+"""Time after boot from which the position estimate allows arming in GUIDED, s. All times here are
+recorded; `Boot` scales them such that this one becomes ``mock.prearm_delay_s``."""
 INITIALISED_S = 2.4
 """Time after boot, s, from which the vehicle can be armed with ``force`` and change its mode."""
 ORIGIN_S = 20.0

@@ -117,7 +117,10 @@ class ArduPilotCommander:
         return ACCEPTED
 
     def take_off(self, height: float) -> int:
-        """Climb to a height above home, m; the vehicle must be armed, in GUIDED, on the ground."""
+        """Climb to a height above home, m; return a MAV_RESULT.
+
+        FAILED unless the vehicle is armed, in GUIDED and on the ground, and the height positive.
+        """
         state = self._state
         ready = state.armed and state.landed and state.mode is Mode.GUIDED
         if not ready or not isfinite(height) or height <= 0.0:
@@ -227,7 +230,10 @@ class ArduPilotCommander:
             self._guided.hold()
 
     def _act(self, mode: Mode) -> None:
-        """Enter a failsafe's mode, or LAND without a needed position; on the ground, disarm."""
+        """Enter a failsafe's mode, or LAND if that mode needs a position and there is none.
+
+        On the ground, disarm instead.
+        """
         state = self._state
         if state.landed:
             self._stop_motors(EventKind.DISARMED_ON_GROUND)

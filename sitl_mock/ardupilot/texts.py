@@ -5,8 +5,7 @@ from collections.abc import Iterable
 from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.autopilot.events import Event, EventKind
-from sitl_mock.link.link import Link
-from sitl_mock.link.status_text import is_long, send_text
+from sitl_mock.link.link import TEXT_BYTES, Link
 
 INFO = dialect.MAV_SEVERITY_INFO
 WARNING = dialect.MAV_SEVERITY_WARNING
@@ -47,9 +46,11 @@ class ArduPilotAnnouncer:
             self.say(event.text.format(detail), event.severity)
 
     def say(self, text: str, severity: int) -> None:
-        """Send a text; only a text of several chunks has an id (recorded)."""
+        """Send a text; only one that needs several messages has an id (recorded)."""
         text_id = 0
-        if is_long(text):
+        if len(text.encode()) > TEXT_BYTES:
             self._long_texts += 1
             text_id = self._long_texts
-        send_text((link for link in self._links if link.heard), text, severity, text_id)
+        for link in self._links:
+            if link.heard:
+                link.send_text(text, severity, text_id)

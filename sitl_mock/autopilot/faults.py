@@ -161,10 +161,10 @@ class FaultEffects:
         return any(not fault.messages or name in fault.messages for fault in self._silences)
 
     def watch_position(self, converged_us: float, timeout_us: float) -> None:
-        """Update ``position_valid``: true from ``converged_us`` on, unless GPS is lost for long.
+        """Update ``position_valid``.
 
         Args:
-            converged_us: vehicle time at which the position becomes valid.
+            converged_us: vehicle time from which on the position is valid.
             timeout_us: time for which it stays valid without GPS.
         """
         state = self._state

@@ -91,10 +91,12 @@ class MissionProtocol:
         link.send(dialect.MAVLink_mission_request_int_message(*upload.client, number, kind))
 
     def _clear(self, message: Message, link: Link) -> None:
-        all_of_them = message.mission_type == dialect.MAV_MISSION_TYPE_ALL
-        for kind in _TYPES if all_of_them else (message.mission_type,):
+        everything = message.mission_type == dialect.MAV_MISSION_TYPE_ALL
+        cleared = _TYPES if everything else self.plans.keys() & {message.mission_type}
+        for kind in cleared:
             self.plans[kind] = []
-        _acknowledge(message, link, _ACCEPTED)
+        result = _ACCEPTED if cleared else dialect.MAV_MISSION_UNSUPPORTED
+        _acknowledge(message, link, result)
 
 
 def _sender(message: Message) -> tuple[int, int]:

@@ -1,11 +1,11 @@
-"""Slips of the stamp of a position."""
+"""Slips of the time stamp of position messages."""
 
 from math import inf
 from random import Random
 
 
 class StampSlips:
-    """Slips of a stamp against its message by one millisecond, alternately back and forth.
+    """A time stamp that slips by 1 ms at random times, alternately back and forth.
 
     Args:
         rate_hz: slips per second, on average; 0 = none.
@@ -19,7 +19,7 @@ class StampSlips:
         self._next_us = self._after(0.0)
 
     def at(self, now_us: int) -> int:
-        """Return by how much the stamp is too small now, ms: 0 or 1."""
+        """Return by how many ms the stamp is too small now, 0 or 1; call it with growing times."""
         if now_us >= self._next_us:
             self._slipped = not self._slipped
             self._next_us = self._after(now_us)

@@ -35,7 +35,7 @@ class Timed(Section):
     @model_validator(mode="after")
     def _one_start(self) -> Self:
         if self.at_s is not None and self.after_offboard_s is not None:
-            raise ValueError("give either at_s or after_offboard_s")
+            raise ValueError("give at_s or after_offboard_s, not both")
         return self
 
 
@@ -91,7 +91,10 @@ class NanField(Timed):
         types = dict(zip(kind.fieldnames, kind.fieldtypes, strict=True))
         floats = [name for name in types if types[name] in ("float", "double")]
         if self.field not in floats:
-            raise ValueError(f"{self.message} has no float field {self.field!r}; it has {floats}")
+            known = ", ".join(floats) or "none"
+            raise ValueError(
+                f"{self.message} has no float field {self.field!r}; its float fields: {known}"
+            )
         return self
 
 

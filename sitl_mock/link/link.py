@@ -3,8 +3,13 @@
 from collections.abc import Callable
 from typing import Protocol
 
+from pymavlink.dialects.v20 import development as dialect
+
 from sitl_mock.link.framing import Framer, Message
 from sitl_mock.link.signing import Signing
+
+TEXT_BYTES = 50
+"""Length of STATUSTEXT.text, bytes."""
 
 
 class StreamSchedule(Protocol):
@@ -59,6 +64,16 @@ class Link:
         if self.tamper is not None:
             self.tamper(message)
         self.outbox.append(self._framer.frame(message))
+
+    def send_text(self, text: str, severity: int, text_id: int) -> None:
+        """Queue a text, in as many STATUSTEXT as it needs.
+
+        ``severity`` is MAV_SEVERITY, ``text_id`` joins the messages of one text.
+        """
+        data = text.encode()
+        for number, start in enumerate(range(0, len(data), TEXT_BYTES)):
+            chunk = data[start : start + TEXT_BYTES]
+            self.send(dialect.MAVLink_statustext_message(severity, chunk, text_id, number))
 
     def send_raw(self, message_id: int, crc_extra: int, payload: bytes) -> None:
         """Queue a message that the dialect lacks, given as its payload."""

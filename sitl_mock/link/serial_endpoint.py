@@ -45,7 +45,7 @@ class SerialEndpoint:
 
     @property
     def readable(self) -> list[int]:
-        """Our end, while the other end is open; after a hang-up it would always be readable."""
+        """Our end; none while the other end is closed, because select would always report it."""
         return [self._master] if self._attached() else []
 
     def receive(self) -> tuple[bytes, bool] | None:

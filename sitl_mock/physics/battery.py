@@ -21,15 +21,6 @@ class Battery:
         thrust_factor: factor on the thrust of every rotor; 1 with a full battery in a hover.
     """
 
-    __slots__ = (
-        "_capacity_as",
-        "_config",
-        "_hover_thrust",
-        "_reference_v",
-        "state",
-        "thrust_factor",
-    )
-
     def __init__(self, config: BatteryConfig, airframe: AirframeConfig) -> None:
         self._config = config
         self._capacity_as = config.capacity_ah * 3600.0

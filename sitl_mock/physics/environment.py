@@ -11,8 +11,6 @@ from sitl_mock.physics.quaternion import Quaternion, Vector, normalise
 class Wind:
     """Wind with gusts: `velocity` is that of the air (NED, m/s); each `step` lasts `dt` seconds."""
 
-    __slots__ = ("_calm", "_decay", "_gust", "_kick", "_kick_down", "_mean", "_random", "velocity")
-
     def __init__(self, config: WindConfig, dt: float, seed: int) -> None:
         direction = radians(config.from_deg)
         self._mean = (-config.speed_m_s * cos(direction), -config.speed_m_s * sin(direction))

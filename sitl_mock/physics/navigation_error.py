@@ -42,12 +42,12 @@ class FilterState(NamedTuple):
     vertical: TrackState
     yaw: float  # heading error, rad
     yaw_pending: float  # part of `yaw` that the output does not yet contain, rad
-    aligned: float  # heading error without its noise, rad
+    noiseless_yaw: float  # heading error without its noise, rad
     sag: float  # slow error of the down position, m
     sink: float  # slow error of the down velocity, m/s
     height_noise: float  # slow noise that the height follows, m
-    at: float  # fusion time of the fix, s
-    corrected: float  # time at which the fix corrected the errors, s
+    fused_at: float  # fusion time of the fix, s
+    corrected_at: float  # time at which the fix corrected the errors, s
     position: complex  # true position at the fusion time, m
     velocity: complex  # true velocity at the fusion time, m/s
 
@@ -71,7 +71,7 @@ def extrapolated(errors: Errors, elapsed: float) -> Errors:
 
 def pending_share(predictor_ms: float, state: FilterState, now: float) -> float:
     """Return the share of the latest corrections that the output does not contain at ``now``."""
-    return exp((state.corrected - now) * 1e3 / predictor_ms)
+    return exp((state.corrected_at - now) * 1e3 / predictor_ms)
 
 
 def propagated_horizontal(
@@ -95,7 +95,7 @@ def propagated_horizontal(
 def propagated_vertical(
     law: ErrorLaw, state: FilterState, truth: TrailRow, elapsed: float
 ) -> Errors:
-    """Return the vertical errors (down) ``elapsed`` s after the fix, as real parts.
+    """Return the vertical errors (down) ``elapsed`` s after the fix; only the real parts count.
 
     The filter takes a part of the horizontal acceleration for a vertical one: tilt times
     acceleration.
@@ -112,7 +112,7 @@ def propagated_vertical(
 
 def error_at(law: ErrorLaw, state: FilterState, truth: TrailRow, now: float) -> NavigationError:
     """Return the error at time ``now`` (s), when the true motion is ``truth`` (pure)."""
-    elapsed = now - state.at
+    elapsed = now - state.fused_at
     unsettled = pending_share(law.predictor_ms, state, now)
     turning = pending_share(law.heading_predictor_ms, state, now)
     place, speed, tilt = propagated_horizontal(law, state, truth, elapsed)

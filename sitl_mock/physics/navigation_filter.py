@@ -87,7 +87,7 @@ class NavigationFilter:
 
     def is_due(self, at: float) -> bool:
         """Whether a fix is due at a fusion time, s."""
-        return at - self.state.at >= self._period - 1e-9
+        return at - self.state.fused_at >= self._period - 1e-9
 
     def advance(self, delayed: TrailRow, at: float, present: TrailRow, now: float) -> None:
         """Correct the errors by a fix; the output follows gradually, without a jump.
@@ -99,7 +99,7 @@ class NavigationFilter:
             now: the present time, s.
         """
         config, law, state = self._config, self.law, self.state
-        elapsed = at - state.at
+        elapsed = at - state.fused_at
         velocity = complex(delayed[0], delayed[1])
         acceleration = complex(delayed[13], delayed[14])
         errors = propagated_horizontal(law, state, delayed, elapsed)
@@ -115,18 +115,18 @@ class NavigationFilter:
         noise = self._next_noise(state.vertical.noise, share)
         errors = propagated_vertical(law, state, delayed, elapsed)
         vertical = self._corrected_state(errors, noise, noise, share * kick)
-        aligned = self._next_alignment(velocity, acceleration, elapsed)
-        yaw = self._next_yaw_noise() + aligned
+        noiseless_yaw = self._next_alignment(velocity, acceleration, elapsed)
+        yaw = self._next_yaw_noise() + noiseless_yaw
         turning = pending_share(law.heading_predictor_ms, state, now)
-        turned = turning * state.yaw_pending + yaw - state.yaw
+        yaw_pending = turning * state.yaw_pending + yaw - state.yaw
         height_noise = self._next_height_noise(elapsed)
         sag, sink = self._next_sag(abs(acceleration), height_noise, elapsed)
         corrected = FilterState(
             horizontal,
             vertical,
             yaw,
-            turned,
-            aligned,
+            yaw_pending,
+            noiseless_yaw,
             sag,
             sink,
             height_noise,
@@ -139,8 +139,8 @@ class NavigationFilter:
 
     def _without_jump(self, corrected: FilterState, present: TrailRow) -> FilterState:
         """Return the corrected state with pending corrections that keep the output as it was."""
-        law, state, now = self.law, self.state, corrected.corrected
-        since, ago = now - state.at, now - corrected.at
+        law, state, now = self.law, self.state, corrected.corrected_at
+        since, ago = now - state.fused_at, now - corrected.fused_at
         unsettled = pending_share(law.predictor_ms, state, now)
         horizontal = _settling(
             state.horizontal,
@@ -162,7 +162,7 @@ class NavigationFilter:
         """Return the slow noise of the heading at the next fix, rad."""
         config, kept = self._config, self._yaw_decay
         spread = radians(config.yaw_error_deg) * sqrt(1.0 - kept * kept)
-        return kept * (self.state.yaw - self.state.aligned) + self._random.gauss(0.0, spread)
+        return kept * (self.state.yaw - self.state.noiseless_yaw) + self._random.gauss(0.0, spread)
 
     def _next_alignment(self, velocity: complex, acceleration: complex, elapsed: float) -> float:
         """Return the next heading error without its noise, rad.
@@ -181,7 +181,7 @@ class NavigationFilter:
         rest = wrong / rate
         left = self._uncertainty / (1.0 + shown * elapsed)
         self._uncertainty = min(left + _UNCERTAINTY_GROWTH * elapsed, _UNCERTAINTY)
-        return rest + (self.state.aligned - rest) * exp(-rate * elapsed)
+        return rest + (self.state.noiseless_yaw - rest) * exp(-rate * elapsed)
 
     def _next_sag(
         self, acceleration: float, height_noise: float, elapsed: float

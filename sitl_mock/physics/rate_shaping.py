@@ -31,8 +31,8 @@ class Shaped(NamedTuple):
 NOT_SHAPED = Shaped(False, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
 
 
-def slew(goal: float, rate: float, max_change: float) -> float:
-    """Return the rate changed towards its goal by at most `max_change`.
+def slew(goal: float, rate: float, limit: float) -> float:
+    """Return the rate changed towards its goal by at most `limit`.
 
     A NaN goal holds the rate. With an infinite goal the rate grows without limit, as measured on
     ArduPilot.
@@ -40,9 +40,7 @@ def slew(goal: float, rate: float, max_change: float) -> float:
     if isnan(goal):
         return rate
     change = goal - rate
-    return rate + (
-        max_change if change > max_change else -max_change if change < -max_change else change
-    )
+    return rate + (limit if change > limit else -limit if change < -limit else change)
 
 
 def rotated(q: Quaternion, rates: Vector, dt: float) -> Quaternion:

@@ -42,7 +42,7 @@ class ArmingChecks:
 
     @property
     def offboard_alive(self) -> bool:
-        """Whether the setpoints are not lost: see `OffboardStream.alive`."""
+        """Whether offboard setpoints arrive, as `OffboardStream.alive` judges."""
         return self._stream.alive(self._state.time_us, self._parameters["COM_OF_LOSS_T"])
 
     def problem(self, *, gcs_alive: bool, pilot: bool, refusal: str | None) -> str | None:

@@ -137,7 +137,7 @@ class Px4Commander:
         self._sticks.receive(message, self._state.time_us)
 
     def setpoint(self, message: Message) -> None:
-        """Accept a setpoint in any mode, if PX4 would."""
+        """Accept a setpoint in any mode, if MAV_FWDEXTSP is set and PX4 would not ignore it."""
         setpoint = decode_setpoint(message)
         if setpoint is not None and self._parameters["MAV_FWDEXTSP"]:
             self._stream.accept(setpoint, self._state.time_us)

@@ -17,7 +17,6 @@ from sitl_mock.link.event_messages import (
 )
 from sitl_mock.link.framing import Message
 from sitl_mock.link.link import Link
-from sitl_mock.link.status_text import send_text
 from sitl_mock.px4.events import PX4_EVENTS
 
 _KEPT = 20
@@ -141,6 +140,7 @@ class Announcer:
             self._events.send(
                 event.event_id, event.severity, event.internal, arguments or event.arguments
             )
-        links = (link for link in self._links if link.gcs_heard)
-        send_text(links, event.text.format(detail), event.severity, self._text_id)
+        for link in self._links:
+            if link.gcs_heard:
+                link.send_text(event.text.format(detail), event.severity, self._text_id)
         self._text_id = (self._text_id + 1) & 0xFFFF

@@ -71,7 +71,7 @@ class HealthReport:
         """Send a report if it changed and is due; also step the events (`EventLog.step`).
 
         Args:
-            offboard_alive: whether the setpoints are not lost.
+            offboard_alive: whether offboard setpoints arrive.
             pilot: whether a pilot holds the sticks.
             gcs_alive: whether a ground station is connected.
             gcs_required: whether arming needs a ground station.

@@ -1,6 +1,7 @@
 """Batches against the flight's own planners, and against rotations of SciPy."""
 
 import math
+import os
 import platform
 import subprocess
 import sys
@@ -195,6 +196,7 @@ def test_numba_is_not_imported_before_it_is_used():
 
 @pytest.mark.skipif(not batch.can_compile(), reason="needs numba")
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="knows the words of x86 only")
+@pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="nothing is compiled")
 def test_the_loop_over_first_order_is_vectorised():
     """Losing this costs a factor of five and changes no result, so nothing else would tell."""
     q, targets = anywhere(8)

@@ -146,6 +146,8 @@ def test_the_levels_of_a_factor_hold_each_case_once():
         np.linspace(0.0, 1.0, 101),
         np.array([1.0, 2.0, 1.0]),
         np.array(["a", None, "b"], dtype=object),
+        np.array([1.0, np.nan, 2.0, np.nan]),
+        np.array([*np.arange(20.0), np.nan, np.nan]),
         np.array([True, False, True], dtype=object),
         np.array([f"word {number:02}" for number in range(14)], dtype=object),
     ):

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from companion.campaign import cluster, store
+from companion.campaign import store
 from companion.files import bounded_yaml
 from tests.campaign.test_campaign_file import CONFIGS
 from tests.campaign.test_flights import QUICK
@@ -206,15 +206,3 @@ def test_ctrl_c_in_a_terminal_ends_it_without_a_traceback(file, local, tmp_path)
         client = started.campaign("again", out)
         assert client.wait(SECONDS) == 0, started.said("again")
     assert store.read(out).equals(local)
-
-
-def test_a_termination_waits_until_the_cluster_is_made():
-    handled = []
-    before = signal.signal(signal.SIGTERM, lambda *_: handled.append("ended"))
-    try:
-        with cluster._terminations_later():
-            signal.raise_signal(signal.SIGTERM)
-            assert handled == []
-        assert handled == ["ended"]
-    finally:
-        signal.signal(signal.SIGTERM, before)

@@ -21,8 +21,10 @@ from companion.attitude.reference import Lag
 from companion.attitude.rotation import clamp, turned
 from companion.batch.rate_loop import fly_steps
 from companion.batch.step_figures import step_figures
-from companion.campaign import loading, store
+from companion.campaign import engine, loading, store, unit
+from companion.campaign.case import Fault
 from companion.campaign.kinematics import check_case, run_cases
+from companion.campaign.versions import versions
 from companion.files.yaml_file import ConfigError
 from companion.recording.measurements.response import measure_response
 
@@ -158,3 +160,38 @@ def test_what_a_batch_cannot_fly_is_refused(tmp_path, told, message):
     (case, *_) = campaign(tmp_path, set=BATCH["set"] | told).cases()
     with pytest.raises(ConfigError, match=message):
         check_case(case)
+
+
+def test_a_batch_is_flown_at_once_and_has_one_time(tmp_path):
+    cases = list(campaign(tmp_path).cases())
+    flown = unit.fly_cases("batch", cases, versions())
+    assert flown.rows == run_cases(cases)
+    assert len(flown.wall_s) == 1
+    assert flown.worker == "this process"
+    unit.check_cases("batch", cases)
+    (hover, *_) = campaign(tmp_path, set={"flight.maneuvers": ["hover"]}, sweep={}).cases()
+    unit.check_cases("flights", [hover])
+    with pytest.raises(ConfigError, match=r"case 0: .*set flight.maneuvers to \[corners\]"):
+        unit.check_cases("batch", [*cases, hover])
+    assert engine.internal_errors(tmp_path, campaign(tmp_path).file) == {}
+
+
+def test_steps_are_flown_to_both_sides_in_both_axes(tmp_path):
+    told = {"flight.maneuvers": ["steps"], "steps.duration_s": 0.4}
+    made = campaign(tmp_path, set=told, sweep={"steps.coefficient": [0.02, 0.04]}, samples=1)
+    small, large = run_cases(list(made.cases()))
+    assert small["ok"]
+    assert small["time_constant_s"] == pytest.approx(large["time_constant_s"], rel=0.05)
+    assert large["rate_max_rad_s"] == pytest.approx(2.0 * small["rate_max_rad_s"], rel=0.1)
+
+
+def test_a_fault_is_no_part_of_a_batch(tmp_path):
+    case = replace(next(campaign(tmp_path).cases()), fault=Fault("x", (), "land", 0.0, ("ok",)))
+    with pytest.raises(ConfigError, match=r"kind: batch has no faults"):
+        check_case(case)
+
+
+def test_a_planner_that_keeps_state_flies_no_batch():
+    stateful = make_planner("model-following", lag=0.05, dead_time=0.04)
+    with pytest.raises(TypeError, match="keeps state; a batch needs a planner without"):
+        fly_steps(stateful, [TILT] * 3, (1.0, 0.0, 0.0, 0.0), np.zeros((3, 4)), EVERY)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.campaign.test_campaign_file import refusal
+from tests.campaign.test_campaign_file import load, refusal
 
 WIND = "mock.wind.speed_m_s"
 SILENCE = {"inject": [{"kind": "stop_telemetry"}], "ends": ["held"]}
@@ -61,6 +61,64 @@ def test_a_swept_key_that_is_none(tmp_path, told, words):
 def test_a_fault_that_is_none(tmp_path, told, words):
     faults = {"lost": SILENCE} if "fault.after_s" in told["sweep"] else {}
     assert words in refusal(tmp_path, samples=2, **{"faults": faults, **told})
+
+
+def test_a_fault_cannot_be_called_none_nor_be_in_a_batch(tmp_path):
+    said = refusal(tmp_path, faults={"none": SILENCE})
+    assert "faults: none is the name of a flight without a fault" in said
+    steps = {"flight.maneuvers": ["corners"]}
+    for told in ({"faults": {"lost": SILENCE}}, {"sweep": {"fault": ["none", "x"]}}):
+        assert "faults need kind: flights" in refusal(tmp_path, kind="batch", set=steps, **told)
+
+
+@pytest.mark.parametrize(
+    ("told", "words"),
+    [
+        (
+            {"sweep": {"x": {"uniform": [1, 2], "times_base": True, "keys": ["vehicle.damping"]}}},
+            "sweep.x: times_base needs a number in the base configuration, and vehicle.damping is "
+            "None",
+        ),
+        (
+            {"sweep": {"link.signing_key_file": ["a", "b"]}},
+            "`link.signing_key_file`: campaigns fly without signing",
+        ),
+        ({"set": {"mock.airframe.no.such": 1}}, "unknown key mock.airframe.no"),
+        ({"set": {"limits.max_tilt_deg": 120}}, "max_tilt_deg"),
+        ({"sweep": {"flight.trajectory": [5, 6]}}, "flight.trajectory: each value must be a file"),
+    ],
+)
+def test_a_key_that_cannot_take_its_value(tmp_path, told, words):
+    said = refusal(tmp_path, **told)
+    assert words in said
+    assert str(tmp_path) in said
+
+
+def test_a_case_is_described_with_its_values(tmp_path):
+    told = {"sweep": {"vehicle.damping": [None, 0.7], "planner.gain_per_s": [1.23456789]}}
+    first, second = load(
+        tmp_path, set={"vehicle.lag_ms": 50, "vehicle.dead_time_ms": 9}, **told
+    ).cases()
+    assert first.described() == "case 0 (vehicle.damping = null, planner.gain_per_s = 1.23457)"
+    assert second.described() == "case 1 (vehicle.damping = 0.7, planner.gain_per_s = 1.23457)"
+    assert (
+        load(tmp_path, sweep={}).case(next(load(tmp_path, sweep={}).samples())).described()
+        == "case 0"
+    )
+
+
+def test_a_trajectory_that_is_named_twice_is_copied_once(tmp_path):
+    (tmp_path / "t.csv").write_text("\n".join(["t,x,y,z", *(f"{k},{k},0,0" for k in range(9))]))
+    path = {"flight.trajectory": "t.csv"}
+    told = load(tmp_path, set=path)
+    assert list(told.files) == ["trajectories/t/t.csv"]
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "t.csv").write_text((tmp_path / "t.csv").read_text())
+    told = load(tmp_path, sweep={"flight.trajectory": ["t.csv", "other/t.csv"]})
+    assert sorted(told.files) == ["trajectories/t-2/t.csv", "trajectories/t/t.csv"]
+    config = {"flight": {"maneuvers": ["trajectory"], "trajectory": "t.csv"}}
+    told = load(tmp_path, config=config, sweep={"flight.trajectory": ["t.csv", "other/t.csv"]})
+    assert len(told.files) == 2
 
 
 @pytest.mark.parametrize(

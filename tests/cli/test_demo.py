@@ -101,3 +101,41 @@ def test_a_mock_vehicle_without_a_word_points_at_the_disk(tmp_path):
     gone.wait()
     with pytest.raises(demo.VehicleStoppedError, match="is the disk full"):
         demo._check_running(gone, log)
+
+
+class Stubborn:
+    """A vehicle that does not end when it is asked to."""
+
+    stdin = None
+    returncode = None
+
+    def __init__(self):
+        self.done = []
+
+    def poll(self):
+        return None
+
+    def terminate(self):
+        self.done.append("terminate")
+
+    def wait(self, timeout=None):
+        if timeout is not None:
+            raise subprocess.TimeoutExpired("mock", timeout)
+        self.done.append("wait")
+
+    def kill(self):
+        self.done.append("kill")
+
+
+def test_a_mock_vehicle_that_does_not_end_is_killed(tmp_path):
+    process = Stubborn()
+    demo._end(process, tmp_path / "mock.log")
+    assert process.done == ["terminate", "kill", "wait"]
+
+
+def test_a_mock_vehicle_that_is_never_ready_is_told(tmp_path, monkeypatch):
+    monkeypatch.setattr(demo, "_START", 0.05)
+    log = tmp_path / "mock.log"
+    log.write_text("still booting")
+    with pytest.raises(demo.VehicleStoppedError, match=r"did not start within 0\.05 s, see .*mock"):
+        demo._await_ready(Stubborn(), log)

@@ -1,20 +1,32 @@
 """`companion doctor`, as a user calls it: on vehicles good and bad, silent and strange."""
 
+import asyncio
+import io
 import json
 import os
 import pty
 import socket
 import sys
 import threading
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import yaml
 from pymavlink.dialects.v20 import common as dialect
+from rich.console import Console
 
+from companion.cli import doctor as doctor_command
 from companion.cli.main import main
+from companion.config import Config
+from companion.config.files import changed
+from companion.config.known_drag import KnownDrag
 from companion.mavlink import lockstep
 from companion.mavlink.transport.free_port import free_port
+from companion.preflight.finding import Finding, Key
+from companion.preflight.parameter_fixes import Answer
+from companion.vehicle.parameter_rules import CheckResult
 from tests.mavlink.fakes import frames_of
 from tests.preflight.vehicles import FAMILIES, config_file, configured, met, shipped_vehicle
 
@@ -27,6 +39,7 @@ MENDED = {
     "ardupilot": {"GUID_OPTIONS": 9.0, "ATC_ANGLE_BOOST": 0.0, "FS_THR_ENABLE": 1.0},
 }
 PLANE, PX4 = 1, 12
+FINDING = Finding(Key.RESPONSE, CheckResult.UNSAFE, "found", "because")
 NO_POSITION_YET = ("LOCAL_POSITION_NED", "GLOBAL_POSITION_INT", "HOME_POSITION", "ODOMETRY")
 
 
@@ -256,3 +269,86 @@ def test_a_missing_extra_is_named_before_anything_is_opened(tmp_path, monkeypatc
     (tmp_path / "my.yaml").write_text("link: {backend: mavsdk}\n")
     assert main(["doctor", "--config", str(tmp_path / "my.yaml")]) == 2
     assert "[mavsdk]'" in capsys.readouterr().err
+
+
+def test_an_undo_without_a_vehicle_is_a_finding_and_sets_nothing(capsys, tmp_path):
+    undo = tmp_path / "undo.yaml"
+    told = {"autopilot": "px4", "system": 1, "uid": "aa", "time": "2026-01-02"}
+    undo.write_text(yaml.safe_dump(told | {"parameters": {"COM_OF_LOSS_T": 1.0}}))
+    config = far_away(tmp_path, free_port())
+    code, out, _ = doctor(capsys, "--config", config, "--undo", undo, "--json")
+    told, keys = found(out)
+    assert (code, keys) == (1, {"vehicle.heartbeat": "not_connected"})
+    assert "changes" not in told
+
+
+def run_of(config=None):
+    shown = io.StringIO()
+    console = Console(file=shown, highlight=False, width=200)
+    return doctor_command._DoctorRun(config or Config(), console), shown
+
+
+@pytest.mark.parametrize(("result", "code"), [("ok", 0), ("unsafe", 1)])
+def test_without_a_change_to_propose_nothing_is_set(result, code):
+    run, shown = run_of()
+    run.result = {"result": result}
+    vehicle = SimpleNamespace(link=None)
+    assert asyncio.run(run._fix(vehicle, None, [FINDING], unasked=True)) == code
+    assert shown.getvalue() == "No parameter is to be set.\n"
+
+
+@pytest.mark.parametrize(
+    ("lines", "answer", "asked"),
+    [
+        (["y\n"], Answer.YES, 1),
+        ([" N \n"], Answer.NO, 1),
+        (["\n", "what?\n", "All\n"], Answer.ALL, 3),
+        (["q\n"], Answer.QUIT, 1),
+        ([""], Answer.QUIT, 1),  # the end of the input
+    ],
+)
+def test_each_answer_is_understood(monkeypatch, lines, answer, asked):
+    async def read():
+        return lines.pop(0)
+
+    monkeypatch.setattr(doctor_command, "read_line", read)
+    run, shown = run_of()
+    change = SimpleNamespace(parameter="COM_OF_LOSS_T", old=5.0, new=0.75)
+    assert asyncio.run(run._ask(replace(FINDING, change=change))) is answer
+    question = "Set COM_OF_LOSS_T from 5 to 0.75? [y]es, [n]o, [a]ll, [q]uit "
+    assert shown.getvalue().count(question) == asked
+
+
+def test_maneuvers_that_cannot_be_flown_are_a_finding(tmp_path):
+    told = {"flight": {"maneuvers": ["trajectory"], "trajectory": str(tmp_path / "gone.yaml")}}
+    flown, (finding,) = doctor_command._maneuvers(
+        changed(Config(), told, "t"), KnownDrag(None, None)
+    )
+    assert flown is None
+    assert "gone.yaml" in finding.found
+    assert finding.result is CheckResult.INEFFECTIVE
+
+
+def test_of_a_planner_of_another_package_no_response_is_expected():
+    config = Config()
+    other = config.planner.model_copy(update={"name": "theirs"})
+    assert doctor_command._response(config.model_copy(update={"planner": other})) == []
+    (finding,) = doctor_command._response(config)
+    assert finding.result is CheckResult.SAFE
+    too_quick = changed(
+        config,
+        {"planner": {"gain_per_s": 15.0}, "vehicle": {"lag_ms": 80.0, "dead_time_ms": 80.0}},
+        "t",
+    )
+    assert doctor_command._response(too_quick)[0].result is CheckResult.INEFFECTIVE
+
+
+def test_ctrl_c_says_that_what_was_set_is_listed(capsys, tmp_path, monkeypatch):
+    def interrupted(work):
+        work.close()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(doctor_command.link_loop, "run", interrupted)
+    code, out, _ = doctor(capsys, "--config", far_away(tmp_path, free_port()))
+    assert code == 1
+    assert out == "Interrupted; every parameter that was set is listed above.\n"

@@ -6,6 +6,7 @@ import io
 import os
 import pty
 import re
+import sys
 import threading
 import time
 from math import inf, radians
@@ -290,3 +291,74 @@ def test_a_stalled_terminal_gets_the_newest_state_only(monkeypatch):
     observer.close()
     assert Screen().feed(out.getvalue()).lines == ["     1.0 s  the last event", ""]
     assert out.getvalue().count("circle, 5 of 14 s") < 5
+
+
+def test_an_alarm_is_drawn_in_its_colour_and_only_the_last_line():
+    out = Terminal()
+    LiveLines(out).show(["one", "safety"], alarm=True)
+    written = out.getvalue()
+    assert written.startswith("\rone\x1b[K\n\x1b[1;31msafety\x1b[0m\x1b[K\n")
+    assert Screen().feed(re.sub(r"\x1b\[[\d;]*m", "", written)).lines == ["one", "safety", ""]
+    calm = Terminal()
+    LiveLines(calm).show(["one", "safety"])
+    assert calm.getvalue() != written
+
+
+class Stalled:
+    """Prints nothing until it may."""
+
+    def __init__(self):
+        self.goes_on, self.lines = threading.Event(), []
+
+    def __call__(self, text):
+        def line():
+            self.goes_on.wait(10.0)
+            self.lines.append(text)
+
+        return line
+
+
+def test_lines_for_a_terminal_that_stalls_are_dropped_and_the_end_does_not_wait(monkeypatch):
+    monkeypatch.setattr(terminal, "_WAITING", 3)
+    monkeypatch.setattr(terminal, "_PATIENCE", 0.05)
+    printer, line = terminal._PrintThread(), Stalled()
+    said = [printer.say(line(number)) for number in range(9)]
+    assert said[:3] == [True] * 3
+    assert not said[-1]
+    began = time.monotonic()
+    printer.close()
+    assert time.monotonic() - began < 1.0
+    line.goes_on.set()
+    printer.close()
+    printer._thread.join(10.0)
+    assert line.lines == [number for number, was in enumerate(said) if was]
+
+
+def test_a_terminal_that_is_gone_is_not_written_to_again():
+    printer, tried = terminal._PrintThread(), []
+
+    def fail():
+        tried.append("once")
+        raise OSError("gone")
+
+    for _ in range(5):
+        printer.say(fail)
+    printer.close()
+    printer.close()
+    assert tried == ["once"]
+
+
+def test_an_answer_is_read_without_holding_up_the_flight(monkeypatch):
+    ours, theirs = pty.openpty()
+    with os.fdopen(theirs) as stdin:
+        monkeypatch.setattr(sys, "stdin", stdin)
+
+        async def asked():
+            answer = asyncio.create_task(terminal.read_line())
+            await asyncio.sleep(0.02)
+            assert not answer.done()
+            os.write(ours, b"yes\n")
+            return await answer
+
+        assert asyncio.run(asyncio.wait_for(asked(), 5.0)) == "yes\n"
+    os.close(ours)

@@ -2,12 +2,15 @@
 
 import json
 import shutil
+from types import SimpleNamespace
 
 import pytest
 import yaml
 
+from companion.cli import tune as command
 from companion.cli.main import main
 from companion.config.files import load, shipped
+from companion.tuning.flights import COURSES, Flown
 from tests.tuning.test_noise import Log, flown, white
 
 
@@ -96,3 +99,53 @@ def test_a_folder_is_no_file_to_write(vehicle, tmp_path, capsys):
     code, _, error = run(capsys, vehicle, "--output", tmp_path, "--no-flights")
     assert code == 2
     assert f"{tmp_path} is a folder; name a file in it with --output" in error
+
+
+def test_what_is_no_flight_folder_needs_a_vehicle_file(tmp_path, capsys):
+    for source in (tmp_path, tmp_path / "nowhere"):
+        code, _, error = run(capsys, source, "--config", shipped("px4.yaml"), "--no-flights")
+        if source.exists():
+            assert code == 0, error  # the configuration knows the vehicle
+            assert "lag_ms: 47" in (tmp_path / "tuned.yaml").read_text()
+            (tmp_path / "tuned.yaml").unlink()
+        else:
+            assert code == 2
+            assert "does not exist; name the file or the flight folder" in error
+    (tmp_path / "empty").mkdir()
+    code, _, error = run(capsys, tmp_path / "empty", "--no-flights")
+    assert code == 2
+    assert "vehicle.yaml does not exist" in error
+
+
+def test_the_doublets_of_the_flight_give_a_second_order(tmp_path, monkeypatch):
+    monkeypatch.setattr(command, "read_flight_log", lambda _: SimpleNamespace(
+        setpoints=1, rates=2, specific_thrust=3))  # fmt: skip
+    seen = []
+    monkeypatch.setattr(command, "identify_vehicle", lambda *told: seen.append(told))
+    monkeypatch.setattr(command, "second_order_keys", lambda _: {"damping": 0.7})
+    assert command._second_order(tmp_path / "flight.tlog") == {"damping": 0.7}
+    assert seen == [(1, 2, 3)]
+
+
+def test_both_configurations_are_flown_on_each_course_and_told(vehicle, capsys, monkeypatch):
+    asked = []
+
+    def fly(config, course, autopilot):
+        asked.append((course.name, autopilot, config.planner.gain_per_s))
+        ok = len(asked) != 2
+        return Flown("ok", 0.2, 0.3, 0.1, 0.5, 0.0, 5.0) if ok else Flown("the fence was left")
+
+    monkeypatch.setattr(command, "flown", fly)
+    config = vehicle.with_name("my.yaml")
+    config.write_text("guidance: {drag_per_s: 1.0}\nplanner: {gain_per_s: 4.0}\n")
+    code, out, error = run(capsys, vehicle, "--config", config, "--json")
+    assert code == 1  # a flight with the proposal failed
+    figures = json.loads(out.splitlines()[-1])
+    names = [course.name for course in COURSES]
+    assert [each[0] for each in asked] == [name for name in names for _ in range(2)]
+    assert {each[1] for each in asked} == {"px4"}
+    assert [each[2] == 4.0 for each in asked[:2]] == [True, False]
+    first = figures["flights"][names[0]]
+    assert first["before"]["reported"] == 0.2
+    assert (first["after"]["result"], first["after"]["true"]) == ("the fence was left", None)
+    assert f"flying the {names[0]} on the px4 mock vehicle…" in error

@@ -148,3 +148,10 @@ def test_a_flight_keeps_room_for_its_summary_until_it_writes_it(tmp_path, monkey
     *flying, writing = held
     assert min(flying) >= flight_files._SUMMARY_ROOM > 10 * len(summary.as_json())
     assert writing < flight_files._SUMMARY_ROOM, "nothing but the rows of the figures"
+
+
+def test_a_folder_that_is_a_file_is_told_with_the_files_own_name(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(NotADirectoryError) as refused:
+        write_whole(tmp_path / "file" / "below", "text")
+    assert refused.value.filename == str(tmp_path / "file" / "below")

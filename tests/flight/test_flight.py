@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from companion.flight.context import cancel
 from companion.flight.flight import Flight
 from companion.flight.observer import Silent
 from companion.flight.phases import Phase
@@ -37,6 +38,7 @@ class Bench:
             ground=SimpleNamespace(standing=False),
             same_vehicle=SimpleNamespace(begin=self.begin),
             release=lambda: None,
+            stop=self.stop,
             detail="",
         )
         self.watch = SimpleNamespace(judge=lambda phase: judge(self, phase))
@@ -49,6 +51,11 @@ class Bench:
 
     def begin(self):
         self.begun += 1
+
+    async def stop(self, tasks):
+        for task in tasks:
+            await cancel(task)
+        self.done.append("stop")
 
     def fly(self):
         async def run():
@@ -65,7 +72,7 @@ def test_another_vehicle_before_arming_is_checked_from_the_beginning(monkeypatch
 
     bench = Bench(monkeypatch, judge)
     result, events = bench.fly()
-    assert (result, bench.done) == ("ok", ["checks", "checks", "maneuvers"])
+    assert (result, bench.done) == ("ok", ["checks", "checks", "maneuvers", "stop"])
     assert events == ["another vehicle answers; the checks are repeated"]
 
 
@@ -90,4 +97,4 @@ def test_a_fault_of_ours_as_a_phase_begins_leaves_no_ending_out(monkeypatch, als
     bench = Bench(monkeypatch, judge)
     result, _ = bench.fly()
     assert result == "internal error: ZeroDivisionError('a fault of ours')"
-    assert bench.done == ["checks", "land"]
+    assert bench.done == ["checks", "land", "stop"]

@@ -68,8 +68,12 @@ def carried(autopilot, speed, held, after):
     with mock_vehicle(autopilot=autopilot, full_rate=True, parameters=settings) as mock:
         session = None
 
+        def end():
+            mock.inject({"kind": "drop", "direction": "from_companion"})
+            session.leave()
+
         def leave():
-            asyncio.get_running_loop().call_later(after, session.leave)
+            asyncio.get_running_loop().call_later(after, end)
 
         observer = When("maneuvers", leave)
         changes = flight(autopilot, speed)

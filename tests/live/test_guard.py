@@ -6,7 +6,7 @@ import socket
 import pytest
 
 from companion.files.yaml_file import ConfigError
-from companion.live.door import open_door
+from companion.live.door import Door, open_door
 from companion.live.page.guard import Guard
 
 TOKEN = "secret"
@@ -96,3 +96,25 @@ def test_the_door_is_of_this_computer_and_has_a_new_token_each_time():
     assert f"127.0.0.1:{first.port}" in first.words()
     for door in (first, second):
         door.listening.close()
+
+
+def test_a_door_for_other_computers_is_told_with_its_name_and_token():
+    told = Door("0.0.0.0", 8090, "secret", None).words()
+    assert told == f"Live page: http://{socket.gethostname()}:8090/?token=secret"
+    assert "http://[2001:db8::1]:8090/?token=" in Door("2001:db8::1", 8090, "s", None).words()
+
+
+def test_a_cookie_that_cannot_be_read_admits_nobody():
+    headers = {"host": "192.168.1.5:8090", "cookie": "companion_watch=1; a\x01b=;=\x00"}
+    assert _asked(headers, client="192.168.1.9")[0] == 403
+    assert _asked({**headers, "cookie": "a(b=1"}, client="192.168.1.9")[0] == 403
+
+
+def test_the_start_of_the_server_is_not_a_request():
+    passed = []
+
+    async def app(scope, _receive, _send):
+        passed.append(scope["type"])
+
+    asyncio.run(Guard(app, TOKEN)({"type": "lifespan"}, None, None))
+    assert passed == ["lifespan"]

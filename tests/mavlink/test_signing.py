@@ -11,7 +11,7 @@ from companion.mavlink.errors import LinkTimeout, SigningError
 from companion.mavlink.framing import FrameScanner
 from companion.mavlink.messages import CRC_EXTRA
 from companion.mavlink.settings import LinkSettings
-from companion.mavlink.signing import Signing, key_from_hex, key_from_passphrase_file
+from companion.mavlink.signing import Signing, key_from_passphrase_file
 from companion.mavlink.stamps import SignatureResult
 from companion.vehicle.link import Link
 from tests.mavlink.fakes import FakeVehicle, attitude, heartbeat, linked
@@ -87,13 +87,9 @@ def test_our_stamps_rise_even_when_no_time_passes():
 
 
 def test_keys(tmp_path):
-    assert key_from_hex(KEY.hex()) == KEY
     phrase = tmp_path / "phrase"
     phrase.write_text("open sesame\n")
     assert key_from_passphrase_file(phrase) == hashlib.sha256(b"open sesame").digest()
-    for bad in ("", "12", "zz" * 32):
-        with pytest.raises(SigningError, match="64 hexadecimal"):
-            key_from_hex(bad)
     with pytest.raises(SigningError, match="cannot be read"):
         key_from_passphrase_file(tmp_path / "missing")
     phrase.write_text("\n")

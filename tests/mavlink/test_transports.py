@@ -1,10 +1,12 @@
 """TCP both ways and serial (a pseudo-terminal): cut frames, drops, and nothing stale after them."""
 
 import asyncio
+import errno
 import os
 import pty
 import time
 import tty
+from contextlib import asynccontextmanager
 
 import pytest
 from pymavlink.dialects.v20 import common as dialect
@@ -13,6 +15,8 @@ from companion.attitude import BodyRates
 from companion.mavlink.errors import EndpointError, LinkLost
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.transport import udp as udp_module
+from companion.mavlink.transport.endpoint import SerialPort
+from companion.mavlink.transport.serial_port import SerialTransport
 from companion.vehicle import connection as connection_module
 from companion.vehicle.link import Link
 from tests.mavlink.fakes import FakeVehicle, attitude, frames_of, heartbeat, linked, until
@@ -253,6 +257,119 @@ def test_a_missing_device_is_said(run):
         with pytest.raises(EndpointError, match="no such device"):
             async with Link(LinkSettings(endpoint="serial:///dev/ttyNOSUCH:57600")):
                 pass
+
+    run(scene())
+
+
+def test_a_device_in_use_by_another_program_is_said(run):
+    async def scene():
+        ours, theirs = pty.openpty()
+        endpoint = f"serial://{os.ttyname(theirs)}:57600"
+        async with Link(LinkSettings(endpoint=endpoint)):
+            with pytest.raises(EndpointError, match="in use by another program"):
+                async with Link(LinkSettings(endpoint=endpoint)):
+                    pass
+        async with Link(LinkSettings(endpoint=endpoint)):  # free again
+            pass
+        os.close(theirs)
+        os.close(ours)
+
+    run(scene())
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        (PermissionError(errno.EACCES, "Permission denied"), "add yourself to its group"),
+        (PermissionError(errno.EPERM, "Operation not permitted"), "add yourself to its group"),
+        (OSError(errno.EBUSY, "Device or resource busy"), "in use by another program"),
+        (OSError(errno.EIO, "Input/output error"), "at 57600 baud cannot be opened: .*Input"),
+        (ValueError("no such rate"), "at 57600 baud cannot be opened: no such rate"),
+    ],
+)
+def test_why_a_device_cannot_be_opened_is_said(run, monkeypatch, fault, words):
+    def refuse(*_, **__):
+        raise fault
+
+    monkeypatch.setattr("serial.Serial", refuse)
+
+    async def scene():
+        with pytest.raises(EndpointError, match=f"serial /dev/ttyUSB7.*{words}"):
+            async with Link(LinkSettings(endpoint="serial:///dev/ttyUSB7:57600")):
+                pass
+
+    run(scene())
+
+
+@asynccontextmanager
+async def serial_transport():
+    """A transport on a pseudo-terminal, the other end, and why it was lost."""
+    ours, theirs = pty.openpty()
+    tty.setraw(ours)
+    os.set_blocking(ours, False)
+    lost = []
+    transport = SerialTransport(SerialPort(os.ttyname(theirs), 57600), lambda *_: True, lost.append)
+    try:
+        yield transport, ours, lost
+    finally:
+        transport.close()
+        os.close(theirs)
+        os.close(ours)
+
+
+def failing(name, fault, monkeypatch):
+    def fail(*_):
+        raise fault
+
+    monkeypatch.setattr(f"companion.mavlink.transport.serial_port.os.{name}", fail)
+
+
+def test_a_serial_device_that_fails_while_written_is_lost_once_and_not_at_once(run, monkeypatch):
+    async def scene():
+        async with serial_transport() as (transport, _, lost):
+            with monkeypatch.context() as patched:
+                failing("write", OSError(errno.EIO, "Input/output error"), patched)
+                assert not transport.send(b"one")
+                assert not transport.send(b"two")
+            assert not lost  # whoever sends is not called back from within
+            await asyncio.sleep(0)
+            await asyncio.sleep(0)
+            assert lost == ["serial device failed: Input/output error"]
+            assert not transport.send(b"three")
+
+    run(scene())
+
+
+def test_a_serial_device_that_fails_while_read_is_lost(run, monkeypatch):
+    async def scene():
+        async with serial_transport() as (transport, ours, lost):
+            with monkeypatch.context() as patched:
+                failing("read", BlockingIOError(), patched)
+                transport._read()  # woken for nothing
+                assert not lost
+                failing("read", OSError(errno.ENODEV, "No such device"), patched)
+                os.write(ours, b"x")
+                await until(lambda: lost)
+            assert lost == ["serial device failed: No such device"]
+            assert not transport.send(b"frame")
+
+    run(scene())
+
+
+def test_the_rest_of_a_frame_waits_for_room_or_ends_the_device(run, monkeypatch):
+    async def scene():
+        async with serial_transport() as (transport, _, lost):
+            frame = bytes(range(256)) * 1024  # more than the terminal takes at once
+            assert transport.send(frame)
+            assert not transport.send(b"next")  # the frame before it is not finished
+            with monkeypatch.context() as patched:
+                failing("write", BlockingIOError(), patched)
+                transport._write_rest()
+                assert not lost
+                assert not transport.send(b"next")
+                failing("write", OSError(errno.EIO, "Input/output error"), patched)
+                transport._write_rest()
+            assert lost == ["serial device failed: Input/output error"]
 
     run(scene())
 

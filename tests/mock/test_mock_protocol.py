@@ -189,3 +189,12 @@ def test_telemetry_agrees_with_the_truth():
     assert last["ATTITUDE_TARGET"].thrust == pytest.approx(0.49, abs=0.03)
     assert last["POSITION_TARGET_LOCAL_NED"].z == pytest.approx(-4.0, abs=0.5)
     assert last["SYS_STATUS"].onboard_control_sensors_health & 0x10000000
+
+
+@pytest.mark.parametrize(("kind", "result"), [(0, 0), (255, 0), (7, 3)])
+def test_only_known_kinds_of_plan_are_cleared(kind, result):
+    rig = Rig()
+    rig.say(dialect.MAVLink_mission_clear_all_message(1, 1, kind))
+    assert rig.messages("MISSION_ACK")[-1].type == result
+    rig.say(dialect.MAVLink_mission_count_message(1, 1, 1, 7))
+    assert rig.messages("MISSION_ACK")[-1].type == 3

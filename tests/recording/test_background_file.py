@@ -107,3 +107,36 @@ def test_figures_do_not_wait_for_such_a_disk_either(tmp_path, monkeypatch):
     assert rows.lost == 1024
     assert "did not answer" in spool.failure
     answers.set()
+
+
+class Refusing(Slices):
+    """A file that cannot be written."""
+
+    def __init__(self):
+        super().__init__()
+        self.complete = None
+
+    def write(self, items):
+        raise ValueError("no such item")
+
+    def close(self, *, complete):
+        self.complete = complete
+
+
+def test_an_item_that_cannot_be_written_ends_the_recording_and_not_the_flight(tmp_path):
+    writer = ToSlices(tmp_path / "file")  # nobody is told
+    writer.file = Refusing()
+    for number in range(30):
+        writer.put(number)
+    with writer:
+        pass
+    assert writer.failure.endswith("internal error: ValueError('no such item'); the flight goes on")
+    assert writer.dropped == 30
+    assert writer.file.complete is False
+
+
+def test_a_file_that_was_never_opened_can_be_closed(tmp_path):
+    writer = ToSlices(tmp_path / "file")
+    writer.close()
+    assert writer.failure is None
+    assert list(tmp_path.iterdir()) == []

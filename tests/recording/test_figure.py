@@ -1,6 +1,7 @@
 """What `companion plot` draws, and what it refuses in one sentence, without a traceback."""
 
 import json
+from dataclasses import replace
 from importlib.util import find_spec
 from math import nan
 
@@ -136,3 +137,18 @@ def test_a_missing_extra_is_one_clear_sentence(tmp_path, monkeypatch):
     assert "drawing" in str(told.value)
     assert "[plot]" in str(told.value)
     assert "\n" not in str(told.value)
+
+
+def test_a_reason_that_is_too_long_is_cut():
+    import matplotlib  # noqa: PLC0415  an extra
+
+    matplotlib.use("Agg")
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
+    axes = list(Figure().subplots(len(HEIGHTS), sharex=True))
+    motion = np.array([[0.0, nan, 0.0, 1.0, 2.0, nan], [8.2, nan, 3.0, 1.0, 2.0, nan]])
+    draw_history(axes, motion, replace(MARKS, reason="x" * 500))
+    title = axes[0].get_title()
+    assert title.startswith("ended at 8.2 s: xxx")
+    assert title.endswith("xxx…")
+    assert len(title) < 140

@@ -1,5 +1,7 @@
 """The channels of `flight.mcap`, as our writer writes them, read by our reader and the official."""
 
+from datetime import UTC, datetime
+
 import numpy as np
 import pytest
 from mcap.reader import make_reader
@@ -8,13 +10,17 @@ from zstandard import ZstdError
 
 from companion.cli.main import main
 from companion.control.loop_record import Unanswered
+from companion.files.yaml_file import ConfigError
 from companion.recording.flight_record import RecordError, read_flight
+from companion.recording.folder import flight_folder
 from companion.recording.mcap_file import cdr, reader, writer
+from companion.recording.mcap_file.batch import _FULL, Batch, messages_of
 from companion.recording.mcap_file.channels import CHANNELS, RESOURCES, WORDS
 from companion.recording.mcap_file.loop_channels import ACTION, INPUT, REASONS, SETPOINT
 from companion.recording.mcap_file.scene import Entity, scene_message
 from companion.recording.mcap_file.writer import McapWriter
 from companion.recording.measurements.recorded_summary import derived_summary, summary_of
+from companion.recording.recorder import _McapEntries
 from companion.replay.entries import entries
 
 ROWS = 50
@@ -177,6 +183,13 @@ def test_other_columns_are_refused_with_the_channel_and_the_version(tmp_path, mo
     monkeypatch.setattr(writer.McapWriter, "_register", register)
     monkeypatch.setattr(writer.McapWriter, "changed", (b"# When", b"# At what time"), raising=False)
     assert write_one(tmp_path, "/action", row(ACTION, 1.0, 0)).rows("action")["time_s"] == 1.0
+    without_last = (b"uint8 ACTION_STOP_TURNING=8\n", b"")  # as before this action existed
+    monkeypatch.setattr(writer.McapWriter, "changed", without_last)
+    assert write_one(tmp_path, "/action", row(ACTION, 1.0, 0)).rows("action")["time_s"] == 1.0
+    other_meaning = (b"ACTION_FOLLOW=4", b"ACTION_FOLLOW=5")
+    monkeypatch.setattr(writer.McapWriter, "changed", other_meaning)
+    with pytest.raises(RecordError, match="of /action have other columns"):
+        write_one(tmp_path, "/action", row(ACTION, 1.0, 0))
     monkeypatch.setattr(writer.McapWriter, "changed", (b"float64 age_s", b"float64 age_ms"))
     with pytest.raises(RecordError, match=r"of /sample have other columns .* companion 0\.0\.7"):
         write_one(tmp_path, "/action", row(ACTION, 1.0, 0))
@@ -228,3 +241,79 @@ def test_only_a_missing_record_is_one_that_was_never_begun(tmp_path, monkeypatch
     monkeypatch.setattr("companion.recording.flight_record.read_mcap", refused)
     with pytest.raises(RecordError, match=r"flight\.mcap: Permission denied"):
         read_flight(tmp_path)
+
+
+def test_a_chunk_that_would_not_fit_into_memory_is_damage(tmp_path, monkeypatch):
+    monkeypatch.setattr(reader, "_MOST_BYTES", 50)
+    content = reader.read_mcap(write(tmp_path))
+    assert not content.complete
+    assert content.order == []
+    assert content.damage
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [("- 1\n", "not a configuration"), ("a: [", "config.yaml: "), (None, "No such file")],
+)
+def test_a_configuration_that_cannot_be_read_is_named(tmp_path, text, words):
+    write(tmp_path)
+    (tmp_path / "config.yaml").unlink(missing_ok=True)
+    if text is not None:
+        (tmp_path / "config.yaml").write_text(text)
+    with pytest.raises(RecordError, match=rf"config\.yaml: .*{words}|{words}"):
+        read_flight(tmp_path).configuration  # noqa: B018
+
+
+def test_a_folder_of_a_flight_is_a_new_one_or_an_error(tmp_path, monkeypatch):
+    first, second = flight_folder(tmp_path), flight_folder(tmp_path)
+    assert first != second
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ConfigError, match=r"recording\.directory: cannot make .*Not a directory"):
+        flight_folder(tmp_path / "file")
+    monkeypatch.setattr("companion.recording.folder.range", lambda *_: [1, 2], raising=False)
+
+    class Still:
+        @staticmethod
+        def now(_):
+            return datetime(2026, 1, 2, tzinfo=UTC)
+
+    monkeypatch.setattr("companion.recording.folder.datetime", Still)
+    assert flight_folder(tmp_path).name == "2026-01-02T00-00-00Z"
+    assert flight_folder(tmp_path).name == "2026-01-02T00-00-00Z-2"
+    with pytest.raises(ConfigError, match="98 more like it exist already"):
+        flight_folder(tmp_path)
+
+
+def test_a_full_batch_is_sent_at_once_and_an_empty_one_never():
+    sent = []
+    batch = Batch(sent.append)
+    batch.send()
+    assert sent == []
+    batch.add("/log", 1, bytes(_FULL))
+    assert len(sent) == 1
+    assert [len(data) for _, _, data in messages_of(sent[0])] == [_FULL]
+    batch.send()
+    assert len(sent) == 1
+
+
+def test_a_full_disk_ends_the_record_but_a_bad_entry_does_not():
+    def encode(value):
+        def encoder(*_):
+            if isinstance(value, Exception):
+                raise value
+            written.append(value)
+
+        return encoder
+
+    class Writer:
+        def stream(self):
+            written.append("streamed")
+
+    written, dropped = [], []
+    file = _McapEntries(Writer(), 0.0, dropped.append)
+    bad = ValueError("no such row")
+    file.write([(1.0, encode(1), ()), (2.0, encode(bad), ()), (3.0, encode(3), ())])
+    assert written == [1, 3, "streamed"]
+    assert dropped == [bad]
+    with pytest.raises(OSError, match="No space"):
+        file.write([(1.0, encode(OSError(28, "No space left on device")), ())])

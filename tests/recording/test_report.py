@@ -2,14 +2,15 @@
 
 import io
 import math
+from dataclasses import replace
 
 import pytest
 from rich.console import Console
 
-from companion.attitude import BodyRates
+from companion.attitude import BodyRates, Target
 from companion.recording.measurements.course import Course
 from companion.recording.measurements.dead_time import AxisDeadTime, DeadTimes, SampleAge
-from companion.recording.measurements.summary import LoopCounts, Summary
+from companion.recording.measurements.summary import LoopCounts, PredictiveFigures, Summary
 from companion.recording.report import flight_table
 from companion.recording.trace import FlightTrace
 from tests.recording.test_summary import trace_of
@@ -112,3 +113,34 @@ def test_in_lockstep_no_latency_and_no_deadline_is_shown():
         assert sign in words(False)
         assert sign not in words(True)
     assert "6 setpoints for 7 samples" in words(True)
+
+
+def text_of(summary):
+    out = io.StringIO()
+    Console(file=out, width=80).print(flight_table(summary))
+    return " ".join(out.getvalue().split())
+
+
+def test_a_flight_without_samples_has_no_table():
+    assert text_of(Summary("ok", "", "exact", 5.0, LoopCounts(), {}, FlightTrace())) == ""
+
+
+def test_a_step_that_was_cut_short_is_told_as_that():
+    trace = FlightTrace()
+    trace.add_response(1.0, (1.0, 0.0, 0.0, 0.0), Target(0.1, 0.0, 0.0))
+    told = text_of(Summary("ok", "", "exact", 5.0, LoopCounts(), {}, trace))
+    assert told == "no acceleration step was flown to its end"
+
+
+def test_predictive_control_is_counted_with_what_it_left_to_linear_guidance():
+    def told(figures):
+        summary = Summary("ok", "", "exact", 5.0, LoopCounts(), {}, FlightTrace())
+        return text_of(replace(summary, predictive=figures))
+
+    assert told(PredictiveFigures(3, {"late": 2, "failed": 1}, (0.001, 0.002, 0.009))) == (
+        "predictive control: 3 answers flown, computed in 2.0 ms (p99 8.9 ms); linear guidance "
+        "flew 2 late, 1 failed instead"
+    )
+    assert told(PredictiveFigures(0, {}, ())) == (
+        "predictive control: 0 answers flown; linear guidance flew none instead"
+    )

@@ -113,3 +113,20 @@ def test_nothing_stays_on_the_disk_and_the_thread_ends(tmp_path):
     thread.join(5.0)
     assert not thread.is_alive()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_chunk_that_the_disk_takes_in_part_is_a_full_disk(tmp_path, monkeypatch):
+    class Full:
+        def write(self, chunk):
+            return len(chunk) - 1
+
+    monkeypatch.setattr(room.tempfile, "TemporaryFile", lambda **_: Full())
+    with pytest.raises(OSError, match="No space left"):
+        SpooledFile(tmp_path).append(b"12345678")
+
+
+def test_a_row_cut_off_at_the_end_of_a_file_is_left_out():
+    file = SpooledFile(None)
+    assert file.read(2).size == 0
+    file.append(np.arange(5.0).tobytes() + b"123")
+    assert file.read(2).tolist() == [0.0, 1.0, 2.0, 3.0]

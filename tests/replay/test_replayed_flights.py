@@ -6,6 +6,7 @@ import subprocess
 import sys
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,12 +14,19 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from pymavlink import mavutil
 
+from companion.attitude import BodyRates
 from companion.cli.main import main
 from companion.config.files import changed, load
+from companion.config.known_drag import prior_of
+from companion.drag import Drag
+from companion.guidance.drag_estimate import ANY_VEHICLE
 from companion.recording.flight_record import read_flight
 from companion.recording.mcap_file.channels import CHANNELS, WORDS
+from companion.recording.mcap_file.happenings import ValuesChange
 from companion.recording.measurements.recorded_summary import derived_summary, summary_of
-from companion.replay.replay import Replay
+from companion.replay.recorded import RecordedAction, Setpoint
+from companion.replay.replay import Replay, ReplayedSample
+from companion.replay.report import words
 from tests.flight.fly import fly, mock_vehicle
 
 FLIGHTS = {
@@ -246,3 +254,98 @@ def test_a_missing_extra_and_a_wrong_folder_are_one_sentence(good, tmp_path, cap
     monkeypatch.setattr("importlib.util.find_spec", lambda *_: None)
     assert main(["export", str(folder), "--parquet", "--into", str(tmp_path)]) == 2
     assert "exporting Parquet needs pyarrow" in capsys.readouterr().err
+
+
+def test_a_place_that_cannot_be_written_is_named(good, tmp_path, capsys, monkeypatch):
+    folder, _ = good
+    file = tmp_path / "file"
+    file.write_text("")
+    below = file / "below"
+    for command in (
+        ["replay", str(folder), "--csv", str(below)],
+        ["export", str(folder), "--csv", "--into", str(below)],
+        ["plot", str(folder), "--out", str(below / "a.png")],
+        ["report", str(folder), "--out", str(below)],
+    ):
+        assert main(command) == 2
+        told = capsys.readouterr().err
+        assert told.startswith(f"companion: {below}")
+        assert "Not a directory" in told
+    monkeypatch.setattr(Replay, "run", lambda _: [])
+    assert main(["replay", str(folder)]) == 2
+    assert "no attitude sample is recorded there to replay" in capsys.readouterr().err
+
+
+def test_answers_that_only_one_of_both_gave_are_told_by_their_reasons():
+    sent = Setpoint(BodyRates(0.1, 0.0, 0.0), 0.5)
+    samples = [
+        ReplayedSample(2.0, 2.0, sent, None, "answered", "not_in_control"),
+        ReplayedSample(3.0, 3.0, None, None, "stale", "stale"),
+    ]
+    assert words(samples, 1.5, follows_record=False) == [
+        "1 of 2 samples have another answer than in the flight, the first 0.50 s after it began.",
+        "1 samples: answered in the flight, not in control in the replay.",
+    ]
+    same = words(samples[1:], 1.5, follows_record=True)
+    assert same[0].startswith("The commands of guidance are those of the record")
+    assert same[1] == (
+        "identical: 0 setpoints to the bit, 1 unanswered samples with the same reasons"
+    )
+
+
+class Loops:
+    """Stands for the loops of a replay, and notes what they are asked to do."""
+
+    def __init__(self):
+        self.asked = []
+        self.command, self.offboard_active = None, False
+        self.estimate = SimpleNamespace(drag=self)
+
+    def __getattr__(self, name):
+        def asked(*told):
+            self.asked.append((name, *told))
+
+        return asked
+
+
+@pytest.mark.parametrize(
+    ("name", "drag", "asked"),
+    [
+        ("drop_command", None, "drop_command"),
+        ("restart_planner", None, "restart_planner"),
+        ("stand_by", None, "stand_by"),
+        ("hold_here", None, "hold_here"),
+        ("hold_reference", None, "hold_reference"),
+        ("follow", None, "follow"),
+        ("give_up", None, "give_up"),
+        ("drag_prior", Drag(0.2, 0.1), "begin"),
+        ("drag_prior", None, "begin"),
+    ],
+)
+def test_each_action_of_the_record_is_repeated(good, name, drag, asked):
+    folder, _ = good
+    made = Replay(read_flight(folder), load(folder / "config.yaml"))
+    made._loop = made._guidance = loops = Loops()
+    made._act(RecordedAction(5.0, name, 0.25, drag))
+    ((found, *told),) = loops.asked
+    assert found == asked
+    if asked == "begin":
+        assert told == [ANY_VEHICLE if drag is None else prior_of(drag)]
+    assert made._vehicle.offset == 0.25
+
+
+def test_a_change_of_values_is_replayed_as_it_was_made(good):
+    folder, _ = good
+    slower = {"planner": {"gain_per_s": 4.0}}
+    made = Replay(read_flight(folder), load(folder / "config.yaml"))
+    made._slew = slew = Loops()
+    made._change(ValuesChange(7.0, False, slower))
+    (begun,) = slew.asked
+    assert (begun[0], begun[1].planner.gain_per_s, begun[2]) == ("begin", 4.0, 7.0)
+    made._change(ValuesChange(8.0, True, slower))
+    assert slew.asked[1][0] == "jump"
+    fixed = changed(load(folder / "config.yaml"), {"guidance": {"kind": "nmpc"}}, "a test")
+    made = Replay(read_flight(folder), fixed)
+    made._slew = slew = Loops()
+    made._change(ValuesChange(7.0, False, slower))
+    assert slew.asked == []

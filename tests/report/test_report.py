@@ -288,3 +288,11 @@ def test_thinning_keeps_the_extremes_and_the_gaps(seed, count, missing):
         assert np.nanmax(values[kept]) == np.nanmax(values)
         assert np.nanmin(values[kept]) == np.nanmin(values)
     assert np.isnan(values[kept]).any() == np.isnan(values).any()
+
+
+@pytest.mark.parametrize("gain", [5.0, float("nan")])
+def test_the_ideal_response_is_drawn_where_the_gain_is_known(folder, gain):
+    flight = dataclasses.replace(recorded(folder), gain=gain)
+    drawn = [trace["name"] for plot in control_plots(flight) for trace in plot.traces]
+    assert any(name.startswith("nearest model: ") for name in drawn)
+    assert ("ideal: first order, 0.2 s" in drawn) == (gain == 5.0)

@@ -304,9 +304,11 @@ def test_our_component_speaks_and_refuses_commands_to_itself(run):
             component.tell("The pilot has taken over.")
             component.tell("The pilot has taken over.")
             component.answer(net.clients[0], "w" * 120)
+            component.answer(net.clients[0], "a tilt of 35°")
             component.value("trk_err", 0.25)
             await until(lambda: client.of("NAMED_VALUE_FLOAT") and client.of("HEARTBEAT"))
-            whole, *pieces = client.of("STATUSTEXT")
+            whole, *pieces, tilt = client.of("STATUSTEXT")
+            assert tilt.text == "a tilt of 35 deg"
             assert (whole.text, whole.id) == ("The pilot has taken over.", 0)
             assert ([len(each.text) for each in pieces], [each.chunk_seq for each in pieces]) == (
                 [50, 50, 20],

@@ -23,11 +23,11 @@ def stream(ownership, client, begin, end, period=0.1):
 
 
 def test_control_needs_a_fresh_setpoint_as_px4_does(ownership):
-    assert "setpoints first" in ownership.ask("a", 0.0)
+    assert "setpoints first" in ownership.request_control("a", 0.0)
     ownership.setpoint("a", 0.0)
-    assert "setpoints first" in ownership.ask("a", TIMEOUT + 0.1), "too old"
+    assert "setpoints first" in ownership.request_control("a", TIMEOUT + 0.1), "too old"
     ownership.setpoint("a", 1.0)
-    assert ownership.ask("a", 1.1) is None
+    assert ownership.request_control("a", 1.1) is None
     assert ownership.owner == "a"
 
 
@@ -43,7 +43,7 @@ def test_one_setpoint_alone_is_no_stream(ownership):
 
 def test_a_setpoint_that_cannot_be_flown_keeps_nobody_live(ownership):
     ownership.setpoint("a", 0.0)
-    ownership.ask("a", 0.1)
+    ownership.request_control("a", 0.1)
     for number in range(10):
         now = 0.2 + 0.1 * number
         assert ownership.setpoint("a", now) is None
@@ -62,15 +62,15 @@ def test_setpoints_without_asking_give_no_control(ownership):
 
 def test_another_clients_setpoints_are_refused_by_name_while_the_owner_is_live(ownership):
     stream(ownership, "a", 0.0, 1.0)
-    ownership.ask("a", 1.0)
+    ownership.request_control("a", 1.0)
     assert set(stream(ownership, "b", 1.0, 1.45)) == {"a is in control"}
-    assert ownership.ask("b", 1.2) == "a is in control"
+    assert ownership.request_control("b", 1.2) == "a is in control"
     assert ownership.owner == "a"
 
 
 def test_a_silent_owner_is_held_for_and_then_handed_back(ownership):
     stream(ownership, "a", 0.0, 1.0)
-    ownership.ask("a", 1.0)
+    ownership.request_control("a", 1.0)
     now = 1.0
     assert ownership.control(now + TIMEOUT - 0.01) is Control.LIVE
     assert ownership.control(now + TIMEOUT + 0.01) is Control.HOLDING
@@ -80,14 +80,14 @@ def test_a_silent_owner_is_held_for_and_then_handed_back(ownership):
 
 def test_an_owner_that_resumes_is_live_again(ownership):
     stream(ownership, "a", 0.0, 1.0)
-    ownership.ask("a", 1.0)
+    ownership.request_control("a", 1.0)
     ownership.setpoint("a", 2.0)
     assert ownership.control(2.1) is Control.LIVE
 
 
 def test_another_client_takes_over_from_a_silent_owner(ownership):
     stream(ownership, "a", 0.0, 1.0)
-    ownership.ask("a", 1.0)
+    ownership.request_control("a", 1.0)
     assert ownership.setpoint("b", 1.6) is None
     assert ownership.owner == "b"
     assert ownership.setpoint("a", 1.7) == "b is in control"
@@ -95,7 +95,7 @@ def test_another_client_takes_over_from_a_silent_owner(ownership):
 
 def test_after_release_nobody_is_in_control(ownership):
     stream(ownership, "a", 0.0, 1.0)
-    ownership.ask("a", 1.0)
+    ownership.request_control("a", 1.0)
     ownership.release()
     assert ownership.control(1.1) is Control.FREE
     assert ownership.setpoint("b", 1.1) is None
@@ -116,7 +116,7 @@ def test_at_any_time_only_a_live_owner_is_flown(ownership):
         client, before = rng.choice("abc"), ownership.owner
         match rng.randrange(10):
             case 0:
-                ownership.ask(client, now)
+                ownership.request_control(client, now)
             case 1:
                 ownership.release()
                 continue

@@ -190,7 +190,7 @@ def test_a_client_that_claims_to_be_the_autopilot_or_us_is_not_heard(net, source
     net.routing.from_client(net.ground, heartbeat(source))
     assert net.heard() == set()
     assert net.routing.stats.looped == 1
-    assert source not in net.routing.addresses(net.ground)
+    assert not net.routing.is_at_client(source, net.silent)
 
 
 def test_our_own_frames_that_the_vehicle_returns_are_dropped(net):

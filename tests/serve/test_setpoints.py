@@ -22,7 +22,7 @@ from companion.serve.setpoints.request import (
     RefusedSetpoint,
     Situation,
 )
-from companion.serve.setpoints.understand import Setpoints
+from companion.serve.setpoints.understand import understand as understand_frame
 
 LOCAL, OFFSET, BODY, BODY_OFFSET, BODY_FRD = 1, 7, 8, 9, 12
 POSITION, VELOCITY, ACCELERATION = (3.0, -4.0, -5.5), (1.25, 2.5, -0.5), (0.5, -0.25, 0.125)
@@ -30,13 +30,13 @@ YAW, YAW_RATE = 0.75, -0.375
 HERE, HEADING = (10.0, 20.0, -30.0), 0.6
 ORIGIN = Origin(47.4, 8.5, 450.0, 440.0)
 SITUATION = Situation(HERE, HEADING, ORIGIN)
-UNDERSTAND = Setpoints(Address(1, 1), Address(1, 191), body_yaw_is_relative=False)
-ARDUPILOT = Setpoints(Address(1, 1), Address(1, 191), body_yaw_is_relative=True)
+TARGETS = Address(1, 1), Address(1, 191)
 
 
-def understand(message, setpoints=UNDERSTAND, situation=SITUATION):
+def understand(message, situation=SITUATION, *, ardupilot=False):
     raw = message.pack(dialect.MAVLink(None, 245, 190))
-    return setpoints.understand(FrameScanner(CRC_EXTRA).feed(raw)[0], situation)
+    (frame,) = FrameScanner(CRC_EXTRA).feed(raw)
+    return understand_frame(frame, situation, TARGETS, body_yaw_is_relative=ardupilot)
 
 
 def local(mask, frame=LOCAL, position=POSITION, target=(1, 1), **changed):
@@ -173,8 +173,8 @@ def test_a_height_may_be_held_while_velocities_are_commanded():
 def test_a_yaw_in_a_body_frame_counts_as_the_autopilot_counts_it(frame):
     mask = 0x0DC7 & ~1024
     assert understand(local(mask, frame)).yaw == pytest.approx(YAW)
-    assert understand(local(mask, frame), ARDUPILOT).yaw == pytest.approx(YAW + HEADING)
-    assert understand(local(mask), ARDUPILOT).yaw == pytest.approx(YAW)
+    assert understand(local(mask, frame), ardupilot=True).yaw == pytest.approx(YAW + HEADING)
+    assert understand(local(mask), ardupilot=True).yaw == pytest.approx(YAW)
 
 
 @pytest.mark.parametrize("target", [(0, 0), (1, 0), (1, 1), (1, 191)])

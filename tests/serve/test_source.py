@@ -23,7 +23,7 @@ def source():
     ownership = Ownership(0.5, 2.0)
     for now in (0.0, 0.1):
         ownership.setpoint("script", now)
-    assert ownership.ask("script", 0.1) is None
+    assert ownership.request_control("script", 0.1) is None
     return ServedSource("script", CommandedMotion(LIMITS), ownership, lambda: 0.5), ownership
 
 

@@ -6,6 +6,7 @@ import threading
 from pathlib import Path
 
 import pytest
+from pymavlink.dialects.v20 import common as dialect
 
 from companion.files.yaml_file import ConfigError
 from companion.flight.observer import Silent
@@ -14,6 +15,7 @@ from companion.mavlink.settings import LinkSettings
 from companion.serve.session import ServeSession
 from companion.testing import (
     MockVehicle,
+    Program,
     UnseenError,
     environment,
     fly,
@@ -22,6 +24,8 @@ from companion.testing import (
     serving,
     session,
 )
+from companion.testing.settings import mock_with
+from companion.testing.virtual_loop import VirtualClock
 from companion.vehicle.link import Link
 from sitl_mock.config.section import ConfigError as MockConfigError
 from tests.flight.fly import QUICK_PARAMETERS, QuickVehicle, attitude_rate_hz, quick_flight
@@ -233,3 +237,56 @@ def test_a_session_of_serve_that_ends_before_its_network_is_told(monkeypatch):
     monkeypatch.setattr(ServeSession, "run", ended)
     with pytest.raises(RuntimeError, match="before its network was open"):
         run(mock, main())
+
+
+def test_a_program_that_is_not_connected_cannot_send():
+    program = Program("tests")
+    program.disconnect()
+    with pytest.raises(RuntimeError, match=r"call connect\(session\) first"):
+        program.send(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+
+
+def test_a_client_hears_what_comes_next_until_it_disconnects():
+    async def main():
+        async with serving(config(mock), mock) as served:
+            program = Program("tests").connect(served)
+            program.send(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+            first = await program.hears("ATTITUDE_QUATERNION", 5.0)
+            second = await program.hears("ATTITUDE_QUATERNION", 5.0)
+            assert second.time_boot_ms > first.time_boot_ms
+            program.disconnect()
+            await asyncio.sleep(0.1)
+            heard = len(program.heard)
+            with pytest.raises(TimeoutError):
+                await program.hears("ATTITUDE_QUATERNION", 0.5)
+            assert len(program.heard) == heard
+
+    mock = vehicle()
+    run(mock, main())
+
+
+def test_a_key_below_one_that_is_no_section_is_refused():
+    with pytest.raises(ConfigError, match=r"mock\.seed is 1, so mock\.seed\.deep has no place"):
+        mock_with({"seed": 1}, {"seed.deep": 2})
+
+
+@pytest.mark.parametrize("collecting", [True, False])
+def test_a_flight_leaves_the_garbage_collector_as_it_was(collecting):
+    async def main():
+        return gc.isenabled()
+
+    try:
+        if not collecting:
+            gc.disable()
+        assert run(vehicle(), main()) is False
+        assert gc.isenabled() is collecting
+    finally:
+        gc.enable()
+
+
+def test_a_lockstep_clock_goes_only_forward():
+    clock = VirtualClock(3.0)
+    assert clock.advance(5.0)
+    assert not clock.advance(5.0)
+    assert not clock.advance(4.0)
+    assert (clock.read(), clock.read_ns()) == (5.0, 5_000_000_000)

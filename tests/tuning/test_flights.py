@@ -99,3 +99,13 @@ def test_it_flies_with_lag_and_dead_time_wrong_by_30_percent(autopilot, factor):
         result = flown(tuned, course, autopilot)
         assert result.ok, result
         assert result.reported <= 0.2
+
+
+def test_a_flight_that_fails_is_told_with_its_reason(monkeypatch):
+    class Failed:
+        result = "the fence was left"
+
+    monkeypatch.setattr(flights, "fly", lambda *_: Failed())
+    told = flown(load(shipped("mock-px4.yaml")), EIGHT, "px4")
+    assert not told.ok
+    assert told.result == "the fence was left"

@@ -1,5 +1,6 @@
 """What `companion.tuning.propose` proposes: margins, wrong beliefs, and what it refuses."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,8 +10,10 @@ from companion.config import Config
 from companion.config.files import changed, load, shipped
 from companion.files.yaml_file import ConfigError
 from companion.tuning import ModelError, propose, stability
+from companion.tuning.flights import Flown
+from companion.tuning.margins import Margins
 from companion.tuning.search import largest_gain
-from companion.tuning.writing import proposal_text
+from companion.tuning.writing import _error, proposal_text, summary_lines
 
 
 def vehicle(lag, dead_time, slew=None):
@@ -80,3 +83,50 @@ def test_a_planner_of_another_package_is_refused():
     )
     with pytest.raises(ConfigError, match=r"planner theirs .* cannot be analysed"):
         propose(other)
+
+
+def test_margins_of_an_unstable_loop_are_not_told():
+    assert Margins(6.0, 30.0, 0.05, True).sentence() == "6.0 dB, 30°, 50 ms of added delay"
+    assert Margins(-2.0, -9.0, 0.0, False).sentence() == "unstable"
+
+
+def test_a_vehicle_without_good_values_is_refused(monkeypatch):
+    """The search itself keeps the margins; a vehicle so slow that rounding loses them does not."""
+    good = propose(VEHICLES["px4"]).after
+    for margins in (
+        good.margins._replace(stable=False),
+        good.margins._replace(gain_db=0.94 * 7.0),
+        good.margins._replace(phase_deg=0.94 * 31.0),
+    ):
+        expected = replace(good, whole=margins, outer=margins)
+        monkeypatch.setattr("companion.tuning.proposal.expectation", lambda *_, e=expected: e)
+        with pytest.raises(ConfigError, match=r"no values keep 7 dB and 31° of margin"):
+            propose(VEHICLES["px4"])
+
+
+def test_flights_stand_in_the_text_with_their_errors_or_their_reasons():
+    proposal = propose(VEHICLES["px4"])
+    before = Flown("ok", 0.2, 0.3, 0.1, 0.5, 0.0, 5.0)
+    after = Flown("ok", 0.1, 0.2, 0.1, 0.5, 0.0, 5.0)
+    lines = summary_lines(proposal, {"circle": (before, after), "eight": (before, Flown("lost"))})
+    assert lines[-1] == "eight: ok -> lost"
+    assert lines[-2].startswith("circle, flown at up to 5.0 m/s: reported 0.200 -> 0.100, true ")
+    assert lines[-3].startswith("Flown on the mock vehicle")
+
+
+def test_the_reason_of_a_gain_names_what_limits_it():
+    def reason(proposal):
+        text = proposal_text(proposal, {}, {}, "a flight")
+        return next(line for line in text.splitlines() if "before 5; " in line)
+
+    assert "the largest sensible gain, " in reason(propose(vehicle(60.0, 40.0)))
+    quick = propose(vehicle(10.0, 5.0))
+    capped = replace(quick, design=quick.design._replace(gain=20.0))
+    assert "the largest gain that is searched, 20" in reason(capped)
+    assert "because the rate loop needs " in reason(propose(vehicle(20.0, 15.0, 500.0)))
+
+
+def test_each_error_of_the_model_has_its_words():
+    assert _error(ModelError(delay=0.02)).startswith("with 20 ms of added delay, as while ")
+    assert _error(ModelError(time_factor=1.3)) == "with lag and dead time 30 % larger"
+    assert _error(ModelError(time_factor=0.7)) == "with lag and dead time 30 % smaller"

@@ -226,7 +226,9 @@ def sys_status(voltage, remaining, health=0):
 
 def test_battery(bench):
     assert bench.take(sys_status(15800, 73)).battery == (10.0, 15.8, 0.73)
-    assert bench.take(sys_status(65535, -1)).battery == (10.0, None, None)
+    bench.now = 12.0
+    assert bench.take(sys_status(65535, -1)).battery == (12.0, None, None)
+    bench.now = 10.0
     assert bench.take(sys_status(9900, 0)).battery == (10.0, 9.9, 0.0)  # empty, not unknown
     cells = [4100, 4000, 3900, *[65535] * 7]
     message = dialect.MAVLink_battery_status_message(0, 0, 0, 0, cells, -1, -1, -1, 55)
@@ -236,6 +238,19 @@ def test_battery(bench):
         0, 0, 0, 0, [4000] * 10, -1, -1, -1, 55, voltages_ext=more
     )
     assert bench.take(message).battery == (10.0, 48.0, 0.55)
+
+
+def test_a_message_without_the_charge_does_not_hide_the_charge_of_the_other(bench):
+    unknown = [65535] * 10
+    for charge in (55, 54, 53):
+        bench.take(dialect.MAVLink_battery_status_message(0, 0, 0, 0, unknown, -1, -1, -1, charge))
+        told = bench.now
+        for _ in range(4):
+            bench.now += 0.25
+            battery = bench.take(sys_status(15800, -1)).battery
+            assert battery == (told, 15.8, charge / 100.0)
+    bench.now += 1.0
+    assert bench.take(sys_status(15700, -1)).battery == (bench.now, 15.7, None)
 
 
 def test_prearm_check_comes_with_sys_status(bench):

@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import shlex
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -54,11 +55,11 @@ def run(options: argparse.Namespace) -> int:
     page = options.out or options.folder / PAGE
     write_whole(page, page_text(results, load(options.folder / FILE)))
     write_tables(results.table, options.folder)
-    console = Console(highlight=False, soft_wrap=True)
-    console.print(headline(results), markup=False)
+    console = Console(highlight=False, soft_wrap=True, markup=False)
+    console.print(headline(results))
     for line in missing(results):
-        console.print(line, markup=False)
-    console.print(f"Open {page}", markup=False)
+        console.print(line)
+    console.print(f"Open {page}")
     return _DONE
 
 
@@ -142,7 +143,7 @@ def missing(results: Results) -> list[str]:
         return []
     return [
         f"{left} of {results.planned} {results.noun} are missing. `companion campaign "
-        f"{results.folder}` goes on with them."
+        f"{shlex.quote(str(results.folder))}` goes on with them."
     ]
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
+from math import inf, isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -70,7 +71,8 @@ def levels(column: Column) -> list[Level]:
     """The levels of a factor.
 
     Up to `_MOST_LEVELS` different values give one level each. More numbers give ranges with about
-    equally many cases. Of more words, the last level joins all that have no level of their own.
+    equally many cases; null is a level of its own. Of more words, the last level joins all that
+    have none of their own.
     """
     known = sorted({_key(value) for value in column})
     if column.dtype != float or len(known) <= _MOST_LEVELS:
@@ -87,15 +89,19 @@ def levels(column: Column) -> list[Level]:
         last = number == _RANGES - 1
         inside = (column >= low) & ((column <= high) if last else (column < high))
         found.append(Level(f"{low:.3g} to {high:.3g}", inside))
+    if np.isnan(column).any():
+        found.append(Level("null", np.isnan(column)))
     return found
 
 
 def _key(value: object) -> tuple[float, str]:
     if isinstance(value, bool):
         return float(value), str(value).lower()
-    if isinstance(value, int | float):
+    if isinstance(value, int | float) and isfinite(value):
         return float(value), f"{value:.4g}"
-    return 0.0, "null" if value is None else str(value)
+    if value is None or isinstance(value, float):  # a column of numbers has NaN for null
+        return -inf, "null"
+    return 0.0, str(value)
 
 
 def worst(results: Results, count: int) -> list[int]:

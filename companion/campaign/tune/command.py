@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
     campaign = load(options.file)
     tune = section_of(campaign)
     place: Path = options.out or folder.RUNS / f"{campaign.file.name}-tune"
-    console = Console(highlight=False, soft_wrap=True)
+    console = Console(highlight=False, soft_wrap=True, markup=False)
     for start in starts(campaign, tune):
         cases(campaign, start.values)  # refuses a bad value before any work
     with folder.locked(place):
@@ -129,6 +129,6 @@ def _concluded(
     path = place / RESULT
     write_whole(path, result_text(result, set_values(campaign.base, tune.search)))
     for line in summary_lines(result):
-        console.print(line, markup=False)
-    console.print(f"Written to {path}; let your configuration include it.", markup=False)
+        console.print(line)
+    console.print(f"Written to {path}; let your configuration include it.")
     return DONE

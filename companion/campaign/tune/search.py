@@ -92,6 +92,9 @@ class Search:
         fly: flies cases.
         learn: flies the vehicle before a new search, and returns the configuration with what was
             measured.
+
+    Raises:
+        ConfigError: the storage in the folder is damaged, or the first case cannot be flown.
     """
 
     def __init__(
@@ -103,16 +106,20 @@ class Search:
         learn: Callable[[Campaign], Config | None] = learned,
     ) -> None:
         import optuna  # noqa: PLC0415  an extra
+        from sqlalchemy.exc import DBAPIError  # noqa: PLC0415  comes with Optuna
 
         optuna.logging.set_verbosity(optuna.logging.ERROR)
         self._optuna = optuna
         self._campaign, self._tune, self._fly = campaign, tune, fly
-        self._study: Study = optuna.create_study(
-            storage=f"sqlite:///{folder / STORAGE}",
-            study_name=_NAME,
-            sampler=self._sampler(0),
-            load_if_exists=True,
-        )
+        try:
+            self._study: Study = optuna.create_study(
+                storage=f"sqlite:///{folder / STORAGE}",
+                study_name=_NAME,
+                sampler=self._sampler(0),
+                load_if_exists=True,
+            )
+        except DBAPIError as error:
+            raise ConfigError(f"{folder / STORAGE}: cannot be used: {error.orig}") from error
         self._begin(learn)
 
     def run(self, trials: int, on_trial: Callable[[Found], None] = lambda _: None) -> Found:

@@ -87,6 +87,7 @@ class Panel:
             return
         try:
             self._say(await request)
+            self._follow()  # otherwise the next request would send these values again
         except (ConfigError, ChangeRefusedError) as refused:
             self._say(f"refused: {refused}")
         except NoAnswerError as error:

@@ -1,7 +1,10 @@
 """The interface of a transport: it receives bytes and sends whole frames, without a queue."""
 
+import errno
 from collections.abc import Callable
 from typing import Protocol
+
+from companion.files.os_errors import reason_of
 
 Receive = Callable[[bytes, int], bool]
 """Called with bytes and the `perf_counter_ns` of their arrival; returns whether a frame in them was
@@ -45,6 +48,19 @@ Tap = Callable[[float, bytes], None]
 
 OPEN_TIMEOUT_S = 5.0
 """Time allowed to open a TCP connection, s."""
+
+_REMEDIES = {
+    errno.EADDRINUSE: "the port is in use by another program (another companion, a ground "
+    "station?); end it or choose another port",
+    errno.EACCES: "not permitted; use a port of 1024 or above",
+    errno.EPERM: "not permitted; use a port of 1024 or above",
+    errno.EADDRNOTAVAIL: "no interface of this computer has that address; use 0.0.0.0",
+}
+
+
+def why_not_opened(error: OSError) -> str:
+    """Why the system refused to open a UDP or TCP port, and if possible what to do."""
+    return _REMEDIES.get(error.errno or 0, reason_of(error))
 
 
 class Transport(Protocol):

@@ -1,14 +1,12 @@
 """MAVLink over TCP, as client or as a server for one vehicle."""
 
 import asyncio
-import errno
 import socket
 import time
 
-from companion.files.os_errors import reason_of
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.peer import CLAIM_LASTS_S, NamedPeers, host_and_port, resolve
-from companion.mavlink.transport.base import OPEN_TIMEOUT_S, Lost, Receiver
+from companion.mavlink.transport.base import OPEN_TIMEOUT_S, Lost, Receiver, why_not_opened
 from companion.mavlink.transport.endpoint import TcpClient, TcpServer
 
 _MAX_UNSENT_BYTES = 2048
@@ -51,20 +49,15 @@ async def open_tcp_server(endpoint: TcpServer, receiver: Receiver, lost: Lost) -
         EndpointError: The port is in use or not permitted, the address is not that of an interface
             of this computer, or a peer's host name is unknown.
     """
-    named = await resolve(endpoint.peers, socket.SOCK_STREAM)
-    transport = TcpTransport(receiver, lost, named)
+    named_peers = await resolve(endpoint.peers, socket.SOCK_STREAM)
+    transport = TcpTransport(receiver, lost, named_peers)
     where = f"TCP {endpoint.host}:{endpoint.port}"
     try:
         server = await asyncio.get_running_loop().create_server(
             lambda: _Connection(transport), endpoint.host, endpoint.port
         )
     except OSError as error:
-        hint = {
-            errno.EADDRINUSE: "the port is in use by another program; end it or choose another",
-            errno.EACCES: "not permitted; use a port of 1024 or above",
-            errno.EADDRNOTAVAIL: "no interface of this computer has that address; use 0.0.0.0",
-        }.get(error.errno or 0, reason_of(error))
-        raise EndpointError(f"{where}: {hint}") from error
+        raise EndpointError(f"{where}: {why_not_opened(error)}") from error
     transport.listen(server)
     return transport
 
@@ -80,9 +73,11 @@ class TcpTransport:
         local: (host, port) of a listening server; `None` for a client.
     """
 
-    def __init__(self, receiver: Receiver, lost: Lost, named: NamedPeers | None = None) -> None:
+    def __init__(
+        self, receiver: Receiver, lost: Lost, named_peers: NamedPeers | None = None
+    ) -> None:
         self._receiver, self._lost = receiver, lost
-        self._named = named or NamedPeers()
+        self._named_peers = named_peers or NamedPeers()
         self._loop = asyncio.get_running_loop()
         self._server: asyncio.Server | None = None
         self._connection: asyncio.Transport | None = None
@@ -106,7 +101,7 @@ class TcpTransport:
         if self._closed:
             return False
         address = connection.get_extra_info("peername")
-        if self._server is not None and not self._named.admit(address):
+        if self._server is not None and not self._named_peers.admit(address):
             self._receiver.note_stranger(host_and_port(address))
             return False
         if self._connection is not None:
@@ -115,8 +110,8 @@ class TcpTransport:
             before = self._connection
             self.dropped(before, "another client took the place of one without a valid heartbeat")
             before.abort()
-        opened = connection.get_extra_info("socket")
-        opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        sock = connection.get_extra_info("socket")
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._connection, self._connected_at = connection, self._loop.time()
         self._claimed = False
         return True

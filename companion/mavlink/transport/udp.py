@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import errno
 import logging
 import socket
 import struct
@@ -12,7 +11,7 @@ from typing import Any, NamedTuple
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.loop import unwatch, watch
 from companion.mavlink.peer import NamedPeers, host_and_port, resolve
-from companion.mavlink.transport.base import Receiver
+from companion.mavlink.transport.base import Receiver, why_not_opened
 from companion.mavlink.transport.endpoint import UdpIn, UdpOut
 
 _LOG = logging.getLogger(__name__)
@@ -45,12 +44,12 @@ class UdpAddress(NamedTuple):
     Attributes:
         family: address family of the socket.
         address: socket address to bind or to send to.
-        named: the senders that the endpoint names.
+        named_peers: the senders that the endpoint names.
     """
 
     family: socket.AddressFamily
     address: Any
-    named: NamedPeers
+    named_peers: NamedPeers
 
 
 async def udp_address(endpoint: UdpIn | UdpOut) -> UdpAddress:
@@ -68,8 +67,8 @@ async def udp_address(endpoint: UdpIn | UdpOut) -> UdpAddress:
             "IP address"
         ) from error
     family, _, _, _, address = found[0]
-    named = await resolve(endpoint.peers if isinstance(endpoint, UdpIn) else (), kind)
-    return UdpAddress(family, address, named)
+    named_peers = await resolve(endpoint.peers if isinstance(endpoint, UdpIn) else (), kind)
+    return UdpAddress(family, address, named_peers)
 
 
 class UdpTransport:
@@ -78,9 +77,9 @@ class UdpTransport:
     A listening socket connects to the first sender that makes a valid claim (`PeerRule`). The
     kernel then drops datagrams of other senders, and a round trip is about 8 us shorter. The
     kernel's queue may still hold earlier datagrams of other senders, so the source of each datagram
-    is checked. If the peer is silent for 2 to 4 s, or its claim has lapsed, a new socket is opened,
-    so that a vehicle is heard that returns at another port. ICMP refusals (the vehicle has not
-    started yet) are ignored.
+    is checked. If the peer of a listening socket is silent for 2 to 4 s, or its claim has lapsed, a
+    new socket is opened, so that a vehicle is heard that returns at another port. ICMP refusals
+    (the vehicle has not started yet) are ignored.
 
     A datagram counts as received when the kernel received it, not when this process read it. So
     latency includes a late wake-up of this process.
@@ -94,11 +93,11 @@ class UdpTransport:
     def __init__(
         self,
         endpoint: UdpIn | UdpOut,
-        at: UdpAddress,
+        addresses: UdpAddress,
         receiver: Receiver,
     ) -> None:
         self._endpoint, self._receiver = endpoint, receiver
-        self._family, self._address, self._named = at
+        self._family, self._address, self._named_peers = addresses
         self._loop = asyncio.get_running_loop()
         self._heard = False
         self._connected = False
@@ -111,23 +110,24 @@ class UdpTransport:
         self._timer = self._loop.call_later(PEER_SILENCE_S, self._check_peer)
 
     def _open(self) -> socket.socket:
-        opened = socket.socket(self._family, socket.SOCK_DGRAM)
+        sock = socket.socket(self._family, socket.SOCK_DGRAM)
         try:
-            opened.setblocking(False)
+            sock.setblocking(False)
             with contextlib.suppress(OSError):  # without stamps, the time of reading is used
-                opened.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
+                sock.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
             if isinstance(self._endpoint, UdpIn):
-                opened.bind(self._address)
+                sock.bind(self._address)
             else:
-                opened.connect(self._address)
+                sock.connect(self._address)
         except OSError as error:
-            opened.close()
-            raise EndpointError(_open_error(self._endpoint, error)) from error
+            sock.close()
+            where = f"UDP {self._endpoint.host}:{self._endpoint.port}"
+            raise EndpointError(f"{where}: {why_not_opened(error)}") from error
         self._connected = isinstance(self._endpoint, UdpOut)
         if self._connected:
-            self._peer = opened.getpeername()
-        watch(self._loop, opened.fileno(), self._read)
-        return opened
+            self._peer = sock.getpeername()
+        watch(self._loop, sock.fileno(), self._read)
+        return sock
 
     def _read(self) -> None:
         if not self._connected:
@@ -159,14 +159,14 @@ class UdpTransport:
         prove its claim (`Receiver.may_answer`).
         """
         who = host_and_port(address)
-        if not self._named.admit(address):
+        if not self._named_peers.admit(address):
             self._receiver.note_stranger(who)
             return False
         if address == self._peer and not self._receiver.claim_lapsed():
-            taken = self._receiver.receive(data, received_ns)  # it was only silent
+            accepted = self._receiver.receive(data, received_ns)  # it was only silent
         else:
-            taken = self._receiver.claim(data, received_ns, who)
-        return taken or self._receiver.may_answer(who)
+            accepted = self._receiver.claim(data, received_ns, who)
+        return accepted or self._receiver.may_answer(who)
 
     def _check_peer(self) -> None:
         self._timer = self._loop.call_later(PEER_SILENCE_S, self._check_peer)
@@ -210,17 +210,3 @@ def _arrival_ns(stamps: list[tuple[int, int, bytes]]) -> int:
     seconds, nanoseconds = _STAMP.unpack(stamps[0][2])
     age = time.time_ns() - (seconds * 1_000_000_000 + nanoseconds)
     return now - age if 0 <= age < _OLDEST_NS else now
-
-
-def _open_error(endpoint: UdpIn | UdpOut, error: OSError) -> str:
-    where = f"UDP {endpoint.host}:{endpoint.port}"
-    if error.errno == errno.EADDRINUSE:
-        return (
-            f"{where}: the port is in use by another program (another companion, a ground "
-            "station?); end it or choose another port on both sides"
-        )
-    if error.errno == errno.EADDRNOTAVAIL:
-        return f"{where}: no interface of this computer has that address; use udpin://0.0.0.0:PORT"
-    if error.errno in (errno.EACCES, errno.EPERM):
-        return f"{where}: not permitted; use a port of 1024 or above"
-    return f"{where} cannot be opened: {error.strerror}"

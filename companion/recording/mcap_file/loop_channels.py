@@ -33,6 +33,7 @@ ACTIONS = (
     "drop_command",
     "restart_planner",
     "drag_prior",
+    "stop_turning",
 )
 """Calls by which a phase controls guidance or the control loop, by number."""
 

@@ -1,4 +1,4 @@
-"""The target of a frame. Source: "Routing" of the MAVLink guide."""
+"""Source and target of a frame. Reference: "Routing" of the MAVLink guide."""
 
 import struct
 from typing import NamedTuple

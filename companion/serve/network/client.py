@@ -47,13 +47,13 @@ class Client(ABC):
     """A client's channel. It queues frames until `flush`; it may drop whole frames, never parts.
 
     Args:
-        name: name for messages.
+        name: name for messages, such as `udp 127.0.0.1:14550`.
         host: IP address of the client, or None.
         device: its serial device, or None.
         streaming: whether a frame may continue in the bytes of the next `scan`.
 
     Attributes:
-        name, host, device: as given.
+        name, host, device: see the arguments.
         stats: counters.
     """
 
@@ -105,13 +105,13 @@ class Client(ABC):
         Returns:
             The bytes, and the number of frames in them.
         """
-        taken = [self._waiting.popleft()]
-        size = len(taken[0])
+        frames = [self._waiting.popleft()]
+        size = len(frames[0])
         while self._waiting and size + len(self._waiting[0]) <= most:
             size += len(self._waiting[0])
-            taken.append(self._waiting.popleft())
+            frames.append(self._waiting.popleft())
         self._bytes -= size
-        return b"".join(taken), len(taken)
+        return b"".join(frames), len(frames)
 
     def _drop_waiting(self) -> None:
         """Drop all queued frames."""

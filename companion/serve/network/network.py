@@ -41,7 +41,9 @@ Port = UdpPort | TcpPort | SerialLine
 
 
 class Network:
-    """Use it as `async with Network(link, endpoints) as network:`, inside the open link.
+    """Joins an open link and the endpoints of the clients.
+
+    Use it as `async with Network(link, endpoints) as network:`.
 
     Args:
         link: open link to the vehicle; its `on_frame` is replaced.
@@ -91,10 +93,10 @@ class Network:
         try:
             for endpoint in self._endpoints:
                 self.ports.append(await self._open(endpoint))
-        except EndpointError:
+        except EndpointError as error:
             await self.__aexit__()
-            raise
-        self._link.on_frame = self._note
+            raise EndpointError(f"serve.clients: {error}") from error
+        self._link.on_frame = self._queue_frame
         return self
 
     async def __aexit__(self, *_: object) -> None:
@@ -163,7 +165,7 @@ class Network:
         if left:
             self._flush_later()
 
-    def _note(self, frame: Frame) -> None:
+    def _queue_frame(self, frame: Frame) -> None:
         """Queue a frame of the link; forwarding it now could delay the next attitude sample."""
         if len(self._from_vehicle) >= _MOST_FROM_VEHICLE:
             self.overflowed += 1

@@ -3,22 +3,22 @@
 Pure: it only queues frames at the given channels, and uses the given clock.
 """
 
+from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
 from companion.mavlink.framing import Frame
 from companion.serve.network.addresses import EVERYBODY, Address, source_of, target_of
-from companion.serve.network.repeats import Repeats
+
+_REPEATED_WITHIN = 0.2
+"""A frame identical to one that was forwarded within this time is a repetition, s."""
+_MOST_REMEMBERED = 4096
+"""Largest number of remembered frames; in a flood, only the newest are remembered."""
 
 
 class Channel(Protocol):
     """The connection of a client; several nodes may be behind it."""
-
-    @property
-    def name(self) -> str:
-        """Name for messages, such as `udp 127.0.0.1:14550`."""
-        ...
 
     def put(self, frame: bytes) -> None:
         """Queue one whole frame, or drop and count it. It never blocks and never raises."""
@@ -29,7 +29,7 @@ class VehicleChannel(Protocol):
     """The channel to the vehicle, and to the nodes connected to its autopilot."""
 
     def put(self, frame: bytes, origin: Channel) -> None:
-        """Queue one whole frame of a client; see `Channel.put`."""
+        """Queue one whole frame of client `origin`, or drop and count it. Never block or raise."""
         ...
 
 
@@ -74,7 +74,8 @@ class Routing:
 
     Attributes:
         stats: counters of frames.
-        intercept: see `Intercept`; until it is set, nothing of a client is forwarded.
+        intercept: called with a client's frame before it is forwarded; returns whether it must not
+            be. Until it is set, nothing of a client is forwarded.
         on_own: called with each client's frame that only our component should receive, or None.
     """
 
@@ -87,12 +88,7 @@ class Routing:
         self._vehicle, self._autopilot, self._own = vehicle, autopilot, own
         self._heard: dict[Channel | VehicleChannel, set[Address]] = {vehicle: {autopilot}}
         self._clients: tuple[Channel, ...] = ()
-        self._repeats = Repeats(clock)
-
-    @property
-    def clients(self) -> tuple[Channel, ...]:
-        """The channels of the clients."""
-        return self._clients
+        self._repeats = _Repeats(clock)
 
     def attach(self, client: Channel) -> None:
         """Add a client; frames are forwarded to it from now on."""
@@ -103,10 +99,6 @@ class Routing:
         """Remove a client and the addresses heard on its channel."""
         self._heard.pop(client, None)
         self._clients = tuple(each for each in self._clients if each is not client)
-
-    def addresses(self, channel: Channel) -> frozenset[Address]:
-        """The addresses heard on a channel."""
-        return frozenset(self._heard.get(channel, ()))
 
     def is_at_client(self, target: Address, origin: Channel) -> bool:
         """Whether a target was heard on the channel of a client other than `origin`."""
@@ -135,7 +127,7 @@ class Routing:
     def from_client(self, client: Channel, frame: Frame) -> None:
         """Forward a client's frame, unless it is looped, for our component, or intercepted.
 
-        A looped frame (see `RoutingStats`) is dropped; one for our component goes to `on_own`.
+        A looped frame (`RoutingStats`) is dropped; a frame for our component goes to `on_own`.
         """
         source = source_of(frame)
         if (
@@ -188,3 +180,30 @@ class Routing:
         if target.component == 0:
             return any(each.system == target.system for each in heard)
         return target in heard
+
+
+class _Repeats:
+    """Detects frames that have come before, on any channel.
+
+    Sequence number and checksum distinguish a frame from its sender's next 255 frames. If a sender
+    does not count its frames, the same content is forwarded once in 0.2 s.
+
+    Args:
+        clock: our clock, s.
+    """
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self._passed: OrderedDict[bytes, float] = OrderedDict()
+
+    def is_repeat(self, raw: bytes) -> bool:
+        """Whether these bytes were forwarded just before; if not, remember them."""
+        now, passed = self._clock(), self._passed
+        at = passed.pop(raw, None)
+        if at is not None and now - at <= _REPEATED_WITHIN:
+            passed[raw] = at
+            return True
+        passed[raw] = now
+        while len(passed) > _MOST_REMEMBERED:
+            passed.popitem(last=False)
+        return False

@@ -5,10 +5,10 @@ import socket
 
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.peer import NamedPeers, host_and_port, plain_host, resolve
+from companion.mavlink.transport.base import why_not_opened
 from companion.mavlink.transport.endpoint import TcpClient as TcpOut
 from companion.mavlink.transport.endpoint import TcpServer
 from companion.serve.network.client import Client, Clients, Flood
-from companion.serve.network.refusal import refusal
 
 _MOST_CLIENTS = 16
 _MOST_UNSENT = 65_536
@@ -29,15 +29,15 @@ async def open_tcp_server(endpoint: TcpServer, clients: Clients) -> "TcpPort":
         EndpointError: the port is in use or not permitted, the address is not that of an interface
             of this computer, or a peer's host name is unknown.
     """
-    named = await resolve(endpoint.peers, socket.SOCK_STREAM)
-    port = TcpPort(clients, named)
+    named_peers = await resolve(endpoint.peers, socket.SOCK_STREAM)
+    port = TcpPort(clients, named_peers)
     try:
         server = await asyncio.get_running_loop().create_server(
             port.protocol, endpoint.host, endpoint.port
         )
     except OSError as error:
         where = f"TCP {endpoint.host}:{endpoint.port}"
-        raise EndpointError(refusal(where, error)) from error
+        raise EndpointError(f"{where}: {why_not_opened(error)}") from error
     port.listen(server)
     return port
 
@@ -56,8 +56,8 @@ class TcpPort:
         local: (host, port) listened on, or None.
     """
 
-    def __init__(self, clients: Clients, named: NamedPeers) -> None:
-        self._clients, self._named = clients, named
+    def __init__(self, clients: Clients, named_peers: NamedPeers) -> None:
+        self._clients, self._named_peers = clients, named_peers
         self._server: asyncio.Server | None = None
         self._dialling: asyncio.Task[None] | None = None
         self._open: set[TcpClient] = set()
@@ -94,11 +94,11 @@ class TcpPort:
         """Make a client for a new connection; None if it is refused."""
         address = transport.get_extra_info("peername")
         full = len(self._open) >= _MOST_CLIENTS
-        if self._closed or full or address is None or not self._named.admit(address):
+        if self._closed or full or address is None or not self._named_peers.admit(address):
             return None
-        opened = transport.get_extra_info("socket")
-        opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        opened.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _KERNEL_BUFFER)
+        sock = transport.get_extra_info("socket")
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _KERNEL_BUFFER)
         name, host = f"tcp {host_and_port(address)}", plain_host(str(address[0]))
         client = TcpClient(name, host, transport)
         self._open.add(client)

@@ -6,10 +6,10 @@ from typing import Any
 
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.peer import NamedPeers, host_and_port, plain_host
+from companion.mavlink.transport.base import why_not_opened
 from companion.mavlink.transport.endpoint import UdpIn, UdpOut
 from companion.mavlink.transport.udp import udp_address
 from companion.serve.network.client import Client, Clients, Flood
-from companion.serve.network.refusal import refusal
 
 _LARGEST_READ = 4_096
 _LARGEST_SENT = 1_400
@@ -28,24 +28,21 @@ async def open_udp(endpoint: UdpIn | UdpOut, clients: Clients) -> "UdpPort":
         EndpointError: the port is in use, a host is unknown, the address is not that of an
             interface of this computer, or permission is missing.
     """
-    where = f"UDP {endpoint.host}:{endpoint.port}"
-    try:
-        family, address, named = await udp_address(endpoint)
-    except EndpointError as error:
-        raise EndpointError(refusal(where, error)) from error
-    opened = socket.socket(family, socket.SOCK_DGRAM)
-    opened.setblocking(False)
+    family, address, named_peers = await udp_address(endpoint)
+    sock = socket.socket(family, socket.SOCK_DGRAM)
+    sock.setblocking(False)
     try:
         if isinstance(endpoint, UdpIn):
-            opened.bind(address)
+            sock.bind(address)
         else:
-            opened.bind(("", 0) if family == socket.AF_INET else ("::", 0))
+            sock.bind(("", 0) if family == socket.AF_INET else ("::", 0))
     except OSError as error:
-        opened.close()
-        raise EndpointError(refusal(where, error)) from error
-    port = UdpPort(opened, clients, named)
+        sock.close()
+        where = f"UDP {endpoint.host}:{endpoint.port}"
+        raise EndpointError(f"{where}: {why_not_opened(error)}") from error
+    port = UdpPort(sock, clients, named_peers)
     if isinstance(endpoint, UdpOut):
-        port.call(address)
+        port.send_only_to(address)
     return port
 
 
@@ -56,18 +53,18 @@ class UdpPort:
         local: the (host, port) it is bound to.
     """
 
-    def __init__(self, opened: socket.socket, clients: Clients, named: NamedPeers) -> None:
-        self._socket, self._clients, self._named = opened, clients, named
-        self.local: tuple[str, int] = opened.getsockname()[:2]
+    def __init__(self, sock: socket.socket, clients: Clients, named_peers: NamedPeers) -> None:
+        self._socket, self._clients, self._named_peers = sock, clients, named_peers
+        self.local: tuple[str, int] = sock.getsockname()[:2]
         self._loop = asyncio.get_running_loop()
         self._by_address: dict[Any, UdpClient] = {}
         self._only: Any = None
         self._flood = Flood()
         self._pause: asyncio.TimerHandle | None = None
         self._timer = self._loop.call_later(_SILENT, self._expire)
-        self._loop.add_reader(opened.fileno(), self._read)
+        self._loop.add_reader(sock.fileno(), self._read)
 
-    def call(self, address: Any) -> None:
+    def send_only_to(self, address: Any) -> None:
         """Send to one client, which need not send first; ignore all others."""
         self._only = address
         self._attach(address)
@@ -84,13 +81,16 @@ class UdpPort:
         self._by_address.clear()
 
     def send(self, data: bytes, address: Any) -> bool:
-        """Send a datagram; return false if the kernel does not take it now."""
+        """Send a datagram; return False if the kernel's buffer is full.
+
+        After another error it is lost, and True is returned: the next one may arrive.
+        """
         try:
             self._socket.sendto(data, address)
         except BlockingIOError:
             return False
         except OSError:
-            return True  # nobody listens there now; the next datagram may find somebody
+            pass  # such as an ICMP refusal: nobody listens there now
         return True
 
     def _read(self) -> None:
@@ -112,7 +112,7 @@ class UdpPort:
     def _take(self, data: bytes, address: Any) -> None:
         client = self._by_address.get(address)
         if client is None:
-            if self._only is not None or not self._named.admit(address):
+            if self._only is not None or not self._named_peers.admit(address):
                 return
             client = UdpClient(self, address)
             frames = client.scan(data)

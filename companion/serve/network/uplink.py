@@ -40,8 +40,6 @@ class Uplink:
         dropped: frames dropped because their client's queue was full, or they waited too long.
     """
 
-    name = "vehicle"
-
     def __init__(
         self, send: Callable[[bytes], bool], rate: float, burst: float, clock: Callable[[], float]
     ) -> None:

@@ -53,21 +53,21 @@ class Approach:
         self, error: State, limits: Sequence[AxisLimits], begins: float, *, by_velocity: bool
     ) -> None:
         axes = len(limits)
-        given = InputParameter(axes)
-        given.current_position = list(error.position)
-        given.current_velocity = list(error.velocity)
-        given.current_acceleration = list(error.acceleration)
-        given.target_position = [0.0] * axes
-        given.max_velocity = [each.velocity for each in limits]
-        given.min_velocity = [-each.backward for each in limits]
-        given.max_acceleration = [each.acceleration for each in limits]
-        given.max_jerk = [each.jerk for each in limits]
+        problem = InputParameter(axes)
+        problem.current_position = list(error.position)
+        problem.current_velocity = list(error.velocity)
+        problem.current_acceleration = list(error.acceleration)
+        problem.target_position = [0.0] * axes
+        problem.max_velocity = [each.velocity for each in limits]
+        problem.min_velocity = [-each.backward for each in limits]
+        problem.max_acceleration = [each.acceleration for each in limits]
+        problem.max_jerk = [each.jerk for each in limits]
         if by_velocity:
-            given.control_interface = ControlInterface.Velocity
+            problem.control_interface = ControlInterface.Velocity
         self._begins = begins
         self._trajectory = Trajectory(axes)
         try:
-            result = Ruckig(axes).calculate(given, self._trajectory)
+            result = Ruckig(axes).calculate(problem, self._trajectory)
         # A ValueError comes of a Result that Ruckig's enumeration lacks.
         except (RuckigError, RuntimeError, ValueError) as refusal:
             raise _unplannable(refusal) from refusal

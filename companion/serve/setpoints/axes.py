@@ -182,19 +182,19 @@ class Axes:
     def _derivatives(self, demand: AxisDemand, now: float) -> tuple[Values, Values]:
         """Acceleration and jerk of a stream; estimated if they are not commanded."""
         before, since = self._demand, now - self._given_at
-        given = demand.acceleration
+        commanded = demand.acceleration
         fresh = before is not None and before.position is not None and 0.0 < since <= _STREAM
         if not fresh or before is None or demand.velocity is None or before.velocity is None:
-            return given or self._zero, self._zero
-        if given is None:
+            return commanded or self._zero, self._zero
+        if commanded is None:
             rate = change_rate(before.velocity, demand.velocity, since, _LARGEST_ACCELERATION)
             if rate is None:
                 return self._zero, self._zero
             return _blend(self._carrier.acceleration, rate), self._zero
         if before.acceleration is None:
-            return given, self._zero
-        jerk = change_rate(before.acceleration, given, since, LARGEST_JERK)
-        return given, self._zero if jerk is None else _blend(self._carrier.jerk, jerk)
+            return commanded, self._zero
+        jerk = change_rate(before.acceleration, commanded, since, LARGEST_JERK)
+        return commanded, self._zero if jerk is None else _blend(self._carrier.jerk, jerk)
 
     def _is_continued(self, error: State) -> bool:
         return (

@@ -33,7 +33,7 @@ class MotionLimits(NamedTuple):
         jerk: largest jerk, m/s³; vertically at most `_VERTICAL_JERK`.
         climb, descent: largest vertical speeds, m/s.
         yaw_rate: largest yaw rate, rad/s.
-        timeout: see `Axes`, s.
+        timeout: time for which a stream that repeats the same moving state is continued, s.
     """
 
     speed: float
@@ -46,7 +46,9 @@ class MotionLimits(NamedTuple):
 
 
 class CommandedMotion:
-    """Turns requests into a reference that jumps by `Continuity` at most, all in one frame.
+    """Turns requests into a reference that jumps by `Continuity` at most.
+
+    Positions of requests and of the reference are in the same local frame.
 
     Args:
         limits: limits of the motion from one request to the next.
@@ -86,7 +88,7 @@ class CommandedMotion:
         horizontal, vertical = _by_axes(actual)
         try:
             self._horizontal.command(request.horizontal, now, horizontal)
-            self._vertical.command(self._within(request.vertical), now, vertical)
+            self._vertical.command(self._clamped(request.vertical), now, vertical)
             self._heading.command(self._turn(request, now), now)
         except UnplannableError:
             self._horizontal, self._vertical, self._heading, self._yaw = before
@@ -106,7 +108,7 @@ class CommandedMotion:
         (heading,), (rate,), _ = self._heading.at(time)
         return Reference((x, y, z), (u, v, w), (a, b, c), heading, rate)
 
-    def _within(self, vertical: AxisDemand) -> AxisDemand:
+    def _clamped(self, vertical: AxisDemand) -> AxisDemand:
         """The demand with its velocity clamped to the limits, unless a position is demanded too."""
         if vertical.velocity is None or vertical.position is not None:
             return vertical

@@ -91,7 +91,8 @@ def global_target(message: Message, situation: Situation) -> MotionRequest:
     """The command of a SET_POSITION_TARGET_GLOBAL_INT.
 
     Raises:
-        RefusedSetpoint: see `local_target`; or the origin of the local frame is unknown.
+        RefusedSetpoint: the setpoint is contradictory, incomplete, not finite, too large, or of a
+            kind that is not flown; or the origin of the local frame is unknown.
     """
     frame = message.coordinate_frame
     if frame in _TERRAIN:

@@ -92,7 +92,7 @@ class ArduPilot:
         return _BY_RATES if by_rates else name
 
     def roles(self, mode: str) -> frozenset[Role]:
-        """Roles of a mode in a flight."""
+        """Roles of a mode in a flight; empty: the mode has none."""
         return _ROLES.get(mode, frozenset())
 
     def set_mode(self, name: str) -> Command:

@@ -106,7 +106,7 @@ class Px4:
         return _NAMES.get(custom_mode, f"mode 0x{custom_mode:08x}")
 
     def roles(self, mode: str) -> frozenset[Role]:
-        """Roles of a mode in a flight."""
+        """Roles of a mode in a flight; empty: the mode has none."""
         return _ROLES.get(mode, frozenset())
 
     def set_mode(self, name: str) -> Command:

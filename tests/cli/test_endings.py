@@ -1,0 +1,324 @@
+"""Each way in which a command can end: its exit code, its sentence, and what it passes on."""
+
+import argparse
+import asyncio
+import contextlib
+import errno
+import io
+import json
+import os
+import signal
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+from companion.bench import flight, link, planner
+from companion.bench import serve as bench_serve
+from companion.cli import flights, flying, identify
+from companion.cli import main as entry
+from companion.cli import serve as serving
+from companion.cli.flying import page_about
+from companion.cli.main import main
+from companion.cli.run import run
+from companion.cli.text_streams import _transliterated
+from companion.config import Config
+from companion.config.files import changed, load, shipped
+from companion.extras import MissingExtraError
+from companion.files.yaml_file import ConfigError
+from companion.mavlink.errors import LinkError
+from companion.mavlink.loop import run as run_loop
+from companion.study import runner
+
+ENOSPC = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (ConfigError("bad [key]"), 2, "bad [key]"),
+        (LinkError("no vehicle"), 1, "no vehicle"),
+        (BrokenPipeError(), 1, None),
+        (ENOSPC, 1, "No space left on device"),
+        (OSError(errno.EACCES, "Permission denied", "/x"), 1, "/x: Permission denied"),
+        (asyncio.CancelledError(), 1, "interrupted before anything was sent"),
+        (
+            ZeroDivisionError("oops"),
+            1,
+            "internal error: ZeroDivisionError('oops'); run again with --debug for where it "
+            "happened",
+        ),
+    ],
+)
+@pytest.mark.parametrize("debug", [False, True])
+def test_each_error_is_one_sentence_and_a_code(capsys, error, code, said, debug):
+    def command(_):
+        raise error
+
+    assert run(command, argparse.Namespace(debug=debug)) == code
+    told = capsys.readouterr().err
+    if debug and isinstance(error, ZeroDivisionError):
+        assert told.startswith("Traceback")
+        told = told[told.index("companion: ") :]
+    assert told == ("" if said is None else f"companion: {said}\n")
+
+
+def test_ctrl_c_outside_a_flight_is_told(monkeypatch, capsys):
+    def loaded(_):
+        def interrupted():
+            raise KeyboardInterrupt
+
+        return interrupted
+
+    monkeypatch.setattr(entry, "_loaded", loaded)
+    before = signal.getsignal(signal.SIGINT)
+    assert main(["demo"]) == 1
+    assert capsys.readouterr().err == "companion: interrupted\n"
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+@pytest.mark.parametrize(
+    ("what", "module", "given"),
+    [
+        ("link", link, (2.0, 100.0, True)),
+        ("serve", bench_serve, (2.0, 100.0, True)),
+        ("planner", planner, (2.0, True)),
+        ("flight", flight, (2.0, True)),
+    ],
+)
+def test_a_benchmark_prints_its_figures_as_one_line_of_json(
+    monkeypatch, capsys, what, module, given
+):
+    asked = []
+    monkeypatch.setattr(module, "run", lambda *told, **_: (asked.append(told), {"p50_us": 1.5})[1])
+    rate = ["--rate", "100"] if len(given) == 3 else []
+    assert main(["bench", what, "--seconds", "2", *rate, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"p50_us": 1.5}
+    assert asked == [given]
+    assert main(["bench", what, "--seconds", "2", *rate]) == 0
+    assert capsys.readouterr().out == ""
+
+
+def test_a_study_that_is_interrupted_says_that_its_files_are_complete(
+    monkeypatch, capsys, tmp_path
+):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(runner, "run", interrupted)
+    out = tmp_path / "a [b]"
+    assert main(["study", "track", "--out", str(out)]) == 1
+    told = " ".join(capsys.readouterr().out.split())
+    assert "Interrupted; the files in" in told
+    assert "a [b] are complete." in told
+    monkeypatch.setattr(runner, "run", lambda *_: (out / "index.html", [{"rms": 0.1}]))
+    assert main(["study", "track", "--out", str(out), "--json"]) == 0
+    told = capsys.readouterr()
+    assert json.loads(told.out) == [{"rms": 0.1}]
+    assert told.err == f"Open {out / 'index.html'}\n"
+
+
+@pytest.mark.parametrize(
+    ("program", "found", "name"),
+    [
+        ("/x/companion", "/x/companion", "companion"),
+        ("/x/companion", "/y/companion", "/x/companion"),
+        ("/x/companion", None, "/x/companion"),
+        ("/x/__main__.py", None, f"{sys.executable} -m companion"),
+    ],
+)
+def test_the_next_command_names_the_program_as_it_was_called(monkeypatch, program, found, name):
+    monkeypatch.setattr(sys, "argv", [program])
+    monkeypatch.setattr(flying.shutil, "which", lambda _: found)
+    options = argparse.Namespace(typed=("fly",), config="c.yaml")
+    assert flying.invocation(options) == (name, ("fly",), "c.yaml")
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (MissingExtraError("needs plotly"), "No report: needs plotly"),
+        (ValueError("x"), "No report: x; `companion report f` tries again"),
+        (ValueError(), "No report: ValueError; `companion report f` tries again"),
+    ],
+)
+def test_a_page_that_cannot_be_written_does_not_fail_the_flight(monkeypatch, error, said):
+    def write(_):
+        raise error
+
+    monkeypatch.setattr("companion.report.page.write_report", write)
+    assert page_about("f") == said
+
+
+@pytest.mark.parametrize("page", [True, False])
+def test_a_demo_opens_its_page_if_there_is_one(monkeypatch, tmp_path, page):
+    opened = []
+    log = tmp_path / "a log"
+    log.mkdir()
+    if page:
+        (log / "report.html").write_text("")
+    monkeypatch.setattr(flying, "fly_bundled", lambda *_, **__: SimpleNamespace(log=log))
+    monkeypatch.setattr(flights, "_ended", lambda *_: 0)
+    monkeypatch.setattr(flights.webbrowser, "open", opened.append)
+    assert main(["demo", "--open"]) == 0
+    assert opened == ([f"{(log / 'report.html').as_uri()}"] if page else [])
+    opened.clear()
+    assert main(["demo"]) == 0
+    assert opened == []
+
+
+class Session:
+    """Serves until it is stopped, and notes what happened."""
+
+    def __init__(self, told):
+        self.told, self.over = told, asyncio.Event()
+
+    def stop(self):
+        self.told.append("stop")
+
+    def leave(self):
+        self.told.append("leave")
+        self.over.set()
+
+    async def run(self):
+        self.loop = asyncio.get_running_loop()
+        for seconds, number in self.signals:
+            self.loop.call_later(seconds, os.kill, os.getpid(), number)
+        await asyncio.wait_for(self.over.wait(), 5.0)
+        return {}
+
+
+class Pages:
+    def __init__(self, told):
+        self.told = told
+
+    def leave(self):
+        self.told.append("leave the page")
+
+
+def test_a_second_ctrl_c_leaves_but_not_one_of_a_bouncing_key(monkeypatch):
+    monkeypatch.setattr(serving, "LEAVE_AFTER", 0.2)
+    told = []
+    session = Session(told)
+    session.signals = ((0.05, signal.SIGINT), (0.1, signal.SIGINT), (0.4, signal.SIGINT))
+    run_loop(serving._until_stopped(session, Pages(told)))
+    assert told == ["stop", "leave", "leave the page"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_stops_serving_and_the_page_of_a_flight_gets_some_time(monkeypatch, number):
+    monkeypatch.setattr(serving, "_PAGE_AFTER_STOP", 0.05)
+    told = []
+    session = Session(told)
+    session.signals = ((0.02, number),)
+
+    class Leaving(Pages):
+        def leave(self):
+            super().leave()
+            session.over.set()
+
+    run_loop(serving._until_stopped(session, Leaving(told)))
+    assert told == ["stop", "leave the page"]
+
+
+def test_only_an_encoding_error_is_transliterated():
+    error = UnicodeDecodeError("utf-8", b"\xff", 0, 1, "bad")
+    with pytest.raises(UnicodeDecodeError):
+        _transliterated(error)
+
+
+@pytest.mark.parametrize("count", ["0", "99999", "-1", "two", "1.5"])
+def test_a_count_of_workers_that_is_none_is_wrong_usage(capsys, count):
+    with pytest.raises(SystemExit) as ending:
+        main(["campaign", "c.yaml", f"--workers={count}"])
+    assert ending.value.code == 2
+    assert "must be a whole number from 1 to " in capsys.readouterr().err
+
+
+def test_the_handlers_are_those_of_before_after_a_command():
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    assert {number: signal.getsignal(number) for number in before} == before
+
+
+class Beside:
+    """Stands for the helper process."""
+
+    feed = None
+
+    def serve_beside(self, work):
+        return "beside", work
+
+
+@pytest.mark.parametrize("beside", [None, Beside()])
+def test_a_flight_is_served_beside_its_helper(monkeypatch, tmp_path, beside):
+    ran = []
+    session = SimpleNamespace(changes="changes", note="note")
+    monkeypatch.setattr(flying, "Session", lambda *_, **__: session)
+    monkeypatch.setattr(flying, "fly_interruptibly", lambda each: ("flight", each))
+    monkeypatch.setattr(flying, "flight_table", lambda _: "table")
+    monkeypatch.setattr(flying, "words_text", lambda _: "words")
+    monkeypatch.setattr(flying, "closing_words", lambda *_: None)
+    summary = SimpleNamespace(as_dict=dict)
+    monkeypatch.setattr(flying.link_loop, "run", lambda work: (ran.append(work), summary)[1])
+    console = flying.FlightConsole(file=io.StringIO(), highlight=False)
+    config = changed(Config(), {"recording": {"report": False}}, "a test")
+    folder = tmp_path / "a [b]"
+    assert flying.fly(config, folder, console, beside=beside) is summary
+    flight = ("flight", session)
+    assert ran == [flight if beside is None else ("beside", flight)]
+    assert console.file.getvalue() == f"table\nRecorded in {folder}\nwords\n"
+    if beside is not None:
+        assert (beside.changes, beside.note) == ("changes", "note")
+
+
+@pytest.mark.parametrize("report", [True, False])
+@pytest.mark.parametrize("beside", [None, Beside()])
+def test_serve_writes_pages_if_asked_to_and_tells_its_counters(
+    monkeypatch, tmp_path, capsys, report, beside
+):
+    session = SimpleNamespace(changes="changes", records=SimpleNamespace(on_recorded=None))
+    monkeypatch.setattr(serving, "ServeSession", lambda *_: session)
+    monkeypatch.setattr(serving, "_until_stopped", lambda *told: ("serving", told[0]))
+    monkeypatch.setattr(serving, "helper", lambda *_, **__: contextlib.nullcontext(beside))
+    ran = []
+    monkeypatch.setattr(serving.link_loop, "run", lambda work: (ran.append(work), {"in": 7})[1])
+    config = tmp_path / "c.yaml"
+    config.write_text(f"recording: {{report: {str(report).lower()}}}\n")
+    assert main(["serve", "--config", str(config), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"in": 7}
+    assert (session.records.on_recorded is not None) is report
+    work = ("serving", session)
+    assert ran == [work if beside is None else ("beside", work)]
+    if beside is not None:
+        assert beside.changes == "changes"
+
+
+def test_a_folder_that_this_user_cannot_write_is_refused_before_the_flight(monkeypatch, tmp_path):
+    monkeypatch.setattr(identify.os, "access", lambda *_: False)
+    with pytest.raises(ConfigError, match=r"the folder .* cannot be written; name another one"):
+        identify._writable(tmp_path / "vehicle.yaml", force=False)
+    monkeypatch.setattr(identify.os, "access", lambda *_: True)
+    identify._writable(tmp_path / "vehicle.yaml", force=False)
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ([], {}),
+        (["--lockstep"], {"link": {"lockstep": True}}),
+        (["--slow-down"], {"flight": {"slow_down": True}}),
+        (["--arm"], {"flight": {"arm": True}}),
+        (["--endpoint", "udpin://127.0.0.1:1"], {"link": {"endpoint": "udpin://127.0.0.1:1"}}),
+    ],
+)
+def test_an_option_of_fly_replaces_its_key(monkeypatch, options, told):
+    flown = []
+    monkeypatch.setattr(flights, "flight_folder", lambda _: None)
+    monkeypatch.setattr(flights, "helper", lambda *_, **__: contextlib.nullcontext(None))
+    monkeypatch.setattr(flights, "_ended", lambda *_: 0)
+    monkeypatch.setattr(flying, "fly", lambda config, *_: flown.append(config))
+    config = shipped("px4.yaml")
+    assert main(["fly", "--config", str(config), *options]) == 0
+    assert flown == [changed(load(config), told, "a test")]
