@@ -94,7 +94,9 @@ class DragEstimate:
         """The fastest mean speed of a window so far, m/s."""
         return self._top_speed
 
-    def observe(self, dt: float, velocity: Vector, residual: Horizontal, heading: float = 0.0) -> None:
+    def observe(
+        self, dt: float, velocity: Vector, residual: Horizontal, heading: float = 0.0
+    ) -> None:
         """Take a measured acceleration; one that is not finite is ignored.
 
         Args:

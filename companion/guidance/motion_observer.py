@@ -138,7 +138,7 @@ class MotionObserver:
         self.disturbance = rotated(*self.disturbance, angle)
 
     def at(self, time: float, known: Horizontal) -> VehicleMotion | None:
-        """The motion at a vehicle time, predicted from the newest measurement; None before the first.
+        """The motion predicted from the newest measurement; None before the first.
 
         Args:
             time: vehicle time, s.

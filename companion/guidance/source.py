@@ -191,7 +191,7 @@ class CommandedSource:
 
     @property
     def failure(self) -> str | None:
-        """Why the references ended: as given to `fail`, or that none came in time; None: neither."""
+        """Why control must end: as given to `fail`, or that references stopped; None: neither."""
         return self._failure
 
     def fail(self, reason: str) -> None:
