@@ -166,7 +166,7 @@ class TargetFrame:
         """Angle by which the target leads the body in yaw when the rates sent now take effect, rad.
 
         It is computed from the newest attitude target. If that is missing, older than `OLDEST` or
-        more than `LARGEST_LEAD` ahead, it follows from `RateResponse.lead`.
+        more than `LARGEST_LEAD` ahead or behind, it follows from `RateResponse.lead`.
 
         Args:
             heading: heading of the body minus its predicted turn since the plans began, rad.

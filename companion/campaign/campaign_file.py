@@ -134,12 +134,16 @@ class CampaignFile(Section):
             raise ValueError(f"sampling: sobol needs samples: {power // 2} or {power}")
         if NO_FAULT in self.faults:
             raise ValueError(f"faults: {NO_FAULT} is the name of a flight without a fault")
-        for key in self.set.keys() & _swept_keys(self.sweep):
-            raise ValueError(f"`{key}` stands in set and in sweep; remove one of them")
+        factors: dict[str, str] = {}
+        for name, swept in self.sweep.items():
+            for key in swept.keys or (name,):
+                if key in self.set:
+                    raise ValueError(f"`{key}` stands in set and in sweep; remove one of them")
+                if factors.setdefault(key, name) != name:
+                    raise ValueError(
+                        f"sweep: `{factors[key]}` and `{name}` both change `{key}`; remove it from "
+                        "one of them"
+                    )
         if self.kind == "batch" and (self.faults or FAULT in self.sweep):
             raise ValueError("faults need kind: flights")
         return self
-
-
-def _swept_keys(sweep: dict[str, Swept]) -> "frozenset[str]":
-    return frozenset(key for name, swept in sweep.items() for key in swept.keys or (name,))

@@ -104,7 +104,10 @@ def response(summary: Summary) -> dict[str, float]:
 def activity(
     setpoints: Sequence[ReceivedSetpoint], summary: Summary, config: Config
 ) -> dict[str, float]:
-    """Rates and thrust that the autopilot received during the maneuvers."""
+    """Rates (rad/s) and thrust (0..1) that the autopilot received during the maneuvers.
+
+    `thrust_rms` is the standard deviation of the thrust. Empty if there were no maneuvers.
+    """
     marks = summary.trace.maneuvers
     if not marks:
         return {}

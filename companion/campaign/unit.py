@@ -18,7 +18,10 @@ SECONDS = 2.5
 It is long compared with the time to send a unit, and so short that a lost unit costs little.
 """
 _UNITS_PER_WORKER = 4
-"""Smallest number of units for each worker, so that all workers end at about the same time."""
+"""Number of units planned for each worker, so that all workers end at about the same time.
+
+Rounding may give fewer units; many cases give more, because a unit has a limited duration.
+"""
 
 
 class Flown(NamedTuple):

@@ -9,7 +9,7 @@ _STILL = 0.5
 _LIFTED = 1.0
 """A climb by more than this since the take-off command means that the vehicle has lifted off, m."""
 _SPEED_LASTS = 0.5
-"""An older vertical speed is ignored, s."""
+"""A vertical speed older than this is ignored, s."""
 _SETTLED = 0.5
 """The landed flag must be set for this long after a landing, s."""
 

@@ -2,5 +2,5 @@
 
 
 def reason_of(error: OSError) -> str:
-    """Why the system refused, without number and file; errors of Python's own have other words."""
+    """The system's reason without error number and file; for an error without one, its text."""
     return error.strerror or str(error)

@@ -197,7 +197,7 @@ class DelayedModel:
         return points[int(np.argmin([float(rest @ rest) for rest in residuals]))]
 
     def explained(self, found: Solution) -> float:
-        """R² of a fit."""
+        """R² of a fit; 0 if the measurements are constant."""
         spread = self.measured - self.measured.mean()
         return 1.0 - found.squares / float(spread @ spread) if spread.any() else 0.0
 

@@ -47,7 +47,7 @@ def held_commands(time: Floats, commanded: Floats, tolerance: float = 0.0) -> Kn
 
 
 def slewed(commands: Knots, slew: float) -> Knots:
-    """Held commands after a slew limit `slew` (per second); it starts at the first command."""
+    """Held commands after a slew limit `slew` (per second); the output starts at the first one."""
     start = _values_before(commands, slew)
     way = commands.value - start
     arrival = commands.time + np.abs(way) / slew
@@ -119,7 +119,7 @@ def _decayed_sums(ages: Numbers, jumps: Numbers) -> Numbers:
 
 
 def value_at(commands: Knots, at: Floats) -> Floats:
-    """(m,), values of the commands at the times `at` (m,), s, none before the first knot."""
+    """(m,), values of the commands at the times `at` (m,), s; none may be before the first knot."""
     piece = np.searchsorted(commands.time, at, side="right") - 1
     values: Floats = commands.value[piece] + commands.slope[piece] * (at - commands.time[piece])
     return values

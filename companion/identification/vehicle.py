@@ -73,7 +73,7 @@ def identify_vehicle(setpoints: Rows, rates: Rows, specific_thrust: Rows) -> Ide
 
 
 def _as_array(rows: Rows, columns: int) -> Floats:
-    return np.array(rows, dtype=np.float64).reshape(-1, columns)
+    return np.array(rows, dtype=np.float64).reshape(len(rows), columns)
 
 
 def _response(commands: Floats, measured: Floats, axis: int) -> RateResponse:

@@ -137,7 +137,14 @@ def _cos_tilt(c: ca.SX) -> ca.SX:
 
 
 def _polygon_terms(vector: ca.SX, radius: Any) -> ca.SX:
-    """Component of a vector (2,) normal to each pair of sides, (6,): 1 or −1 on a side."""
+    """Six terms, each within ±1, that keep a vector (2,) inside a regular polygon.
+
+    Each is the component normal to a pair of sides, as a share of their distance from the centre.
+
+    Args:
+        vector: (2,).
+        radius: radius of the circle through the corners, in the unit of the vector.
+    """
     angles = [pi * k / _SIDE_PAIRS for k in range(_SIDE_PAIRS)]
     across = (cos(angle) * vector[0] + sin(angle) * vector[1] for angle in angles)
     sides: ca.SX = ca.vertcat(*across) / (cos(0.5 * pi / _SIDE_PAIRS) * radius)

@@ -30,7 +30,8 @@ _LARGEST_MESSAGE = 4096
 _EXIT_TIME = 0.02
 """Time allowed for the process to exit after its socket has closed, s; it usually takes < 1 ms."""
 _TOLERANCE = 0.02
-"""Share by which an answer may exceed the tilt limit through rounding; for thrust, of gravity."""
+"""Margin for rounding when an answer is checked: a share of the tilt limit; for thrust, of gravity.
+"""
 
 
 class Trouble(Enum):

@@ -60,9 +60,8 @@ def node_of(
     """Attitude and thrust of a sample: differential flatness of a point mass with drag.
 
     The rotors must provide f = a + d − w − g, with d the deceleration by drag; its upward part is
-    kept above a fifth of gravity. |f| is the specific
-    thrust, the horizontal part of f/|f| the coefficients, and ḟ = jerk + ḋ gives their time
-    derivative.
+    kept above a fifth of gravity. |f| is the specific thrust, the horizontal part of f/|f| the
+    coefficients, and ḟ = jerk + ḋ gives their time derivative.
 
     Args:
         sample: sample of the trajectory.

@@ -65,8 +65,8 @@ async def survey(
     """Read the rules' parameters, several at a time; ask again if the link loses frames.
 
     An old name is requested only if the new one gave no value. Parameters without any answer are
-    requested in a second round, for longer, but only if frames were lost. Without losses, no answer
-    means that the autopilot lacks the parameter.
+    requested in a second round, for longer, but only if the link loses frames and at least one
+    parameter was answered. Without losses, no answer means that the autopilot lacks the parameter.
 
     Args:
         link: Link to the vehicle.
@@ -117,7 +117,7 @@ class _Questions:
 
     @property
     def lossy(self) -> bool:
-        """Whether frames were lost since the start, in either direction.
+        """Whether more than `SOME_LOST` of the frames were lost, or a request had to be repeated.
 
         Gaps in sequence numbers show lost frames of the vehicle. An answer to a repeated request
         shows that the earlier request or its answer was lost.

@@ -39,7 +39,7 @@ def flight_tables(flight: FlightData) -> list[Table]:
 
 
 def events_at_end(flight: FlightData) -> list[Table]:
-    """The events around the early end of a flight; no table without any."""
+    """The events around the early end of a flight; no table if there was none, or no event."""
     if flight.end is None:
         return []
     around = [each for each in flight.events if abs(each.time - flight.end.time) <= _AROUND_END]

@@ -141,10 +141,10 @@ class Inbox:
         return True
 
     def may_answer(self, who: str) -> bool:
-        """Whether frames are sent to `who` although its claim was refused.
+        """Let `who` answer a TIMESYNC request, if that could make its signatures acceptable.
 
-        They are if its answer to a TIMESYNC request would make its signatures acceptable. Then the
-        next frame that `receive` accepts makes `who` the peer.
+        Returns whether it may; then frames are sent to `who`, although its frame was refused, and
+        the next frame that `receive` accepts makes `who` the peer.
         """
         if not self._filter.awaits_answer:
             return False

@@ -63,6 +63,12 @@ def test_a_fault_that_is_none(tmp_path, told, words):
     assert words in refusal(tmp_path, samples=2, **{"faults": faults, **told})
 
 
+def test_a_key_that_two_factors_change(tmp_path):
+    gusts = {"values": [0, 1], "keys": [WIND]}
+    said = refusal(tmp_path, sweep={WIND: [2, 4], "gusts": gusts}, samples=2)
+    assert f"sweep: `{WIND}` and `gusts` both change `{WIND}`; remove it from one of them" in said
+
+
 def test_a_fault_cannot_be_called_none_nor_be_in_a_batch(tmp_path):
     said = refusal(tmp_path, faults={"none": SILENCE})
     assert "faults: none is the name of a flight without a fault" in said

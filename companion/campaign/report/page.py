@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 PARQUET, CSV = "results.parquet", "results.csv"
 _DONE = 0
 _GRID_LIKE, _FEW_SAMPLES = 12, 60
-"""A sampled factor with a number of values between these has too few to separate its influence
-from that of other factors.
+"""If the largest number of different values of a sampled factor lies between these, there are too
+few values to separate the influence of the factors.
 """
 
 

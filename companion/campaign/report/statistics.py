@@ -71,8 +71,8 @@ def levels(column: Column) -> list[Level]:
     """The levels of a factor.
 
     Up to `_MOST_LEVELS` different values give one level each. More numbers give ranges with about
-    equally many cases; null is a level of its own. Of more words, the last level joins all that
-    have none of their own.
+    equally many cases; null is a level of its own. Of more words, the last level joins the
+    remaining ones.
     """
     known = sorted({_key(value) for value in column})
     if column.dtype != float or len(known) <= _MOST_LEVELS:

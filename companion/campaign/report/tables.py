@@ -113,7 +113,10 @@ def sensitivity(influences: dict[str, list[Influence]]) -> Table:
 
 
 def crossed(results: Results) -> Table | None:
-    """Median error and success for each pair of values of the first two factors with few values."""
+    """Median error and success for each pair of values of the first two factors with few values.
+
+    None if fewer than two factors have few values.
+    """
     columns = results.columns
     few = [
         name

@@ -91,7 +91,7 @@ class Search:
         folder: folder for the storage.
         fly: flies cases.
         learn: flies the vehicle before a new search, and returns the configuration with what was
-            measured.
+            measured; None: nothing was measured.
 
     Raises:
         ConfigError: the storage in the folder is damaged, or the first case cannot be flown.
@@ -214,7 +214,10 @@ class Search:
         trial.set_constraint(_MISSED, missed)
 
     def _missed_share(self, score: Score, of: int) -> float:
-        """Shortfall of the share inside the envelope, if the rest of `of` cases stay inside."""
+        """Shortfall of the share inside the envelope, if the rest of `of` cases stay inside.
+
+        0 or less: the required share can still be reached.
+        """
         outside = sum(not each for each in score.inside)
         return self._tune.inside_share - (of - outside) / of
 

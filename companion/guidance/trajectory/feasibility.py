@@ -17,7 +17,7 @@ _ROUNDING = 1e-9
 _DEGREES = 180.0 / pi
 
 SLOWER = "fly it more slowly (--slow-down finds how much), or change the limit"
-"""The remedy for a limit that a slower motion keeps."""
+"""The remedy if a slower motion would keep the limit."""
 
 
 class Violation(NamedTuple):

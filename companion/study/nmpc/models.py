@@ -89,7 +89,7 @@ def euler_reduced(settings: Settings) -> Model:
     """Equation 37 without its matrix and with constant yaw, for a fair comparison.
 
     The controls are φ̇ and θ̇ themselves, since ω = M·(φ̇, θ̇, ψ̇) can be computed afterwards. So
-    the matrix drops out. The yaw stays that at the start of the horizon.
+    the matrix drops out. The yaw is constant over the horizon.
     """
     state, control, constants = ca.SX.sym("x", 8), ca.SX.sym("u", 3), constants_symbols(own=1)
     yaw = own_constant(constants)

@@ -24,7 +24,7 @@ _SWEEP = (10, 5, 3, 2, 1)
 PARTS = 2 * len(METHODS) + len(_SWEEP)
 
 Sweep = dict[float, dict[Method, float]]
-"""Cross-track of each method of the paper at heading 0, by `LoopFlights.time_63` of the loop, s."""
+"""`LoopFlights.time_63` of the loop in s -> method -> cross-track at heading 0."""
 
 
 class LoopFlights(NamedTuple):
