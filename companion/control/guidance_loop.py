@@ -16,7 +16,7 @@ from companion.control.telemetry import Clock, FreshPosition, Ground, Telemetry
 from companion.control.ticker import Ticker
 from companion.control.tracking_record import TrackingRecord
 from companion.guidance import GuidanceInput, HoverThrust, Pose, Reference, VehicleMotion
-from companion.guidance.braking import Assumed
+from companion.guidance.braking import AssumedBraking
 from companion.guidance.linear import Guidance
 from companion.guidance.reference import Horizontal
 from companion.guidance.source import Source
@@ -60,7 +60,7 @@ class GuidanceLoop:
         trace: FlightTrace,
         *,
         max_tilt: float,
-        assumed_braking: Assumed,
+        assumed_braking: AssumedBraking,
         period: float,
         position_stale: float,
         clock: Callable[[], float],

@@ -8,7 +8,7 @@ from companion.control.command_maker import CommandMaker
 from companion.control.flown_source import FlownSource
 from companion.control.hover_learning import HoverLearning
 from companion.guidance import GRAVITY, VehicleMotion
-from companion.guidance.braking import Assumed, brake
+from companion.guidance.braking import AssumedBraking, brake
 
 
 class Hold:
@@ -32,7 +32,7 @@ class Hold:
         maker: CommandMaker,
         learning: HoverLearning,
         max_tilt: float,
-        assumed: Assumed,
+        assumed: AssumedBraking,
     ) -> None:
         self.max_tilt = max_tilt
         self.given_up: str | None = None

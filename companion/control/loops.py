@@ -9,7 +9,7 @@ from companion.control.inner_loop import hover_thrust, planner, rate_limits
 from companion.control.loop_record import Deadlines
 from companion.control.outer_loop import make_guidance, motion_estimate
 from companion.control.telemetry import Clock, Ground, Telemetry
-from companion.guidance.braking import Assumed
+from companion.guidance.braking import AssumedBraking
 from companion.recording.trace import FlightTrace
 
 
@@ -50,7 +50,7 @@ def make_loops(
         ground,
         trace,
         max_tilt=config.limits.max_tilt,
-        assumed_braking=Assumed(config.safety.reaction_s, config.safety.braking_m_s2),
+        assumed_braking=AssumedBraking(config.safety.reaction_s, config.safety.braking_m_s2),
         period=1.0 / config.guidance.rate_hz,
         position_stale=config.deadman.position_stale,
         clock=clock,

@@ -176,7 +176,7 @@ class MotionEstimate:
 
     def mismatch_warning(self) -> str | None:
         """Advice to change the drag keys if the learned drag differs from them; else None."""
-        assumed, learned, speed = self.drag.first, self.drag.drag, self.drag.top_speed
+        assumed, learned, speed = self.drag.prior_drag, self.drag.drag, self.drag.top_speed
         error = learned.per_velocity(speed) - assumed.per_velocity(speed)
         if not self.drag.certain or abs(error) <= _MISMATCH:
             return None

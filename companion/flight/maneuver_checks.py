@@ -18,7 +18,7 @@ from companion.flight.fence_check import FenceCheck
 from companion.guidance import GRAVITY, Doublets, Maneuver, ManeuverSequence
 from companion.guidance.fence import Place
 from companion.guidance.follow import Follow, HeldFigure
-from companion.guidance.predicted import predicted
+from companion.guidance.predicted import predict
 from companion.guidance.reference import Vector
 from companion.guidance.trajectory import (
     Envelope,
@@ -162,7 +162,7 @@ def _motions(part: Maneuver, drag: Drag) -> Iterator[Motion]:
 def _motion(part: Maneuver, heading: float, drag: Drag) -> Motion:
     """The predicted motion of a maneuver that begins at a heading (rad)."""
     times, offset, velocity, acceleration = (
-        np.array(column) for column in zip(*predicted(part, heading, drag), strict=True)
+        np.array(column) for column in zip(*predict(part, heading, drag), strict=True)
     )
     jerk, turning = np.zeros_like(offset), np.zeros_like(times)
     return Motion(times, offset, velocity, acceleration, jerk, turning)

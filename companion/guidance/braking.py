@@ -16,7 +16,7 @@ _NOTICED = 0.1
 """Time within which the fence's monitor and guidance notice a breach, s."""
 
 
-class Assumed(NamedTuple):
+class AssumedBraking(NamedTuple):
     """What the fence's monitor assumes of braking; braking must achieve it.
 
     Attributes:
@@ -28,7 +28,7 @@ class Assumed(NamedTuple):
     deceleration: float
 
 
-def braking_time(speed: float, acceleration: float, assumed: Assumed) -> float:
+def braking_time(speed: float, acceleration: float, assumed: AssumedBraking) -> float:
     """Time in which the vehicle brakes from a speed, s; 0 for a vehicle at rest.
 
     It is as long as a smooth stop needs, but the vehicle stops no further away than the fence's
@@ -97,7 +97,7 @@ class Braking(NamedTuple):
 
 
 def brake(
-    now: float, motion: VehicleMotion, heading: float, acceleration: float, assumed: Assumed
+    now: float, motion: VehicleMotion, heading: float, acceleration: float, assumed: AssumedBraking
 ) -> Braking:
     """The braking that begins now.
 

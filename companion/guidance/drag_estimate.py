@@ -56,7 +56,7 @@ class DragEstimate:
     is a random walk. Wind changes slowly, so what changes with the velocity is drag.
 
     Attributes:
-        first: drag of the prior.
+        prior_drag: drag of the prior.
     """
 
     def __init__(self, prior: DragPrior) -> None:
@@ -64,7 +64,7 @@ class DragEstimate:
 
     def begin(self, prior: DragPrior) -> None:
         """Start again from `prior`."""
-        self.first = prior.drag
+        self.prior_drag = prior.drag
         self._top_speed = 0.0
         self._state = np.array([prior.drag.linear, prior.drag.quadratic, 0.0, 0.0, 0.0])
         deviations = prior.linear_deviation, prior.quadratic_deviation, _WIND, _WIND
@@ -94,24 +94,26 @@ class DragEstimate:
         """The fastest mean speed of a window so far, m/s."""
         return self._top_speed
 
-    def observe(self, dt: float, velocity: Vector, left: Horizontal, heading: float = 0.0) -> None:
+    def observe(
+        self, dt: float, velocity: Vector, residual: Horizontal, heading: float = 0.0
+    ) -> None:
         """Take a measured acceleration; one that is not finite is ignored.
 
         Args:
             dt: duration of the measurement, s.
             velocity: mean velocity during the measurement, m/s, NED.
-            left: measured acceleration less the acceleration by thrust, m/s², NED.
+            residual: measured acceleration less the acceleration by thrust, m/s², NED.
             heading: heading of the vehicle, rad.
         """
         speed = hypot(*velocity)
-        if not (isfinite(dt) and isfinite(speed) and isfinite(hypot(*left))) or dt <= 0.0:
+        if not (isfinite(dt) and isfinite(speed) and isfinite(hypot(*residual))) or dt <= 0.0:
             return
         along_axes = AxisDrag(1.0, heading).deceleration(velocity[0], velocity[1])
         for axis in (0, 1):
             self._along_axes[axis] += dt * along_axes[axis]
             self._passed[axis] += dt * velocity[axis]
             self._squared[axis] += dt * speed * velocity[axis]
-            self._left[axis] += dt * left[axis]
+            self._residual[axis] += dt * residual[axis]
         self._span += dt
         if self._span >= _WINDOW:
             self._learn()
@@ -130,7 +132,7 @@ class DragEstimate:
             spread = self._covariance @ row
             variance = float(row @ spread) + _NOISE**2
             innovation, most = (
-                self._left[axis] / span - float(row @ self._state),
+                self._residual[axis] / span - float(row @ self._state),
                 _CLAMP * sqrt(variance),
             )
             gain = spread / variance
@@ -146,9 +148,9 @@ class DragEstimate:
         (linear, quadratic), p = self._state[:2].tolist(), self._covariance
         within = min(max(quadratic, 0.0), _LARGEST_QUADRATIC)
         linear += float(p[0, 1] / p[1, 1]) * (within - quadratic) if p[1, 1] > 0.0 else 0.0
-        return Drag(min(max(linear, 0.0), self.first.linear + _LARGEST_INCREASE), within)
+        return Drag(min(max(linear, 0.0), self.prior_drag.linear + _LARGEST_INCREASE), within)
 
     def _forget_window(self) -> None:
         self._span = 0.0
-        self._passed, self._squared, self._left = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
+        self._passed, self._squared, self._residual = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
         self._along_axes = [0.0, 0.0]

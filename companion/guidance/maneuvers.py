@@ -77,20 +77,20 @@ class Steps:
 
     def check_times(self) -> list[float]:
         """Times 0.01 s apart over each doublet, s; pauses and settling are not checked."""
-        begins = [which * self._period + _REST for which in range(len(self.DIRECTIONS))]
+        begins = [index * self._period + _REST for index in range(len(self.DIRECTIONS))]
         return [time for begin in begins for time in spread(begin, begin + 4.0 * self.step)]
 
     def at(self, time: float, start: Pose) -> Reference:
         """The reference: a pause, open-loop coefficients in the doublet, then position hold."""
-        which = min(max(int(time / self._period), 0), len(self.DIRECTIONS) - 1)
-        within = time - which * self._period - _REST
+        index = min(max(int(time / self._period), 0), len(self.DIRECTIONS) - 1)
+        within = time - index * self._period - _REST
         rest = Reference(start.position_ned, heading=start.heading)
         if within < 0.0:
             return rest._replace(drifting=True)
         if within >= 4.0 * self.step:
             return rest
         sign = -1.0 if self.step <= within < 3.0 * self.step else 1.0
-        north, east = self.DIRECTIONS[which]
+        north, east = self.DIRECTIONS[index]
         c = sign * self.coefficient
         return rest._replace(coefficients=Coefficients(c * north, c * east))
 
@@ -143,10 +143,10 @@ class Corners:
         rest = Reference(start.position_ned, heading=start.heading)
         if time < _REST:
             return rest._replace(drifting=True)
-        which = int((time - _REST) / self.step)
-        if which >= len(self.CORNERS):
+        index = int((time - _REST) / self.step)
+        if index >= len(self.CORNERS):
             return rest
-        north, east = self.CORNERS[which]
+        north, east = self.CORNERS[index]
         return rest._replace(coefficients=Coefficients(self.north * north, self.east * east))
 
 

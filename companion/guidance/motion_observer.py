@@ -10,8 +10,9 @@ from companion.attitude.history import between
 from companion.guidance.reference import Horizontal, Vector, VehicleMotion, limited, rotated
 
 _LARGEST_STEP = 0.5
-"""Largest product of the pull and the time between two measurements: with a larger one, the
-observer is unstable at low position rates, and a gap in the positions makes a false wind."""
+"""Largest product of `ObserverSettings.pull` and the time between two measurements: with a larger
+one, the observer is unstable at low position rates, and a gap in the positions makes a false wind.
+"""
 
 
 class ObserverGains(NamedTuple):
@@ -98,6 +99,8 @@ class MotionObserver:
     ) -> None:
         """Take a measured position and velocity.
 
+        The first one is taken as it is, and so is one after 1 s or more without a measurement.
+
         Args:
             time: vehicle time of the measurement, s.
             measured: measured motion, NED.
@@ -135,7 +138,7 @@ class MotionObserver:
         self.disturbance = rotated(*self.disturbance, angle)
 
     def at(self, time: float, known: Horizontal) -> VehicleMotion | None:
-        """The motion at a vehicle time (s), predicted from the newest measurement.
+        """The motion predicted from the newest measurement; None before the first.
 
         Args:
             time: vehicle time, s.

@@ -113,20 +113,20 @@ class PositionCorrection:
         """Filter r, the change of position per time that the velocity does not explain."""
         settings = self._settings
         (p_before, v_before), (p_now, v_now) = before, now
-        raw, way, more = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
+        raw, filtered, correction = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
         for axis in (0, 1):
             explained = 0.5 * (v_before[axis] + v_now[axis])
             raw[axis] = (p_now[axis] - p_before[axis]) / dt - explained
         kept = exp(-dt / self._window(raw, dt))
         change = limited(raw[0] - self._filtered[0], raw[1] - self._filtered[1], _LARGEST_CHANGE)
         for axis in (0, 1):
-            way[axis] = self._filtered[axis] + (1.0 - kept) * change[axis]
-            wanted = settings.ahead * way[axis]
-            more[axis] = wanted + kept * (self._correction[axis] - wanted)
+            filtered[axis] = self._filtered[axis] + (1.0 - kept) * change[axis]
+            wanted = settings.ahead * filtered[axis]
+            correction[axis] = wanted + kept * (self._correction[axis] - wanted)
         self._raw = raw[0], raw[1]
         most = settings.largest / settings.ahead if settings.ahead > 0.0 else 0.0
-        self._filtered = limited(way[0], way[1], most)
-        self._correction = limited(more[0], more[1], settings.largest)
+        self._filtered = limited(filtered[0], filtered[1], most)
+        self._correction = limited(correction[0], correction[1], settings.largest)
 
     def _window(self, raw: list[float], dt: float) -> float:
         """Time constant of the low-pass filters, s, from the changes of r between two positions."""

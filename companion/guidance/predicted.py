@@ -32,7 +32,7 @@ class Moment(NamedTuple):
     acceleration: Vector
 
 
-def predicted(part: Maneuver, heading: float = 0.0, drag: Drag = NO_DRAG) -> Iterator[Moment]:
+def predict(part: Maneuver, heading: float = 0.0, drag: Drag = NO_DRAG) -> Iterator[Moment]:
     """The predicted motion at the maneuver's `check_times`; it begins at rest.
 
     Args:

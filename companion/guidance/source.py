@@ -35,7 +35,7 @@ class Source(Protocol):
         ...
 
     def begin(self, now: float, pose: Pose) -> None:
-        """Start at `now` from `pose`: the held one, or that at which the vehicle would stop."""
+        """Start at `now` from `pose`: where the vehicle holds, or where it would stop."""
         ...
 
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
@@ -146,8 +146,7 @@ class CommandedSource:
     def _difference(self, reference: Reference, now: float) -> Vector:
         """Jerk between an earlier reference and this one, m/s³; 0 if it cannot be computed.
 
-        Two references close together give no usable difference, so they must be at least
-        `_SHORTEST` apart.
+        References less than `_SHORTEST` apart give no usable difference: the last jerk stays.
         """
         before, since = self._base, now - self._base_at
         if before is not None and since < _SHORTEST:
@@ -192,7 +191,7 @@ class CommandedSource:
 
     @property
     def failure(self) -> str | None:
-        """Why control must end: the reason given to `fail`, or that references stopped."""
+        """Why control must end: as given to `fail`, or that references stopped; None: neither."""
         return self._failure
 
     def fail(self, reason: str) -> None:

@@ -13,7 +13,7 @@ from companion.control.guidance_command import GuidanceCommand
 from companion.control.guidance_loop import GuidanceLoop
 from companion.control.outer_loop import make_guidance, motion_estimate
 from companion.guidance import Doublets, ManeuverSequence
-from companion.guidance.braking import Assumed
+from companion.guidance.braking import AssumedBraking
 from companion.guidance.source import ManeuverSource
 from companion.recording.trace import FlightTrace
 from companion.vehicle.clock import VehicleClock
@@ -66,7 +66,7 @@ class Bench:
             self.ground,
             FlightTrace(recorder=recorder),
             max_tilt=radians(30.0),
-            assumed_braking=Assumed(0.3, 2.5),
+            assumed_braking=AssumedBraking(0.3, 2.5),
             period=0.02,
             position_stale=0.3,
             clock=lambda: self.now,

@@ -313,7 +313,7 @@ def test_only_a_new_reset_of_the_heading_turns_the_estimate():
 
 
 def test_predictive_control_gets_the_newest_attitude_and_the_estimated_wind():
-    made, _ = estimate(first=Drag(), drag=Drag())
+    made, _ = estimate(prior_drag=Drag(), drag=Drag())
     rates = BodyRates(0.1, 0.2, 0.3)
     made.note_attitude(SAMPLE._replace(q=(0.8, 0.0, 0.6, 0.0), body_rates=rates))
     motion = VehicleMotion((1.0, 2.0, -3.0), (4.0, 5.0, 6.0))
@@ -337,7 +337,7 @@ def test_predictive_control_gets_the_newest_attitude_and_the_estimated_wind():
     ],
 )
 def test_a_drag_that_is_far_off_is_told_with_the_keys_to_set(learned, certain, told):
-    made, _ = estimate(first=Drag(0.25, 0.0), drag=learned, top_speed=5.0, certain=certain)
+    made, _ = estimate(prior_drag=Drag(0.25, 0.0), drag=learned, top_speed=5.0, certain=certain)
     warning = made.mismatch_warning()
     assert (warning is None) is (told is None)
     if told is not None:

@@ -13,7 +13,7 @@ from companion.flight.maneuver_checks import require_inside
 from companion.flight.maneuvers import configured_maneuvers
 from companion.guidance import Pose
 from companion.guidance.fence import Fence, Place, distance_inside
-from companion.guidance.predicted import predicted
+from companion.guidance.predicted import predict
 from companion.guidance.trajectory.demand import Motion
 from companion.safety.motion_judges import braking
 from companion.safety.snapshot import Motion as Now
@@ -165,11 +165,11 @@ def test_every_maneuver_is_judged(flight, limits, words):
 def test_the_ideal_doublet_ends_where_it_began():
     for name in ("steps", "corners"):
         (part,) = configured_maneuvers(config_of(flight={"maneuvers": [name]})).parts
-        moments = list(predicted(part))
+        moments = list(predict(part))
         assert np.linalg.norm(moments[-1].offset) < 0.05
         far = max(np.hypot(*moment.offset[:2]) for moment in moments)
         assert 2.0 < far < 25.0
-        dragged = max(np.hypot(*moment.offset[:2]) for moment in predicted(part, drag=Drag(1.0)))
+        dragged = max(np.hypot(*moment.offset[:2]) for moment in predict(part, drag=Drag(1.0)))
         assert dragged < 0.9 * far
 
 
@@ -182,7 +182,7 @@ def test_what_is_accepted_never_makes_the_monitor_speak(seed):
     config = config_of(flight, fence)
     judge = braking(fence_of(config))
     (part,) = configured_maneuvers(config).parts
-    for moment in predicted(part):
+    for moment in predict(part):
         off = rng.normal(size=3)
         off *= 0.999 * (MARGIN - 0.13) / np.linalg.norm(off)
         place = tuple((np.array(moment.offset) + off).tolist())

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.guidance import VehicleMotion
-from companion.guidance.braking import Assumed, Braking, brake, braking_time
+from companion.guidance.braking import AssumedBraking, Braking, brake, braking_time
 
 HERE, BEGUN, HEADING = (3.0, -2.0, -5.0), 100.0, 0.7
 SPEEDS = st.floats(-10.0, 10.0)
@@ -40,26 +40,26 @@ def test_it_is_smooth_and_ends_where_the_vehicle_is_at_rest(velocity, duration):
 def test_it_stops_within_what_the_monitor_of_the_fence_assumes(
     speed, acceleration, reaction, deceleration
 ):
-    duration = braking_time(speed, acceleration, Assumed(reaction, deceleration))
+    duration = braking_time(speed, acceleration, AssumedBraking(reaction, deceleration))
     braking = Braking(BEGUN, VehicleMotion(HERE, (0.0, speed, 0.0)), HEADING, duration)
     assumed = speed * max(0.0, reaction - 0.1) + speed**2 / (2.0 * deceleration)
     assert 0.0 < braking.stop[1] - HERE[1] <= assumed + 1e-9
 
 
 def test_a_vehicle_at_rest_is_held_where_it_is():
-    duration = braking_time(0.05, 5.0, Assumed(0.3, 2.5))
+    duration = braking_time(0.05, 5.0, AssumedBraking(0.3, 2.5))
     assert duration == 0.0
     braking = Braking(BEGUN, VehicleMotion(HERE, (0.05, 0.0, 0.0)), HEADING, duration)
     assert braking.at(BEGUN + 1.0).position_ned == HERE
 
 
 def test_a_vehicle_whose_thrust_allows_no_tilt_brakes_as_the_monitor_of_the_fence_assumes():
-    assert braking_time(5.0, 0.0, Assumed(0.3, 2.5)) == pytest.approx(2.0 * 0.2 + 5.0 / 2.5)
+    assert braking_time(5.0, 0.0, AssumedBraking(0.3, 2.5)) == pytest.approx(2.0 * 0.2 + 5.0 / 2.5)
 
 
 @pytest.mark.parametrize("velocity", [(3.0, 4.0, -2.0), (5.0, 0.0, 1.0), (0.0, -5.0, 0.0)])
 def test_the_braking_that_begins_now_is_as_long_as_the_horizontal_speed_needs(velocity):
-    motion, assumed = VehicleMotion((1.0, 2.0, -9.0), velocity), Assumed(0.3, 2.5)
+    motion, assumed = VehicleMotion((1.0, 2.0, -9.0), velocity), AssumedBraking(0.3, 2.5)
     found = brake(7.0, motion, 0.4, 6.0, assumed)
     assert found == Braking(7.0, motion, 0.4, braking_time(5.0, 6.0, assumed))
     assert found.duration > 0.0

@@ -7,7 +7,7 @@ import pytest
 from companion.attitude import BodyRates, Coefficients
 from companion.drag import Drag
 from companion.guidance import GRAVITY, Reference
-from companion.guidance.predicted import predicted
+from companion.guidance.predicted import predict
 
 
 class Part:
@@ -29,7 +29,7 @@ class Part:
 
 
 def moment(time, part, **options):
-    return next(each for each in predicted(part, **options) if each.time >= time - 1e-9)
+    return next(each for each in predict(part, **options) if each.time >= time - 1e-9)
 
 
 def test_in_closed_loop_it_is_the_reference():

@@ -49,7 +49,7 @@ def test_derivatives_of_figures_agree_with_finite_differences(figure):
 @given(st.one_of(_eights, _rounds), st.floats(0.0, 1.0))
 def test_the_jerk_of_figures_is_continuous(figure, share):
     """Also where a ramp joins the steady pace, which it meets at the ends of the ramps."""
-    joints = (figure.law.gathering, figure.duration - figure.law.losing)
+    joints = (figure.law.rise_time, figure.duration - figure.law.fall_time)
     for t in (share * figure.duration, 0.0, figure.duration, *joints):
         before, after = (figure.at(t + d).jerk for d in (-1e-7, 1e-7))
         # A short ramp may lie between two of the 200 places: its own jerk counts, too.

@@ -38,12 +38,13 @@ Made from a table
 Checked
     Envelope         limits; None is no limit
     violations       the limits that a trajectory breaks: each a `Violation`
-    slow_down        slowed down, where it must be, until it keeps them: a `SlowDown`
+    slow_down        slows a trajectory down until it keeps the limits: a `SlowDown`
     SlowDown         the slower trajectory, and what slowed it; parts: SlowedPart
-    evenly_slowed    all of a trajectory slowed down by one factor
+    evenly_slowed    slows the whole trajectory down by one factor
     Violation        the limit, when it is broken, and what to do
-    Slowed           a trajectory in another time; SlowerTime: that time
-    Motion, judge    the same for a motion given as arrays
+    Slowed           a trajectory flown more slowly; SlowerTime: its time law
+    judge            like `violations`, for a `Motion`, which is given as arrays
+    Motion
     turned_first     a turn on the spot before a trajectory that begins with a heading
     computable       turns numerical errors into a `TrajectoryError`
     LONGEST          longest duration that is checked, s

@@ -122,10 +122,10 @@ def _missing(group: str, header: list[str]) -> str:
     nearest = max(spellings, key=lambda names: sum(column in header for column in names))
     lacks = [column for column in nearest if column not in header]
     if len(lacks) < len(nearest):
-        told = f"the column {' and '.join(lacks)} of the {group} is missing"
+        fault = f"the column {' and '.join(lacks)} of the {group} is missing"
     else:
-        told = f"the header names no {group}"
-    return f"{told}; expected {known}, found {shown(','.join(header))}"
+        fault = f"the header names no {group}"
+    return f"{fault}; expected {known}, found {shown(','.join(header))}"
 
 
 def shown(text: str) -> str:

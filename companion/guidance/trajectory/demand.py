@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """A motion at (m,) times; vectors are (m, 3), NED, relative to its start."""
+    """A motion at (m,) times; vectors are (m, 3), NED, relative to its start; SI units, radians."""
 
     times: Floats
     position: Floats
@@ -25,7 +25,10 @@ class Motion:
     heading_rate: Floats
 
     def retimed(self, times: Floats, progress: Progress) -> "Motion":
-        """The motion at other times (m,); the progress at these times is a number or (m,) each."""
+        """The same path, passed at other `times` (m,).
+
+        `progress` is the present time as a function of the new one, at each of these times.
+        """
         velocity, acceleration, jerk = derivatives(
             progress, _columns(self.velocity), _columns(self.acceleration), _columns(self.jerk)
         )
@@ -39,7 +42,7 @@ class Motion:
         )
 
     def slowed(self, factor: "float | Floats") -> "Motion":
-        """Motion of the trajectory stretched in time by `factor`, one for all or (m,)."""
+        """The motion stretched in time by `factor`: one for all times, or (m,)."""
         return self.retimed(self.times * factor, Progress(0.0, 1.0 / factor))  # type: ignore[arg-type]
 
 

@@ -135,11 +135,11 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
     speeds = [_speed(spline, end) for end in (spline.begin, spline.end)]
     resting = speeds[0] < _AT_REST, speeds[1] < _AT_REST
     spline = smoothed(table.times, position, options.cutoff, derivatives, resting)
-    gathering, losing = [
+    rise_time, fall_time = [
         0.0 if rests else min(STEEPEST * speed / options.acceleration, _LARGEST_RAMP * spline.end)
         for rests, speed in zip(resting, speeds, strict=True)
     ]
-    law = Cruise(spline.end, 1.0, gathering, losing)
+    law = Cruise(spline.end, 1.0, rise_time, fall_time)
     heading = _heading(spline, table, options, resting)
     step = inf if isinstance(heading, HeldHeading) else HEADING_CHECK_STEP
     return TimedCurve(name, SplineCurve(spline, _CHECKS_PER_PIECE, step), law, heading)

@@ -21,7 +21,7 @@ from companion.guidance.trajectory.septic_spline import (
 )
 
 _CONDITION = 1e-13
-"""Smallest eigenvalue of the scaled equations at the last knot that determines the spline."""
+"""The spline is undetermined if an eigenvalue of the scaled last pivot is smaller than this."""
 
 
 class Fixed(NamedTuple):

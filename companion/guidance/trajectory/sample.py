@@ -93,5 +93,5 @@ def computable() -> Iterator[None]:
             yield
     except (ArithmeticError, np.linalg.LinAlgError) as error:
         raise TrajectoryError(
-            "its numbers cannot be computed with: they are too large, too small or too far apart"
+            "it cannot be computed: its numbers are too large, too small or too far apart"
         ) from error

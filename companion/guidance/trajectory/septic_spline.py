@@ -66,16 +66,16 @@ class SepticSpline:
 
     def at(self, time: float) -> list[tuple[float, float, float, float]]:
         """Value, first, second and third derivative of each series; plain floats, for flight."""
-        which = min(max(bisect_right(self._knots, time) - 1, 0), len(self._pieces) - 1)
-        u = time - self._knots[which]
-        return [_horner(piece, u) for piece in self._pieces[which]]
+        index = min(max(bisect_right(self._knots, time) - 1, 0), len(self._pieces) - 1)
+        u = time - self._knots[index]
+        return [_horner(piece, u) for piece in self._pieces[index]]
 
     def along(self, times: Floats) -> Floats:
         """Like `at`, at (m,) times at once; (m, n, 4)."""
         knots, pieces = self._arrays
-        which = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(pieces) - 1)
-        u = (times - knots[which])[:, None]
-        return np.stack(_horner(np.moveaxis(pieces[which], -1, 0), u), axis=-1)
+        index = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(pieces) - 1)
+        u = (times - knots[index])[:, None]
+        return np.stack(_horner(np.moveaxis(pieces[index], -1, 0), u), axis=-1)
 
     @property
     def knots(self) -> Floats:

@@ -30,12 +30,12 @@ _PRECISION = 1e-3
 """Relative precision of a factor."""
 _HALVINGS = 16
 """Number of bisection steps in the search for the factor of one moment."""
-_WIDTHS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
-"""Widths of the slowness' pieces to try, s. A ramp takes at least four pieces."""
-_FEWEST_PIECES = 4
+_WIDTHS, _FEWEST_PIECES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2), 4
+"""Widths of the slowness' pieces to try, s, and the fewest pieces: a ramp takes at least these."""
 _ROUNDS = 60
 """Largest number of times that the slowness is raised before the search gives up."""
 _LEAST_RAISE, _LARGEST_RAISE = 0.004, 0.1
+"""Bounds of the relative increase of the slowness in one round."""
 _MOST_MOMENTS = 20_000
 """Largest number of moments for slowing down in parts. The search then takes some seconds."""
 _EVEN_MOMENTS = 8000
@@ -62,8 +62,8 @@ class SlowedPart(NamedTuple):
     Attributes:
         begin, end: time in the slowed trajectory, s.
         factor: the largest factor by which the speed is divided.
-        time: when the factor is largest, s.
-        limit: configuration key of the limit that requires it.
+        time: when the factor is largest, or, slowed evenly, when the limit was broken most, s.
+        limit: configuration key of the limit that requires it; empty if none was found.
     """
 
     begin: float
@@ -170,7 +170,7 @@ def _best_law(motion: Motion, length: float, envelope: Envelope) -> SlowerTime |
 
 
 def _needed_factors(motion: Motion, envelope: Envelope) -> Floats:
-    """For each moment (m,), the factor of slowing the whole trajectory that satisfies it."""
+    """Factor of slowing the whole trajectory with which each moment keeps the limits, (m,)."""
     low, high = np.zeros_like(motion.times), np.full_like(motion.times, np.log(_SLOWEST))
     high[_over(motion, envelope) <= 0.0] = 0.0
     for _ in range(_HALVINGS):
@@ -192,9 +192,9 @@ def _law(
 ) -> SlowerTime | None:
     """The slowness of this width, raised until all limits are kept; None if that fails."""
     count = int(np.ceil(length / width))
-    which = np.clip((motion.times * (count / length)).astype(int), 0, count - 1)
+    piece = np.clip((motion.times * (count / length)).astype(int), 0, count - 1)
     most = np.ones(count)
-    np.maximum.at(most, which, needed)
+    np.maximum.at(most, piece, needed)
     coefficients = _over_four(most, 1.0)
     for _ in range(_ROUNDS):
         law = SlowerTime(length, tuple(coefficients.tolist()))
@@ -203,12 +203,12 @@ def _law(
         slower = motion.retimed(*law.of(motion.times))
         over = _over(slower, envelope)
         if envelope.fence is not None and (found := envelope.fence(slower)) is not None:
-            late = (slower.times >= found.begins) & (slower.times <= found.time)
-            over = np.where(late, np.maximum(over, _LARGEST_RAISE), over)
+            outside = (slower.times >= found.begins) & (slower.times <= found.time)
+            over = np.where(outside, np.maximum(over, _LARGEST_RAISE), over)
         if not (over > 0.0).any():
             return law
         raised = np.zeros(count)
-        np.maximum.at(raised, which, np.where(over > 0.0, over, 0.0))
+        np.maximum.at(raised, piece, np.where(over > 0.0, over, 0.0))
         raised = np.where(raised > 0.0, np.clip(0.5 * raised, _LEAST_RAISE, _LARGEST_RAISE), 0.0)
         coefficients *= 1.0 + _over_four(raised, 0.0)
     return None

@@ -125,29 +125,29 @@ class Cruise:
     Attributes:
         length: phase at the end.
         rate: steady rate, per s.
-        gathering: time in which the rate rises, s.
-        losing: time in which the rate falls, s.
+        rise_time: time in which the rate rises, s.
+        fall_time: time in which the rate falls, s.
         ramp: how the rate rises and, mirrored, falls: (rate, duration of the ramp in s, time in s)
             → progress. The mean rate of a ramp is half the steady rate.
     """
 
     length: float
     rate: float
-    gathering: float = 0.0
-    losing: float = 0.0
+    rise_time: float = 0.0
+    fall_time: float = 0.0
     ramp: Ramp = septic_ramp
 
     @property
     def duration(self) -> float:
         """Time for the whole length at the steady rate, plus half of each ramp, s."""
-        return self.length / self.rate + 0.5 * (self.gathering + self.losing)
+        return self.length / self.rate + 0.5 * (self.rise_time + self.fall_time)
 
     def pieces(self) -> list[Piece]:
         """Three parts: speeding up, steady, slowing down."""
-        brake = self.duration - self.losing
+        brake = self.duration - self.fall_time
         return [
-            Piece(0.0, self.gathering, False),
-            Piece(self.gathering, brake, True),
+            Piece(0.0, self.rise_time, False),
+            Piece(self.rise_time, brake, True),
             Piece(brake, self.duration, False),
         ]
 
@@ -158,12 +158,12 @@ class Cruise:
             return Progress(0.0)
         if left < 0.0:
             return Progress(self.length)
-        if time < self.gathering:
-            return self.ramp(self.rate, self.gathering, time)
-        if left < self.losing:
-            phase, first, second, third = self.ramp(self.rate, self.losing, left)
+        if time < self.rise_time:
+            return self.ramp(self.rate, self.rise_time, time)
+        if left < self.fall_time:
+            phase, first, second, third = self.ramp(self.rate, self.fall_time, left)
             return Progress(self.length - phase, first, -second, third)
-        return Progress(self.rate * (time - 0.5 * self.gathering), self.rate)
+        return Progress(self.rate * (time - 0.5 * self.rise_time), self.rate)
 
 
 _CRUISING = 3
@@ -191,20 +191,20 @@ class LimitedJerk:
         """
         if min(length, speed, acceleration, jerk) <= 0.0:
             raise TrajectoryError("length, speed, acceleration and jerk of a line must be positive")
-        turning = min(acceleration / jerk, sqrt(speed / jerk))
-        gathering = turning + speed / (jerk * turning)
-        cruising = length / speed - gathering
+        jerk_time = min(acceleration / jerk, sqrt(speed / jerk))
+        ramp = jerk_time + speed / (jerk * jerk_time)
+        cruising = length / speed - ramp
         if cruising < 0.0:
             cruising = 0.0
-            turning = min(acceleration / jerk, (length / (2.0 * jerk)) ** (1.0 / 3.0))
-            gathering = turning / 2.0 + sqrt(turning**2 / 4.0 + length / (jerk * turning))
-        steady = max(gathering - 2.0 * turning, 0.0)
+            jerk_time = min(acceleration / jerk, (length / (2.0 * jerk)) ** (1.0 / 3.0))
+            ramp = jerk_time / 2.0 + sqrt(jerk_time**2 / 4.0 + length / (jerk * jerk_time))
+        steady = max(ramp - 2.0 * jerk_time, 0.0)
         self._length = length
-        faster = ((turning, jerk), (steady, 0.0), (turning, -jerk))
-        slower = ((turning, -jerk), (steady, 0.0), (turning, jerk))
+        faster = ((jerk_time, jerk), (steady, 0.0), (jerk_time, -jerk))
+        slower = ((jerk_time, -jerk), (steady, 0.0), (jerk_time, jerk))
         self._pieces = _joined((*faster, (cruising, 0.0), *slower))
         self._ends = [start for start, _, _ in self._pieces[1:]]
-        self.duration = 2.0 * gathering + cruising
+        self.duration = 2.0 * ramp + cruising
         """Duration, s."""
 
     def pieces(self) -> list[Piece]:
@@ -219,8 +219,8 @@ class LimitedJerk:
             return Progress(0.0)
         if time >= self.duration:
             return Progress(self._length)
-        which = sum(time >= end for end in self._ends)
-        start, state, jerk = self._pieces[which]
+        index = sum(time >= end for end in self._ends)
+        start, state, jerk = self._pieces[index]
         return _moved(state, jerk, time - start)
 
 

@@ -80,9 +80,9 @@ def waypoints(
 def _fault(distances: Floats) -> str:
     if not distances.size:
         return "there are no waypoints"
-    which = int(np.flatnonzero(distances < LEAST_WAY)[0])
-    before = f"waypoint {which}" if which else "the start"
-    return f"waypoint {which + 1} is the same as {before}; leave it out"
+    index = int(np.flatnonzero(distances < LEAST_WAY)[0])
+    before = f"waypoint {index}" if index else "the start"
+    return f"waypoint {index + 1} is the same as {before}; leave it out"
 
 
 def _trapezoids(distances: Floats, speed: float, acceleration: float) -> Floats:
