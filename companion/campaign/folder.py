@@ -100,6 +100,7 @@ def read_description(folder: Path) -> Description:
     try:
         told = json.loads(read_text(path, _MOST_BYTES))
         description = Description(**{**told, "versions": as_versions(told["versions"])})
+        # `range` refuses all that is no whole number.
         if not (range(description.cases) and range(description.unit)):
             raise ValueError("cases and unit must be positive")
     except FileRefusedError as error:

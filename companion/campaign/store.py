@@ -185,13 +185,14 @@ def read(folder: Path) -> "pa.Table":
     numbers = sorted(finished_units(folder))
     if not numbers:
         raise ConfigError(f"{folder}: there are no results of a campaign")
+    mixed = f"{folder / RESULTS}: its files are not of one campaign"
     units = [read_unit(folder, number) for number in numbers]
     if any(not (unit.schema.metadata or {}).get(METADATA) for unit in units):
-        raise ConfigError(f"{folder / RESULTS}: its files are not of one campaign")
+        raise ConfigError(mixed)
     try:
         return pa.concat_tables(units).sort_by("case")
     except pa.ArrowException as error:
-        raise ConfigError(f"{folder / RESULTS}: its files are not of one campaign") from error
+        raise ConfigError(mixed) from error
 
 
 def read_unit(folder: Path, number: int) -> "pa.Table":

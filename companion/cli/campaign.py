@@ -34,8 +34,8 @@ def rerun(options: argparse.Namespace) -> int:
     """Fly one case again, and tell whether the flight is identical."""
     from companion.campaign.rerun import rerun as fly_again  # noqa: PLC0415
 
-    console = Console(highlight=False, soft_wrap=True)
+    console = Console(highlight=False, soft_wrap=True, markup=False)
     again = fly_again(options.folder, options.case)
     for text in (*again.lines, f"Recorded in {again.folder}", page_about(Path(again.folder))):
-        console.print(text, markup=False)
+        console.print(text)
     return EXIT_OK if again.identical else EXIT_FLIGHT

@@ -116,11 +116,11 @@ def fly(
     interrupts.raise_interrupt(interrupts.unhandled())
     with suppress(OSError):
         console.print(flight_table(summary))
-        console.print(f"Recorded in {folder}", soft_wrap=True, markup=False)
+        console.print(f"Recorded in {folder}", soft_wrap=True)
         words = closing_words(summary.as_dict(), invocation)
         console.print(words_text(words), soft_wrap=True)
         if config.recording.report:
-            console.print(page_about(folder), soft_wrap=True, markup=False)
+            console.print(page_about(folder), soft_wrap=True)
     return summary
 
 

@@ -63,7 +63,7 @@ def identify(options: argparse.Namespace) -> int:
             f"fit it with companion identify --log {summary.log}"
         )
         with suppress(OSError):
-            console.print(reason, soft_wrap=True, markup=False)
+            console.print(reason, soft_wrap=True)
         _print_json(options, {"result": reason, "log": str(log)})
         return EXIT_FLIGHT
 
@@ -119,7 +119,7 @@ def _fitted(log: Path, out: Path, options: argparse.Namespace, console: FlightCo
         console.print(vehicle_table(vehicle, GRAVITY))
         for axis, words in kept.items():
             console.print(f"{axis}: {words}", style="bold yellow", soft_wrap=True)
-        console.print(_how_to_include(out, options.config), soft_wrap=True, markup=False)
+        console.print(_how_to_include(out, options.config), soft_wrap=True)
     result = {"result": "ok", "log": str(log), "file": str(out), "kept": kept}
     _print_json(options, {**result, **_figures(vehicle)})
     return EXIT_OK

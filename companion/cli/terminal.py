@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable
 from math import inf
+from typing import Any
 
 from rich.console import Console
 
@@ -73,7 +74,14 @@ async def read_line() -> str:
 
 
 class FlightConsole(Console):
-    """A console that survives a closed pipe; rich itself would end the program."""
+    """A console that shows brackets as they are, and survives a closed pipe.
+
+    Rich would read brackets, as in the name of a folder, as markup, and end the program when the
+    pipe closes.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options, markup=False)
 
     def on_broken_pipe(self) -> None:
         """Raise `BrokenPipeError` instead of ending the program, as Rich would."""

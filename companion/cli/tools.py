@@ -61,15 +61,13 @@ def study(options: argparse.Namespace) -> int:
     from companion.study import runner, workers  # noqa: PLC0415  needs the extra
 
     count = options.workers or workers.cores()
-    console = Console(stderr=options.json)
+    console = Console(stderr=options.json, markup=False)
     try:
         page, rows = runner.run(options.name, options.case, options.out, console, count)
     except KeyboardInterrupt:
-        console.print(
-            f"Interrupted; the files in {options.out} are complete.", highlight=False, markup=False
-        )
+        console.print(f"Interrupted; the files in {options.out} are complete.", highlight=False)
         return EXIT_FLIGHT
-    console.print(f"Open {page}", soft_wrap=True, highlight=False, markup=False)
+    console.print(f"Open {page}", soft_wrap=True, highlight=False)
     if options.json:
         print(json.dumps(rows, allow_nan=False))
     return EXIT_OK

@@ -62,4 +62,4 @@ def test_without_a_sample_to_answer_nothing_is_sent_in_leaving():
         state = mock.state()
     assert summary.result == "left at once by the user"
     assert state["time"] - state["last_setpoint"] == pytest.approx(0.15, abs=0.03)
-    assert state["time"] > began
+    assert state["last_setpoint"] > began

@@ -89,8 +89,9 @@ def levels(column: Column) -> list[Level]:
         last = number == _RANGES - 1
         inside = (column >= low) & ((column <= high) if last else (column < high))
         found.append(Level(f"{low:.3g} to {high:.3g}", inside))
-    if np.isnan(column).any():
-        found.append(Level("null", np.isnan(column)))
+    unknown = np.isnan(column)
+    if unknown.any():
+        found.append(Level("null", unknown))
     return found
 
 
