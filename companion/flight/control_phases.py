@@ -122,6 +122,27 @@ async def hand_back(context: FlightContext) -> None:
     )
 
 
+async def hold_when_heard(context: FlightContext) -> None:
+    """Send nothing until the vehicle is heard; if it still obeys us, command it to hold.
+
+    ArduPilot stays in GUIDED when setpoints end, and does not hold its position.
+    """
+    frames = context.link.stats.frames
+    await context.until(lambda: context.link.stats.frames > frames, "its next frame")
+    await context.fresh_heartbeat()  # only now, because a request during the silence is lost
+    mode = context.link.state.mode
+    if not context.armed() or not in_role(context.link, Role.OFFBOARD):
+        armed = "armed" if context.armed() else "disarmed"
+        context.note(f"the vehicle is heard again, {armed} in {mode}: nothing is commanded")
+        return
+    context.note(f"the vehicle is heard again, still in {mode}: asking it to hold")
+    context.detail = "its report that it holds"
+    ours = in_roles(context.link, {Role.OFFBOARD})
+    await change_mode(
+        context, context.link.autopilot.hold(), ours, lambda: in_role(context.link, Role.HOLD)
+    )
+
+
 async def land(context: FlightContext) -> None:
     """Command the landing, send setpoints until the autopilot lands, and wait for touchdown."""
     context.detail = "the autopilot to accept the landing"

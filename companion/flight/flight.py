@@ -76,7 +76,7 @@ class Flight:
 
     def end(self, ended: FlightEnded) -> None:
         """End the running phase from outside; only the first reason counts."""
-        if ended.exit is Exit.RELEASE:
+        if ended.exit is not None and not ended.exit.sends_setpoints:
             self._context.release()
         if not self._end.done():
             self._end.set_result(ended)

@@ -21,7 +21,8 @@ _SHORT = 10.0
 """Timeout for commands that the autopilot carries out at once or not at all, s."""
 _TAKE_OVER = 15.0
 """Timeout for the takeover with its preflight checks, whose parameters a bad link may lose, s."""
-
+_LISTENING = 10.0
+"""Time for which a vehicle that is not heard any more is listened for, s."""
 
 Work = Callable[[FlightContext], Coroutine[Any, Any, None]]
 
@@ -182,6 +183,7 @@ def exit_phases(config: FlightConfig, exit_: Exit) -> tuple[Phase, ...]:
     """The phases that an exit flies."""
     return {
         Exit.LEAVE: (),
+        Exit.LISTEN: (_listen(),),
         Exit.RELEASE: (),
         Exit.DISARM: (_undo_arming(),),
         Exit.HOLD: (hand_back_phase(),),
@@ -198,6 +200,12 @@ def hand_back_phase() -> Phase:
         _SHORT,
         Exit.LAND,
         modes=_AIRBORNE | {Role.OFFBOARD},
+    )
+
+
+def _listen() -> Phase:
+    return Phase(
+        "listen", "the vehicle to be heard and to hold", control_phases.hold_when_heard, _LISTENING
     )
 
 

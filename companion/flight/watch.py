@@ -158,12 +158,13 @@ class Watch:
 
     def _judge_heartbeat(self) -> None:
         state, now = self._context.link.state, self._clock()
+        exit_ = Exit.LISTEN if self._context.loop.offboard_active else Exit.RELEASE
         if now - state.mode_received > self._context.heartbeat_limit:
             raise FlightEnded(
-                "no heartbeat from the vehicle, so its mode is not known any more", Exit.RELEASE
+                "no heartbeat from the vehicle, so its mode is not known any more", exit_
             )
         if state.heartbeat is None or outdated(state.heartbeat.received, now):
             raise FlightEnded(
                 "no heartbeat from the vehicle, so whether it is armed is not known any more",
-                Exit.RELEASE,
+                exit_,
             )

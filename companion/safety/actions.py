@@ -8,7 +8,7 @@ from companion.attitude.within_limits import PlannerFaultError
 class Action(Enum):
     """The actions by rising severity; the value is the word used in messages and in YAML.
 
-    RELEASE cannot be configured.
+    LISTEN and RELEASE cannot be configured.
     """
 
     WARN = "warn"
@@ -22,6 +22,8 @@ class Action(Enum):
     """Command the autopilot to hold, and end offboard control."""
     LAND = "land"
     """Command the autopilot to land, and end offboard control."""
+    LISTEN = "listen"
+    """Stop sending setpoints; command a hold once the vehicle is heard and still obeys us."""
     RELEASE = "release"
     """Stop sending setpoints: the pilot or the autopilot's failsafe flies the vehicle."""
 
@@ -38,12 +40,22 @@ class Exit(Enum):
     DISARM = "disarming"
     HOLD = "handing back: asking the autopilot to hold"
     LAND = "handing back: asking the autopilot to land"
+    LISTEN = (
+        "releasing control, and listening: if the vehicle is heard again while it still obeys us, "
+        "it is asked to hold"
+    )
     RELEASE = "releasing control: the vehicle is left to its pilot and its autopilot"
+
+    @property
+    def sends_setpoints(self) -> bool:
+        """Whether setpoints may be sent until the exit is over."""
+        return self not in (Exit.LISTEN, Exit.RELEASE)
 
 
 EXITS = {
     Action.HAND_BACK: Exit.HOLD,
     Action.LAND: Exit.LAND,
+    Action.LISTEN: Exit.LISTEN,
     Action.RELEASE: Exit.RELEASE,
 }
 """The exit of each action that ends a flight."""

@@ -35,7 +35,7 @@ def _fixed(config: Config) -> tuple[Monitor, ...]:
     unheard = link_judges.silence(limit, heard=False)
     silence = link_judges.silence(limit, heard=True)
     return (
-        Monitor("unheard", unheard, _RELEASE, mutes=True),
+        Monitor("unheard", unheard, Action.LISTEN, mutes=True),
         Monitor("silence", silence, _HAND_BACK, mutes=True),
         Monitor("clock", link_judges.clock_changed, _HAND_BACK, mutes=True),
         Monitor("disarmed", autopilot_judges.disarmed, _RELEASE),

@@ -298,9 +298,28 @@ def test_an_unplugged_cable_is_let_go_and_left_to_the_autopilot(tmp_path, ways):
         summary = memory.fly(mock, tmp_path / "log", observer)
         state = mock.until(ways.left, seconds=40)
     assert "no attitude" in summary.result
-    assert "releasing control" in summary.events[-1][1]
+    assert "releasing control" in summary.events[-2][1]
+    assert summary.events[-1][1].startswith("waited 10 s for the vehicle to be heard")
     assert not state["crashed"]
-    assert state["time"] < setpoints(summary)[-1]._timestamp + 8.0
+    assert setpoints(summary)[-1]._timestamp < summary.events[-2][0] - 0.4
+
+
+@BOTH
+@pytest.mark.parametrize("maneuver", ["hover", "circle"])
+def test_a_vehicle_heard_again_is_asked_to_hold_without_setpoints(ways, maneuver):
+    """ArduPilot would stay in GUIDED, and drift."""
+    with ways.in_memory() as mock:
+        cut = {"kind": "drop", "direction": "to_companion", "duration_s": 0.7}
+        observer = When("maneuvers", lambda: mock.inject(cut), after=1.0)
+        summary = memory.fly(mock, None, observer, flight={"maneuvers": [maneuver]})
+        assert mock.state()["mode"] == ways.held
+        released, heard = (
+            next(at for at, text in summary.events if words in text)
+            for words in ("releasing control", "is heard again, still in")
+        )
+        assert heard - released < 0.4
+        assert mock.time - mock.setpoints[-1].time > 0.7
+    assert "no attitude" in summary.result
 
 
 def test_interrupted_in_full_tilt_it_streams_until_the_autopilot_holds(tmp_path):

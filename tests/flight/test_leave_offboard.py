@@ -24,7 +24,7 @@ def test_after_a_failsafe_landing_the_next_flight_begins():
         cut = {"kind": "drop", "duration_s": 3.0}
         observer = When("maneuvers", lambda: mock.inject(cut), after=1.0)
         first = fly(mock, None, observer)
-        assert "releasing control" in first.events[-1][1]
+        assert "nothing is commanded" in first.events[-1][1]
         left = mock.until(lambda state: not state["armed"])
         assert (left["mode"], left["crashed"]) == ("OFFBOARD", False)
         second = fly(mock)

@@ -109,6 +109,17 @@ def unplugged(vehicle):
     return figures(vehicle, flight, event)
 
 
+def link_lost(vehicle, maneuver="hover"):
+    """The cable is unplugged for less than PX4's failsafe waits, or for 2 s."""
+    flight = vehicle.hovering(flight={"maneuvers": [maneuver]})
+    vehicle.relay.plug(up=False, down=False)
+    event = time.monotonic()
+    time.sleep(0.75 if vehicle.autopilot == "px4" else 2.0)
+    vehicle.relay.plug(up=True, down=True)
+    flight.finish()
+    return figures(vehicle, flight, event, events=flight.result.get("events", [])[-4:])
+
+
 def battery(vehicle):
     """PX4's simulated battery drains to half in a minute, ArduPilot's by 5 % in a short flight."""
     if vehicle.autopilot == "px4":
@@ -215,6 +226,8 @@ ROWS = {
     "stopped": stopped,
     "frozen_guidance": frozen_guidance,
     "unplugged": unplugged,
+    "link_lost": link_lost,
+    "link_lost_on_circle": lambda vehicle: link_lost(vehicle, "circle"),
     "battery": battery,
     "pilot": pilot,
     "no_gps": no_gps,

@@ -188,7 +188,7 @@ def test_exactly_the_limit_of_silence_is_none_and_a_vehicle_not_heard_cannot_be_
     at_the_limit = Snapshot(0.3, control=Control(answered=-1.0, heard=0.0))
     assert silence(0.5, heard=False)(at_the_limit, False)
     verdict = SafetyLadder(monitors(Config()), 1.0).step(unheard)
-    assert (verdict.action, verdict.mutes) == (Action.RELEASE, True)
+    assert (verdict.action, verdict.mutes) == (Action.LISTEN, True)
 
 
 def test_it_brakes_in_time_before_a_fence_on_the_map():

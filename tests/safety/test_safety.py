@@ -62,10 +62,10 @@ def unanswered(reason, **changes):
 
 OLD = NOW - 0.6
 SILENT = {"answered": OLD, "sampled": OLD}
-WARN, HOLD, HAND_BACK, LAND, RELEASE = Action
+WARN, HOLD, HAND_BACK, LAND, LISTEN, RELEASE = Action
 STOOD_STILL = "this program did not run for 0.4 s (computer overloaded or suspended)"
 BREACHES = [
-    ("unheard", control(**SILENT, heard=OLD), RELEASE, 0.0, "no attitude from the vehicle for 0.6"),
+    ("unheard", control(**SILENT, heard=OLD), LISTEN, 0.0, "no attitude from the vehicle for 0.6"),
     ("silence", control(**SILENT), HAND_BACK, 0.0, "no attitude"),
     ("silence", unanswered(Unanswered.NOT_NEWER), HAND_BACK, 0.0, "clock stands still"),
     ("silence", unanswered(Unanswered.AHEAD), HAND_BACK, 0.0, "stamped far ahead"),
@@ -73,7 +73,7 @@ BREACHES = [
     ("silence", unanswered(Unanswered.LATE, stood_still=0.2), HAND_BACK, 0.0, "stale_ms"),
     ("silence", unanswered(Unanswered.LATE, stood_still=0.4), HAND_BACK, 0.0, STOOD_STILL),
     ("silence", unanswered(Unanswered.AWAITING_MODE, stood_still=0.4), HAND_BACK, 0.0, STOOD_STILL),
-    ("unheard", control(**SILENT, heard=OLD, stood_still=0.4), RELEASE, 0.0, STOOD_STILL),
+    ("unheard", control(**SILENT, heard=OLD, stood_still=0.4), LISTEN, 0.0, STOOD_STILL),
     ("silence", unanswered(Unanswered.OLD_TARGET, placed=OLD), HAND_BACK, 0.0, "no position"),
     (
         "silence",
