@@ -15,7 +15,7 @@ Pair = tuple[float, float]
 KeyName = Annotated[str, Field(max_length=100)]
 
 _GRID = ("values", "range")
-_SPREAD = ("uniform", "loguniform", "normal", "choice")
+_DISTRIBUTIONS = ("uniform", "loguniform", "normal", "choice")
 _MOST_VALUES = 1000
 
 
@@ -73,9 +73,9 @@ class Swept(Section):
 
     @model_validator(mode="after")
     def _consistent(self) -> "Swept":
-        kinds = [kind for kind in (*_GRID, *_SPREAD) if getattr(self, kind) is not None]
+        kinds = [kind for kind in (*_GRID, *_DISTRIBUTIONS) if getattr(self, kind) is not None]
         if len(kinds) != 1:
-            raise ValueError(f"give exactly one of {', '.join((*_GRID, *_SPREAD))}")
+            raise ValueError(f"give exactly one of {', '.join((*_GRID, *_DISTRIBUTIONS))}")
         for kind in ("range", "uniform", "loguniform", "within"):
             pair = getattr(self, kind)
             if pair is not None and not pair[0] < pair[1]:
@@ -95,12 +95,12 @@ class Swept(Section):
     @property
     def kind(self) -> str:
         """`values`, `range`, `uniform`, `loguniform`, `normal` or `choice`."""
-        return next(kind for kind in (*_GRID, *_SPREAD) if getattr(self, kind) is not None)
+        return next(kind for kind in (*_GRID, *_DISTRIBUTIONS) if getattr(self, kind) is not None)
 
     @property
     def sampled(self) -> bool:
         """Whether the values are sampled; otherwise they form a grid."""
-        return self.kind in _SPREAD
+        return self.kind in _DISTRIBUTIONS
 
     @property
     def is_number(self) -> bool:

@@ -12,7 +12,7 @@ from companion.config import Config
 from companion.config.root import MOST_INCLUDED
 from companion.files import bounded_yaml, yaml_file
 from companion.files.bounded_yaml import Where
-from companion.files.yaml_faults import owners, shortened
+from companion.files.yaml_faults import dotted_keys, shortened
 from companion.files.yaml_file import ConfigError, Contents, UnreadableFileError
 
 _INCLUDE = "include"
@@ -194,7 +194,7 @@ def assigned(texts: Sequence[str]) -> dict[str, dict[str, Any]]:
     for text in texts:
         key, equals, value = text.partition("=")
         section, dot, name = key.strip().partition(".")
-        if equals and not dot and (found := owners(section, Config)):
+        if equals and not dot and (found := dotted_keys(section, Config)):
             raise ConfigError(f"--set {text}: name the section, as in {found}")
         if not (equals and dot and section and name):
             raise ConfigError(f"--set {text}: write SECTION.KEY=VALUE, as limits.max_tilt_deg=20")

@@ -10,7 +10,7 @@ from typing import Any, get_args
 from pydantic import BaseModel
 
 _LONGEST_TOLD = 60
-_PLACES_TOLD = 3
+_MOST_PLACES = 3
 _ALIKE, _ELSEWHERE_ALIKE = 0.5, 0.75
 """Smallest similarity to an unknown key for a suggestion: in the same section, and in another one.
 """
@@ -181,14 +181,14 @@ def _unknown(location: tuple[int | str, ...], value: Any, model: type[BaseModel]
     return f"is not a known key; {hint}"
 
 
-def owners(name: str, model: type[BaseModel]) -> str:
+def dotted_keys(name: str, model: type[BaseModel]) -> str:
     """The dotted keys with this name, as alternatives; empty if no section has one."""
     return _either([".".join((*place, key)) for place, key in _keys(model) if key == name])
 
 
 def _either(places: list[str]) -> str:
     """Some dotted keys, joined as alternatives."""
-    return " or ".join(f"`{place}`" for place in places[:_PLACES_TOLD])
+    return " or ".join(f"`{place}`" for place in places[:_MOST_PLACES])
 
 
 def _likeness(written: str, known: str) -> float:

@@ -90,8 +90,8 @@ class Search:
         tune: section `tune` of the campaign.
         folder: folder for the storage.
         fly: flies cases.
-        learn: flies the vehicle before a new search, and returns the configuration with what was
-            measured; None: nothing was measured.
+        learning_flight: flies the vehicle before a new search; returns the configuration with what
+            was measured, or None if nothing was.
 
     Raises:
         ConfigError: the storage in the folder is damaged, or the first case cannot be flown.
@@ -103,7 +103,7 @@ class Search:
         tune: Tune,
         folder: Path,
         fly: Fly,
-        learn: Callable[[Campaign], Config | None] = learned,
+        learning_flight: Callable[[Campaign], Config | None] = learned,
     ) -> None:
         import optuna  # noqa: PLC0415  an extra
         from sqlalchemy.exc import DBAPIError  # noqa: PLC0415  comes with Optuna
@@ -120,7 +120,7 @@ class Search:
             )
         except DBAPIError as error:
             raise ConfigError(f"{folder / STORAGE}: cannot be used: {error.orig}") from error
-        self._begin(learn)
+        self._begin(learning_flight)
 
     def run(self, trials: int, on_trial: Callable[[Found], None] = lambda _: None) -> Found:
         """Try candidates until there are `trials` of them, including those of earlier runs."""
@@ -154,10 +154,10 @@ class Search:
             n_startup_trials=_STARTS + self._near,
         )
 
-    def _begin(self, learn: Callable[[Campaign], Config | None]) -> None:
+    def _begin(self, learning_flight: Callable[[Campaign], Config | None]) -> None:
         """Enqueue the starts of a new search."""
         if not self._study.trials:
-            begin = list(starts(self._campaign, self._tune, learn(self._campaign)))
+            begin = list(starts(self._campaign, self._tune, learning_flight(self._campaign)))
             seed, search = self._campaign.file.seed, self._tune.search
             for start in (*begin, *near(begin[-1], search, self._near, seed)):
                 self._enqueue(start)
