@@ -54,7 +54,7 @@ def tune(options: argparse.Namespace) -> int:
     keys = [f"{section}.{key}" for section, keys in proposal.changes.items() for key in keys]
     console.print(
         f"Written to {output}. Let your configuration include it, and remove {', '.join(keys)} "
-        "from your own file: its own keys would win."
+        "from your own file: keys there override those of an included file."
     )
     good = all(after.ok for _, after in flights.values())
     if options.json:

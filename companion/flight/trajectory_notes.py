@@ -50,8 +50,8 @@ def slowing(before: Trajectory, found: SlowDown) -> tuple[str, ...]:
 def _limit(trajectory: Trajectory, part: SlowedPart) -> str:
     north, east, down = trajectory.at(part.time).position
     return (
-        f"most by {part.limit} at {part.time:.1f} s ({north:.1f} m north, {east:.1f} m east, "
-        f"{0.0 - down:.1f} m up)"
+        f"the tightest limit: {part.limit} at {part.time:.1f} s ({north:.1f} m north, "
+        f"{east:.1f} m east, {0.0 - down:.1f} m up)"
     )
 
 
