@@ -50,11 +50,11 @@ class Swept(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _list_alone(cls, told: Any) -> Any:
-        if isinstance(told, list | tuple):
-            return {"values": told}
-        if isinstance(told, dict | cls):
-            return told
+    def _list_alone(cls, value: Any) -> Any:
+        if isinstance(value, list | tuple):
+            return {"values": value}
+        if isinstance(value, dict | cls):
+            return value
         raise ValueError("must be a list of values, or a distribution such as {uniform: [0, 8]}")
 
     @field_validator("values", "choice")
@@ -138,8 +138,10 @@ class Swept(Section):
 
     def described(self) -> dict[str, Any]:
         """Kind and values, for the metadata of the results."""
-        told = {"count": self.count, "within": self.within}
-        shown: Mapping[str, Any] = {key: value for key, value in told.items() if value is not None}
+        details = {"count": self.count, "within": self.within}
+        shown: Mapping[str, Any] = {
+            key: value for key, value in details.items() if value is not None
+        }
         return {
             "kind": self.kind,
             "sampled": self.sampled,

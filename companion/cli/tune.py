@@ -97,8 +97,8 @@ def _configuration(source: Path, vehicle: Path, base: Path | None) -> tuple[Conf
     identified = load(vehicle)
     if base is None:
         return _flyable(identified), True
-    told = identified.model_dump(exclude_unset=True, include=set(_SECTIONS))
-    return _flyable(changed(load(base), told, str(vehicle))), True
+    identified_keys = identified.model_dump(exclude_unset=True, include=set(_SECTIONS))
+    return _flyable(changed(load(base), identified_keys, str(vehicle))), True
 
 
 def _with_learned_drag(config: Config, source: Path) -> Config:

@@ -132,8 +132,8 @@ def _included(path: Path, own: dict[str, Any]) -> list[Path]:
     if not isinstance(names, list) or not all(
         isinstance(name, str) and yaml_file.is_path(name) for name in names
     ):
-        told = shortened(names)
-        raise ConfigError(f"{path}: `{_INCLUDE}` must be a file or a list of files, not {told}")
+        shown = shortened(names)
+        raise ConfigError(f"{path}: `{_INCLUDE}` must be a file or a list of files, not {shown}")
     return [path.parent / name for name in names]
 
 
@@ -147,8 +147,8 @@ def _check_part(included: Path, part: dict[str, Any]) -> None:
         if section == _INCLUDE:
             continue
         if section in Config.model_fields and not isinstance(values, dict):
-            told = shortened(values)
-            raise ConfigError(f"{included}: `{section}` must hold keys, not {told}")
+            shown = shortened(values)
+            raise ConfigError(f"{included}: `{section}` must hold keys, not {shown}")
 
 
 def _merge(merged: Contents, part: Contents) -> None:

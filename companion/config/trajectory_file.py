@@ -86,8 +86,8 @@ class CsvShape(Section):
                 f"{path}: its comment says frame: {named}, and csv.frame says {self.frame}; "
                 "remove one of them"
             )
-        told = self.frame or named
-        return None if told is None else Frame(told)
+        frame = self.frame or named
+        return None if frame is None else Frame(frame)
 
 
 class LoadedTrajectory(NamedTuple):

@@ -84,8 +84,8 @@ def explained(detail: Any, model: type[BaseModel], former: Mapping[str, str]) ->
     location, value = detail["loc"], detail["input"]
     where = ".".join(str(part) for part in location)
     if detail["type"] == "extra_forbidden":
-        told = former.get(where)
-        return f"`{where}` {told}" if told else f"`{where}` {_unknown(location, value, model)}"
+        advice = former.get(where)
+        return f"`{where}` {advice}" if advice else f"`{where}` {_unknown(location, value, model)}"
     if detail["type"] == "missing" and isinstance(value, list | tuple):
         held = ".".join(str(part) for part in location[:-1])
         return f"`{held}` has too few values (got {shortened(value)})"

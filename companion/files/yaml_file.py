@@ -184,7 +184,7 @@ def validated(
         return model.model_validate(data)
     except ValidationError as error:
         details = without_consequences(error.errors(include_url=False))
-        told, before = [], Place("")
+        faults, before = [], Place("")
         for detail in details[:_FAULTS_TOLD]:
             place = place_of(detail["loc"], places or {}, name)
             repeats = place.file == before.file
@@ -195,10 +195,10 @@ def validated(
                 if repeats and place.line
                 else f"{place}: "
             )
-            told.append(where + explained(detail, model, model.former_keys))
+            faults.append(where + explained(detail, model, model.former_keys))
             before = place
         more = len(details) - _FAULTS_TOLD
-        raise ConfigError("; ".join(told) + (f"; and {more} more" if more > 0 else "")) from error
+        raise ConfigError("; ".join(faults) + (f"; and {more} more" if more > 0 else "")) from error
 
 
 def place_of(where: Where, places: Mapping[Where, Place], name: str) -> Place:

@@ -31,12 +31,12 @@ def slowing(before: Trajectory, found: SlowDown) -> tuple[str, ...]:
     )
     if found.even:
         (whole,) = found.parts
-        told = (
+        note = (
             f"{before.name} is slowed down evenly, by a factor of {whole.factor:.2f}, because "
             f"{found.reason}; "
             f"{_limit(after, whole)}"
         )
-        return (f"{told}; {left}",)
+        return (f"{note}; {left}",)
     parts = "; ".join(
         f"from {part.begin:.1f} to {part.end:.1f} s by a factor of up to {part.factor:.2f}, "
         f"{_limit(after, part)}"

@@ -229,8 +229,10 @@ class Search:
         return float(trial.user_attrs[_MISSED]) > 0.0
 
     def _candidate(self, trial: "FrozenTrial") -> Candidate:
-        told = trial.user_attrs
-        return Candidate(trial.number, told[_VALUES], Score.from_attributes(told[_SCORE]))
+        attributes = trial.user_attrs
+        return Candidate(
+            trial.number, attributes[_VALUES], Score.from_attributes(attributes[_SCORE])
+        )
 
 
 def _finite(score: Score) -> float:
