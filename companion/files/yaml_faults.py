@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 from pydantic import BaseModel
 
-_LONGEST_TOLD = 60
+_LONGEST_SHOWN = 60
 _MOST_PLACES = 3
 _ALIKE, _ELSEWHERE_ALIKE = 0.5, 0.75
 """Smallest similarity to an unknown key for a suggestion: in the same section, and in another one.
@@ -41,7 +41,7 @@ _BOUNDS: dict[str, Callable[[float, float], bool]] = {
 def shortened(value: Any) -> str:
     """A value as shown in an error message."""
     text = repr(value)
-    return text if len(text) <= _LONGEST_TOLD else f"{text[:_LONGEST_TOLD]}..."
+    return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
 
 
 def kinds_in(annotation: Any) -> frozenset[Any]:

@@ -14,7 +14,7 @@ from companion.files.yaml_faults import explained, kinds_in, without_consequence
 Model = TypeVar("Model", bound="Section")
 
 _LONGEST_PATH = 1000
-_FAULTS_TOLD = 5
+_MOST_FAULTS_SHOWN = 5
 
 PathKey = Annotated[Path, Field(json_schema_extra={"maxLength": _LONGEST_PATH})]
 """A key that names a file or a folder; `Section` checks its length."""
@@ -185,7 +185,7 @@ def validated(
     except ValidationError as error:
         details = without_consequences(error.errors(include_url=False))
         faults, before = [], Place("")
-        for detail in details[:_FAULTS_TOLD]:
+        for detail in details[:_MOST_FAULTS_SHOWN]:
             place = place_of(detail["loc"], places or {}, name)
             repeats = place.file == before.file
             where = (
@@ -197,7 +197,7 @@ def validated(
             )
             faults.append(where + explained(detail, model, model.former_keys))
             before = place
-        more = len(details) - _FAULTS_TOLD
+        more = len(details) - _MOST_FAULTS_SHOWN
         raise ConfigError("; ".join(faults) + (f"; and {more} more" if more > 0 else "")) from error
 
 

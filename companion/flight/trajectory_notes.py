@@ -5,7 +5,7 @@ import numpy as np
 from companion.guidance.trajectory import SlowDown, SlowedPart, Trajectory
 from companion.guidance.trajectory.demand import sampled
 
-_PARTS_TOLD = 4
+_MOST_PARTS_SHOWN = 4
 
 
 def overview(trajectory: Trajectory) -> str:
@@ -40,9 +40,9 @@ def slowing(before: Trajectory, found: SlowDown) -> tuple[str, ...]:
     parts = "; ".join(
         f"from {part.begin:.1f} to {part.end:.1f} s by a factor of up to {part.factor:.2f}, "
         f"{_limit(after, part)}"
-        for part in found.parts[:_PARTS_TOLD]
+        for part in found.parts[:_MOST_PARTS_SHOWN]
     )
-    more = len(found.parts) - _PARTS_TOLD
+    more = len(found.parts) - _MOST_PARTS_SHOWN
     parts += f"; and {more} more" if more > 0 else ""
     return (f"{before.name} is slowed down where limits ask for it: {parts}", left)
 

@@ -36,7 +36,7 @@ STORAGE = "tune.db"
 _NAME = "tune"
 _STARTS, _FEWEST_NEAR = 3, 4
 """Largest number of starts, and smallest number of candidates near the last of them."""
-_FIRST_SHARE = 4
+_FIRST_DIVISOR = 4
 """A candidate flies the first 1/4 of its cases, at least `_FEWEST`, before the others."""
 _FEWEST = 2
 _HOPELESS = 1.3
@@ -143,7 +143,7 @@ class Search:
         return Found(tried, tried - len(whole), good[0] if good else None, near)
 
     @property
-    def _near(self) -> int:
+    def _neighbour_count(self) -> int:
         """Number of candidates near the last start that are tried before Optuna proposes any."""
         return max(_FEWEST_NEAR, len(self._tune.search))
 
@@ -151,7 +151,7 @@ class Search:
         return self._optuna.samplers.TPESampler(
             seed=self._campaign.file.seed + number,
             multivariate=True,
-            n_startup_trials=_STARTS + self._near,
+            n_startup_trials=_STARTS + self._neighbour_count,
         )
 
     def _begin(self, learning_flight: Callable[[Campaign], Config | None]) -> None:
@@ -159,7 +159,7 @@ class Search:
         if not self._study.trials:
             begin = list(starts(self._campaign, self._tune, learning_flight(self._campaign)))
             seed, search = self._campaign.file.seed, self._tune.search
-            for start in (*begin, *near(begin[-1], search, self._near, seed)):
+            for start in (*begin, *near(begin[-1], search, self._neighbour_count, seed)):
                 self._enqueue(start)
 
     def _enqueue(self, start: Start) -> None:
@@ -184,7 +184,7 @@ class Search:
         except ConfigError:  # keys that do not fit together, such as a minimum above a maximum
             self._stop(trial, _UNFLOWN, 1.0)
             return
-        count = min(len(flown), max(_FEWEST, len(flown) // _FIRST_SHARE))
+        count = min(len(flown), max(_FEWEST, len(flown) // _FIRST_DIVISOR))
         score = scored(self._fly(flown[:count]), self._tune.envelope_m)
         missed = self._missed_share(score, len(flown))
         if count < len(flown) and (missed > 0.0 or self._hopeless(score)):
