@@ -203,7 +203,7 @@ def test_what_is_too_long_is_slowed_evenly_and_says_so():
     assert found.even
     assert violations(found.trajectory, ENVELOPE) == ()
     (note,) = slowing(laps, found)
-    assert "because it is too long to be slowed down in parts; tightest limit: limits." in note
+    assert "because it is too long to be slowed down in parts; the tightest limit: limits." in note
 
 
 def test_an_even_slowing_names_the_limit_that_asks_for_most():
