@@ -20,7 +20,7 @@ from companion.flight.change_bounds import require_moderate
 from companion.recording.recorder import FlightRecorder
 from companion.safety.actions import internal
 
-_MOST = 200
+_MAX_UNDO_COUNT = 200
 """Number of changes that can be undone; older ones stay in force."""
 
 
@@ -122,10 +122,10 @@ class Changes:
         except (ValueError, ArithmeticError) as error:
             raise ChangeRefusedError(f"{by}: {error}; nothing has changed") from error
         before = self.wanted
-        told = self._begin(wanted, by)
-        self._earlier = [*self._earlier, before][-_MOST:]
+        text = self._begin(wanted, by)
+        self._earlier = [*self._earlier, before][-_MAX_UNDO_COUNT:]
         self.on_change(wanted)
-        return told
+        return text
 
     def undo(self, by: str) -> str:
         """Begin to return to the values before the newest change; return the change in words.
@@ -135,10 +135,10 @@ class Changes:
         """
         if not self._earlier:
             raise ChangeRefusedError(f"{by}: there is no change to undo")
-        told = self._begin(self._earlier[-1], by)
+        text = self._begin(self._earlier[-1], by)
         self._earlier.pop()
         self.on_change(self.wanted)
-        return told
+        return text
 
     @contextmanager
     def limited_by(self, refuses: Callable[[Config, Config], str | None]) -> Iterator[None]:
@@ -171,14 +171,14 @@ class Changes:
             retuning.apply(tuning(self.wanted))
         if self.wanted is not self.flown:
             self._record_change(self.flown, at_once=True)
-        outside, self.note = self.note, note
+        note_before, self.note = self.note, note
         try:
             with retuning.stepped_by(self.step):
                 yield
         finally:
             self._retuning = self._record = None
             self._slew.jump(self.wanted)
-            self.note = outside
+            self.note = note_before
 
     def step(self, now: float) -> None:
         """Continue a change that is under way; the guidance loop calls this at each step."""

@@ -94,9 +94,9 @@ async def undo_arming(context: FlightContext) -> None:
         return
     context.detail = "the autopilot to accept disarming"
     # Sent even if the newest heartbeat says disarmed: it may be older than our arming.
-    ours = in_roles(context.link, {Role.READY, Role.TAKEOFF})
+    require_ours = in_roles(context.link, {Role.READY, Role.TAKEOFF})
     await command_if_ours(
-        context, context.link.autopilot.disarm(), ours, lambda: not context.armed()
+        context, context.link.autopilot.disarm(), require_ours, lambda: not context.armed()
     )
     await context.fresh_heartbeat()
     await context.until(lambda: not context.armed())
@@ -148,12 +148,12 @@ def _require_flyable_by_vehicle(context: FlightContext) -> None:
         FlightEnded: a maneuver leaves the fence or exceeds a limit.
     """
     config, maneuvers, drag = context.config, context.maneuvers, context.known_drag
-    told = context.link.state.global_position
+    position = context.link.state.global_position
     try:
         if drag != before_connecting(config):
             require_still_flyable(config, maneuvers, drag)
-        if config.safety.fence_polygon_deg and told is not None:
-            place = Place(told.latitude_deg, told.longitude_deg)
+        if config.safety.fence_polygon_deg and position is not None:
+            place = Place(position.latitude_deg, position.longitude_deg)
             require_inside(config, maneuvers.parts, place, drag)
     except ConfigError as error:
         raise FlightEnded(str(error)) from error

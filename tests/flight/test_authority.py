@@ -8,7 +8,7 @@ from pymavlink import mavutil
 
 from companion.control.guidance_loop import GuidanceLoop
 from companion.flight import control_phases, takeoff
-from companion.flight.observer import Silent
+from companion.flight.observer import SilentObserver
 from companion.guidance.source import ManeuverSource
 from companion.mavlink.commands import (
     MAV_CMD_COMPONENT_ARM_DISARM,
@@ -29,7 +29,7 @@ from tests.flight.others import When
 HOLD_ASKED = "disarmed in OFFBOARD, in which it cannot be armed again: asking the autopilot to hold"
 
 
-class OnEvent(Silent):
+class OnEvent(SilentObserver):
     """Calls `action` once, when an event with this text happens."""
 
     def __init__(self, text, action):
