@@ -149,7 +149,7 @@ class PeerRule:
             )
 
     def ignore(self, sender: str) -> None:
-        """Tell the user that `sender` sends, but is not one of the peers that the endpoint names."""
+        """Tell the user that `sender` sends, but the endpoint does not name it as a peer."""
         self._notice(
             f"{PEER_NOTICE}frames from {sender} are ignored, as the endpoint names another peer; "
             f"if {sender} is the vehicle, correct ?peer="
