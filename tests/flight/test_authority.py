@@ -327,7 +327,7 @@ def test_a_vehicle_that_does_not_say_it_stands_is_not_armed(tmp_path):
 
 
 def test_a_hold_near_the_top_of_the_climb_is_respected(tmp_path, monkeypatch):
-    over, held = takeoff._Climb.over, []
+    over, held = takeoff._Climb.is_over, []
 
     def holding(climb):
         if climb._context.link.state.height > 3.3 and not held:

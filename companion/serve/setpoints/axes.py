@@ -181,8 +181,8 @@ class Axes:
             clamp(value, _MAX_BRAKING_FACTOR * each.acceleration)
             for value, each in zip(error.acceleration, self._limits, strict=True)
         )
-        begin_time = error._replace(acceleration=acceleration)
-        return Approach(begin_time, limits, now, by_velocity=by_velocity)
+        start = error._replace(acceleration=acceleration)
+        return Approach(start, limits, now, by_velocity=by_velocity)
 
     def _derivatives(self, demand: AxisDemand, now: float) -> tuple[Values, Values]:
         """Acceleration and jerk of a stream; estimated if they are not commanded."""
