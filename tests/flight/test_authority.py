@@ -334,7 +334,7 @@ def test_a_hold_near_the_top_of_the_climb_is_respected(tmp_path, monkeypatch):
             held.append(mock.command(SET_MODE, 1, 4, 3))
         return over(climb)
 
-    monkeypatch.setattr(takeoff._Climb, "over", holding)
+    monkeypatch.setattr(takeoff._Climb, "is_over", holding)
     with mock_vehicle(tmp_path, parameters={"MPC_TKO_SPEED": 1.0}) as mock:
         summary = fly(mock, tmp_path / "log", flight={"takeoff_height_m": 5.0})
         assert mock.state()["mode"] == "LOITER"
