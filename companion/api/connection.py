@@ -56,14 +56,16 @@ async def connect(
         OSError: the folder cannot be written; nothing was sent.
         RealtimeError: the system refused a required `realtime` setting; nothing was sent.
     """
-    told = load(Path(config)) if isinstance(config, Path | str) else config
+    flown_config = load(Path(config)) if isinstance(config, Path | str) else config
     own: dict[str, dict[str, Any]] = {"link": {}, "flight": {}}
     if endpoint is not None:
         own["link"]["endpoint"] = endpoint
     if arm is not None:
         own["flight"]["arm"] = arm
-    told = changed(changed(told, changes or {}, "changes"), own, "connect")
-    async with flying(told, folder or flight_folder(told.recording.directory), observer) as vehicle:
+    flown_config = changed(changed(flown_config, changes or {}, "changes"), own, "connect")
+    async with flying(
+        flown_config, folder or flight_folder(flown_config.recording.directory), observer
+    ) as vehicle:
         yield vehicle
 
 
@@ -133,8 +135,8 @@ async def _begin(
     config: Config, folder: Path | None, observer: Observer | None, environment: Environment
 ) -> tuple[Session, Program]:
     program = Program()
-    told = observer or Silent()
-    session = Session(config, folder, told, decline_landing, program, environment)
+    observer = observer or Silent()
+    session = Session(config, folder, observer, decline_landing, program, environment)
     program.interrupt = session.interrupt
     return session, program
 

@@ -122,10 +122,10 @@ class Changes:
         except (ValueError, ArithmeticError) as error:
             raise ChangeRefusedError(f"{by}: {error}; nothing has changed") from error
         before = self.wanted
-        told = self._begin(wanted, by)
+        text = self._begin(wanted, by)
         self._earlier = [*self._earlier, before][-_MOST:]
         self.on_change(wanted)
-        return told
+        return text
 
     def undo(self, by: str) -> str:
         """Begin to return to the values before the newest change; return the change in words.
@@ -135,10 +135,10 @@ class Changes:
         """
         if not self._earlier:
             raise ChangeRefusedError(f"{by}: there is no change to undo")
-        told = self._begin(self._earlier[-1], by)
+        text = self._begin(self._earlier[-1], by)
         self._earlier.pop()
         self.on_change(self.wanted)
-        return told
+        return text
 
     @contextmanager
     def limited_by(self, refuses: Callable[[Config, Config], str | None]) -> Iterator[None]:

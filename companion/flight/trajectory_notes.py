@@ -5,7 +5,7 @@ import numpy as np
 from companion.guidance.trajectory import SlowDown, SlowedPart, Trajectory
 from companion.guidance.trajectory.demand import sampled
 
-_PARTS_TOLD = 4
+_MOST_PARTS_SHOWN = 4
 
 
 def overview(trajectory: Trajectory) -> str:
@@ -31,18 +31,18 @@ def slowing(before: Trajectory, found: SlowDown) -> tuple[str, ...]:
     )
     if found.even:
         (whole,) = found.parts
-        told = (
+        note = (
             f"{before.name} is slowed down evenly, by a factor of {whole.factor:.2f}, because "
             f"{found.reason}; "
             f"{_limit(after, whole)}"
         )
-        return (f"{told}; {left}",)
+        return (f"{note}; {left}",)
     parts = "; ".join(
         f"from {part.begin:.1f} to {part.end:.1f} s by a factor of up to {part.factor:.2f}, "
         f"{_limit(after, part)}"
-        for part in found.parts[:_PARTS_TOLD]
+        for part in found.parts[:_MOST_PARTS_SHOWN]
     )
-    more = len(found.parts) - _PARTS_TOLD
+    more = len(found.parts) - _MOST_PARTS_SHOWN
     parts += f"; and {more} more" if more > 0 else ""
     return (f"{before.name} is slowed down where limits ask for it: {parts}", left)
 
@@ -50,8 +50,8 @@ def slowing(before: Trajectory, found: SlowDown) -> tuple[str, ...]:
 def _limit(trajectory: Trajectory, part: SlowedPart) -> str:
     north, east, down = trajectory.at(part.time).position
     return (
-        f"most by {part.limit} at {part.time:.1f} s ({north:.1f} m north, {east:.1f} m east, "
-        f"{0.0 - down:.1f} m up)"
+        f"the tightest limit: {part.limit} at {part.time:.1f} s ({north:.1f} m north, "
+        f"{east:.1f} m east, {0.0 - down:.1f} m up)"
     )
 
 
