@@ -92,7 +92,7 @@ class Grant(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Wishes:
+class RealtimeSettings:
     """The settings to request.
 
     Attributes:
@@ -111,7 +111,7 @@ class Wishes:
 
 
 @contextmanager
-def asked_for(wishes: Wishes) -> Iterator[tuple[Grant, ...]]:
+def asked_for(settings: RealtimeSettings) -> Iterator[tuple[Grant, ...]]:
     """Request all settings; undo the granted ones at the end of the block.
 
     Raises:
@@ -119,14 +119,14 @@ def asked_for(wishes: Wishes) -> Iterator[tuple[Grant, ...]]:
     """
     grants: list[Grant] = []
     with ExitStack() as undo:
-        for name, asked, take in _requested_settings(wishes):
+        for name, asked, take in _requested_settings(settings):
             try:
                 undo.callback(take())
                 grants.append(Grant(name, asked))
             except Refused as refused:
                 grants.append(Grant(name, asked, str(refused)))
         refusals = [str(grant) for grant in grants if grant.refusal is not None]
-        if refusals and wishes.required:
+        if refusals and settings.required:
             raise RealtimeError(f"{'; '.join(refusals)} (realtime.required is true)")
         yield tuple(grants)
 
@@ -135,15 +135,15 @@ _Undo = Callable[[], object]
 _Apply = Callable[[], _Undo]
 
 
-def _requested_settings(wishes: Wishes) -> Iterator[tuple[str, str, _Apply]]:
+def _requested_settings(settings: RealtimeSettings) -> Iterator[tuple[str, str, _Apply]]:
     """For each requested setting: its key, the setting in words, and a function that applies it."""
-    priority, processors = wishes.fifo_priority, wishes.processors
+    priority, processors = settings.fifo_priority, settings.processors
     if processors:
         numbers = ", ".join(map(str, processors))
         yield "cpu_affinity", f"processor {numbers}", lambda: _run_on(processors)
-    if wishes.freeze_gc:
+    if settings.freeze_gc:
         yield "freeze_gc", "no garbage collection in flight", _stop_collecting
-    if wishes.lock_memory:
+    if settings.lock_memory:
         yield "lock_memory", "memory locked in RAM", _lock_memory
     if priority is not None:  # last: the others take time, at normal priority
         yield "scheduler", f"SCHED_FIFO at priority {priority}", lambda: _take_fifo(priority)

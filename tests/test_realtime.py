@@ -11,22 +11,22 @@ import sys
 import pytest
 
 from companion import realtime
-from companion.realtime import RealtimeError, Wishes, asked_for
+from companion.realtime import RealtimeError, RealtimeSettings, asked_for
 
 
-def refusals(wishes):
-    with asked_for(wishes) as grants:
+def refusals(settings):
+    with asked_for(settings) as grants:
         return [grant.refusal for grant in grants]
 
 
 def test_who_asks_for_nothing_gets_nothing():
-    assert refusals(Wishes(required=True)) == []
+    assert refusals(RealtimeSettings(required=True)) == []
 
 
 def test_what_this_computer_surely_grants_is_granted_and_given_back():
     before = os.sched_getaffinity(0)
     one = (min(before),)
-    with asked_for(Wishes(processors=one, freeze_gc=True, required=True)) as grants:
+    with asked_for(RealtimeSettings(processors=one, freeze_gc=True, required=True)) as grants:
         assert [str(grant) for grant in grants] == [
             f"realtime: processor {one[0]}: granted",
             "realtime: no garbage collection in flight: granted",
@@ -87,7 +87,7 @@ def policies_elsewhere():
     return in_a_thread, in_a_process
 
 before = os.sched_getscheduler(0)
-with realtime.asked_for(realtime.Wishes(fifo_priority=7, lock_memory=True)) as grants:
+with realtime.asked_for(realtime.RealtimeSettings(fifo_priority=7, lock_memory=True)) as grants:
     memory, scheduler = grants
     assert (os.sched_getscheduler(0) == os.SCHED_FIFO) == (scheduler.refusal is None)
     if scheduler.refusal is None:
@@ -116,7 +116,7 @@ def test_a_user_who_may_not_is_told_how_he_may(monkeypatch):
         raise PermissionError(errno.EPERM, "Operation not permitted")
 
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
-    (why,) = refusals(Wishes(fifo_priority=50))
+    (why,) = refusals(RealtimeSettings(fifo_priority=50))
     assert "this user lacks the permission" in why
     assert "docs/companion.service" in why
     assert "rtprio" in why
@@ -125,7 +125,7 @@ def test_a_user_who_may_not_is_told_how_he_may(monkeypatch):
 def test_a_limit_that_only_just_suffices_is_refused_for_it_would_end_a_flight(monkeypatch):
     monkeypatch.setattr(os, "geteuid", lambda: 1000)
     monkeypatch.setattr(resource, "getrlimit", lambda _: (8 << 20, 8 << 20))
-    (why,) = refusals(Wishes(lock_memory=True))
+    (why,) = refusals(RealtimeSettings(lock_memory=True))
     assert "may lock only 8192 KiB" in why
     assert "memlock unlimited" in why
 
@@ -138,19 +138,19 @@ def test_a_kernel_that_does_not_lock_is_believed(monkeypatch, number):
             return -1
 
     monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: Libc())
-    (why,) = refusals(Wishes(lock_memory=True))
+    (why,) = refusals(RealtimeSettings(lock_memory=True))
     assert why.startswith(os.strerror(number))
 
 
 def test_a_processor_that_is_not_there_is_named():
-    (why,) = refusals(Wishes(processors=(1023,)))
+    (why,) = refusals(RealtimeSettings(processors=(1023,)))
     assert why.startswith("processor 1023 is not available to this program; available are ")
 
 
 def test_what_is_required_and_refused_is_raised_and_the_rest_given_back():
     with (
         pytest.raises(RealtimeError, match=r"processor 1023: not granted.*realtime\.required"),
-        asked_for(Wishes(processors=(1023,), freeze_gc=True, required=True)),
+        asked_for(RealtimeSettings(processors=(1023,), freeze_gc=True, required=True)),
     ):
         raise AssertionError("nothing may fly")
     assert gc.isenabled()
@@ -158,7 +158,9 @@ def test_what_is_required_and_refused_is_raised_and_the_rest_given_back():
 
 def test_the_priority_is_taken_last():
     """Else what takes long (the collection before the freeze) would be done at that priority."""
-    taken = [name for name, *_ in realtime._requested_settings(Wishes(1, (0,), True, True))]
+    taken = [
+        name for name, *_ in realtime._requested_settings(RealtimeSettings(1, (0,), True, True))
+    ]
     assert taken[-1] == "scheduler"
 
 
@@ -176,18 +178,18 @@ def test_another_error_of_the_kernel_is_told_without_the_permission(monkeypatch)
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
     monkeypatch.setattr(os, "sched_setaffinity", refuse)
     here = min(os.sched_getaffinity(0))
-    for wishes, words in (
-        (Wishes(lock_memory=True), os.strerror(errno.EAGAIN)),
-        (Wishes(fifo_priority=50), os.strerror(errno.EINVAL)),
-        (Wishes(processors=(here,)), os.strerror(errno.EINVAL)),
+    for settings, words in (
+        (RealtimeSettings(lock_memory=True), os.strerror(errno.EAGAIN)),
+        (RealtimeSettings(fifo_priority=50), os.strerror(errno.EINVAL)),
+        (RealtimeSettings(processors=(here,)), os.strerror(errno.EINVAL)),
     ):
-        assert refusals(wishes) == [words]
+        assert refusals(settings) == [words]
 
 
 def test_a_collector_that_the_caller_stopped_stays_stopped():
     gc.disable()
     try:
-        with asked_for(Wishes(freeze_gc=True)):
+        with asked_for(RealtimeSettings(freeze_gc=True)):
             assert not gc.isenabled()
         assert not gc.isenabled()
     finally:

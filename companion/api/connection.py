@@ -57,12 +57,12 @@ async def connect(
         RealtimeError: the system refused a required `realtime` setting; nothing was sent.
     """
     flown_config = load(Path(config)) if isinstance(config, Path | str) else config
-    overrides: dict[str, dict[str, Any]] = {"link": {}, "flight": {}}
+    own: dict[str, dict[str, Any]] = {"link": {}, "flight": {}}
     if endpoint is not None:
         overrides["link"]["endpoint"] = endpoint
     if arm is not None:
-        overrides["flight"]["arm"] = arm
-    flown_config = changed(changed(flown_config, changes or {}, "changes"), overrides, "connect")
+        own["flight"]["arm"] = arm
+    flown_config = changed(changed(flown_config, changes or {}, "changes"), own, "connect")
     async with flying(
         flown_config, folder or flight_folder(flown_config.recording.directory), observer
     ) as vehicle:
@@ -135,8 +135,8 @@ async def _begin(
     config: Config, folder: Path | None, observer: Observer | None, environment: Environment
 ) -> tuple[Session, Program]:
     program = Program()
-    told = observer or SilentObserver()
-    session = Session(config, folder, told, decline_landing, program, environment)
+    observer = observer or Silent()
+    session = Session(config, folder, observer, decline_landing, program, environment)
     program.interrupt = session.interrupt
     return session, program
 

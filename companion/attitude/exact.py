@@ -49,13 +49,21 @@ def exact(
     share = 1.0 if cosine >= cos_recovery else share_of_law(cosine, cos_recovery, slope)
     roll = pitch = yaw = 0.0
     if share > 0.0:
-        north_left, east_left = north + 2.0 * a * tilt_y, east - 2.0 * a * tilt_x
-        distance = sqrt(north_left * north_left + east_left * east_left)
+        remaining_north, remaining_east = north + 2.0 * a * tilt_y, east - 2.0 * a * tilt_x
+        distance = sqrt(remaining_north * remaining_north + remaining_east * remaining_east)
         part = 1.0 - distance_left(1.0, gain, max_speed / distance if distance > 0.0 else inf, dt)
         error = short_way(heading - heading_of(a, w, z))
         turn = (1.0 - exp(-yaw_gain * dt)) * error + heading_rate * dt
         r_x, r_y, r_z = _rotation(
-            a, tilt_x, tilt_y, north_left, east_left, part, turn, max_rate * dt, max_yaw_rate * dt
+            a,
+            tilt_x,
+            tilt_y,
+            remaining_north,
+            remaining_east,
+            part,
+            turn,
+            max_rate * dt,
+            max_yaw_rate * dt,
         )
         roll, pitch = into_body(b * b - yaw_z * yaw_z, 2.0 * b * yaw_z, r_x, r_y)
         roll *= share / dt
@@ -74,8 +82,8 @@ def _rotation(
     a: float,
     x: float,
     y: float,
-    north_left: float,
-    east_left: float,
+    remaining_north: float,
+    remaining_east: float,
     part: float,
     turn: float,
     max_angle: float,
@@ -92,8 +100,12 @@ def _rotation(
     for _ in range(_MAX_ITERATIONS):
         reached = part
         if max_angle < inf:
-            reached = _reachable_share(a, x, y, north_left, east_left, part, max_angle / f)
-        d_w, d_x, d_y, d_z = _tilt_change(a, x, y, reached * north_left, reached * east_left)
+            reached = _reachable_share(
+                a, x, y, remaining_north, remaining_east, part, max_angle / f
+            )
+        d_w, d_x, d_y, d_z = _tilt_change(
+            a, x, y, reached * remaining_north, reached * remaining_east
+        )
         length = sqrt(d_w * d_w + d_z * d_z)
         own_half = atan2(d_z, d_w)
         half = own_half + 0.5 * turn
@@ -133,8 +145,8 @@ def _reachable_share(
     a: float,
     x: float,
     y: float,
-    north_left: float,
-    east_left: float,
+    remaining_north: float,
+    remaining_east: float,
     part: float,
     half_sine: float,
 ) -> float:
@@ -144,8 +156,8 @@ def _reachable_share(
     of the line, n(0)·n(s) = cos Θ is a quadratic in s.
     """
     k = 2.0 * half_sine * half_sine  # 1 − cos Θ
-    along = 2.0 * a * (x * east_left - y * north_left)
-    square = north_left * north_left + east_left * east_left
+    along = 2.0 * a * (x * remaining_east - y * remaining_north)
+    square = remaining_north * remaining_north + remaining_east * remaining_east
     cosine = 2.0 * a * a - 1.0
     leading = along * along + cosine * cosine * square
     inside = along * along * k * k + leading * k * (2.0 * cosine * cosine - k)

@@ -54,8 +54,8 @@ class Case:
 
     def described(self) -> str:
         """The case in a message: its number and its factors."""
-        told = ", ".join(f"{key} = {_shown(value)}" for key, value in self.factors.items())
-        return f"case {self.index}" + (f" ({told})" if told else "")
+        factors = ", ".join(f"{key} = {_shown(value)}" for key, value in self.factors.items())
+        return f"case {self.index}" + (f" ({factors})" if factors else "")
 
 
 def _shown(value: Value) -> str:

@@ -176,8 +176,8 @@ def _compare_versions(client: "Client") -> None:
     Raises:
         VersionError: says who has which.
     """
-    told = client.get_versions()
-    ours, scheduler = (_of_dask(told[who]) for who in ("client", "scheduler"))
+    dask_versions = client.get_versions()
+    ours, scheduler = (_of_dask(dask_versions[who]) for who in ("client", "scheduler"))
     require_equal(ours, scheduler, "the Dask scheduler")
     for address, found in client.run(versions, on_error="return").items():
         if isinstance(found, BaseException):
@@ -188,9 +188,9 @@ def _compare_versions(client: "Client") -> None:
         require_equal(versions(), as_versions(found), f"the worker {address}")
 
 
-def _of_dask(told: Mapping[str, Any]) -> dict[str, str]:
-    python = ".".join(str(told["host"]["python"]).split(".")[:2])
-    return {"python": python, "distributed": str(told["packages"]["distributed"])}
+def _of_dask(versions: Mapping[str, Any]) -> dict[str, str]:
+    python = ".".join(str(versions["host"]["python"]).split(".")[:2])
+    return {"python": python, "distributed": str(versions["packages"]["distributed"])}
 
 
 def run_tasks(client: "Client", tasks: Mapping[int, tuple[Any, ...]]) -> Iterator[Ended]:

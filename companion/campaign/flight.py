@@ -43,10 +43,10 @@ def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
         try:
             return row | CaseFlight(case, Path(place)).fly(folder)
         except ConfigError as error:  # such as a trajectory that the limits do not allow
-            told = str(error)
+            reason = str(error)
         except Exception as error:
-            told = f"{INTERNAL_ERROR}{type(error).__name__}: {error}"
-        return row | outcomes.unflown(told.replace(f"{place}/", ""))
+            reason = f"{INTERNAL_ERROR}{type(error).__name__}: {error}"
+        return row | outcomes.unflown(reason.replace(f"{place}/", ""))
 
 
 class CaseFlight:

@@ -98,8 +98,8 @@ def read_description(folder: Path) -> Description:
     """
     path = folder / _DESCRIPTION
     try:
-        told = json.loads(read_text(path, _MOST_BYTES))
-        description = Description(**{**told, "versions": as_versions(told["versions"])})
+        values = json.loads(read_text(path, _MOST_BYTES))
+        description = Description(**{**values, "versions": as_versions(values["versions"])})
         # `range` refuses all that is no whole number.
         if not (range(description.cases) and range(description.unit)):
             raise ValueError("cases and unit must be positive")

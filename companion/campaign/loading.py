@@ -98,12 +98,12 @@ class _Reading:
         return f"{place_of(where, self._places, str(self._path))}: {'.'.join(where[:-1])}"
 
     def _base(self) -> Config:
-        told = self._file.config
-        if isinstance(told, Mapping):
-            config = validated(dict(told), f"{self._path}: config", Config)
+        given_config = self._file.config
+        if isinstance(given_config, Mapping):
+            config = validated(dict(given_config), f"{self._path}: config", Config)
             path = config.flight.trajectory
             return config if path is None else _with_trajectory(config, self._folder / path)
-        return load_config(self._folder / told)
+        return load_config(self._folder / given_config)
 
     def _flyable(self, base: Config) -> Config:
         """Adapt the base to a flight in memory: the program arms, its trajectory is copied.
@@ -163,15 +163,15 @@ class _Reading:
 
     def _check_faults(self) -> None:
         file, name = self._file, self._path
-        for scenario, told in file.faults.items():
-            for fault in told.inject:
+        for scenario, fault_case in file.faults.items():
+            for fault in fault_case.inject:
                 if fault.keys() & {"at_s", "after_offboard_s"}:
                     raise ConfigError(
                         f"{name}: faults.{scenario}: phase and after_s say when it begins; "
                         "take out at_s and after_offboard_s"
                     )
             try:
-                complete_mock({"faults": told.inject})
+                complete_mock({"faults": fault_case.inject})
             except ConfigError as error:
                 raise ConfigError(f"{name}: faults.{scenario}: {error}") from error
         self._check_words(FAULT, (NO_FAULT, *file.faults))

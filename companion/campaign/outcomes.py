@@ -61,13 +61,13 @@ def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
         place = [np.interp(settled[:, 0], truth[:, 0], each) for each in truth[:, 1:4].T]
         true = np.column_stack([settled[:, :4], *place])
         figures.update(tracking_errors(true))
-        figures.update(_level(settled, true))
+        figures.update(_horizontal_errors(settled, true))
         in_maneuvers = (truth[:, 0] >= settled[0, 0]) & (truth[:, 0] <= settled[-1, 0])
         figures["max_tilt_rad"] = float(truth[in_maneuvers, 4].max(initial=0.0))
     return figures
 
 
-def _level(estimated: Floats, true: Floats) -> dict[str, float]:
+def _horizontal_errors(estimated: Floats, true: Floats) -> dict[str, float]:
     """RMS of three horizontal distances, m: estimate-reference, true-reference, estimate-true.
 
     Args:

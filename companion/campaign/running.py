@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 DONE, FAILED = 0, 1
 _FEW = 2
 """The time of a case is measured only with more than this number of cases for each worker."""
-_TOLD = 3
+_MOST_SHOWN = 3
 """Largest number of lost units, and of internal errors, that are printed."""
 
 
@@ -165,12 +165,12 @@ class _Run:
     def _finished(self, progress: engine.Progress, description: Description) -> int:
         """Report how the run ended; return the exit code."""
         say = self._console.print
-        for sentence in progress.lost[:_TOLD]:
+        for sentence in progress.lost[:_MOST_SHOWN]:
             say(f"not flown: {sentence}")
         if progress.flown < description.cases:
             return self._stopped(f"{len(progress.lost)} units were given up")
         errors = engine.internal_errors(self._place, self._campaign.file)
-        for error, times in errors.most_common(_TOLD):
+        for error, times in errors.most_common(_MOST_SHOWN):
             say(f"{times} of the {self._noun} failed by the program's own fault: {error}")
         results = Results.read(self._place)
         say(f"{results.good.sum()} of {progress.flown} {self._noun} were good.")

@@ -87,10 +87,10 @@ def schema(file: CampaignFile) -> "pa.Schema":
     described = {
         name: {**each.described(), "unit": physical_unit(name)} for name, each in file.sweep.items()
     }
-    told = {"name": file.name, "kind": file.kind, "factors": described}
+    contents = {"name": file.name, "kind": file.kind, "factors": described}
     return pa.schema(
         [(name, pa.bool_() if kind == "bool" else getattr(pa, kind)()) for name, kind in columns],
-        metadata={METADATA: json.dumps(told).encode()},
+        metadata={METADATA: json.dumps(contents).encode()},
     )
 
 
@@ -213,8 +213,8 @@ def read_unit(folder: Path, number: int) -> "pa.Table":
 
 def metadata(results: "pa.Table") -> dict[str, Any]:
     """Name, kind and factors of the campaign that a table of results belongs to."""
-    told: dict[str, Any] = json.loads((results.schema.metadata or {})[METADATA])
-    return told
+    contents: dict[str, Any] = json.loads((results.schema.metadata or {})[METADATA])
+    return contents
 
 
 def write_campaign(folder: Path, campaign: Campaign, text: str) -> None:

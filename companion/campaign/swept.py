@@ -15,7 +15,7 @@ Pair = tuple[float, float]
 KeyName = Annotated[str, Field(max_length=100)]
 
 _GRID = ("values", "range")
-_SPREAD = ("uniform", "loguniform", "normal", "choice")
+_DISTRIBUTIONS = ("uniform", "loguniform", "normal", "choice")
 _MOST_VALUES = 1000
 
 
@@ -50,11 +50,11 @@ class Swept(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _list_alone(cls, told: Any) -> Any:
-        if isinstance(told, list | tuple):
-            return {"values": told}
-        if isinstance(told, dict | cls):
-            return told
+    def _list_alone(cls, value: Any) -> Any:
+        if isinstance(value, list | tuple):
+            return {"values": value}
+        if isinstance(value, dict | cls):
+            return value
         raise ValueError("must be a list of values, or a distribution such as {uniform: [0, 8]}")
 
     @field_validator("values", "choice")
@@ -73,9 +73,9 @@ class Swept(Section):
 
     @model_validator(mode="after")
     def _consistent(self) -> "Swept":
-        kinds = [kind for kind in (*_GRID, *_SPREAD) if getattr(self, kind) is not None]
+        kinds = [kind for kind in (*_GRID, *_DISTRIBUTIONS) if getattr(self, kind) is not None]
         if len(kinds) != 1:
-            raise ValueError(f"give exactly one of {', '.join((*_GRID, *_SPREAD))}")
+            raise ValueError(f"give exactly one of {', '.join((*_GRID, *_DISTRIBUTIONS))}")
         for kind in ("range", "uniform", "loguniform", "within"):
             pair = getattr(self, kind)
             if pair is not None and not pair[0] < pair[1]:
@@ -95,12 +95,12 @@ class Swept(Section):
     @property
     def kind(self) -> str:
         """`values`, `range`, `uniform`, `loguniform`, `normal` or `choice`."""
-        return next(kind for kind in (*_GRID, *_SPREAD) if getattr(self, kind) is not None)
+        return next(kind for kind in (*_GRID, *_DISTRIBUTIONS) if getattr(self, kind) is not None)
 
     @property
     def sampled(self) -> bool:
         """Whether the values are sampled; otherwise they form a grid."""
-        return self.kind in _SPREAD
+        return self.kind in _DISTRIBUTIONS
 
     @property
     def is_number(self) -> bool:
@@ -138,8 +138,10 @@ class Swept(Section):
 
     def described(self) -> dict[str, Any]:
         """Kind and values, for the metadata of the results."""
-        told = {"count": self.count, "within": self.within}
-        shown: Mapping[str, Any] = {key: value for key, value in told.items() if value is not None}
+        details = {"count": self.count, "within": self.within}
+        shown: Mapping[str, Any] = {
+            key: value for key, value in details.items() if value is not None
+        }
         return {
             "kind": self.kind,
             "sampled": self.sampled,

@@ -89,6 +89,8 @@ def require_equal(ours: Versions, others: Versions, who: str) -> None:
         )
 
 
-def as_versions(told: Any) -> Versions:
+def as_versions(found: Any) -> Versions:
     """Versions from JSON or from another process, all converted to text."""
-    return {str(name): str(value) for name, value in told.items()} if isinstance(told, dict) else {}
+    return (
+        {str(name): str(value) for name, value in found.items()} if isinstance(found, dict) else {}
+    )

@@ -12,13 +12,13 @@ _SUB_COMMANDS = (_RUN, "report", "rerun", "tune", "-h", "--help")
 
 def with_campaign_command(arguments: Sequence[str]) -> list[str]:
     """The arguments, with `campaign FILE` expanded to `campaign run FILE`."""
-    told = list(arguments)
-    place = next((n for n, word in enumerate(told) if not word.startswith("-")), len(told))
-    if told[place : place + 1] == [_CAMPAIGN] and not (
-        told[place + 1 : place + 2] and told[place + 1] in _SUB_COMMANDS
+    words = list(arguments)
+    place = next((n for n, word in enumerate(words) if not word.startswith("-")), len(words))
+    if words[place : place + 1] == [_CAMPAIGN] and not (
+        words[place + 1 : place + 2] and words[place + 1] in _SUB_COMMANDS
     ):
-        told.insert(place + 1, _RUN)
-    return told
+        words.insert(place + 1, _RUN)
+    return words
 
 
 def add_campaign(commands: Commands) -> None:

@@ -85,10 +85,10 @@ def _as_told(config: Config, options: argparse.Namespace) -> Config:
     link: dict[str, Any] = {"endpoint": options.endpoint} if options.endpoint else {}
     if options.lockstep:
         link["lockstep"] = True
-    told = changed(config, {"link": link}, "the command line")
-    check_link(told)
-    require_backend(told)
-    return told
+    checked_config = changed(config, {"link": link}, "the command line")
+    check_link(checked_config)
+    require_backend(checked_config)
+    return checked_config
 
 
 def _maneuvers(config: Config, drag: KnownDrag) -> tuple[ManeuverSequence | None, list[Finding]]:

@@ -56,14 +56,14 @@ def as_told(config: Config, options: argparse.Namespace, planner: str | None = N
     if options.arm:
         flight["arm"] = True
     changes = {"link": link, "flight": flight, "planner": {"name": planner} if planner else {}}
-    told = changed(config, assigned(options.set), "--set")
-    told = changed(told, changes, "the command line")
+    flown_config = changed(config, assigned(options.set), "--set")
+    flown_config = changed(flown_config, changes, "the command line")
     # What cannot be flown is to be found out before anything is begun.
-    check_link(told)
-    configured_maneuvers(told)
-    check_control(told)
-    require_extras(told)
-    return told
+    check_link(flown_config)
+    configured_maneuvers(flown_config)
+    check_control(flown_config)
+    require_extras(flown_config)
+    return flown_config
 
 
 def invocation(options: argparse.Namespace) -> Invocation:
@@ -98,8 +98,10 @@ def fly(
         RealtimeError: what `realtime` requires is not granted; nothing was sent.
     """
     observer = TerminalObserver(console)
-    told = observer if beside is None else SeveralObservers(observer, beside)
-    session = Session(config, folder, told, observer.ask_landing, environment=environment(beside))
+    observers = observer if beside is None else Several(observer, beside)
+    session = Session(
+        config, folder, observers, observer.ask_landing, environment=environment(beside)
+    )
     flight = fly_interruptibly(session)
     if beside is not None:
         beside.changes, beside.note = session.changes, session.note

@@ -157,8 +157,8 @@ def _how_to_include(out: Path, config: Path | None) -> str:
         place = Path(os.path.relpath(place, config.resolve().parent))
     return "\n".join(
         (
-            f"Written to {out}. Add this to your configuration, and remove `vehicle` and",
-            "`thrust.hover_thrust` from it, because its own keys would win:",
+            f"Written to {out}. Add this line to your configuration, and remove `vehicle` and",
+            "`thrust.hover_thrust` from it, because its keys override those of an included file:",
             f"  include: {place}",
         )
     )

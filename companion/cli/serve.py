@@ -35,11 +35,13 @@ def serve(options: argparse.Namespace) -> int:
     began = time.monotonic()
 
     def note(text: str) -> None:
-        told.event(time.monotonic() - began, text)
+        observers.event(time.monotonic() - began, text)
 
     with helper(options, config, options.config, read, None, console, follows=False) as beside:
-        told = observer if beside is None else SeveralObservers(observer, beside)
-        session = ServeSession(config, note, told, environment(beside), config.recording.directory)
+        observers = observer if beside is None else Several(observer, beside)
+        session = ServeSession(
+            config, note, observers, environment(beside), config.recording.directory
+        )
         pages = ReportPages()
         if config.recording.report:
             session.records.on_recorded = pages.write
@@ -106,15 +108,15 @@ def _as_told(config: Config, options: argparse.Namespace) -> Config:
         MissingExtraError: an extra that the configuration needs is not installed.
         SigningError: the signing key cannot be used.
     """
-    told = changed(config, assigned(options.set), "--set")
+    served_config = changed(config, assigned(options.set), "--set")
     link = {"endpoint": options.endpoint} if options.endpoint else {}
     clients = {"clients": options.client} if options.client else {}
-    told = changed(told, {"link": link, "serve": clients}, "the command line")
-    if told.link.lockstep:
+    served_config = changed(served_config, {"link": link, "serve": clients}, "the command line")
+    if served_config.link.lockstep:
         raise ConfigError("link.lockstep: serve runs in real time; set link.lockstep: false")
-    if told.serve.control:
+    if served_config.serve.control:
         require("ruckig", "serve", "serve.control: true")
-        check_control(told)
-    check_link(told)
-    require_extras(told)
-    return told
+        check_control(served_config)
+    check_link(served_config)
+    require_extras(served_config)
+    return served_config

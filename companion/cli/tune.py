@@ -54,7 +54,7 @@ def tune(options: argparse.Namespace) -> int:
     keys = [f"{section}.{key}" for section, keys in proposal.changes.items() for key in keys]
     console.print(
         f"Written to {output}. Let your configuration include it, and remove {', '.join(keys)} "
-        "from your own file: its own keys would win."
+        "from your own file: keys there override those of an included file."
     )
     good = all(after.ok for _, after in flights.values())
     if options.json:
@@ -97,8 +97,8 @@ def _configuration(source: Path, vehicle: Path, base: Path | None) -> tuple[Conf
     identified = load(vehicle)
     if base is None:
         return _flyable(identified), True
-    told = identified.model_dump(exclude_unset=True, include=set(_SECTIONS))
-    return _flyable(changed(load(base), told, str(vehicle))), True
+    identified_keys = identified.model_dump(exclude_unset=True, include=set(_SECTIONS))
+    return _flyable(changed(load(base), identified_keys, str(vehicle))), True
 
 
 def _with_learned_drag(config: Config, source: Path) -> Config:

@@ -45,8 +45,8 @@ def doubts(config: Config) -> Iterator[Doubt]:
         yield Doubt(
             "vehicle.identified",
             "vehicle.lag_ms and vehicle.dead_time_ms were not measured on this vehicle",
-            "the response is less exact than after `companion identify`, but steps are still "
-            "straighter than with first-order in the cases of docs/identify.md",
+            "the response is less exact than after `companion identify`; steps are still "
+            "straighter than with planner.name: first-order (docs/identify.md)",
             "run `companion identify` before raising planner.gain_per_s, and include its file",
         )
 

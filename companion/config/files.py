@@ -12,7 +12,7 @@ from companion.config import Config
 from companion.config.root import MOST_INCLUDED
 from companion.files import bounded_yaml, yaml_file
 from companion.files.bounded_yaml import Where
-from companion.files.yaml_faults import owners, shortened
+from companion.files.yaml_faults import dotted_keys, shortened
 from companion.files.yaml_file import ConfigError, Contents, UnreadableFileError
 
 _INCLUDE = "include"
@@ -132,8 +132,8 @@ def _included(path: Path, own: dict[str, Any]) -> list[Path]:
     if not isinstance(names, list) or not all(
         isinstance(name, str) and yaml_file.is_path(name) for name in names
     ):
-        told = shortened(names)
-        raise ConfigError(f"{path}: `{_INCLUDE}` must be a file or a list of files, not {told}")
+        shown = shortened(names)
+        raise ConfigError(f"{path}: `{_INCLUDE}` must be a file or a list of files, not {shown}")
     return [path.parent / name for name in names]
 
 
@@ -147,8 +147,8 @@ def _check_part(included: Path, part: dict[str, Any]) -> None:
         if section == _INCLUDE:
             continue
         if section in Config.model_fields and not isinstance(values, dict):
-            told = shortened(values)
-            raise ConfigError(f"{included}: `{section}` must hold keys, not {told}")
+            shown = shortened(values)
+            raise ConfigError(f"{included}: `{section}` must hold keys, not {shown}")
 
 
 def _merge(merged: Contents, part: Contents) -> None:
@@ -194,7 +194,7 @@ def assigned(texts: Sequence[str]) -> dict[str, dict[str, Any]]:
     for text in texts:
         key, equals, value = text.partition("=")
         section, dot, name = key.strip().partition(".")
-        if equals and not dot and (found := owners(section, Config)):
+        if equals and not dot and (found := dotted_keys(section, Config)):
             raise ConfigError(f"--set {text}: name the section, as in {found}")
         if not (equals and dot and section and name):
             raise ConfigError(f"--set {text}: write SECTION.KEY=VALUE, as limits.max_tilt_deg=20")

@@ -112,5 +112,5 @@ class GuidanceConfig(Section):
     @property
     def drag(self) -> Drag | None:
         """The configured drag, or None."""
-        told = self.drag_per_s
-        return None if told is None else Drag(told, self.quadratic_drag_per_m)
+        linear = self.drag_per_s
+        return None if linear is None else Drag(linear, self.quadratic_drag_per_m)

@@ -83,5 +83,5 @@ def prior_of(drag: Drag) -> DragPrior:
 
 def drag_prior(config: Config) -> DragPrior:
     """The prior with which the drag estimate begins."""
-    told = config.guidance.drag
-    return ANY_VEHICLE if told is None else prior_of(told)
+    drag = config.guidance.drag
+    return ANY_VEHICLE if drag is None else prior_of(drag)

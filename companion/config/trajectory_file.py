@@ -27,7 +27,7 @@ from companion.guidance.trajectory import (
     read_csv,
 )
 
-_COLUMNS_TOLD = 10
+_MOST_COLUMNS_SHOWN = 10
 
 
 class _Shape(Protocol):
@@ -86,8 +86,8 @@ class CsvShape(Section):
                 f"{path}: its comment says frame: {named}, and csv.frame says {self.frame}; "
                 "remove one of them"
             )
-        told = self.frame or named
-        return None if told is None else Frame(told)
+        frame = self.frame or named
+        return None if frame is None else Frame(frame)
 
 
 class LoadedTrajectory(NamedTuple):
@@ -117,7 +117,7 @@ def _understood(path: Path, frame: Frame | None, unused: tuple[str, ...]) -> tup
             ", because it names no frame; to name one, write `# frame: ned` in its first line, or "
             "csv.frame in a YAML file that names it"
         )
-    left = f"{path.name}: these columns are not used: {', '.join(unused[:_COLUMNS_TOLD])}"
+    left = f"{path.name}: these columns are not used: {', '.join(unused[:_MOST_COLUMNS_SHOWN])}"
     return (axes, left) if unused else (axes,)
 
 

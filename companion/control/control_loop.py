@@ -162,7 +162,7 @@ class ControlLoop:
         try:
             rates, thrust = self._answer(sample, command, period)
             # This process may have been stopped since the sample came.
-            now = self._recorder.checked = self._clock()
+            now = self._recorder.checked_at = self._clock()
             if sample.age + now - sample.received > self._deadlines.telemetry_stale:
                 return Unanswered.LATE
             if not self._send(sample.time_boot_ms, rates, thrust):

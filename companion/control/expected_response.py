@@ -24,22 +24,22 @@ class ExpectedResponse:
     Attributes:
         coefficient: coefficient at which the step ends.
         time_constant: time until 63 % of the step is covered, s.
-        otherwise: name of a cause of delay -> time constant (s) if this cause changes: with twice
-            the gain, or without the rate limit, the lag or the dead time.
+        time_constants_without: name of a cause of delay -> time constant (s) if this cause changes:
+            with twice the gain, or without the rate limit, the lag or the dead time.
         gain: gain p of the planner, 1/s.
         largest_gain: the largest sensible gain, 1/s; None if lag and dead time are not known.
     """
 
     coefficient: float
     time_constant: float
-    otherwise: dict[str, float]
+    time_constants_without: dict[str, float]
     gain: float
     largest_gain: float | None
 
     @property
     def limited_by(self) -> str:
         """Name of the cause whose change reduces the time constant most."""
-        return min(self.otherwise, key=self.otherwise.__getitem__)
+        return min(self.time_constants_without, key=self.time_constants_without.__getitem__)
 
     @property
     def too_quick(self) -> bool:
@@ -50,7 +50,7 @@ class ExpectedResponse:
         """A message for the user: time constant, its main limit, and the effect of each change."""
         changes = ", ".join(
             f"{time:.2f} s {'with twice' if name == _GAIN else 'without'} {name}"
-            for name, time in self.otherwise.items()
+            for name, time in self.time_constants_without.items()
             if time < _NOTICEABLE * self.time_constant
         )
         tilt = degrees(asin(self.coefficient))
@@ -89,7 +89,7 @@ def expected_response(config: Config) -> ExpectedResponse:
     speed = _largest_speed(config)
     twice = config.planner.model_copy(update={"gain_per_s": 2.0 * config.planner.gain_per_s})
     quicker = tilt_response(config.model_copy(update={"planner": twice}))
-    otherwise = {
+    time_constants_without = {
         _GAIN: quicker.step_time(step, speed),
         _RATE: response.step_time(step),
         **_without_the_vehicle(config, response, speed),
@@ -98,7 +98,7 @@ def expected_response(config: Config) -> ExpectedResponse:
     return ExpectedResponse(
         config.steps.coefficient,
         response.step_time(step, speed),
-        otherwise,
+        time_constants_without,
         config.planner.gain_per_s,
         None if largest == inf else largest,
     )

@@ -8,7 +8,7 @@ _STILL = 0.5
 """Largest estimated vertical speed of a vehicle on the ground, m/s."""
 _LIFTED = 1.0
 """A climb by more than this since the take-off command means that the vehicle has lifted off, m."""
-_SPEED_LASTS = 0.5
+_MAX_SPEED_AGE = 0.5
 """A vertical speed older than this is ignored, s."""
 _SETTLED = 0.5
 """The landed flag must be set for this long after a landing, s."""
@@ -86,6 +86,6 @@ class GroundContact:
     def _vertical_speed(self) -> float:
         """Vertical speed, positive down, m/s; 0 if it is no longer received."""
         position = self._state.position
-        if position is None or self._clock() - position.received > _SPEED_LASTS:
+        if position is None or self._clock() - position.received > _MAX_SPEED_AGE:
             return 0.0
         return position.velocity_ned[2]

@@ -43,7 +43,7 @@ class HoverLearning:
     @property
     def present_hover(self) -> float:
         """Normalised thrust at hover at the present battery voltage, as learned so far, 0..1."""
-        return self._hover_thrust.present
+        return self._hover_thrust.present_hover
 
     def largest_tilt(self, acceleration_down: float = 0.0) -> float:
         """Largest tilt at which 95 % of full thrust still give `acceleration_down` (m/s²), rad."""

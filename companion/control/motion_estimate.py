@@ -114,7 +114,7 @@ class MotionEstimate:
         measured = self._correction.corrected(
             position.vehicle_time, VehicleMotion(position.position_ned, (north, east, down))
         )
-        known = self._known(slope, measured)
+        known = self._modelled_acceleration(slope, measured)
         self._observer.observe(position.vehicle_time, measured, known, self._correction.trust)
         if offboard_active and before is not None:
             self._learn_drag(before, position, slope)
@@ -137,9 +137,9 @@ class MotionEstimate:
         time = self.vehicle_time(now, self._position)
         still = VehicleMotion(self._position.position_ned, self._position.velocity_ned)
         slope = self._slopes.mean(self._position.vehicle_time, time)
-        motion = self._observer.at(time, self._known(slope, still)) or still
+        motion = self._observer.at(time, self._modelled_acceleration(slope, still)) or still
         slope = self._slopes.mean(self._position.vehicle_time, time + ahead)
-        later = self._observer.at(time + ahead, self._known(slope, motion)) or still
+        later = self._observer.at(time + ahead, self._modelled_acceleration(slope, motion)) or still
         north, east = self._slopes.newest
         thrust = self.vertical * north, self.vertical * east
         disturbance, drag = self._observer.disturbance, self.drag.drag
@@ -201,7 +201,7 @@ class MotionEstimate:
             self._heading,
         )
 
-    def _known(self, slope: Horizontal, motion: VehicleMotion) -> Horizontal:
+    def _modelled_acceleration(self, slope: Horizontal, motion: VehicleMotion) -> Horizontal:
         """Horizontal acceleration due to thrust and drag, m/s², without the disturbance."""
         north, east, _ = motion.velocity_ned
         slowed = self.drag.drag.deceleration(motion.velocity_ned)

@@ -15,7 +15,7 @@ from companion.vehicle.records import AttitudeSample, AttitudeTarget
 class SampleRecorder:
     """Records each sample and the loop's answer to it, if the flight is recorded.
 
-    The loop calls `begin`, sets `checked`, calls `answer` if it sends a setpoint, and then `end`.
+    The loop calls `begin`, sets `checked_at`, calls `answer` if it sends a setpoint, then `end`.
 
     Args:
         recorder: recorder of the flight, or None.
@@ -26,7 +26,7 @@ class SampleRecorder:
 
     Attributes:
         on: whether the flight is recorded.
-        checked: time of the check of the sample's age before sending, s of event-loop time; NaN:
+        checked_at: time of the check of the sample's age before sending, s of event-loop time; NaN:
             not checked.
     """
 
@@ -39,7 +39,7 @@ class SampleRecorder:
         clock: Callable[[], float],
     ) -> None:
         self.on = recorder is not None
-        self.checked = nan
+        self.checked_at = nan
         self._recorder, self._planner = recorder, planner
         self._thrust_limits, self._clock = thrust_limits, clock
         self._answer: Answer | None = None
@@ -53,7 +53,7 @@ class SampleRecorder:
 
     def begin(self) -> None:
         """Begin a new sample, which is not yet checked or answered."""
-        self.checked, self._answer = nan, None
+        self.checked_at, self._answer = nan, None
 
     def answer(
         self, command: GuidanceCommand, rates: BodyRates, thrust: float, latency_ns: int
@@ -81,7 +81,7 @@ class SampleRecorder:
         if self._recorder is None:
             return
         reason = reason if flags.on else None
-        entry = SampleEntry(sample, reason, flags, self.checked, self._answer)
+        entry = SampleEntry(sample, reason, flags, self.checked_at, self._answer)
         self._recorder.add(sample.received, self._rows.sample, entry)
 
     def action(self, name: str) -> None:

@@ -69,14 +69,14 @@ class SampleEntry(NamedTuple):
         sample: the sample.
         reason: why it is unanswered, or None.
         flags: state of the loop before the answer.
-        checked: time of the check of its age before sending, s on our clock; NaN: not checked.
+        checked_at: time of the check of its age before sending, s on our clock; NaN: not checked.
         answer: setpoint that was sent, or None.
     """
 
     sample: AttitudeSample
     reason: Unanswered | None
     flags: LoopFlags
-    checked: float
+    checked_at: float
     answer: Answer | None
 
 
@@ -95,7 +95,7 @@ class SampleRows:
 
     def sample(self, writer: McapWriter, time_ns: int, entry: SampleEntry) -> None:
         """Write a sample, and the setpoint that answers it."""
-        sample, reason, flags, checked, answer = entry
+        sample, reason, flags, checked_at, answer = entry
         code = _CODES[reason] if flags.on else CONTROL_OFF
         data = SAMPLE.packing.pack(
             CDR,
@@ -105,7 +105,7 @@ class SampleRows:
             sample.age,
             *sample.q,
             *sample.body_rates,
-            checked,
+            checked_at,
             code,
             _MISFITS[sample.misfit],
             sample.age_known,

@@ -9,8 +9,8 @@ from typing import Any, get_args
 
 from pydantic import BaseModel
 
-_LONGEST_TOLD = 60
-_PLACES_TOLD = 3
+_LONGEST_SHOWN = 60
+_MOST_PLACES = 3
 _ALIKE, _ELSEWHERE_ALIKE = 0.5, 0.75
 """Smallest similarity to an unknown key for a suggestion: in the same section, and in another one.
 """
@@ -41,7 +41,7 @@ _BOUNDS: dict[str, Callable[[float, float], bool]] = {
 def shortened(value: Any) -> str:
     """A value as shown in an error message."""
     text = repr(value)
-    return text if len(text) <= _LONGEST_TOLD else f"{text[:_LONGEST_TOLD]}..."
+    return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
 
 
 def kinds_in(annotation: Any) -> frozenset[Any]:
@@ -84,8 +84,8 @@ def explained(detail: Any, model: type[BaseModel], former: Mapping[str, str]) ->
     location, value = detail["loc"], detail["input"]
     where = ".".join(str(part) for part in location)
     if detail["type"] == "extra_forbidden":
-        told = former.get(where)
-        return f"`{where}` {told}" if told else f"`{where}` {_unknown(location, value, model)}"
+        advice = former.get(where)
+        return f"`{where}` {advice}" if advice else f"`{where}` {_unknown(location, value, model)}"
     if detail["type"] == "missing" and isinstance(value, list | tuple):
         held = ".".join(str(part) for part in location[:-1])
         return f"`{held}` has too few values (got {shortened(value)})"
@@ -181,14 +181,14 @@ def _unknown(location: tuple[int | str, ...], value: Any, model: type[BaseModel]
     return f"is not a known key; {hint}"
 
 
-def owners(name: str, model: type[BaseModel]) -> str:
+def dotted_keys(name: str, model: type[BaseModel]) -> str:
     """The dotted keys with this name, as alternatives; empty if no section has one."""
     return _either([".".join((*place, key)) for place, key in _keys(model) if key == name])
 
 
 def _either(places: list[str]) -> str:
     """Some dotted keys, joined as alternatives."""
-    return " or ".join(f"`{place}`" for place in places[:_PLACES_TOLD])
+    return " or ".join(f"`{place}`" for place in places[:_MOST_PLACES])
 
 
 def _likeness(written: str, known: str) -> float:

@@ -14,7 +14,7 @@ from companion.files.yaml_faults import explained, kinds_in, without_consequence
 Model = TypeVar("Model", bound="Section")
 
 _LONGEST_PATH = 1000
-_FAULTS_TOLD = 5
+_MOST_FAULTS_SHOWN = 5
 
 PathKey = Annotated[Path, Field(json_schema_extra={"maxLength": _LONGEST_PATH})]
 """A key that names a file or a folder; `Section` checks its length."""
@@ -184,8 +184,8 @@ def validated(
         return model.model_validate(data)
     except ValidationError as error:
         details = without_consequences(error.errors(include_url=False))
-        told, before = [], Place("")
-        for detail in details[:_FAULTS_TOLD]:
+        faults, before = [], Place("")
+        for detail in details[:_MOST_FAULTS_SHOWN]:
             place = place_of(detail["loc"], places or {}, name)
             repeats = place.file == before.file
             where = (
@@ -195,10 +195,10 @@ def validated(
                 if repeats and place.line
                 else f"{place}: "
             )
-            told.append(where + explained(detail, model, model.former_keys))
+            faults.append(where + explained(detail, model, model.former_keys))
             before = place
-        more = len(details) - _FAULTS_TOLD
-        raise ConfigError("; ".join(told) + (f"; and {more} more" if more > 0 else "")) from error
+        more = len(details) - _MOST_FAULTS_SHOWN
+        raise ConfigError("; ".join(faults) + (f"; and {more} more" if more > 0 else "")) from error
 
 
 def place_of(where: Where, places: Mapping[Where, Place], name: str) -> Place:

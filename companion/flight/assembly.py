@@ -31,7 +31,7 @@ from companion.mavlink.signing import Signing, key_from_passphrase_file
 from companion.mavlink.stamp_file import StampFile
 from companion.mavlink.transport.base import Tap
 from companion.mavlink.transport.opening import OpenTransport, open_transport
-from companion.realtime import Wishes
+from companion.realtime import RealtimeSettings
 from companion.recording.recorder import FlightRecorder
 from companion.recording.trace import FlightTrace
 from companion.safety import SafetyLadder, monitors
@@ -75,10 +75,10 @@ def open_link(
     return Link(settings, tap, opener, notice)
 
 
-def realtime_wishes(config: Config) -> Wishes:
+def realtime_settings(config: Config) -> RealtimeSettings:
     """The real-time settings to request from the operating system."""
     section = config.realtime
-    return Wishes(
+    return RealtimeSettings(
         fifo_priority=section.priority if section.scheduler == "fifo" else None,
         processors=section.cpu_affinity,
         lock_memory=section.lock_memory,

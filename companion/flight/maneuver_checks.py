@@ -121,7 +121,7 @@ def require_still_flyable(config: Config, flown: ManeuverSequence, drag: KnownDr
         if broken:
             raise ConfigError(
                 f"{part.name}: {broken[0]}; a trajectory is not slowed down again in flight, so "
-                f"choose a value that it fits{drag.assumption}"
+                f"choose a value with which it keeps the limits{drag.assumption}"
             )
 
 

@@ -17,7 +17,7 @@ _AIRBORNE = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD})
 _UNDER_CONTROL = frozenset({Role.OFFBOARD})
 _MANEUVER_GRACE = 10.0
 """Time that the maneuvers may take beyond their duration, s."""
-_SHORT = 10.0
+_COMMAND_TIMEOUT = 10.0
 """Timeout for commands that the autopilot carries out at once or not at all, s."""
 _TAKEOVER_TIMEOUT = 15.0
 """Timeout for the takeover with its preflight checks, whose parameters a bad link may lose, s."""
@@ -90,7 +90,7 @@ def flight_phases(
 
 def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, ...]:
     """The phases from the ground until the autopilot obeys our rates, in the autopilot's order."""
-    stream = Phase("stream", "setpoints to flow", preflight_phases.stream, _SHORT)
+    stream = Phase("stream", "setpoints to flow", preflight_phases.stream, _COMMAND_TIMEOUT)
     return (
         *((stream,) if autopilot.control_entry is ControlEntry.BY_COMMAND else ()),
         Phase(
@@ -119,20 +119,20 @@ def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, .
 
 def takeover_phases(config: FlightConfig) -> tuple[Phase, ...]:
     """The phases that take over a vehicle which its autopilot holds in the air."""
-    checks = _look_over(config, "to be taken over", takeover.look_over, _RISING)
-    return checks, _held_takeover_phase()
+    checks = _checks_phase(config, "to be taken over", takeover.check_airborne, _RISING)
+    return checks, _take_over_held()
 
 
 def takeoff_for_client_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, ...]:
     """The phases that take off a vehicle which somebody else armed, and take it over."""
-    checks = _look_over(config, "to take off", takeover.look_over_standing, _STANDING)
+    checks = _checks_phase(config, "to take off", takeover.check_standing, _STANDING)
     (takeoff_phase,) = (
         phase for phase in takeoff_phases(config, autopilot) if phase.name == "takeoff"
     )
     return checks, takeoff_phase, _held_takeover_phase()
 
 
-def _look_over(config: FlightConfig, ready: str, work: Work, modes: frozenset[Role]) -> Phase:
+def _checks_phase(config: FlightConfig, ready: str, work: Work, modes: frozenset[Role]) -> Phase:
     return Phase(
         "checks", f"the vehicle to be ready {ready}", work, config.ready_timeout_s, modes=modes
     )
@@ -197,7 +197,7 @@ def hand_back_phase() -> Phase:
         "hand back",
         "the autopilot to hold",
         control_phases.hand_back,
-        _SHORT,
+        _COMMAND_TIMEOUT,
         Exit.LAND,
         modes=_AIRBORNE | {Role.OFFBOARD},
     )
@@ -224,7 +224,9 @@ def _land(config: FlightConfig) -> Phase:
 
 def _undo_arming() -> Phase:
     """The exit that disarms; its own exit is to land, as a refusal means that the vehicle flies."""
-    return Phase("disarm", "the motors to stop", preflight_phases.undo_arming, _SHORT, Exit.LAND)
+    return Phase(
+        "disarm", "the motors to stop", preflight_phases.undo_arming, _COMMAND_TIMEOUT, Exit.LAND
+    )
 
 
 def _disarm() -> Phase:

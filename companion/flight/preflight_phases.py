@@ -148,12 +148,12 @@ def _require_flyable_by_vehicle(context: FlightContext) -> None:
         FlightEnded: a maneuver leaves the fence or exceeds a limit.
     """
     config, maneuvers, drag = context.config, context.maneuvers, context.known_drag
-    position = context.link.state.global_position
+    global_position = context.link.state.global_position
     try:
         if drag != before_connecting(config):
             require_still_flyable(config, maneuvers, drag)
-        if config.safety.fence_polygon_deg and position is not None:
-            place = Place(position.latitude_deg, position.longitude_deg)
+        if config.safety.fence_polygon_deg and global_position is not None:
+            place = Place(global_position.latitude_deg, global_position.longitude_deg)
             require_inside(config, maneuvers.parts, place, drag)
     except ConfigError as error:
         raise FlightEnded(str(error)) from error

@@ -6,7 +6,7 @@ from pathlib import Path
 from companion import realtime
 from companion.config import Config
 from companion.flight.assembled import Assembled
-from companion.flight.assembly import assemble, open_link, realtime_wishes
+from companion.flight.assembly import assemble, open_link, realtime_settings
 from companion.flight.changes import Changes
 from companion.flight.context import cancel
 from companion.flight.environment import THIS_COMPUTER, Environment
@@ -15,7 +15,7 @@ from companion.flight.flight_files import FlightFiles
 from companion.flight.observer import Observer
 from companion.flight.plan import ConfiguredPlan, Plan
 from companion.flight.wiring import connected
-from companion.realtime import Wishes
+from companion.realtime import RealtimeSettings
 from companion.recording.closing_words import LEFT_BY_USER
 from companion.recording.measurements.summary import Summary
 from companion.safety.actions import internal
@@ -96,8 +96,8 @@ class Session:
         record = FlightFiles(
             config, self._folder, environment, self.note, follows=self._plan is None
         )
-        wishes = realtime_wishes(self._config) if environment.realtime else Wishes()
-        with realtime.asked_for(wishes) as grants, record:
+        settings = realtime_settings(self._config) if environment.realtime else RealtimeSettings()
+        with realtime.asked_for(settings) as grants, record:
             recorder, opener = record.recorder(self._observer), environment.open_transport
             async with open_link(self._config, record.tap, self.note, opener) as link:
                 self._assembled = assemble(

@@ -13,17 +13,17 @@ _ARMED_REPORT_TIMEOUT = 1.5
 """Longest time from arming to the heartbeat that shows it, s: PX4 sends one a second."""
 
 
-async def look_over(context: FlightContext) -> None:
+async def check_airborne(context: FlightContext) -> None:
     """Check a vehicle that already flies; only request telemetry.
 
     Raises:
         FlightEnded: the vehicle does not fly, or a finding blocks the takeover.
     """
-    await _look_over(context, Stage.AIRBORNE, _require_flying)
+    await _check(context, Stage.AIRBORNE, _require_flying)
     context.ground.note_flying()
 
 
-async def look_over_standing(context: FlightContext) -> None:
+async def check_standing(context: FlightContext) -> None:
     """Check a vehicle that somebody else armed on the ground; only request telemetry.
 
     The newest heartbeat may be older than the arming.
@@ -34,11 +34,11 @@ async def look_over_standing(context: FlightContext) -> None:
     with suppress(TimeoutError):
         async with asyncio.timeout(_ARMED_REPORT_TIMEOUT):
             await context.until(context.armed, "the vehicle to show that it is armed")
-    await _look_over(context, Stage.ARMED, _require_standing)
+    await _check(context, Stage.ARMED, _require_standing)
     await context.until(lambda: context.link.state.home is not None, "the home position")
 
 
-async def _look_over(
+async def _check(
     context: FlightContext, stage: Stage, require: Callable[[FlightContext], None]
 ) -> None:
     """Run the checks of a stage; call `require` before and after, which raises in a wrong state."""

@@ -5,7 +5,7 @@ import numpy as np
 from companion.guidance.trajectory import SlowDown, SlowedPart, Trajectory
 from companion.guidance.trajectory.demand import sampled
 
-_MAX_SLOWED_PARTS = 4
+_MOST_PARTS_SHOWN = 4
 
 
 def overview(trajectory: Trajectory) -> str:
@@ -29,29 +29,29 @@ def slowing(before: Trajectory, slow_down: SlowDown) -> tuple[str, ...]:
         f"it lasts {after.duration:.1f} s instead of {before.duration:.1f} s, at most "
         f"{_fastest(after):.2f} m/s instead of {_fastest(before):.2f} m/s"
     )
-    if slow_down.even:
-        (whole,) = slow_down.parts
-        slowing_text = (
+    if found.even:
+        (whole,) = found.parts
+        note = (
             f"{before.name} is slowed down evenly, by a factor of {whole.factor:.2f}, because "
             f"{slow_down.reason}; "
             f"{_limit(after, whole)}"
         )
-        return (f"{slowing_text}; {result}",)
+        return (f"{note}; {left}",)
     parts = "; ".join(
         f"from {part.begin:.1f} to {part.end:.1f} s by a factor of up to {part.factor:.2f}, "
         f"{_limit(after, part)}"
-        for part in slow_down.parts[:_MAX_SLOWED_PARTS]
+        for part in found.parts[:_MOST_PARTS_SHOWN]
     )
-    more_count = len(slow_down.parts) - _MAX_SLOWED_PARTS
-    parts += f"; and {more_count} more" if more_count > 0 else ""
-    return (f"{before.name} is slowed down where limits ask for it: {parts}", result)
+    more = len(found.parts) - _MOST_PARTS_SHOWN
+    parts += f"; and {more} more" if more > 0 else ""
+    return (f"{before.name} is slowed down where limits ask for it: {parts}", left)
 
 
 def _limit(trajectory: Trajectory, part: SlowedPart) -> str:
     north, east, down = trajectory.at(part.time).position
     return (
-        f"most by {part.limit} at {part.time:.1f} s ({north:.1f} m north, {east:.1f} m east, "
-        f"{0.0 - down:.1f} m up)"
+        f"the tightest limit: {part.limit} at {part.time:.1f} s ({north:.1f} m north, "
+        f"{east:.1f} m east, {0.0 - down:.1f} m up)"
     )
 
 

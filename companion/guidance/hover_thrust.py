@@ -82,7 +82,7 @@ class HoverThrust:
         return self._curve.signal(GRAVITY / self._filter.gain)
 
     @property
-    def present(self) -> float:
+    def present_hover(self) -> float:
         """Learned normalised thrust at hover, at the present battery voltage."""
         return self._normalised(GRAVITY)
 

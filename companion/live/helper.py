@@ -169,13 +169,13 @@ class Helper:
             return
         try:
             if kind == "undo":
-                told = self.changes.undo(by)
+                text = self.changes.undo(by)
             else:
-                told = self.changes.change(message.get("values") or {}, by)
+                text = self.changes.change(message.get("values") or {}, by)
         except (ChangeRefusedError, ValueError, ArithmeticError) as refused:
             self._send("answer", id=message.get("id"), refusal=str(refused))
         else:
-            self._send("answer", id=message.get("id"), refusal=None, text=told)
+            self._send("answer", id=message.get("id"), refusal=None, text=text)
 
 
 def _helper_name(tasks: HelperTasks) -> str:

@@ -92,7 +92,7 @@ class Relay:
                 why = "the flight has ended" if ended else "the flight is too busy to take it"
                 raise ChangeRefusedError(f"{why}; nothing has changed")
             async with asyncio.timeout(_ANSWER):
-                told = await answer
+                reply = await answer
         except TimeoutError as error:
             raise NoAnswerError(
                 f"no answer from the flight within {_ANSWER:g} s; the change may have been "
@@ -100,9 +100,9 @@ class Relay:
             ) from error
         finally:
             del self._asked[number]
-        if told.get("refusal") is not None:
-            raise ChangeRefusedError(str(told["refusal"]))
-        return str(told.get("text"))
+        if reply.get("refusal") is not None:
+            raise ChangeRefusedError(str(reply["refusal"]))
+        return str(reply.get("text"))
 
     def note(self, text: str) -> None:
         """Let the flight record and show a sentence."""

@@ -51,7 +51,7 @@ class Start(NamedTuple):
 def node_of(
     sample: Sample,
     start: Start,
-    near: float,
+    nearby_heading: float,
     drag: Drag,
     axis_drag: float,
     gravity: float,
@@ -66,7 +66,7 @@ def node_of(
     Args:
         sample: sample of the trajectory.
         start: start of the trajectory.
-        near: a heading, rad; that of the node is at most π from it.
+        nearby_heading: a heading, rad; that of the node is at most π from it.
         drag: drag of the vehicle.
         axis_drag: coefficient of `AxisDrag`, 1/m.
         gravity: m/s².
@@ -74,7 +74,7 @@ def node_of(
     """
     velocity, acceleration, jerk = sample.velocity, sample.acceleration, sample.jerk
     slowed, growing = drag.deceleration(velocity), drag.growth(velocity, acceleration)
-    heading = near + wrap_angle(start.turned + sample.heading - near)
+    heading = nearby_heading + wrap_angle(start.turned + sample.heading - nearby_heading)
     along_axes = AxisDrag(axis_drag, heading)
     more = *along_axes.deceleration(*velocity[:2]), 0.0
     growing_more = *along_axes.growth(velocity[:2], acceleration[:2], sample.heading_rate), 0.0

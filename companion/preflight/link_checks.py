@@ -43,8 +43,8 @@ def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
             arrives = f"arrives at {even:.0f} Hz"
             if uneven:
                 arrives = (
-                    f"arrives in bursts: {rate.achieved:.0f} Hz on average, but its gaps are those "
-                    f"of {even:.0f} Hz"
+                    f"arrives in bursts: {rate.achieved:.0f} Hz on average, but its gaps are as "
+                    f"long as at {even:.0f} Hz"
                 )
             yield Finding(
                 f"link.{key}",

@@ -14,7 +14,7 @@ from companion.report.plots import (
     REFERENCE,
     Plot,
     axes,
-    evenly,
+    even_indices,
     limit_lines,
     line,
     numbers,
@@ -39,20 +39,22 @@ def _colour(flights: Sequence[FlightData], number: int) -> str:
     return MEASURED if len(flights) == 1 else FLIGHTS[number % len(FLIGHTS)]
 
 
-def _name(flights: Sequence[FlightData], flight: FlightData, what: str) -> str:
-    return what if len(flights) == 1 else f"{flight.name}: {what}"
+def _name(flights: Sequence[FlightData], flight: FlightData, label: str) -> str:
+    return label if len(flights) == 1 else f"{flight.name}: {label}"
 
 
 def _plan(flights: Sequence[FlightData]) -> Plot:
     """The track from above."""
     traces = []
     for number, flight in enumerate(flights):
-        for which, dash in (("position", "solid"), ("reference", "dash")):  # the latter on top
-            if which in flight.curves:
-                place = flight.curves[which].values[evenly(len(flight.curves[which].time))]
-                first = which == "reference" and len(flights) == 1
+        for curve_name, dash in (("position", "solid"), ("reference", "dash")):  # the latter on top
+            if curve_name in flight.curves:
+                place = flight.curves[curve_name].values[
+                    even_indices(len(flight.curves[curve_name].time))
+                ]
+                first = curve_name == "reference" and len(flights) == 1
                 colour = REFERENCE if first else _colour(flights, number)
-                name = _name(flights, flight, "flown" if which == "position" else which)
+                name = _name(flights, flight, "flown" if curve_name == "position" else curve_name)
                 traces.append(line(name, place[:, _EAST], place[:, _NORTH], colour, dash=dash))
     traces += [*_place_of_end(flights), *limit_lines(flights, "track")]
     layout = axes(x="east, m", y="north, m")
@@ -116,9 +118,9 @@ def _cube_ranges(traces: Sequence[Mapping[str, Any]]) -> dict[str, tuple[float, 
     return ranges
 
 
-def _track(name: str, flight: FlightData, which: str, colour: str) -> dict[str, Any]:
-    curve = flight.curves[which]
-    place = curve.values[evenly(len(curve.time))]
+def _track(name: str, flight: FlightData, curve_name: str, colour: str) -> dict[str, Any]:
+    curve = flight.curves[curve_name]
+    place = curve.values[even_indices(len(curve.time))]
     return {
         "type": "scatter3d",
         "mode": "lines",
@@ -126,7 +128,7 @@ def _track(name: str, flight: FlightData, which: str, colour: str) -> dict[str, 
         "x": numbers(place[:, _EAST]),
         "y": numbers(place[:, _NORTH]),
         "z": numbers(place[:, _HEIGHT]),
-        "line": {"color": colour, "width": 4 if which == "position" else 2},
+        "line": {"color": colour, "width": 4 if curve_name == "position" else 2},
     }
 
 
@@ -170,12 +172,12 @@ def _largest_error(flights: Sequence[FlightData]) -> float | None:
     return float(max(throughout))
 
 
-def _lines(flights: Sequence[FlightData], which: str, what: str) -> list[dict[str, Any]]:
-    """The first column of the curve `which` over time, one line for each flight that has it."""
+def _lines(flights: Sequence[FlightData], curve: str, label: str) -> list[dict[str, Any]]:
+    """The first column of a curve over time, one line for each flight that has it."""
     return [
-        over_time(_name(flights, flight, what), flight.curves[which], 0, _colour(flights, number))
+        over_time(_name(flights, flight, label), flight.curves[curve], 0, _colour(flights, number))
         for number, flight in enumerate(flights)
-        if which in flight.curves
+        if curve in flight.curves
     ]
 
 

@@ -79,7 +79,7 @@ def kept_indices(values: Floats) -> Any:
     return np.array(sorted(kept))
 
 
-def evenly(count: int) -> Any:
+def even_indices(count: int) -> Any:
     """Indices (M,) of evenly chosen points of a track, few enough for a small page."""
     return np.unique(np.linspace(0, count - 1, min(count, _MOST_POINTS)).astype(int))
 

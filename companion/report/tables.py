@@ -54,12 +54,12 @@ def extremes(flight: FlightData) -> str:
     if motion is None or flight.last is None:
         return ""
     texts = "{:.1f} m high", "{:.1f} m/s fast", "{:.0f}° tilted"
-    told = [
+    largest = [
         text.format(np.nanmax(values))
         for text, values in zip(texts, motion.values.T, strict=True)
         if not np.isnan(values).all()
     ]
-    return f"{flight.last:.0f} s" + (f", up to {', '.join(told)}" if told else "")
+    return f"{flight.last:.0f} s" + (f", up to {', '.join(largest)}" if largest else "")
 
 
 def configuration(flight: FlightData) -> Table:

@@ -65,7 +65,9 @@ def estimator_flags(snapshot: Snapshot, _: bool) -> str | None:
         missing |= good & HORIZONTAL
     if not missing:
         return None
-    return f"the estimator is not sure any more (its status lost flags 0x{missing:x})"
+    names = ("attitude", ATTITUDE), ("velocity", VELOCITY), ("position", HORIZONTAL)
+    lost = ", ".join(name for name, bits in names if missing & bits)
+    return f"the estimator reports no valid {lost} any more"
 
 
 def estimator_reset(snapshot: Snapshot, _: bool) -> str | None:

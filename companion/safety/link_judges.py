@@ -57,7 +57,10 @@ def loss(most: float) -> Judge:
         lost = snapshot.health.lost
         if lost is None or lost <= released(most, raised):
             return None
-        return f"{100 * lost:.0f} % of the vehicle's frames are lost"
+        return (
+            f"{100 * lost:.0f} % of the vehicle's frames are lost, more than "
+            f"safety.max_loss = {most:g}"
+        )
 
     return judge
 
@@ -69,7 +72,10 @@ def round_trip(most: float) -> Judge:
         seconds = snapshot.health.round_trip
         if seconds is None or seconds <= released(most, raised):
             return None
-        return f"the link's round trip takes {1e3 * seconds:.0f} ms"
+        return (
+            f"the link's round trip takes {1e3 * seconds:.0f} ms, longer than "
+            f"safety.max_round_trip_ms = {1e3 * most:.0f}"
+        )
 
     return judge
 

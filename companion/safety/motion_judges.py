@@ -21,7 +21,12 @@ def tilt(limit: float) -> Judge:
         if q is None:
             return None
         angle = tilt_angle(q[1], q[2])
-        return f"{degrees(angle):.0f}° of tilt" if angle > released(limit, raised) else None
+        if angle <= released(limit, raised):
+            return None
+        return (
+            f"{degrees(angle):.0f}° of tilt, more than limits.max_tilt_deg + "
+            f"safety.tilt_margin_deg = {degrees(limit):.0f}"
+        )
 
     return judge
 
@@ -33,7 +38,10 @@ def body_rate(limit: float) -> Judge:
         rate = hypot(*snapshot.motion.body_rates)
         if rate <= released(limit, raised):
             return None
-        return f"the vehicle turns at {degrees(rate):.0f}°/s"
+        return (
+            f"the vehicle turns at {degrees(rate):.0f}°/s, faster than "
+            f"safety.max_body_rate_deg_s = {degrees(limit):.0f}"
+        )
 
     return judge
 

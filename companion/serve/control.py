@@ -36,8 +36,8 @@ from companion.serve.situation import SituationKeeper
 from companion.vehicle.autopilot import ControlEntry, Role
 from companion.vehicle.link import Link
 
-_ENDS = "the vehicle is held, and control ends; then request control again"
-_RETRY_PAUSE = 2.0
+_ENDS = "control is ending and the vehicle is held; request control again when it has ended"
+_TRY_AGAIN = 2.0
 """Time after a failed takeover in which setpoints alone begin no other takeover, s."""
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from companion import realtime
 from companion.config import Config
-from companion.flight.assembly import open_link, realtime_wishes
+from companion.flight.assembly import open_link, realtime_settings
 from companion.flight.changes import Changes
 from companion.flight.context import cancel
 from companion.flight.environment import THIS_COMPUTER, Environment
@@ -17,7 +17,7 @@ from companion.mavlink.errors import LinkError
 from companion.mavlink.framing import Frame
 from companion.mavlink.peer import HEARTBEAT
 from companion.preflight.session import wanted_rates
-from companion.realtime import Wishes
+from companion.realtime import RealtimeSettings
 from companion.serve.component import Component
 from companion.serve.flight_records import FlightRecords
 from companion.serve.network.addresses import target_of
@@ -91,8 +91,10 @@ class ServeSession:
             RealtimeError: the system refused a required `realtime` setting.
             SigningError: the key cannot be used.
         """
-        wishes = realtime_wishes(self._config) if self._environment.realtime else Wishes()
-        with realtime.asked_for(wishes) as grants:
+        settings = (
+            realtime_settings(self._config) if self._environment.realtime else RealtimeSettings()
+        )
+        with realtime.asked_for(settings) as grants:
             self.records.grants = grants
             for grant in grants:
                 self._note(str(grant))

@@ -80,7 +80,7 @@ def check_guidance(name: str) -> None:
         AssertionError: a flight ended early, or strayed too far from its reference.
         ConfigError: there is no guidance of that name, or it cannot be loaded.
     """
-    told: dict[str, dict[str, Any]] = {
+    changes: dict[str, dict[str, Any]] = {
         "guidance": {"kind": name},
         "flight": {"arm": True, "maneuvers": ["hover", "circle"]},
     }
@@ -88,7 +88,7 @@ def check_guidance(name: str) -> None:
         vehicle = MockVehicle(
             autopilot, prearm_delay_s=_BOOT_S, parameters=_SAFE.get(autopilot, {})
         )
-        summary = fly({**told, "thrust": {"hover_thrust": hover}}, vehicle)
+        summary = fly({**changes, "thrust": {"hover_thrust": hover}}, vehicle)
         assert summary.result == "ok", f"{autopilot}: {summary.result}"
         strayed = summary.tracking()["position_max_m"]
         assert strayed < _WORST, f"{autopilot}: {strayed:.2f} m away from its reference"

@@ -182,12 +182,12 @@ class MockVehicle:
         """Set the clock of vehicle time (ns) for TIMESYNC; it advances between two steps."""
         simulation = self._simulation
 
-        def told() -> int:
+        def vehicle_time_us() -> int:
             if simulation.effects.clock_frozen:
                 return simulation.state.shown_us * 1000
             return min(max(clock_ns(), simulation.time_us * 1000), simulation.next_us * 1000)
 
-        simulation.set_clock(told)
+        simulation.set_clock(vehicle_time_us)
 
     def receive(self, datagram: bytes) -> None:
         """Take a datagram of the companion link; in lockstep it waits for the next step."""

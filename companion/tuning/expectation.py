@@ -116,18 +116,18 @@ def expected_errors(loop: Loop, disturbances: Disturbances, period: float) -> Er
         disturbances: disturbances of the vehicle.
         period: time between two positions, s.
     """
-    omega, told = loop.s.imag, disturbances
+    omega = loop.s.imag
     push, speed = loop.by_acceleration(), loop.by_velocity_error()
     place = loop.by_position_error()
-    gusts = ((push, _slow(omega, told.gust * loop.drag, told.gust_time)),)
+    gusts = ((push, _slow(omega, disturbances.gust * loop.drag, disturbances.gust_time)),)
     path = (
-        (speed, _slow(omega, told.velocity_error, told.path_time)),
-        (push, _slow(omega, told.push, told.path_time)),
+        (speed, _slow(omega, disturbances.velocity_error, disturbances.path_time)),
+        (push, _slow(omega, disturbances.push, disturbances.path_time)),
     )
     noise = (
-        (speed, told.wander**2 + 2.0 * period * told.velocity_noise**2),
-        (push, told.shake**2),
-        (place, 2.0 * period * told.position_noise**2),
+        (speed, disturbances.wander**2 + 2.0 * period * disturbances.velocity_noise**2),
+        (push, disturbances.shake**2),
+        (place, 2.0 * period * disturbances.position_noise**2),
     )
     parts = (gusts, path, noise)
     # Both axes are disturbed independently, therefore the factor 2.

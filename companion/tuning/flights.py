@@ -113,24 +113,24 @@ def flown(config: Config, course: Course, autopilot: str, seed: int = 3) -> Flow
         wind=dict(course.wind),
         parameters={**parameters, **_QUICK[autopilot]},
     )
-    told = _configured(config, course, mock)
+    flown_config = _configured(config, course, mock)
     with _truth(vehicle) as rows:
-        summary = fly(told, vehicle)
+        summary = fly(flown_config, vehicle)
     if summary.result == LEFT_BY_USER:
         raise KeyboardInterrupt
     if summary.result != "ok":
         return Flown(summary.result)
-    return _tracking(summary.trace.tracking_rows(), np.array(rows), vehicle, told)
+    return _tracking(summary.trace.tracking_rows(), np.array(rows), vehicle, flown_config)
 
 
-def _tracking(tracking: _Rows, truth: _Rows, vehicle: MockVehicle, told: Config) -> Flown:
+def _tracking(tracking: _Rows, truth: _Rows, vehicle: MockVehicle, flown_config: Config) -> Flown:
     """How a course was tracked while its reference moved.
 
     Args:
         tracking: rows of the flight's tracking record.
         truth: rows of `_truth`.
         vehicle: vehicle after the flight.
-        told: configuration of the flight.
+        flown_config: configuration of the flight.
     """
     time, reference = tracking[:, 0], tracking[:, 1:3]
     speed = np.hypot(*np.gradient(reference, time, axis=0).T)
@@ -142,7 +142,7 @@ def _tracking(tracking: _Rows, truth: _Rows, vehicle: MockVehicle, told: Config)
         for each in vehicle.setpoints
         if time[moving[0]] <= each.time <= time[moving[-1]]
     ]
-    rates, limit = np.array(during), told.limits.max_tilt_rate
+    rates, limit = np.array(during), flown_config.limits.max_tilt_rate
     return Flown(
         "ok",
         _rms(tracking[part, 4:6] - reference[part]),

@@ -167,7 +167,7 @@ class VehicleClock:
         if self._reported_unknown:
             self.on_event(
                 f"the age of telemetry is not known, because {self.delay.unknown.value}; "
-                "samples are judged late only by comparison with the quickest one"
+                "a delay of all samples is not noticed, only of some against the quickest one"
             )
         else:
             self.on_event("the age of telemetry is known by TIMESYNC")

@@ -65,8 +65,8 @@ def read_flight_log(path: Path) -> FlightLog:
         raise LogError(f"{path}: holds no heartbeat of {AUTOPILOT_NAMES}")
     if not reader.obeyed:
         raise LogError(
-            f"{path}: holds no body rates that the vehicle obeyed: no SET_ATTITUDE_TARGET by rates "
-            "while it was armed, in the mode that obeys them"
+            f"{path}: holds no body rates that the vehicle obeyed: no SET_ATTITUDE_TARGET with "
+            "body rates was sent while it was armed in the mode that obeys them"
         )
     # Both attitude messages carry the same rates, so only one of them is used.
     return FlightLog(

@@ -146,8 +146,8 @@ def _why_refused(opening: str, stats: LinkStats) -> str | None:
     """
     if stats.unclaimed:
         return (
-            f"{opening}, but {stats.unclaimed} other frames with the vehicle's ids; a sender "
-            "counts as the vehicle only after a heartbeat of its autopilot"
+            f"{opening}, but {stats.unclaimed} other frames with the vehicle's ids; let the "
+            "autopilot send HEARTBEAT on this link, because only its sender counts as the vehicle"
         )
     if stats.ignored_foreign:
         source = "/".join(map(str, min(stats.foreign_sources)))

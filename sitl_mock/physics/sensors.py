@@ -205,16 +205,16 @@ class Estimator:
         )
         self.reset_counter += 1
 
-    def correct(self, time: float, before: Callable[[int], TrailRow]) -> None:
+    def correct(self, time: float, row_before: Callable[[int], TrailRow]) -> None:
         """Correct the errors if a fix of the navigation filter is due.
 
         Args:
             time: now, s.
-            before: returns the true motion k steps ago, for k below `trail_length`.
+            row_before: returns the true motion k steps ago, for k below `trail_length`.
         """
         fused = time - self._behind * self.law.dt
         if self._filter is not None and self._filter.is_due(fused):
-            self._filter.advance(before(self._behind), fused, before(0), time)
+            self._filter.advance(row_before(self._behind), fused, row_before(0), time)
             self.state = self.state._replace(filter=self._filter.state)
 
     def draw(self) -> Sequence[float]:

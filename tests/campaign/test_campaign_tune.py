@@ -83,7 +83,7 @@ def searched(place, folder, fleet, trials=14):
     with pytest.MonkeyPatch.context() as patch:
         proposal = Proposal({"planner": {"gain_per_s": 5.5}, "limits": {"max_tilt_deg": 30.0}})
         patch.setattr(candidates, "propose", lambda _: proposal)
-        search = Search(made, section_of(made), folder, fleet, learn=lambda _: None)
+        search = Search(made, section_of(made), folder, fleet, learning_flight=lambda _: None)
     return search.run(trials), search
 
 

@@ -33,7 +33,7 @@ def quick(connected, monkeypatch):
     """Candidates are flown by `row_of` on a worker in this process."""
 
     monkeypatch.setattr(command, "connected", connected)
-    monkeypatch.setattr(command, "Search", partial(Search, learn=lambda _: None))
+    monkeypatch.setattr(command, "Search", partial(Search, learning_flight=lambda _: None))
     monkeypatch.setattr(candidates, "propose", lambda _: Proposal({}))
     monkeypatch.setattr(unit, "fly_case", row_of)
 
@@ -173,7 +173,7 @@ def test_a_candidate_whose_keys_do_not_fit_together_is_not_flown(tmp_path, monke
     made = campaign(tmp_path)
     monkeypatch.setattr(candidates, "propose", lambda _: Proposal({}))
     fly = pytest.fail
-    search = Search(made, section_of(made), tmp_path, fly, learn=lambda _: None)
+    search = Search(made, section_of(made), tmp_path, fly, learning_flight=lambda _: None)
 
     def refuse(*_):
         raise ConfigError("a minimum above a maximum")

@@ -205,7 +205,7 @@ def test_bursts_are_judged_on_the_ground_as_in_flight():
     bursts = replace(GOOD, samples=GOOD.samples._replace(rate=41.0))
     assert found(link_checks.streams, bursts) == {"link.min_attitude_rate_hz": UNSAFE}
     (finding, _) = link_checks.streams(CONFIG, bursts)
-    assert "in bursts: 197 Hz on average, but its gaps are those of 41 Hz" in finding.found
+    assert "in bursts: 197 Hz on average, but its gaps are as long as at 41 Hz" in finding.found
 
 
 def test_asked_again_nothing_is_asked_that_only_the_configuration_decides():

@@ -86,7 +86,7 @@ def test_a_client_that_asks_again_does_not_take_the_fence_along(autopilot):
             assert vehicle.state()["mode"] == "LAND"
             said = " ".join(script.texts())
             assert "safety: braking: braking now would end" in said, said
-            assert "the vehicle is held, and control ends" in said
+            assert "control is ending and the vehicle is held" in said
             # After a run-up of 3 m; without the acceleration it was up to 1.3 m outside, and
             # without the lateness of ArduPilot's estimate up to 0.2 m.
             assert max(controlled) < RADIUS

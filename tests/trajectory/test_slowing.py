@@ -159,7 +159,7 @@ def test_two_corners_are_slowed_down_and_the_legs_are_not():
         assert found.trajectory.law.at(t).first > 0.97
     notes = slowing(ANGULAR, found)
     assert notes[0].startswith("angular is slowed down where limits ask for it: from ")
-    assert "most by limits.max_tilt" in notes[0]
+    assert "tightest limit: limits.max_tilt" in notes[0]
     assert f"instead of {ANGULAR.duration:.1f} s, at most" in notes[1]
     assert f"{found.trajectory.duration:.1f} s, at most" in overview(found.trajectory)
 
@@ -203,7 +203,7 @@ def test_what_is_too_long_is_slowed_evenly_and_says_so():
     assert found.even
     assert violations(found.trajectory, ENVELOPE) == ()
     (note,) = slowing(laps, found)
-    assert "because it is too long to be slowed down in parts; most by limits." in note
+    assert "because it is too long to be slowed down in parts; the tightest limit: limits." in note
 
 
 def test_an_even_slowing_names_the_limit_that_asks_for_most():

@@ -47,8 +47,8 @@ LABELS = {
 
 def label(name: str) -> str:
     """Name and unit of an outcome or a factor on the page."""
-    told = LABELS.get(name, name)
-    return f"{told}, {physical_unit(name)}" if physical_unit(name) else told
+    words = LABELS.get(name, name)
+    return f"{words}, {physical_unit(name)}" if physical_unit(name) else words
 
 
 @dataclass(frozen=True)
@@ -80,8 +80,8 @@ class Results:
         """
         planned = read_description(folder).cases
         table = store.read(folder)
-        told = store.metadata(table)
-        return cls(folder, told["name"], told["kind"], planned, told["factors"], table)
+        metadata = store.metadata(table)
+        return cls(folder, metadata["name"], metadata["kind"], planned, metadata["factors"], table)
 
     @cached_property
     def columns(self) -> dict[str, Column]:
@@ -110,8 +110,8 @@ class Results:
     @cached_property
     def documented(self) -> NDArray[np.bool_]:
         """(k,): whether each of the k cases with a fault ended as documented for that fault."""
-        told = self.columns.get("as_documented", ())
-        return np.array([value for value in told if value is not None], dtype=bool)
+        judged = self.columns.get("as_documented", ())
+        return np.array([value for value in judged if value is not None], dtype=bool)
 
     @property
     def all_faulty(self) -> bool:

@@ -47,17 +47,21 @@ def influences(results: Results, outcome: str) -> list[Influence]:
     rows = np.flatnonzero(np.isfinite(values))
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _MOST)).astype(int))]
     values = values[rows]
-    told = {name: as_numbers(results.columns[name][rows], values) for name in results.factors}
-    told = {name: column for name, column in told.items() if np.ptp(column) > 0.0}
-    if len(rows) < FEWEST or not told or not np.ptp(values) > 1e-12:
+    columns = {name: as_numbers(results.columns[name][rows], values) for name in results.factors}
+    columns = {name: column for name, column in columns.items() if np.ptp(column) > 0.0}
+    if len(rows) < FEWEST or not columns or not np.ptp(values) > 1e-12:
         return []
     from SALib.analyze import delta  # noqa: PLC0415  takes a second to import
 
-    problem = {"num_vars": len(told), "names": list(told), "bounds": [[0.0, 1.0]] * len(told)}
+    problem = {
+        "num_vars": len(columns),
+        "names": list(columns),
+        "bounds": [[0.0, 1.0]] * len(columns),
+    }
     found = delta.analyze(
-        problem, np.column_stack(list(told.values())), values, seed=_SEED, method="sobol"
+        problem, np.column_stack(list(columns.values())), values, seed=_SEED, method="sobol"
     )
-    listed = zip(told, found["S1"], found["S1_conf"], strict=True)
+    listed = zip(columns, found["S1"], found["S1_conf"], strict=True)
     return sorted(
         (Influence(name, float(index), float(half)) for name, index, half in listed),
         key=lambda each: -each.share,

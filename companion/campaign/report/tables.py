@@ -46,8 +46,8 @@ def _rerun(results: Results, case: int) -> str:
 
 
 def _values(results: Results, row: int) -> str:
-    told = (f"{name} = {_cell(results.columns[name][row])}" for name in results.factors)
-    return ", ".join(told)
+    cells = (f"{name} = {_cell(results.columns[name][row])}" for name in results.factors)
+    return ", ".join(cells)
 
 
 def configuration(campaign: Campaign) -> Table:
@@ -86,8 +86,8 @@ def _by_level(results: Results, name: str) -> Iterator[tuple[str, ...]]:
         row = [name, level.name, str(int(level.cases.sum()))]
         row.append(str(share_of(results.good[level.cases])))
         if "as_documented" in columns and "fault" in results.factors:
-            told = [value for value in columns["as_documented"][level.cases] if value is not None]
-            row.append(str(share_of(np.array(told, dtype=bool))) if told else EMPTY)
+            judged = [value for value in columns["as_documented"][level.cases] if value is not None]
+            row.append(str(share_of(np.array(judged, dtype=bool))) if judged else EMPTY)
         row += [_median(columns[each][level.cases]) for each in (results.error, RATES)]
         yield tuple(row)
 

@@ -81,8 +81,8 @@ def cases(campaign: Campaign, values: Values) -> list[Case]:
 
 def unseen(campaign: Campaign, samples: int) -> Campaign:
     """The campaign with other samples, noise and gusts than those of the search."""
-    told = {"seed": campaign.file.seed + _UNSEEN, "samples": samples}
-    return replace(campaign, file=campaign.file.model_copy(update=told))
+    update = {"seed": campaign.file.seed + _UNSEEN, "samples": samples}
+    return replace(campaign, file=campaign.file.model_copy(update=update))
 
 
 def suggested(trial: "Trial", search: Mapping[str, Swept]) -> dict[str, Any]:
@@ -117,12 +117,12 @@ def starts(campaign: Campaign, tune: Tune, learned: Config | None = None) -> Ite
         changes = propose(_analysed(known)).changes
     except ConfigError:
         return  # its rate loop is not known, or the linear analysis does not cover it
-    told = {
+    proposed = {
         f"{section}.{key}": value
         for section, keys in changes.items()
         for key, value in keys.items()
     }
-    yield Start("companion tune", within({**present, **told}, tune.search))
+    yield Start("companion tune", within({**present, **proposed}, tune.search))
 
 
 def near(start: Start, search: Mapping[str, Swept], count: int, seed: int) -> Iterator[Start]:

@@ -53,10 +53,10 @@ def _identified(config: Config, case: Case, *, damped: bool) -> Config:
             rows = read_flight_log(folder / "flight.tlog")
             vehicle = identify_vehicle(rows.setpoints, rows.rates, rows.specific_thrust)
             fragment.write_text(vehicle_fragment(vehicle, GRAVITY, config.vehicle.axes))
-            told = load(fragment).model_dump(exclude_unset=True, include={"vehicle"})
+            identified = load(fragment).model_dump(exclude_unset=True, include={"vehicle"})
             if damped:
-                told["vehicle"] |= second_order_keys(vehicle)
-            return changed(config, told, "the identified vehicle")
+                identified["vehicle"] |= second_order_keys(vehicle)
+            return changed(config, identified, "the identified vehicle")
         except (LogError, BadFitError, ConfigError):
             return config
 

@@ -60,19 +60,20 @@ class Score(NamedTuple):
 
     def as_attributes(self) -> dict[str, Any]:
         """The score as JSON; an infinite number is null."""
-        told: dict[str, Any] = {
+        attributes: dict[str, Any] = {
             name: [each if isfinite(each) else None for each in getattr(self, name)]
             for name in _ERRORS
         }
-        return {**told, "inside": list(self.inside)}
+        return {**attributes, "inside": list(self.inside)}
 
     @classmethod
-    def from_attributes(cls, told: Mapping[str, Any]) -> "Score":
+    def from_attributes(cls, attributes: Mapping[str, Any]) -> "Score":
         """The score that `as_attributes` wrote."""
         true, estimated, estimate = (
-            tuple(inf if each is None else float(each) for each in told[name]) for name in _ERRORS
+            tuple(inf if each is None else float(each) for each in attributes[name])
+            for name in _ERRORS
         )
-        return cls(true, estimated, estimate, tuple(told["inside"]))
+        return cls(true, estimated, estimate, tuple(attributes["inside"]))
 
 
 def scored(rows: Sequence[Row], envelope: float | None) -> Score:

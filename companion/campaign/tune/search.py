@@ -36,7 +36,7 @@ STORAGE = "tune.db"
 _NAME = "tune"
 _STARTS, _FEWEST_NEAR = 3, 4
 """Largest number of starts, and smallest number of candidates near the last of them."""
-_FIRST_SHARE = 4
+_FIRST_DIVISOR = 4
 """A candidate flies the first 1/4 of its cases, at least `_FEWEST`, before the others."""
 _FEWEST = 2
 _HOPELESS = 1.3
@@ -90,8 +90,8 @@ class Search:
         tune: section `tune` of the campaign.
         folder: folder for the storage.
         fly: flies cases.
-        learn: flies the vehicle before a new search, and returns the configuration with what was
-            measured; None: nothing was measured.
+        learning_flight: flies the vehicle before a new search; returns the configuration with what
+            was measured, or None if nothing was.
 
     Raises:
         ConfigError: the storage in the folder is damaged, or the first case cannot be flown.
@@ -103,7 +103,7 @@ class Search:
         tune: Tune,
         folder: Path,
         fly: Fly,
-        learn: Callable[[Campaign], Config | None] = learned,
+        learning_flight: Callable[[Campaign], Config | None] = learned,
     ) -> None:
         import optuna  # noqa: PLC0415  an extra
         from sqlalchemy.exc import DBAPIError  # noqa: PLC0415  comes with Optuna
@@ -120,7 +120,7 @@ class Search:
             )
         except DBAPIError as error:
             raise ConfigError(f"{folder / STORAGE}: cannot be used: {error.orig}") from error
-        self._begin(learn)
+        self._begin(learning_flight)
 
     def run(self, trials: int, on_trial: Callable[[Found], None] = lambda _: None) -> Found:
         """Try candidates until there are `trials` of them, including those of earlier runs."""
@@ -143,7 +143,7 @@ class Search:
         return Found(tried, tried - len(whole), good[0] if good else None, near)
 
     @property
-    def _near(self) -> int:
+    def _neighbour_count(self) -> int:
         """Number of candidates near the last start that are tried before Optuna proposes any."""
         return max(_FEWEST_NEAR, len(self._tune.search))
 
@@ -151,15 +151,15 @@ class Search:
         return self._optuna.samplers.TPESampler(
             seed=self._campaign.file.seed + number,
             multivariate=True,
-            n_startup_trials=_STARTS + self._near,
+            n_startup_trials=_STARTS + self._neighbour_count,
         )
 
-    def _begin(self, learn: Callable[[Campaign], Config | None]) -> None:
+    def _begin(self, learning_flight: Callable[[Campaign], Config | None]) -> None:
         """Enqueue the starts of a new search."""
         if not self._study.trials:
-            begin = list(starts(self._campaign, self._tune, learn(self._campaign)))
+            begin = list(starts(self._campaign, self._tune, learning_flight(self._campaign)))
             seed, search = self._campaign.file.seed, self._tune.search
-            for start in (*begin, *near(begin[-1], search, self._near, seed)):
+            for start in (*begin, *near(begin[-1], search, self._neighbour_count, seed)):
                 self._enqueue(start)
 
     def _enqueue(self, start: Start) -> None:
@@ -184,7 +184,7 @@ class Search:
         except ConfigError:  # keys that do not fit together, such as a minimum above a maximum
             self._stop(trial, _UNFLOWN, 1.0)
             return
-        count = min(len(flown), max(_FEWEST, len(flown) // _FIRST_SHARE))
+        count = min(len(flown), max(_FEWEST, len(flown) // _FIRST_DIVISOR))
         score = scored(self._fly(flown[:count]), self._tune.envelope_m)
         missed = self._missed_share(score, len(flown))
         if count < len(flown) and (missed > 0.0 or self._hopeless(score)):
@@ -229,8 +229,10 @@ class Search:
         return float(trial.user_attrs[_MISSED]) > 0.0
 
     def _candidate(self, trial: "FrozenTrial") -> Candidate:
-        told = trial.user_attrs
-        return Candidate(trial.number, told[_VALUES], Score.from_attributes(told[_SCORE]))
+        attributes = trial.user_attrs
+        return Candidate(
+            trial.number, attributes[_VALUES], Score.from_attributes(attributes[_SCORE])
+        )
 
 
 def _finite(score: Score) -> float:

@@ -62,20 +62,20 @@ def _certainty(result: Result) -> Iterator[str]:
             f"configuration before the search, and {early[1]} with the result; samples with such a "
             "flight are not compared."
         )
-    told = result.comparison
-    if told is None:
+    comparison = result.comparison
+    if comparison is None:
         yield "Fewer than two samples were flown to their end by both, so no errors are compared."
         return
     yield (
-        f"On {told.samples} samples that the search has not seen, RMS of the true horizontal error "
-        f"in m with its 95 % interval: {told.before} -> {told.after}."
+        f"On {comparison.samples} samples that the search has not seen, RMS of the true horizontal "
+        f"error in m with its 95 % interval: {comparison.before} -> {comparison.after}."
     )
     yield (
-        f"That is {told.ratio.value:.2f} times the error before, 95 % interval "
-        f"{told.ratio.low:.2f} to {told.ratio.high:.2f}; better in {told.better} of "
-        f"{told.samples} samples."
+        f"That is {comparison.ratio.value:.2f} times the error before, 95 % interval "
+        f"{comparison.ratio.low:.2f} to {comparison.ratio.high:.2f}; better in "
+        f"{comparison.better} of {comparison.samples} samples."
     )
-    (known, known_after), (floor, floor_after) = told.known, told.estimate
+    (known, known_after), (floor, floor_after) = comparison.known, comparison.estimate
     yield (
         f"On the same flights the estimated position was {known:.3f} -> {known_after:.3f} m from "
         f"the reference, and {floor:.3f} -> {floor_after:.3f} m from the true one."
@@ -84,7 +84,7 @@ def _certainty(result: Result) -> Iterator[str]:
         "The last is the error of the position estimate, which gains and weights hardly change; "
         "where the estimate is late, guidance.position_lateness_ms reduces it."
     )
-    if told.ratio.high >= 1.0:
+    if comparison.ratio.high >= 1.0:
         yield "The interval holds 1: fly more samples before you believe that it is better."
 
 
@@ -106,8 +106,8 @@ def result_text(result: Result, present: Mapping[str, Any]) -> str:
         reason = _reason(key, tune.search[key], result, present.get(key))
         dumped = bounded_yaml.dump_value(value)
         sections.setdefault(section, []).extend([f"  # {reason}", f"  {short}: {dumped}"])
-    for section, told in sections.items():
-        lines += ["", f"{section}:", *told]
+    for section, lines_of_section in sections.items():
+        lines += ["", f"{section}:", *lines_of_section]
     return "\n".join(lines) + "\n"
 
 
@@ -120,13 +120,13 @@ def _reason(key: str, swept: Swept, result: Result, before: Any) -> str:
         same = sum(each == result.best.values[key] for each in near)
         return f"{was}; {same} of the best {len(near)} candidates have it"
     low, high = pair
-    told = f"{was}; the best {len(near)} candidates have {min(near):.3g} to {max(near):.3g}"
-    told += f" of {low:g} to {high:g}"
+    text = f"{was}; the best {len(near)} candidates have {min(near):.3g} to {max(near):.3g}"
+    text += f" of {low:g} to {high:g}"
     value = float(result.best.values[key])
     if min(value - low, high - value) < _AT_EDGE * (high - low):
-        return f"{told}; it lies at an end of its range: widen the range"
+        return f"{text}; it lies at an end of its range: widen the range"
     wide = max(near) - min(near) > 0.5 * (high - low)
-    return f"{told}; it matters little here" if wide else told
+    return f"{text}; it matters little here" if wide else text
 
 
 def _shown(value: Any) -> str:

@@ -9,12 +9,12 @@ from matplotlib.figure import Figure
 
 from companion.study.drawing import draw, draw_plane
 from companion.study.lag.flights import (
-    COMPLETE_HZ,
     EXAMPLE_ERRORS_HZ,
     FINE_ERRORS,
     METHODS,
     NO_ERROR,
     RATES_HZ,
+    SHOWN_RATE_HZ,
     Cell,
     Complete,
     Example,
@@ -82,7 +82,7 @@ def draw_figure(grid: Grid, example: Example, complete: Complete) -> Figure:
     panels["example errors"].set_title(f"Wrong times, the example, {EXAMPLE_ERRORS_HZ:.0f} Hz")
     _draw_inner_loop_errors(panels["loop errors"], complete)
     _draw_paths(panels["loop path"], complete.shown)
-    panels["loop path"].set_title(f"Path, complete inner loop, {COMPLETE_HZ:.0f} Hz")
+    panels["loop path"].set_title(f"Path, complete inner loop, {SHOWN_RATE_HZ:.0f} Hz")
     _draw_rates(panels["loop rate"], complete)
     return figure
 
@@ -156,14 +156,14 @@ def _draw_errors(axes: Axes, scores: dict[TimesError, Score]) -> None:
 
 
 def _draw_inner_loop_errors(axes: Axes, complete: Complete) -> None:
-    flown = complete.by_rate[COMPLETE_HZ]
+    flown = complete.by_rate[SHOWN_RATE_HZ]
     _draw_errors(axes, flown.wrong)
     other = flown.best_other
     across = flown.right[other].cross_track
     axes.axhline(across, **LIMIT)
     axes.annotate(f"{other.label}, the best of the others", (50, across), ha="right", va="bottom")
     axes.set(
-        title=f"Wrong times, complete inner loop, {COMPLETE_HZ:.0f} Hz",
+        title=f"Wrong times, complete inner loop, {SHOWN_RATE_HZ:.0f} Hz",
         ylim=(0.0, 1.1 * max(across, flown.worst)),
     )
 

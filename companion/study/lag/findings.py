@@ -1,10 +1,10 @@
 """The findings of the study `lag`: statements, and whether its numbers support them."""
 
 from companion.study.lag.flights import (
-    COMPLETE_HZ,
     MAX_TILT_RATE,
     NO_ERROR,
     OTHERS,
+    SHOWN_RATE_HZ,
     Cell,
     Complete,
     Example,
@@ -114,7 +114,7 @@ def _too_long_or_too_short(grid: Grid, complete: Complete) -> Finding:
     too_long = max(one.cross_track for one, _ in pairs)
     too_short = max(other.cross_track for _, other in pairs)
     straighter = sum(one.cross_track < other.cross_track for one, other in pairs)
-    loop = complete.by_rate[COMPLETE_HZ].wrong
+    loop = complete.by_rate[SHOWN_RATE_HZ].wrong
     return Finding(
         "ours",
         "Both times 50 % too long are better than both 50 % too short.",
@@ -129,7 +129,7 @@ def _with_the_complete_loop(
     complete: Complete, from_fit: dict[Method, float]
 ) -> tuple[Finding, Finding, Finding]:
     by_rate = complete.by_rate
-    bent = {m: flown.cross_track for m, flown in by_rate[COMPLETE_HZ].right.items()}
+    bent = {m: flown.cross_track for m, flown in by_rate[SHOWN_RATE_HZ].right.items()}
     nearest = min(OTHERS, key=lambda method: from_fit[method])
     last = max(by_rate, key=lambda rate: by_rate[rate].ratio)
     at = by_rate[last]
@@ -142,7 +142,7 @@ def _with_the_complete_loop(
                 a.wrong[NO_ERROR].cross_track < a.right[a.best_other].cross_track
                 for a in by_rate.values()
             ),
-            f"Cross-track at {COMPLETE_HZ:.0f} Hz {bent[FOLLOWING]:.2g}; first-order"
+            f"Cross-track at {SHOWN_RATE_HZ:.0f} Hz {bent[FOLLOWING]:.2g}; first-order"
             f" {bent[PROPOSED]:.2g}, quaternion {bent[QUATERNION]:.2g}.",
         ),
         Finding(

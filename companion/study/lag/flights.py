@@ -28,7 +28,7 @@ MAX_TILT_RATE = pi / 2.0
 """W_M of the flights with a rate limit, rad/s."""
 
 COMPLETE_LOOP = InnerLoop(transport_delay=0.02)
-COMPLETE_HZ = 250.0
+SHOWN_RATE_HZ = 250.0
 """The sample rate at which the complete inner loop is shown."""
 
 
@@ -153,7 +153,7 @@ class Complete(NamedTuple):
 
     Attributes:
         by_rate: comparison at each sample rate (Hz); `wrong` there has right times as well.
-        shown: responses of every method at `COMPLETE_HZ`.
+        shown: responses of every method at `SHOWN_RATE_HZ`.
     """
 
     by_rate: dict[float, Comparison]
@@ -215,7 +215,7 @@ def fly_complete(tick: Tick) -> Complete:
             {method: score(response) for method, response in flown[rate].items()},
             _with_errors(_combined(FINE_ERRORS), COMPLETE_TIMES, COMPLETE_LOOP, rate),
         )
-    return Complete(by_rate, flown[COMPLETE_HZ])
+    return Complete(by_rate, flown[SHOWN_RATE_HZ])
 
 
 def _combined(errors: tuple[float, ...]) -> list[TimesError]:

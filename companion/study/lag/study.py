@@ -6,7 +6,6 @@ from typing import NamedTuple
 from companion.study.lag.figure import CAPTION, draw_figure
 from companion.study.lag.findings import find
 from companion.study.lag.flights import (
-    COMPLETE_HZ,
     DEAD_TIMES_MS,
     EXAMPLE_ERRORS_HZ,
     EXAMPLE_LOOP,
@@ -14,6 +13,7 @@ from companion.study.lag.flights import (
     LAGS_MS,
     METHODS,
     RATES_HZ,
+    SHOWN_RATE_HZ,
     Cell,
     Complete,
     Example,
@@ -89,9 +89,9 @@ def run(tick: Tick) -> Outcome:
             _errors_table(
                 "lag-inner-loop-wrong-knowledge",
                 "Cross-track of model-following with the complete inner loop at"
-                f" {COMPLETE_HZ:.0f} Hz, by the error of its lags (rows) and dead times (columns)"
+                f" {SHOWN_RATE_HZ:.0f} Hz, by the error of its lags (rows) and dead times (columns)"
                 " against those fitted to the inner loop.",
-                complete.by_rate[COMPLETE_HZ].wrong,
+                complete.by_rate[SHOWN_RATE_HZ].wrong,
             ),
         ),
         findings=find(
@@ -164,11 +164,11 @@ def _worst_table(grid: Grid) -> Table:
 
 
 def _fit_table(complete: Complete, fitted: dict[Method, _Fitted]) -> Table:
-    """Score and fitted model of every method at `COMPLETE_HZ`."""
-    scores = complete.by_rate[COMPLETE_HZ].right
+    """Score and fitted model of every method at `SHOWN_RATE_HZ`."""
+    scores = complete.by_rate[SHOWN_RATE_HZ].right
     return Table(
         "lag-inner-loop",
-        f"The complete inner loop with 20 ms of transport delay, {COMPLETE_HZ:.0f} Hz, heading 0,"
+        f"The complete inner loop with 20 ms of transport delay, {SHOWN_RATE_HZ:.0f} Hz, heading 0,"
         " and the second-order model with dead time fitted to each response.",
         ("method", *_SCORE_COLUMNS, *FIT_COLUMNS, "largest deviation from it"),
         tuple(

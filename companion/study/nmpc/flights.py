@@ -70,10 +70,10 @@ class Vehicle:
         """Simulate `seconds` with a constant target and specific thrust (m/s²)."""
         dt = 1.0 / _PLANNER_HZ
         for _ in range(round(seconds * _PLANNER_HZ)):
-            before = _lift(self.body.q, thrust)
+            before = _thrust_and_gravity(self.body.q, thrust)
             rates = self._planner.rates(self.body.q, target, dt, self.body.rates)
             self.body.turn(rates, _STEPS)
-            after = _lift(self.body.q, thrust)
+            after = _thrust_and_gravity(self.body.q, thrust)
             self._move(tuple(0.5 * (a + b) for a, b in zip(before, after, strict=True)), dt)
 
     def _move(self, lift: tuple[float, ...], dt: float) -> None:
@@ -87,7 +87,7 @@ class Vehicle:
         self.velocity = (velocity[0], velocity[1], velocity[2])
 
 
-def _lift(q: Quaternion, thrust: float) -> Vector:
+def _thrust_and_gravity(q: Quaternion, thrust: float) -> Vector:
     """Acceleration by thrust and gravity, m/s², NED (equation 10)."""
     _, ax, ay = tilt_products(*q)
     return -2.0 * ay * thrust, 2.0 * ax * thrust, GRAVITY - thrust * cos_tilt(q[1], q[2])
