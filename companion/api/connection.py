@@ -57,12 +57,12 @@ async def connect(
         RealtimeError: the system refused a required `realtime` setting; nothing was sent.
     """
     flown_config = load(Path(config)) if isinstance(config, Path | str) else config
-    own: dict[str, dict[str, Any]] = {"link": {}, "flight": {}}
+    overrides: dict[str, dict[str, Any]] = {"link": {}, "flight": {}}
     if endpoint is not None:
         overrides["link"]["endpoint"] = endpoint
     if arm is not None:
-        own["flight"]["arm"] = arm
-    flown_config = changed(changed(flown_config, changes or {}, "changes"), own, "connect")
+        overrides["flight"]["arm"] = arm
+    flown_config = changed(changed(flown_config, changes or {}, "changes"), overrides, "connect")
     async with flying(
         flown_config, folder or flight_folder(flown_config.recording.directory), observer
     ) as vehicle:
@@ -135,7 +135,7 @@ async def _begin(
     config: Config, folder: Path | None, observer: Observer | None, environment: Environment
 ) -> tuple[Session, Program]:
     program = Program()
-    observer = observer or Silent()
+    observer = observer or SilentObserver()
     session = Session(config, folder, observer, decline_landing, program, environment)
     program.interrupt = session.interrupt
     return session, program

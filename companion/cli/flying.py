@@ -98,7 +98,7 @@ def fly(
         RealtimeError: what `realtime` requires is not granted; nothing was sent.
     """
     observer = TerminalObserver(console)
-    observers = observer if beside is None else Several(observer, beside)
+    observers = observer if beside is None else SeveralObservers(observer, beside)
     session = Session(
         config, folder, observers, observer.ask_landing, environment=environment(beside)
     )

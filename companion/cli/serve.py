@@ -38,7 +38,7 @@ def serve(options: argparse.Namespace) -> int:
         observers.event(time.monotonic() - began, text)
 
     with helper(options, config, options.config, read, None, console, follows=False) as beside:
-        observers = observer if beside is None else Several(observer, beside)
+        observers = observer if beside is None else SeveralObservers(observer, beside)
         session = ServeSession(
             config, note, observers, environment(beside), config.recording.directory
         )

@@ -123,7 +123,7 @@ class Changes:
             raise ChangeRefusedError(f"{by}: {error}; nothing has changed") from error
         before = self.wanted
         text = self._begin(wanted, by)
-        self._earlier = [*self._earlier, before][-_MOST:]
+        self._earlier = [*self._earlier, before][-_MAX_UNDO_COUNT:]
         self.on_change(wanted)
         return text
 

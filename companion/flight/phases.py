@@ -120,7 +120,7 @@ def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, .
 def takeover_phases(config: FlightConfig) -> tuple[Phase, ...]:
     """The phases that take over a vehicle which its autopilot holds in the air."""
     checks = _checks_phase(config, "to be taken over", takeover.check_airborne, _RISING)
-    return checks, _take_over_held()
+    return checks, _held_takeover_phase()
 
 
 def takeoff_for_client_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, ...]:

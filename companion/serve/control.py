@@ -37,7 +37,7 @@ from companion.vehicle.autopilot import ControlEntry, Role
 from companion.vehicle.link import Link
 
 _ENDS = "control is ending and the vehicle is held; request control again when it has ended"
-_TRY_AGAIN = 2.0
+_RETRY_PAUSE = 2.0
 """Time after a failed takeover in which setpoints alone begin no other takeover, s."""
 
 
