@@ -11,7 +11,7 @@ from companion.guidance.fence import Place
 from companion.guidance.reference import Vector, minus
 from companion.mavlink.stats import share_lost
 from companion.safety.snapshot import (
-    LONGEST_UNHEARD,
+    UNHEARD_S,
     Autopilot,
     Control,
     Health,
@@ -27,8 +27,7 @@ _WINDOW = 1.0
 _FILLED_SHARE = 0.9
 """Share of the window that must be filled before shares and rates are known."""
 _LONGEST_INTERVAL = 0.03
-"""An interval between two calls of `listen` above this is a stall, s; the timer's period is 0.02 s.
-"""
+"""A longer interval between two calls of `listen` is a stall, s; the timer's period is 0.02 s."""
 _PLACE_LASTS = 1.0
 """Largest age of a GLOBAL_POSITION_INT for the place where control begins, s."""
 _GAPS_WITHIN = 5.0
@@ -129,7 +128,7 @@ class SnapshotBuilder:
         """How long no frame has come from the vehicle at `now`, s; None: it is heard."""
         self.listen(now)
         silence = now - self._heard_at
-        return silence if silence > LONGEST_UNHEARD else None
+        return silence if silence > UNHEARD_S else None
 
     def listen(self, now: float) -> None:
         """Take the counters at `now`; the watch calls this at least 50 times a second."""
@@ -186,12 +185,9 @@ class SnapshotBuilder:
         )
 
     def stood_still(self, since: float) -> float:
-        """Time for which this program did not run since `since`, s.
+        """How long this program did not run after `since` (event-loop time, s), s.
 
         Only stalls that ended within the last second, or are the latest, are known.
-
-        Args:
-            since: s of event-loop time.
         """
         return sum(counted.late for counted in self._counted if counted.now > since)
 
