@@ -16,7 +16,7 @@ from companion.config import Config
 from companion.config.files import changed, load
 from companion.flight.context import FlightContext
 from companion.flight.environment import THIS_COMPUTER, Environment
-from companion.flight.observer import Observer, Silent, decline_landing
+from companion.flight.observer import Observer, SilentObserver, decline_landing
 from companion.flight.phases import Phase, hand_back_phase
 from companion.flight.session import Session
 from companion.mavlink import lockstep, loop
@@ -57,12 +57,12 @@ async def connect(
         RealtimeError: the system refused a required `realtime` setting; nothing was sent.
     """
     flown_config = load(Path(config)) if isinstance(config, Path | str) else config
-    own: dict[str, dict[str, Any]] = {"link": {}, "flight": {}}
+    overrides: dict[str, dict[str, Any]] = {"link": {}, "flight": {}}
     if endpoint is not None:
-        own["link"]["endpoint"] = endpoint
+        overrides["link"]["endpoint"] = endpoint
     if arm is not None:
-        own["flight"]["arm"] = arm
-    flown_config = changed(changed(flown_config, changes or {}, "changes"), own, "connect")
+        overrides["flight"]["arm"] = arm
+    flown_config = changed(changed(flown_config, changes or {}, "changes"), overrides, "connect")
     async with flying(
         flown_config, folder or flight_folder(flown_config.recording.directory), observer
     ) as vehicle:
@@ -77,7 +77,7 @@ async def flying(
     environment: Environment = THIS_COMPUTER,
 ) -> AsyncGenerator[Vehicle, None]:
     """Like `connect`, for a complete configuration; nothing is recorded without a folder."""
-    loop, lost = flight_loop(), False
+    loop, is_lost = flight_loop(), False
     try:
         session, program = await loop.start(_begin(config, folder, observer, environment))
         loop.on_lost(partial(_end, session, program))
@@ -87,12 +87,12 @@ async def flying(
                 async with _vehicle(loop, session, program, flight) as vehicle:
                     yield vehicle
         finally:
-            lost = True  # if the next line is cancelled
+            is_lost = True  # if the next line is cancelled
             await asyncio.wait({flight})
-            lost = False
+            is_lost = False
         flight.result()
     finally:
-        loop.close(wait=not lost)
+        loop.close(wait=not is_lost)
 
 
 @asynccontextmanager
@@ -135,7 +135,7 @@ async def _begin(
     config: Config, folder: Path | None, observer: Observer | None, environment: Environment
 ) -> tuple[Session, Program]:
     program = Program()
-    observer = observer or Silent()
+    observer = observer or SilentObserver()
     session = Session(config, folder, observer, decline_landing, program, environment)
     program.interrupt = session.interrupt
     return session, program

@@ -125,9 +125,9 @@ class Control:
         self._command = reference, self._loop.time(), jerk_ned
         if not self._posted:  # else the flight has yet to take a command, and takes this one
             self._posted = True
-            self._loop.post(self._give)
+            self._loop.post(self._post_command)
 
-    def _give(self) -> None:
+    def _post_command(self) -> None:
         """Give the newest command to guidance; this runs in the flight's loop."""
         self._posted = False
         if self._command is not None:

@@ -57,10 +57,10 @@ class _Reaction:
 
     def expect(self) -> None:
         """Begin to wait for the program's loop to run."""
-        self._loop.tell(self._come)
+        self._loop.tell(self._note_ctrl_c)
         asyncio.get_running_loop().call_later(REACTS_WITHIN, self._judge)
 
-    def _come(self) -> None:
+    def _note_ctrl_c(self) -> None:
         self._came = True
 
     def _judge(self) -> None:

@@ -25,7 +25,7 @@ each answer by a multiple of it, because every system call of the flight release
 interpreter.
 """
 
-_LOOK_PERIOD = 0.1
+_CHECK_PERIOD = 0.1
 """Period with which the flight checks whether the program still exists, s."""
 
 
@@ -156,7 +156,7 @@ class OwnThread:
     async def _until_closed(self) -> None:
         while not self._closing.is_set() and not self._program_is_lost():
             with suppress(TimeoutError):
-                await asyncio.wait_for(self._closing.wait(), _LOOK_PERIOD)
+                await asyncio.wait_for(self._closing.wait(), _CHECK_PERIOD)
         if self._end is not None:
             await self._end()
 
@@ -168,7 +168,7 @@ class OwnThread:
 
 
 _switching = threading.Lock()
-_quick: list[float] = []
+_intervals_before: list[float] = []
 """Python's previous switch interval, once for each running flight."""
 
 
@@ -176,15 +176,15 @@ _quick: list[float] = []
 def quick_switches() -> Iterator[None]:
     """Let Python switch threads after `SWITCH_INTERVAL` while any flight runs."""
     with _switching:
-        _quick.append(sys.getswitchinterval())
-        sys.setswitchinterval(min(SWITCH_INTERVAL, _quick[0]))
+        _intervals_before.append(sys.getswitchinterval())
+        sys.setswitchinterval(min(SWITCH_INTERVAL, _intervals_before[0]))
     try:
         yield
     finally:
         with _switching:
-            before = _quick[0]
-            _quick.pop()
-            if not _quick:
+            before = _intervals_before[0]
+            _intervals_before.pop()
+            if not _intervals_before:
                 sys.setswitchinterval(before)
 
 

@@ -36,7 +36,7 @@ from companion.safety.actions import Exit, FlightEnded
 T = TypeVar("T")
 Arguments = TypeVarTuple("Arguments")
 
-_BEGINS_WITHIN = 1.0
+_START_TIMEOUT = 1.0
 """Longest time from the beginning of control to the first command, s."""
 
 
@@ -126,13 +126,13 @@ class Vehicle:
         """
         here = self._pose()
         north, east, down = (
-            there - begin for there, begin in zip(position_ned, here.position_ned, strict=True)
+            goal - begin for goal, begin in zip(position_ned, here.position_ned, strict=True)
         )
-        way = line((north, east, down), speed, acceleration, jerk)
+        displacement = line((north, east, down), speed, acceleration, jerk)
         if heading is None:
-            await self._fly(HeldFigure(way))
+            await self._fly(HeldFigure(displacement))
         else:
-            await self.follow(replace(way, heading=FixedHeading(heading)))
+            await self.follow(replace(displacement, heading=FixedHeading(heading)))
 
     async def follow(self, trajectory: Trajectory | Path | str) -> None:
         """Follow a trajectory from the present position.
@@ -163,7 +163,7 @@ class Vehicle:
         Raises:
             FlightEnded: control has ended before the block did.
         """
-        source = CommandedSource(name, self._context.config.deadman.target_stale, _BEGINS_WITHIN)
+        source = CommandedSource(name, self._context.config.deadman.target_stale, _START_TIMEOUT)
         work = partial(fly_commanded, source=source)
         phase = program_phase("control", f"{name} to end its control", work)
         flown = self._request(lambda _: (phase,))

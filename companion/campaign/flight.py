@@ -12,7 +12,7 @@ from companion.campaign.case import Case, Fault
 from companion.campaign.swept import Value
 from companion.config import Config
 from companion.files.yaml_file import ConfigError
-from companion.flight.observer import Silent
+from companion.flight.observer import SilentObserver
 from companion.recording.measurements.summary import Summary
 from companion.testing import MockVehicle, Truth, run, session
 
@@ -133,7 +133,7 @@ class CaseFlight:
             self._truth.append((self._vehicle.time, *state["position"], tilt_angle(x, y)))
 
 
-class _BeginFault(Silent):
+class _BeginFault(SilentObserver):
     """Injects the faults of a scenario at a set time after the beginning of a phase.
 
     Args:

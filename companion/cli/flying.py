@@ -18,7 +18,7 @@ from companion.config.files import assigned, changed, load
 from companion.extras import MissingExtraError
 from companion.files.os_errors import reason_of
 from companion.flight.maneuvers import configured_maneuvers
-from companion.flight.observer import Several
+from companion.flight.observer import SeveralObservers
 from companion.flight.session import Session
 from companion.flight.start_checks import check_control, check_link, require_extras
 from companion.live.helper import Helper
@@ -98,7 +98,7 @@ def fly(
         RealtimeError: what `realtime` requires is not granted; nothing was sent.
     """
     observer = TerminalObserver(console)
-    observers = observer if beside is None else Several(observer, beside)
+    observers = observer if beside is None else SeveralObservers(observer, beside)
     session = Session(
         config, folder, observers, observer.ask_landing, environment=environment(beside)
     )

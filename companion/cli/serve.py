@@ -15,7 +15,7 @@ from companion.config import Config
 from companion.config.files import assigned, changed, load
 from companion.extras import require
 from companion.files.yaml_file import ConfigError
-from companion.flight.observer import Several
+from companion.flight.observer import SeveralObservers
 from companion.flight.start_checks import check_control, check_link, require_extras
 from companion.flight.status import FlightStatus
 from companion.mavlink import loop as link_loop
@@ -38,7 +38,7 @@ def serve(options: argparse.Namespace) -> int:
         observers.event(time.monotonic() - began, text)
 
     with helper(options, config, options.config, read, None, console, follows=False) as beside:
-        observers = observer if beside is None else Several(observer, beside)
+        observers = observer if beside is None else SeveralObservers(observer, beside)
         session = ServeSession(
             config, note, observers, environment(beside), config.recording.directory
         )

@@ -10,15 +10,15 @@ from companion.files.yaml_file import ConfigError
 
 LARGEST_FACTOR = 3.0
 """Largest factor by which a change may multiply or divide a value."""
-_LEAST = {"limits.max_tilt_deg": 5.0, "limits.max_tilt_rate_deg_s": 20.0}
+_SMALLEST_VALUES = {"limits.max_tilt_deg": 5.0, "limits.max_tilt_rate_deg_s": 20.0}
 """Smallest values in flight; with less tilt or tilt rate the vehicle cannot hold against wind."""
 _NEVER_ZERO = frozenset(
     {"planner.yaw_gain_per_s", "guidance.height_gain_per_s", "guidance.climb_gain_per_s"}
 )
 """Gains that must not be 0, because yaw or height would be uncontrolled."""
-_BANDWIDTH = "guidance.disturbance_bandwidth_rad_s"
-_WITHOUT_EFFECT = frozenset(
-    {"guidance.position_weight_per_s4", "guidance.velocity_weight_per_s2", _BANDWIDTH}
+_BANDWIDTH_KEY = "guidance.disturbance_bandwidth_rad_s"
+_WITHOUT_EFFECT_IN_IDENTIFY = frozenset(
+    {"guidance.position_weight_per_s4", "guidance.velocity_weight_per_s2", _BANDWIDTH_KEY}
 )
 """Keys without effect in `identify`, which has its own weights and bandwidth."""
 
@@ -47,17 +47,18 @@ def require_moderate(before: Config, after: Config, name: str) -> None:
 def _why_not(before: Config, after: Config, change: Difference) -> str | None:
     """Why this change is not permitted, as a sentence; None: it is."""
     key = change.name
-    if key in _WITHOUT_EFFECT and flies_identify(before):
+    if key in _WITHOUT_EFFECT_IN_IDENTIFY and flies_identify(before):
         return f"{key} has no effect while the maneuver `identify` is flown"
-    if key == _BANDWIDTH and None in (change.before, change.after):
+    if key == _BANDWIDTH_KEY and None in (change.before, change.after):
         return (
             f"{key} must not change between null and a number in flight; begin the next flight "
             "with a number to change it in flight"
         )
     if key in _NEVER_ZERO and change.after == 0.0:
         return f"{key} must not become 0 in flight"
-    if key in _LEAST and change.after < _LEAST[key]:
-        return f"{key} {shown(change.after)} is less than {_LEAST[key]:g}, the least in flight"
+    smallest = _SMALLEST_VALUES.get(key)
+    if smallest is not None and change.after < smallest:
+        return f"{key} {shown(change.after)} is less than {smallest:g}, the least in flight"
     old = value_in_effect(before, change, change.before)
     new = value_in_effect(after, change, change.after)
     low, high = min(old, new), max(old, new)

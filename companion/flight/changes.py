@@ -20,7 +20,7 @@ from companion.flight.change_bounds import require_moderate
 from companion.recording.recorder import FlightRecorder
 from companion.safety.actions import internal
 
-_MOST = 200
+_MAX_UNDO_COUNT = 200
 """Number of changes that can be undone; older ones stay in force."""
 
 
@@ -123,7 +123,7 @@ class Changes:
             raise ChangeRefusedError(f"{by}: {error}; nothing has changed") from error
         before = self.wanted
         text = self._begin(wanted, by)
-        self._earlier = [*self._earlier, before][-_MOST:]
+        self._earlier = [*self._earlier, before][-_MAX_UNDO_COUNT:]
         self.on_change(wanted)
         return text
 
@@ -171,14 +171,14 @@ class Changes:
             retuning.apply(tuning(self.wanted))
         if self.wanted is not self.flown:
             self._record_change(self.flown, at_once=True)
-        outside, self.note = self.note, note
+        note_before, self.note = self.note, note
         try:
             with retuning.stepped_by(self.step):
                 yield
         finally:
             self._retuning = self._record = None
             self._slew.jump(self.wanted)
-            self.note = outside
+            self.note = note_before
 
     def step(self, now: float) -> None:
         """Continue a change that is under way; the guidance loop calls this at each step."""

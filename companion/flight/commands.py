@@ -15,15 +15,15 @@ from companion.vehicle.autopilot import Role
 from companion.vehicle.link import Link
 
 _TRIES = 4
-_SHOWS = 3.0
+_EFFECT_TIMEOUT = 3.0
 """Longest time from a command to its effect, s; a take-off takes longer than a mode change."""
-_ENTERED = 1.0
+_MODE_REPORT_TIMEOUT = 1.0
 """An accepted mode that is not reported within this time was left again, s."""
 _OFFBOARD = frozenset({Role.OFFBOARD})
 
 Done = Callable[[], bool]
 """Returns whether the vehicle does what was commanded; may raise `FlightEnded` instead."""
-Ours = Callable[[], None]
+RequireOurs = Callable[[], None]
 """Raises `FlightEnded` if we must not command the vehicle; for example `in_roles`."""
 
 
@@ -54,12 +54,14 @@ def require_role(link: Link, allowed: Set[Role]) -> None:
     raise FlightEnded(f"{who}: mode {link.state.mode}", Exit.RELEASE)
 
 
-def in_roles(link: Link, allowed: Set[Role]) -> Ours:
+def in_roles(link: Link, allowed: Set[Role]) -> RequireOurs:
     """`require_role` as a function without arguments."""
     return lambda: require_role(link, allowed)
 
 
-async def command_if_ours(context: FlightContext, command: Command, ours: Ours, done: Done) -> None:
+async def command_if_ours(
+    context: FlightContext, command: Command, require_ours: RequireOurs, done: Done
+) -> None:
     """Send a command until it is answered; before each try, check who controls the vehicle.
 
     A command is never repeated blindly. The vehicle may have obeyed the first one whose answer was
@@ -68,7 +70,7 @@ async def command_if_ours(context: FlightContext, command: Command, ours: Ours, 
     Args:
         context: context of the flight.
         command: command to send.
-        ours: called before each try; if it raises, nothing is sent.
+        require_ours: called before each try; if it raises, nothing is sent.
         done: see `Done`; called before a repetition.
 
     Raises:
@@ -78,12 +80,12 @@ async def command_if_ours(context: FlightContext, command: Command, ours: Ours, 
         CommandUnfinished: the autopilot answered "in progress", and did not finish in time.
         LinkLost: the connection dropped while waiting.
     """
-    for given in range(_TRIES):
+    for attempt in range(_TRIES):
         await context.fresh_heartbeat()
         context.same_vehicle.require()
-        if given > 0 and done():
+        if attempt > 0 and done():
             return
-        ours()
+        require_ours()
         try:
             await context.link.command(*command, retries=0)
             return
@@ -96,7 +98,7 @@ async def command_if_ours(context: FlightContext, command: Command, ours: Ours, 
             pass
         except CommandRefused:
             # A vehicle that has obeyed the first try refuses the second one.
-            if given == 0 or not await _takes_effect(context, done):
+            if attempt == 0 or not await _takes_effect(context, done):
                 raise
             return
     await context.fresh_heartbeat()
@@ -105,21 +107,23 @@ async def command_if_ours(context: FlightContext, command: Command, ours: Ours, 
         raise CommandTimeout(f"{name}: no answer to {_TRIES} tries; does the uplink work?")
 
 
-async def change_mode(context: FlightContext, command: Command, ours: Ours, done: Done) -> None:
+async def change_mode(
+    context: FlightContext, command: Command, require_ours: RequireOurs, done: Done
+) -> None:
     """Send a mode command like `command_if_ours`, and wait until the mode is reported.
 
     Raises:
         FlightEnded: somebody else has the vehicle, or left the accepted mode at once.
         CommandRefused, CommandTimeout, LinkLost: see `command_if_ours`.
     """
-    await command_if_ours(context, command, ours, done)
-    accepted = asyncio.get_running_loop().time()
+    await command_if_ours(context, command, require_ours, done)
+    accepted_at = asyncio.get_running_loop().time()
 
     def entered() -> bool:
         state = context.link.state
         if done():
             return True
-        if state.mode_received > accepted + _ENTERED:
+        if state.mode_received > accepted_at + _MODE_REPORT_TIMEOUT:
             raise FlightEnded(
                 "the autopilot accepted the mode but left it again without our command: "
                 f"{state.mode}",
@@ -154,14 +158,17 @@ async def leave_offboard(
     )
     context.detail = f"the autopilot to leave {mode}"
 
-    def ours() -> None:
+    def require_ours() -> None:
         if context.armed():
             raise FlightEnded("somebody else armed the vehicle", Exit.RELEASE)
         require_role(context.link, cannot_arm_in)
 
     try:
         await change_mode(
-            context, context.link.autopilot.hold(), ours, lambda: in_role(context.link, Role.HOLD)
+            context,
+            context.link.autopilot.hold(),
+            require_ours,
+            lambda: in_role(context.link, Role.HOLD),
         )
     except (CommandRefused, CommandTimeout) as error:
         raise FlightEnded(
@@ -173,7 +180,7 @@ async def leave_offboard(
 
 async def _takes_effect(context: FlightContext, done: Done) -> bool:
     try:
-        async with asyncio.timeout(_SHOWS):
+        async with asyncio.timeout(_EFFECT_TIMEOUT):
             await context.until(done)
     except TimeoutError:
         return False

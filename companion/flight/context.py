@@ -26,13 +26,13 @@ SLOWEST_HEARTBEAT = 3.0
 _POLL = 0.02
 """Period with which a condition is checked, s; telemetry is slower."""
 
-_LAST_SETPOINT = 0.1
+_LAST_SETPOINT_TIMEOUT = 0.1
 """Longest wait for a sample that the last setpoint of a flight can answer, s."""
 
-_BACKLOG = 0.5
+_BACKLOG_DRAIN_TIME = 0.5
 """After a stall the backlog is drained within this time, s."""
 
-_HEARTBEAT = 0.0
+_HEARTBEAT_ID = 0.0
 """Message id of HEARTBEAT."""
 
 
@@ -88,17 +88,17 @@ class FlightContext:
     async def _stop_turning(self) -> None:
         """If the autopilot still obeys us, send zero body rates, because it keeps the last ones.
 
-        They answer the next sample; without one within `_LAST_SETPOINT`, nothing is sent. Guidance
-        must have stopped, because its next command would replace the zero rates.
+        They answer the next sample; without one within `_LAST_SETPOINT_TIMEOUT`, nothing is sent.
+        Guidance must have stopped, because its next command would replace the zero rates.
         """
         loop = self.loop
         if not (loop.on and loop.offboard_active):
             return
         loop.stop_turning()
-        sent = loop.record.setpoints
+        sent_before = loop.record.setpoints
         with suppress(TimeoutError):
-            async with asyncio.timeout(_LAST_SETPOINT):
-                await self.until(lambda: loop.record.setpoints > sent)
+            async with asyncio.timeout(_LAST_SETPOINT_TIMEOUT):
+                await self.until(lambda: loop.record.setpoints > sent_before)
 
     async def until(self, condition: Callable[[], bool], detail: str | None = None) -> None:
         """Wait until `condition` holds; `detail` tells the user what the phase waits for."""
@@ -111,26 +111,26 @@ class FlightContext:
         """Wait for a heartbeat that left the vehicle after this call.
 
         After a stall of our process, frames from the backlog look new. So we request a heartbeat.
-        The heartbeat after the answer is fresh; without an answer, a heartbeat after `_BACKLOG` is
-        fresh.
+        The heartbeat after the answer is fresh; without an answer, a heartbeat after
+        `_BACKLOG_DRAIN_TIME` is fresh.
         """
         loop = asyncio.get_running_loop()
-        since = loop.time() + _BACKLOG
+        fresh_from = loop.time() + _BACKLOG_DRAIN_TIME
         fresh = loop.create_future()
 
         async def ask() -> None:
-            nonlocal since
+            nonlocal fresh_from
             with suppress(LinkError):
                 for _ in range(2):  # PX4 sends it before its answer, so the second one is fresh
-                    await self.link.command(MAV_CMD_REQUEST_MESSAGE, _HEARTBEAT, retries=0)
-                    since = min(since, loop.time())
+                    await self.link.command(MAV_CMD_REQUEST_MESSAGE, _HEARTBEAT_ID, retries=0)
+                    fresh_from = min(fresh_from, loop.time())
 
-        def look(_: object) -> None:
+        def on_heartbeat(_: object) -> None:
             heartbeat = self.link.state.heartbeat
-            if heartbeat is not None and heartbeat.received >= since and not fresh.done():
+            if heartbeat is not None and heartbeat.received >= fresh_from and not fresh.done():
                 fresh.set_result(None)
 
-        unsubscribe = self.link.subscribe("HEARTBEAT", look)
+        unsubscribe = self.link.subscribe("HEARTBEAT", on_heartbeat)
         question = asyncio.create_task(ask())
         try:
             await fresh

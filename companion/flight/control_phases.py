@@ -6,7 +6,7 @@ from math import degrees
 
 from companion.flight.commands import (
     Done,
-    Ours,
+    RequireOurs,
     change_mode,
     command_if_ours,
     in_role,
@@ -22,13 +22,13 @@ from companion.mavlink.errors import CommandTimeout
 from companion.safety.actions import Exit, FlightEnded, internal
 from companion.vehicle.autopilot import Role
 
-_SELF_DISARM = 8.0
+_SELF_DISARM_TIMEOUT = 8.0
 """Time allowed for the autopilot to disarm itself after landing, s."""
 
-_LEAST_TILT = 5.0
+_MIN_HOLDING_TILT = 5.0
 """Smallest tilt that the thrust must allow to hold against a breeze, °."""
 
-_OURS = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
+_CONTROLLED_ROLES = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
 
 
 async def maneuvers(context: FlightContext) -> None:
@@ -98,7 +98,7 @@ class _TiltMargin:
         """
         limits, learning = self._context.config.limits, self._context.guidance_loop.learning
         tilt, hover = degrees(learning.largest_tilt()), learning.present_hover
-        if tilt < _LEAST_TILT:
+        if tilt < _MIN_HOLDING_TILT:
             raise FlightEnded(
                 f"the vehicle hovers at a thrust of {hover:.2f}: limits.max_thrust "
                 f"{limits.max_thrust:g} leaves nothing to steer with; raise it, or make "
@@ -116,9 +116,12 @@ class _TiltMargin:
 async def hand_back(context: FlightContext) -> None:
     """Stop the motion, and send setpoints until the autopilot holds by itself."""
     context.detail = "the autopilot to hold"
-    ours = in_roles(context.link, _OURS)
+    require_ours = in_roles(context.link, _CONTROLLED_ROLES)
     await _hand_over(
-        context, context.link.autopilot.hold(), ours, lambda: in_role(context.link, Role.HOLD)
+        context,
+        context.link.autopilot.hold(),
+        require_ours,
+        lambda: in_role(context.link, Role.HOLD),
     )
 
 
@@ -137,9 +140,12 @@ async def hold_when_heard(context: FlightContext) -> None:
         return
     context.note(f"the vehicle is heard again, still in {mode}: asking it to hold")
     context.detail = "its report that it holds"
-    ours = in_roles(context.link, {Role.OFFBOARD})
+    require_ours = in_roles(context.link, {Role.OFFBOARD})
     await change_mode(
-        context, context.link.autopilot.hold(), ours, lambda: in_role(context.link, Role.HOLD)
+        context,
+        context.link.autopilot.hold(),
+        require_ours,
+        lambda: in_role(context.link, Role.HOLD),
     )
 
 
@@ -150,8 +156,8 @@ async def land(context: FlightContext) -> None:
     def landing() -> bool:
         return in_role(context.link, Role.LAND) or not context.armed()
 
-    ours = in_roles(context.link, _OURS | {Role.LAND})
-    await _hand_over(context, context.link.autopilot.land(), ours, landing)
+    require_ours = in_roles(context.link, _CONTROLLED_ROLES | {Role.LAND})
+    await _hand_over(context, context.link.autopilot.land(), require_ours, landing)
 
     def down() -> bool:
         height = context.link.state.height
@@ -171,7 +177,7 @@ async def disarm(context: FlightContext) -> None:
         return not context.armed()
 
     try:
-        async with asyncio.timeout(_SELF_DISARM):
+        async with asyncio.timeout(_SELF_DISARM_TIMEOUT):
             await context.until(disarmed)
     except TimeoutError:
         context.detail = "the autopilot to accept disarming"
@@ -192,7 +198,9 @@ def _require_landing(context: FlightContext) -> None:
         require_role(context.link, {Role.LAND})
 
 
-async def _hand_over(context: FlightContext, command: Command, ours: Ours, done: Done) -> None:
+async def _hand_over(
+    context: FlightContext, command: Command, require_ours: RequireOurs, done: Done
+) -> None:
     """Stop the motion, and command a mode until the autopilot has entered it; then release.
 
     A command without an answer is sent again until the phase is over: a vehicle whose uplink loses
@@ -201,7 +209,7 @@ async def _hand_over(context: FlightContext, command: Command, ours: Ours, done:
     while True:
         _stop_moving(context)
         try:
-            await change_mode(context, command, ours, done)
+            await change_mode(context, command, require_ours, done)
         except CommandTimeout as error:
             context.detail = str(error)
         else:

@@ -93,8 +93,8 @@ def _unheard(context: FlightContext, now: float) -> float | None:
     heartbeat = context.link.state.heartbeat
     if heartbeat is None:
         return None
-    since = now - heartbeat.received
-    return since if since > context.heartbeat_limit else context.snapshot_builder.unheard(now)
+    silence = now - heartbeat.received
+    return silence if silence > context.heartbeat_limit else context.snapshot_builder.unheard(now)
 
 
 def _early_end(
@@ -107,13 +107,13 @@ def _early_end(
     result: str,
 ) -> EarlyEnd:
     """The end of a flight that ended early; `time` and `takeoff` in s since the flight began."""
-    name, into = None, None
+    name, maneuver_elapsed = None, None
     if phase == "maneuvers":
         for mark in marks:  # a hold may have ended the maneuver before the flight ended
             if mark.name is not None:
-                name, begun = mark.name, mark.time
-                into = time + began - begun
+                name, maneuver_begin = mark.name, mark.time
+                maneuver_elapsed = time + began - maneuver_begin
             elif name is not None and mark.time <= time + began:
-                into = mark.time - begun
-    since = None if takeoff is None or takeoff > time else time - takeoff
-    return EarlyEnd(time, since, phase, name, into, breaches.get(result))
+                maneuver_elapsed = mark.time - maneuver_begin
+    airborne = None if takeoff is None or takeoff > time else time - takeoff
+    return EarlyEnd(time, airborne, phase, name, maneuver_elapsed, breaches.get(result))

@@ -16,14 +16,14 @@ from companion.safety.actions import internal
 
 _PERIOD = 2.0
 """Time between two measurements, s; the axes take turns."""
-_PERIODS = 4
+_WINDOW_PERIODS = 4
 """Length of a measurement in these periods; the first measurement is a period shorter."""
-_UNSURE = 1.5
+_MIN_ROW_AGE = 1.5
 """Rows newer than this are not used, s: the autopilot may already have left offboard."""
-_LONGEST = 75_000
+_MAX_ROWS = 75_000
 """Largest number of rows for the measurement after the flight: 5 min at 250 Hz."""
 _AXES = ("roll", "pitch", "yaw")
-_COMMANDED, _MEASURED, _AGE = 2, 6, 9
+_COMMANDED_COLUMN, _MEASURED_COLUMN, _AGE_COLUMN = 2, 6, 9
 """Columns of `FlightTrace.rates`: first commanded rate, first measured rate, sample age."""
 
 
@@ -77,7 +77,7 @@ class DeadTimeWatch:
         self._due = -inf
         self._measurements = 0
         # Number of rows at each of the latest measurements.
-        self._rows = deque([0], maxlen=_PERIODS + 1)
+        self._rows = deque([0], maxlen=_WINDOW_PERIODS + 1)
         self._suspected: set[str] = set()
         self._warned = False
         time = np.arange(0.0, 3.0, 0.01)
@@ -96,17 +96,17 @@ class DeadTimeWatch:
 
     def _measure_next_axis(self) -> None:
         self._rows.append(len(self._trace.rates))
-        if len(self._rows) > _PERIODS:
+        if len(self._rows) > _WINDOW_PERIODS:
             first = self._rows[0]
             name = _AXES[self._measurements % len(_AXES)]
             self._measurements += 1
             self._judge(name, self._dead_time(name, self._trace.rates_rows(first)))
 
     def over_the_flight(self) -> DeadTimes:
-        """Measure over the flight (its last `_LONGEST` rows); warn if no warning was given yet."""
-        first = max(0, len(self._trace.rates) - _LONGEST)
+        """Measure over the flight (its last `_MAX_ROWS` rows); warn if no warning was given yet."""
+        first = max(0, len(self._trace.rates) - _MAX_ROWS)
         rows = self._trace.rates_rows(first)
-        ages = rows[:, _AGE]
+        ages = rows[:, _AGE_COLUMN]
         ages = ages[np.isfinite(ages)]
         measured = DeadTimes(
             {name: self._dead_time(name, rows) for name in _AXES},
@@ -119,32 +119,34 @@ class DeadTimeWatch:
     def _dead_time(self, name: str, rows: NDArray[np.float64]) -> AxisDeadTime:
         """Measured and configured dead time of one axis."""
         loop, axis = self._rate_loops[name], _AXES.index(name)
-        measured = None
+        dead_time = None
         if loop.lag is not None:
-            time, commanded, followed = rows[:, [0, _COMMANDED + axis, _MEASURED + axis]].T
-            sure = time < time[-1:] - _UNSURE
-            measured = dead_time_by_correlation(
-                time[sure],
-                commanded[sure],
-                time[sure],
-                followed[sure],
+            time, commanded_rates, measured_rates = rows[
+                :, [0, _COMMANDED_COLUMN + axis, _MEASURED_COLUMN + axis]
+            ].T
+            is_certain = time < time[-1:] - _MIN_ROW_AGE
+            dead_time = dead_time_by_correlation(
+                time[is_certain],
+                commanded_rates[is_certain],
+                time[is_certain],
+                measured_rates[is_certain],
                 loop.lag,
                 loop.acceleration_limit,
                 inf if loop.damping is None else loop.damping,
             )
-        return AxisDeadTime(measured, loop.dead_time)
+        return AxisDeadTime(dead_time, loop.dead_time)
 
-    def _judge(self, name: str, found: AxisDeadTime) -> None:
+    def _judge(self, name: str, dead_time: AxisDeadTime) -> None:
         """Warn at the second wrong measurement in a row; a gust may cause a single one."""
-        if not found.is_wrong:
+        if not dead_time.is_wrong:
             self._suspected.discard(name)
         elif name in self._suspected:
-            self._warn(DeadTimes({name: found}))
+            self._warn(DeadTimes({name: dead_time}))
         else:
             self._suspected.add(name)
 
-    def _warn(self, found: DeadTimes) -> None:
-        warning = found.warning()
+    def _warn(self, dead_times: DeadTimes) -> None:
+        warning = dead_times.warning()
         if warning is not None and not self._warned:
             self._warned = True
             self._note(warning)

@@ -15,12 +15,12 @@ from companion.guidance.trajectory.demand import Floats, Motion
 from companion.guidance.trajectory.feasibility import Violation
 
 MARGIN = 0.5
-"""Margin between reference and fence, m: for errors of position and speed, and for `_APART`."""
+"""Margin between reference and fence, m, for errors of position and speed and `_POINT_DISTANCE`."""
 
-_APART = 0.25
+_POINT_DISTANCE = 0.25
 """Distance between two checked points of a polygon fence, m."""
 
-_SHOWN = 4000
+_MAX_MOMENTS = 4000
 """Number of moments checked to find where a breach begins."""
 
 
@@ -44,40 +44,40 @@ class FenceCheck:
         worst = self._worst(motion)
         if worst is None:
             return None
-        nothing = np.zeros_like(motion.velocity)
-        still = replace(motion, velocity=nothing, acceleration=nothing)
-        place = self._worst(still)
-        time, found = worst if place is None else place
-        begins = self._begins(motion if place is None else still, time)
-        brakes = place is None
-        text, remedy = _text(found, begins, brakes), _remedy(brakes)
-        return Violation(found.limit, begins, time, text, remedy, slowing_helps=brakes)
+        zeros = np.zeros_like(motion.velocity)
+        still = replace(motion, velocity=zeros, acceleration=zeros)
+        worst_at_rest = self._worst(still)
+        time, breach = worst if worst_at_rest is None else worst_at_rest
+        begin = self._begin_time(motion if worst_at_rest is None else still, time)
+        slowing_helps = worst_at_rest is None
+        text, remedy = _text(breach, begin, slowing_helps), _remedy(slowing_helps)
+        return Violation(breach.limit, begin, time, text, remedy, slowing_helps=slowing_helps)
 
     def _worst(self, motion: Motion) -> tuple[float, Breach] | None:
         """The worst breach and its time, s."""
         columns = self.fence.stop(
-            _columns(motion.position), _columns(motion.velocity), _level(motion.acceleration)
+            _columns(motion.position), _columns(motion.velocity), _horizontal(motion.acceleration)
         )
         stops = np.stack(columns, axis=1)
-        broken = [
-            (motion.times[k], found)
+        breaches = [
+            (motion.times[k], breach)
             for k in self._candidates(stops)
-            if (found := self._breach(motion, k)) is not None
+            if (breach := self._breach(motion, k)) is not None
         ]
-        if not broken:
+        if not breaches:
             return None
-        time, found = max(broken, key=lambda each: each[1].by)
-        return float(time), found
+        time, breach = max(breaches, key=lambda each: each[1].by)
+        return float(time), breach
 
     def _candidates(self, stops: Floats) -> list[int]:
         """Indices that contain the worst moment: farthest, highest, lowest, and along a polygon."""
         distance = np.hypot(stops[:, 0], stops[:, 1])
-        found = {int(distance.argmax()), int(stops[:, 2].argmin()), int(stops[:, 2].argmax())}
+        indices = {int(distance.argmax()), int(stops[:, 2].argmin()), int(stops[:, 2].argmax())}
         if self.fence.polygon or (self.fence.places and self.origin):
-            ways = np.hypot(*np.diff(stops[:, :2], axis=0).T)
-            part = np.floor(np.concatenate(([0.0], np.cumsum(ways))) / _APART)
-            found.update(np.unique(part, return_index=True)[1].tolist())
-        return sorted(found)
+            step_lengths = np.hypot(*np.diff(stops[:, :2], axis=0).T)
+            section = np.floor(np.concatenate(([0.0], np.cumsum(step_lengths))) / _POINT_DISTANCE)
+            indices.update(np.unique(section, return_index=True)[1].tolist())
+        return sorted(indices)
 
     def _breach(self, motion: Motion, k: int) -> Breach | None:
         offset, velocity = _vector(motion.position[k]), _vector(motion.velocity[k])
@@ -88,29 +88,33 @@ class FenceCheck:
         height = self.height - offset[2]
         return fence.stop_breach(offset, velocity, height, self.origin, MARGIN, (north, east))
 
-    def _begins(self, motion: Motion, worst: float) -> float:
+    def _begin_time(self, motion: Motion, worst: float) -> float:
         """Time of the first breach, s."""
-        stride = max(1, motion.times.size // _SHOWN)
+        stride = max(1, motion.times.size // _MAX_MOMENTS)
         for k in range(0, motion.times.size, stride):
             if motion.times[k] >= worst or self._breach(motion, k) is not None:
                 return float(min(motion.times[k], worst))
         return worst
 
 
-def _text(found: Breach, time: float, brakes: bool) -> str:
-    if found.by > 0.0:
-        goes = "braking would end" if brakes else "it goes"
-        goes = f"{goes} up to {found.by:.1f} m outside the fence"
+def _text(breach: Breach, time: float, slowing_helps: bool) -> str:
+    if breach.by > 0.0:
+        what_happens = "braking would end" if slowing_helps else "it goes"
+        what_happens = f"{what_happens} up to {breach.by:.1f} m outside the fence"
     else:
-        goes = "it would stop too near to the fence" if brakes else "it comes too near to the fence"
+        what_happens = (
+            "it would stop too near to the fence"
+            if slowing_helps
+            else "it comes too near to the fence"
+        )
     return (
-        f"from {time:.2f} s on {goes} ({found.where}; {found.limit} with a margin of "
+        f"from {time:.2f} s on {what_happens} ({breach.where}; {breach.limit} with a margin of "
         f"{MARGIN:g} m for the tracking error)"
     )
 
 
-def _remedy(brakes: bool) -> str:
-    if brakes:
+def _remedy(slowing_helps: bool) -> str:
+    if slowing_helps:
         return (
             "fly it more slowly (--slow-down finds how much for a trajectory), or widen the fence"
         )
@@ -121,7 +125,7 @@ def _columns(vectors: Floats) -> tuple[Floats, Floats, Floats]:
     return vectors[:, 0], vectors[:, 1], vectors[:, 2]
 
 
-def _level(vectors: Floats) -> tuple[Floats, Floats]:
+def _horizontal(vectors: Floats) -> tuple[Floats, Floats]:
     return vectors[:, 0], vectors[:, 1]
 
 

@@ -12,7 +12,7 @@ from companion.safety.table import fence_of
 
 _PERIOD = 10.0
 """Period with which the fence is drawn again, s, because a viewer may join late."""
-_SIDES, _UPRIGHT = 48, 12
+_CIRCLE_SIDES, _UPRIGHT_EDGES = 48, 12
 """Sides of the polygon that approximates a circle, and number of its upright edges."""
 _COLOR: Color = (0.9, 0.3, 0.3, 0.6)
 Point = tuple[float, float, float]
@@ -41,7 +41,7 @@ class FenceRows:
         self._due = now + _PERIOD
         north, east, down = origin
         heights = self._fence.floor - height - motion.position_ned[2], self._fence.ceiling - down
-        outlines = [circle_corners(self._fence.radius, _SIDES)]
+        outlines = [circle_corners(self._fence.radius, _CIRCLE_SIDES)]
         if self._fence.places and centre.place is not None:
             outlines.append(local_polygon(self._fence.places, centre.place))
         elif self._fence.polygon:
@@ -58,12 +58,12 @@ def _edges(
     outline: Sequence[Corner], heights: tuple[float, float]
 ) -> Iterator[tuple[Corner, float]]:
     """The two ends of each edge of a prism: floor, ceiling, and some upright edges."""
-    upright = max(1, len(outline) // _UPRIGHT)
+    edge_step = max(1, len(outline) // _UPRIGHT_EDGES)
     for number, (here, there) in enumerate(zip(outline, (*outline[1:], outline[0]), strict=True)):
         for up in heights:
             yield here, up
             yield there, up
-        if number % upright == 0:
+        if number % edge_step == 0:
             yield here, heights[0]
             yield here, heights[1]
 

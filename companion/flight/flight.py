@@ -17,7 +17,7 @@ from companion.safety.actions import Exit, FlightEnded, internal
 
 AskLanding = Callable[[], Coroutine[Any, Any, bool]]
 
-_WATCH_PERIOD, _TELL_PERIOD = 0.02, 1.0
+_WATCH_PERIOD, _PROGRESS_PERIOD = 0.02, 1.0
 _ATTEMPTS = 5
 """Number of times the checks run if another vehicle may have come meanwhile."""
 
@@ -61,7 +61,7 @@ class Flight:
         """Fly; returns "ok" or the reason why the flight ended early."""
         helpers = [
             asyncio.create_task(self._guarded(work))
-            for work in (self._context.guidance_loop.run, self._watch_over, self._report_progress)
+            for work in (self._context.guidance_loop.run, self._watch_once, self._report_progress)
         ]
         try:
             await self._fly_all()
@@ -203,11 +203,11 @@ class Flight:
             for phase in exit_phases(self._context.config.flight, exit_):
                 await self._fly(phase)
         except FlightEnded as ended:
-            then = ended.exit or self._usual_exit()
-            if then in (exit_, Exit.LEAVE, Exit.RELEASE):
+            next_exit = ended.exit or self._usual_exit()
+            if next_exit in (exit_, Exit.LEAVE, Exit.RELEASE):
                 raise
             self.note(ended.reason)
-            await self._exit(then)
+            await self._exit(next_exit)
 
     async def _user_wants_landing(self) -> bool:
         """Ask the user whether to land; somebody else may take over meanwhile."""
@@ -226,7 +226,7 @@ class Flight:
                 self.fail(error)
             await asyncio.sleep(_WATCH_PERIOD)
 
-    async def _watch_over(self) -> None:
+    async def _watch_once(self) -> None:
         self._judge(self._watch.judge)
 
     def _judge(self, judge: Callable[[Phase], None]) -> None:
@@ -239,7 +239,7 @@ class Flight:
 
     async def _report_progress(self) -> None:
         while True:
-            await asyncio.sleep(_TELL_PERIOD)
+            await asyncio.sleep(_PROGRESS_PERIOD)
             phase, elapsed = self.phase, self._clock() - self._entered
             self._observer.waiting(phase.name, self._context.detail, elapsed, phase.timeout)
 

@@ -22,7 +22,7 @@ from companion.recording.measurements.summary import Summary
 from companion.recording.recorder import FlightRecorder
 from companion.recording.tlog import TlogWriter
 
-_SUMMARY_ROOM = 1 << 18
+_SUMMARY_RESERVE = 1 << 18
 """Room kept for `summary.json`, bytes; most take less than 10 kB, and every event adds to them."""
 
 
@@ -66,7 +66,7 @@ class FlightFiles:
         self.mcap: FlightRecorder | None = None
         if folder is not None:
             flown_config.record(config, folder, follows=follows)
-            self._room = ReservedRoom(folder, _SUMMARY_ROOM)
+            self._room = ReservedRoom(folder, _SUMMARY_RESERVE)
             loop = asyncio.get_running_loop()
             in_vehicle_time = config.link.lockstep or not environment.realtime
             epoch = 0.0 if in_vehicle_time else time.time() - loop.time()

@@ -15,10 +15,10 @@ from companion.files import bounded_yaml, yaml_file
 from companion.files.write_whole import write_whole
 from companion.flight.plan import ConfiguredPlan, Plan
 
-_NAME = "config.yaml"
-_TRAJECTORY = "trajectory"
+_CONFIG_FILE = "config.yaml"
+_TRAJECTORY_FOLDER = "trajectory"
 """Folder for the copies of the trajectory's file and of the table it names."""
-_TABLE = "table.csv"
+_TABLE_FILE = "table.csv"
 
 
 def record(config: Config, folder: Path, *, follows: bool = True) -> None:
@@ -42,9 +42,9 @@ def record(config: Config, folder: Path, *, follows: bool = True) -> None:
     path = config.flight.trajectory
     if follows and path is not None and "trajectory" in config.flight.maneuvers:
         data["flight"]["trajectory"] = (
-            f"{_TRAJECTORY}/{copy_trajectory(path, folder / _TRAJECTORY)}"
+            f"{_TRAJECTORY_FOLDER}/{copy_trajectory(path, folder / _TRAJECTORY_FOLDER)}"
         )
-    write_whole(folder / _NAME, bounded_yaml.dump(data))
+    write_whole(folder / _CONFIG_FILE, bounded_yaml.dump(data))
 
 
 def description(config: Config, plan: Plan, *, real_time: bool) -> dict[str, str]:
@@ -71,13 +71,13 @@ def description(config: Config, plan: Plan, *, real_time: bool) -> dict[str, str
 
 def flat(section: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
     """Flatten a configuration: `section.key` -> value as JSON."""
-    found: dict[str, str] = {}
+    values: dict[str, str] = {}
     for key, value in section.items():
         if isinstance(value, dict):
-            found.update(flat(value, f"{prefix}{key}."))
+            values.update(flat(value, f"{prefix}{key}."))
         else:
-            found[f"{prefix}{key}"] = json.dumps(value)
-    return found
+            values[f"{prefix}{key}"] = json.dumps(value)
+    return values
 
 
 def _make_absolute(data: dict[str, Any], place: tuple[str, ...]) -> None:
@@ -107,7 +107,7 @@ def copy_trajectory(path: Path, folder: Path) -> str:
         return copy.name
     table = shape.csv.file
     # The table lies beside its file now, so the file must name it by its name alone.
-    name = _TABLE if table.name == path.name else table.name
+    name = _TABLE_FILE if table.name == path.name else table.name
     shutil.copyfile(path.parent / table, folder / name)
     if table == Path(name):
         shutil.copyfile(path, copy)

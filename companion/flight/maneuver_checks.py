@@ -30,7 +30,7 @@ from companion.guidance.trajectory import (
 )
 from companion.safety.table import fence_of
 
-_SLOWER = "make it slower or smaller, or change the limit"
+_SLOWER_REMEDY = "make it slower or smaller, or change the limit"
 
 
 def require_flyable(config: Config, part: Maneuver, drag: KnownDrag) -> None:
@@ -154,7 +154,7 @@ def _motions(part: Maneuver, drag: Drag) -> Iterator[Motion]:
         heading = tau * k / turns
         # A flight checks its maneuvers several times. `Follow` remembers where it began: not kept.
         if isinstance(part, Hashable):
-            yield _kept_motion(part, heading, drag)
+            yield _cached_motion(part, heading, drag)
         else:
             yield _motion(part, heading, drag)
 
@@ -168,14 +168,14 @@ def _motion(part: Maneuver, heading: float, drag: Drag) -> Motion:
     return Motion(times, offset, velocity, acceleration, jerk, turning)
 
 
-_kept_motion = lru_cache(maxsize=32)(_motion)
+_cached_motion = lru_cache(maxsize=32)(_motion)
 
 
 def _refuse(name: str, broken: Violation | None, assumption: str = "") -> None:
     if broken is None:
         return
     # `--slow-down` applies to trajectories only.
-    remedy = _SLOWER if broken.slowing_helps else broken.remedy
+    remedy = _SLOWER_REMEDY if broken.slowing_helps else broken.remedy
     raise ConfigError(f"{name}: {broken}; {remedy}{assumption}")
 
 

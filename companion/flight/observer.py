@@ -29,7 +29,7 @@ class Observer(Protocol):
         ...
 
 
-class Silent:
+class SilentObserver:
     """An observer that ignores everything."""
 
     def phase(self, name: str, waits_for: str) -> None:
@@ -45,7 +45,7 @@ class Silent:
         """Ignore it."""
 
 
-class Several:
+class SeveralObservers:
     """Passes everything to several observers, in order.
 
     Args:
@@ -127,7 +127,7 @@ class EventRecorder:
     @property
     def wants_status(self) -> bool:
         """Whether the observer uses the status, which takes time to compute."""
-        return type(self._observer).status is not Silent.status
+        return type(self._observer).status is not SilentObserver.status
 
     def status(self, status: FlightStatus) -> None:
         """Pass on; the caller notes an exception of the observer, and passes no more states."""
@@ -142,7 +142,7 @@ class EventRecorder:
         try:
             tell(self._observer)
         except Exception as error:
-            self._observer = Silent()
+            self._observer = SilentObserver()
             self.write(f"the observer of this flight failed and gets no more messages: {error!r}")
 
 

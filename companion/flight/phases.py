@@ -15,13 +15,13 @@ _RISING = frozenset({Role.TAKEOFF, Role.READY})
 _STANDING = frozenset({Role.READY})
 _AIRBORNE = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD})
 _UNDER_CONTROL = frozenset({Role.OFFBOARD})
-_GRACE = 10.0
+_MANEUVER_GRACE = 10.0
 """Time that the maneuvers may take beyond their duration, s."""
 _COMMAND_TIMEOUT = 10.0
 """Timeout for commands that the autopilot carries out at once or not at all, s."""
-_TAKE_OVER = 15.0
+_TAKEOVER_TIMEOUT = 15.0
 """Timeout for the takeover with its preflight checks, whose parameters a bad link may lose, s."""
-_LISTENING = 10.0
+_LISTENING_TIMEOUT = 10.0
 """Time for which a vehicle that is not heard any more is listened for, s."""
 
 Work = Callable[[FlightContext], Coroutine[Any, Any, None]]
@@ -80,7 +80,7 @@ def flight_phases(
         "maneuvers",
         "the maneuver to end",
         control_phases.maneuvers,
-        maneuver_duration + _GRACE,
+        maneuver_duration + _MANEUVER_GRACE,
         Exit.LAND,
         modes=_UNDER_CONTROL,
         monitored=True,
@@ -109,7 +109,7 @@ def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, .
             "offboard",
             "the autopilot to obey our rates",
             takeoff.offboard,
-            _TAKE_OVER,
+            _TAKEOVER_TIMEOUT,
             Exit.LAND,
             modes=_RISING | {Role.OFFBOARD},
             monitored=True,
@@ -120,7 +120,7 @@ def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, .
 def takeover_phases(config: FlightConfig) -> tuple[Phase, ...]:
     """The phases that take over a vehicle which its autopilot holds in the air."""
     checks = _checks_phase(config, "to be taken over", takeover.check_airborne, _RISING)
-    return checks, _take_over_held()
+    return checks, _held_takeover_phase()
 
 
 def takeoff_for_client_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, ...]:
@@ -129,7 +129,7 @@ def takeoff_for_client_phases(config: FlightConfig, autopilot: Autopilot) -> tup
     (takeoff_phase,) = (
         phase for phase in takeoff_phases(config, autopilot) if phase.name == "takeoff"
     )
-    return checks, takeoff_phase, _take_over_held()
+    return checks, takeoff_phase, _held_takeover_phase()
 
 
 def _checks_phase(config: FlightConfig, ready: str, work: Work, modes: frozenset[Role]) -> Phase:
@@ -138,13 +138,13 @@ def _checks_phase(config: FlightConfig, ready: str, work: Work, modes: frozenset
     )
 
 
-def _take_over_held() -> Phase:
+def _held_takeover_phase() -> Phase:
     """The takeover of a vehicle that holds in the air; if it fails, the autopilot keeps holding."""
     return Phase(
         "offboard",
         "the autopilot to obey our rates",
         takeoff.offboard,
-        _TAKE_OVER,
+        _TAKEOVER_TIMEOUT,
         Exit.HOLD,
         modes=_RISING | _UNDER_CONTROL,
         monitored=True,
@@ -167,7 +167,7 @@ def program_phase(name: str, waits_for: str, work: Work, duration: float = inf) 
         name,
         waits_for,
         work,
-        duration + _GRACE,
+        duration + _MANEUVER_GRACE,
         Exit.HOLD,
         modes=_UNDER_CONTROL,
         monitored=True,
@@ -205,7 +205,10 @@ def hand_back_phase() -> Phase:
 
 def _listen() -> Phase:
     return Phase(
-        "listen", "the vehicle to be heard and to hold", control_phases.hold_when_heard, _LISTENING
+        "listen",
+        "the vehicle to be heard and to hold",
+        control_phases.hold_when_heard,
+        _LISTENING_TIMEOUT,
     )
 
 

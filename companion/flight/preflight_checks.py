@@ -18,9 +18,9 @@ from companion.vehicle.link import Link
 from companion.vehicle.parameter_rules import CheckResult
 from companion.vehicle.streams import StreamRate
 
-_COUNTED_FOR = 1.0
+_COUNTING_TIME = 1.0
 """Time over which telemetry rates are counted while the parameters are read, s."""
-_LASTS = 1.0
+_MAX_EVIDENCE_AGE = 1.0
 """Time for which counted rates and read parameters stay valid, s."""
 
 
@@ -81,11 +81,11 @@ class PreflightChecks:
             LinkLost: the connection was lost.
         """
         before = evidence = self._evidence
-        if evidence is None or self._clock() - self._gathered_at > _LASTS:
+        if evidence is None or self._clock() - self._gathered_at > _MAX_EVIDENCE_AGE:
             evidence = await gather(
                 self._link,
                 self._granted,
-                _COUNTED_FOR,
+                _COUNTING_TIME,
                 stage=stage,
                 known=None if before is None else before.survey,
             )

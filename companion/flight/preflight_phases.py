@@ -94,9 +94,9 @@ async def undo_arming(context: FlightContext) -> None:
         return
     context.detail = "the autopilot to accept disarming"
     # Sent even if the newest heartbeat says disarmed: it may be older than our arming.
-    ours = in_roles(context.link, {Role.READY, Role.TAKEOFF})
+    require_ours = in_roles(context.link, {Role.READY, Role.TAKEOFF})
     await command_if_ours(
-        context, context.link.autopilot.disarm(), ours, lambda: not context.armed()
+        context, context.link.autopilot.disarm(), require_ours, lambda: not context.armed()
     )
     await context.fresh_heartbeat()
     await context.until(lambda: not context.armed())

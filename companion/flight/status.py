@@ -19,9 +19,9 @@ from companion.safety.actions import internal
 from companion.vehicle.records import Battery, LocalPosition
 
 _PERIOD = 0.1
-_WINDOW = 1.0
+_RATE_WINDOW = 1.0
 """Time over which the rate of setpoints is counted, s."""
-_OUT_OF_DATE = 1.0
+_MAX_TELEMETRY_AGE = 1.0
 """A position or attitude that was received longer ago is unknown by now, s."""
 
 
@@ -200,7 +200,7 @@ class StatusReporter:
         """Setpoints in the last second, Hz; None while none are sent."""
         counted = self._counted
         counted.append((now, record.setpoints))
-        while len(counted) > 2 and now - counted[1][0] >= _WINDOW:
+        while len(counted) > 2 and now - counted[1][0] >= _RATE_WINDOW:
             counted.popleft()
         since, before = counted[0]
         sent = record.setpoints - before
@@ -208,7 +208,7 @@ class StatusReporter:
 
     def _position(self, now: float) -> LocalPosition | None:
         position = self._context.link.state.position
-        return position if position and now - position.received <= _OUT_OF_DATE else None
+        return position if position and now - position.received <= _MAX_TELEMETRY_AGE else None
 
     def _height(self, now: float) -> float | None:
         return self._context.link.state.height if self._position(now) else None
@@ -219,7 +219,7 @@ class StatusReporter:
 
     def _tilt(self, now: float) -> float | None:
         sample = self._context.loop.resets.newest
-        if sample is None or now - sample.received > _OUT_OF_DATE:
+        if sample is None or now - sample.received > _MAX_TELEMETRY_AGE:
             return None
         return tilt_angle(sample.q[1], sample.q[2])
 

@@ -12,10 +12,10 @@ from companion.vehicle.autopilot import ControlEntry, Role
 _SETTLE_TIME = 1.0
 """Hold in offboard before the maneuvers begin, s, so that the takeover does not disturb them."""
 
-_BELOW = 0.5
+_MAX_UNDERSHOOT = 0.5
 """A climb may end this far below the commanded height, m."""
 
-_ABOVE = 3.0
+_MAX_OVERSHOOT = 3.0
 """A climb has failed this far above the commanded height, m; PX4 overshoots by some tenths."""
 
 _ARRIVAL_TIME = 2.0
@@ -41,7 +41,7 @@ async def takeoff(context: FlightContext) -> None:
         context, command, lambda: _require_ground(context), lambda: not state.landed
     )
     climb = _Climb(context, height)
-    await context.until(climb.over)
+    await context.until(climb.is_over)
 
 
 async def offboard(context: FlightContext) -> None:
@@ -61,10 +61,10 @@ class _Climb:
 
     def __init__(self, context: FlightContext, height: float) -> None:
         self._context, self._height = context, height
-        self._begun = False
+        self._has_begun = False
         self._held_at: float | None = None
 
-    def over(self) -> bool:
+    def is_over(self) -> bool:
         """Whether the height is reached; raise `FlightEnded` if somebody stopped the climb."""
         context, state = self._context, self._context.link.state
         if not context.armed():
@@ -73,22 +73,22 @@ class _Climb:
         if height is None or position is None:
             return False
         context.detail = f"{self._height:g} m, now {height:.1f} m"
-        if height > self._height + _ABOVE:
+        if height > self._height + _MAX_OVERSHOOT:
             raise FlightEnded(
                 f"the vehicle climbed to {height:.1f} m, but flight.takeoff_height_m is "
                 f"{self._height:g}"
             )
-        near = height > self._height - _BELOW
-        if not near and self._stopped():
+        is_near_height = height > self._height - _MAX_UNDERSHOOT
+        if not is_near_height and self._was_stopped():
             raise FlightEnded(f"the climb was stopped at {height:.1f} m, not by us", Exit.RELEASE)
-        return near and abs(position.velocity_ned[2]) < 0.3 and not state.taking_off
+        return is_near_height and abs(position.velocity_ned[2]) < 0.3 and not state.taking_off
 
-    def _stopped(self) -> bool:
+    def _was_stopped(self) -> bool:
         """Whether the mode changed from take-off to hold more than `_ARRIVAL_TIME` ago."""
         now = asyncio.get_running_loop().time()
         if in_role(self._context.link, Role.TAKEOFF):
-            self._begun, self._held_at = True, None
-        elif self._begun and self._held_at is None:
+            self._has_begun, self._held_at = True, None
+        elif self._has_begun and self._held_at is None:
             self._held_at = now
         return self._held_at is not None and now - self._held_at > _ARRIVAL_TIME
 
@@ -119,9 +119,9 @@ async def _take_over(context: FlightContext) -> None:
         context.loop.on = True
         await context.until(lambda: in_role(context.link, Role.OFFBOARD))
         return
-    ours = in_roles(context.link, {Role.READY})
+    require_ours = in_roles(context.link, {Role.READY})
     command = autopilot.set_mode(autopilot.offboard_mode)
-    await change_mode(context, command, ours, lambda: in_role(context.link, Role.OFFBOARD))
+    await change_mode(context, command, require_ours, lambda: in_role(context.link, Role.OFFBOARD))
 
 
 def _commands_flight(context: FlightContext) -> bool:

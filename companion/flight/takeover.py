@@ -9,7 +9,7 @@ from companion.flight.preflight_phases import note_heartbeat_rate, report_offboa
 from companion.preflight.evidence import Stage
 from companion.safety.actions import Exit, FlightEnded
 
-_ARMED_SHOWS = 1.5
+_ARMED_REPORT_TIMEOUT = 1.5
 """Longest time from arming to the heartbeat that shows it, s: PX4 sends one a second."""
 
 
@@ -32,7 +32,7 @@ async def check_standing(context: FlightContext) -> None:
         FlightEnded: the vehicle does not stand armed, or a finding blocks the take-off.
     """
     with suppress(TimeoutError):
-        async with asyncio.timeout(_ARMED_SHOWS):
+        async with asyncio.timeout(_ARMED_REPORT_TIMEOUT):
             await context.until(context.armed, "the vehicle to show that it is armed")
     await _check(context, Stage.ARMED, _require_standing)
     await context.until(lambda: context.link.state.home is not None, "the home position")

@@ -20,31 +20,31 @@ def overview(trajectory: Trajectory) -> str:
     )
 
 
-def slowing(before: Trajectory, found: SlowDown) -> tuple[str, ...]:
+def slowing(before: Trajectory, slow_down: SlowDown) -> tuple[str, ...]:
     """What was slowed down, where, by which limit, and the speed left; empty if nothing was."""
-    if not found.parts:
+    if not slow_down.parts:
         return ()
-    after = found.trajectory
-    left = (
+    after = slow_down.trajectory
+    result = (
         f"it lasts {after.duration:.1f} s instead of {before.duration:.1f} s, at most "
         f"{_fastest(after):.2f} m/s instead of {_fastest(before):.2f} m/s"
     )
-    if found.even:
-        (whole,) = found.parts
+    if slow_down.even:
+        (whole,) = slow_down.parts
         note = (
             f"{before.name} is slowed down evenly, by a factor of {whole.factor:.2f}, because "
-            f"{found.reason}; "
+            f"{slow_down.reason}; "
             f"{_limit(after, whole)}"
         )
-        return (f"{note}; {left}",)
+        return (f"{note}; {result}",)
     parts = "; ".join(
         f"from {part.begin:.1f} to {part.end:.1f} s by a factor of up to {part.factor:.2f}, "
         f"{_limit(after, part)}"
-        for part in found.parts[:_MOST_PARTS_SHOWN]
+        for part in slow_down.parts[:_MOST_PARTS_SHOWN]
     )
-    more = len(found.parts) - _MOST_PARTS_SHOWN
-    parts += f"; and {more} more" if more > 0 else ""
-    return (f"{before.name} is slowed down where limits ask for it: {parts}", left)
+    more_count = len(slow_down.parts) - _MOST_PARTS_SHOWN
+    parts += f"; and {more_count} more" if more_count > 0 else ""
+    return (f"{before.name} is slowed down where limits ask for it: {parts}", result)
 
 
 def _limit(trajectory: Trajectory, part: SlowedPart) -> str:

@@ -20,9 +20,9 @@ _STATUS_PERIOD = 0.45
 """Time since the last CURRENT_MODE below which a new one reports a change, s; PX4 sends one every
 0.5 s.
 """
-_QUESTION_PERIOD = 0.15
+_HEARTBEAT_REQUEST_PERIOD = 0.15
 """Shortest time between two requests for a heartbeat, s."""
-_COUNTED = 0.1
+_COUNTING_TIME = 0.1
 """Time over which `set_rates` counts messages, s; nothing waits for it."""
 
 
@@ -61,7 +61,7 @@ class RateRequester:
 
     async def _request(self, message: str, rate: float) -> None:
         try:
-            await self._link.set_rates({message: rate}, window_s=_COUNTED)
+            await self._link.set_rates({message: rate}, window_s=_COUNTING_TIME)
         except LinkError as error:
             self.note(str(error))
 
@@ -87,9 +87,9 @@ class Watch:
         self._ladder = ladder
         self._clock = clock
         self._rate_requester = rate_requester
-        self._status_at = self._status_asked_at = -inf
-        self._status_question: asyncio.Task[None] | None = None
-        self._question: asyncio.Task[None] | None = None
+        self._status_at = self._heartbeat_asked_at = -inf
+        self._heartbeat_request: asyncio.Task[None] | None = None
+        self._mode_request: asyncio.Task[None] | None = None
 
     def judge(self, phase: Phase) -> None:
         """Check the vehicle's identity, its mode and heartbeat, and the safety monitors once.
@@ -113,23 +113,23 @@ class Watch:
         """Check a CURRENT_MODE, which comes twice a second and at once after a status change.
 
         An early one may mean that the vehicle disarmed or is in a failsafe. Only a heartbeat can
-        confirm this, so one is requested, at most every `_QUESTION_PERIOD`.
+        confirm this, so one is requested, at most every `_HEARTBEAT_REQUEST_PERIOD`.
 
         Raises:
             FlightEnded: the phase must end; see `judge`.
         """
         now = self._clock()
         early, self._status_at = now - self._status_at < _STATUS_PERIOD, now
-        asking = self._status_question is not None and not self._status_question.done()
-        if early and not asking and now - self._status_asked_at >= _QUESTION_PERIOD:
-            self._status_asked_at = now
-            self._status_question = asyncio.create_task(self._context.fresh_heartbeat())
+        asking = self._heartbeat_request is not None and not self._heartbeat_request.done()
+        if early and not asking and now - self._heartbeat_asked_at >= _HEARTBEAT_REQUEST_PERIOD:
+            self._heartbeat_asked_at = now
+            self._heartbeat_request = asyncio.create_task(self._context.fresh_heartbeat())
         self.judge(phase)
 
     def ask_mode(self) -> None:
         """Request the mode, and let the loop resume after a gap if the vehicle still obeys us."""
         # Without an answer the silence monitor ends the flight.
-        self._question = asyncio.create_task(self._confirm())
+        self._mode_request = asyncio.create_task(self._confirm())
 
     async def _confirm(self) -> None:
         """Wait for a fresh heartbeat, because one from the backlog may carry an old mode."""

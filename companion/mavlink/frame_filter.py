@@ -10,7 +10,7 @@ from companion.mavlink.stats import LinkStats
 Notice = Callable[[str], None]
 """Called with a sentence about the link for the user."""
 
-_REFUSED = {
+_REFUSED_NOTICES = {
     SignatureResult.UNSIGNED: "the vehicle does not sign its frames, so they are refused; give it "
     "the same key as link.signing_key_file, or leave signing out on both sides",
     SignatureResult.WRONG_KEY: "the vehicle signs its frames with another key, so they are "
@@ -18,7 +18,7 @@ _REFUSED = {
 }
 """Notices about refused signatures. Notices about their time stamps are in `Signing.remarks`."""
 
-_KEY_MISSING = (
+_KEY_MISSING_NOTICE = (
     "the vehicle signs its frames and we do not, so it may obey nothing we send; set "
     "link.signing_key_file to a file with its passphrase"
 )
@@ -61,15 +61,15 @@ class FrameFilter:
         """Whether a frame is signed as required; without a key every frame is good."""
         if self._signing is None:
             if frame.signed:
-                self.notice_once(_KEY_MISSING)
+                self.notice_once(_KEY_MISSING_NOTICE)
             return True
         result = self._signing.check(frame)
         self.tell_remarks()
         if result is SignatureResult.GOOD:
             return True
         self._stats.bad_signature += 1
-        if result in _REFUSED:
-            self.notice_once(_REFUSED[result])
+        if result in _REFUSED_NOTICES:
+            self.notice_once(_REFUSED_NOTICES[result])
         return False
 
     def tell_remarks(self) -> None:

@@ -61,7 +61,7 @@ CRC_EXTRA: dict[int, bytes] = {
 }
 
 
-_ORDERED: dict[int, Callable[[tuple[Any, ...]], tuple[Any, ...]]] = {
+_IN_FIELD_ORDER: dict[int, Callable[[tuple[Any, ...]], tuple[Any, ...]]] = {
     number: itemgetter(*kind.orders)
     for number, kind in _CLASSES.items()
     if len(kind.orders) > 1 and set(kind.lengths) == {1} and "s" not in kind.unpacker.format
@@ -90,8 +90,8 @@ def decode(number: int, payload: bytes) -> Message:
     kind = _CLASSES[number]
     size = kind.unpacker.size
     flat = kind.unpacker.unpack(payload[:size].ljust(size, b"\0"))
-    if number in _ORDERED:
-        return kind(*_ORDERED[number](flat))
+    if number in _IN_FIELD_ORDER:
+        return kind(*_IN_FIELD_ORDER[number](flat))
     wire: list[Any] = []
     at = 0
     for length in kind.lengths:

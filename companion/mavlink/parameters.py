@@ -17,14 +17,14 @@ from companion.mavlink.pending import Pending, PendingRegistry
 from companion.mavlink.router import Router
 from companion.mavlink.settings import LinkSettings
 
-_VALUE = struct.Struct("<4sHH16sB")
-_SET = struct.Struct("<4sBB16sB")
-_READ = struct.Struct("<hBB16s")
+_VALUE_LAYOUT = struct.Struct("<4sHH16sB")
+_SET_LAYOUT = struct.Struct("<4sBB16sB")
+_READ_LAYOUT = struct.Struct("<hBB16s")
 _BY_NAME = -1
 _MAX_NAME = 16
 
-_INTEGERS = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}
-_ERRORS = {
+_INTEGER_LAYOUTS = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}
+_ERROR_TEXTS = {
     1: "the autopilot has no such parameter",
     2: "the value is out of range",
     3: "the parameter is read-only or may not be changed now",
@@ -92,17 +92,17 @@ class ParameterClient:
         self._check(name)
         async with self._locks.setdefault(name, asyncio.Lock()):
             kind = (await self._ask(name, timeout_s, retries)).kind
-            wanted = _Value(self._bytes(name, value, kind), kind)
-            payload = _SET.pack(wanted.raw, *self._target, name.encode(), kind)
-            held = await self._exchange("PARAM_SET", payload, name, timeout_s, retries)
-            if held != wanted:
+            value_wanted = _Value(self._bytes(name, value, kind), kind)
+            payload = _SET_LAYOUT.pack(value_wanted.raw, *self._target, name.encode(), kind)
+            value_held = await self._exchange("PARAM_SET", payload, name, timeout_s, retries)
+            if value_held != value_wanted:
                 raise ParameterRefused(
-                    f"{name}: the autopilot keeps {self._number(held)} instead of {value}"
+                    f"{name}: the autopilot keeps {self._number(value_held)} instead of {value}"
                 )
-            return self._number(held)
+            return self._number(value_held)
 
     async def _ask(self, name: str, timeout_s: float, retries: int) -> _Value:
-        payload = _READ.pack(_BY_NAME, *self._target, name.encode())
+        payload = _READ_LAYOUT.pack(_BY_NAME, *self._target, name.encode())
         return await self._exchange("PARAM_REQUEST_READ", payload, name, timeout_s, retries)
 
     async def _exchange(
@@ -132,29 +132,29 @@ class ParameterClient:
             raise UnknownParameter(f"{name!r} is no parameter name: 1 to 16 ASCII characters")
 
     def _number(self, value: _Value) -> float | int:
-        if self._bytewise() and value.kind in _INTEGERS:
-            integer: int = struct.unpack(_INTEGERS[value.kind], value.raw)[0]
+        if self._bytewise() and value.kind in _INTEGER_LAYOUTS:
+            integer: int = struct.unpack(_INTEGER_LAYOUTS[value.kind], value.raw)[0]
             return integer
         number: float = struct.unpack("<f", value.raw)[0]
         # NaN and infinity cannot become integers; the caller gets them unchanged.
-        return int(number) if value.kind in _INTEGERS and isfinite(number) else number
+        return int(number) if value.kind in _INTEGER_LAYOUTS and isfinite(number) else number
 
     def _bytes(self, name: str, value: float, kind: int) -> bytes:
         if not isfinite(value):
             raise ParameterRefused(f"{name} cannot hold {value}")
         try:
-            if kind not in _INTEGERS:
+            if kind not in _INTEGER_LAYOUTS:
                 return struct.pack("<f", value)
             if value != int(value):
                 raise ParameterRefused(f"{name} is an integer and cannot hold {value}")
             # Packed also when not bytewise, so that the range of the integer type is checked.
-            packed = struct.pack(_INTEGERS[kind], int(value))
+            packed = struct.pack(_INTEGER_LAYOUTS[kind], int(value))
             return packed if self._bytewise() else struct.pack("<f", value)
         except (struct.error, OverflowError, ValueError) as error:
             raise ParameterRefused(f"{name} cannot hold {value}: {error}") from error
 
     def _on_value(self, payload: bytes) -> None:
-        raw, _, _, name, kind = _VALUE.unpack_from(payload.ljust(_VALUE.size, b"\0"))
+        raw, _, _, name, kind = _VALUE_LAYOUT.unpack_from(payload.ljust(_VALUE_LAYOUT.size, b"\0"))
         text = name.split(b"\0", 1)[0].decode("ascii", errors="replace")
         answers = self._waiting.get(text)
         if answers is not None:
@@ -167,6 +167,6 @@ class ParameterClient:
 
 
 def _refused(name: str, code: int) -> UnknownParameter | ParameterRefused:
-    reason = _ERRORS.get(code, f"error {code}")
+    reason = _ERROR_TEXTS.get(code, f"error {code}")
     kind = UnknownParameter if code == 1 else ParameterRefused
     return kind(f"{name}: {reason}")

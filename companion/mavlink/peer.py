@@ -23,13 +23,13 @@ async def resolve(peers: Sequence[PeerAddress], kind: socket.SocketKind) -> "Nam
     admitted: set[tuple[str, int | None]] = set()
     for peer in peers:
         try:
-            found = await loop.getaddrinfo(peer.host, None, type=kind)
+            addresses = await loop.getaddrinfo(peer.host, None, type=kind)
         except OSError as error:
             raise EndpointError(
                 f"the peer {peer.host!r} is unknown ({error.strerror}); check the name or use its "
                 "IP address"
             ) from error
-        admitted |= {(plain_host(str(info[4][0])), peer.port) for info in found}
+        admitted |= {(plain_host(str(info[4][0])), peer.port) for info in addresses}
     return NamedPeers(frozenset(admitted))
 
 
@@ -137,20 +137,20 @@ class PeerRule:
             return False
         return now - self._claimed_at > CLAIM_LASTS_S
 
-    def set_peer(self, who: str) -> None:
-        """Make `who`, given as HOST:PORT, the peer; count a change and report it to the user."""
-        before, self._peer = self._peer, who
+    def set_peer(self, sender: str) -> None:
+        """Make `sender`, given as HOST:PORT, the peer; count a change and report it to the user."""
+        before, self._peer = self._peer, sender
         self.renew()
-        if before is not None and before != who:
+        if before is not None and before != sender:
             self._stats.peers += 1
             self._notice(
-                f"{PEER_NOTICE}the vehicle's frames now come from {who}, before from {before}; "
+                f"{PEER_NOTICE}the vehicle's frames now come from {sender}, before from {before}; "
                 f"to prevent this, name the vehicle's address in the endpoint (?peer=ADDRESS)"
             )
 
-    def ignore(self, who: str) -> None:
-        """Tell the user that `who` sends, but is not one of the peers that the endpoint names."""
+    def ignore(self, sender: str) -> None:
+        """Tell the user that `sender` sends, but the endpoint does not name it as a peer."""
         self._notice(
-            f"{PEER_NOTICE}frames from {who} are ignored, as the endpoint names another peer; "
-            f"if {who} is the vehicle, correct ?peer="
+            f"{PEER_NOTICE}frames from {sender} are ignored, as the endpoint names another peer; "
+            f"if {sender} is the vehicle, correct ?peer="
         )

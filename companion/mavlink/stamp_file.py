@@ -14,7 +14,7 @@ from companion.mavlink.errors import SigningError
 from companion.mavlink.stamps import MOST_TICKS, Stamps, Stream
 
 _FOLDER = Path("mavlink-companion", "signing")
-_MOST_BYTES = 4_000_000
+_MAX_FILE_BYTES = 4_000_000
 """Largest file read, bytes; 65536 streams of one vehicle need less."""
 
 
@@ -44,7 +44,7 @@ class StampFile:
         """
         try:
             with self.path.open("rb") as file:
-                return _parsed(file.read(_MOST_BYTES)), None
+                return _parsed(file.read(_MAX_FILE_BYTES)), None
         except FileNotFoundError:
             return Stamps(), None
         except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:

@@ -19,10 +19,10 @@ _DAY = 86_400 * TICKS_PER_S
 _MINUTE = 60 * TICKS_PER_S
 _PROGRAM_DATE = (1_788_220_800 - EPOCH_UNIX_S) * TICKS_PER_S
 """2026-09-01, ticks. A correct clock is never earlier; raise this date with a release."""
-_FURTHEST = 5 * 365 * _DAY
+_MAX_AHEAD = 5 * 365 * _DAY
 """Furthest that an accepted stamp may be ahead of the date, ticks."""
 
-MOST_TICKS = 2**48 - 2 * _FURTHEST
+MOST_TICKS = 2**48 - 2 * _MAX_AHEAD
 """Latest date that is used (2094), ticks, so that every stamp fits into 48 bits."""
 
 Stream = tuple[int, int, int]
@@ -110,7 +110,7 @@ class StampJudge:
     def awaits_answer(self, stamp: int) -> bool:
         """Whether `stamp` would be accepted if its frame answered a TIMESYNC request."""
         date = self.date()
-        in_reach = date + _DAY < stamp <= date + _FURTHEST
+        in_reach = date + _DAY < stamp <= date + _MAX_AHEAD
         # Once a signer near the date was heard, no other changes the date.
         return in_reach and not self._answered and not self._newest[False]
 
@@ -124,7 +124,7 @@ class StampJudge:
         """
         date = self.date()
         ahead = stamp > date + _DAY
-        if stamp > date + _FURTHEST:
+        if stamp > date + _MAX_AHEAD:
             self._remark_ahead(stamp - date, f"and refused; {SET_CLOCK}, or the vehicle's")
             return SignatureResult.AHEAD
         if stamp <= self._lower_bound(stream, ahead, date):

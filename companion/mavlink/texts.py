@@ -9,8 +9,8 @@ from companion.mavlink.messages import CRC_EXTRA, Message, dialect, encode
 
 _CHUNK_CHARACTERS = 50
 MOST_TEXT_NUMBER = 0xFFFF
-_KEPT = 100
-_SAME_WITHIN_S = 1.0
+_MAX_TEXTS = 100
+_REPETITION_TIME_S = 1.0
 
 
 class StatusText(NamedTuple):
@@ -35,11 +35,11 @@ class TextAssembler:
     """
 
     def __init__(self) -> None:
-        self.texts: deque[StatusText] = deque(maxlen=_KEPT)
+        self.texts: deque[StatusText] = deque(maxlen=_MAX_TEXTS)
         self._id = 0
         self._parts: list[str] = []
         self._severity = 6
-        self._events: deque[StatusText] = deque(maxlen=_KEPT)
+        self._events: deque[StatusText] = deque(maxlen=_MAX_TEXTS)
 
     def take_event(self, severity: int, words: str, now: float) -> None:
         """Take the text of an event.
@@ -86,7 +86,7 @@ class TextAssembler:
 
 def _recent(texts: deque[StatusText], words: str, now: float) -> bool:
     """Whether one of `texts` from the last second has the same words."""
-    return any(one.text == words for one in texts if one.time >= now - _SAME_WITHIN_S)
+    return any(text.text == words for text in texts if text.time >= now - _REPETITION_TIME_S)
 
 
 def status_texts(text: str, severity: int, number: int) -> list[Message]:

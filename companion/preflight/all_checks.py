@@ -16,9 +16,9 @@ ONCE: tuple[Check, ...] = (
     offboard_loss,
     configuration_checks.planner,
     configuration_checks.dead_time,
-    configuration_checks.doubtful,
+    configuration_checks.doubtful_values,
     configuration_checks.tilt_compensation,
-    configuration_checks.accepted,
+    configuration_checks.accept_entries,
 )
 """Checks that a flight runs only once, because the vehicle's state does not change their result."""
 

@@ -14,7 +14,7 @@ SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.IN
 
 _MANY_NOT_NEWER = 0.2
 _SAMPLES_NEEDED = 10
-_SHAKES, _MAY_SHAKE = 0.3, 0.15
+_SHAKING_PRODUCT, _MAYBE_SHAKING_PRODUCT = 0.3, 0.15
 """Products of planner.gain_per_s and the round trip, from mock vehicles. Above the first, attitude
 oscillates at the limit of the roll-pitch rate; above the second, that of a slow vehicle may.
 """
@@ -55,14 +55,16 @@ def round_trip(config: Config, seconds: float) -> Finding:
     gain = config.planner.gain_per_s
     gain_matters = config.planner_name in PLANNER_NAMES and not config.link.lockstep
     product = gain * seconds if gain_matters else 0.0
-    late = product > _MAY_SHAKE
+    late = product > _MAYBE_SHAKING_PRODUCT
     return Finding(
         Key.ROUND_TRIP,
-        UNSAFE if product > _SHAKES else INEFFECTIVE if late else SAFE,
+        UNSAFE if product > _SHAKING_PRODUCT else INEFFECTIVE if late else SAFE,
         f"the link's round trip takes {1e3 * seconds:.1f} ms"
         + (f", long for planner.gain_per_s {gain:g}" if late else ""),
         "the vehicle shakes, because the attitude is corrected too late" if late else "",
-        f"use a faster link, or a gain of at most {_MAY_SHAKE / seconds:.1f}" if late else "",
+        f"use a faster link, or a gain of at most {_MAYBE_SHAKING_PRODUCT / seconds:.1f}"
+        if late
+        else "",
         "TIMESYNC",
     )
 

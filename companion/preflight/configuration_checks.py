@@ -71,7 +71,7 @@ def dead_time(config: Config, evidence: Evidence) -> Iterator[Finding]:
     )
 
 
-def doubtful(config: Config, _: Evidence) -> Iterator[Finding]:
+def doubtful_values(config: Config, _: Evidence) -> Iterator[Finding]:
     """Values that are probably a mistake, or not measured on this vehicle."""
     for doubt in doubts(config):
         key = doubt.key if doubt.key in (Key.IDENTIFIED, Key.BODY_RATE) else Key.UNITS
@@ -93,7 +93,7 @@ def tilt_compensation(config: Config, evidence: Evidence) -> Iterator[Finding]:
         )
 
 
-def accepted(config: Config, _: Evidence) -> Iterator[Finding]:
+def accept_entries(config: Config, _: Evidence) -> Iterator[Finding]:
     """Whether each entry of `flight.accept` names a check that exists."""
     streams = {
         f"{Key.STREAMS}.{name}" for autopilot in AUTOPILOTS for name in autopilot.wanted_rates
@@ -118,11 +118,15 @@ def _newest_dead_times(config: Config, uid: str | None) -> tuple[Path | None, di
     A flight counts if vehicle (hardware id), planner and gain are the same. All vehicles without an
     id count as the same. Without such a flight: None and no dead times.
     """
-    kind = uid, config.planner_name, config.planner.gain_per_s
+    wanted_flight = uid, config.planner_name, config.planner.gain_per_s
     for summary in sorted(config.recording.directory.glob("*/summary.json"), reverse=True):
         try:
             flight = json.loads(summary.read_text(encoding="utf-8"))
-            if (flight.get("vehicle_uid"), flight["planner"], flight["gain_per_s"]) != kind:
+            if (
+                flight.get("vehicle_uid"),
+                flight["planner"],
+                flight["gain_per_s"],
+            ) != wanted_flight:
                 continue
             axes = {name: flight["dead_time_s"][name] for name in ("roll", "pitch", "yaw")}
         except (OSError, ValueError, KeyError, TypeError, AttributeError):

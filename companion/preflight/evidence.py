@@ -13,7 +13,7 @@ from companion.vehicle.autopilot import Autopilot
 from companion.vehicle.state import VehicleState
 from companion.vehicle.streams import StreamRate
 
-_ABOUT_POSITION = frozenset(
+_POSITION_MESSAGES = frozenset(
     {"LOCAL_POSITION_NED", "GLOBAL_POSITION_INT", "HOME_POSITION", "ODOMETRY"}
 )
 """Messages that autopilots send only when their estimator has a position."""
@@ -175,5 +175,5 @@ class Evidence:
             for name, rate in self.streams.items()
             if rate.achieved == 0.0
             and not rate.refusal
-            and (self.booting or name in _ABOUT_POSITION)
+            and (self.booting or name in _POSITION_MESSAGES)
         )

@@ -13,33 +13,33 @@ from companion.vehicle.streams import StreamRate
 
 SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 
-_REACHED = 0.7
+_MIN_RATE_SHARE = 0.7
 """Smallest share of the requested rate; PX4 sends 197 Hz of 250 requested (measured)."""
-_COUNTABLE = 5.0
+_MIN_EXPECTED_COUNT = 5.0
 """Smallest number of expected messages while we listen to judge a rate by counting."""
 _SENT_ON_CHANGE = {"CURRENT_MODE": 2.0}
 """Messages sent on change, and otherwise only at this rate, Hz, whatever rate is requested (PX4).
 """
-_MANY_LOST = 0.2
-_SOME_DAMAGED = 0.01
+_UNSAFE_LOSS_SHARE = 0.2
+_MAX_DAMAGED_SHARE = 0.01
 
 
 def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """Whether the requested telemetry arrives at the requested rates."""
     link = config.link
-    least = {
+    minimum_rates = {
         "ATTITUDE_QUATERNION": ("min_attitude_rate_hz", link.min_attitude_rate_hz),
         "LOCAL_POSITION_NED": ("min_position_rate_hz", link.min_position_rate_hz),
     }
-    good = []
+    good_rates = []
     for name, rate in evidence.streams.items():
-        trouble = _trouble(name, rate, evidence)
-        if name in evidence.awaited and rate.granted >= _REACHED * rate.asked:
+        fault = _rate_fault(name, rate, evidence)
+        if name in evidence.awaited and rate.granted >= _MIN_RATE_SHARE * rate.asked:
             continue  # `readiness` reports it
         even = _even_rate(name, rate, evidence)
-        if name in least and even < least[name][1]:
-            key, limit = least[name]
-            uneven = even < _REACHED * rate.achieved
+        if name in minimum_rates and even < minimum_rates[name][1]:
+            key, limit = minimum_rates[name]
+            uneven = even < _MIN_RATE_SHARE * rate.achieved
             arrives = f"arrives at {even:.0f} Hz"
             if uneven:
                 arrives = (
@@ -51,19 +51,19 @@ def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
                 UNSAFE,
                 f"{name} {arrives}, less than link.{key} = {limit:g}",
                 "the flight would be controlled with data that is too old",
-                trouble[1] if trouble else "raise the link's speed",
+                fault[1] if fault else "raise the link's speed",
                 source="counted",
             )
-        elif trouble is not None:
-            found, fix = trouble
+        elif fault is not None:
+            found, fix = fault
             because = "what depends on this message is delayed or does not work"
             yield Finding(
                 f"{Key.STREAMS}.{name}", INEFFECTIVE, found, because, fix, source="counted"
             )
         else:
-            good.append(f"{name} {rate.achieved:.0f} of {rate.asked:g}")
-    if good:
-        found = f"telemetry arrives, Hz: {', '.join(good)}"
+            good_rates.append(f"{name} {rate.achieved:.0f} of {rate.asked:g}")
+    if good_rates:
+        found = f"telemetry arrives, Hz: {', '.join(good_rates)}"
         yield Finding(Key.STREAMS, SAFE, found, source="counted")
 
 
@@ -75,19 +75,19 @@ def _even_rate(name: str, rate: StreamRate, evidence: Evidence) -> float:
     return min(rate.achieved, samples)
 
 
-def _trouble(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, str] | None:
+def _rate_fault(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, str] | None:
     """The fault of a message's rate, and the remedy; None: no fault."""
     asked, achieved = rate.asked, rate.achieved
     if rate.refusal:
         return f"{name} is refused ({rate.refusal})", "a newer version of the autopilot may send it"
-    if rate.granted < _REACHED * asked:
+    if rate.granted < _MIN_RATE_SHARE * asked:
         return (
             f"{name}: asked for {asked:g} Hz, granted {rate.granted:g} Hz",
             "ask for less, or let the autopilot's loop run faster",
         )
     asked = min(asked, _SENT_ON_CHANGE.get(name, asked))
-    countable = asked * evidence.window >= _COUNTABLE
-    if achieved >= _REACHED * asked if countable else evidence.received[name] > 0:
+    countable = asked * evidence.window >= _MIN_EXPECTED_COUNT
+    if achieved >= _MIN_RATE_SHARE * asked if countable else evidence.received[name] > 0:
         return None
     return (
         f"{name} arrives at {achieved:.0f} Hz, asked for {asked:g} Hz",
@@ -99,7 +99,7 @@ def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
     """Check the link for lost messages, damaged messages and reconnects."""
     link = evidence.link
     share = link.loss
-    result = UNSAFE if share > _MANY_LOST else INEFFECTIVE if share > SOME_LOST else SAFE
+    result = UNSAFE if share > _UNSAFE_LOSS_SHARE else INEFFECTIVE if share > SOME_LOST else SAFE
     bad = result is not SAFE
     yield Finding(
         Key.LOSS,
@@ -109,7 +109,7 @@ def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
         "ask for lower rates, or use a faster or better link" if bad else "",
         "gaps in MAVLink sequence numbers",
     )
-    if link.damaged > _SOME_DAMAGED * max(1, link.frames):
+    if link.damaged > _MAX_DAMAGED_SHARE * max(1, link.frames):
         yield Finding(
             Key.DAMAGE,
             INEFFECTIVE,

@@ -22,11 +22,11 @@ _SETPOINTS = frozenset(
         dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT,
     }
 )
-_STILL = 0.05
+_MAX_IDLE_TARGET = 0.05
 """Largest body rate (rad/s) and thrust in ATTITUDE_TARGET of a disarmed autopilot that receives no
 setpoints (recorded: 0.02 rad/s, 0).
 """
-_ENOUGH = 10
+_MIN_SAMPLES = 10
 """Smallest number of samples to measure the rate of a clock."""
 
 
@@ -75,7 +75,7 @@ class LinkListener:
         if not pairs:
             return SampleTimes(len(self._stamps), unusable=self._unusable)
         (first, first_stamp), (last, last_stamp) = self._stamps[0], self._stamps[-1]
-        known = len(self._stamps) >= _ENOUGH and last > first
+        known = len(self._stamps) >= _MIN_SAMPLES and last > first
         held, clock = HeldRates(), self._link.clock
         for earlier, later in pairs:
             held.add(later[0] - earlier[0])
@@ -123,7 +123,7 @@ class LinkListener:
 
     def _on_target(self, message: Message) -> None:
         rates = message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate
-        moving = any(abs(value) > _STILL for value in (*rates, message.thrust))
+        moving = any(abs(value) > _MAX_IDLE_TARGET for value in (*rates, message.thrust))
         self._echo = self._echo or (moving and self._link.state.armed is False)
 
     def _on_odometry(self, message: Message) -> None:

@@ -27,14 +27,14 @@ from companion.vehicle.parameter_rules import CheckResult
 
 _PERIOD = 0.05
 """Shortest time between the points of the maneuvers that are checked, s."""
-_MOST = 1500
+_MAX_POINTS = 1500
 """Largest number of these points; longer maneuvers are checked at longer intervals."""
-_AHEAD = 0.02
+_DERIVATIVE_STEP = 0.02
 """Time over which the rate of change of the thrust is taken, s."""
 _START = Pose((0.0, 0.0, 0.0), 0.0)
 
 
-class Worst(NamedTuple):
+class WorstReach(NamedTuple):
     """The largest reach over the maneuvers.
 
     Attributes:
@@ -53,38 +53,38 @@ class Worst(NamedTuple):
 def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """How far the vehicle is carried if our setpoints stop at the worst moment of the flight."""
     failsafe, maneuvers = evidence.autopilot.offboard_loss_failsafe, evidence.maneuvers
-    held = evidence.survey.values.get(failsafe.parameter)
-    if maneuvers is None or held is None or not 0.0 <= held <= LONGEST_HELD:
+    hold_time = evidence.survey.values.get(failsafe.parameter)
+    if maneuvers is None or hold_time is None or not 0.0 <= hold_time <= LONGEST_HELD:
         return  # an unknown or longer time is unsafe, whatever is flown
     drag = evidence.known_drag.least
-    worst = worst_reach(config, maneuvers, held, drag, brakes=failsafe.brakes)
-    carried = (
-        f"should our setpoints end, the last rates are held for {held:g} s "
+    worst = worst_reach(config, maneuvers, hold_time, drag, brakes=failsafe.brakes)
+    reach_text = (
+        f"should our setpoints end, the last rates are held for {hold_time:g} s "
         f"({failsafe.parameter}), and can carry the vehicle {worst.away:.0f} m away, "
         f"{worst.up:.0f} m up and {worst.down:.0f} m down"
     )
     source = "worst case of docs/exits.md"
     if worst.breach is None:
-        yield Finding(Key.OFFBOARD_LOSS, CheckResult.SAFE, carried, source=source)
+        yield Finding(Key.OFFBOARD_LOSS, CheckResult.SAFE, reach_text, source=source)
         return
     shortest = shortest_hold(config.deadman.silence_limit)
-    shorter = f"set {failsafe.parameter} to {shortest:g}, " if held > shortest else ""
+    shorter_hold = f"set {failsafe.parameter} to {shortest:g}, " if hold_time > shortest else ""
     yield Finding(
         Key.OFFBOARD_LOSS,
         CheckResult.INEFFECTIVE,
-        carried,
+        reach_text,
         f"if that happens {worst.time:.1f} s after control begins, the vehicle can end "
         f"{worst.breach}",
-        f"{shorter}fly more slowly or with a lower limits.max_tilt_rate_deg_s, or farther from the "
-        "fence and the ground",
+        f"{shorter_hold}fly more slowly or with a lower limits.max_tilt_rate_deg_s, or farther "
+        "from the fence and the ground",
         source,
     )
 
 
 def worst_reach(
-    config: Config, maneuvers: ManeuverSequence, held: float, drag: Drag, *, brakes: bool
-) -> Worst:
-    """The largest reach over the maneuvers; `held`, `drag` and `brakes` as in `LossFailsafe`."""
+    config: Config, maneuvers: ManeuverSequence, hold_time: float, drag: Drag, *, brakes: bool
+) -> WorstReach:
+    """The largest reach over the maneuvers; `hold_time` is `LossFailsafe.held`."""
     limits, safety = config.limits, config.safety
     fence = Fence(
         limits.fence_radius_m,
@@ -96,20 +96,20 @@ def worst_reach(
         safety.reaction_s,
     )
     max_tilt_rate = limits.max_tilt_rate
-    loss, worst = LossFailsafe(held, brakes, drag, max_tilt_rate, fence), Worst()
-    before: MotionAtLoss | None = None
-    for time, flown in _flown(config, maneuvers, drag):
-        if flown != before:  # in a hover the motion stays the same
-            before, reached = flown, reach(flown, loss)
-        breach, at = worst.breach, worst.time
+    loss, worst = LossFailsafe(hold_time, brakes, drag, max_tilt_rate, fence), WorstReach()
+    motion_before: MotionAtLoss | None = None
+    for time, motion in _motions(config, maneuvers, drag):
+        if motion != motion_before:  # in a hover the motion stays the same
+            motion_before, reached = motion, reach(motion, loss)
+        breach, breach_time = worst.breach, worst.time
         if breach is None:
-            breach, at = _breach(config, flown.offset, reached, loss.fence), time
-        worst = Worst(
+            breach, breach_time = _breach(config, motion.offset, reached, loss.fence), time
+        worst = WorstReach(
             max(worst.away, reached.away),
             max(worst.up, reached.up),
             max(worst.down, reached.down),
             breach,
-            at,
+            breach_time,
         )
     return worst
 
@@ -138,7 +138,7 @@ def _breach(config: Config, offset: Vector, reached: Reach, fence: Fence) -> str
     return None
 
 
-def _flown(
+def _motions(
     config: Config, maneuvers: ManeuverSequence, drag: Drag
 ) -> Iterator[tuple[float, MotionAtLoss]]:
     """Time (s after control begins) and motion at each checked point of the maneuvers.
@@ -146,7 +146,7 @@ def _flown(
     In open-loop steps the tilt follows the attitude law.
     """
     gain = config.planner.gain_per_s
-    period = max(_PERIOD, maneuvers.duration / _MOST)
+    period = max(_PERIOD, maneuvers.duration / _MAX_POINTS)
     velocity: Vector = (0.0, 0.0, 0.0)
     place: Vector = (0.0, 0.0, 0.0)
     tilt = (0.0, 0.0)
@@ -156,23 +156,35 @@ def _flown(
         if reference.closed_loop:
             place, velocity = reference.position_ned, reference.velocity_ned
             thrust = path_thrust(reference.acceleration_ned, velocity, drag)
-            ahead = maneuvers.at(time + _AHEAD, _START)
-            later = path_thrust(ahead.acceleration_ned, ahead.velocity_ned, drag)
-            turn = tuple((b - a) / _AHEAD for a, b in zip(thrust, later, strict=True))
-            size = hypot(*thrust)
-            tilt = (thrust[0] / size, thrust[1] / size)
-            yield time, MotionAtLoss(place, velocity, thrust, (turn[0], turn[1], turn[2]))
+            reference_after = maneuvers.at(time + _DERIVATIVE_STEP, _START)
+            thrust_after = path_thrust(
+                reference_after.acceleration_ned, reference_after.velocity_ned, drag
+            )
+            thrust_rate = tuple(
+                (b - a) / _DERIVATIVE_STEP for a, b in zip(thrust, thrust_after, strict=True)
+            )
+            thrust_magnitude = hypot(*thrust)
+            tilt = (thrust[0] / thrust_magnitude, thrust[1] / thrust_magnitude)
+            yield (
+                time,
+                MotionAtLoss(
+                    place, velocity, thrust, (thrust_rate[0], thrust_rate[1], thrust_rate[2])
+                ),
+            )
             continue
         rates, tilt_after = _tilt_step(reference, tilt, gain, period)
         thrust = tilted_thrust(*tilt)
-        turn_north, turn_east = (hypot(*thrust) * rate for rate in rates)
-        yield time, MotionAtLoss(place, velocity, thrust, (turn_north, turn_east, 0.0))
+        thrust_rate_north, thrust_rate_east = (hypot(*thrust) * rate for rate in rates)
+        yield (
+            time,
+            MotionAtLoss(place, velocity, thrust, (thrust_rate_north, thrust_rate_east, 0.0)),
+        )
         tilt = tilt_after
         north, east, _ = tilted_thrust(*tilt)
-        slowed = drag.deceleration(velocity)
+        drag_deceleration = drag.deceleration(velocity)
         velocity = (
-            velocity[0] + (north - slowed[0]) * period,
-            velocity[1] + (east - slowed[1]) * period,
+            velocity[0] + (north - drag_deceleration[0]) * period,
+            velocity[1] + (east - drag_deceleration[1]) * period,
             0.0,
         )
         place = (place[0] + velocity[0] * period, place[1] + velocity[1] * period, place[2])
@@ -188,11 +200,11 @@ def _tilt_step(
         coefficients at the end of the period.
     """
     if reference.coefficients is not None:
-        aim = reference.coefficients
-        left = exp(-gain * period)
-        north, east = (goal - now for goal, now in zip(aim, tilt, strict=True))
-        after = (aim[0] - north * left, aim[1] - east * left)
-        return (gain * north, gain * east), after
+        tilt_goal = reference.coefficients
+        remaining_share = exp(-gain * period)
+        north, east = (goal - now for goal, now in zip(tilt_goal, tilt, strict=True))
+        tilt_after = (tilt_goal[0] - north * remaining_share, tilt_goal[1] - east * remaining_share)
+        return (gain * north, gain * east), tilt_after
     assert reference.body_rates is not None
     north, east = -reference.body_rates.pitch, reference.body_rates.roll
     return (north, east), (tilt[0] + north * period, tilt[1] + east * period)

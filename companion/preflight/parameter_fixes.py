@@ -18,7 +18,7 @@ from companion.preflight.evidence import Identity
 from companion.preflight.finding import Change, Finding
 from companion.vehicle.link import Link
 
-Word = Annotated[str, Field(max_length=100)]
+ShortText = Annotated[str, Field(max_length=100)]
 LARGEST = 3.4028234e38
 """Largest finite 32-bit float, which is what PARAM_SET carries."""
 
@@ -26,15 +26,15 @@ LARGEST = 3.4028234e38
 class Undo(Section):
     """Contents of an undo file: the old values and their vehicle."""
 
-    autopilot: Word
+    autopilot: ShortText
     """Autopilot of the vehicle, by name."""
     system: Annotated[int, Field(ge=1, le=255)]
     """The vehicle's system id."""
-    uid: Word | None
+    uid: ShortText | None
     """Hardware id of AUTOPILOT_VERSION; null: not received."""
-    time: Word
+    time: ShortText
     """Time when `doctor --fix` began to propose changes, UTC."""
-    parameters: dict[Word, Annotated[float, Field(ge=-LARGEST, le=LARGEST)]]
+    parameters: dict[ShortText, Annotated[float, Field(ge=-LARGEST, le=LARGEST)]]
     """Old value of each parameter, in the order in which they were set."""
 
     def meant_for(self, link: Link, identity: Identity) -> bool:
@@ -99,9 +99,9 @@ def _unused(directory: Path, name: str) -> Path:
     return path
 
 
-_SINGLE = 1e-6
+_FLOAT32_RESOLUTION = 1e-6
 """Relative resolution of a single-precision parameter."""
-_KNOWN_FOR = 3.0
+_MAX_HEARTBEAT_AGE = 3.0
 """Largest age of a heartbeat from which the vehicle counts as known to be armed or disarmed, s."""
 
 
@@ -199,7 +199,7 @@ def require_disarmed(link: Link) -> None:
         VehicleArmedError: The vehicle is armed, or its last heartbeat is too old.
     """
     heartbeat, now = link.state.heartbeat, asyncio.get_running_loop().time()
-    if heartbeat is None or now - heartbeat.received > _KNOWN_FOR:
+    if heartbeat is None or now - heartbeat.received > _MAX_HEARTBEAT_AGE:
         raise VehicleArmedError(
             "no heartbeat any more, so it is not known whether the vehicle is armed; "
             "no more parameters are set"
@@ -214,9 +214,11 @@ async def _set(link: Link, change: Change) -> Outcome:
     """Set a parameter and read it back. Raises `LinkLost`."""
     try:
         await link.write_parameter(change.parameter, change.new)
-        held = await link.read_parameter(change.parameter)
+        value_held = await link.read_parameter(change.parameter)
     except ParameterError as error:
         return Outcome(change, str(error))
-    if isclose(held, change.new, rel_tol=_SINGLE, abs_tol=_SINGLE):
+    if isclose(value_held, change.new, rel_tol=_FLOAT32_RESOLUTION, abs_tol=_FLOAT32_RESOLUTION):
         return Outcome(change)
-    return Outcome(change, f"{change.parameter}: {held:g} was read back instead of {change.new:g}")
+    return Outcome(
+        change, f"{change.parameter}: {value_held:g} was read back instead of {change.new:g}"
+    )

@@ -9,7 +9,7 @@ from companion.mavlink.stats import SOME_LOST, share_lost
 from companion.vehicle.link import Link
 from companion.vehicle.parameter_rules import ParameterRule, Values
 
-_AT_ONCE = 8
+_MAX_OPEN_REQUESTS = 8
 """Number of parameter requests under way at a time. ArduPilot queues 20 and drops the rest; at
 57600 baud eight take 30 ms.
 """
@@ -27,11 +27,11 @@ class RetryPolicy(NamedTuple):
     tries: int
 
 
-_AT_FIRST = RetryPolicy(0.5, 3)
+_FIRST_ROUND = RetryPolicy(0.5, 3)
 """First round. Old versions of PX4 do not answer for a parameter that they lack; each of these
 costs 1.5 s.
 """
-_ONCE_MORE = RetryPolicy(0.75, 6)
+_SECOND_ROUND = RetryPolicy(0.75, 6)
 """Second round. If each direction loses one frame in five, 5 % of the parameters get no answer to
 the first three requests, and 0.01 % get none after six more.
 """
@@ -59,8 +59,8 @@ async def survey(
     rules: Iterable[ParameterRule],
     *,
     before: Survey | None = None,
-    at_first: RetryPolicy = _AT_FIRST,
-    once_more: RetryPolicy = _ONCE_MORE,
+    at_first: RetryPolicy = _FIRST_ROUND,
+    once_more: RetryPolicy = _SECOND_ROUND,
 ) -> Survey:
     """Read the rules' parameters, several at a time; ask again if the link loses frames.
 
@@ -111,7 +111,7 @@ class _Questions:
         self.names: dict[str, str] = {}
         self._link = link
         self._frames, self._lost = link.stats.frames, link.stats.lost
-        self._free = asyncio.Semaphore(_AT_ONCE)
+        self._free = asyncio.Semaphore(_MAX_OPEN_REQUESTS)
         self._none: set[str] = set()
         self._repeated = False
 

@@ -25,12 +25,12 @@ from companion.vehicle.link import Link
 from companion.vehicle.parameter_rules import CheckResult
 from companion.vehicle.streams import StreamRate
 
-_LISTENING = 3.0
+_LISTENING_TIME = 3.0
 """Time for listening, s; enough to count messages at 2 Hz."""
 _POLL = 0.05
 _WARNING = 4
 """MAV_SEVERITY of a warning; a lower number is worse."""
-_RELEASES = {0: "-dev", 64: "-alpha", 128: "-beta", 192: "-rc", 255: ""}
+_RELEASE_SUFFIXES = {0: "-dev", 64: "-alpha", 128: "-beta", 192: "-rc", 255: ""}
 """FIRMWARE_VERSION_TYPE, the lowest byte of `flight_sw_version`."""
 
 
@@ -70,7 +70,7 @@ async def gather(
     loop = asyncio.get_running_loop()
     before, began = replace(link.stats), loop.time()
     with LinkListener(link, loop.time) as listener:
-        read, achieved, identity = await asyncio.gather(
+        parameters_read, achieved, identity = await asyncio.gather(
             survey(link, link.autopilot.parameters, before=known),
             link.measure_rates(granted, seconds),
             _identity_and_words(link) if thorough else identify(link),
@@ -79,7 +79,7 @@ async def gather(
     return Evidence(
         autopilot=link.autopilot,
         state=link.state,
-        survey=read,
+        survey=parameters_read,
         streams={name: rate._replace(achieved=achieved[name]) for name, rate in granted.items()},
         received={name: counts.get(message_id(name), 0) for name in granted},
         window=seconds,
@@ -112,7 +112,7 @@ async def identify(link: Link) -> Identity:
     number, uid, uid2 = received.flight_sw_version, received.uid, received.uid2
     version = ".".join(str(number >> shift & 0xFF) for shift in (24, 16, 8))
     return Identity(
-        version=version + _RELEASES.get(number & 0xFF, ""),
+        version=version + _RELEASE_SUFFIXES.get(number & 0xFF, ""),
         capabilities=received.capabilities,
         uid=bytes(uid2).hex() if any(uid2) else f"{uid:016x}" if uid else None,
     )
@@ -198,11 +198,11 @@ class PreflightSession:
         granted = await link.set_rates(wanted_rates(self._config, link), window_s=0.1)
         with suppress(TimeoutError):
             async with asyncio.timeout(ready_within):
-                while self._waits():  # noqa: ASYNC110 - telemetry sets no events
+                while self._is_waiting():  # noqa: ASYNC110 - telemetry sets no events
                     await asyncio.sleep(_POLL)
-        return await gather(link, granted, _LISTENING, thorough=True, notices=self._notices)
+        return await gather(link, granted, _LISTENING_TIME, thorough=True, notices=self._notices)
 
-    def _waits(self) -> bool:
+    def _is_waiting(self) -> bool:
         state = self.link.state
         return not state.armed and self.link.autopilot.not_ready(state.readiness) is not None
 

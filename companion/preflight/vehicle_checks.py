@@ -13,7 +13,7 @@ from companion.vehicle.state import GROUND_HEIGHT, VehicleState
 SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 NOT_READY = CheckResult.NOT_READY
 
-_FEW_UNUSABLE = 0.01
+_MAX_UNUSABLE_SHARE = 0.01
 """Largest share of unusable attitude samples that damaged messages can explain."""
 
 
@@ -169,7 +169,7 @@ def attitude(_: Config, evidence: Evidence) -> Iterator[Finding]:
     if samples.unusable:
         yield Finding(
             Key.ATTITUDE,
-            UNSAFE if samples.unusable > _FEW_UNUSABLE * samples.heard else INEFFECTIVE,
+            UNSAFE if samples.unusable > _MAX_UNUSABLE_SHARE * samples.heard else INEFFECTIVE,
             f"{samples.unusable} of {samples.heard} attitude samples are no unit quaternion of "
             "finite numbers",
             "they are not answered, and if that lasts, control is given back",

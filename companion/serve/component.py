@@ -16,9 +16,9 @@ from companion.serve.network.network import Network
 from companion.serve.network.routing import Channel
 
 _HEARTBEAT_PERIOD = 1.0
-_LONGEST_TEXT = 200
+_MAX_TEXT_LENGTH = 200
 """Number of characters after which a text is cut."""
-_SAME_TEXT = 5.0
+_TEXT_REPEAT_PERIOD = 5.0
 """Shortest time between two equal texts to the same client, s."""
 _AUTOPILOT_INVALID, _STATE_ACTIVE, _VERSION = 8, 4, 3
 _COMMANDS = dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT
@@ -41,7 +41,7 @@ class Component:
     ) -> None:
         self._settings, self._network, self._to_vehicle = settings, network, to_vehicle
         self._loop = asyncio.get_running_loop()
-        self._own = Address(settings.source_system, settings.source_component)
+        self._own_address = Address(settings.source_system, settings.source_component)
         self._sequence = self._text_id = 0
         self._began = time.monotonic()
         self._sent_at: dict[tuple[Client | None, str], float] = {}
@@ -96,11 +96,13 @@ class Component:
     def on_own(self, client: Channel, frame: Frame) -> None:
         """Refuse a command addressed only to our component, which carries out no commands."""
         if frame.message_id in _COMMANDS and isinstance(client, Client):
-            self.acknowledge(client, frame, dialect.MAV_RESULT_UNSUPPORTED, self._own)
+            self.acknowledge(client, frame, dialect.MAV_RESULT_UNSUPPORTED, self._own_address)
 
     def _not_sent_lately(self, client: Client | None, text: str) -> bool:
         now = self._loop.time()
-        self._sent_at = {who: at for who, at in self._sent_at.items() if now - at < _SAME_TEXT}
+        self._sent_at = {
+            who: at for who, at in self._sent_at.items() if now - at < _TEXT_REPEAT_PERIOD
+        }
         if (client, text) in self._sent_at:
             return False
         self._sent_at[client, text] = now
@@ -108,11 +110,11 @@ class Component:
 
     def _pieces(self, text: str, severity: int) -> list[Message]:
         self._text_id = self._text_id % MOST_TEXT_NUMBER + 1
-        return status_texts(ascii_for(text)[:_LONGEST_TEXT], severity, self._text_id)
+        return status_texts(ascii_for(text)[:_MAX_TEXT_LENGTH], severity, self._text_id)
 
     def _frame(self, message: Message, sender: Address | None = None) -> bytes:
         number, signing = message.get_msgId(), self._settings.signing
-        system, component = sender or self._own
+        system, component = sender or self._own_address
         frame = build_frame(
             number,
             encode(message),

@@ -37,7 +37,7 @@ from companion.vehicle.autopilot import ControlEntry, Role
 from companion.vehicle.link import Link
 
 _ENDS = "control is ending and the vehicle is held; request control again when it has ended"
-_TRY_AGAIN = 2.0
+_RETRY_PAUSE = 2.0
 """Time after a failed takeover in which setpoints alone begin no other takeover, s."""
 
 
@@ -239,7 +239,7 @@ class ServedControl:
             self._fence.keep(flight.fence_centre)
             self._flight = self._task = None
             if not begun:
-                self._not_before = self._clock() + _TRY_AGAIN
+                self._not_before = self._clock() + _RETRY_PAUSE
             await flight.save()
             if self._flight is None and self._config.realtime.freeze_gc:  # between flights
                 gc.collect()

@@ -19,8 +19,8 @@ _MISSION_ITEMS = dialect.MAVLINK_MSG_ID_MISSION_ITEM, dialect.MAVLINK_MSG_ID_MIS
 _GUIDED_ITEMS = 2, 3
 """Values of `current` with which ArduPilot flies to a mission item, or to its height, at once."""
 _SET_MESSAGE_INTERVAL = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
-_STEERING = dialect.MAV_CMD_DO_REPOSITION, dialect.MAV_CMD_DO_PAUSE_CONTINUE
-_LEAVING = MAV_CMD_DO_SET_MODE, MAV_CMD_NAV_LAND, MAV_CMD_NAV_RETURN_TO_LAUNCH
+_STEERING_COMMANDS = dialect.MAV_CMD_DO_REPOSITION, dialect.MAV_CMD_DO_PAUSE_CONTINUE
+_LEAVING_COMMANDS = MAV_CMD_DO_SET_MODE, MAV_CMD_NAV_LAND, MAV_CMD_NAV_RETURN_TO_LAUNCH
 _CUSTOM_MODE = 1
 _MAIN_MODE = 0xFF << 16
 """PX4's main mode within a custom mode. OFFBOARD has no sub mode, and PX4 ignores one."""
@@ -69,7 +69,7 @@ def steers_in_our_mode(frame: Frame, autopilot: Autopilot) -> bool:
     if frame.message_id not in (_COMMAND_LONG, _COMMAND_INT):
         return False
     command = decode(frame.message_id, frame.payload).command
-    return command in _STEERING
+    return command in _STEERING_COMMANDS
 
 
 def leaves_control(frame: Frame) -> bool:
@@ -78,7 +78,7 @@ def leaves_control(frame: Frame) -> bool:
         return True
     if frame.message_id not in (_COMMAND_LONG, _COMMAND_INT):
         return False
-    return decode(frame.message_id, frame.payload).command in _LEAVING
+    return decode(frame.message_id, frame.payload).command in _LEAVING_COMMANDS
 
 
 def starves_control(frame: Frame, needed: dict[str, float]) -> bool:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import Enum
 from math import inf
 
-_MOST_CLIENTS = 64
+_MAX_CLIENTS = 64
 """Number of remembered clients above which the silent ones are forgotten."""
 
 
@@ -59,7 +59,7 @@ class Ownership:
             self.owner = client
         stream = self._streams.setdefault(client, _Stream())
         stream.before, stream.newest = stream.newest, now
-        if len(self._streams) > _MOST_CLIENTS:
+        if len(self._streams) > _MAX_CLIENTS:
             self._forget_silent(now)
         return None
 

@@ -7,7 +7,7 @@ from companion.serve.network.addresses import Address, source_of
 from companion.serve.network.client import Client
 from companion.serve.setpoints.request import Request
 
-_MOST = 32
+_MAX_PROGRAMS = 32
 """Number of programs whose newest request is kept."""
 
 
@@ -31,7 +31,7 @@ class Programs:
         """Keep a program's newest request; of too many, drop those of programs silent longest."""
         self._newest.pop(program, None)
         self._newest[program] = request
-        while len(self._newest) > _MOST:
+        while len(self._newest) > _MAX_PROGRAMS:
             del self._newest[next(iter(self._newest))]
 
     def newest(self, program: Program) -> Request:

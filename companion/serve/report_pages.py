@@ -10,11 +10,11 @@ from pathlib import Path
 
 from companion.realtime import schedule_as_usual
 
-_LONGEST = 120.0
+_PAGE_TIMEOUT = 120.0
 """Time allowed for one page, s; a small computer needs about ten seconds."""
-_LOOK_PERIOD = 1.0
+_CHECK_PERIOD = 1.0
 """Period at which the wait for the process checks whether it must end, s."""
-_NICE = 19
+_NICENESS = 19
 """Niceness of the process, so that it yields to everything else; the next flight may have begun."""
 _INTERRUPTED = "interrupted"
 
@@ -23,9 +23,9 @@ class ReportPages:
     """Writes pages one after the other. `write` is called in threads outside the event loop."""
 
     def __init__(self) -> None:
-        self._turn = threading.Lock()
+        self._lock = threading.Lock()
         self._process: subprocess.Popen[str] | None = None
-        self._left = False
+        self._has_left = False
 
     def write(self, folder: Path) -> str:
         """Write `report.html` about the flight in `folder`.
@@ -33,7 +33,7 @@ class ReportPages:
         Returns:
             A sentence with the path of the page, or with the reason why there is none.
         """
-        with self._turn:
+        with self._lock:
             try:
                 return f"Report: {self._written(folder)}"
             except (OSError, RuntimeError) as error:
@@ -41,7 +41,7 @@ class ReportPages:
 
     def leave(self) -> None:
         """Write no further page, because the program ends."""
-        self._left = True
+        self._has_left = True
         if self._process is not None:
             self._process.kill()
 
@@ -52,7 +52,7 @@ class ReportPages:
             OSError: the process cannot be started.
             RuntimeError: the process wrote no page; the message says why.
         """
-        if self._left:
+        if self._has_left:
             raise RuntimeError(_INTERRUPTED)
         self._process = subprocess.Popen(
             [sys.executable, "-m", "companion", "report", str(folder)],
@@ -75,20 +75,20 @@ class ReportPages:
             RuntimeError: the wait was ended. The process is killed without waiting for its end,
                 because no process ends on a disk that hangs.
         """
-        deadline = time.monotonic() + _LONGEST
+        deadline = time.monotonic() + _PAGE_TIMEOUT
         while True:
             with suppress(subprocess.TimeoutExpired):
-                output = process.communicate(timeout=_LOOK_PERIOD)
-                if not self._left:
+                output = process.communicate(timeout=_CHECK_PERIOD)
+                if not self._has_left:
                     return output
-            if self._left or time.monotonic() > deadline:
+            if self._has_left or time.monotonic() > deadline:
                 process.kill()
-                late = f"it was not written within {_LONGEST:g} s"
-                raise RuntimeError(_INTERRUPTED if self._left else late)
+                late_text = f"it was not written within {_PAGE_TIMEOUT:g} s"
+                raise RuntimeError(_INTERRUPTED if self._has_left else late_text)
 
 
 def _give_way(pid: int) -> None:
     """Give a process the normal scheduler and the lowest priority instead of the flight's."""
     schedule_as_usual(pid)
     with suppress(ProcessLookupError):  # it has ended already
-        os.setpriority(os.PRIO_PROCESS, pid, _NICE)
+        os.setpriority(os.PRIO_PROCESS, pid, _NICENESS)

@@ -34,7 +34,7 @@ REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
 
 _PROGRESS_PERIOD = 0.4
 """Period of progress messages to a client that requested control, s."""
-_LOOK_PERIOD = 0.05
+_CHECK_PERIOD = 0.05
 _VALUES_PERIOD = 0.5
 
 
@@ -221,7 +221,7 @@ class ServedFlight:
             if now is not reported and now in (Control.LIVE, Control.HOLDING):
                 self._component.tell(f"{self._source.name}: {now.value}")
                 reported = now
-            await asyncio.sleep(_LOOK_PERIOD)
+            await asyncio.sleep(_CHECK_PERIOD)
 
     async def _send_values(self) -> None:
         """Send the tracking error and the latency of setpoints to clients."""

@@ -12,7 +12,7 @@ from companion.flight.assembly import open_link, realtime_settings
 from companion.flight.changes import Changes
 from companion.flight.context import cancel
 from companion.flight.environment import THIS_COMPUTER, Environment
-from companion.flight.observer import Observer, Silent, StateLogger
+from companion.flight.observer import Observer, SilentObserver, StateLogger
 from companion.mavlink.errors import LinkError
 from companion.mavlink.framing import Frame
 from companion.mavlink.peer import HEARTBEAT
@@ -65,7 +65,7 @@ class ServeSession:
     ) -> None:
         self._config, self._note = config, note
         self.records = FlightRecords(directory, environment, note)
-        self._observer, self._environment = observer or Silent(), environment
+        self._observer, self._environment = observer or SilentObserver(), environment
         self.changes = Changes(config)
         self.changes.note = note
         self._stop = asyncio.Event()

@@ -20,15 +20,15 @@ from companion.serve.setpoints.request import Origin, Request, Situation, climbs
 from companion.vehicle.link import Link
 
 _CHECK_PERIOD = 1.0
-_COUNTED = 0.1
+_COUNTING_TIME = 0.1
 """Time over which messages are counted after a request, s; short, as nothing uses the count."""
-_STALE = 0.5
+_MAX_TELEMETRY_AGE = 0.5
 """Largest age of a position or attitude that is used, s."""
-_MOST_APART = 0.3
+_MAX_PAIR_INTERVAL = 0.3
 """Largest time between a local and a global position of a pair, s."""
 _NEW_ORIGIN_WEIGHT = 0.05
 """Weight of a new pair of positions; each pair is off by some centimetres."""
-_ORIGIN_MOVED = 2.0
+_NEW_ORIGIN_DISTANCE = 2.0
 """An origin this far from the estimate counts as newly set, m."""
 
 
@@ -52,7 +52,7 @@ class SituationKeeper:
         if position is None or decoded is None:
             return None
         age = self._link.clock.age(position.vehicle_time, now) or 0.0
-        if max(age, now - position.received, now - self._network.attitude_at) > _STALE:
+        if max(age, now - position.received, now - self._network.attitude_at) > _MAX_TELEMETRY_AGE:
             return None
         _, q, _ = decoded
         if not is_unit(q):
@@ -82,14 +82,14 @@ class SituationKeeper:
             if newest != before or self._link.state.autopilot is None:
                 continue
             with suppress(LinkError):  # it may be booting; asked again
-                await self._link.set_rates(wanted(), window_s=_COUNTED)
+                await self._link.set_rates(wanted(), window_s=_COUNTING_TIME)
 
     def _on_global_position(self, message: Message) -> None:
         position = self._link.state.position
         if position is None or message.lat == message.lon == 0:
             return
         later = self._link.clock.vehicle_time(message.time_boot_ms) - position.vehicle_time
-        if abs(later) > _MOST_APART:
+        if abs(later) > _MAX_PAIR_INTERVAL:
             return
         north, east, down = (
             there + later * speed
@@ -132,18 +132,18 @@ class OriginEstimate:
             height: height above home, m.
         """
         north, east, down = position_ned
-        seen = Origin(
+        measured = Origin(
             latitude - degrees(north / EARTH_RADIUS),
             longitude - degrees(east / (EARTH_RADIUS * cos(radians(latitude)))),
             altitude + down,
             altitude - height,
         )
-        known = self.origin
-        if known is None or _distance(known, seen) > _ORIGIN_MOVED:
-            self.origin = seen
+        estimate = self.origin
+        if estimate is None or _distance(estimate, measured) > _NEW_ORIGIN_DISTANCE:
+            self.origin = measured
             return
         self.origin = Origin(
-            *(a + _NEW_ORIGIN_WEIGHT * (b - a) for a, b in zip(known, seen, strict=True))
+            *(a + _NEW_ORIGIN_WEIGHT * (b - a) for a, b in zip(estimate, measured, strict=True))
         )
 
 

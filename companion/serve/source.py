@@ -17,7 +17,7 @@ from companion.serve.setpoints.request import (
     Request,
 )
 
-_FLOWN = frozenset({Control.LIVE, Control.HOLDING})
+_FLOWN_STATES = frozenset({Control.LIVE, Control.HOLDING})
 
 
 class ServedSource:
@@ -100,7 +100,7 @@ class ServedSource:
 
     def finished(self, now: float) -> bool:
         """Whether no client is in control any more: it released control, or was silent too long."""
-        return self._ownership.control(now) not in _FLOWN
+        return self._ownership.control(now) not in _FLOWN_STATES
 
     def _leave_direct(self, now: float) -> None:
         """If attitudes or rates were flown, let the commanded motion begin where the vehicle is."""

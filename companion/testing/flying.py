@@ -14,7 +14,7 @@ from companion.config.files import changed, load
 from companion.files.yaml_file import ConfigError
 from companion.flight.environment import Environment
 from companion.flight.flight import AskLanding
-from companion.flight.observer import Observer, Silent, decline_landing
+from companion.flight.observer import Observer, SilentObserver, decline_landing
 from companion.flight.session import Session
 from companion.recording.measurements.summary import Summary
 from companion.testing.vehicle import MockVehicle
@@ -93,7 +93,11 @@ def session(
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
     return Session(
-        whole, folder, observer or Silent(), ask_landing or decline_landing, environment=environment
+        whole,
+        folder,
+        observer or SilentObserver(),
+        ask_landing or decline_landing,
+        environment=environment,
     )
 
 

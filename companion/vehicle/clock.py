@@ -21,13 +21,13 @@ from companion.vehicle.clock_jumps import (
     has_wrapped,
 )
 
-_SETTLES_FOR = 2.0
+_SETTLING_TIME = 2.0
 """Time after the first sample in which queued samples may falsify the offset, s."""
-_CERTAINLY_BACK = 0.5
+_MIN_CLOCK_SETBACK = 0.5
 """A TIMESYNC time this far behind the newest stamp, s, means that the clock was set back."""
 _TIMESYNC_LAG = 0.012
 """Largest lag of TIMESYNC behind the samples' stamps in the simulators, s (measured)."""
-_UNKNOWN_AFTER = 3.0
+_UNKNOWN_AGE_DELAY = 3.0
 """An unknown age is reported this long after the first sample, s; TIMESYNC is answered by then."""
 
 
@@ -137,13 +137,13 @@ class VehicleClock:
         if self._lockstep or self._began == inf:
             return
         time = vehicle_ns * 1e-9 + self._shift
-        middle, half = 0.5 * (sent + received), 0.5 * (received - sent)
-        quickest = self._quickest + self.rate.rate * (middle - self._received)
+        middle_time, half_round_trip = 0.5 * (sent + received), 0.5 * (received - sent)
+        quickest = self._quickest + self.rate.rate * (middle_time - self._received)
         attitude_fits = received - self._received < 1.0 and self._late < JUMP
-        error = half + self.rate.spread(max(0.0, received - self._received))
-        delay = time - middle - quickest
-        behind = self.delay.compare(received, error, delay)
-        if behind is None:
+        error = half_round_trip + self.rate.spread(max(0.0, received - self._received))
+        delay = time - middle_time - quickest
+        setback = self.delay.compare(received, error, delay)
+        if setback is None:
             if -delay < JUMP:
                 self._quickest -= max(0.0, -delay - error - _TIMESYNC_LAG)
             return
@@ -151,8 +151,8 @@ class VehicleClock:
             self.delay.forget(DelayUnknown.OTHER_CLOCK)
         else:
             # The answer may be a little older than the newest sample.
-            back = time < self._newest - _CERTAINLY_BACK
-            self._accept_jump(-behind, round(vehicle_ns * 1e-6), restarted=back)
+            was_set_back = time < self._newest - _MIN_CLOCK_SETBACK
+            self._accept_jump(-setback, round(vehicle_ns * 1e-6), restarted=was_set_back)
 
     def update(self, now: float) -> None:
         """Drop expired TIMESYNC exchanges; report when ages become unknown or known again.
@@ -161,7 +161,7 @@ class VehicleClock:
             now: Event-loop time, s.
         """
         self.delay.expire(now)
-        if now - self._began < _UNKNOWN_AFTER or self.age_known is not self._reported_unknown:
+        if now - self._began < _UNKNOWN_AGE_DELAY or self.age_known is not self._reported_unknown:
             return
         self._reported_unknown = not self.age_known
         if self._reported_unknown:
@@ -191,11 +191,11 @@ class VehicleClock:
         self._misfits.stamps.append(stamp)
         if not self._misfits.confirmed(quickest):
             return Misfit.AHEAD if is_ahead else Misfit.NOT_NEWER
-        by = self._misfits.most_ahead() - quickest
+        jump = self._misfits.most_ahead() - quickest
         self._misfits.stamps.clear()
         self._quickest = quickest
         self._newest = -inf
-        self._accept_jump(by, time_boot_ms, restarted=by < 0.0)
+        self._accept_jump(jump, time_boot_ms, restarted=jump < 0.0)
         return None
 
     def _link_got_quicker(self, stamp: Stamp, quickest: float) -> bool:
@@ -205,11 +205,11 @@ class VehicleClock:
         Exchanges after the last sample that fitted do not count, because the clock may have jumped
         before them.
         """
-        by = stamp.ahead - quickest
-        if by > self.delay.largest_possible(before=self._received - TOGETHER):
+        lead = stamp.ahead - quickest
+        if lead > self.delay.largest_possible(before=self._received - TOGETHER):
             return False
         self._quickest = quickest
-        self.delay.shorten(by, stamp.received)
+        self.delay.shorten(lead, stamp.received)
         self._drop_misfits()
         return True
 
@@ -229,22 +229,22 @@ class VehicleClock:
         ahead = sum(stamp.time > self._newest for stamp in self._misfits.stamps)
         if ahead and not self._reported_outlier:
             self._reported_outlier = True
-            by = self._misfits.most_ahead() - self._quickest
+            lead = self._misfits.most_ahead() - self._quickest
             self.on_event(
-                f"a sample stamped {by:.1f} s ahead of the vehicle's clock was dropped; such "
+                f"a sample stamped {lead:.1f} s ahead of the vehicle's clock was dropped; such "
                 "samples are counted"
             )
         self.outliers += ahead
         self._misfits.stamps.clear()
 
-    def _accept_jump(self, by: float, time_boot_ms: int, *, restarted: bool) -> None:
-        """Accept that the vehicle's clock jumped by `by` s; vehicle times stay continuous."""
+    def _accept_jump(self, jump: float, time_boot_ms: int, *, restarted: bool) -> None:
+        """Accept that the vehicle's clock jumped by `jump` s; vehicle times stay continuous."""
         before = self._received + self._quickest - self._shift
-        self._shift -= by
+        self._shift -= jump
         self.delay.forget_after(self._received - self.delay.seconds - TOGETHER)
-        if self._received - self._began < _SETTLES_FOR and by > -REBOOTED:
+        if self._received - self._began < _SETTLING_TIME and jump > -REBOOTED:
             return
         self.changes += 1
-        self.restarts += restarted and not has_wrapped(by, before) and by < -REBOOTED
-        self.last_change = describe_change(by, before, time_boot_ms / 1000.0, restarted=restarted)
+        self.restarts += restarted and not has_wrapped(jump, before) and jump < -REBOOTED
+        self.last_change = describe_change(jump, before, time_boot_ms / 1000.0, restarted=restarted)
         self.on_event(self.last_change)

@@ -12,22 +12,22 @@ from typing import NamedTuple
 MOST_DRIFT = 0.02
 """Largest difference in rate between the two clocks, s per s. Crystals differ by less than 0.0002,
 a simulator that is slower than real time by 0.006 (measured)."""
-_UNSURE = 0.005
+_RATE_UNCERTAINTY = 0.005
 """Uncertainty of a measured rate, s per s."""
-_NO_DRIFT = 0.005
+_LATE_SAMPLES_RISE = 0.005
 """If the offset rises by this (s) more than drift explains, the earlier samples were late, and the
 measurement of the rate restarts. Without a restart, a backlog of 68 ms at the start (measured on
 PX4) would give a rate of 1.4 %, and samples would seem up to 79 ms old for 40 s.
 """
 _PERIOD = 1.0
-_LEAST, _MOST = 5, 20
+_MIN_WINDOW, _MAX_WINDOW = 5, 20
 """Shortest and longest time over which a rate is measured, s."""
 
 LIFETIME = 20.0
 """Time for which a TIMESYNC exchange is used, s; there is one each second."""
-_LONGEST = 10.0
+_MAX_DELAY = 10.0
 """Largest plausible delay of a sample, s; a greater difference means another clock."""
-_TOLERATED = 0.05
+_MAX_TIMESYNC_LAG = 0.05
 """Tolerated lag of TIMESYNC behind the samples' stamps, s; in the simulators up to 0.012."""
 
 
@@ -48,7 +48,7 @@ class ClockRate:
         self.due = inf if fixed else -inf
         self._unsure = 0.0 if fixed else MOST_DRIFT
         self.slowest = -self._unsure
-        self._noted: deque[tuple[float, float]] = deque(maxlen=_MOST + 1)
+        self._noted: deque[tuple[float, float]] = deque(maxlen=_MAX_WINDOW + 1)
 
     def spread(self, seconds: float) -> float:
         """Difference between the fastest and the slowest possible clock after `seconds`, s."""
@@ -65,16 +65,16 @@ class ClockRate:
         """
         if self._noted:
             then, before = self._noted[-1]
-            if offset - before > MOST_DRIFT * (now - then) + _NO_DRIFT:
+            if offset - before > MOST_DRIFT * (now - then) + _LATE_SAMPLES_RISE:
                 self._noted.clear()  # the noted offsets are of late samples
                 self.rate, self._unsure = 0.0, MOST_DRIFT
                 self.slowest = -MOST_DRIFT
         self.due = now + _PERIOD
         self._noted.append((now, offset))
         then, before = self._noted[0]
-        if now - then < _LEAST * _PERIOD:
+        if now - then < _MIN_WINDOW * _PERIOD:
             return
-        self._unsure = _UNSURE
+        self._unsure = _RATE_UNCERTAINTY
         slope = (offset - before) / (now - then)
         self.rate = max(-MOST_DRIFT, min(MOST_DRIFT, slope))
         self.slowest = self.rate - self._unsure
@@ -136,14 +136,14 @@ class TelemetryDelay:
             How far TIMESYNC has fallen behind the samples' stamps, s; None: it has not.
         """
         exchange = _Exchange(now, half, delay)
-        if -(half + _TOLERATED) <= delay <= _LONGEST:
+        if -(half + _MAX_TIMESYNC_LAG) <= delay <= _MAX_DELAY:
             self._odd = None
             self.unknown = DelayUnknown.UNANSWERED
             self._exchanges.append(exchange)
             self.expire(now)
             return None
         before, self._odd = self._odd, exchange
-        if before is None or abs(before.delay - delay) > before.half + half + _TOLERATED:
+        if before is None or abs(before.delay - delay) > before.half + half + _MAX_TIMESYNC_LAG:
             return None
         self._odd = None
         if self._exchanges and delay < 0.0:
@@ -162,15 +162,15 @@ class TelemetryDelay:
         best = min(earlier, key=lambda each: each.error(before))
         return best.delay + best.error(before)
 
-    def shorten(self, by: float, now: float) -> None:
+    def shorten(self, decrease: float, now: float) -> None:
         """Shorten all delays: a quicker sample than before has come.
 
         Args:
-            by: How much quicker it is than the quickest sample before, s.
+            decrease: How much quicker it is than the quickest sample before, s.
             now: Event-loop time, s.
         """
         self._exchanges = deque(
-            (each._replace(delay=each.delay - by) for each in self._exchanges),
+            (each._replace(delay=each.delay - decrease) for each in self._exchanges),
             maxlen=self._exchanges.maxlen,
         )
         self.expire(now)

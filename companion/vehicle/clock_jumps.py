@@ -7,15 +7,15 @@ JUMP = 0.05
 """A stamp further ahead of the clock than this, s, is no drift; simulators slip by up to 0.016."""
 TOGETHER = 0.1
 """Largest difference of offsets of samples that may belong to one clock, s."""
-_CONFIRMED_BY = 3
+_MIN_JUMP_SAMPLES = 3
 """Number of misfits in a row that shows a jump of the clock; fewer are outliers."""
-_CONFIRMED_FOR = 0.04
+_MIN_JUMP_SPAN = 0.04
 """Time that the misfits in a row must span to show a jump of the clock, s."""
 REBOOTED = 2.0
 """The autopilot restarted if its clock went back by more than this, s; otherwise it jumped."""
-_WRAP = 2**32 / 1000.0
+_WRAP_PERIOD = 2**32 / 1000.0
 """Time after which time_boot_ms, a uint32, wraps: 49.7 days in s."""
-_NEAR_WRAP = 600.0
+_WRAP_TOLERANCE = 600.0
 """Tolerance for recognising a wrap, s."""
 
 
@@ -76,9 +76,9 @@ class MisfitRun:
         """Whether the misfits show a jump of the clock away from `quickest`, the old offset, s."""
         first, last = self.stamps[0], self.stamps[-1]
         return (
-            len(self.stamps) >= _CONFIRMED_BY
+            len(self.stamps) >= _MIN_JUMP_SAMPLES
             and last.time > first.time
-            and last.received - first.received >= _CONFIRMED_FOR
+            and last.received - first.received >= _MIN_JUMP_SPAN
             and abs(self.most_ahead() - quickest) >= JUMP
         )
 
@@ -91,34 +91,38 @@ class MisfitRun:
         return self.stamps[0].time == self.stamps[-1].time == newest
 
 
-def has_wrapped(by: float, before: float) -> bool:
+def has_wrapped(jump: float, before: float) -> bool:
     """Whether a clock has wrapped.
 
     Args:
-        by: How far the clock moved, s.
+        jump: How far the clock moved, s.
         before: Time since boot before the change, s.
     """
-    return by < 0.0 and before > _WRAP - _NEAR_WRAP and abs(by + _WRAP) < _NEAR_WRAP
+    return (
+        jump < 0.0
+        and before > _WRAP_PERIOD - _WRAP_TOLERANCE
+        and abs(jump + _WRAP_PERIOD) < _WRAP_TOLERANCE
+    )
 
 
-def describe_change(by: float, before: float, now: float, *, restarted: bool) -> str:
+def describe_change(jump: float, before: float, now: float, *, restarted: bool) -> str:
     """A change of the vehicle's clock in words.
 
     Args:
-        by: How far the clock moved, s.
+        jump: How far the clock moved, s.
         before: Time since boot before the change, s.
         now: Time since boot after the change, s.
         restarted: True: the clock went back and goes on from there. False: it stood still.
     """
-    if has_wrapped(by, before):
+    if has_wrapped(jump, before):
         return "the vehicle's time since boot wrapped around after 49.7 days"
-    if by > 0.0:
-        return f"the vehicle's clock jumped ahead by {by:.2f} s"
+    if jump > 0.0:
+        return f"the vehicle's clock jumped ahead by {jump:.2f} s"
     if not restarted:
-        return f"the vehicle's clock stood still for {-by:.2f} s"
-    if by < -REBOOTED:
+        return f"the vehicle's clock stood still for {-jump:.2f} s"
+    if jump < -REBOOTED:
         return (
             f"the vehicle's time since boot went back from {before:.1f} s to {now:.1f} s: the "
             "autopilot restarted"
         )
-    return f"the vehicle's clock went back by {-by:.2f} s"
+    return f"the vehicle's clock went back by {-jump:.2f} s"

@@ -19,7 +19,7 @@ _BACKOFF_FIRST_S, _BACKOFF_MAX_S = 0.2, 3.0
 class Connection:
     """A connection that is opened again when it drops, with growing pauses.
 
-    When it drops, unsent frames and an incomplete frame received are discarded, and `dropped` is
+    When it drops, unsent frames and an incomplete frame received are discarded, and `on_dropped` is
     called.
 
     Args:
@@ -27,7 +27,7 @@ class Connection:
         inbox: Takes the bytes that arrive.
         outbox: Sends over the open transport; without one it drops frames.
         stats: Counts the reconnects.
-        dropped: Called with the reason of each drop; ends all waiting for answers.
+        on_dropped: Called with the reason of each drop; ends all waiting for answers.
         opener: Opens the transport.
     """
 
@@ -37,11 +37,11 @@ class Connection:
         inbox: Inbox,
         outbox: Outbox,
         stats: LinkStats,
-        dropped: Callable[[str], None],
+        on_dropped: Callable[[str], None],
         opener: OpenTransport = open_transport,
     ) -> None:
         self._endpoint, self._inbox, self._outbox = endpoint, inbox, outbox
-        self._stats, self._dropped, self._opener = stats, dropped, opener
+        self._stats, self._on_dropped, self._opener = stats, on_dropped, opener
         self._reopening: asyncio.Task[None] | None = None
         self._lost_early: str | None = None
 
@@ -89,7 +89,7 @@ class Connection:
         else:  # a TCP server goes on listening
             self._inbox.connect(streaming=True)
             self._stats.reconnects += 1
-        self._dropped(reason)
+        self._on_dropped(reason)
 
     async def _reopen(self) -> None:
         pause = _BACKOFF_FIRST_S

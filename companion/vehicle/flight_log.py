@@ -17,11 +17,11 @@ _ARMED = 128
 _RELEVANT_BITS = IGNORE_ATTITUDE | 0b1100111
 """Bits of a type mask that are compared: quaternion, three rates, throttle, body thrust."""
 _STANDARD_GRAVITY = 9.80665
-_RECENT = 500
+_RECENT_SAMPLES = 500
 """Number of newest samples whose time stamp a setpoint may carry."""
-_ONE_CLOCK = 1.0
+_MAX_CLOCK_DIFFERENCE = 1.0
 """Stamps of accelerometer and attitude that differ by more than this, s, are of two clocks."""
-_NAMES = {
+_MESSAGE_NAMES = {
     "HEARTBEAT",
     "SET_ATTITUDE_TARGET",
     "ATTITUDE_QUATERNION",
@@ -59,7 +59,7 @@ def read_flight_log(path: Path) -> FlightLog:
             supported autopilot, or no setpoint that the autopilot obeyed.
     """
     reader = _Reader()
-    for frame, message in messages(path, _NAMES):
+    for frame, message in messages(path, _MESSAGE_NAMES):
         reader.take((frame.system, frame.component), message)
     if reader.vehicle is None:
         raise LogError(f"{path}: holds no heartbeat of {AUTOPILOT_NAMES}")
@@ -96,7 +96,7 @@ class _Reader:
     _autopilot: Autopilot | None = None
     _obeying: bool = False
     _unconfirmed: list[Row] = field(default_factory=list)
-    _stamps_ms: deque[int] = field(default_factory=lambda: deque(maxlen=_RECENT))
+    _stamps_ms: deque[int] = field(default_factory=lambda: deque(maxlen=_RECENT_SAMPLES))
 
     def take(self, source: tuple[int, int], message: Message) -> None:
         """Take one message from `source` (system, component)."""
@@ -149,5 +149,5 @@ class _Reader:
             self._stamps_ms.append(message.time_boot_ms)
 
     def _accelerometer(self, time: float, specific_thrust: float) -> None:
-        if self._stamps_ms and abs(time - 1e-3 * self._stamps_ms[-1]) < _ONE_CLOCK:
+        if self._stamps_ms and abs(time - 1e-3 * self._stamps_ms[-1]) < _MAX_CLOCK_DIFFERENCE:
             self.specific_thrust.append((time, specific_thrust))

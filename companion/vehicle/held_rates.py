@@ -1,6 +1,6 @@
 """The effective rate of setpoints or samples, from the time until each is replaced by the next."""
 
-_UNEVEN = 2.0
+_MAX_UNEVENNESS = 2.0
 """Largest ratio of the time-weighted mean interval Σg²/Σg to the mean interval for which the
 effective rate equals the mean rate. With a larger ratio it is lower.
 """
@@ -40,4 +40,4 @@ class HeldRates:
         seconds, squares = self.seconds - before.seconds, self.squares - before.squares
         if seconds <= 0.0 or squares <= 0.0:
             return None
-        return min(intervals / seconds, _UNEVEN * seconds / squares)
+        return min(intervals / seconds, _MAX_UNEVENNESS * seconds / squares)

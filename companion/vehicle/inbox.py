@@ -121,8 +121,8 @@ class Inbox:
             return False
         return accepted
 
-    def claim(self, data: bytes, received_ns: int, who: str) -> bool:
-        """Take bytes of `who`, who is not the peer; return whether `who` becomes the peer.
+    def claim(self, data: bytes, received_ns: int, sender: str) -> bool:
+        """Take bytes of `sender`, who is not the peer; return whether `sender` becomes the peer.
 
         Without a valid claim in the bytes, no frame in them is accepted. Never raises.
         """
@@ -132,7 +132,7 @@ class Inbox:
             self._stats.unclaimed += len(admitted)
             return False
         self._candidate = None
-        self._peer_rule.set_peer(who)
+        self._peer_rule.set_peer(sender)
         try:
             for frame in admitted:
                 self._accept(frame, received_ns)
@@ -140,24 +140,24 @@ class Inbox:
             self._router.report(error)
         return True
 
-    def may_answer(self, who: str) -> bool:
-        """Let `who` answer a TIMESYNC request, if that could make its signatures acceptable.
+    def may_answer(self, sender: str) -> bool:
+        """Let `sender` answer a TIMESYNC request, if that could make its signatures acceptable.
 
-        Returns whether it may; then frames are sent to `who`, although its frame was refused, and
-        the next frame that `receive` accepts makes `who` the peer.
+        Returns whether it may; then frames are sent to `sender`, although its frame was refused,
+        and the next frame that `receive` accepts makes `sender` the peer.
         """
         if not self._filter.awaits_answer:
             return False
-        self._candidate = who
+        self._candidate = sender
         return True
 
     def claim_lapsed(self) -> bool:
         """Whether another sender may become the peer."""
         return self._peer_rule.lapsed()
 
-    def note_stranger(self, who: str) -> None:
-        """Tell the user that bytes of `who` were ignored, as the endpoint names other peers."""
-        self._peer_rule.ignore(who)
+    def note_stranger(self, sender: str) -> None:
+        """Tell the user that bytes of `sender` were ignored, as the endpoint names other peers."""
+        self._peer_rule.ignore(sender)
 
     def tell_remarks(self) -> None:
         """Pass the remarks about the time stamps of signatures to the user."""

@@ -12,7 +12,7 @@ from companion.vehicle.registry import MULTIROTORS, autopilot_for
 
 _ARMED = 128
 _AUTOPILOT_INVALID = 8
-_FAILSAFES = frozenset({5, 6, 8})
+_FAILSAFE_STATES = frozenset({5, 6, 8})
 """MAV_STATE of an autopilot in a failsafe: critical, emergency, flight termination."""
 
 
@@ -68,7 +68,7 @@ class ModeState:
     @property
     def failsafe(self) -> bool:
         """Whether HEARTBEAT's system_status reports a failsafe; False without any heartbeat."""
-        return self.heartbeat is not None and self.heartbeat.system_status in _FAILSAFES
+        return self.heartbeat is not None and self.heartbeat.system_status in _FAILSAFE_STATES
 
     @property
     def mode_by_failsafe(self) -> bool:

@@ -11,10 +11,10 @@ LONGEST_HELD = 2.0
 """Longest time for which the last rates may be held, s. 0.4 rad/s held for 1 s became 24° of tilt
 (measured on PX4); twice that tilt is not recoverable."""
 
-_SAME_HOVER = 1.4
+_MAX_HOVER_RATIO = 1.4
 """Largest plausible ratio of two hover thrusts; above it, one of them is wrong."""
 
-_SAME_LIMIT = 1.15
+_MAX_LIMIT_RATIO = 1.15
 """Acceleration limits that differ by less than this factor have the same effect."""
 
 
@@ -124,13 +124,13 @@ def rates_held(value: float, _: Values, settings: CompanionSettings) -> Problem 
 
 def hover_thrust(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
     """Check that the autopilot's hover thrust agrees with `thrust.hover_thrust`."""
-    ours = settings.hover_thrust
-    if value > 0.0 and 1.0 / _SAME_HOVER < value / ours < _SAME_HOVER:
+    configured = settings.hover_thrust
+    if value > 0.0 and 1.0 / _MAX_HOVER_RATIO < value / configured < _MAX_HOVER_RATIO:
         return None
     return Problem(
         INEFFECTIVE,
-        f"thrust.hover_thrust is {ours:g}, and one of the two is wrong, so the vehicle jumps or "
-        "sags at the takeover; hover the vehicle, read its thrust, and set both to that",
+        f"thrust.hover_thrust is {configured:g}, and one of the two is wrong, so the vehicle jumps "
+        "or sags at the takeover; hover the vehicle, read its thrust, and set both to that",
     )
 
 
@@ -179,16 +179,20 @@ def acceleration_limit(unit: float, axis: str) -> Check:
     key = f"vehicle.{prefix}acceleration_limit_deg_s2"
 
     def check(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
-        limit = settings.acceleration_limits[axis]
-        theirs = unit * value
-        if limit is None:
-            agrees = theirs == 0.0
+        assumed_limit = settings.acceleration_limits[axis]
+        autopilot_limit = unit * value
+        if assumed_limit is None:
+            agrees = autopilot_limit == 0.0
         else:
-            agrees = 1.0 / _SAME_LIMIT < theirs / degrees(limit) < _SAME_LIMIT
+            agrees = (
+                1.0 / _MAX_LIMIT_RATIO < autopilot_limit / degrees(assumed_limit) < _MAX_LIMIT_RATIO
+            )
         if agrees:
             return None
-        ours = "null" if limit is None else f"{degrees(limit):g}"
-        right = "null" if theirs == 0.0 else f"{theirs:g}"
-        return Problem(INEFFECTIVE, f"the planner assumes {key} {ours}; set that to {right}")
+        assumed_text = "null" if assumed_limit is None else f"{degrees(assumed_limit):g}"
+        actual_text = "null" if autopilot_limit == 0.0 else f"{autopilot_limit:g}"
+        return Problem(
+            INEFFECTIVE, f"the planner assumes {key} {assumed_text}; set that to {actual_text}"
+        )
 
     return check

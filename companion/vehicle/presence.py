@@ -21,7 +21,7 @@ _MAVLINK_VERSION = 3
 _QUICK_REQUESTS, _QUICK_PERIOD_S = 10, 0.1  # for a good clock offset within the first second
 _PERIOD_S = 1.0
 _WINDOW = 16
-_NS = 1e-9
+_S_PER_NS = 1e-9
 
 
 def send_heartbeat(settings: LinkSettings, outbox: Outbox) -> None:
@@ -95,12 +95,12 @@ class TimeSync:
             self._outbox.message(dialect.MAVLink_timesync_message(tc1=now, ts1=message.ts1))
         elif message.ts1 in self._requests:  # otherwise it answers another station
             self._requests.remove(message.ts1)
-            self._round_trips.append((now * _NS, (now - message.ts1) * _NS))
-            self._vehicle_clock.exchange(message.ts1 * _NS, now * _NS, message.tc1)
+            self._round_trips.append((now * _S_PER_NS, (now - message.ts1) * _S_PER_NS))
+            self._vehicle_clock.exchange(message.ts1 * _S_PER_NS, now * _S_PER_NS, message.tc1)
 
     def _recent(self) -> list[float]:
         oldest = self._clock() - LIFETIME
-        return [took for received, took in self._round_trips if received >= oldest]
+        return [round_trip for received, round_trip in self._round_trips if received >= oldest]
 
     def _now_ns(self) -> int:
         # Never 0: a zero in tc1 marks a request.

@@ -7,16 +7,16 @@ from companion.vehicle.clock_jumps import Misfit
 
 Vector = tuple[float, float, float]
 
-_LASTS = 5.0
+_MAX_TELEMETRY_AGE = 5.0
 """Age from which telemetry counts as unknown, s; every message should come at 1 Hz or faster."""
 
-_CHARGE_LASTS = 1.5
+_MAX_CHARGE_AGE = 1.5
 """Age up to which a charge is kept although a newer message lacks it, s; both come at 1 Hz."""
 
 
 def outdated(received: float, now: float) -> bool:
     """Whether telemetry received at `received` is too old at `now`; both are loop times, s."""
-    return now - received > _LASTS
+    return now - received > _MAX_TELEMETRY_AGE
 
 
 GPS_FIX_3D = 3
@@ -148,7 +148,7 @@ class Battery(NamedTuple):
         Some vehicles send the charge in one of the two messages only.
         """
         age = newer.received - self.received
-        if newer.remaining is not None or self.remaining is None or age > _CHARGE_LASTS:
+        if newer.remaining is not None or self.remaining is None or age > _MAX_CHARGE_AGE:
             return newer
         return self if newer.voltage_v is None else self._replace(voltage_v=newer.voltage_v)
 

@@ -11,11 +11,11 @@ from companion.mavlink.messages import message_id
 from companion.mavlink.stats import LinkStats
 
 MAV_CMD_SET_MESSAGE_INTERVAL = 511
-_DISABLE = -1.0
+_DISABLED_INTERVAL = -1.0
 _TIMEOUT_S = 1.0
 _RETRIES = 3
-_DENIED = 2
-_HALVINGS = 3
+_RESULT_DENIED = 2
+_MAX_HALVINGS = 3
 _ROUNDING = 1e-6  # so that a rounding error, as in 1e6 / 333.333…, does not lose a whole step
 
 
@@ -77,8 +77,8 @@ async def _request(
 ) -> tuple[float, str]:
     """Request one message; return the granted rate in Hz, and the last refusal if it is 0."""
     refusal = ""
-    for _ in range(_HALVINGS + 1):
-        interval_us = _DISABLE
+    for _ in range(_MAX_HALVINGS + 1):
+        interval_us = _DISABLED_INTERVAL
         if rate > 0.0:
             steps = max(1, floor(1e6 / rate / interval_step_us + _ROUNDING))
             interval_us = float(steps * interval_step_us)
@@ -87,7 +87,7 @@ async def _request(
             await commands.send(MAV_CMD_SET_MESSAGE_INTERVAL, params, _TIMEOUT_S, _RETRIES)
         except CommandRefused as refused:
             refusal = refused.result_name
-            if refused.result != _DENIED or rate <= 0.0:
+            if refused.result != _RESULT_DENIED or rate <= 0.0:
                 break
             rate /= 2.0
         else:

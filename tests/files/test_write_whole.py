@@ -13,7 +13,7 @@ import pytest
 from companion.files import write_whole as module
 from companion.files.write_whole import ReservedRoom, write_whole
 from companion.flight import flight_files
-from companion.flight.observer import Silent
+from companion.flight.observer import SilentObserver
 from companion.testing import fly
 from tests.flight.fly import QUICK_FLIGHT, QuickVehicle, merged
 
@@ -134,7 +134,7 @@ def test_a_disk_that_cannot_keep_room_is_no_error(tmp_path, monkeypatch):
 def test_a_flight_keeps_room_for_its_summary_until_it_writes_it(tmp_path, monkeypatch):
     held, written = [], flight_files.write_in_time
 
-    class Watching(Silent):
+    class Watching(SilentObserver):
         def phase(self, name, waits_for):
             held.append(reserved(tmp_path))
 
@@ -146,8 +146,8 @@ def test_a_flight_keeps_room_for_its_summary_until_it_writes_it(tmp_path, monkey
     summary = fly(merged(QUICK_FLIGHT, {}), QuickVehicle(), tmp_path, Watching())
     assert summary.result == "ok"
     *flying, writing = held
-    assert min(flying) >= flight_files._SUMMARY_ROOM > 10 * len(summary.as_json())
-    assert writing < flight_files._SUMMARY_ROOM, "nothing but the rows of the figures"
+    assert min(flying) >= flight_files._SUMMARY_RESERVE > 10 * len(summary.as_json())
+    assert writing < flight_files._SUMMARY_RESERVE, "nothing but the rows of the figures"
 
 
 def test_a_folder_that_is_a_file_is_told_with_the_files_own_name(tmp_path):

@@ -1,9 +1,9 @@
 """What others do while a flight is on its way, at a certain phase."""
 
-from companion.flight.observer import Silent
+from companion.flight.observer import SilentObserver
 
 
-class When(Silent):
+class When(SilentObserver):
     """Calls `action` once, when `phase` has been waiting for `after` seconds."""
 
     def __init__(self, phase, action, after=0.0):

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from companion.files import bounded_yaml
-from companion.flight.observer import Silent
+from companion.flight.observer import SilentObserver
 from companion.flight.session import Session
 from companion.mavlink import lockstep
 from companion.mavlink.transport.free_port import free_port
@@ -88,7 +88,7 @@ def session_for(mock, folder: Path, observer=None, ask_landing=None, **changes):
     link["endpoint"] = f"udpin://127.0.0.1:{mock.port}"
     config = quick_flight(mock.autopilot, changes, **link)
     folder.mkdir(exist_ok=True)
-    return Session(config, folder, observer or Silent(), ask_landing or decline)
+    return Session(config, folder, observer or SilentObserver(), ask_landing or decline)
 
 
 async def decline():

@@ -8,7 +8,7 @@ from pymavlink import mavutil
 
 from companion.control.guidance_loop import GuidanceLoop
 from companion.flight import control_phases, takeoff
-from companion.flight.observer import Silent
+from companion.flight.observer import SilentObserver
 from companion.guidance.source import ManeuverSource
 from companion.mavlink.commands import (
     MAV_CMD_COMPONENT_ARM_DISARM,
@@ -29,7 +29,7 @@ from tests.flight.others import When
 HOLD_ASKED = "disarmed in OFFBOARD, in which it cannot be armed again: asking the autopilot to hold"
 
 
-class OnEvent(Silent):
+class OnEvent(SilentObserver):
     """Calls `action` once, when an event with this text happens."""
 
     def __init__(self, text, action):
@@ -327,14 +327,14 @@ def test_a_vehicle_that_does_not_say_it_stands_is_not_armed(tmp_path):
 
 
 def test_a_hold_near_the_top_of_the_climb_is_respected(tmp_path, monkeypatch):
-    over, held = takeoff._Climb.over, []
+    over, held = takeoff._Climb.is_over, []
 
     def holding(climb):
         if climb._context.link.state.height > 3.3 and not held:
             held.append(mock.command(SET_MODE, 1, 4, 3))
         return over(climb)
 
-    monkeypatch.setattr(takeoff._Climb, "over", holding)
+    monkeypatch.setattr(takeoff._Climb, "is_over", holding)
     with mock_vehicle(tmp_path, parameters={"MPC_TKO_SPEED": 1.0}) as mock:
         summary = fly(mock, tmp_path / "log", flight={"takeoff_height_m": 5.0})
         assert mock.state()["mode"] == "LOITER"

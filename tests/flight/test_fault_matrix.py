@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from companion.config.limits import LimitsConfig
-from companion.flight.observer import Silent
+from companion.flight.observer import SilentObserver
 from tests.flight.fly import fly, mock_vehicle
 
 AUTOPILOTS = ("px4", "ardupilot")
@@ -92,7 +92,7 @@ def cells():
                 yield pytest.param(autopilot, fault, phase, expected, marks=marks, id=label)
 
 
-class Begin(Silent):
+class Begin(SilentObserver):
     """Begins the fault a little after a phase did; ArduPilot has its setpoints only in the air."""
 
     def __init__(self, mock, fault, phase):

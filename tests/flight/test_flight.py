@@ -7,7 +7,7 @@ import pytest
 
 from companion.flight.context import cancel
 from companion.flight.flight import Flight
-from companion.flight.observer import Silent
+from companion.flight.observer import SilentObserver
 from companion.flight.phases import Phase
 from companion.flight.vehicle_identity import ChecksVoid
 from companion.safety.actions import Exit
@@ -59,7 +59,7 @@ class Bench:
 
     def fly(self):
         async def run():
-            flight = Flight(self.context, self.plan, self.watch, Silent(), None)
+            flight = Flight(self.context, self.plan, self.watch, SilentObserver(), None)
             return await flight.run(), [text for _, text in flight.events]
 
         return asyncio.run(run())

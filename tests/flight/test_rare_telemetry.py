@@ -5,7 +5,7 @@ from math import acos, degrees
 import pytest
 from pymavlink import mavutil
 
-from companion.flight.observer import Silent
+from companion.flight.observer import SilentObserver
 from tests.flight.fly import fly, mock_vehicle
 
 ATTITUDE_QUATERNION, LOCAL_POSITION_NED = 31, 32
@@ -19,7 +19,7 @@ CIRCLE = {
 HELD = {"px4": "LOITER", "ardupilot": "BRAKE"}
 
 
-class Lowers(Silent):
+class Lowers(SilentObserver):
     """A ground station that sets a message's rate once a second, the first time on the circle."""
 
     def __init__(self, mock, message, hz, times):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pymavlink import mavutil
 
-from companion.flight.observer import Silent
+from companion.flight.observer import SilentObserver
 from companion.recording.closing_words import closing_words
 from companion.recording.flight_record import read_flight
 from companion.testing import fly
@@ -20,7 +20,7 @@ SHORT = {
 LOG = mavutil.mavlink.MAV_COMP_ID_LOG
 
 
-class Watching(Silent):
+class Watching(SilentObserver):
     """Keeps the states and the events that are shown."""
 
     def __init__(self):
@@ -157,7 +157,7 @@ def test_a_wrong_hover_thrust_is_advised_once_and_not_among_the_events_shown(tmp
 
 
 def test_a_fault_in_what_is_shown_does_not_end_the_flight(tmp_path):
-    class Broken(Silent):
+    class Broken(SilentObserver):
         def status(self, status):
             raise ZeroDivisionError("the screen")
 

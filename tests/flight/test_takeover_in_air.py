@@ -8,7 +8,7 @@ import pytest
 from companion.config import Config
 from companion.config.files import changed
 from companion.flight.assembly import assemble, link_settings
-from companion.flight.observer import EventRecorder, Silent
+from companion.flight.observer import EventRecorder, SilentObserver
 from companion.flight.plan import TakeoverPlan
 from companion.flight.wiring import connected
 from companion.guidance import Reference
@@ -48,7 +48,9 @@ def taken_over(mock, source, program=None):
 
     async def main():
         async with Link(link_settings(config), opener=open_wire) as link:
-            recorder = EventRecorder(Silent(), asyncio.get_running_loop().time, lambda _: None)
+            recorder = EventRecorder(
+                SilentObserver(), asyncio.get_running_loop().time, lambda _: None
+            )
             assembled = assemble(
                 config, link, recorder, None, None, TakeoverPlan(source), environment
             )

@@ -19,7 +19,7 @@ from companion.control.inner_loop import planner, rate_limits
 from companion.control.outer_loop import predictive_settings
 from companion.files.yaml_file import ConfigError
 from companion.flight.assembly import assemble, link_settings
-from companion.flight.observer import EventRecorder, Silent
+from companion.flight.observer import EventRecorder, SilentObserver
 from companion.flight.plan import ConfiguredPlan
 from companion.vehicle.link import Link
 from tests.fuzz import trajectories
@@ -82,7 +82,7 @@ async def _assembled(config: Config, folder: Path) -> None:
         return False
 
     link = Link(link_settings(config), None)
-    recorder = EventRecorder(Silent(), asyncio.get_running_loop().time, lambda _: None)
+    recorder = EventRecorder(SilentObserver(), asyncio.get_running_loop().time, lambda _: None)
     assembled = assemble(config, link, recorder, ask, folder, ConfiguredPlan(config))
     assert 0.0 < assembled.context.maneuvers.duration < inf
     assembled.close()

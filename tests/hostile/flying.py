@@ -9,7 +9,7 @@ import yaml
 
 from companion.config import Config
 from companion.files.yaml_file import parse
-from companion.flight.observer import Silent
+from companion.flight.observer import SilentObserver
 from companion.flight.session import Session
 from companion.mavlink import lockstep
 from companion.mavlink.transport.free_port import free_port
@@ -69,7 +69,7 @@ def fly(kind, script, folder, *, mode=None, **changes):
     world = MemoryWorld(autopilot, kind.dialect)
     surroundings = replace(environment, open_transport=world.open)
     config = _config("udpin://127.0.0.1:1", changes)
-    session = Session(config, None, Silent(), decline, environment=surroundings)
+    session = Session(config, None, SilentObserver(), decline, environment=surroundings)
     with _own_clock(), asyncio.Runner(loop_factory=world.make_loop) as runner:
         summary = runner.run(session.fly())
     return _flown(summary, autopilot, config)
@@ -83,7 +83,7 @@ def fly_over_sockets(kind, script, folder, *, mode=None, late_by=None, **changes
     if late_by is not None:
         vehicle.late_by = lambda: late_by(vehicle.wire)
     config = _config(f"udpin://127.0.0.1:{port}", changes)
-    session = Session(config, folder, Silent(), decline)
+    session = Session(config, folder, SilentObserver(), decline)
     vehicle.start()
     try:
         with _own_clock():

@@ -17,7 +17,7 @@ import psutil
 
 from companion import demo
 from companion.config.files import changed, load
-from companion.flight.observer import Silent, decline_landing
+from companion.flight.observer import SilentObserver, decline_landing
 from companion.flight.session import Session
 from companion.live.door import open_door
 from companion.live.helper import Helper, HelperTasks
@@ -67,7 +67,7 @@ def _flight(seconds: float, *, page: bool) -> tuple[list[float], list[float]]:
             },
             "test",
         )
-        helper, observer = None, Silent()
+        helper, observer = None, SilentObserver()
         if page:
             door = open_door("127.0.0.1:0")
             helper = observer = Helper(HelperTasks(None, config, door, None, True, folder), config)

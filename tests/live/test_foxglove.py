@@ -18,7 +18,7 @@ from websockets.sync.client import connect
 from companion.cli.main import main
 from companion.config import Config
 from companion.files.yaml_file import ConfigError
-from companion.flight.observer import Silent, decline_landing
+from companion.flight.observer import SilentObserver, decline_landing
 from companion.flight.session import Session
 from companion.live.channel import Feed
 from companion.live.door import stream_address
@@ -47,7 +47,7 @@ def flown(tmp_path_factory):
         "px4", {"flight": {"maneuvers": ["circle"]}, "circle": {"radius_m": 2.0, "laps": 1}}
     )
     streaming = replace(environment, stream=datagrams.append)
-    session = Session(config, folder, Silent(), decline_landing, environment=streaming)
+    session = Session(config, folder, SilentObserver(), decline_landing, environment=streaming)
     assert run(QuickVehicle(lockstep=False), session.fly()).result == "ok"
     return read_flight(folder), datagrams
 

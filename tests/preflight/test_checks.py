@@ -425,11 +425,11 @@ def test_times_that_are_not_the_vehicles_own_and_units_mistaken_are_told():
         "safety": {"max_body_rate_deg_s": 20.0},
     }
     config = changed(CONFIG, wrong, "test")
-    found = {one.key: one for one in configuration_checks.doubtful(config, GOOD)}
+    found = {one.key: one for one in configuration_checks.doubtful_values(config, GOOD)}
     assert set(found) == {Key.IDENTIFIED, Key.UNITS, Key.BODY_RATE}
     assert all(one.result is CheckResult.INEFFECTIVE for one in found.values())
     assert found[Key.UNITS].source == "limits.max_tilt_rate_deg_s"
-    assert list(configuration_checks.doubtful(CONFIG, GOOD)) == []
+    assert list(configuration_checks.doubtful_values(CONFIG, GOOD)) == []
 
 
 def test_px4_is_not_expected_to_divide_thrust_by_the_cosine_of_the_tilt():

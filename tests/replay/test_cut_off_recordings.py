@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from companion.config.files import load
-from companion.flight.observer import Silent
+from companion.flight.observer import SilentObserver
 from companion.mavlink.tlog_file import messages
 from companion.recording import background_file
 from companion.recording.flight_record import read_flight
@@ -28,7 +28,7 @@ RANDOM = random.Random(18)
 MOMENTS = [(RANDOM.choice(["px4", "ardupilot"]), RANDOM.uniform(0.0, LASTS)) for _ in range(50)]
 
 
-class Telling(Silent):
+class Telling(SilentObserver):
     """Tells our time and that of the flight at each status."""
 
     def __init__(self, pipe):

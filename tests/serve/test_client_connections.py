@@ -34,7 +34,7 @@ def read(descriptor):
 
 
 def test_an_unplugged_radio_is_opened_again_when_it_is_back(run, monkeypatch, tmp_path):
-    monkeypatch.setattr(serial_line, "_RETRY", 0.01)
+    monkeypatch.setattr(serial_line, "_RETRY_PAUSE", 0.01)
     device = tmp_path / "radio"
 
     async def scene():
@@ -63,7 +63,7 @@ def test_an_unplugged_radio_is_opened_again_when_it_is_back(run, monkeypatch, tm
 
 
 def test_a_radio_that_is_away_when_we_end_is_not_opened_any_more(run, monkeypatch, tmp_path):
-    monkeypatch.setattr(serial_line, "_RETRY", 0.02)
+    monkeypatch.setattr(serial_line, "_RETRY_PAUSE", 0.02)
     device = tmp_path / "radio"
 
     async def scene():
@@ -124,7 +124,7 @@ def test_a_tcp_port_in_use_is_one_clear_error(run):
 
 
 def test_one_tcp_client_too_many_is_refused_and_the_others_stay(run, monkeypatch):
-    monkeypatch.setattr(tcp, "_MOST_CLIENTS", 2)
+    monkeypatch.setattr(tcp, "_MAX_CLIENTS", 2)
 
     async def scene():
         async with network("tcpin://127.0.0.1:0") as (net, _, vehicle):
@@ -159,7 +159,7 @@ def test_one_tcp_client_too_many_is_refused_and_the_others_stay(run, monkeypatch
 
 
 def test_a_tcp_program_that_does_not_listen_yet_is_called_when_it_does(run, monkeypatch):
-    monkeypatch.setattr(tcp, "_RETRY", 0.01)
+    monkeypatch.setattr(tcp, "_RETRY_PAUSE", 0.01)
 
     async def scene():
         port = free_port()
@@ -197,8 +197,8 @@ def test_reading_from_a_tcp_client_that_floods_pauses_and_goes_on(run):
 
 
 def test_one_udp_client_too_many_is_ignored_until_a_silent_one_is_forgotten(run, monkeypatch):
-    monkeypatch.setattr(udp, "_MOST_CLIENTS", 1)
-    monkeypatch.setattr(udp, "_SILENT", 0.5)
+    monkeypatch.setattr(udp, "_MAX_CLIENTS", 1)
+    monkeypatch.setattr(udp, "_SILENCE_TIMEOUT", 0.5)
 
     async def scene():
         async with network() as (net, _, _):
@@ -221,7 +221,7 @@ def test_one_udp_client_too_many_is_ignored_until_a_silent_one_is_forgotten(run,
 
 
 def test_a_program_named_for_udp_is_not_forgotten_however_silent(run, monkeypatch):
-    monkeypatch.setattr(udp, "_SILENT", 0.0)
+    monkeypatch.setattr(udp, "_SILENCE_TIMEOUT", 0.0)
 
     async def scene():
         async with network(f"udpout://127.0.0.1:{free_port()}") as (net, _, _):
@@ -276,7 +276,7 @@ def test_frames_that_the_kernel_does_not_take_are_counted(run, error, sent, drop
 
 
 def test_after_a_stall_only_so_many_frames_of_the_vehicle_wait(run, monkeypatch):
-    monkeypatch.setattr(network_module, "_MOST_FROM_VEHICLE", 2)
+    monkeypatch.setattr(network_module, "_MAX_VEHICLE_FRAMES", 2)
 
     async def scene():
         async with network() as (net, _, vehicle):

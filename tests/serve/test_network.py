@@ -106,7 +106,7 @@ def test_a_frame_in_pieces_over_tcp_arrives_whole(run):
 
 
 def test_a_listening_tcp_program_is_called_again_after_it_ended(run, monkeypatch):
-    monkeypatch.setattr("companion.serve.network.tcp._RETRY", 0.01)
+    monkeypatch.setattr("companion.serve.network.tcp._RETRY_PAUSE", 0.01)
 
     async def scene():
         connected = []

@@ -38,7 +38,7 @@ def test_a_process_that_cannot_be_killed_is_not_waited_for(tmp_path, monkeypatch
     told = []
     pages = ReportPages()
     monkeypatch.setattr(report_pages, "_give_way", lambda pid: None)
-    monkeypatch.setattr(report_pages, "_LONGEST", 0.0)
+    monkeypatch.setattr(report_pages, "_PAGE_TIMEOUT", 0.0)
     hung, left = Hung(lambda: None), Hung(pages.leave)
     monkeypatch.setattr(subprocess, "Popen", lambda *_, **__: [hung, left][len(told)])
     told.append(pages.write(tmp_path))

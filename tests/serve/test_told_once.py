@@ -9,7 +9,7 @@ import pytest
 from companion import testing
 from companion.cli import serve as command
 from companion.cli.terminal import FlightConsole
-from companion.flight.observer import Silent
+from companion.flight.observer import SilentObserver
 from companion.serve import session as session_module
 from tests.serve.virtual import POSITION, MemoryClient, airborne, begin_control, mock, serving
 
@@ -20,11 +20,11 @@ HOLD = {"px4": (176, 1, 4, 3), "ardupilot": (176, 1, 17)}
 def test_a_mode_change_in_a_served_flight_is_told_once(autopilot, monkeypatch):
     told = []
 
-    class Observer(Silent):
+    class Observer(SilentObserver):
         def event(self, _, text):
             told.append(text)
 
-    monkeypatch.setattr(session_module, "Silent", Observer)
+    monkeypatch.setattr(session_module, "SilentObserver", Observer)
     vehicle = mock(autopilot)
 
     async def whole():

@@ -9,7 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import common as dialect
 
 from companion.files.yaml_file import ConfigError
-from companion.flight.observer import Silent
+from companion.flight.observer import SilentObserver
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.settings import LinkSettings
 from companion.serve.session import ServeSession
@@ -190,7 +190,7 @@ def test_an_error_that_nobody_takes_is_raised():
     assert isinstance(raised.value.__cause__, ZeroDivisionError)
 
 
-class Interrupts(Silent):
+class Interrupts(SilentObserver):
     def __init__(self):
         self.session = None
 

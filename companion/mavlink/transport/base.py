@@ -21,14 +21,14 @@ class Receiver(Protocol):
     def receive(self, data: bytes, received_ns: int) -> bool:
         """Take bytes of the peer (`Receive`)."""
 
-    def claim(self, data: bytes, received_ns: int, who: str) -> bool:
-        """Take bytes of `who`, who is not the peer; return whether `who` becomes the peer.
+    def claim(self, data: bytes, received_ns: int, sender: str) -> bool:
+        """Take bytes of `sender`, who is not the peer; return whether `sender` becomes the peer.
 
         Without a valid claim in the bytes, no frame in them is accepted.
         """
 
-    def may_answer(self, who: str) -> bool:
-        """Whether frames are sent to `who` although its claim was refused.
+    def may_answer(self, sender: str) -> bool:
+        """Whether frames are sent to `sender` although its claim was refused.
 
         Its signature is good but its date is not proven; an answer to TIMESYNC would prove it.
         """
@@ -36,8 +36,8 @@ class Receiver(Protocol):
     def claim_lapsed(self) -> bool:
         """Whether the peer's claim is so old that another sender may become the peer."""
 
-    def note_stranger(self, who: str) -> None:
-        """Note that bytes of `who`, whom the endpoint does not name as a peer, were ignored."""
+    def note_stranger(self, sender: str) -> None:
+        """Note that bytes of `sender`, whom the endpoint does not name as a peer, were ignored."""
 
 
 Lost = Callable[[str], None]

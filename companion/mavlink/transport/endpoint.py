@@ -16,7 +16,7 @@ _DEVICE = re.compile(r"(?:serial:/*)?(/?dev/[^:,]+|tty[^:,/]+|COM\d+)(?:[:,](\d{
 """A serial device as other programs write it, and its baud rate."""
 _ADDRESS = re.compile(r"(?:(\w+):/*)?([^:/\[\]]*|\[[0-9a-fA-F:.]+\]):(\d{1,5})/?")
 """An address as other programs write it: in pymavlink's notation, or without a scheme."""
-_OURSELVES = ("", "0.0.0.0", "127.0.0.1", "localhost", "::", "::1")
+_LISTENING_HOSTS = ("", "0.0.0.0", "127.0.0.1", "localhost", "::", "::1")
 """Hosts for which `udp://` can only mean listening."""
 
 
@@ -102,17 +102,17 @@ def parse_endpoint(text: str) -> Endpoint:
     if not separator or kind is None:
         raise EndpointError(f"endpoint {text!r} is not understood: {_remedy(text)}")
     rest, question, query = rest.partition("?")
-    found = _NETWORK.fullmatch(rest.rstrip("/"))
-    if found is None:
+    match = _NETWORK.fullmatch(rest.rstrip("/"))
+    if match is None:
         raise EndpointError(f"endpoint {text!r} needs HOST:PORT after {scheme}://: {_HELP}")
     listens = kind in (UdpIn, TcpServer)
-    host, port = found[1].strip("[]") or ("0.0.0.0" if listens else ""), int(found[2])
+    host, port = match[1].strip("[]") or ("0.0.0.0" if listens else ""), int(match[2])
     if not host:
         raise EndpointError(f"endpoint {text!r} names no host to connect to: {_HELP}")
-    if scheme == "udp" and host not in _OURSELVES:
+    if scheme == "udp" and host not in _LISTENING_HOSTS:
         raise EndpointError(
             f"endpoint {text!r} does not say who listens: write udpin://0.0.0.0:{port} to wait for "
-            f"the vehicle, or udpout://{found[1]}:{port} to send to {host} first"
+            f"the vehicle, or udpout://{match[1]}:{port} to send to {host} first"
         )
     if not is_host(host):
         raise EndpointError(f"endpoint {text!r}: {host!r} is no host name or address")
@@ -131,19 +131,19 @@ def _peers(text: str, query: str) -> tuple[PeerAddress, ...]:
     key, _, names = query.partition("=")
     peers = []
     for name in names.split(","):
-        found = _PEER.fullmatch(name.strip())
-        port = int(found[2]) if found and found[2] else None
+        match = _PEER.fullmatch(name.strip())
+        port = int(match[2]) if match and match[2] else None
         if (
             key != "peer"
-            or found is None
-            or not is_host(found[1].strip("[]"))
+            or match is None
+            or not is_host(match[1].strip("[]"))
             or not (port is None or 1 <= port <= 65535)
         ):
             raise EndpointError(
                 f"endpoint {text!r}: {query!r} is not understood; write ?peer=ADDRESS or "
                 "?peer=ADDRESS:PORT, several with commas between"
             )
-        peers.append(PeerAddress(found[1].strip("[]"), port))
+        peers.append(PeerAddress(match[1].strip("[]"), port))
     return tuple(peers)
 
 
@@ -157,10 +157,10 @@ def is_host(text: str) -> bool:
 
 
 def _serial(text: str, rest: str) -> SerialPort:
-    found = _SERIAL.fullmatch(rest)
-    if found is None:
+    match = _SERIAL.fullmatch(rest)
+    if match is None:
         raise EndpointError(f"endpoint {text!r} needs DEVICE:BAUD: {_remedy(text)}")
-    return SerialPort(found[1], int(found[2]))
+    return SerialPort(match[1], int(match[2]))
 
 
 def _remedy(text: str) -> str:
@@ -179,7 +179,7 @@ def _remedy(text: str) -> str:
     if address := _ADDRESS.fullmatch(text):
         scheme, host, port = address[1], address[2], address[3]
         kind = _NETWORK_KINDS.get(scheme or "")
-        if kind is not None and (scheme != "udp" or host in _OURSELVES):
+        if kind is not None and (scheme != "udp" or host in _LISTENING_HOSTS):
             usual = "udpin" if scheme == "udp" else scheme
             return f"write {usual}://{host or '0.0.0.0'}:{port}"
         if scheme in (None, "udp"):

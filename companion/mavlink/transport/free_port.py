@@ -9,7 +9,7 @@ from companion.mavlink.errors import LinkError
 _FIRST, _COUNT = 20_000, 12_000
 """Below 32768, where Linux begins to give ports to sockets that ask for any."""
 
-_BLOCK = 50
+_PORTS_PER_PROCESS = 50
 """Processes with neighboring numbers start this many ports apart."""
 
 _counter = itertools.count()
@@ -28,7 +28,7 @@ def free_port(*offsets: int) -> int:
         LinkError: all ports are in use.
     """
     for number in itertools.islice(_counter, _COUNT):
-        port = _FIRST + (os.getpid() * _BLOCK + number) % _COUNT
+        port = _FIRST + (os.getpid() * _PORTS_PER_PROCESS + number) % _COUNT
         if all(_is_free(port + offset) for offset in (0, *offsets)):
             return port
     raise LinkError(f"all ports from {_FIRST} to {_FIRST + _COUNT - 1} are in use")

@@ -107,9 +107,11 @@ class TcpTransport:
         if self._connection is not None:
             if not self._replaceable():
                 return False
-            before = self._connection
-            self.dropped(before, "another client took the place of one without a valid heartbeat")
-            before.abort()
+            connection_before = self._connection
+            self.connection_dropped(
+                connection_before, "another client took the place of one without a valid heartbeat"
+            )
+            connection_before.abort()
         sock = connection.get_extra_info("socket")
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._connection, self._connected_at = connection, self._loop.time()
@@ -129,10 +131,10 @@ class TcpTransport:
         if self._claimed or self._server is None:
             self._receiver.receive(data, received)
         else:
-            who = host_and_port(connection.get_extra_info("peername"))
-            self._claimed = self._receiver.claim(data, received, who)
+            sender = host_and_port(connection.get_extra_info("peername"))
+            self._claimed = self._receiver.claim(data, received, sender)
 
-    def dropped(self, connection: asyncio.Transport | None, reason: str) -> None:
+    def connection_dropped(self, connection: asyncio.Transport | None, reason: str) -> None:
         """Note that a connection is closed, for `reason`."""
         if self._connection is None or connection is not self._connection:
             return
@@ -181,4 +183,4 @@ class _Connection(asyncio.Protocol):
 
     def connection_lost(self, exc: Exception | None) -> None:
         reason = f"connection broken: {exc}" if exc else "closed by the other side"
-        self._owner.dropped(self._transport, reason)
+        self._owner.connection_dropped(self._transport, reason)

@@ -20,8 +20,8 @@ _MAX_DATAGRAM = 4096  # far above the largest MAVLink frame (280); routers pack 
 _SO_TIMESTAMPNS = getattr(socket, "SO_TIMESTAMPNS", 35)  # Linux; the module names it from 3.13 on
 _STAMP = struct.Struct("@qq")  # s and ns since 1970
 _STAMP_SPACE = socket.CMSG_SPACE(_STAMP.size)
-_OLDEST_NS = 1_000_000_000  # an older stamp means that the computer's clock was changed
-_BURST = 32  # datagrams read before the loop does other work
+_MAX_STAMP_AGE_NS = 1_000_000_000  # an older stamp means that the computer's clock was changed
+_MAX_READS_AT_ONCE = 32  # datagrams read before the loop does other work
 
 PEER_SILENCE_S = 2.0
 """Period in which the peer is checked for silence, s. After a silent period, a sender at another
@@ -60,13 +60,13 @@ async def udp_address(endpoint: UdpIn | UdpOut) -> UdpAddress:
     """
     loop, kind = asyncio.get_running_loop(), socket.SOCK_DGRAM
     try:
-        found = await loop.getaddrinfo(endpoint.host, endpoint.port, type=kind)
+        addresses = await loop.getaddrinfo(endpoint.host, endpoint.port, type=kind)
     except OSError as error:
         raise EndpointError(
             f"host {endpoint.host!r} is unknown ({error.strerror}); check the name or use its "
             "IP address"
         ) from error
-    family, _, _, _, address = found[0]
+    family, _, _, _, address = addresses[0]
     named_peers = await resolve(endpoint.peers if isinstance(endpoint, UdpIn) else (), kind)
     return UdpAddress(family, address, named_peers)
 
@@ -135,7 +135,7 @@ class UdpTransport:
             return
         receive, read, peer = self._receiver.receive, self._socket.recvmsg, self._peer
         try:
-            for _ in range(_BURST):
+            for _ in range(_MAX_READS_AT_ONCE):
                 data, stamps, _, address = read(_MAX_DATAGRAM, _STAMP_SPACE)
                 if address == peer and receive(data, _arrival_ns(stamps)):
                     self._heard = True
@@ -158,15 +158,15 @@ class UdpTransport:
         The sender becomes the peer if its claim is valid, or if it must receive frames in order to
         prove its claim (`Receiver.may_answer`).
         """
-        who = host_and_port(address)
+        sender = host_and_port(address)
         if not self._named_peers.admit(address):
-            self._receiver.note_stranger(who)
+            self._receiver.note_stranger(sender)
             return False
         if address == self._peer and not self._receiver.claim_lapsed():
             accepted = self._receiver.receive(data, received_ns)  # it was only silent
         else:
-            accepted = self._receiver.claim(data, received_ns, who)
-        return accepted or self._receiver.may_answer(who)
+            accepted = self._receiver.claim(data, received_ns, sender)
+        return accepted or self._receiver.may_answer(sender)
 
     def _check_peer(self) -> None:
         self._timer = self._loop.call_later(PEER_SILENCE_S, self._check_peer)
@@ -209,4 +209,4 @@ def _arrival_ns(stamps: list[tuple[int, int, bytes]]) -> int:
         return now
     seconds, nanoseconds = _STAMP.unpack(stamps[0][2])
     age = time.time_ns() - (seconds * 1_000_000_000 + nanoseconds)
-    return now - age if 0 <= age < _OLDEST_NS else now
+    return now - age if 0 <= age < _MAX_STAMP_AGE_NS else now

@@ -11,7 +11,7 @@ from companion.mavlink.framing import Frame, FrameScanner
 from companion.mavlink.messages import CRC_EXTRA
 from companion.mavlink.stats import LinkStats
 
-_MOST_WAITING = 32_768
+_MAX_QUEUED_BYTES = 32_768
 """Largest number of bytes queued for one client."""
 
 
@@ -75,7 +75,7 @@ class Client(ABC):
 
     def put(self, frame: bytes) -> None:
         """Queue one frame; drop it if the queue is full."""
-        if self._bytes + len(frame) > _MOST_WAITING:
+        if self._bytes + len(frame) > _MAX_QUEUED_BYTES:
             self.stats.dropped += 1
             return
         self._waiting.append(frame)

@@ -2,7 +2,7 @@
 
 The control loop comes first: an arriving frame is only queued. It is forwarded after the next
 attitude sample has been answered, when another one is a whole period away; if that takes longer
-than `_LONGEST_WAIT`, it is forwarded without waiting for the sample.
+than `_MAX_FORWARDING_DELAY`, it is forwarded without waiting for the sample.
 """
 
 import asyncio
@@ -30,11 +30,11 @@ from companion.serve.network.udp import UdpPort, open_udp
 from companion.serve.network.uplink import Uplink, uplink_rate
 from companion.vehicle.link import Link
 
-_LONGEST_WAIT = 0.004
+_MAX_FORWARDING_DELAY = 0.004
 """Longest time that a frame waits to be forwarded, s."""
-_MOST_FROM_VEHICLE = 4096
+_MAX_VEHICLE_FRAMES = 4096
 """Largest number of the vehicle's frames that wait to be forwarded; only a stall causes more."""
-_MOST_FAULTS = 16
+_MAX_FAULTS = 16
 """Largest number of different faults that are reported."""
 
 Port = UdpPort | TcpPort | SerialLine
@@ -167,7 +167,7 @@ class Network:
 
     def _queue_frame(self, frame: Frame) -> None:
         """Queue a frame of the link; forwarding it now could delay the next attitude sample."""
-        if len(self._from_vehicle) >= _MOST_FROM_VEHICLE:
+        if len(self._from_vehicle) >= _MAX_VEHICLE_FRAMES:
             self.overflowed += 1
             return
         self._from_vehicle.append(frame)
@@ -176,16 +176,16 @@ class Network:
             if self._flush_handle is None:
                 self._flush_handle = self._loop.call_soon(self.flush)
         elif self._timer is None:
-            self._timer = self._loop.call_later(_LONGEST_WAIT, self.flush)
+            self._timer = self._loop.call_later(_MAX_FORWARDING_DELAY, self.flush)
 
     def _tell_once(self, text: str) -> None:
-        if text not in self._faults and len(self._faults) < _MOST_FAULTS:
+        if text not in self._faults and len(self._faults) < _MAX_FAULTS:
             self._faults.add(text)
             self._note_event(text)
 
     def _flush_later(self) -> None:
         if self._timer is None and self._flush_handle is None:
-            self._timer = self._loop.call_later(_LONGEST_WAIT, self.flush)
+            self._timer = self._loop.call_later(_MAX_FORWARDING_DELAY, self.flush)
 
     async def _open(self, endpoint: UdpIn | UdpOut | TcpClient | TcpServer | SerialPort) -> Port:
         match endpoint:

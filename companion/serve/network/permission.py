@@ -12,7 +12,7 @@ from companion.mavlink.signing import Signing
 from companion.mavlink.stamps import SignatureResult
 from companion.serve.network.client import Client
 
-_READING = frozenset(
+_READING_MESSAGES = frozenset(
     {
         dialect.MAVLINK_MSG_ID_PING,
         dialect.MAVLINK_MSG_ID_TIMESYNC,
@@ -54,7 +54,7 @@ def reads_only(frame: Frame) -> bool:
         return int.from_bytes(whole[_COMMAND_AT : _COMMAND_AT + 2], "little") in _READING_COMMANDS
     if frame.message_id == _FTP:
         return frame.payload.ljust(_OPCODE_AT + 1, b"\0")[_OPCODE_AT] in _READING_OPCODES
-    return frame.message_id in _READING
+    return frame.message_id in _READING_MESSAGES
 
 
 class Permission:

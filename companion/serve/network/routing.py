@@ -11,9 +11,9 @@ from typing import Protocol
 from companion.mavlink.framing import Frame
 from companion.serve.network.addresses import EVERYBODY, Address, source_of, target_of
 
-_REPEATED_WITHIN = 0.2
+_REPETITION_TIME = 0.2
 """A frame identical to one that was forwarded within this time is a repetition, s."""
-_MOST_REMEMBERED = 4096
+_MAX_REMEMBERED_FRAMES = 4096
 """Largest number of remembered frames; in a flood, only the newest are remembered."""
 
 
@@ -200,10 +200,10 @@ class _Repeats:
         """Whether these bytes were forwarded just before; if not, remember them."""
         now, passed = self._clock(), self._passed
         at = passed.pop(raw, None)
-        if at is not None and now - at <= _REPEATED_WITHIN:
+        if at is not None and now - at <= _REPETITION_TIME:
             passed[raw] = at
             return True
         passed[raw] = now
-        while len(passed) > _MOST_REMEMBERED:
+        while len(passed) > _MAX_REMEMBERED_FRAMES:
             passed.popitem(last=False)
         return False

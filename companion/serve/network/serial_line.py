@@ -7,7 +7,7 @@ from companion.mavlink.transport.endpoint import SerialPort
 from companion.mavlink.transport.serial_port import SerialTransport
 from companion.serve.network.client import Client, Clients
 
-_RETRY = 2.0
+_RETRY_PAUSE = 2.0
 """Pause before opening a lost device again, s."""
 
 
@@ -47,7 +47,7 @@ class SerialLine:
 
     async def _reopen(self) -> None:
         while True:
-            await asyncio.sleep(_RETRY)
+            await asyncio.sleep(_RETRY_PAUSE)
             self._client = SerialClient(self._endpoint.device)
             try:
                 self._transport = self._open()

@@ -10,14 +10,14 @@ from companion.mavlink.transport.endpoint import TcpClient as TcpOut
 from companion.mavlink.transport.endpoint import TcpServer
 from companion.serve.network.client import Client, Clients, Flood
 
-_MOST_CLIENTS = 16
-_MOST_UNSENT = 65_536
+_MAX_CLIENTS = 16
+_MAX_UNSENT_BYTES = 65_536
 """Unsent bytes above which frames are dropped."""
 _KERNEL_BUFFER = 65_536
 """Size of the kernel's buffer for a client, bytes. A client that paused must read these old bytes
 before it reads anything new.
 """
-_RETRY = 2.0
+_RETRY_PAUSE = 2.0
 """Pause before connecting again, s."""
 _CONNECT_TIMEOUT = 5.0
 
@@ -88,12 +88,12 @@ class TcpPort:
                 await connection.lost.wait()
             except OSError:
                 pass  # TimeoutError is one, too
-            await asyncio.sleep(_RETRY)
+            await asyncio.sleep(_RETRY_PAUSE)
 
     def accept(self, transport: asyncio.Transport) -> "TcpClient | None":
         """Make a client for a new connection; None if it is refused."""
         address = transport.get_extra_info("peername")
-        full = len(self._open) >= _MOST_CLIENTS
+        full = len(self._open) >= _MAX_CLIENTS
         if self._closed or full or address is None or not self._named_peers.admit(address):
             return None
         sock = transport.get_extra_info("socket")
@@ -142,10 +142,10 @@ class TcpClient(Client):
 
     def _flush(self) -> None:
         transport = self._transport
-        if transport.is_closing() or transport.get_write_buffer_size() > _MOST_UNSENT:
+        if transport.is_closing() or transport.get_write_buffer_size() > _MAX_UNSENT_BYTES:
             self._drop_waiting()
         else:
-            data, frames = self._take(_MOST_UNSENT)
+            data, frames = self._take(_MAX_UNSENT_BYTES)
             transport.write(data)
             self.stats.sent += frames
 

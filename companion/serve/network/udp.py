@@ -11,14 +11,14 @@ from companion.mavlink.transport.endpoint import UdpIn, UdpOut
 from companion.mavlink.transport.udp import udp_address
 from companion.serve.network.client import Client, Clients, Flood
 
-_LARGEST_READ = 4_096
-_LARGEST_SENT = 1_400
+_READ_BYTES = 4_096
+_MAX_DATAGRAM = 1_400
 """Largest datagram that joins several frames, bytes, so that no network must split it."""
-_BURST = 8
+_MAX_READS_AT_ONCE = 8
 """Number of datagrams read before the loop does other work."""
-_SILENT = 15.0
+_SILENCE_TIMEOUT = 15.0
 """A client counts as gone after this silence, s; ground stations send once a second."""
-_MOST_CLIENTS = 16
+_MAX_CLIENTS = 16
 
 
 async def open_udp(endpoint: UdpIn | UdpOut, clients: Clients) -> "UdpPort":
@@ -58,15 +58,15 @@ class UdpPort:
         self.local: tuple[str, int] = sock.getsockname()[:2]
         self._loop = asyncio.get_running_loop()
         self._by_address: dict[Any, UdpClient] = {}
-        self._only: Any = None
+        self._only_address: Any = None
         self._flood = Flood()
         self._pause: asyncio.TimerHandle | None = None
-        self._timer = self._loop.call_later(_SILENT, self._expire)
+        self._timer = self._loop.call_later(_SILENCE_TIMEOUT, self._expire)
         self._loop.add_reader(sock.fileno(), self._read)
 
     def send_only_to(self, address: Any) -> None:
         """Send to one client, which need not send first; ignore all others."""
-        self._only = address
+        self._only_address = address
         self._attach(address)
 
     def close(self) -> None:
@@ -94,9 +94,9 @@ class UdpPort:
         return True
 
     def _read(self) -> None:
-        for _ in range(_BURST):
+        for _ in range(_MAX_READS_AT_ONCE):
             try:
-                data, address = self._socket.recvfrom(_LARGEST_READ)
+                data, address = self._socket.recvfrom(_READ_BYTES)
             except OSError:
                 return  # nothing left, or an ICMP refusal of something sent before
             self._take(data, address)
@@ -112,11 +112,11 @@ class UdpPort:
     def _take(self, data: bytes, address: Any) -> None:
         client = self._by_address.get(address)
         if client is None:
-            if self._only is not None or not self._named_peers.admit(address):
+            if self._only_address is not None or not self._named_peers.admit(address):
                 return
             client = UdpClient(self, address)
             frames = client.scan(data)
-            if not frames or len(self._by_address) >= _MOST_CLIENTS:
+            if not frames or len(self._by_address) >= _MAX_CLIENTS:
                 return
             self._attach(address, client)
         else:
@@ -132,7 +132,7 @@ class UdpPort:
         self._timer = self._loop.call_later(1.0, self._expire)
         now = self._loop.time()
         for address, client in tuple(self._by_address.items()):
-            if address != self._only and now - client.heard_at > _SILENT:
+            if address != self._only_address and now - client.heard_at > _SILENCE_TIMEOUT:
                 del self._by_address[address]
                 self._clients.detach(client)
 
@@ -152,7 +152,7 @@ class UdpClient(Client):
 
     def _flush(self) -> None:
         while self._waiting:
-            datagram, frames = self._take(_LARGEST_SENT)
+            datagram, frames = self._take(_MAX_DATAGRAM)
             if self._port.send(datagram, self._address):
                 self.stats.sent += frames
             else:

@@ -5,9 +5,9 @@ from collections.abc import Callable
 
 from companion.mavlink.transport.endpoint import Endpoint, SerialPort
 
-_QUEUE = 64
+_MAX_QUEUED_FRAMES = 64
 """Largest number of frames that wait for one client."""
-_OLDEST = 1.0
+_MAX_FRAME_AGE = 1.0
 """Largest age of a frame that is sent, s: a command from before an outage must not arm later."""
 _LARGEST_FRAME = 280
 _SERIAL_SHARE = 0.5
@@ -55,7 +55,7 @@ class Uplink:
         if queue is None:
             queue = self._queues[origin] = deque()
             self._turns.append(origin)
-        if len(queue) >= _QUEUE:
+        if len(queue) >= _MAX_QUEUED_FRAMES:
             self.dropped += 1
             return
         queue.append((self._clock(), frame))
@@ -69,7 +69,7 @@ class Uplink:
             origin = self._turns[0]
             queue = self._queues[origin]
             queued_at, frame = queue[0]
-            if now - queued_at > _OLDEST:
+            if now - queued_at > _MAX_FRAME_AGE:
                 self.dropped += 1
             elif self._send(frame):
                 self._allowed -= len(frame)

@@ -42,7 +42,7 @@ class Approach:
     Args:
         error: initial error.
         limits: limits of each axis.
-        begins: time when it begins, s.
+        begin_time: time when it begins, s.
         by_velocity: whether only the velocity must become zero, at any position.
 
     Raises:
@@ -50,7 +50,7 @@ class Approach:
     """
 
     def __init__(
-        self, error: State, limits: Sequence[AxisLimits], begins: float, *, by_velocity: bool
+        self, error: State, limits: Sequence[AxisLimits], begin_time: float, *, by_velocity: bool
     ) -> None:
         axes = len(limits)
         problem = InputParameter(axes)
@@ -64,7 +64,7 @@ class Approach:
         problem.max_jerk = [each.jerk for each in limits]
         if by_velocity:
             problem.control_interface = ControlInterface.Velocity
-        self._begins = begins
+        self._begin_time = begin_time
         self._trajectory = Trajectory(axes)
         try:
             result = Ruckig(axes).calculate(problem, self._trajectory)
@@ -76,7 +76,7 @@ class Approach:
 
     def at(self, time: float) -> State:
         """The error at a time, s; constant after the end."""
-        elapsed = max(0.0, time - self._begins)
+        elapsed = max(0.0, time - self._begin_time)
         position, velocity, acceleration = self._trajectory.at_time(elapsed)[:3]
         return State(tuple(position), tuple(velocity), tuple(acceleration))
 

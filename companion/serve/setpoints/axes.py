@@ -12,25 +12,25 @@ from typing import NamedTuple
 from companion.attitude.rotation import clamp
 from companion.guidance.reference import LARGEST_JERK, change_rate
 from companion.serve.setpoints.approach import Approach, AxisLimits, State, Values
-from companion.serve.setpoints.carrier import AxisMotion, Carrier, far, plus
+from companion.serve.setpoints.carrier import AxisMotion, Carrier, are_far_apart, plus
 from companion.serve.setpoints.request import AxisDemand
 
-_STREAM = 0.25
+_MAX_STREAM_PERIOD = 0.25
 """Longest period of setpoints that count as a stream, whose derivatives are estimated, s."""
-_SMOOTHING = 0.5
+_DERIVATIVE_WEIGHT = 0.5
 """Weight of a new derivative in its running estimate."""
 _LARGEST_ACCELERATION = 15.0
 """Largest estimated acceleration, m/s²; faster changes of the velocity are jumps."""
-_MOST_BRAKED = 2.0
+_MAX_BRAKING_FACTOR = 2.0
 """Largest acceleration with which a motion begins, as a multiple of its limit."""
-_STRAYED = 1.5
+_MAX_LEAD_DISTANCE = 1.5
 """Largest distance of the reference ahead of the vehicle if no position is commanded, m."""
-_OUTRUN = 2.0
+_MAX_LEAD_SPEED = 2.0
 """Largest velocity of the reference ahead of the vehicle's if only accelerations are commanded,
 m/s.
 """
 
-_LEAST_SHARE = 0.25
+_MIN_LIMIT_SHARE = 0.25
 """Smallest share of the limits for an axis, also if the motion is across this axis."""
 
 
@@ -94,9 +94,9 @@ class Axes:
         """
         if actual is not None:
             current = self.at(now)
-            if far(current.position, actual.position, _STRAYED) or far(
-                current.velocity, actual.velocity, _OUTRUN
-            ):
+            if are_far_apart(
+                current.position, actual.position, _MAX_LEAD_DISTANCE
+            ) or are_far_apart(current.velocity, actual.velocity, _MAX_LEAD_SPEED):
                 self._demand, self._approach = None, None
                 self._carrier = Carrier(*actual, self._zero, self._zero, now)
         self.command(AxisDemand(None, self._zero, None), now)
@@ -120,7 +120,7 @@ class Axes:
         if demand.position is not None:
             self._carry_position(demand, current, now)
         else:
-            self._carry_motion(demand, _near(current, actual, demand), now)
+            self._carry_motion(demand, _near_vehicle(current, actual, demand), now)
         self._demand, self._given_at = demand, now
 
     def _repeat(self, demand: AxisDemand, now: float, actual: AxisMotion | None) -> None:
@@ -134,14 +134,19 @@ class Axes:
             self._given_at = inf
 
     def _repeat_motion(self, demand: AxisDemand, now: float, actual: AxisMotion | None) -> None:
-        """Follow a repeated velocity or acceleration, at most `_STRAYED` ahead of the vehicle."""
+        """Follow a repeated velocity or acceleration.
+
+        The reference stays at most `_MAX_LEAD_DISTANCE` ahead of the vehicle.
+        """
         current = self.at(now)
         if demand.velocity is not None and now - self._given_at > self._timeout:
             demand = AxisDemand(None, demand.velocity, None)
-        strayed = actual is not None and far(current.position, actual.position, _STRAYED)
+        strayed = actual is not None and are_far_apart(
+            current.position, actual.position, _MAX_LEAD_DISTANCE
+        )
         accelerates_on = demand.acceleration is None and any(self._carrier.acceleration)
         if demand.velocity is None or strayed or accelerates_on:
-            self._carry_motion(demand, _near(current, actual, demand), now)
+            self._carry_motion(demand, _near_vehicle(current, actual, demand), now)
 
     def _carry_position(self, demand: AxisDemand, current: State, now: float) -> None:
         assert demand.position is not None
@@ -169,21 +174,23 @@ class Axes:
         """A motion of the error to zero; the limits hold along its direction, not for each axis."""
         length = hypot(*direction)
         limits = [
-            each if length == 0.0 else _scaled(each, max(_LEAST_SHARE, abs(part) / length))
+            each if length == 0.0 else _scaled(each, max(_MIN_LIMIT_SHARE, abs(part) / length))
             for each, part in zip(self._limits, direction, strict=True)
         ]
         acceleration = tuple(
-            clamp(value, _MOST_BRAKED * each.acceleration)
+            clamp(value, _MAX_BRAKING_FACTOR * each.acceleration)
             for value, each in zip(error.acceleration, self._limits, strict=True)
         )
-        begins = error._replace(acceleration=acceleration)
-        return Approach(begins, limits, now, by_velocity=by_velocity)
+        start = error._replace(acceleration=acceleration)
+        return Approach(start, limits, now, by_velocity=by_velocity)
 
     def _derivatives(self, demand: AxisDemand, now: float) -> tuple[Values, Values]:
         """Acceleration and jerk of a stream; estimated if they are not commanded."""
         before, since = self._demand, now - self._given_at
         commanded = demand.acceleration
-        fresh = before is not None and before.position is not None and 0.0 < since <= _STREAM
+        fresh = (
+            before is not None and before.position is not None and 0.0 < since <= _MAX_STREAM_PERIOD
+        )
         if not fresh or before is None or demand.velocity is None or before.velocity is None:
             return commanded or self._zero, self._zero
         if commanded is None:
@@ -208,10 +215,10 @@ def _scaled(limits: AxisLimits, share: float) -> AxisLimits:
 
 
 def _blend(old: Values, new: Values) -> Values:
-    return tuple(a + _SMOOTHING * (b - a) for a, b in zip(old, new, strict=True))
+    return tuple(a + _DERIVATIVE_WEIGHT * (b - a) for a, b in zip(old, new, strict=True))
 
 
-def _near(current: State, actual: AxisMotion | None, demand: AxisDemand) -> State:
+def _near_vehicle(current: State, actual: AxisMotion | None, demand: AxisDemand) -> State:
     """The state, with values that are too far from the vehicle's replaced by the vehicle's.
 
     This applies to the position, and to a velocity that is not commanded.
@@ -219,8 +226,8 @@ def _near(current: State, actual: AxisMotion | None, demand: AxisDemand) -> Stat
     if actual is None:
         return current
     position, velocity, acceleration = current
-    if far(position, actual.position, _STRAYED):
+    if are_far_apart(position, actual.position, _MAX_LEAD_DISTANCE):
         position = actual.position
-    if demand.velocity is None and far(velocity, actual.velocity, _OUTRUN):
+    if demand.velocity is None and are_far_apart(velocity, actual.velocity, _MAX_LEAD_SPEED):
         velocity = actual.velocity
     return State(position, velocity, acceleration)

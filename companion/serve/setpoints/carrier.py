@@ -56,6 +56,6 @@ def _minus(left: Values, right: Values) -> Values:
     return tuple(a - b for a, b in zip(left, right, strict=True))
 
 
-def far(left: Values, right: Values, distance: float) -> bool:
+def are_far_apart(left: Values, right: Values, distance: float) -> bool:
     """Whether two vectors are further apart than `distance`."""
     return hypot(*_minus(left, right)) > distance

@@ -20,7 +20,7 @@ for tilt.
 _YAW_ACCELERATION, _YAW_JERK = 2.0, 10.0
 """Largest yaw acceleration, rad/s², and jerk, rad/s³, after a jump of the yaw; yaw responds slowly.
 """
-_STREAM = 0.25
+_MAX_STREAM_PERIOD = 0.25
 """Longest period of yaws that count as a stream, whose rate is estimated, s."""
 
 
@@ -129,7 +129,11 @@ class CommandedMotion:
                 return AxisDemand((heading,), None, None)
             heading += wrap_angle(request.yaw - yaw)
             turned = wrap_angle(request.yaw - yaw) / max(now - at, 1e-3)
-            if rate is None and now - at <= _STREAM and abs(turned) <= self._largest_yaw_rate:
+            if (
+                rate is None
+                and now - at <= _MAX_STREAM_PERIOD
+                and abs(turned) <= self._largest_yaw_rate
+            ):
                 rate = turned
         else:
             (heading,), _, _ = self._heading.at(now)

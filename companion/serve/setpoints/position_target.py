@@ -26,7 +26,7 @@ _NO_ACCELERATION = 64 | 128 | 256
 _KNOWN_BITS = 4095
 _HORIZONTAL, _VERTICAL = (0, 1), (2,)
 
-_FARTHEST, _FASTEST, _STRONGEST, _FASTEST_YAW = 10_000.0, 100.0, 100.0, 20.0
+_MAX_POSITION, _MAX_SPEED, _MAX_ACCELERATION, _MAX_YAW_RATE = 10_000.0, 100.0, 100.0, 20.0
 """Larger numbers count as errors; m, m/s, m/s², rad/s."""
 
 
@@ -122,10 +122,14 @@ def _groups(message: Message, position: Vector) -> tuple[_Values, _Values, _Valu
     if mask & ~_KNOWN_BITS:
         raise RefusedSetpoint(f"type_mask {mask} has bits that mean nothing to a multirotor")
     return (
-        _masked(mask, _POSITION, position, _FARTHEST, "position"),
-        _masked(mask, _VELOCITY, (message.vx, message.vy, message.vz), _FASTEST, "velocity"),
+        _masked(mask, _POSITION, position, _MAX_POSITION, "position"),
+        _masked(mask, _VELOCITY, (message.vx, message.vy, message.vz), _MAX_SPEED, "velocity"),
         _masked(
-            mask, _ACCELERATION, (message.afx, message.afy, message.afz), _STRONGEST, "acceleration"
+            mask,
+            _ACCELERATION,
+            (message.afx, message.afy, message.afz),
+            _MAX_ACCELERATION,
+            "acceleration",
         ),
     )
 
@@ -149,7 +153,7 @@ def _heading(message: Message) -> tuple[float | None, float | None]:
     rate = None if mask & _NO_YAW_RATE else message.yaw_rate
     if yaw is not None and not (isfinite(yaw) and abs(yaw) <= 4.0 * pi):
         raise RefusedSetpoint(f"yaw is not finite or too large: {yaw:g}")
-    if rate is not None and not (isfinite(rate) and abs(rate) <= _FASTEST_YAW):
+    if rate is not None and not (isfinite(rate) and abs(rate) <= _MAX_YAW_RATE):
         raise RefusedSetpoint(f"yaw_rate is not finite or too large: {rate:g}")
     return yaw, rate
 
@@ -188,8 +192,10 @@ def _demand(
         raise RefusedSetpoint(f"nothing {name} is commanded: give position, velocity or accel.")
     if position is not None and velocity is None and acceleration is not None:
         raise RefusedSetpoint("position and acceleration need velocity, too")
-    if position is not None and hypot(*position) > _FARTHEST:
-        raise RefusedSetpoint(f"the position is more than {_FARTHEST:g} m from the local origin")
+    if position is not None and hypot(*position) > _MAX_POSITION:
+        raise RefusedSetpoint(
+            f"the position is more than {_MAX_POSITION:g} m from the local origin"
+        )
     return AxisDemand(position, velocity, acceleration)
 
 

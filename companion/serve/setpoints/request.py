@@ -86,7 +86,7 @@ class Situation(NamedTuple):
     origin: "Origin | None" = None
 
 
-_LEAST_HEIGHT, _LEAST_CLIMB = 1.0, 0.1
+_MIN_TAKEOFF_HEIGHT, _MIN_TAKEOFF_SPEED = 1.0, 0.1
 """Height above the vehicle (m) or upward speed (m/s) from which a setpoint requests a take-off."""
 
 
@@ -96,8 +96,8 @@ def climbs(request: Request, situation: Situation) -> bool:
         return False
     position, velocity, _ = request.vertical
     if position is not None:
-        return position[0] < situation.position_ned[2] - _LEAST_HEIGHT
-    return velocity is not None and velocity[0] < -_LEAST_CLIMB
+        return position[0] < situation.position_ned[2] - _MIN_TAKEOFF_HEIGHT
+    return velocity is not None and velocity[0] < -_MIN_TAKEOFF_SPEED
 
 
 class Origin(NamedTuple):

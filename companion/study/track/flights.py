@@ -19,7 +19,7 @@ from companion.child_process import end_with_parent
 from companion.config import Config
 from companion.config.files import changed, load
 from companion.files import bounded_yaml
-from companion.flight.observer import Silent, decline_landing
+from companion.flight.observer import SilentObserver, decline_landing
 from companion.flight.session import Session
 from companion.mavlink import lockstep
 from companion.mavlink.transport.free_port import free_port
@@ -174,7 +174,7 @@ def _configured(shipped: Config, task: Task, course: Path, endpoint: str) -> Con
     return changed(shipped, changes, "study track")
 
 
-class TruthRecorder(Silent):
+class TruthRecorder(SilentObserver):
     """Requests the true position from the vehicle's control channel during the measured phase.
 
     In lockstep, vehicle time stops until `companion` answers. So a request may block the event

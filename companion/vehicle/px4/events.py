@@ -14,7 +14,7 @@ from companion.mavlink.texts import TextAssembler
 _EVENT = struct.Struct("<IIHBBB40s")  # id, time, sequence, destination, log levels, arguments
 _AUTOPILOT = 1 << 24
 _FNV_OFFSET, _FNV_PRIME = 0x811C9DC5, 0x01000193
-_WARNING, _FOR_PROGRAMS = 4, 8
+_WARNING_SEVERITY, _PROGRAMS_ONLY_SEVERITY = 4, 8
 
 _REASONS = {
     1: "stick gesture",
@@ -197,9 +197,9 @@ class EventReader:
         elif self._in_report:
             self._failing.add(number)
             known = self._failed_before | _OUR_STREAM_IDS
-            if number not in known and severity <= _WARNING:
+            if number not in known and severity <= _WARNING_SEVERITY:
                 self._report(severity, number, _CHECKS_BY_ID.get(number))
-        elif severity < _FOR_PROGRAMS:
+        elif severity < _PROGRAMS_ONLY_SEVERITY:
             words = _WORDS_BY_ID.get(number)
             self._report(severity, number, words and _filled_in(words, arguments))
 

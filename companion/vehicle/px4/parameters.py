@@ -33,7 +33,7 @@ _TERMINATION_OFF = 121212
 _FAILURE_ANGLES = ("FD_FAIL_R", "FD_FAIL_P")
 _NAMED_ANGLES = ", ".join(_FAILURE_ANGLES)
 _DEFAULT_FAILURE_ANGLE = 60.0
-_OVERSHOOT = 15.0
+_TILT_OVERSHOOT = 15.0
 """Tilt beyond the limit that a gust or a step may cause, degrees."""
 
 
@@ -60,13 +60,13 @@ def _termination(value: float, values: Values, settings: CompanionSettings) -> P
             f"the tilt at which the motors stop ({_NAMED_ANGLES}) is not known; fix the link",
         )
     angles = [values[name] for name in _FAILURE_ANGLES if values[name] > 0.0]
-    if not angles or min(angles) > degrees(settings.max_tilt) + _OVERSHOOT:
+    if not angles or min(angles) > degrees(settings.max_tilt) + _TILT_OVERSHOOT:
         return None
     return Problem(
         UNSAFE,
         f"a tilt of {min(angles):g}° ({_NAMED_ANGLES}) stops the motors, and "
         f"limits.max_tilt_deg is {degrees(settings.max_tilt):g}; lower limits.max_tilt_deg to "
-        f"{_OVERSHOOT:g}° below that angle, for gusts and steps",
+        f"{_TILT_OVERSHOOT:g}° below that angle, for gusts and steps",
     )
 
 
