@@ -25,7 +25,7 @@ demo: $(VENV)/.fly  ## fly the bundled vehicle and show what was measured
 	$(BIN)/companion demo
 
 # In the order of the files: sorted by their number of tests, the long flights would come last.
-PYTEST := $(BIN)/python -m pytest -n 4 --dist loadscope --no-loadscope-reorder
+PYTEST := $(BIN)/python -m pytest -n 3 --dist loadscope --no-loadscope-reorder
 
 test: lint bytecode  ## style, types, import rules, then the tests
 	$(PYTEST) -m 'not slow'
