@@ -25,7 +25,7 @@ _LOCAL_PORT_OFFSET = 40
 _READY = "ready on "
 """First words of the vehicle's output when its ports are open."""
 
-_START = 20.0
+_START_TIMEOUT = 20.0
 """Time allowed for the vehicle to start, s."""
 
 
@@ -112,7 +112,7 @@ def bundled_vehicle(config: Path, wire: Wire, log: Path, *, lockstep: bool) -> I
     Raises:
         OSError: `log` cannot be written.
         VehicleStoppedError: it stopped by itself (the message has its last line of output), or was
-            not ready within `_START`.
+            not ready within `_START_TIMEOUT`.
     """
     command = [sys.executable, "-m", "sitl_mock", "--headless", "--config", str(config)]
     command += ["--end-with-stdin"]
@@ -149,12 +149,12 @@ def _end(process: "subprocess.Popen[bytes]", log: Path) -> None:
 
 
 def _await_ready(process: "subprocess.Popen[bytes]", log: Path) -> None:
-    deadline = time.monotonic() + _START
+    deadline = time.monotonic() + _START_TIMEOUT
     while not log.read_text(errors="replace").startswith(_READY):
         _check_running(process, log)
         if time.monotonic() > deadline:
             raise VehicleStoppedError(
-                f"the mock vehicle did not start within {_START:g} s, see {log}"
+                f"the mock vehicle did not start within {_START_TIMEOUT:g} s, see {log}"
             )
         time.sleep(0.02)
 

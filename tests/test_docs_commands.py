@@ -117,7 +117,7 @@ def ready_to_fly(options: Namespace) -> None:
     if options.run.startswith("identify"):
         options.maneuvers, planner = ("identify",), "first-order"
     try:
-        flying.as_told(load(path), options, planner)
+        flying.with_options(load(path), options, planner)
     except MissingExtraError as error:
         pytest.skip(str(error))
 

@@ -10,7 +10,7 @@ from companion.attitude.types import Quaternion
 
 TWO_PI = 2.0 * pi
 
-_SMALL = 1e-12
+_SMALL_ANGLE = 1e-12
 """Below this half angle (rad) sin(h)/h is 1 to double precision."""
 
 
@@ -50,7 +50,7 @@ def angle_per_sine(w: float, sine: float) -> float:
 
     It scales the vector part v of a unit quaternion to the rotation vector: Log(q) = θ/sin(θ/2)·v.
     """
-    if sine < _SMALL:
+    if sine < _SMALL_ANGLE:
         return 2.0
     return 2.0 * atan2(sine, w) / sine
 
@@ -58,7 +58,7 @@ def angle_per_sine(w: float, sine: float) -> float:
 def cos_and_sinc(square: float) -> tuple[float, float]:
     """cos(h) and sin(h)/h of an angle h in rad, given as h²."""
     h = sqrt(square)
-    return cos(h), sin(h) / h if h > _SMALL else 1.0
+    return cos(h), sin(h) / h if h > _SMALL_ANGLE else 1.0
 
 
 def turned(q: Quaternion, rates: tuple[float, float, float], dt: float) -> Quaternion:

@@ -20,7 +20,7 @@ _SHORTEST, _LONGEST = log(0.02), log(2.0)
 _GOLDEN = 0.5 * (sqrt(5.0) - 1.0)
 _NARROWINGS = 17
 """Steps of the golden-section search; the range left is 0.13 % of a time constant."""
-_ASKED = 1e-3
+_MIN_STEP = 1e-3
 """Smallest target coefficient of a step; a smaller one counts as level."""
 
 
@@ -124,7 +124,7 @@ def _time_constants(path: Array, targets: Array, period: float) -> tuple[float, 
             else:
                 at_right[axis] = found[axis]
     north, east = exp(0.5 * (low[0] + high[0])), exp(0.5 * (low[1] + high[1]))
-    return north if asked[0] > _ASKED else nan, east if asked[1] > _ASKED else nan
+    return north if asked[0] > _MIN_STEP else nan, east if asked[1] > _MIN_STEP else nan
 
 
 def _squares(path: Array, targets: Array, logarithms: Array, period: float, found: Array) -> None:

@@ -20,7 +20,7 @@ FAULT, FAULT_PHASE, FAULT_AFTER = "fault", "fault.phase", "fault.after_s"
 """Factors that choose a fault scenario, the phase in which it begins, and when in this phase."""
 FAULT_FACTORS = (FAULT, FAULT_PHASE, FAULT_AFTER)
 """Factors that are not keys of a configuration."""
-_AFTER = {
+_DEFAULT_AFTER_S = {
     "stream": 0.0,
     "arm": 0.0,
     "takeoff": 0.8,
@@ -58,7 +58,7 @@ class FaultScenario(Section):
 
     def after(self, phase: str) -> float:
         """Time from the beginning of a phase to the fault, s."""
-        return _AFTER[phase] if self.after_s is None else self.after_s
+        return _DEFAULT_AFTER_S[phase] if self.after_s is None else self.after_s
 
     def endings(self, phase: str) -> tuple[str, ...]:
         """The permitted endings for a phase; empty if the file names none for it."""

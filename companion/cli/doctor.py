@@ -50,7 +50,7 @@ _ANSWERS = {answer.value[0]: answer for answer in Answer}
 
 def doctor(options: argparse.Namespace) -> int:
     """Find what is wrong with a vehicle before it flies, and fix it if asked to."""
-    config = _as_told(load(options.config), options)
+    config = _with_options(load(options.config), options)
     if options.yes and not options.fix:
         raise ConfigError("--yes needs --fix: it answers the questions that --fix asks")
     if options.fix and not options.yes and not sys.stdin.isatty():
@@ -73,7 +73,7 @@ def doctor(options: argparse.Namespace) -> int:
     return code
 
 
-def _as_told(config: Config, options: argparse.Namespace) -> Config:
+def _with_options(config: Config, options: argparse.Namespace) -> Config:
     """The configuration as changed by the options of the command line.
 
     Raises:

@@ -16,7 +16,7 @@ from companion.report import PAGE
 def fly(options: argparse.Namespace) -> int:
     """Fly the vehicle that the configuration names."""
     read = load(options.config)
-    config = flying.as_told(read, options)
+    config = flying.with_options(read, options)
     folder = flight_folder(config.recording.directory)
     invocation = flying.invocation(options)
     console = _console(options)

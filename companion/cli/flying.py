@@ -32,7 +32,7 @@ from companion.recording.measurements.summary import Summary
 from companion.recording.report import flight_table, words_text
 
 
-def as_told(config: Config, options: argparse.Namespace, planner: str | None = None) -> Config:
+def with_options(config: Config, options: argparse.Namespace, planner: str | None = None) -> Config:
     """The configuration as changed by the options of the command line.
 
     Raises:
@@ -162,7 +162,7 @@ def fly_bundled(
     config = read = load(path)
     with demo.wire_like(config.link.endpoint) as wire:
         options.endpoint, options.arm = wire.endpoint, True
-        config = as_told(config, options, planner)
+        config = with_options(config, options, planner)
         demo.check_mock(path)
         folder = flight_folder(config.recording.directory)
         in_lockstep = config.link.lockstep

@@ -89,7 +89,7 @@ def _flown(options: argparse.Namespace, console: FlightConsole) -> Summary:
     if options.bundled is not None:
         path = None if options.bundled == SHIPPED else options.bundled
         return flying.fly_bundled(path, options, console, _PLANNER)
-    config = flying.as_told(load(options.config), options, _PLANNER)
+    config = flying.with_options(load(options.config), options, _PLANNER)
     return flying.fly(config, flight_folder(config.recording.directory), console)
 
 

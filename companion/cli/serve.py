@@ -29,7 +29,7 @@ _PAGE_AFTER_STOP = 40.0
 def serve(options: argparse.Namespace) -> int:
     """Relay between the vehicle and other programs, and fly the setpoints of those programs."""
     read = load(options.config)
-    config = _as_told(read, options)
+    config = _with_options(read, options)
     console = FlightConsole(stderr=options.json, highlight=False)
     observer = _Events(console)
     began = time.monotonic()
@@ -100,7 +100,7 @@ async def _until_stopped(session: ServeSession, pages: ReportPages) -> dict[str,
     return await session.run()
 
 
-def _as_told(config: Config, options: argparse.Namespace) -> Config:
+def _with_options(config: Config, options: argparse.Namespace) -> Config:
     """The configuration as changed by the options of the command line.
 
     Raises:

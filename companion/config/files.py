@@ -40,7 +40,7 @@ def load(path: Path) -> Config:
     merged = Contents({}, {})
     _Reading(merged).add_included((path,), own.keys)
     _merge(merged, own)
-    _unmark_times(merged)
+    _drop_foreign_identified(merged)
     return yaml_file.validated(merged.keys, str(path), Config, merged.places)
 
 
@@ -68,7 +68,7 @@ def _read(path: Path) -> Contents:
     return contents
 
 
-def _unmark_times(merged: Contents) -> None:
+def _drop_foreign_identified(merged: Contents) -> None:
     """Drop `vehicle.identified` if another key of `vehicle` comes from another file."""
     mark = merged.places.get(("vehicle", "identified"))
     times = {

@@ -15,7 +15,7 @@ from companion.recording.learned_file import LearnedFile, newest
 
 _LINEAR, _QUADRATIC = 0.2, 0.02
 """Standard deviations of a configured or learned drag, 1/s and 1/m; the flight corrects it."""
-_MOST = Drag(ANY_VEHICLE.drag.linear + ANY_VEHICLE.linear_deviation)
+_LARGEST_DRAG = Drag(ANY_VEHICLE.drag.linear + ANY_VEHICLE.linear_deviation)
 """Drag that few vehicles exceed."""
 
 
@@ -40,20 +40,20 @@ class KnownDrag(NamedTuple):
     @property
     def most(self) -> Drag:
         """The drag that thrust must be able to overcome; a large one if it is unknown."""
-        return self.drag or _MOST
+        return self.drag or _LARGEST_DRAG
 
     @property
     def assumption(self) -> str:
         """The assumption about an unconfigured drag, as the end of a sentence; else empty."""
         if self.drag is None:
-            return f" (the drag is not known: assumed up to {_MOST.linear:g} 1/s)"
+            return f" (the drag is not known: assumed up to {_LARGEST_DRAG.linear:g} 1/s)"
         if self.source is not None:
             return f" (with the drag that an earlier flight learned: {self.source})"
         return ""
 
 
 def before_connecting(config: Config) -> KnownDrag:
-    """The configured drag, or the one of the vehicle that flew last."""
+    """The configured drag, or the one of the vehicle that flew last; unknown without either."""
     if config.guidance.drag is not None:
         return KnownDrag(config.guidance.drag)
     kept = newest(config.recording.directory)
@@ -61,7 +61,9 @@ def before_connecting(config: Config) -> KnownDrag:
 
 
 def of_vehicle(config: Config, directory: Path | None, uid: str | None) -> KnownDrag:
-    """The configured drag, or the one that this vehicle learned.
+    """The configured drag, or the one that this vehicle learned; unknown without either.
+
+    `trouble` tells why a learned drag could not be read.
 
     Args:
         config: configuration of the flight.

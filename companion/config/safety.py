@@ -15,7 +15,7 @@ from companion.guidance.fence import inside
 
 Ending = Literal["hand_back", "land"]
 """hand_back: the autopilot holds, and the program leaves it there. land: the autopilot lands."""
-Any = Literal["warn", "hold", "hand_back", "land"]
+AnyAction = Literal["warn", "hold", "hand_back", "land"]
 """warn: report the breach. hold: end the maneuver, hold in offboard, and land. Or an `Ending`."""
 Metres = Annotated[float, Field(ge=-2000.0, le=2000.0)]
 Latitude = Annotated[float, Field(ge=-85.0, le=85.0)]
@@ -70,27 +70,27 @@ class SafetyConfig(Section):
     """Action if the tilt exceeds its limit for 0.3 s, or the body rate for 0.2 s."""
     max_speed_m_s: Annotated[float, Field(ge=0.1, le=60.0)] = 15.0
     """Largest speed in any direction."""
-    speed_action: Any = "hold"
+    speed_action: AnyAction = "hold"
     """Action if the vehicle is faster for 0.3 s."""
     max_tracking_error_m: Annotated[float, Field(ge=0.05, le=100.0)] = 5.0
     """Largest distance from the reference. After open-loop steps the monitor waits until the
     vehicle has returned.
     """
-    tracking_action: Any = "hold"
+    tracking_action: AnyAction = "hold"
     """Action if the distance is larger for 1 s."""
-    thrust_action: Any = "hold"
+    thrust_action: AnyAction = "hold"
     """Action if thrust stays at limits.min_thrust or limits.max_thrust for 2 s."""
     max_loss: MonitoredShare = 0.4
     """Largest share of lost frames over a second."""
     max_round_trip_ms: Annotated[float, Field(ge=1.0, le=2000.0)] = 150.0
     """Largest round-trip time of the link."""
-    link_action: Any = "warn"
+    link_action: AnyAction = "warn"
     """Action if the loss is larger for 2 s, or the round trip for 5 s."""
     max_missed: MonitoredShare = 0.25
     """Largest share of setpoints that miss deadman.deadline_ms, over a second."""
     max_starved: MonitoredShare = 0.5
     """CPU starvation: largest share of a second by which our timer may be late."""
-    computer_action: Any = "hand_back"
+    computer_action: AnyAction = "hand_back"
     """Action if max_missed or max_starved is exceeded for 1.5 s."""
 
     max_reset_angle = Si("max_reset_deg")

@@ -25,7 +25,7 @@ from companion.recording.mcap_file.scene import (
 from companion.recording.mcap_file.writer import McapWriter
 
 _HALF_ROOT = sqrt(0.5)
-_KEPT = 100
+_MOST_POINTS = 100
 """Number of points in a path: 20 s with guidance at 50 Hz."""
 _POINT_EACH, _PATHS_EACH, _BODY_EACH = 2, 5, 10
 """With guidance at 50 Hz the thrust is drawn every 0.1 s. Every second drawing adds a point to the
@@ -43,7 +43,7 @@ _GREY: Color = (0.25, 0.25, 0.28, 1.0)
 _FRONT: Color = (0.85, 0.35, 0.1, 0.8)
 _BACK: Color = (0.3, 0.3, 0.35, 0.8)
 _THRUST: Color = (0.1, 0.7, 0.3, 1.0)
-_WANTED: Color = (0.85, 0.2, 0.75, 0.7)
+_COMMANDED_THRUST_COLOR: Color = (0.85, 0.2, 0.75, 0.7)
 _FLOWN: Color = (0.1, 0.5, 0.95, 1.0)
 _REFERENCE: Color = (0.95, 0.65, 0.1, 1.0)
 _ARM = 0.18
@@ -72,8 +72,8 @@ class SceneRows:
 
     def __init__(self) -> None:
         self._command: GuidanceCommand | None = None
-        self._flown: deque[Vector] = deque(maxlen=_KEPT)
-        self._reference: deque[Vector] = deque(maxlen=_KEPT)
+        self._flown: deque[Vector] = deque(maxlen=_MOST_POINTS)
+        self._reference: deque[Vector] = deque(maxlen=_MOST_POINTS)
         self._count = self._newest_ns = 0
 
     def commanded(self, command: GuidanceCommand) -> None:
@@ -117,7 +117,7 @@ class SceneRows:
         arrows = [_arrow(q, q, lift, _THRUST)]
         wanted = _wanted_attitude(command)
         if wanted is not None:
-            arrows.append(_arrow(q, wanted, lift, _WANTED))
+            arrows.append(_arrow(q, wanted, lift, _COMMANDED_THRUST_COLOR))
         return tuple(arrows)
 
 

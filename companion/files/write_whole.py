@@ -10,7 +10,7 @@ from pathlib import Path
 
 from companion.files.os_errors import reason_of
 
-LONGEST = 5.0
+DISK_TIMEOUT = 5.0
 """Time allowed for the disk, s."""
 
 
@@ -39,7 +39,7 @@ def write_in_time(path: Path, text: str) -> str | None:
     Returns:
         None if the file is on the disk; else the reason why not, in words.
     """
-    outcome: list[str | None] = [f"the disk did not answer for {LONGEST:g} s"]
+    outcome: list[str | None] = [f"the disk did not answer for {DISK_TIMEOUT:g} s"]
 
     def write() -> None:
         try:
@@ -51,7 +51,7 @@ def write_in_time(path: Path, text: str) -> str | None:
 
     thread = threading.Thread(target=write, name=path.name, daemon=True)
     thread.start()
-    thread.join(LONGEST)
+    thread.join(DISK_TIMEOUT)
     return outcome[0]
 
 

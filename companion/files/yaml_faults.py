@@ -182,12 +182,12 @@ def _unknown(location: tuple[int | str, ...], value: Any, model: type[BaseModel]
 
 
 def dotted_keys(name: str, model: type[BaseModel]) -> str:
-    """The dotted keys with this name, as alternatives; empty if no section has one."""
+    """Up to three dotted keys with this name, as alternatives; empty if no section has one."""
     return _either([".".join((*place, key)) for place, key in _keys(model) if key == name])
 
 
 def _either(places: list[str]) -> str:
-    """Some dotted keys, joined as alternatives."""
+    """The first three dotted keys, joined as alternatives."""
     return " or ".join(f"`{place}`" for place in places[:_MOST_PLACES])
 
 

@@ -7,7 +7,7 @@ from companion.attitude import BodyRates
 from companion.guidance.maneuvers import spread
 from companion.guidance.reference import Pose, Reference
 
-_SMALL = 0.5
+_SMALL_SIZE = 0.5
 """Relative size of the first doublet of an axis; a single size cannot tell a slew limit from
 a lag."""
 _REST = 0.5
@@ -111,7 +111,7 @@ class Doublets:
                 (self.tilt_step, (0.0, tilt, 0.0)),
                 (self.yaw_step, (0.0, 0.0, yaw)),
             )
-            for size in (_SMALL, 1.0)
+            for size in (_SMALL_SIZE, 1.0)
         ]
         return *rates, *(_CLIMBS * [_Doublet(self.climb_step, climb=self.climb)])
 

@@ -9,7 +9,7 @@ from contextlib import asynccontextmanager
 
 from companion.live.door import leave_address
 
-_ALONE = 5.0
+_LONGEST_UNUSED = 5.0
 """Time after which a page or stream without users ends, s."""
 _LONGEST = 3600.0
 """Longest time that a page or stream stays after the flight, s."""
@@ -28,7 +28,7 @@ async def until_alone(port: int, is_open: Callable[[], bool]) -> None:
         quiet = 0.0
         for _ in range(int(_LONGEST)):
             quiet = 0.0 if is_open() else quiet + 1.0
-            if asked.is_set() or quiet > _ALONE:
+            if asked.is_set() or quiet > _LONGEST_UNUSED:
                 break
             done = asyncio.create_task(asked.wait())
             await asyncio.wait({done}, timeout=1.0)

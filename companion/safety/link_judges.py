@@ -2,7 +2,7 @@
 
 from companion.control.loop_record import Unanswered
 from companion.safety.monitor import Judge, released, released_minimum
-from companion.safety.snapshot import HEARD, Control, Snapshot
+from companion.safety.snapshot import UNHEARD_S, Control, Snapshot
 
 _STALL_SHARE = 0.5
 """If this program did not run for more than this share of the time since its last setpoint, this
@@ -17,7 +17,7 @@ def silence(limit: float, *, heard: bool) -> Judge:
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
         now, control = snapshot.now, snapshot.control
-        if now - control.answered <= limit or (now - control.heard < HEARD) is not heard:
+        if now - control.answered <= limit or (now - control.heard < UNHEARD_S) is not heard:
             return None
         return _silence_cause(now, control, limit)
 

@@ -9,7 +9,7 @@ from companion.guidance.fence import Place
 from companion.guidance.reference import Horizontal, Vector
 from companion.vehicle.records import Battery, Estimator, Gps
 
-HEARD = 0.3
+UNHEARD_S = 0.3
 """Time without a frame, s, after which the vehicle counts as not heard: a takeover would not be
 noticed either."""
 

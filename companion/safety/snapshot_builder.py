@@ -10,17 +10,24 @@ from companion.control.guidance_loop import GuidanceLoop
 from companion.guidance.fence import Place
 from companion.guidance.reference import Vector, minus
 from companion.mavlink.stats import share_lost
-from companion.safety.snapshot import HEARD, Autopilot, Control, Health, Motion, Resets, Snapshot
+from companion.safety.snapshot import (
+    UNHEARD_S,
+    Autopilot,
+    Control,
+    Health,
+    Motion,
+    Resets,
+    Snapshot,
+)
 from companion.vehicle.held_rates import HeldRates
 from companion.vehicle.link import Link
 
 _WINDOW = 1.0
 """Averaging time of shares and rates, s."""
-_EARLY = 0.9
+_FILLED_SHARE = 0.9
 """Share of the window that must be filled before shares and rates are known."""
-_LATE = 0.03
-"""An interval between two calls of `listen` above this is a stall, s; the timer's period is 0.02 s.
-"""
+_LONGEST_INTERVAL = 0.03
+"""A longer interval between two calls of `listen` is a stall, s; the timer's period is 0.02 s."""
 _PLACE_LASTS = 1.0
 """Largest age of a GLOBAL_POSITION_INT for the place where control begins, s."""
 _GAPS_WITHIN = 5.0
@@ -121,7 +128,7 @@ class SnapshotBuilder:
         """How long no frame has come from the vehicle at `now`, s; None: it is heard."""
         self.listen(now)
         silence = now - self._heard_at
-        return silence if silence > HEARD else None
+        return silence if silence > UNHEARD_S else None
 
     def listen(self, now: float) -> None:
         """Take the counters at `now`; the watch calls this at least 50 times a second."""
@@ -130,7 +137,7 @@ class SnapshotBuilder:
             self._frames_heard, self._heard_at = stats.frames, now
         loop.resets.on_counter(self._link.state.reset_counter, now)
         counted = self._counted
-        late = max(0.0, now - counted[-1].now - _LATE) if counted else 0.0
+        late = max(0.0, now - counted[-1].now - _LONGEST_INTERVAL) if counted else 0.0
         counted.append(
             _Counters(
                 now,
@@ -178,12 +185,9 @@ class SnapshotBuilder:
         )
 
     def stood_still(self, since: float) -> float:
-        """Time for which this program did not run since `since`, s.
+        """How long this program did not run after `since` (event-loop time, s), s.
 
         Only stalls that ended within the last second, or are the latest, are known.
-
-        Args:
-            since: s of event-loop time.
         """
         return sum(counted.late for counted in self._counted if counted.now > since)
 
@@ -212,7 +216,7 @@ class SnapshotBuilder:
         gaps = sum(at > since for at in self._loop.record.gaps)
         first, last = self._counted[0], self._counted[-1]
         span = last.now - first.now
-        if span < _EARLY * _WINDOW:
+        if span < _FILLED_SHARE * _WINDOW:
             return Health(round_trip=self._link.timesync.round_trip_s, gaps=gaps)
         late = sum(counted.late for counted in self._counted) - first.late
         lost = last.lost - first.lost

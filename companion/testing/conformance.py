@@ -26,11 +26,11 @@ _LIMITS = Limits(max_tilt=radians(40.0), max_tilt_rate=radians(200.0), max_yaw_r
 _GAIN = 5.0
 _DT = 0.004
 _CASES = 200
-_SETTLES = 3.0
+_SETTLING_TIME = 3.0
 """Time allowed for a step, s: 15 time constants of `_GAIN`."""
-_CLOSE = 0.02
+_MAX_REMAINING_ERROR = 0.02
 """Largest error of the coefficients that remains after a step."""
-_WORST = 1.5
+_MAX_DISTANCE = 1.5
 """Largest distance from the reference of a hover and a circle, m."""
 
 
@@ -91,7 +91,7 @@ def check_guidance(name: str) -> None:
         summary = fly({**changes, "thrust": {"hover_thrust": hover}}, vehicle)
         assert summary.result == "ok", f"{autopilot}: {summary.result}"
         strayed = summary.tracking()["position_max_m"]
-        assert strayed < _WORST, f"{autopilot}: {strayed:.2f} m away from its reference"
+        assert strayed < _MAX_DISTANCE, f"{autopilot}: {strayed:.2f} m away from its reference"
 
 
 _BOOT_S = 0.5
@@ -115,13 +115,14 @@ def _check_convergence(planner: str | Law | type[Planner], begin: Target, end: T
     made, rates = _made(planner), BodyRates(0.0, 0.0, 0.0)
     q = attitude(Coefficients(begin.north, begin.east), begin.heading)
     made.reset(q, rates)
-    for _ in range(round(_SETTLES / _DT)):
+    for _ in range(round(_SETTLING_TIME / _DT)):
         rates = BodyRates(*made.rates(q, end, _DT, rates))
         q = turned(q, rates, _DT)
     reached = coefficients(q)
-    left = hypot(reached.north - end.north, reached.east - end.east)
-    assert left < _CLOSE, (
-        f"after {_SETTLES:g} s its coefficients are {left:.3f} away from {end}; it began at {begin}"
+    remaining = hypot(reached.north - end.north, reached.east - end.east)
+    assert remaining < _MAX_REMAINING_ERROR, (
+        f"after {_SETTLING_TIME:g} s its coefficients are {remaining:.3f} away from {end}; "
+        f"it began at {begin}"
     )
 
 

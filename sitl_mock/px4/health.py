@@ -16,7 +16,7 @@ _CRITICAL, _ERROR, _WARNING, _INFO, _PROTOCOL = 2, 3, 4, 6, 8
 _ALL_MODES = 0xFFFFFFFF
 _ARMABLE_MODES = 0x807F7AB0
 """Bit mask of the modes in which PX4 arms without a transmitter, if no check fails."""
-_PRESENT = 0x38020D02
+_SENSORS_PRESENT = 0x38020D02
 _GPS_PRESENT = 1 << 3
 _GCS_PRESENT = 1 << 12
 _PERIOD_US = 2_000_000
@@ -93,7 +93,9 @@ class HealthReport:
         )
         failing = tuple(check for check in candidates if check is not None)
         gps = state.gps_ok and state.position_valid
-        present = _PRESENT | (_GPS_PRESENT if gps else 0) | (_GCS_PRESENT if gcs_alive else 0)
+        present = (
+            _SENSORS_PRESENT | (_GPS_PRESENT if gps else 0) | (_GCS_PRESENT if gcs_alive else 0)
+        )
         if (failing, present) != self._reported:
             self._reported = (failing, present)
             self._reported_us = state.time_us

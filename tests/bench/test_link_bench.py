@@ -43,9 +43,9 @@ def test_every_sample_is_answered_and_its_time_taken(module):
 def test_the_echo_is_of_a_setpoints_size():
     from companion.bench import echo_program  # noqa: PLC0415
 
-    size = len(echo_program._BEFORE) + 4 + len(echo_program._AFTER)
+    size = len(echo_program._HEADER) + 4 + len(echo_program._PAYLOAD_END)
     assert size == len(setpoint(1))
-    assert struct.unpack_from("<B", echo_program._BEFORE, 7)[0] == 82
+    assert struct.unpack_from("<B", echo_program._HEADER, 7)[0] == 82
 
 
 def test_a_program_that_ends_early_is_told_with_its_last_words():

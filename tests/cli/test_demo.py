@@ -134,7 +134,7 @@ def test_a_mock_vehicle_that_does_not_end_is_killed(tmp_path):
 
 
 def test_a_mock_vehicle_that_is_never_ready_is_told(tmp_path, monkeypatch):
-    monkeypatch.setattr(demo, "_START", 0.05)
+    monkeypatch.setattr(demo, "_START_TIMEOUT", 0.05)
     log = tmp_path / "mock.log"
     log.write_text("still booting")
     with pytest.raises(demo.VehicleStoppedError, match=r"did not start within 0\.05 s, see .*mock"):

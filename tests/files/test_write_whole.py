@@ -69,7 +69,7 @@ def test_a_full_disk_leaves_the_old_file_and_no_other(tmp_path, monkeypatch):
 
 
 def test_a_disk_that_hangs_is_not_waited_for(tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "LONGEST", 0.05)
+    monkeypatch.setattr(module, "DISK_TIMEOUT", 0.05)
     answers = threading.Event()
     monkeypatch.setattr(os, "fsync", lambda _: answers.wait(10.0))
     began = time.monotonic()

@@ -136,7 +136,7 @@ def test_noise_of_steps_as_short_as_they_may_be_raises_no_warning(tmp_path):
 
 
 def test_a_table_is_read_no_further_than_it_may_be_long(tmp_path, monkeypatch):
-    monkeypatch.setattr(csv_file, "_MOST", 100)
+    monkeypatch.setattr(csv_file, "_MOST_SAMPLES", 100)
     assert load(csv_of(tmp_path, rows(100))).duration > 0.0
     read = []
 

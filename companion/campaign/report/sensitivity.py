@@ -14,7 +14,7 @@ from companion.campaign.report.results import Column, Floats, Results
 
 FEWEST = 100
 """Smallest number of cases for useful indices."""
-_MOST = 5000
+_MOST_CASES = 5000
 """Largest number of cases used; more are thinned out evenly."""
 _SEED = 1
 
@@ -45,7 +45,7 @@ def influences(results: Results, outcome: str) -> list[Influence]:
     """
     values = np.array(results.columns[outcome], dtype=float)
     rows = np.flatnonzero(np.isfinite(values))
-    rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _MOST)).astype(int))]
+    rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _MOST_CASES)).astype(int))]
     values = values[rows]
     columns = {name: as_numbers(results.columns[name][rows], values) for name in results.factors}
     columns = {name: column for name, column in columns.items() if np.ptp(column) > 0.0}

@@ -25,11 +25,11 @@ from companion.guidance.trajectory.septic_spline import Floats
 _FEWEST = 4
 """Smallest number of samples of a table. Fewer do not determine a smooth curve."""
 
-_MOST = 50_000
+_MOST_SAMPLES = 50_000
 """Largest number of samples of a table; reading them takes half a second."""
 
 _MOST_BYTES = 20_000_000
-"""Largest size of a file, bytes: `_MOST` samples of twenty columns with all their digits."""
+"""Largest size of a file, bytes: `_MOST_SAMPLES` samples of twenty columns with all digits."""
 
 _LEAST_STEP, _LONGEST_STEP = 1e-4, 10.0
 """Shortest and longest time between two samples, s."""
@@ -103,11 +103,11 @@ def table(lines: Iterable[str], name: str) -> Table:
         csv.Error: the text is not CSV.
     """
     frames: list[str] = []
-    rows = list(itertools.islice(rows_of(csv.reader(lines), frames), _MOST + 2))
+    rows = list(itertools.islice(rows_of(csv.reader(lines), frames), _MOST_SAMPLES + 2))
     if len(rows) <= _FEWEST:
         raise TrajectoryError(f"{name}: needs a header and at least {_FEWEST} samples")
-    if len(rows) > _MOST + 1:
-        raise TrajectoryError(f"{name}: has more than {_MOST} samples; leave some out")
+    if len(rows) > _MOST_SAMPLES + 1:
+        raise TrajectoryError(f"{name}: has more than {_MOST_SAMPLES} samples; leave some out")
     named = [column.strip().lower() for column in rows[0][1]]
     header = [without_unit(column) for column in named]
     groups = columns_of(header, named, name)

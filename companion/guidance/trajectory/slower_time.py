@@ -10,7 +10,7 @@ from companion.guidance.trajectory.septic_spline import Floats
 from companion.guidance.trajectory.time_laws import Progress
 
 _NEWTON_STEPS = 20
-_NEAR = 1e-14
+_TOLERANCE = 1e-14
 """Tolerance of Newton's method, as a share of a piece."""
 
 Number = Any
@@ -103,7 +103,7 @@ class SlowerTime:
         for _ in range(_NEWTON_STEPS):
             step = (float(piece.area(u)) - area) / float(piece.factor(u))
             u = min(max(u - step, 0.0), 1.0)
-            if abs(step) < _NEAR:
+            if abs(step) < _TOLERANCE:
                 break
         return self._progress(piece, u, index)
 

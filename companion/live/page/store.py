@@ -9,7 +9,7 @@ from companion.config.reference import Key, keys
 from companion.files.bounded_yaml import dump_value
 from companion.live.channel import Message
 
-KEPT = 30.0
+SHOWN_S = 30.0
 """Time shown in the plots, s."""
 _MOST_FRAMES, _MOST_EVENTS = 400, 200
 
@@ -18,7 +18,7 @@ class Store:
     """Keeps the messages of the flight.
 
     Attributes:
-        frames: states of the last `KEPT` seconds, oldest first.
+        frames: states of the last `SHOWN_S` seconds, oldest first.
         count: number of states so far.
         events: the newest events, newest last, each {"time_s", "text"}.
         event_count: number of events so far.
@@ -100,7 +100,7 @@ class Store:
             self.frames.clear()  # another flight of `companion serve`
         self.frames.append(state)
         self.count += 1
-        while state["time_s"] - self.frames[0]["time_s"] > KEPT:
+        while state["time_s"] - self.frames[0]["time_s"] > SHOWN_S:
             self.frames.popleft()
 
     def _add_event(self, time: float, text: str) -> None:

@@ -56,7 +56,7 @@ def step_runs(rows: Floats) -> list[StepRun]:
     ]
 
 
-_ENOUGH = 600
+_FITTED_ROWS = 600
 """Approximate number of rows used to find the model."""
 _LAG, _DAMPING, _DEAD_TIME = (0.02, 4.0), (0.2, 10.0), (0.0, 0.5)
 """Ranges in which 2ζ/ω (s), ζ and the dead time (s) are searched. ζ = 10 is almost first order."""
@@ -146,7 +146,7 @@ class RunData(NamedTuple):
 
 def nearest_second_order(runs: list[StepRun]) -> SecondOrderFit:
     """Least squares over ω, ζ and dead time."""
-    thinning = 1 + sum(run.time.size for run in runs) // _ENOUGH
+    thinning = 1 + sum(run.time.size for run in runs) // _FITTED_ROWS
     thinned = [RunData.of(run, thinning) for run in runs]
     measured = np.concatenate([run.measured[::thinning] for run in runs])
 

@@ -22,7 +22,7 @@ from companion.study.outcome import Finding, Source
 
 _SETTLED_M = 0.1
 """Largest error in the last 2 s of a flight that has settled, m."""
-_LAST = round(2.0 * RATE_HZ)
+_LAST_PERIODS = round(2.0 * RATE_HZ)
 """Number of periods in these 2 s."""
 _MAX_ANSWER_MS = 10.0
 """Required 99th percentile of the solver process's answer time, ms; half a period."""
@@ -81,7 +81,7 @@ def _from_cold(counts: ColdStarts) -> Finding:
 
 def _settles(model: ModelName, flown: Flights) -> Finding:
     flight = flown[CIRCLE.name, Variant(model)]
-    last = max(flight.errors[-_LAST:])
+    last = max(flight.errors[-_LAST_PERIODS:])
     return Finding(
         "ours",
         f"From a standing start, {STYLES[model].label} settles on the circle within 4 s.",

@@ -37,7 +37,7 @@ from companion.study.methods import (
 from companion.study.outcome import Cell, Finding, Outcome, Table, Tick
 from companion.study.step import FIGURE_2, Floats, Response, fly
 
-_SAME = 1e-9
+_SAME_WITHIN = 1e-9
 """Paths at two headings that differ by less count as the same."""
 _METHODS = (*PAPERS, EXACT)
 PARTS = len(_METHODS) + 1
@@ -113,7 +113,7 @@ def run(tick: Tick) -> Outcome:
 def _rows(label: str, response: Response, reference: Floats) -> list[tuple[Cell, ...]]:
     away, across = largest_deviation(response, reference), cross_track(response)
     arrived, effect = time_to(response), heading_effect(response)
-    if effect < _SAME:
+    if effect < _SAME_WITHIN:
         return [(label, float(away.max()), float(across.max()), float(arrived[0]), effect)]
     rows: list[tuple[Cell, ...]] = []
     for words, index in zip(("best", "worst"), best_and_worst(away), strict=True):
@@ -179,7 +179,7 @@ def _findings(
             "paper",
             "Heading does not change the response of the proposed, the quaternion and the SO(3)"
             " method.",
-            max(effect[method] for method in (PROPOSED, QUATERNION, SO3)) < _SAME,
+            max(effect[method] for method in (PROPOSED, QUATERNION, SO3)) < _SAME_WITHIN,
             "Largest difference of the paths between any two headings: "
             + ", ".join(
                 f"{method.label} {effect[method]:.1g}" for method in (PROPOSED, QUATERNION, SO3)
@@ -190,7 +190,7 @@ def _findings(
             "ours",
             "Heading does not change the response of the quaternion method with the error"
             " q_d ⊗ q⁻¹, as the paper prints it.",
-            heading_effect(printed) < _SAME,
+            heading_effect(printed) < _SAME_WITHIN,
             f"With that error as body rates the paths at two headings differ by up to"
             f" {heading_effect(printed):.2g}, and the largest deviation is"
             f" {largest_deviation(printed, reference).max():.2g}.",
@@ -198,7 +198,7 @@ def _findings(
         Finding(
             "paper",
             "Heading changes the response of the Euler-angle method.",
-            effect[EULER] > _SAME,
+            effect[EULER] > _SAME_WITHIN,
             f"Its largest deviation is {away[EULER].min():.2g} at the best heading and"
             f" {away[EULER].max():.2g} at the worst.",
         ),
