@@ -206,17 +206,20 @@ def test_a_pilot_whose_takeover_cannot_be_heard_is_not_overruled(tmp_path):
         summary = fly(mock, tmp_path / "log")
         assert mock.state()["mode"] == "POSCTL"
     assert "no attitude" in summary.result
+    assert summary.as_dict()["at_the_end"]["unheard_s"] > 4.0
     took_over = next(at for at, text in summary.events if text == "mode OFFBOARD")
     assert {command for at, command, _ in commands(summary) if at > took_over + 1.0} <= {512}
 
 
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 def test_a_pilot_who_took_over_unheard_is_not_overruled_once_heard(autopilot):
-    silence = {"kind": "drop", "direction": "to_companion", "duration_s": 2.0}
-    silence, takeover = (
-        {**fault, "after_offboard_s": at}
-        for fault, at in ((silence, 2.0), ({"kind": "pilot_takeover", "mode": "POSCTL"}, 2.2))
-    )
+    silence = {
+        "kind": "drop",
+        "direction": "to_companion",
+        "duration_s": 2.0,
+        "after_offboard_s": 2.0,
+    }
+    takeover = {"kind": "pilot_takeover", "mode": "POSCTL", "after_offboard_s": 2.2}
     with mock_vehicle(autopilot=autopilot, faults=[silence, takeover]) as mock:
         summary = fly(mock)
         piloted = mock.state()["mode"]

@@ -294,7 +294,13 @@ def test_frozen_guidance_is_noticed_and_the_vehicle_handed_back(tmp_path, monkey
 @BOTH
 def test_an_unplugged_cable_is_let_go_and_left_to_the_autopilot(tmp_path, ways):
     with ways.in_memory() as mock:
-        observer = When("maneuvers", lambda: mock.inject({"kind": "drop"}), after=1.0)
+        left_at = []
+
+        def cut():
+            mock.inject({"kind": "drop"})
+            mock.when(lambda: ways.left(mock.state()), lambda: left_at.append(mock.time))
+
+        observer = When("maneuvers", cut, after=1.0)
         summary = memory.fly(mock, tmp_path / "log", observer)
         state = mock.until(ways.left, seconds=40)
     assert "no attitude" in summary.result
@@ -302,6 +308,7 @@ def test_an_unplugged_cable_is_let_go_and_left_to_the_autopilot(tmp_path, ways):
     assert summary.events[-1][1].startswith("waited 10 s for the vehicle to be heard")
     assert not state["crashed"]
     assert setpoints(summary)[-1]._timestamp < summary.events[-2][0] - 0.4
+    assert left_at[0] < setpoints(summary)[-1]._timestamp + 8.0
 
 
 @BOTH

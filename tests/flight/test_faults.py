@@ -4,6 +4,7 @@ import pytest
 from pymavlink import mavutil
 
 from tests.flight.fly import fly, mock_vehicle
+from tests.flight.others import When
 
 CONTROL = {"after_offboard_s": 3.0}
 HANDED_BACK = {"LOITER", "LAND", "RTL"}
@@ -111,13 +112,17 @@ FAULTS = [
 )
 def test_a_fault_in_flight_ends_in_its_stated_way(tmp_path, fault, words, modes, latest):
     with mock_vehicle(tmp_path, faults=[{**fault, **CONTROL}]) as mock:
-        flown_modes = set()
-        mock.after_step.append(lambda: flown_modes.add(mock.state()["mode"]))
-        summary = fly(mock, tmp_path / "log", hover={"duration_s": 5.0})
+        since_control = set()
+
+        def note_mode():
+            since_control.add(mock.state()["mode"])
+
+        observer = When("maneuvers", lambda: mock.after_step.append(note_mode))
+        summary = fly(mock, tmp_path / "log", observer, hover={"duration_s": 5.0})
         assert words in summary.result, summary.events
         assert summary.phase == "maneuvers"
         # Where nothing is heard nothing is commanded: the autopilot's own failsafe comes by itself.
-        state = mock.until(lambda _: flown_modes & modes)
+        state = mock.until(lambda _: since_control & modes)
         assert not state["crashed"]
     times = setpoint_times(summary)
     began = next(at for at, text in summary.events if text == "mode OFFBOARD")

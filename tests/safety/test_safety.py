@@ -64,6 +64,7 @@ OLD = NOW - 0.6
 SILENT = {"answered": OLD, "sampled": OLD}
 WARN, HOLD, HAND_BACK, LAND, LISTEN, RELEASE = Action
 STOOD_STILL = "this program did not run for 0.4 s (computer overloaded or suspended)"
+TILTED = "57° of tilt, more than limits.max_tilt_deg + safety.tilt_margin_deg = 55"
 BREACHES = [
     ("unheard", control(**SILENT, heard=OLD), LISTEN, 0.0, "no attitude from the vehicle for 0.6"),
     ("silence", control(**SILENT), HAND_BACK, 0.0, "no attitude"),
@@ -102,7 +103,7 @@ BREACHES = [
     ("resets", FINE._replace(resets=Resets(1, 1.1)), LAND, 0.0, "reset by 1.1 m"),
     ("resets", FINE._replace(resets=Resets(1, 0.0, -0.8)), LAND, 0.0, "46° of heading"),
     ("resets", FINE._replace(resets=Resets(1, 0.0, 0.0, 0.4)), LAND, 0.0, "23° of tilt"),
-    ("tilt", motion(q=roll(57.0)), HAND_BACK, 0.3, "tilt_margin_deg = 55"),
+    ("tilt", motion(q=roll(57.0)), HAND_BACK, 0.3, TILTED),
     ("body rate", motion(body_rates=(0.0, 0.0, -7.1)), HAND_BACK, 0.2, "407°/s, faster than"),
     ("fence", motion(offset=(50.0, 35.0, 0.0)), LAND, 0.0, "61.0 m from where control began"),
     ("fence", motion(offset=(0.0, 0.0, -30.1), velocity=(0, 0, 0)), LAND, 0.0, "ceiling"),
