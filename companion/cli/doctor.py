@@ -59,7 +59,7 @@ def doctor(options: argparse.Namespace) -> int:
         )
     undo = None if options.undo is None else load_yaml(options.undo, Undo)
     run: Callable[..., int] = lockstep.run if config.link.lockstep else link_loop.run
-    doctor_run = _DoctorRun(config, Console(stderr=options.json, highlight=False))
+    doctor_run = _DoctorRun(config, Console(stderr=options.json, highlight=False, markup=False))
     try:
         if undo is None:
             code = run(doctor_run.run_checks(options.wait, fix=options.fix, unasked=options.yes))
@@ -195,7 +195,7 @@ class _DoctorRun:
         while True:
             self._console.print(
                 f"Set {change.parameter} from {change.old:g} to {change.new:g}? "
-                "\\[y]es, \\[n]o, \\[a]ll, \\[q]uit ",
+                "[y]es, [n]o, [a]ll, [q]uit ",
                 end="",
             )
             line = await read_line()
@@ -216,7 +216,7 @@ class _DoctorRun:
 
     def say(self, text: str) -> None:
         """Print a message for the user."""
-        self._console.print(text, markup=False, soft_wrap=True)
+        self._console.print(text, soft_wrap=True)
 
 
 async def _agree(_: Finding) -> Answer:

@@ -54,7 +54,7 @@ def helper(
         door = open_door(options.live)
     for each in (door, stream):
         if each is not None:
-            console.print(each.words(), markup=False, highlight=False, soft_wrap=True)
+            console.print(each.words(), highlight=False, soft_wrap=True)
     watched = path if options.watch else None
     made = Helper(HelperTasks(watched, read, door, stream, follows, folder), config)
     if door is not None:

@@ -134,6 +134,16 @@ async def change_mode(
     await context.until(entered)
 
 
+async def ask_to_hold(context: FlightContext, require_ours: RequireOurs) -> None:
+    """`change_mode` to the autopilot's hold; raises as it does."""
+    await change_mode(
+        context,
+        context.link.autopilot.hold(),
+        require_ours,
+        lambda: in_role(context.link, Role.HOLD),
+    )
+
+
 async def leave_offboard(
     context: FlightContext, cannot_arm_in: frozenset[Role] = _OFFBOARD
 ) -> None:
@@ -164,12 +174,7 @@ async def leave_offboard(
         require_role(context.link, cannot_arm_in)
 
     try:
-        await change_mode(
-            context,
-            context.link.autopilot.hold(),
-            require_ours,
-            lambda: in_role(context.link, Role.HOLD),
-        )
+        await ask_to_hold(context, require_ours)
     except (CommandRefused, CommandTimeout) as error:
         raise FlightEnded(
             f"the vehicle is left disarmed in {mode}, in which it cannot be armed again; "

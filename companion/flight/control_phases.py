@@ -7,6 +7,7 @@ from math import degrees
 from companion.flight.commands import (
     Done,
     RequireOurs,
+    ask_to_hold,
     change_mode,
     command_if_ours,
     in_role,
@@ -140,13 +141,7 @@ async def hold_when_heard(context: FlightContext) -> None:
         return
     context.note(f"the vehicle is heard again, still in {mode}: asking it to hold")
     context.detail = "its report that it holds"
-    require_ours = in_roles(context.link, {Role.OFFBOARD})
-    await change_mode(
-        context,
-        context.link.autopilot.hold(),
-        require_ours,
-        lambda: in_role(context.link, Role.HOLD),
-    )
+    await ask_to_hold(context, in_roles(context.link, {Role.OFFBOARD}))
 
 
 async def land(context: FlightContext) -> None:

@@ -84,7 +84,10 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
 def worst_reach(
     config: Config, maneuvers: ManeuverSequence, hold_time: float, drag: Drag, *, brakes: bool
 ) -> WorstReach:
-    """The largest reach over the maneuvers; `hold_time` is `LossFailsafe.held`."""
+    """The largest reach over the maneuvers.
+
+    `hold_time`, `drag` and `brakes` are `held`, `drag` and `brakes` of `LossFailsafe`.
+    """
     limits, safety = config.limits, config.safety
     fence = Fence(
         limits.fence_radius_m,

@@ -40,7 +40,7 @@ BY_PHASE: Mapping[str, str] = {
     "offboard": "mend what the message names; the autopilot must accept our setpoints",
     "maneuvers": "read the events before the end; if the pilot took over, nothing needs fixing",
     "hand back": "read the events before the end; the pilot may have taken over",
-    "listen": "check cable, radio and power: the vehicle was not heard any more",
+    "listen": BY_MONITOR["unheard"],
     "land": "read the events before the end; the pilot may have taken over",
     "disarm": "disarm by the pilot's switch",
 }

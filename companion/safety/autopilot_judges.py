@@ -60,14 +60,11 @@ def estimator_flags(snapshot: Snapshot, _: bool) -> str | None:
         return None
     if outdated(estimator.received, snapshot.now):
         return "the estimator's state is not reported any more"
-    missing = good & (ATTITUDE | VELOCITY) & ~estimator.flags
+    quantities = ("attitude", ATTITUDE), ("velocity", VELOCITY)
+    lost = [name for name, bits in quantities if good & bits & ~estimator.flags]
     if good & HORIZONTAL and not estimator.flags & HORIZONTAL:
-        missing |= good & HORIZONTAL
-    if not missing:
-        return None
-    names = ("attitude", ATTITUDE), ("velocity", VELOCITY), ("position", HORIZONTAL)
-    lost = ", ".join(name for name, bits in names if missing & bits)
-    return f"the estimator reports no valid {lost} any more"
+        lost.append("position")
+    return f"the estimator reports no valid {', '.join(lost)} any more" if lost else None
 
 
 def estimator_reset(snapshot: Snapshot, _: bool) -> str | None:

@@ -284,7 +284,7 @@ def test_an_undo_without_a_vehicle_is_a_finding_and_sets_nothing(capsys, tmp_pat
 
 def run_of(config=None):
     shown = io.StringIO()
-    console = Console(file=shown, highlight=False, width=200)
+    console = Console(file=shown, highlight=False, width=200, markup=False)
     return doctor_command._DoctorRun(config or Config(), console), shown
 
 

@@ -15,7 +15,7 @@ from companion.recording.measurements.second_order import (
 
 _TIME_CONSTANT = (0.02, 2.0)
 """Range in which the time constant is searched, s."""
-_SMALLEST_TARGET = 1e-3
+_MIN_STEP = 1e-3
 """Smallest target coefficient along an axis that counts as a step along it."""
 
 
@@ -102,7 +102,7 @@ def _time_constant(runs: list[StepRun], axis: int, start: float) -> float:
     stepped = [
         StepRun(run.time, run.measured[:, [axis]], run.target[:, [axis]])
         for run in runs
-        if np.abs(run.target[:, axis]).max() > _SMALLEST_TARGET
+        if np.abs(run.target[:, axis]).max() > _MIN_STEP
     ]
     if not stepped:
         return float("nan")
