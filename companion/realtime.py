@@ -72,23 +72,23 @@ class Refused(Exception):  # noqa: N818 - a refusal is not an error of this prog
     """The system refuses a setting; the message gives the reason and the remedy."""
 
 
-class Grant(NamedTuple):
+class SettingResult(NamedTuple):
     """One setting that was requested.
 
     Attributes:
         name: its key in the section `realtime`.
-        asked: the setting in words.
+        setting: the setting in words.
         refusal: why it was refused and how to get it; None: granted.
     """
 
     name: str
-    asked: str
+    setting: str
     refusal: str | None = None
 
     def __str__(self) -> str:
         if self.refusal is None:
-            return f"realtime: {self.asked}: granted"
-        return f"realtime: {self.asked}: not granted: {self.refusal}"
+            return f"realtime: {self.setting}: granted"
+        return f"realtime: {self.setting}: not granted: {self.refusal}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,24 +111,24 @@ class RealtimeSettings:
 
 
 @contextmanager
-def asked_for(settings: RealtimeSettings) -> Iterator[tuple[Grant, ...]]:
+def requested(settings: RealtimeSettings) -> Iterator[tuple[SettingResult, ...]]:
     """Request all settings; undo the granted ones at the end of the block.
 
     Raises:
         RealtimeError: a setting is refused although `required`.
     """
-    grants: list[Grant] = []
+    results: list[SettingResult] = []
     with ExitStack() as undo:
-        for name, asked, take in _requested_settings(settings):
+        for name, setting, apply in _requested_settings(settings):
             try:
-                undo.callback(take())
-                grants.append(Grant(name, asked))
+                undo.callback(apply())
+                results.append(SettingResult(name, setting))
             except Refused as refused:
-                grants.append(Grant(name, asked, str(refused)))
-        refusals = [str(grant) for grant in grants if grant.refusal is not None]
+                results.append(SettingResult(name, setting, str(refused)))
+        refusals = [str(result) for result in results if result.refusal is not None]
         if refusals and settings.required:
             raise RealtimeError(f"{'; '.join(refusals)} (realtime.required is true)")
-        yield tuple(grants)
+        yield tuple(results)
 
 
 _Undo = Callable[[], object]

@@ -20,7 +20,7 @@ def helper(
     options: argparse.Namespace,
     config: Config,
     path: Path,
-    read: Config,
+    config_as_read: Config,
     folder: Path | None,
     console: Console,
     *,
@@ -32,7 +32,7 @@ def helper(
         options: options of the command line; `watch`, `live` and `foxglove` count.
         config: configuration of the flight.
         path: file of the configuration, which `--watch` watches.
-        read: the configuration as it was read from this file.
+        config_as_read: the configuration as it was read from this file.
         folder: folder of the flight, or None.
         console: shows where the live page and the live stream are.
         follows: whether the flight flies the maneuvers of its configuration.
@@ -56,7 +56,7 @@ def helper(
         if each is not None:
             console.print(each.words(), highlight=False, soft_wrap=True)
     watched = path if options.watch else None
-    made = Helper(HelperTasks(watched, read, door, stream, follows, folder), config)
+    made = Helper(HelperTasks(watched, config_as_read, door, stream, follows, folder), config)
     if door is not None:
         door.listening.close()  # the process has it
     words = "the program has ended"

@@ -10,6 +10,7 @@ from typing import Any
 
 from companion.cli import flying
 from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
+from companion.cli.output_file import require_writable
 from companion.cli.terminal import FlightConsole
 from companion.config.files import load
 from companion.config.vehicle import AxisKeys
@@ -45,10 +46,11 @@ def identify(options: argparse.Namespace) -> int:
         log = options.log / _LOG if options.log.is_dir() else options.log
         out = options.out or log.with_name(_FRAGMENT)
         if log.exists():  # else it is the log that is to be mended
-            _writable(out, options.force)
+            require_writable(out, "--out", force=options.force)
         return _fitted(log, out, options, console)
     if options.out is not None:
-        _writable(options.out, options.force)  # not to be found out after the flight
+        # Before the flight, not after it.
+        require_writable(options.out, "--out", force=options.force)
     summary = _flown(options, console)
     if summary.result != "ok" or summary.log is None:
         _print_json(options, {"result": summary.result, "log": str(summary.log)})
@@ -66,22 +68,6 @@ def identify(options: argparse.Namespace) -> int:
             console.print(reason, soft_wrap=True)
         _print_json(options, {"result": reason, "log": str(log)})
         return EXIT_FLIGHT
-
-
-def _writable(out: Path, force: bool) -> None:
-    """Refuse an output path that cannot be written.
-
-    Raises:
-        ConfigError: the path cannot be written; the message says why.
-    """
-    if out.is_dir():
-        raise ConfigError(f"{out} is a folder; name a file in it, such as {out / _FRAGMENT}")
-    if out.exists() and not force:
-        raise ConfigError(f"{out} exists; name another file with --out, or replace it with --force")
-    if not out.parent.is_dir():
-        raise ConfigError(f"{out}: there is no folder {out.parent}")
-    if not os.access(out.parent, os.W_OK | os.X_OK):
-        raise ConfigError(f"{out}: the folder {out.parent} cannot be written; name another one")
 
 
 def _flown(options: argparse.Namespace, console: FlightConsole) -> Summary:

@@ -80,7 +80,7 @@ def _number(value: float | None, digits: str, unit: str) -> str:
 class LiveLines:
     """Status lines that stay at the bottom while other text scrolls above them.
 
-    Each change is one write, so nothing flickers. It writes no more than the terminal's width.
+    Each change is one write, so nothing flickers. Lines are cut to the terminal's width.
 
     Args:
         file: the terminal.

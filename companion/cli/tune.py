@@ -11,6 +11,7 @@ from typing import Any
 from rich.console import Console
 
 from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
+from companion.cli.output_file import require_writable
 from companion.config import Config
 from companion.config.files import changed, load
 from companion.config.known_drag import drag_prior
@@ -37,7 +38,7 @@ def tune(options: argparse.Namespace) -> int:
     source: Path = options.vehicle
     vehicle = source / _VEHICLE if source.is_dir() else source
     output = options.output or vehicle.with_name(_OUTPUT)
-    _check_output(output, options.force)
+    require_writable(output, "--output", force=options.force)
     config, included = _configuration(source, vehicle, options.config)
     config = _with_learned_drag(config, source)
     log = source / _LOG
@@ -60,22 +61,6 @@ def tune(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(_figures(proposal, flights, output), allow_nan=False))
     return EXIT_OK if good else EXIT_FLIGHT
-
-
-def _check_output(output: Path, force: bool) -> None:
-    """Refuse a file that cannot be written, before the flights.
-
-    Raises:
-        ConfigError: the file cannot be written; the message says why.
-    """
-    if output.is_dir():
-        raise ConfigError(f"{output} is a folder; name a file in it with --output")
-    if output.exists() and not force:
-        raise ConfigError(
-            f"{output} exists; name another with --output, or replace it with --force"
-        )
-    if not output.parent.is_dir():
-        raise ConfigError(f"{output}: there is no folder {output.parent}")
 
 
 def _configuration(source: Path, vehicle: Path, base: Path | None) -> tuple[Config, bool]:

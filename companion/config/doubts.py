@@ -11,10 +11,10 @@ from companion.files.yaml_faults import other_unit
 BODY_RATE = "safety.max_body_rate_deg_s"
 _TYPICAL = {"_deg_s2": 1000.0, "_ms": 50.0}
 """Usual value of a key whose default is null, by the end of the key's name."""
-_FAR, _NEAR = 20.0, 5.0
-"""A value is suspect if it is below 1/_FAR of the usual value, and above 1/_NEAR of it when read in
-the other unit.
-"""
+_MAX_SUSPECT_SHARE = 1.0 / 20.0
+"""A value may be in the wrong unit if it is below this share of the usual value."""
+_MIN_MEANT_SHARE = 1.0 / 5.0
+"""And if it is above this share of the usual value when read in the other unit."""
 
 
 class Doubt(NamedTuple):
@@ -75,7 +75,11 @@ def _units(config: Config) -> Iterator[Doubt]:
         if key.value == key.default or not isinstance(usual, int | float) or not usual:
             continue
         unit, meant = other_unit(key.name, key.value)
-        if meant > key.value and key.value < usual / _FAR and meant > usual / _NEAR:
+        if (
+            meant > key.value
+            and key.value < usual * _MAX_SUSPECT_SHARE
+            and meant > usual * _MIN_MEANT_SHARE
+        ):
             name = f"{key.section}.{key.name}"
             yield Doubt(
                 name,

@@ -72,7 +72,7 @@ class StepsConfig(Section):
 
 
 class CornersConfig(Section):
-    """Maneuver `corners`: acceleration steps past level, where the planners differ."""
+    """Maneuver `corners`: acceleration steps, none through level; in them planners differ."""
 
     north_coefficient: Annotated[float, Field(gt=0.0, le=0.8)] = 0.35
     """North coefficient of each corner, up to its sign. The tilt's sine is √(north² + east²)."""

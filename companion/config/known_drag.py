@@ -13,8 +13,10 @@ from companion.drag import NO_DRAG, Drag
 from companion.guidance.drag_estimate import ANY_VEHICLE, DragPrior
 from companion.recording.learned_file import LearnedFile, newest
 
-_LINEAR, _QUADRATIC = 0.2, 0.02
-"""Standard deviations of a configured or learned drag, 1/s and 1/m; the flight corrects it."""
+_LINEAR_DEVIATION_PER_S = 0.2
+"""Standard deviation of a configured or learned linear drag, 1/s; the flight corrects it."""
+_QUADRATIC_DEVIATION_PER_M = 0.02
+"""Standard deviation of a configured or learned quadratic drag, 1/m."""
 _LARGEST_DRAG = Drag(ANY_VEHICLE.drag.linear + ANY_VEHICLE.linear_deviation)
 """Drag that few vehicles exceed."""
 
@@ -80,7 +82,7 @@ def of_vehicle(config: Config, directory: Path | None, uid: str | None) -> Known
 
 def prior_of(drag: Drag) -> DragPrior:
     """The prior of a drag that is configured or was learned in an earlier flight."""
-    return DragPrior(drag, _LINEAR, _QUADRATIC)
+    return DragPrior(drag, _LINEAR_DEVIATION_PER_S, _QUADRATIC_DEVIATION_PER_M)
 
 
 def drag_prior(config: Config) -> DragPrior:

@@ -37,7 +37,7 @@ class AxisKeys(NamedTuple):
         """Slew limit of the rate, rad/s²."""
         return converted(self.acceleration_limit_deg_s2, radians)
 
-    def but(self, *keys: float | None) -> "AxisKeys":
+    def overridden_by(self, *keys: float | None) -> "AxisKeys":
         """A copy with those `keys` that are not None; a given lag drops the copied damping."""
         mine = self if keys[0] is None else self._replace(damping=None)
         return AxisKeys(*(a if b is None else b for a, b in zip(mine, keys, strict=True)))
@@ -97,7 +97,11 @@ class VehicleConfig(Section):
         )
         yaw = self.yaw_lag_ms, self.yaw_dead_time_ms, self.yaw_acceleration_limit_deg_s2, None
         first_order = roll._replace(damping=None)
-        return {"roll": roll, "pitch": roll.but(*pitch), "yaw": first_order.but(*yaw)}
+        return {
+            "roll": roll,
+            "pitch": roll.overridden_by(*pitch),
+            "yaw": first_order.overridden_by(*yaw),
+        }
 
     @property
     def response(self) -> dict[str, float]:

@@ -9,14 +9,14 @@ class FileRefusedError(Exception):
     """A file cannot be used; the message continues a sentence that begins with the file's name."""
 
 
-def read_text(path: Path, most: int) -> str:
+def read_text(path: Path, max_bytes: int) -> str:
     """Read a regular UTF-8 file, with or without a byte order mark.
 
     Devices and pipes are refused: they may block or never end.
 
     Args:
         path: path of the file.
-        most: largest size, bytes.
+        max_bytes: largest size, bytes.
 
     Raises:
         FileRefusedError: the file cannot be read, is not regular, too large, or not text.
@@ -27,15 +27,15 @@ def read_text(path: Path, most: int) -> str:
             if not stat.S_ISREG(os.fstat(descriptor).st_mode):
                 raise FileRefusedError("not a regular file")
             with os.fdopen(descriptor, "rb", closefd=False) as file:
-                data = file.read(most + 1)
+                data = file.read(max_bytes + 1)
         finally:
             os.close(descriptor)
     except OSError as error:
         raise FileRefusedError(f"cannot read it: {error.strerror}") from error
     except ValueError as error:
         raise FileRefusedError("the name holds a character that no file name may hold") from error
-    if len(data) > most:
-        raise FileRefusedError(f"larger than {most / 1e6:g} MB")
+    if len(data) > max_bytes:
+        raise FileRefusedError(f"larger than {max_bytes / 1e6:g} MB")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

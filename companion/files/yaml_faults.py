@@ -11,9 +11,10 @@ from pydantic import BaseModel
 
 _LONGEST_SHOWN = 60
 _MOST_PLACES = 3
-_ALIKE, _ELSEWHERE_ALIKE = 0.5, 0.75
-"""Smallest similarity to an unknown key for a suggestion: in the same section, and in another one.
-"""
+_MIN_SIMILARITY = 0.5
+"""Smallest similarity to an unknown key at which a key of the same section is suggested."""
+_MIN_SIMILARITY_ELSEWHERE = 0.75
+"""The same for a key of another section."""
 
 _NUMBER_AND_UNIT = re.compile(r"([-+]?[0-9]+(?:[.,][0-9]+)?(?:[eE][-+]?[0-9]+)?)\s*(\D*)")
 
@@ -97,7 +98,7 @@ def explained(detail: Any, model: type[BaseModel], former: Mapping[str, str]) ->
     if detail["type"] == "path_type":
         message = "must name a file or a folder"
     got = "" if isinstance(value, dict) else f" (got {shortened(value)})"
-    return f"`{where}`: {message[:1].lower()}{message[1:]}{got}{_slip(detail, where)}"
+    return f"`{where}`: {message[:1].lower()}{message[1:]}{got}{_unit_hint(detail, where)}"
 
 
 def _remedy(detail: Any, key: str) -> str | None:
@@ -146,8 +147,8 @@ def _number_in(key: str, text: str) -> str:
     return f"write {number} without quotation marks"
 
 
-def _slip(detail: Any, where: str) -> str:
-    """A hint if the value would be in range in the unit that is often confused with the key's."""
+def _unit_hint(detail: Any, where: str) -> str:
+    """A hint if the value would be in range in the unit often confused with the key's, else ""."""
     bound = detail.get("ctx", {})
     value = detail["input"]
     if not isinstance(value, int | float) or not value:
@@ -171,9 +172,9 @@ def _unknown(location: tuple[int | str, ...], value: Any, model: type[BaseModel]
         same = [".".join((*place, key)) for key, place in everywhere if key == name]
         if same:
             return f"stands in the wrong place; write {_either(same)}"
-    near = _nearest(name, beside, _ALIKE)
+    near = _nearest(name, beside, _MIN_SIMILARITY)
     if not isinstance(value, dict):
-        far = _nearest(name, [key for key, _ in everywhere], _ELSEWHERE_ALIKE)
+        far = _nearest(name, [key for key, _ in everywhere], _MIN_SIMILARITY_ELSEWHERE)
         if far and (not near or _likeness(name, far) > _likeness(name, near)):
             places = [".".join((*place, key)) for key, place in everywhere if key == far]
             return f"is not a known key; did you mean {_either(places)}?"

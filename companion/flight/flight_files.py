@@ -144,7 +144,7 @@ class FlightFiles:
         assembled: Assembled,
         recorder: EventRecorder,
         result: str,
-        grants: tuple[realtime.Grant, ...],
+        grants: tuple[realtime.SettingResult, ...],
     ) -> Summary:
         """The summary of a finished flight whose log is still open; saves the learned drag, too.
 

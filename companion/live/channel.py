@@ -128,9 +128,9 @@ class Feed:
         self._end.close()
 
 
-def datagrams(end: socket.socket, most: int) -> Iterator[bytes]:
-    """At most `most` datagrams that have arrived at a non-blocking socket; b"": it was closed."""
-    for _ in range(most):
+def datagrams(end: socket.socket, max_count: int) -> Iterator[bytes]:
+    """At most `max_count` datagrams that arrived at a non-blocking socket; b"": it was closed."""
+    for _ in range(max_count):
         try:
             datagram = end.recv(_LARGEST)
         except BlockingIOError:

@@ -42,7 +42,7 @@ class FlightRecords:
         environment: Environment,
         note: Callable[[str], None],
     ) -> None:
-        self.grants: tuple[realtime.Grant, ...] = ()
+        self.grants: tuple[realtime.SettingResult, ...] = ()
         self.on_recorded: Callable[[Path], str | None] = lambda _: None
         self._directory = directory
         self._environment, self._note = environment, note

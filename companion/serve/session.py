@@ -94,7 +94,7 @@ class ServeSession:
         settings = (
             realtime_settings(self._config) if self._environment.realtime else RealtimeSettings()
         )
-        with realtime.asked_for(settings) as grants:
+        with realtime.requested(settings) as grants:
             self.records.grants = grants
             for grant in grants:
                 self._note(str(grant))

@@ -83,7 +83,7 @@ class VirtualEventLoop(LockstepEventLoop):
 
     Attributes:
         clock: clock of the loop.
-        world: as the argument.
+        world: moves the clock.
     """
 
     def __init__(self, clock: VirtualClock, world: World) -> None:

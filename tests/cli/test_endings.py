@@ -15,7 +15,7 @@ import pytest
 
 from companion.bench import flight, link, planner
 from companion.bench import serve as bench_serve
-from companion.cli import flights, flying, identify
+from companion.cli import flights, flying, output_file
 from companion.cli import main as entry
 from companion.cli import serve as serving
 from companion.cli.flying import page_about
@@ -296,11 +296,13 @@ def test_serve_writes_pages_if_asked_to_and_tells_its_counters(
 
 
 def test_a_folder_that_this_user_cannot_write_is_refused_before_the_flight(monkeypatch, tmp_path):
-    monkeypatch.setattr(identify.os, "access", lambda *_: False)
-    with pytest.raises(ConfigError, match=r"the folder .* cannot be written; name another one"):
-        identify._writable(tmp_path / "vehicle.yaml", force=False)
-    monkeypatch.setattr(identify.os, "access", lambda *_: True)
-    identify._writable(tmp_path / "vehicle.yaml", force=False)
+    monkeypatch.setattr(output_file.os, "access", lambda *_: False)
+    with pytest.raises(
+        ConfigError, match=r"the folder .* cannot be written; name another with --out"
+    ):
+        output_file.require_writable(tmp_path / "vehicle.yaml", "--out", force=False)
+    monkeypatch.setattr(output_file.os, "access", lambda *_: True)
+    output_file.require_writable(tmp_path / "vehicle.yaml", "--out", force=False)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,32 @@
+"""The check of an output file, before the work whose result it is to hold."""
+
+import os
+from pathlib import Path
+
+from companion.files.yaml_file import ConfigError
+
+
+def require_writable(output: Path, option: str, *, force: bool) -> None:
+    """Refuse an output file that cannot be written.
+
+    Args:
+        output: the file.
+        option: the option that names it, for the message.
+        force: whether an existing file may be replaced.
+
+    Raises:
+        ConfigError: the file cannot be written; the message says why.
+    """
+    folder = output.parent
+    if output.is_dir():
+        raise ConfigError(f"{output} is a folder; name a file in it with {option}")
+    if output.exists() and not force:
+        raise ConfigError(
+            f"{output} exists; name another with {option}, or replace it with --force"
+        )
+    if not folder.is_dir():
+        raise ConfigError(f"{output}: there is no folder {folder}")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise ConfigError(
+            f"{output}: the folder {folder} cannot be written; name another with {option}"
+        )
