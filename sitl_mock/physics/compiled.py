@@ -23,7 +23,7 @@ from sitl_mock.physics.sensors import Estimate, SensorLaw, SensorState, estimate
 from sitl_mock.physics.vehicle import Vehicle
 from sitl_mock.physics.vehicle_step import (
     ActuatorCommand,
-    Air,
+    Conditions,
     Outcome,
     VehicleLaw,
     VehicleState,
@@ -128,6 +128,7 @@ def _advance(
     thrust: float,
     thrust_factor: float,
     wind: tuple[float, float, float],
+    attitude_error: tuple[float, float, float],
     count: int,
 ) -> Outcome:
     state = advance(
@@ -136,7 +137,7 @@ def _advance(
         trail,
         _load_state(state_memory),
         ActuatorCommand(armed, roll, pitch, yaw, thrust),
-        Air(thrust_factor, wind),
+        Conditions(thrust_factor, wind, attitude_error),
         count,
     )
     _store_state(state_memory, state)
@@ -177,7 +178,7 @@ class CompiledPlant:
             self._state = _state(self._memory)
         return self._state
 
-    def advance(self, command: ActuatorCommand, air: Air, count: int) -> Outcome:
+    def advance(self, command: ActuatorCommand, conditions: Conditions, count: int) -> Outcome:
         """Advance by `count` steps under one command."""
         self._steps += count
         self._state = None
@@ -188,7 +189,7 @@ class CompiledPlant:
             self._shaped,
             self._trail,
             *command,
-            *air,
+            *conditions,
             count,
         )
 

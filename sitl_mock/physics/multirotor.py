@@ -90,6 +90,7 @@ class Multirotor:
             controlled,
             1.0,
             ZERO,
+            ZERO,
         )
         self._steps += 1
         return load

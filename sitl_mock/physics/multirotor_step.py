@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from sitl_mock.config.airframe import AirframeConfig
 from sitl_mock.config.rate_loop import RateLoopConfig
-from sitl_mock.physics.quaternion import Quaternion, Vector
+from sitl_mock.physics.quaternion import Quaternion, Vector, rotated_slightly
 from sitl_mock.physics.rate_loop import (
     ZERO_STATE,
     Axes,
@@ -117,6 +117,7 @@ def drive(
     controlled: bool,
     thrust_factor: float,
     wind: Vector,
+    attitude_error: Vector,
 ) -> tuple[Load, Actuation]:
     """Run controller, allocation and rotors for one step; return the load and their new state.
 
@@ -132,12 +133,15 @@ def drive(
         controlled: whether the rate loop runs; otherwise it idles.
         thrust_factor: factor of the battery voltage on the thrust of every rotor.
         wind: velocity of the air, NED, m/s.
+        attitude_error: small rotation of the estimated attitude against the true one, rad, NED.
+            Only the shaping knows an attitude.
     """
     mixed, thrusts, axes, shaped = actuation
     motion, _, angular_acceleration = body
     _, _, _, w, x, y, z, p, q, r = motion
     if law.shapes:
-        setpoint, shaped = _shaped(law, rings, shaped, (w, x, y, z), step, setpoint, controlled)
+        estimated = rotated_slightly(attitude_error, (w, x, y, z))
+        setpoint, shaped = _shaped(law, rings, shaped, estimated, step, setpoint, controlled)
     setpoint = delayed(rings.shaped, law.rates.delays, step, setpoint)
     if controlled:
         _, tilt_saturated, yaw_saturated = mixed

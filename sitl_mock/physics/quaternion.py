@@ -25,6 +25,12 @@ def normalise(q: Quaternion) -> Quaternion:
     return (w * scale, x * scale, y * scale, z * scale)
 
 
+def rotated_slightly(rotation: Vector, q: Quaternion) -> Quaternion:
+    """The attitude `q` turned by a small rotation about world axes (rad); not quite of length 1."""
+    x, y, z = rotation
+    return multiply((1.0, 0.5 * x, 0.5 * y, 0.5 * z), q)
+
+
 def from_yaw(angle: float) -> Quaternion:
     """A rotation by `angle` (rad) about the down axis."""
     return (cos(0.5 * angle), 0.0, 0.0, sin(0.5 * angle))

@@ -16,7 +16,15 @@ from sitl_mock.physics.navigation_error import (
     error_at,
 )
 from sitl_mock.physics.navigation_filter import NavigationFilter
-from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw, multiply, normalise, to_body
+from sitl_mock.physics.quaternion import (
+    Quaternion,
+    Vector,
+    from_yaw,
+    multiply,
+    normalise,
+    rotated_slightly,
+    to_body,
+)
 
 NO_ERROR = NavigationError((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 _NO_TRACK = TrackState((0j, 0j, 0j), (0j, 0j), (0j, 0j))
@@ -72,12 +80,6 @@ def white_noise(numbers: list[float], deviations: tuple[float, ...]) -> None:
         numbers[index + 1] = 0.0 + sin(angle) * radius * deviations[(index + 1) % period]
 
 
-def rotated_estimate(yaw: Quaternion, rotation: Vector, q: Quaternion) -> Quaternion:
-    """Return `q` turned by the small `rotation` (rad, NED), then by `yaw`, of all resets."""
-    roll, pitch, heading = rotation
-    return multiply(yaw, multiply((1.0, 0.5 * roll, 0.5 * pitch, 0.5 * heading), q))
-
-
 def estimate(
     law: SensorLaw,
     state: SensorState,
@@ -104,7 +106,7 @@ def estimate(
         error = NO_ERROR
     q = (attitude[3], attitude[4], attitude[5], attitude[6])
     fx, fy, fz = to_body(q, (attitude[13], attitude[14], attitude[15] - law.gravity))
-    tilted = rotated_estimate(state.yaw, error.rotation, q)
+    tilted = multiply(state.yaw, rotated_slightly(error.rotation, q))
     rates = trail[(steps - law.rate_delay) % len(trail)]
     yaw_rate = rates[9] + law.yaw_rate_bias + noise[5]
     gyro = (rates[7] + noise[3], rates[8] + noise[4], yaw_rate)

@@ -15,13 +15,13 @@ from sitl_mock.physics.multirotor_step import (
     multirotor_law,
     steady_throttle,
 )
-from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw
+from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw, multiply
 from sitl_mock.physics.rate_shaping import Shaped
 from sitl_mock.physics.rotors import Four
-from sitl_mock.physics.sensors import Estimate, Estimator, rotated_estimate
+from sitl_mock.physics.sensors import Estimate, Estimator
 from sitl_mock.physics.vehicle_step import (
     ActuatorCommand,
-    Air,
+    Conditions,
     Plant,
     PythonPlant,
     VehicleLaw,
@@ -163,13 +163,12 @@ class Vehicle:
     def attitude_target(self) -> Shaped | None:
         """ArduPilot's shaped rates and attitude target; None if rates are not shaped now.
 
-        The attitude target has the error of the latest estimated attitude.
+        The attitude target is in the frame of the estimate, with all resets of its heading.
         """
         *_, shaped = self.plant.state.actuation
         if not shaped.active:
             return None
-        yaw, rotation = self.estimator.state.yaw, self.estimator.rotation
-        return shaped._replace(target=rotated_estimate(yaw, rotation, shaped.target))
+        return shaped._replace(target=multiply(self.estimator.state.yaw, shaped.target))
 
     def step(self, command: ActuatorCommand, count: int = 1) -> None:
         """Advance by `count` physics steps of `step_s` seconds under one command."""
@@ -179,7 +178,10 @@ class Vehicle:
                 self._wind.step()
                 self._battery.step(self._thrust, self._slow_dt)
             steps = min(count, self._slow_steps - since)
-            air = Air(self._battery.thrust_factor, self._wind.velocity)
-            self.on_ground, self.crashed, self._thrust = self.plant.advance(command, air, steps)
+            conditions = Conditions(
+                self._battery.thrust_factor, self._wind.velocity, self.estimator.rotation
+            )
+            outcome = self.plant.advance(command, conditions, steps)
+            self.on_ground, self.crashed, self._thrust = outcome
             self.steps += steps
             count -= steps

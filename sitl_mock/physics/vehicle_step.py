@@ -51,13 +51,15 @@ class VehicleState(NamedTuple):
     touchdown_speed: float  # m/s down at the latest touchdown, NaN before the first
 
 
-class Air(NamedTuple):
+class Conditions(NamedTuple):
     """Slowly changing conditions, constant during the steps of one call."""
 
     thrust_factor: float
     """Factor of the battery voltage on the thrust of every rotor."""
     wind: Vector
     """Velocity of the air, NED, m/s."""
+    attitude_error: Vector
+    """Small rotation of the estimated attitude against the true one, rad, NED."""
 
 
 class VehicleLaw(NamedTuple):
@@ -79,7 +81,7 @@ def advance(
     trail: Trail,
     state: VehicleState,
     command: ActuatorCommand,
-    air: Air,
+    conditions: Conditions,
     count: int,
 ) -> VehicleState:
     """Advance by `count` steps under one command.
@@ -90,7 +92,7 @@ def advance(
         trail: the latest rows of `trail_row`, one for each step. It is changed.
         state: state before the steps.
         command: command for all steps.
-        air: conditions for all steps.
+        conditions: conditions for all steps.
         count: number of steps.
     """
     steps, body, actuation, position, on_ground, crashed, touchdown_speed = state
@@ -106,8 +108,9 @@ def advance(
             (roll, pitch, yaw),
             thrust if armed and not crashed else 0.0,
             armed and not on_ground,
-            air.thrust_factor,
-            air.wind,
+            conditions.thrust_factor,
+            conditions.wind,
+            conditions.attitude_error,
         )
         steps += 1
         body, position, on_ground, crashed, touchdown_speed = _settled(
@@ -176,7 +179,7 @@ class Plant(Protocol):
         """State after the latest step."""
         ...
 
-    def advance(self, command: ActuatorCommand, air: Air, count: int) -> Outcome:
+    def advance(self, command: ActuatorCommand, conditions: Conditions, count: int) -> Outcome:
         """Advance by `count` steps under one command."""
         ...
 
@@ -205,9 +208,11 @@ class PythonPlant:
         self._rings = empty_rings(law.multirotor)
         self._trail = [trail_row(state.body, state.position)] * trail_length
 
-    def advance(self, command: ActuatorCommand, air: Air, count: int) -> Outcome:
+    def advance(self, command: ActuatorCommand, conditions: Conditions, count: int) -> Outcome:
         """Advance by `count` steps under one command."""
-        self.state = advance(self.law, self._rings, self._trail, self.state, command, air, count)
+        self.state = advance(
+            self.law, self._rings, self._trail, self.state, command, conditions, count
+        )
         return outcome(self.state)
 
     def before(self, steps: int) -> TrailRow:

@@ -16,7 +16,15 @@ from sitl_mock.ardupilot.defaults import RATE_LAG_MS
 from sitl_mock.config.airframe import AirframeConfig
 from sitl_mock.config.rate_loop import AxisShaping, RateLoopConfig
 from sitl_mock.physics.multirotor import Multirotor
-from sitl_mock.physics.multirotor_step import at_rest
+from sitl_mock.physics.multirotor_step import (
+    at_rest,
+    drive,
+    empty_rings,
+    initial_actuation,
+    move,
+    multirotor_law,
+    steady_throttle,
+)
 from sitl_mock.physics.rate_shaping import NOT_SHAPED, shape, shaping_law, sqrt_controller
 from sitl_mock.physics.vehicle import ActuatorCommand, Vehicle
 from sitl_mock.settings import MockSettings, load_settings
@@ -164,6 +172,23 @@ def test_the_attitude_target_and_what_it_asks_of_the_body_about_all_axes():
         ahead = body.inv() * target
         expected = ahead.apply(setpoint) + axis.attitude_gain_1_s * ahead.as_rotvec()
         assert np.array(rates) == pytest.approx(expected, abs=1e-5)
+
+
+def test_the_body_follows_a_correction_of_the_estimated_attitude():
+    """The attitude target stays in the frame of the estimate, as recorded on ArduPilot."""
+    law = multirotor_law(AirframeConfig(), RateLoopConfig.ardupilot())
+    throttle = steady_throttle(law, GRAVITY)
+    rings, body = empty_rings(law), at_rest(LEVEL)
+    actuation = initial_actuation(law, throttle)
+    for step in range(4000):
+        error = (0.0, 0.0, 0.0) if step < 1000 else (0.004, -0.003, 0.02)
+        load, actuation = drive(
+            law, rings, actuation, body, step, REST, throttle, True, 1.0, REST, error
+        )
+        body, _ = move(law, body, load)
+    w, x, y, z = body[0][3:7]
+    turn = Rotation.from_quat([x, y, z, w]).as_rotvec()
+    assert turn == pytest.approx([-0.004, 0.003, -0.02], abs=1e-4)
 
 
 def test_angles_are_closed_in_proportion_then_as_they_can_be_stopped():
