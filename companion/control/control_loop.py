@@ -195,13 +195,14 @@ class ControlLoop:
         return self._rates(sample, command, period), thrust
 
     def _rates(self, sample: AttitudeSample, command: GuidanceCommand, period: float) -> BodyRates:
-        """The body rates of the planner, or those of guidance within the same limits."""
-        if command.body_rates is None:
+        """The body rates of the planner or of guidance, within the limits."""
+        rates = command.body_rates
+        if rates is None:
             target = command.target_at(sample.received - sample.age)
             target = self.resets.target(target, command.turn)
-            return self.planner.rates(sample, target, period, is_step=command.is_step)
+            rates = self.planner.rates(sample, target, period, is_step=command.is_step)
         limits = self._limits
-        return BodyRates(*limit_rates(*command.body_rates, limits.tilt_rate, limits.yaw_rate))
+        return BodyRates(*limit_rates(*rates, limits.tilt_rate, limits.yaw_rate))
 
     def _note_answer(
         self, sample: AttitudeSample, command: GuidanceCommand, rates: BodyRates, thrust: float

@@ -96,7 +96,8 @@ class PlannerRunner:
         self._planned_at = sample.vehicle_time
         self._note_attitude_target(sample)
         self.asked = q, target
-        return self._planner.rates(q, target, period, sample.body_rates)
+        rates = self._planner.rates(q, target, period, sample.body_rates)
+        return rates if self._noted is None else self._frame.rates(q, rates)
 
     def _note_attitude_target(self, sample: AttitudeSample) -> None:
         """Pass a new ATTITUDE_TARGET to the planner once a sample is at least as new.

@@ -8,11 +8,15 @@ flown, the planner sees an attitude without the heading changes that body rates 
 In closed loop, guidance computes each acceleration in the estimator's frame. The horizontal target
 is rotated together with the attitude, so the acceleration stays as commanded by guidance, and the
 turn decays. The heading target is not rotated: it would jump by the turn where steps begin and end.
+
+ArduPilot takes body rates along an attitude target that stays in the estimator's frame, so the
+vehicle follows each correction: it turns about the vertical, and when tilted its thrust axis turns,
+too. The rates of such an autopilot get the rotation of this frame added.
 """
 
 from math import exp, radians
 
-from companion.attitude import Quaternion, Target
+from companion.attitude import BodyRates, Quaternion, Target
 from companion.attitude.rotation import clamp, turned_about_vertical
 from companion.guidance.reference import rotated
 
@@ -20,6 +24,8 @@ _LARGEST = radians(3.0)
 """Largest turn of the frame, rad: it limits what a wrong gyro can do."""
 _DECAY_S = 2.0
 """Time constant with which the turn decays after the steps, s."""
+_FOLLOWING_S = 1.0 / 4.5
+"""Time constant with which ArduPilot's attitude controller follows its target (ATC_ANG_*_P), s."""
 
 
 class StepFrame:
@@ -27,10 +33,11 @@ class StepFrame:
 
     Attributes:
         turn: heading in the estimator's frame minus heading in the frame of steps, rad.
+        turn_rate: rate of `turn`, low-passed, rad/s.
     """
 
     def __init__(self) -> None:
-        self.turn = 0.0
+        self.turn = self.turn_rate = 0.0
         self._zero = 0.0
 
     def advance(self, corrections: float, dt: float, *, stepping: bool) -> None:
@@ -41,15 +48,29 @@ class StepFrame:
             dt: time since the last call, s.
             stepping: whether an open-loop step is flown.
         """
+        before = self.turn
         if stepping:
             self.turn = clamp(corrections - self._zero, _LARGEST)
         else:
             self.turn *= exp(-dt / _DECAY_S)
             self._zero = corrections - self.turn
+        if dt > 0.0:
+            share = 1.0 - exp(-dt / _FOLLOWING_S)
+            self.turn_rate += share * ((self.turn - before) / dt - self.turn_rate)
 
     def attitude(self, q: Quaternion) -> Quaternion:
         """An attitude of the estimator's frame in this frame."""
         return q if self.turn == 0.0 else turned_about_vertical(q, -self.turn)
+
+    def rates(self, q: Quaternion, rates: BodyRates) -> BodyRates:
+        """Body rates in the estimator's frame, from body rates in this frame at attitude `q`."""
+        w, x, y, z = q
+        turn_rate = self.turn_rate
+        return BodyRates(
+            rates.roll + 2.0 * (x * z - w * y) * turn_rate,
+            rates.pitch + 2.0 * (y * z + w * x) * turn_rate,
+            rates.yaw + (1.0 - 2.0 * (x * x + y * y)) * turn_rate,
+        )
 
     def target(self, target: Target) -> Target:
         """A target of the estimator's frame with its horizontal part in this frame.
