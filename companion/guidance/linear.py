@@ -113,6 +113,36 @@ class Guidance(Protocol):
         ...
 
 
+class RestingCoefficients:
+    """Mean target coefficients of the latest drift, in which only the disturbance is compensated.
+
+    Steps that are added to them accelerate the vehicle as asked, in wind and with an estimate that
+    is tilted by a fraction of a degree, too.
+    """
+
+    def __init__(self) -> None:
+        self._sum = 0j
+        self._count = 0
+        self._drifting = False
+
+    def take(self, target: Target, *, drifting: bool) -> None:
+        """Take the target of a closed-loop step of guidance; a new drift begins a new mean."""
+        if drifting:
+            if not self._drifting:
+                self._sum, self._count = 0j, 0
+            self._sum += complex(target.north, target.east)
+            self._count += 1
+        self._drifting = drifting
+
+    def added_to(self, coefficients: Coefficients, reference: Reference) -> Coefficients:
+        """Open-loop coefficients of a reference, with the mean added if it asks for that."""
+        self._drifting = False
+        if not reference.from_rest or self._count == 0:
+            return coefficients
+        mean = self._sum / self._count
+        return Coefficients(coefficients.north + mean.real, coefficients.east + mean.imag)
+
+
 class LinearGuidance:
     """Acceleration of the reference, plus feedback of position, velocity and acceleration errors.
 
@@ -123,6 +153,7 @@ class LinearGuidance:
 
     def __init__(self, settings: LinearSettings) -> None:
         self._settings = settings
+        self._rest = RestingCoefficients()
 
     def retune(self, settings: LinearSettings) -> None:
         """Use other settings from the next step on."""
@@ -150,9 +181,8 @@ class LinearGuidance:
         )
         ends = time, time + self._settings.period
         if reference.coefficients is not None:
-            target, later = (
-                Target(*reference.coefficients, *self._heading(reference_at, at)) for at in ends
-            )
+            north, east = self._rest.added_to(reference.coefficients, reference)
+            target, later = (Target(north, east, *self._heading(reference_at, at)) for at in ends)
             return LinearCommand(target, later, down)
         feedback = self._feedback(reference, reference_at(time + self.acts_after), inputs)
 
@@ -163,6 +193,7 @@ class LinearGuidance:
             Target(*self._settings.tilt.target(path, at), *self._heading(reference_at, at))
             for at in ends
         )
+        self._rest.take(target, drifting=reference.drifting)
         return LinearCommand(target, later, down)
 
     def _feedback(self, now: Reference, acts: Reference, inputs: GuidanceInput) -> Horizontal:

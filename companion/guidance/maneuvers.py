@@ -49,9 +49,9 @@ def spread(begin: float, end: float, step: float = 0.01) -> list[float]:
 class Steps:
     """Acceleration doublets +c, −c, +c (lasting T, 2T, T) along north, east and north-west.
 
-    Before each doublet the position hold pauses, so that the attitude is at rest. With an ideal
-    response and no drag the vehicle ends where it began, at rest. Position hold corrects the
-    remaining error for `settle` seconds.
+    Before each doublet the position hold pauses, so that the attitude is at rest; c is added to the
+    coefficients of this rest. With an ideal response and no drag the vehicle ends where it began,
+    at rest. Position hold corrects the remaining error for `settle` seconds.
 
     Attributes:
         coefficient: length of c, the sine of the tilt.
@@ -92,7 +92,7 @@ class Steps:
         sign = -1.0 if self.step <= within < 3.0 * self.step else 1.0
         north, east = self.DIRECTIONS[index]
         c = sign * self.coefficient
-        return rest._replace(coefficients=Coefficients(c * north, c * east))
+        return rest._replace(coefficients=Coefficients(c * north, c * east), from_rest=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +101,8 @@ class Corners:
 
     Such steps show the differences between the planners, as in the paper's figure 2; a step through
     level is straight with every planner. Before the first step the position hold pauses, so that
-    the attitude is at rest. The acceleration goes round the rectangle twice, the second time
+    the attitude is at rest; the corners are added to the coefficients of this rest. The
+    acceleration goes round the rectangle twice, the second time
     mirrored. With an ideal response and no drag the vehicle ends where it began, at rest. Position
     hold corrects the remaining error for `settle` seconds.
 
@@ -147,7 +148,8 @@ class Corners:
         if index >= len(self.CORNERS):
             return rest
         north, east = self.CORNERS[index]
-        return rest._replace(coefficients=Coefficients(self.north * north, self.east * east))
+        coefficients = Coefficients(self.north * north, self.east * east)
+        return rest._replace(coefficients=coefficients, from_rest=True)
 
 
 @dataclass(frozen=True, slots=True)

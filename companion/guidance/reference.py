@@ -36,9 +36,10 @@ class Reference(NamedTuple):
     `coefficients` or `body_rates` (rad/s) command the horizontal motion open loop; position and
     velocity then count for the height only. `body_rates` command the heading, too. `thrust_steps`
     says that the vertical acceleration jumps. `drifting` pauses the horizontal feedback: only drag
-    and the disturbance are compensated. Without `holds_height`, the vertical acceleration is
-    commanded as it is, and the height is not held. `thrust` (0..1) replaces the thrust that
-    guidance computes.
+    and the disturbance are compensated. With `from_rest`, `coefficients` are added to their mean in
+    the drift just before, which balances wind and a tilted estimate. Without `holds_height`, the
+    vertical acceleration is commanded as it is, and the height is not held. `thrust` (0..1)
+    replaces the thrust that guidance computes.
     """
 
     position_ned: Vector
@@ -50,6 +51,7 @@ class Reference(NamedTuple):
     body_rates: BodyRates | None = None
     thrust_steps: bool = False
     drifting: bool = False
+    from_rest: bool = False
     holds_height: bool = True
     thrust: float | None = None
 

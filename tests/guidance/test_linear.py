@@ -167,6 +167,30 @@ def test_drifting_it_asks_for_what_holds_against_the_wind_wherever_it_is():
     assert later == target
 
 
+def test_steps_from_rest_are_added_to_the_mean_of_the_drift_just_before_them():
+    guidance, motion = LinearGuidance(SETTINGS), VehicleMotion((0.0, 0.0, -5.0), REST)
+
+    def target(wind, **changes):
+        inputs = GuidanceInput(motion, motion, (0.0, 0.0), wind, DRAG, THRUST)
+        reference = Reference(motion.position_ned)._replace(**changes)
+        return np.array(guidance.command(lambda _: reference, 0.0, inputs).target[:2])
+
+    def step(wind, **changes):
+        return target(wind, coefficients=Coefficients(0.2, -0.1), **changes)
+
+    strong = (3.0, 3.0)
+    assert step(strong, from_rest=True) == pytest.approx([0.2, -0.1])  # no drift came before
+    target(strong, drifting=True)
+    target(strong)  # the hold goes on: the drift that follows is another one
+    mean = 0.5 * (target((0.2, 0.4), drifting=True) + target((0.4, 0.2), drifting=True))
+    assert mean == pytest.approx([-0.3 / GRAVITY] * 2, rel=2e-3)
+    for _ in range(2):
+        assert step(strong, from_rest=True) == pytest.approx(np.add([0.2, -0.1], mean))
+    assert step(strong) == pytest.approx([0.2, -0.1])
+    again = target((-0.2, 0.0), drifting=True)
+    assert step(strong, from_rest=True) == pytest.approx(np.add([0.2, -0.1], again))
+
+
 def test_the_heading_is_asked_for_ahead_of_its_response():
     motion = VehicleMotion(circling(2.0).position_ned, circling(2.0).velocity_ned)
     situation = GuidanceInput(motion, motion, (0.0, 0.0), (0.0, 0.0), DRAG, THRUST)

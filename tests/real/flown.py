@@ -11,7 +11,7 @@ from companion.recording.flight_record import read_flight
 from companion.recording.measurements.recorded_summary import trace_of
 from tests.real.flights import MOVING, PARTS, configuration, named, shipped
 from tests.real.incidents import INCIDENTS, ten
-from tests.real.measures import straightness, tracking_errors
+from tests.real.measures import resting, straightness, tracking_errors
 from tests.real.stamps import estimated, stamp_offset
 from tests.real.truth import Floats, NoTruthError
 from tests.real.vehicle import merged
@@ -116,7 +116,7 @@ class Flying:
             response = trace.response.rows().copy()
             response[:, 0] += offset
             told = estimated(response[:, 0], log / "flight.tlog")
-            found = straightness(response, told, truth, result["gain_per_s"])
+            found = straightness(response, told, truth, result["gain_per_s"], resting(response))
             if found is not None:
                 reported = result["response"]
                 out["cross_axis"] = {"reported": reported["cross_axis_max"], **found}

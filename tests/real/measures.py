@@ -43,7 +43,7 @@ _SHORTEST = 1.0
 
 
 def straightness(
-    response: Floats, estimated: Floats, truth: Truth | None, gain: float
+    response: Floats, estimated: Floats, truth: Truth | None, gain: float, resting: Floats
 ) -> dict[str, float] | None:
     """Cross-axis of the steps by telemetry and by truth; None where none was flown.
 
@@ -53,6 +53,8 @@ def straightness(
         estimated: (n, 4), the attitudes at those times as telemetry told them.
         truth: of that flight, or None where there is none to be had.
         gain: p, 1/s.
+        resting: (2,), coefficients that the program added to those of the steps: by its estimate
+            they hold the vehicle at rest, so in the world the targets are without them.
     """
     rows = response.copy()
     rows[:, 1:5] = estimated
@@ -65,6 +67,7 @@ def straightness(
     turn = mean_angle(_headings_apart(response[:, 1:5], q))
     wander = np.unwrap(_headings_apart(estimated, q))
     rows[:, 1:5] = turned(q, turn)
+    rows[:, 5:7] -= resting
     true = measure_response(rows, gain)
     assert true is not None
     return {
@@ -75,6 +78,14 @@ def straightness(
         "heading_wander_deg": degrees(float(np.ptp(wander))),
         "attitude_late_ms": 1e3 * attitude_lateness(response, truth),
     }
+
+
+def resting(response: Floats) -> Floats:
+    """(2,), the coefficients that were added to those of a whole maneuver of steps.
+
+    The steps of a maneuver cancel each other, so this is the mean of its targets.
+    """
+    return np.unique(response[:, 5:7].round(9), axis=0).mean(axis=0)
 
 
 def _headings_apart(left: Floats, right: Floats) -> list[float]:

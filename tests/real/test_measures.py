@@ -5,7 +5,13 @@ import pytest
 
 from companion.attitude import attitude
 from companion.attitude.types import Coefficients
-from tests.real.measures import maneuvers, split_error, straightness, tracking_errors
+from tests.real.measures import (
+    maneuvers,
+    resting,
+    split_error,
+    straightness,
+    tracking_errors,
+)
 from tests.real.truth import NoTruthError, Truth, multiplied, truth_from
 
 RADIUS, SPEED, RAMP, LAP = 5.0, 5.0, 5.0, 2.0 * np.pi
@@ -102,6 +108,9 @@ def test_a_hole_in_the_truth_is_told():
         tracking_errors(tracking, positions, holed)
 
 
+NOTHING_ADDED = np.zeros(2)
+
+
 def step_rows(*, bent, turn=0.0, every=0.004, late=0.0):
     """Response rows of one step by telemetry, and the truth, which is `bent` off the line."""
     gain, before, after = 4.0, np.array([0.4, 0.5]), np.array([-0.4, 0.5])
@@ -131,15 +140,30 @@ def step_rows(*, bent, turn=0.0, every=0.004, late=0.0):
 def test_the_distance_from_the_line_is_that_of_the_true_attitude(every):
     told, _ = step_rows(bent=0.0)
     _, truth = step_rows(bent=0.03, turn=0.05, every=every)
-    figures = straightness(told, told[:, 1:5], truth, 4.0)
+    figures = straightness(told, told[:, 1:5], truth, 4.0, NOTHING_ADDED)
     assert figures["telemetry"] < 0.001
     # The target is reached up to exp(-8), so the line is that of the step.
     assert figures["truth"] == pytest.approx(0.03, abs=0.0015)
     assert figures["heading_off_deg"] == pytest.approx(-np.degrees(0.05), abs=0.1)
 
 
+def late_ms(rows, truth):
+    return straightness(rows, rows[:, 1:5], truth, 4.0, NOTHING_ADDED)["attitude_late_ms"]
+
+
 def test_late_telemetry_is_told():
     rows, truth = step_rows(bent=0.01, late=0.006)
-    assert straightness(rows, rows[:, 1:5], truth, 4.0)["attitude_late_ms"] == pytest.approx(
-        6.0, abs=0.2
-    )
+    assert late_ms(rows, truth) == pytest.approx(6.0, abs=0.2)
+
+
+def test_what_was_added_to_balance_a_tilted_estimate_is_no_target_in_the_world():
+    rows, truth = step_rows(bent=0.0)
+    rows[:, 5:7] += [0.0, 0.004]
+    added = np.array([0.0, 0.004])
+    figures = straightness(rows, rows[:, 1:5], truth, 4.0, added)
+    assert figures["truth"] == pytest.approx(0.0, abs=2e-4)
+    assert figures["telemetry"] == pytest.approx(0.004, abs=4e-4)
+    corners = np.array([[n + 0.01, e - 0.02] for n in (-0.4, 0.4) for e in (-0.5, 0.5)])
+    everything = np.zeros((12, 7))
+    everything[:, 5:7] = np.repeat(corners, 3, axis=0)
+    assert resting(everything) == pytest.approx([0.01, -0.02])
