@@ -43,11 +43,11 @@ class LearnedFile:
 
     def load(self) -> tuple[Learned | None, str | None]:
         """The learned values, and a warning if the file cannot be read. Never raises."""
-        if not self.path.exists():
-            return None, None
         try:
             return _parsed(self.path), None
         except (FileRefusedError, ValueError, TypeError, KeyError, RecursionError) as error:
+            if isinstance(error.__cause__, FileNotFoundError):
+                return None, None
             reason = error if isinstance(error, FileRefusedError) else "it is damaged"
             return None, (
                 f"{self.path}: what earlier flights learned cannot be used ({reason}); "

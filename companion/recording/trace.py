@@ -89,10 +89,10 @@ class FlightTrace:
         self,
         vehicle_time: float,
         reference: tuple[float, float, float],
-        measured: tuple[float, float, float],
+        estimated: tuple[float, float, float],
     ) -> None:
         """Record reference and estimated position (NED, m)."""
-        self.tracking.add([vehicle_time, *reference, *measured])
+        self.tracking.add([vehicle_time, *reference, *estimated])
 
     def add_rates(
         self,

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from companion.recording.flight_record import FlightRecord, as_recorded
 from companion.recording.mcap_file.fields import Channel
-from companion.recording.mcap_file.happenings import ValuesChange
+from companion.recording.mcap_file.flight_events import ValuesChange
 from companion.recording.mcap_file.loop_channels import (
     ACTION,
     ATTITUDE_TARGET,

@@ -23,7 +23,7 @@ from companion.guidance.reference import ReferenceAt
 from companion.guidance.source import ManeuverSource, Source
 from companion.mavlink.codec import SetpointEncoder
 from companion.recording.flight_record import FlightRecord
-from companion.recording.mcap_file.happenings import ValuesChange
+from companion.recording.mcap_file.flight_events import ValuesChange
 from companion.recording.mcap_file.loop_channels import REASONS
 from companion.recording.trace import FlightTrace
 from companion.replay.entries import entries

@@ -14,8 +14,8 @@ from companion.config.files import load
 from companion.config.reference import Key, differences
 from companion.files.yaml_file import ConfigError
 from companion.recording.flight_record import FlightRecord, read_flight
-from companion.recording.mcap_file.fields import Row
-from companion.recording.mcap_file.happenings import Event
+from companion.recording.mcap_file.fields import Rows
+from companion.recording.mcap_file.flight_events import Event
 from companion.recording.measurements.recorded_summary import summary_of, trace_of
 from companion.recording.measurements.second_order import StepRun, step_runs
 from companion.report.early_end import EarlyEnd, early_end
@@ -165,16 +165,16 @@ def _curves(record: FlightRecord) -> dict[str, Curve]:
     }
 
 
-def _columns(rows: Row, *names: str) -> Floats:
+def _columns(rows: Rows, *names: str) -> Floats:
     return np.column_stack([rows[name] for name in names])
 
 
-def _place(rows: Row, whose: str) -> Floats:
+def _place(rows: Rows, whose: str) -> Floats:
     """North, east and height, m."""
     return _columns(rows, *(f"{whose}_{axis}_m" for axis in ("north", "east", "down"))) * (1, 1, -1)
 
 
-def _held(guidance: Row) -> Floats:
+def _held(guidance: Rows) -> Floats:
     """The reference; NaN where there is none, as in open loop."""
     reference = _place(guidance, "reference")
     reference[guidance["holds_position"] == 0, :2] = np.nan
@@ -182,7 +182,7 @@ def _held(guidance: Row) -> Floats:
     return reference
 
 
-def _rates(rows: Row, which: str) -> Floats:
+def _rates(rows: Rows, which: str) -> Floats:
     """Roll, pitch and yaw rate, °/s."""
     return np.degrees(
         _columns(rows, *(f"{which}_{axis}_rad_s" for axis in ("roll", "pitch", "yaw")))
