@@ -129,8 +129,7 @@ def _marks(record: FlightRecord) -> Marks:
 def _draw_steps(axes: "Axes", runs: list[StepRun], gain: float) -> None:
     """The first doublet along its own direction, with the ideal and the best linear response."""
     run, model = runs[0], nearest_second_order(runs)
-    along = run.target[0] / np.hypot(*run.target[0])
-    time = run.time - run.time[0]
+    along, time = run.direction, run.time - run.time[0]
     nearest = f"second order, {1e3 * model.dead_time:.0f} ms dead time"
     axes.plot(time, run.target @ along, color=_TARGET, label="target")
     axes.plot(

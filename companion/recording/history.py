@@ -38,7 +38,12 @@ _COLUMNS = (
 
 
 class Span(NamedTuple):
-    """A maneuver with its label, from `begin` to `end` in s since the flight began."""
+    """A maneuver, a phase or a mode.
+
+    Attributes:
+        begin, end: time since the flight began, s.
+        name: shown to the user.
+    """
 
     begin: float
     end: float

@@ -14,11 +14,12 @@ from companion.config.files import load
 from companion.config.reference import Key, differences
 from companion.files.yaml_file import ConfigError
 from companion.recording.flight_record import FlightRecord, read_flight
+from companion.recording.history import Span
 from companion.recording.mcap_file.fields import Rows
 from companion.recording.mcap_file.flight_events import Event
 from companion.recording.measurements.recorded_summary import summary_of, trace_of
 from companion.recording.measurements.second_order import StepRun, step_runs
-from companion.report.early_end import EarlyEnd, early_end
+from companion.report.early_end import EndMark, early_end
 
 Floats = NDArray[np.float64]
 
@@ -33,19 +34,6 @@ class Curve(NamedTuple):
 
     time: Floats
     values: Floats
-
-
-class Span(NamedTuple):
-    """A phase, a maneuver or a mode.
-
-    Attributes:
-        begin, end: time since the flight began, s.
-        name: shown to the user.
-    """
-
-    begin: float
-    end: float
-    name: str
 
 
 @dataclass(frozen=True)
@@ -82,7 +70,7 @@ class FlightData:
     differences: tuple[Key, ...] | None = None
     runs: list[StepRun] = field(default_factory=list)
     gain: float = float("nan")
-    end: EarlyEnd | None = None
+    end: EndMark | None = None
 
     @property
     def last(self) -> float | None:
@@ -142,9 +130,8 @@ def _configuration(folder: Path) -> Config | None:
 
 
 def _curves(record: FlightRecord) -> dict[str, Curve]:
-    guidance, setpoint, sample = map(record.rows, ("guidance", "setpoint", "sample"))
-    sent = setpoint
-    setpoint = sent[sent["idle"] == 0]
+    guidance, sent, sample = map(record.rows, ("guidance", "setpoint", "sample"))
+    setpoint = sent[sent["idle"] == 0]  # on the ground there is no target
     motion, thrust = record.rows("motion"), record.rows("thrust")
     stepped = record.since_start(guidance["time_s"])
     answered = record.since_start(setpoint["received_s"])

@@ -31,6 +31,12 @@ class StepRun(NamedTuple):
     measured: Floats
     target: Floats
 
+    @property
+    def direction(self) -> Floats:
+        """(2,), direction of the first target in the plane of the coefficients."""
+        first: Floats = self.target[0]
+        return first / max(float(np.hypot(*first)), 1e-9)
+
     def steps(self) -> list["StepRun"]:
         """The single steps: each from one change of the target to the next."""
         return [StepRun(*parts) for parts in zip(*self._split(), strict=True)]
