@@ -44,23 +44,21 @@ def helper(
     if not options.watch and options.live is None and options.foxglove is None:
         yield None
         return
-    page_socket = stream = None
+    page = stream = None
     if options.live is not None:
         require("nicegui", "live", "--live")
     if options.foxglove is not None:
         require("foxglove", "foxglove", "--foxglove")
         stream = stream_address(options.foxglove)
     if options.live is not None:
-        page_socket = open_page_socket(options.live)
-    for each in (page_socket, stream):
+        page = open_page_socket(options.live)
+    for each in (page, stream):
         if each is not None:
             console.print(each.words(), highlight=False, soft_wrap=True)
     watched = path if options.watch else None
-    made = Helper(
-        HelperTasks(watched, config_as_read, page_socket, stream, follows, folder), config
-    )
-    if page_socket is not None:
-        page_socket.listening.close()  # the process has it
+    made = Helper(HelperTasks(watched, config_as_read, page, stream, follows, folder), config)
+    if page is not None:
+        page.listening.close()  # the process has it
     words = "the program has ended"
     try:
         yield made
