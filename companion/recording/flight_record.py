@@ -36,6 +36,7 @@ from companion.recording.trace import ManeuverMark
 FILE = "flight.mcap"
 _BY_NAME = {channel.name: channel for channel in CHANNELS}
 _LONGEST_CONFIGURATION = 1 << 20
+"""Largest `config.yaml` that is read, bytes."""
 
 
 class RecordError(Exception):

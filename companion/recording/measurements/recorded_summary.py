@@ -18,7 +18,8 @@ from companion.recording.measurements.course import Course, EarlyEnd
 from companion.recording.measurements.summary import LoopCounts, Summary
 from companion.recording.trace import FlightTrace
 
-_LONGEST = 1 << 26
+_MOST_BYTES = 1 << 26
+"""Largest `summary.json` that is read, bytes."""
 _AXES = "roll", "pitch", "yaw"
 _SENT = ["received_s", *(f"commanded_{axis}_rad_s" for axis in _AXES), "thrust"]
 _STEP = ["q_w", "q_x", "q_y", "q_z", "target_north", "target_east"]
@@ -204,7 +205,7 @@ def _last(values: NDArray[np.float64]) -> float | None:
 def _written(path: Path) -> dict[str, Any] | None:
     """`summary.json`; None if it is missing, incomplete, or of another version."""
     try:
-        found = json.loads(read_text(path, _LONGEST))
+        found = json.loads(read_text(path, _MOST_BYTES))
     except (FileRefusedError, ValueError, RecursionError):
         return None
     return found if isinstance(found, dict) and found.keys() >= _KEYS else None
