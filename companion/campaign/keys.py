@@ -76,7 +76,7 @@ def _check_mock_key(name: str, section: dict[str, Any], where: str) -> None:
     try:
         mock_with(section, {name: 0.0})
     except ConfigError as error:
-        if "unknown" in str(error) or "wrong place" in str(error):
+        if "unknown" in str(error) or "wrong section" in str(error):
             raise ConfigError(f"{where}: {error}") from error
 
 

@@ -29,7 +29,7 @@ from companion.realtime import RealtimeError
 from companion.recording.closing_words import Invocation, closing_words
 from companion.recording.folder import flight_folder
 from companion.recording.measurements.summary import Summary
-from companion.recording.report import flight_table, words_text
+from companion.recording.summary_tables import flight_table, words_text
 
 
 def with_options(config: Config, options: argparse.Namespace, planner: str | None = None) -> Config:

@@ -11,7 +11,7 @@ from rich.console import Console
 from companion.config import Config
 from companion.extras import require
 from companion.flight.environment import THIS_COMPUTER, Environment
-from companion.live.door import open_door, stream_address
+from companion.live.addresses import open_page_socket, stream_address
 from companion.live.helper import Helper, HelperTasks
 
 
@@ -44,21 +44,21 @@ def helper(
     if not options.watch and options.live is None and options.foxglove is None:
         yield None
         return
-    door = stream = None
+    page = stream = None
     if options.live is not None:
         require("nicegui", "live", "--live")
     if options.foxglove is not None:
         require("foxglove", "foxglove", "--foxglove")
         stream = stream_address(options.foxglove)
     if options.live is not None:
-        door = open_door(options.live)
-    for each in (door, stream):
+        page = open_page_socket(options.live)
+    for each in (page, stream):
         if each is not None:
             console.print(each.words(), highlight=False, soft_wrap=True)
     watched = path if options.watch else None
-    made = Helper(HelperTasks(watched, config_as_read, door, stream, follows, folder), config)
-    if door is not None:
-        door.listening.close()  # the process has it
+    made = Helper(HelperTasks(watched, config_as_read, page, stream, follows, folder), config)
+    if page is not None:
+        page.listening.close()  # the process has it
     words = "the program has ended"
     try:
         yield made

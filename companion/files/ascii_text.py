@@ -2,7 +2,7 @@
 
 import unicodedata
 
-_WORDS = {
+_REPLACEMENTS = {
     "°": " deg",
     "µ": "u",
     "μ": "u",
@@ -46,16 +46,20 @@ def ascii_for(text: str) -> str:
         was_raised, raised = raised, unicodedata.decomposition(char).startswith("<super>")
         if raised and not was_raised:
             out.append("^")
-        out.append(char if char.isascii() else _one(char))
+        out.append(char if char.isascii() else _ascii_for_char(char))
     return "".join(out)
 
 
-def _one(char: str) -> str:
+def _ascii_for_char(char: str) -> str:
     """ASCII for one non-ASCII character."""
-    if char in _WORDS:
-        return _WORDS[char]
-    kept = [one for one in unicodedata.normalize("NFKD", char) if not unicodedata.combining(one)]
-    return "".join(one if one.isascii() else _WORDS.get(one) or _ascii_name(one) for one in kept)
+    if char in _REPLACEMENTS:
+        return _REPLACEMENTS[char]
+    parts = [
+        part for part in unicodedata.normalize("NFKD", char) if not unicodedata.combining(part)
+    ]
+    return "".join(
+        part if part.isascii() else _REPLACEMENTS.get(part) or _ascii_name(part) for part in parts
+    )
 
 
 def _ascii_name(char: str) -> str:

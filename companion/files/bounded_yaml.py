@@ -1,8 +1,8 @@
 """YAML as plain values, read within bounds, so that no file costs much time or memory.
 
-Numbers and words mean what YAML 1.2 says (its core schema): 010 is ten, 1:30 and a date are texts,
-and so are yes, no, on and off. Tags and aliases are refused. Our files do not need them, and a few
-lines of aliases can expand to gigabytes.
+Unquoted values are read by the core schema of YAML 1.2: 010 is ten; 1:30, a date, yes, no, on and
+off are texts. Tags and aliases are refused: our files do not need them, and a few lines of aliases
+can expand to gigabytes.
 """
 
 import re
@@ -24,7 +24,7 @@ LONGEST_KEY = 100
 LONGEST_NUMBER = 40
 """Largest number of characters of a number."""
 
-_WORDS = {
+_CONSTANTS = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL")),
     **dict.fromkeys(("true", "True", "TRUE"), True),
     **dict.fromkeys(("false", "False", "FALSE"), False),
@@ -34,7 +34,7 @@ _FLOAT = re.compile(
     r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?"
     r"|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)"
 )
-_NO_TEXT = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff]")
+_CONTROL_CHARACTER = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff]")
 
 
 class YamlError(Exception):
@@ -76,7 +76,7 @@ def parse(text: str) -> Any:
 
 
 def read(text: str) -> Document:
-    """The one document in a YAML text as dicts with texts as keys, lists and scalars.
+    """Read the single document in a YAML text: dicts with texts as keys, lists and scalars.
 
     Raises:
         YamlError: it is not valid YAML, holds a key twice, an alias or a tag, or is out of bounds.
@@ -91,18 +91,18 @@ def read(text: str) -> Document:
     except yaml.reader.ReaderError as error:
         line = text.count("\n", 0, error.position) + 1
         raise YamlError(f"not valid YAML: {error.reason}", line) from error
-    except (ValueError, OverflowError) as error:  # an escape beyond all characters, say
+    except (ValueError, OverflowError) as error:  # for example the escape "\\U99999999"
         raise YamlError(f"not valid YAML: {error}") from error
     return Document(builder.root, builder.lines)
 
 
 def _explained(error: yaml.MarkedYAMLError, text: str) -> str:
-    """The fault and its remedy, for the most common mistakes."""
+    """The error message, with a remedy for the most common mistakes."""
     problem = str(error.problem)
     lines, mark = text.splitlines(), error.problem_mark
     line = lines[mark.line] if mark and mark.line < len(lines) else ""
     if "\t" in line[: len(line) - len(line.lstrip())] or "'\\t'" in problem:
-        return "a tab stands where YAML wants spaces; indent with two spaces for each level"
+        return "a tab is used where YAML requires spaces; indent with two spaces for each level"
     if problem.startswith("mapping values are not allowed"):
         problem += "; a key is indented too far, or a line before it lacks its colon"
     return f"not valid YAML: {problem}"
@@ -215,7 +215,7 @@ def _new_key(key: Any, into: dict[str, Any], line: int) -> str:
     if len(key) > LONGEST_KEY:
         raise YamlError(f"the key {key[:20]!r}... is longer than {LONGEST_KEY} characters", line)
     if key in into:
-        raise YamlError(f"not valid YAML: the key {key!r} stands there twice", line)
+        raise YamlError(f"not valid YAML: the key {key!r} is given twice", line)
     return key
 
 
@@ -223,15 +223,15 @@ def _scalar(event: yaml.ScalarEvent, line: int) -> Any:
     text: str = event.value
     if len(text) > LONGEST_TEXT:
         raise YamlError(f"a value is longer than {LONGEST_TEXT} characters", line)
-    if _NO_TEXT.search(text):
+    if _CONTROL_CHARACTER.search(text):
         raise YamlError("a value holds a control character", line)
     return _plain(text, line) if event.style is None else text
 
 
 def _plain(text: str, line: int) -> Any:
     """The meaning of an unquoted value in YAML 1.2's core schema."""
-    if text in _WORDS:
-        return _WORDS[text]
+    if text in _CONSTANTS:
+        return _CONSTANTS[text]
     whole = _INTEGER.fullmatch(text)
     if not whole and not _FLOAT.fullmatch(text):
         return text

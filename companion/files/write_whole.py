@@ -8,16 +8,16 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from companion.files.os_errors import reason_of
-
-DISK_TIMEOUT = 5.0
-"""Time allowed for the disk, s."""
+from companion.files.os_errors import DISK_HANGS, DISK_TIMEOUT, reason_of
 
 
 class ReservedRoom:
     """Room on a disk for a file that is written later, however full the disk is then.
 
     A file without a name holds the room, so nothing is left of it when the process is killed.
+
+    Attributes:
+        free: releases the room; the end of this object does so, too.
 
     Args:
         folder: folder of the later file. If there is no room, or the file system cannot reserve
@@ -34,12 +34,12 @@ class ReservedRoom:
 
 
 def write_in_time(path: Path, text: str) -> str | None:
-    """Write a file like `write_whole`, but do not wait for a disk that hangs.
+    """Write a file like `write_whole`, but wait at most 5 s for the disk.
 
     Returns:
         None if the file is on the disk; else the reason why not, in words.
     """
-    outcome: list[str | None] = [f"the disk did not answer for {DISK_TIMEOUT:g} s"]
+    outcome: list[str | None] = [DISK_HANGS]
 
     def write() -> None:
         try:
@@ -80,7 +80,7 @@ def write_whole(path: Path, text: str, mode: int = 0o666) -> None:
     except OSError as error:  # it names the temporary file, or none where the disk is full
         raise OSError(error.errno, error.strerror, str(path)) from error
     finally:
-        with suppress(OSError):  # what matters has been told above
+        with suppress(OSError):  # after a success it no longer exists
             temporary.unlink()
 
 

@@ -18,7 +18,7 @@ _MIN_SIMILARITY_ELSEWHERE = 0.75
 
 _NUMBER_AND_UNIT = re.compile(r"([-+]?[0-9]+(?:[.,][0-9]+)?(?:[eE][-+]?[0-9]+)?)\s*(\D*)")
 
-_SLIPS: tuple[tuple[str, str, Callable[[float], float]], ...] = (
+_MISTAKEN_UNITS: tuple[tuple[str, str, Callable[[float], float]], ...] = (
     ("_deg_s2", "rad/s²", degrees),
     ("_deg_s", "rad/s", degrees),
     ("_deg", "rad", degrees),
@@ -50,7 +50,7 @@ def kinds_in(annotation: Any) -> frozenset[Any]:
     return _kinds_in(annotation)
 
 
-@cache
+@cache  # apart, because mypy does not regard a type as hashable
 def _kinds_in(annotation: Any) -> frozenset[Any]:
     return frozenset({annotation}).union(*(kinds_in(part) for part in get_args(annotation)))
 
@@ -70,7 +70,9 @@ def without_consequences(details: list[Any]) -> list[Any]:
 
 def other_unit(key: str, value: float) -> tuple[str, float]:
     """The unit that is often confused with this key's unit, and the value converted from it."""
-    unit, convert = next((unit, convert) for end, unit, convert in _SLIPS if key.endswith(end))
+    unit, convert = next(
+        (unit, convert) for end, unit, convert in _MISTAKEN_UNITS if key.endswith(end)
+    )
     return unit, convert(value)
 
 
@@ -155,7 +157,7 @@ def _unit_hint(detail: Any, where: str) -> str:
         return ""
     unit, meant = other_unit(where, value)
     if unit == "%" and bound.get("le", bound.get("lt", inf)) > 1.0:
-        return ""  # no share of 1
+        return ""  # only a share of 1 is confused with a percentage
     kept = [keeps(meant, bound[name]) for name, keeps in _BOUNDS.items() if name in bound]
     return f"; if it is in {unit}, write {meant:.4g}" if kept and all(kept) else ""
 
@@ -165,17 +167,17 @@ def _unknown(location: tuple[int | str, ...], value: Any, model: type[BaseModel]
     name = str(location[-1])
     section, _, key = name.partition(".")
     if len(location) == 1 and ((section,), key) in _keys(model):
-        return f"holds a point; write `{section}: {{{key}: {shortened(value)}}}`"
+        return f"contains a dot; write `{section}: {{{key}: {shortened(value)}}}`"
     beside = list(_model_at(location, model).model_fields)
     everywhere = [(key, place) for place, key in _keys(model) if place != location[:-1]]
     if not isinstance(value, dict) and not any(key.startswith(f"{name}_") for key in beside):
         same = [".".join((*place, key)) for key, place in everywhere if key == name]
         if same:
-            return f"stands in the wrong place; write {_either(same)}"
+            return f"is in the wrong section; write {_either(same)}"
     near = _nearest(name, beside, _MIN_SIMILARITY)
     if not isinstance(value, dict):
         far = _nearest(name, [key for key, _ in everywhere], _MIN_SIMILARITY_ELSEWHERE)
-        if far and (not near or _likeness(name, far) > _likeness(name, near)):
+        if far and (not near or _similarity(name, far) > _similarity(name, near)):
             places = [".".join((*place, key)) for key, place in everywhere if key == far]
             return f"is not a known key; did you mean {_either(places)}?"
     hint = f"did you mean `{near}`?" if near else f"known here: {', '.join(beside)}"
@@ -192,8 +194,8 @@ def _either(places: list[str]) -> str:
     return " or ".join(f"`{place}`" for place in places[:_MOST_PLACES])
 
 
-def _likeness(written: str, known: str) -> float:
-    """Similarity of a written key to a known one, 0 to 1; nearly 1 if the known one holds it."""
+def _similarity(written: str, known: str) -> float:
+    """Similarity of a written key to a known one; nearly 1 if that begins or ends with it."""
     if known.startswith(f"{written}_"):
         return 0.99
     if known.endswith(f"_{written}"):
@@ -202,13 +204,13 @@ def _likeness(written: str, known: str) -> float:
 
 
 def _nearest(name: str, keys: Iterable[str], least: float) -> str | None:
-    likeness = {key: _likeness(name, key) for key in keys}
-    best = max(likeness, key=likeness.__getitem__, default=None)
-    return best if best is not None and likeness[best] >= least else None
+    similarity = {key: _similarity(name, key) for key in keys}
+    best = max(similarity, key=similarity.__getitem__, default=None)
+    return best if best is not None and similarity[best] >= least else None
 
 
 def _keys(model: type[BaseModel]) -> Iterator[tuple[tuple[str, ...], str]]:
-    """The keys of the sections of a file's top level: (section, key)."""
+    """The keys in the sections of a file's top level: (path of the section, key)."""
     for section, field in model.model_fields.items():
         for kind in kinds_in(field.annotation):
             if isinstance(kind, type) and issubclass(kind, BaseModel):

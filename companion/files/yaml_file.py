@@ -115,7 +115,7 @@ def load(path: Path, model: type[Model]) -> Model:
 
 
 def read(path: Path, model: type[Section]) -> Contents:
-    """Read a YAML file without checking it against `model`.
+    """Read a YAML file; `model` only says which keys are sections.
 
     Raises:
         UnreadableFileError: the file is missing, not regular, too large, or not UTF-8.
@@ -187,14 +187,11 @@ def validated(
         faults, before = [], Place("")
         for detail in details[:_MOST_FAULTS_SHOWN]:
             place = place_of(detail["loc"], places or {}, name)
-            repeats = place.file == before.file
-            where = (
-                ""
-                if place == before
-                else f"line {place.line}: "
-                if repeats and place.line
-                else f"{place}: "
-            )
+            where = f"{place}: "
+            if place == before:
+                where = ""
+            elif place.file == before.file and place.line:
+                where = f"line {place.line}: "
             faults.append(where + explained(detail, model, model.former_keys))
             before = place
         more = len(details) - _MOST_FAULTS_SHOWN

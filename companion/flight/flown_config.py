@@ -10,6 +10,7 @@ from typing import Any
 
 from companion.config import Config
 from companion.config.files import FILES_READ
+from companion.config.known_drag import KnownDrag
 from companion.config.trajectory_file import TrajectoryFile, is_table
 from companion.files import bounded_yaml, yaml_file
 from companion.files.write_whole import write_whole
@@ -66,6 +67,17 @@ def description(config: Config, plan: Plan, *, real_time: bool) -> dict[str, str
         "max_yaw_rate_rad_s": repr(limits.max_yaw_rate),
         "real_time": "yes" if real_time else "no",
         **({} if seed is None else {"seed": str(seed)}),
+        **(_assumed_drag(plan.drag) if isinstance(plan, ConfiguredPlan) else {}),
+    }
+
+
+def _assumed_drag(known: KnownDrag) -> dict[str, str]:
+    """The drag assumed for the maneuvers, which a replay needs; empty if it was unknown."""
+    if known.drag is None:
+        return {}
+    return {
+        "assumed_drag_per_s": repr(known.drag.linear),
+        "assumed_quadratic_drag_per_m": repr(known.drag.quadratic),
     }
 
 

@@ -5,6 +5,7 @@ from functools import partial
 from typing import Protocol
 
 from companion.config import Config
+from companion.config.known_drag import before_connecting
 from companion.flight.context import FlightContext
 from companion.flight.control_phases import fly_commanded
 from companion.flight.maneuvers import configured_maneuvers
@@ -40,12 +41,16 @@ class ConfiguredPlan:
     Args:
         config: configuration of the flight.
 
+    Attributes:
+        drag: drag assumed for the maneuvers.
+
     Raises:
         ConfigError: a maneuver cannot be flown within the limits and the fence.
     """
 
     def __init__(self, config: Config) -> None:
-        self.maneuvers = configured_maneuvers(config)
+        self.drag = before_connecting(config)
+        self.maneuvers = configured_maneuvers(config, self.drag)
 
     async def phases(self, context: FlightContext) -> AsyncGenerator[Phase, None]:
         """All phases in order; those after the ground phases depend on the autopilot."""

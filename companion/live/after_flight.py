@@ -7,7 +7,7 @@ import struct
 from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager
 
-from companion.live.door import leave_address
+from companion.live.addresses import leave_address
 
 _LONGEST_UNUSED = 5.0
 """Time after which a page or stream without users ends, s."""
@@ -15,10 +15,10 @@ _LONGEST = 3600.0
 """Longest time that a page or stream stays after the flight, s."""
 
 
-async def until_alone(port: int, is_open: Callable[[], bool]) -> None:
+async def until_unused(port: int, is_open: Callable[[], bool]) -> None:
     """Wait until nobody has the page or stream open any more, or the next flight needs its port.
 
-    It takes at most an hour.
+    Wait at most an hour.
 
     Args:
         port: port of the page or stream.
@@ -30,9 +30,9 @@ async def until_alone(port: int, is_open: Callable[[], bool]) -> None:
             quiet = 0.0 if is_open() else quiet + 1.0
             if asked.is_set() or quiet > _LONGEST_UNUSED:
                 break
-            done = asyncio.create_task(asked.wait())
-            await asyncio.wait({done}, timeout=1.0)
-            done.cancel()
+            waiting = asyncio.create_task(asked.wait())
+            await asyncio.wait({waiting}, timeout=1.0)
+            waiting.cancel()
 
 
 @asynccontextmanager

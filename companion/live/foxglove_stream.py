@@ -12,7 +12,7 @@ import socket
 import foxglove
 from foxglove.websocket import ChannelView, Client, ServerListener, StatusLevel
 
-from companion.live.after_flight import until_alone
+from companion.live.after_flight import until_unused
 from companion.live.channel import Message, datagrams
 from companion.live.helper_process import Relay
 from companion.recording.mcap_file.batch import messages_of
@@ -102,7 +102,7 @@ class Stream:
 
 
 async def serve_stream(relay: Relay, feed: socket.socket) -> None:
-    """Serve the stream of a flight until the flight has ended, and then as `until_alone` says.
+    """Serve the stream of a flight until the flight has ended, and then as `until_unused` says.
 
     Args:
         relay: receives messages of the flight.
@@ -128,6 +128,6 @@ async def serve_stream(relay: Relay, feed: socket.socket) -> None:
     loop.add_reader(feed.fileno(), on_readable)
     relay.listen(stream.note)
     await relay.over.wait()
-    await until_alone(port, stream.is_open)
+    await until_unused(port, stream.is_open)
     loop.remove_reader(feed.fileno())
     await asyncio.to_thread(stream.close)

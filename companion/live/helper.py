@@ -13,8 +13,8 @@ from companion.config import Config
 from companion.config.known_drag import KnownDrag
 from companion.flight.changes import ChangeRefusedError, Changes
 from companion.flight.status import FlightStatus
+from companion.live.addresses import PageSocket, StreamAddress
 from companion.live.channel import Channel, Feed, Message
-from companion.live.door import Door, StreamAddress
 from companion.realtime import schedule_as_usual
 
 T = TypeVar("T")
@@ -29,7 +29,7 @@ class HelperTasks(NamedTuple):
     Attributes:
         watch: file whose edits are applied, or None.
         read: configuration that was read from this file for the flight.
-        door: listening socket of the live page, or None.
+        page: listening socket of the live page, or None.
         stream: address of the live stream, or None.
         follows: whether the flight flies the maneuvers of its configuration.
         folder: folder of the flight, for `live.log` and saved values; None: there is none.
@@ -37,7 +37,7 @@ class HelperTasks(NamedTuple):
 
     watch: Path | None
     read: Config
-    door: Door | None
+    page: PageSocket | None
     stream: StreamAddress | None
     follows: bool
     folder: Path | None
@@ -62,13 +62,13 @@ class Helper:
     def __init__(self, tasks: HelperTasks, config: Config) -> None:
         self.changes = Changes(config)
         self.note: Callable[[str], None] = lambda _: None
-        self._name = _helper_name(tasks)
+        self._name, self._has_ended = _helper_name(tasks), False
         self._channel, theirs = Channel.pair()
         self.feed: Feed | None = None
         fed: socket.socket | None = None
         if tasks.stream is not None:
             self.feed, fed = Feed.pair()
-        served = None if tasks.door is None else tasks.door.listening
+        served = None if tasks.page is None else tasks.page.listening
         self._process = _started((theirs, served, fed), tasks.folder)
         theirs.close()
         if fed is not None:
@@ -91,8 +91,9 @@ class Helper:
             loop.remove_reader(self._channel.fileno())
 
     def close(self, words: str) -> None:
-        """Tell the process that the flight has ended; page and stream may stay (`until_alone`)."""
+        """Tell the process that the flight has ended; page and stream may stay (`until_unused`)."""
         self._send("end", text=words)
+        self._has_ended = True
         self._channel.close()
         if self.feed is not None:
             self.feed.close()
@@ -136,9 +137,14 @@ class Helper:
         self._send("event", time_s=round(time, 3), text=text)
 
     def _send(self, kind: str, **content: Any) -> None:
-        was_open = self._channel.open
         self._channel.send({"kind": kind, **content})
-        if was_open and not self._channel.open and kind != "end":
+        if not self._channel.open and kind != "end":
+            self._note_ended()
+
+    def _note_ended(self) -> None:
+        """Note once that the process has ended."""
+        if not self._has_ended:
+            self._has_ended = True
             self.note(f"{self._name} has ended by itself; the flight goes on without it")
 
     def _tell_change(self, config: Config) -> None:
@@ -158,7 +164,7 @@ class Helper:
         for message in self._channel.waiting(_MOST_A_TURN):
             if message is None:
                 asyncio.get_running_loop().remove_reader(self._channel.fileno())
-                self.note(f"{self._name} has ended by itself; the flight goes on without it")
+                self._note_ended()
             else:
                 self._handle(message)
 
@@ -180,7 +186,7 @@ class Helper:
 
 def _helper_name(tasks: HelperTasks) -> str:
     """Name of the helper process in messages: what the user sees of it."""
-    if tasks.door is not None:
+    if tasks.page is not None:
         return "the live page"
     return "the file watcher" if tasks.stream is None else "the live stream"
 
@@ -206,16 +212,16 @@ def _started(
 
 
 def _first(tasks: HelperTasks, config: Config) -> Message:
-    door, stream = tasks.door, tasks.stream
+    page, stream = tasks.page, tasks.stream
     return {
         "config": _plain(config),
         "read": _plain(tasks.read),
         "follows": tasks.follows,
         "watch": None if tasks.watch is None else str(tasks.watch.absolute()),
         "folder": None if tasks.folder is None else str(tasks.folder.absolute()),
-        "token": None if door is None else door.token,
-        "host": None if door is None else door.host,
-        "port": None if door is None else door.port,
+        "token": None if page is None else page.token,
+        "host": None if page is None else page.host,
+        "port": None if page is None else page.port,
         "stream_host": None if stream is None else stream.host,
         "stream_port": None if stream is None else stream.port,
     }

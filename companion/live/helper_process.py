@@ -19,7 +19,7 @@ from companion.live.watched_file import WatchedFile
 
 _LOOK_PERIOD = 0.06
 """Period of checks of the watched file, s; an edit needs three of them."""
-_ANSWER = 3.0
+_ANSWER_TIMEOUT = 3.0
 """Time allowed for the flight to answer, s."""
 _NICE = 5
 """Niceness of the process, so that it yields to the flight."""
@@ -91,11 +91,11 @@ class Relay:
                 ended = self.over.is_set() or not self._channel.open
                 why = "the flight has ended" if ended else "the flight is too busy to take it"
                 raise ChangeRefusedError(f"{why}; nothing has changed")
-            async with asyncio.timeout(_ANSWER):
+            async with asyncio.timeout(_ANSWER_TIMEOUT):
                 reply = await answer
         except TimeoutError as error:
             raise NoAnswerError(
-                f"no answer from the flight within {_ANSWER:g} s; the change may have been "
+                f"no answer from the flight within {_ANSWER_TIMEOUT:g} s; the change may have been "
                 "applied, so look at the values of the flight"
             ) from error
         finally:
@@ -149,7 +149,7 @@ async def watch(relay: Relay, path: Path) -> None:
         await asyncio.sleep(_LOOK_PERIOD)
 
 
-async def _help(descriptor: int, listening: int, feed: int) -> None:
+async def _serve(descriptor: int, listening: int, feed: int) -> None:
     """Do the requested tasks; the arguments are file descriptors of sockets, −1: none.
 
     Args:
@@ -163,7 +163,7 @@ async def _help(descriptor: int, listening: int, feed: int) -> None:
         return
     os.set_blocking(descriptor, False)
     relay = Relay(channel, first)
-    serving: list[Awaitable[None]] = [_until_over(relay)]
+    serving: list[Awaitable[None]] = [_watch_until_over(relay)]
     if feed >= 0:
         from companion.live.foxglove_stream import serve_stream  # noqa: PLC0415  needs the extra
 
@@ -175,7 +175,7 @@ async def _help(descriptor: int, listening: int, feed: int) -> None:
     await asyncio.gather(*serving)
 
 
-async def _until_over(relay: Relay) -> None:
+async def _watch_until_over(relay: Relay) -> None:
     """Watch the file, if that is asked for, until the flight ends."""
     path = relay.first["watch"]
     watching = None if path is None else asyncio.create_task(watch(relay, Path(path)))
@@ -186,4 +186,4 @@ async def _until_over(relay: Relay) -> None:
 
 if __name__ == "__main__":
     os.nice(_NICE)
-    asyncio.run(_help(*map(int, sys.argv[1:])))
+    asyncio.run(_serve(*map(int, sys.argv[1:])))

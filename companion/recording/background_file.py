@@ -15,7 +15,7 @@ from time import monotonic, sleep
 from types import TracebackType
 from typing import Generic, Protocol, Self, TypeVar
 
-from companion.files.os_errors import reason_of
+from companion.files.os_errors import DISK_HANGS, DISK_TIMEOUT, reason_of
 
 T = TypeVar("T")
 Item_contra = TypeVar("Item_contra", contravariant=True)
@@ -28,8 +28,6 @@ _MOST_SLICES = 50
 """Largest number of slices in which a backlog is written."""
 _PAUSE = 0.001
 """Pause after a slice, s."""
-_LONGEST_CLOSE = 5.0
-"""Time allowed to write the remaining items when the file is closed, s."""
 _SYNC_PERIOD = 0.5
 """Period of syncs, s; a power cut loses this much, plus the time that the disk takes."""
 
@@ -131,10 +129,10 @@ class BackgroundFile(ABC, Generic[T]):
         """
         self._closing.set()
         if self._thread is not None:
-            self._thread.join(_LONGEST_CLOSE)
+            self._thread.join(DISK_TIMEOUT)
             if self._thread.is_alive():
                 self.dropped += len(self._waiting)
-                self._fail(f"the disk did not answer for {_LONGEST_CLOSE:g} s")
+                self._fail(DISK_HANGS)
 
     def _run(self, file: ItemFile[T]) -> None:
         while not self._closing.wait(_PERIOD):

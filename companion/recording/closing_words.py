@@ -111,7 +111,7 @@ def _ended_early(figures: Figures) -> tuple[str, list[str]]:
     interrupted = figures["result"].startswith(_INTERRUPTED)
     remedy = "nothing needs fixing" if interrupted else what_to_do(end["monitor"], end["phase"])
     if figures["at_the_end"]["armed"]:
-        on_ground = end["since_takeoff_s"] is None  # as far as it was heard
+        on_ground = end["since_takeoff_s"] is None  # or the take-off was not heard
         what = "disarm it, or take it over if it flies" if on_ground else "take it over or land it"
         then = "" if interrupted else f"; then: {remedy}"
         armed = "is armed" if _unheard(figures) is None else "was armed when last heard"

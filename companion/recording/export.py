@@ -16,7 +16,7 @@ from companion.recording.flight_record import FlightRecord
 from companion.recording.mcap_file.channels import CHANNELS
 from companion.recording.measurements.recorded_summary import trace_of
 
-_JOINED = ("tracking", "rates", "response")
+_JOINED_TABLES = ("tracking", "rates", "response")
 
 
 class Table(NamedTuple):
@@ -38,7 +38,7 @@ def tables(record: FlightRecord) -> Iterator[Table]:
             names = rows.dtype.names or ()
             yield Table(channel.name, {name: rows[name] for name in names})
     trace = trace_of(record)
-    for name in _JOINED:
+    for name in _JOINED_TABLES:
         series = getattr(trace, name)
         if len(series):
             yield Table(name, dict(zip(series.columns, series.rows().T, strict=True)))
@@ -60,7 +60,7 @@ def export_csv(record: FlightRecord, folder: Path) -> dict[Path, int]:
         with path.open("w", encoding="utf-8") as file:
             file.write(",".join(columns) + "\n")
             file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
-        written[path] = _rows(columns)
+        written[path] = _row_count(columns)
     return written
 
 
@@ -80,9 +80,9 @@ def export_parquet(record: FlightRecord, folder: Path) -> dict[Path, int]:
     for name, columns in tables(record):
         path = folder / f"{name}.parquet"
         parquet.write_table(ArrowTable.from_pydict(columns), path)
-        written[path] = _rows(columns)
+        written[path] = _row_count(columns)
     return written
 
 
-def _rows(columns: dict[str, NDArray[np.generic]]) -> int:
+def _row_count(columns: dict[str, NDArray[np.generic]]) -> int:
     return max(map(len, columns.values()), default=0)

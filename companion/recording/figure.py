@@ -29,7 +29,7 @@ _WIDTH, _HEIGHT, _HISTORY_HEIGHT = 13.5, 4.4, 7.6
 """Width of the picture, height of its upper panels and of its history, inches."""
 _LARGEST = 1e9
 """Numbers above this, such as times in s and distances in m, are invalid."""
-_FOR_LEGEND = 0.2
+_ROOM_FOR_LEGEND = 0.2
 """Room above the curves, as a share of their height."""
 
 
@@ -42,9 +42,8 @@ def draw_flight(folder: Path, out: Path) -> None:
 
     Raises:
         MissingExtraError: matplotlib is missing.
-        FigureError: the folder holds no readable record or nothing to draw, the record or its
-            summary has invalid values, or `out` is of an unknown kind.
-        RecordError: a message of the record is not valid.
+        FigureError: there is nothing to draw, or the suffix of `out` is unknown.
+        RecordError: there is no readable record, or it or its summary has invalid values.
         OSError: the picture cannot be written.
     """
     require("matplotlib", "plot", "drawing")
@@ -53,7 +52,7 @@ def draw_flight(folder: Path, out: Path) -> None:
     mpl.use("Agg")
     from matplotlib import pyplot as plt  # noqa: PLC0415
 
-    record = _record(folder)
+    record = read_flight(folder)
     trace = trace_of(record)
     panels, motion = _panels(record, trace), _rows(record, "motion", trace.motion)
     if not panels and motion is None:
@@ -72,17 +71,10 @@ def draw_flight(folder: Path, out: Path) -> None:
             grid = next(parts).subplots(len(HEIGHTS), 1, sharex=True, height_ratios=HEIGHTS)
             draw_history(grid, motion, marks)
         figure.savefig(out, dpi=120)
-    except ValueError as error:  # an ending that matplotlib does not know
+    except ValueError as error:  # a suffix that matplotlib does not know
         raise FigureError(f"{out}: {error}") from error
     finally:
         plt.close(figure)
-
-
-def _record(folder: Path) -> FlightRecord:
-    try:
-        return read_flight(folder)
-    except RecordError as error:
-        raise FigureError(str(error)) from error
 
 
 def _panels(record: FlightRecord, trace: FlightTrace) -> "list[Callable[[Axes], None]]":
@@ -103,12 +95,12 @@ def _rows(record: FlightRecord, name: str, series: Series) -> Floats | None:
     """The rows of a series; None if it has none.
 
     Raises:
-        FigureError: a number is too large to be valid.
+        RecordError: a number is too large to be valid.
     """
     rows = series.rows()
     # NaN means that there is no value.
     if np.abs(rows[~np.isnan(rows)]).max(initial=0.0) > _LARGEST:
-        raise FigureError(
+        raise RecordError(
             f"{record.folder}: {name}: not as a flight records it: a number is above {_LARGEST:g}"
         )
     return rows if len(rows) else None
@@ -121,7 +113,7 @@ def _gain(record: FlightRecord) -> float:
             raise ValueError(f"gain_per_s is {gain:g}")
         return gain
     except (ValueError, KeyError) as error:
-        raise FigureError(f"{record.folder}: not as a flight records it: {error}") from error
+        raise RecordError(f"{record.folder}: not as a flight records it: {error}") from error
 
 
 def _marks(record: FlightRecord) -> Marks:
@@ -131,14 +123,13 @@ def _marks(record: FlightRecord) -> Marks:
         return marks_of(summary)
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
         path = record.folder / "summary.json"
-        raise FigureError(f"{path}: not as a flight writes it: {error}") from error
+        raise RecordError(f"{path}: not as a flight writes it: {error}") from error
 
 
 def _draw_steps(axes: "Axes", runs: list[StepRun], gain: float) -> None:
     """The first doublet along its own direction, with the ideal and the best linear response."""
     run, model = runs[0], nearest_second_order(runs)
-    along = run.target[0] / np.hypot(*run.target[0])
-    time = run.time - run.time[0]
+    along, time = run.direction, run.time - run.time[0]
     nearest = f"second order, {1e3 * model.dead_time:.0f} ms dead time"
     axes.plot(time, run.target @ along, color=_TARGET, label="target")
     axes.plot(
@@ -154,7 +145,7 @@ def _draw_steps(axes: "Axes", runs: list[StepRun], gain: float) -> None:
         title="Response to the first doublet", xlabel="time, s", ylabel="acceleration / thrust"
     )
     low, high = axes.get_ylim()
-    axes.set_ylim(low, high + _FOR_LEGEND * (high - low))
+    axes.set_ylim(low, high + _ROOM_FOR_LEGEND * (high - low))
     axes.legend(loc="upper center", fontsize="small", ncols=2, handlelength=1.4, columnspacing=1.0)
     axes.grid(alpha=0.3)
 

@@ -28,14 +28,15 @@ from companion.files import bounded_yaml
 from companion.files.bounded_file import FileRefusedError, read_text
 from companion.recording.mcap_file import cdr
 from companion.recording.mcap_file.channels import CHANNELS
-from companion.recording.mcap_file.fields import Row
-from companion.recording.mcap_file.happenings import AlarmChange, Event, Phase, ValuesChange
+from companion.recording.mcap_file.fields import Rows
+from companion.recording.mcap_file.flight_events import AlarmChange, Event, Phase, ValuesChange
 from companion.recording.mcap_file.reader import McapContent, changed_topic, read_mcap
 from companion.recording.trace import ManeuverMark
 
 FILE = "flight.mcap"
 _BY_NAME = {channel.name: channel for channel in CHANNELS}
 _LONGEST_CONFIGURATION = 1 << 20
+"""Largest `config.yaml` that is read, bytes."""
 
 
 class RecordError(Exception):
@@ -78,7 +79,7 @@ class FlightRecord:
     epoch: float
     metadata: Mapping[str, Mapping[str, str]]
 
-    def rows(self, name: str) -> Row:
+    def rows(self, name: str) -> Rows:
         """All rows of a channel of numbers, such as "sample" or "guidance", in the file's order.
 
         Raises:
@@ -93,7 +94,7 @@ class FlightRecord:
         return self._rows[name]
 
     @cached_property
-    def _rows(self) -> dict[str, Row]:
+    def _rows(self) -> dict[str, Rows]:
         """The channels read so far, by name: `rows` reads each channel once."""
         return {}
 
@@ -105,7 +106,7 @@ class FlightRecord:
     def duration(self) -> float:
         """Time from the beginning of the flight to the last row or event, s."""
         newest = [messages[-1][0] for messages in self.content.messages.values() if messages]
-        return max(newest, default=0) * 1e-9 - self.epoch - self.began if newest else 0.0
+        return max(newest) * 1e-9 - self.epoch - self.began if newest else 0.0
 
     @cached_property
     def phases(self) -> tuple[Phase, ...]:

@@ -17,16 +17,16 @@ HEIGHTS = (1.0, 1.0, 1.0, 1.4)
 """Relative heights of the panels, from top to bottom."""
 _MARGIN = 0.02
 """Margin after the end, as a share of the flight."""
-_FOR_NAMES = 1.5
+_ROOM_FOR_NAMES = 1.5
 """Factor on the height axis, which leaves space for the names of the phases."""
-_LARGEST = 1e9
-"""Times above this are invalid, s."""
+_LATEST = 1e9
+"""Later times are invalid, s."""
 _LINE, _PHASE, _END = "#0072b2", "#666666", "#cc0000"
 _SHADES = ("#f0e6c8", "#d5e8f0")
 """Colours of the maneuvers, used in turn."""
 _LONGEST_REASON = 110
 """Largest number of characters of the reason that are drawn."""
-_APART = 0.022
+_JOINED_BELOW = 0.022
 """Names of phases that begin closer together than this share of the flight are joined."""
 _COLUMNS = (
     ("tracking error", "m", 5),
@@ -38,7 +38,12 @@ _COLUMNS = (
 
 
 class Span(NamedTuple):
-    """A maneuver with its label, from `begin` to `end` in s since the flight began."""
+    """A maneuver, a phase or a mode.
+
+    Attributes:
+        begin, end: time since the flight began, s.
+        name: shown to the user.
+    """
 
     begin: float
     end: float
@@ -63,14 +68,12 @@ class Marks:
 
 
 def marks_of(summary: Any) -> Marks:
-    """The marks in a `summary.json`; empty for one of an older version.
+    """The marks in a `summary.json`.
 
     Raises:
         ValueError: the summary is not valid.
         TypeError, KeyError, AttributeError, OverflowError: the same.
     """
-    if "phases" not in summary:
-        return Marks()
     early = summary["early_end"]
     maneuvers = [
         Span(begin := _time(each["begin_s"]), begin + _time(each["duration_s"]), _title(each))
@@ -105,7 +108,7 @@ def draw_history(panels: Sequence["Axes"], motion: Floats, marks: Marks) -> None
         axes.grid(alpha=0.3)
         axes.set_xlim(float(time[0]), float(time[0]) + (1.0 + _MARGIN) * length)
         low, high = axes.get_ylim()
-        axes.set_ylim(min(low, 0.0), high * (_FOR_NAMES if axes is panels[-1] else 1.0))
+        axes.set_ylim(min(low, 0.0), high * (_ROOM_FOR_NAMES if axes is panels[-1] else 1.0))
     panels[-1].set_xlabel("time since the flight began, s")
     for axes in panels[:-1]:
         axes.tick_params(labelbottom=False)
@@ -138,7 +141,7 @@ def _name_phases(axes: "Axes", marks: Marks, length: float) -> None:
     """Write in the last panel: the phases; those that begin close together share a line."""
     groups: list[tuple[float, list[str]]] = []
     for begin, name in marks.phases:
-        if groups and begin - groups[-1][0] < _APART * length:
+        if groups and begin - groups[-1][0] < _JOINED_BELOW * length:
             groups[-1][1].append(name)
         else:
             groups.append((begin, [name]))
@@ -157,12 +160,12 @@ def _name_phases(axes: "Axes", marks: Marks, length: float) -> None:
 
 
 def _plain(text: str) -> str:
-    """The text without the character that begins a formula."""
+    """The text with each `$` escaped, which would otherwise begin a formula."""
     return text.replace("$", r"\$")
 
 
 def _time(value: Any) -> float:
     time = float(value)
-    if not isfinite(time) or abs(time) > _LARGEST:
+    if not isfinite(time) or abs(time) > _LATEST:
         raise ValueError(f"a time is {value}")
     return time

@@ -10,10 +10,13 @@ from companion.files.bounded_file import FileRefusedError, read_text
 from companion.files.write_whole import write_whole
 
 _MOST_BYTES = 10_000
+"""Largest file that is read, bytes."""
 _MOST_FILES = 1000
 """Largest number of vehicle files in a folder; with more, none is read."""
 _MOST_LINEAR, _MOST_QUADRATIC = 10.0, 1.0
 """Upper bounds of `guidance.drag_per_s` and `guidance.quadratic_drag_per_m`, 1/s and 1/m."""
+_MOST_SPEED = 1000.0
+"""Upper bound of a learned top speed, m/s."""
 
 
 class Learned(NamedTuple):
@@ -43,11 +46,11 @@ class LearnedFile:
 
     def load(self) -> tuple[Learned | None, str | None]:
         """The learned values, and a warning if the file cannot be read. Never raises."""
-        if not self.path.exists():
-            return None, None
         try:
             return _parsed(self.path), None
         except (FileRefusedError, ValueError, TypeError, KeyError, RecursionError) as error:
+            if isinstance(error.__cause__, FileNotFoundError):
+                return None, None
             reason = error if isinstance(error, FileRefusedError) else "it is damaged"
             return None, (
                 f"{self.path}: what earlier flights learned cannot be used ({reason}); "
@@ -89,7 +92,7 @@ def _parsed(path: Path) -> Learned:
             _number(values["drag_per_s"], _MOST_LINEAR),
             _number(values["quadratic_drag_per_m"], _MOST_QUADRATIC),
         ),
-        _number(values["top_speed_m_s"], 1000.0),
+        _number(values["top_speed_m_s"], _MOST_SPEED),
         path,
     )
 

@@ -20,15 +20,12 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.files.os_errors import reason_of
+from companion.files.os_errors import DISK_HANGS, DISK_TIMEOUT, reason_of
 
 _CHUNK_ROWS = 1024
 """Number of rows that are written at a time."""
 _MOST_WAITING = 64
 """Largest number of chunks that wait for a slow disk; further ones are lost and counted."""
-
-_LONGEST_WAIT = 5.0
-"""Time allowed for the disk to take all chunks, s."""
 
 
 class SpooledFile:
@@ -108,9 +105,9 @@ class Spool:
         if self._begun and not self._stuck:
             written = threading.Event()
             self._queue.put(written)
-            if not written.wait(_LONGEST_WAIT):
+            if not written.wait(DISK_TIMEOUT):
                 self._stuck = True
-                self._failures.append(f"the disk did not answer for {_LONGEST_WAIT:g} s")
+                self._failures.append(DISK_HANGS)
         return not self._stuck
 
 

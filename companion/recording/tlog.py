@@ -1,4 +1,4 @@
-"""Writes the flight's MAVLink frames, sent and received, as a `.tlog`, a common format.
+"""Writes the flight's MAVLink frames, sent and received, as a `.tlog`, which ground stations read.
 
 A record is the time in microseconds since 1970 (in vehicle time: since its boot), 8 bytes big
 endian, then the frame as it was on the wire.

@@ -61,8 +61,8 @@ class FlightTrace:
         tracking: (vehicle time s, reference north, east, down, estimated north, east, down m) while
             offboard control is active; NaN: the reference is not held along this axis.
         rates: (vehicle time s, arrival on our clock s, commanded roll, pitch, yaw rad/s, thrust
-            0..1, measured roll, pitch, yaw rad/s, age of the sample s or NaN), while offboard
-            control is active by the vehicle's heartbeats.
+            0..1, measured roll, pitch, yaw rad/s, age of the sample s or NaN), while the
+            vehicle's heartbeats show offboard control.
         latencies_ns: latencies from sample to setpoint inside this process, ns.
         newest_latency_ns: the newest latency, ns; 0 before the first.
         motion: (time since the flight began s, vehicle time s, height over home m, speed m/s, tilt
@@ -89,10 +89,10 @@ class FlightTrace:
         self,
         vehicle_time: float,
         reference: tuple[float, float, float],
-        measured: tuple[float, float, float],
+        estimated: tuple[float, float, float],
     ) -> None:
         """Record reference and estimated position (NED, m)."""
-        self.tracking.add([vehicle_time, *reference, *measured])
+        self.tracking.add([vehicle_time, *reference, *estimated])
 
     def add_rates(
         self,

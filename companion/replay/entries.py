@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from companion.recording.flight_record import FlightRecord, as_recorded
 from companion.recording.mcap_file.fields import Channel
-from companion.recording.mcap_file.happenings import ValuesChange
+from companion.recording.mcap_file.flight_events import ValuesChange
 from companion.recording.mcap_file.loop_channels import (
     ACTION,
     ATTITUDE_TARGET,
@@ -41,48 +41,56 @@ def entries(record: FlightRecord) -> Iterator[Entry]:
 
 
 def _in_order(messages: "_Messages") -> Iterator[Entry]:
-    while (channel := messages.next()) is not None:
-        if channel is SAMPLE:
+    while (topic := messages.next()) is not None:
+        if topic == SAMPLE.topic:
             row = messages.take(SAMPLE)
             yield recorded_sample(row, messages.take(SETPOINT) if row["unanswered"] == 0 else None)
-        elif channel is INPUT:
+        elif topic == INPUT.topic:
             read = messages.take(INPUT)
-            target = messages.take(TARGET) if messages.next() is TARGET else None
-            made = messages.take(GUIDANCE) if messages.next() is GUIDANCE else None
+            target = messages.take(TARGET) if messages.next() == TARGET.topic else None
+            made = messages.take(GUIDANCE) if messages.next() == GUIDANCE.topic else None
             yield recorded_step(read, target, made)
-        elif channel is ACTION:
+        elif topic == ACTION.topic:
             yield recorded_action(messages.take(ACTION))
-        elif isinstance(channel, str):
+        elif topic == ATTITUDE_TARGET.topic:
+            yield attitude_target(messages.take(ATTITUDE_TARGET))
+        elif topic == _CHANGE:
             yield messages.take_change()
-        else:
-            row = messages.take(channel)
-            if channel is ATTITUDE_TARGET:
-                yield attitude_target(row)
+        else:  # its sample or its step was not recorded
+            messages.skip(topic)
+
+
+_CHANGE = "/change"
+_CHANNELS = (SAMPLE, SETPOINT, INPUT, TARGET, GUIDANCE, ACTION, ATTITUDE_TARGET)
 
 
 class _Messages:
     """The messages of the replayed channels and the changes, in the order of the file."""
 
     def __init__(self, record: FlightRecord) -> None:
-        used = (SAMPLE, SETPOINT, INPUT, TARGET, GUIDANCE, ACTION, ATTITUDE_TARGET)
-        known: dict[str, Channel | str] = {"/change": "/change"}
-        known |= {channel.topic: channel for channel in used}
-        self._order = [known[topic] for topic in record.content.order if topic in known]
+        used = {_CHANGE, *(channel.topic for channel in _CHANNELS)}
+        self._order = [topic for topic in record.content.order if topic in used]
         self._changes = iter(record.changes)
-        self._rows = {channel.topic: iter(record.rows(channel.name).tolist()) for channel in used}
+        self._rows = {each.topic: iter(record.rows(each.name).tolist()) for each in _CHANNELS}
         self._at = 0
 
-    def next(self) -> Channel | str | None:
+    def next(self) -> str | None:
+        """Topic of the next message; None at the end."""
         return self._order[self._at] if self._at < len(self._order) else None
 
     def take_change(self) -> ValuesChange:
         self._at += 1
         return next(self._changes)
 
+    def skip(self, topic: str) -> None:
+        """Skip the next message, which has this topic."""
+        self._at += 1
+        next(self._rows[topic])
+
     def take(self, channel: Channel) -> Row:
         """The next message if it is one of `channel`, else a row of NaN."""
         names = channel.dtype.names or ()
-        if self.next() is not channel:
+        if self.next() != channel.topic:
             return dict.fromkeys(names, float("nan"))
         self._at += 1
         return dict(zip(names, next(self._rows[channel.topic]), strict=True))

@@ -40,7 +40,7 @@ class RecordedSample(NamedTuple):
         sample: the sample; `received_ns`, from which latencies are computed, is 0.
         flags: state of the control loop at its arrival.
         checked: time of the check of its age before sending, s; NaN: not checked.
-        reason: why it is unanswered; one of `REASONS`.
+        reason: "answered", or why it is unanswered; one of `REASONS`.
         setpoint: setpoint that was sent, or None.
     """
 

@@ -12,18 +12,19 @@ from typing import NamedTuple
 from companion.attitude import BodyRates
 from companion.config import Config
 from companion.config.files import changed
-from companion.config.known_drag import prior_of
+from companion.config.known_drag import KnownDrag, prior_of
 from companion.control.loops import make_loops
 from companion.control.retuning import Retuning, fixed_because, tuning
 from companion.control.slew import Slew
+from companion.drag import Drag
 from companion.flight.maneuvers import configured_maneuvers
 from companion.guidance import Pose, Reference, VehicleMotion
 from companion.guidance.drag_estimate import ANY_VEHICLE
 from companion.guidance.reference import ReferenceAt
 from companion.guidance.source import ManeuverSource, Source
 from companion.mavlink.codec import SetpointEncoder
-from companion.recording.flight_record import FlightRecord
-from companion.recording.mcap_file.happenings import ValuesChange
+from companion.recording.flight_record import FlightRecord, as_recorded
+from companion.recording.mcap_file.flight_events import ValuesChange
 from companion.recording.mcap_file.loop_channels import REASONS
 from companion.recording.trace import FlightTrace
 from companion.replay.entries import entries
@@ -68,6 +69,7 @@ class Replay:
 
     Raises:
         ConfigError: a maneuver of the configuration cannot be flown.
+        RecordError: the drag in the record is not valid.
     """
 
     def __init__(self, record: FlightRecord, config: Config) -> None:
@@ -97,7 +99,9 @@ class Replay:
         self._recorded_source = _RecordedSource()
         self._source: Source = self._recorded_source
         if not self.follows_record:
-            self._source = ManeuverSource(configured_maneuvers(config))
+            self._source = ManeuverSource(
+                configured_maneuvers(config, _assumed_drag(record, config))
+            )
 
     def run(self) -> list[ReplayedSample]:
         """Replay the whole flight; return every sample that reached the control loop.
@@ -194,6 +198,18 @@ class Replay:
         self._encoder.frame(0, time_boot_ms, rates, thrust)  # refuses what the link refuses
         self._sent = Setpoint(rates, thrust)
         return self._accepts
+
+
+def _assumed_drag(record: FlightRecord, config: Config) -> KnownDrag:
+    """The drag assumed for the maneuvers before the flight, whatever was learned since."""
+    if config.guidance.drag is not None:
+        return KnownDrag(config.guidance.drag)
+    flight = record.metadata["flight"]
+    linear = flight.get("assumed_drag_per_s")
+    if linear is None:
+        return KnownDrag()
+    with as_recorded(record.folder):
+        return KnownDrag(Drag(float(linear), float(flight.get("assumed_quadratic_drag_per_m", 0))))
 
 
 class _RecordedSource:

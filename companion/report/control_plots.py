@@ -5,8 +5,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from companion.recording.measurements.response import first_order
-from companion.recording.measurements.second_order import StepRun, nearest_second_order
-from companion.report.flight_data import FlightData, Floats
+from companion.recording.measurements.second_order import nearest_second_order
+from companion.report.flight_data import FlightData
 from companion.report.plots import (
     FLIGHTS,
     IDEAL,
@@ -37,11 +37,8 @@ def compared_steps(flights: Sequence[FlightData]) -> Iterator[Plot]:
     for number, flight in enumerate(flights):
         if flight.runs:
             run, model = flight.runs[0], nearest_second_order(flight.runs)
-            time, along, colour = (
-                run.time - run.time[0],
-                _along(run),
-                FLIGHTS[number % len(FLIGHTS)],
-            )
+            time, along = run.time - run.time[0], run.direction
+            colour = FLIGHTS[number % len(FLIGHTS)]
             traces.append(line(f"{flight.name}: measured", time, run.measured @ along, colour))
             nearest = f"{flight.name}: nearest model, {1e3 * model.dead_time:.0f} ms dead time"
             traces.append(line(nearest, time, model.path(run) @ along, colour, dash="dash"))
@@ -53,18 +50,12 @@ def compared_steps(flights: Sequence[FlightData]) -> Iterator[Plot]:
         yield Plot("Step responses", note, traces, axes(x="time, s", y="acceleration / thrust"))
 
 
-def _along(run: StepRun) -> Floats:
-    """The direction of a doublet in the plane of the coefficients, (2,)."""
-    direction: Floats = run.target[0] / max(float(np.hypot(*run.target[0])), 1e-9)
-    return direction
-
-
 def _step_response(flight: FlightData) -> Plot:
     """The first doublet along its own direction, with the ideal and the best linear model."""
     if not flight.runs:
         return Plot("", "", [])
     run, model = flight.runs[0], nearest_second_order(flight.runs)
-    along, time = _along(run), run.time - run.time[0]
+    along, time = run.direction, run.time - run.time[0]
     nearest = f"nearest model: {1e3 * model.dead_time:.0f} ms dead time, second order"
     traces = [
         line("target", time, run.target @ along, REFERENCE, dash="dot"),
@@ -75,7 +66,7 @@ def _step_response(flight: FlightData) -> Plot:
         ideal = f"ideal: first order, {1.0 / flight.gain:.2g} s"
         traces.append(line(ideal, time, first_order(run, 1.0 / flight.gain) @ along, IDEAL))
     note = (
-        "A first doublet along its direction. The response is linear if it follows the nearest "
+        "The first doublet along its direction. The response is linear if it follows the nearest "
         "model; that model is slower than the ideal by the vehicle's own rate loop."
     )
     return Plot("Step response", note, traces, axes(x="time, s", y="acceleration / thrust"))
@@ -102,9 +93,7 @@ def _coefficients(flight: FlightData) -> Iterator[Plot]:
             if which in flight.curves
         ]
         layout = time_axis([flight], y="acceleration / thrust")
-        note = (
-            "Horizontal acceleration per specific thrust: what guidance asks, what the tilt gives."
-        )
+        note = "Horizontal acceleration per specific thrust: target, and measured by the tilt."
         yield Plot(f"Acceleration coefficient, {axis}", note, traces, layout, 300)
 
 
@@ -136,7 +125,7 @@ def _thrust(flight: FlightData) -> Plot:
 
 def _latency(flight: FlightData) -> Plot:
     curve = flight.curves.get("latency")
-    if curve is None or not curve.values.any():  # In virtual time there is no latency.
+    if curve is None or not curve.values.any():  # Vehicle time has no latency.
         return Plot("", "", [])
     traces = [over_time("latency", curve, 0, MEASURED), *limit_lines([flight], "latency")]
     layout = time_axis([flight], y="latency, ms")

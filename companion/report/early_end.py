@@ -35,8 +35,8 @@ class CrossedLimit:
 
 
 @dataclass(frozen=True)
-class EarlyEnd:
-    """The early end of a flight.
+class EndMark:
+    """The early end of a flight, as the plots mark it.
 
     Attributes:
         time: time since the flight began, s.
@@ -55,7 +55,7 @@ class EarlyEnd:
 
 def early_end(
     figures: Mapping[str, Any], record: FlightRecord, config: Config | None
-) -> EarlyEnd | None:
+) -> EndMark | None:
     """The early end of a flight; None if it was flown to its end.
 
     Args:
@@ -68,10 +68,10 @@ def early_end(
         return None
     monitor, reason = end["monitor"], figures["result"]
     if config is None or monitor is None:
-        return EarlyEnd(end["time_s"], reason)
+        return EndMark(end["time_s"], reason)
     if monitor in ("fence", "braking"):
-        return EarlyEnd(end["time_s"], reason, _fence(config, reason, record))
-    return EarlyEnd(end["time_s"], reason, _levels(config).get(monitor))
+        return EndMark(end["time_s"], reason, _fence(config, reason, record))
+    return EndMark(end["time_s"], reason, _levels(config).get(monitor))
 
 
 def _levels(config: Config) -> dict[str, CrossedLimit]:

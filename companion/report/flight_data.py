@@ -14,11 +14,12 @@ from companion.config.files import load
 from companion.config.reference import Key, differences
 from companion.files.yaml_file import ConfigError
 from companion.recording.flight_record import FlightRecord, read_flight
-from companion.recording.mcap_file.fields import Row
-from companion.recording.mcap_file.happenings import Event
+from companion.recording.history import Span
+from companion.recording.mcap_file.fields import Rows
+from companion.recording.mcap_file.flight_events import Event
 from companion.recording.measurements.recorded_summary import summary_of, trace_of
 from companion.recording.measurements.second_order import StepRun, step_runs
-from companion.report.early_end import EarlyEnd, early_end
+from companion.report.early_end import EndMark, early_end
 
 Floats = NDArray[np.float64]
 
@@ -33,19 +34,6 @@ class Curve(NamedTuple):
 
     time: Floats
     values: Floats
-
-
-class Span(NamedTuple):
-    """A phase, a maneuver or a mode.
-
-    Attributes:
-        begin, end: time since the flight began, s.
-        name: shown to the user.
-    """
-
-    begin: float
-    end: float
-    name: str
 
 
 @dataclass(frozen=True)
@@ -82,7 +70,7 @@ class FlightData:
     differences: tuple[Key, ...] | None = None
     runs: list[StepRun] = field(default_factory=list)
     gain: float = float("nan")
-    end: EarlyEnd | None = None
+    end: EndMark | None = None
 
     @property
     def last(self) -> float | None:
@@ -142,9 +130,8 @@ def _configuration(folder: Path) -> Config | None:
 
 
 def _curves(record: FlightRecord) -> dict[str, Curve]:
-    guidance, setpoint, sample = map(record.rows, ("guidance", "setpoint", "sample"))
-    sent = setpoint
-    setpoint = sent[sent["idle"] == 0]
+    guidance, sent, sample = map(record.rows, ("guidance", "setpoint", "sample"))
+    setpoint = sent[sent["idle"] == 0]  # on the ground there is no target
     motion, thrust = record.rows("motion"), record.rows("thrust")
     stepped = record.since_start(guidance["time_s"])
     answered = record.since_start(setpoint["received_s"])
@@ -165,16 +152,16 @@ def _curves(record: FlightRecord) -> dict[str, Curve]:
     }
 
 
-def _columns(rows: Row, *names: str) -> Floats:
+def _columns(rows: Rows, *names: str) -> Floats:
     return np.column_stack([rows[name] for name in names])
 
 
-def _place(rows: Row, whose: str) -> Floats:
+def _place(rows: Rows, whose: str) -> Floats:
     """North, east and height, m."""
     return _columns(rows, *(f"{whose}_{axis}_m" for axis in ("north", "east", "down"))) * (1, 1, -1)
 
 
-def _held(guidance: Row) -> Floats:
+def _held(guidance: Rows) -> Floats:
     """The reference; NaN where there is none, as in open loop."""
     reference = _place(guidance, "reference")
     reference[guidance["holds_position"] == 0, :2] = np.nan
@@ -182,7 +169,7 @@ def _held(guidance: Row) -> Floats:
     return reference
 
 
-def _rates(rows: Row, which: str) -> Floats:
+def _rates(rows: Rows, which: str) -> Floats:
     """Roll, pitch and yaw rate, °/s."""
     return np.degrees(
         _columns(rows, *(f"{which}_{axis}_rad_s" for axis in ("roll", "pitch", "yaw")))

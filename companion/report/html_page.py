@@ -58,7 +58,7 @@ def rendered(package: str, template: str, title: str, plots: Sequence[Plot], **s
 
 
 def _with_code(text: str) -> "Markup":
-    """A text for the page: what stands between two `…` is set as code."""
+    """A text as HTML, with its parts between backticks as code."""
     from markupsafe import Markup, escape  # noqa: PLC0415  comes with jinja2
 
     return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))

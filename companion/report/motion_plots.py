@@ -49,11 +49,10 @@ def _plan(flights: Sequence[FlightData]) -> Plot:
     for number, flight in enumerate(flights):
         for curve_name, dash in (("position", "solid"), ("reference", "dash")):  # the latter on top
             if curve_name in flight.curves:
-                place = flight.curves[curve_name].values[
-                    even_indices(len(flight.curves[curve_name].time))
-                ]
-                first = curve_name == "reference" and len(flights) == 1
-                colour = REFERENCE if first else _colour(flights, number)
+                values = flight.curves[curve_name].values
+                place = values[even_indices(len(values))]
+                alone = curve_name == "reference" and len(flights) == 1
+                colour = REFERENCE if alone else _colour(flights, number)
                 name = _name(flights, flight, "flown" if curve_name == "position" else curve_name)
                 traces.append(line(name, place[:, _EAST], place[:, _NORTH], colour, dash=dash))
     traces += [*_place_of_end(flights), *limit_lines(flights, "track")]

@@ -15,7 +15,7 @@ from companion.report.motion_plots import motion_plots
 from companion.report.plots import Plot
 from companion.report.tables import (
     Table,
-    beside_each_other,
+    comparison_tables,
     configuration,
     events_at_end,
     extremes,
@@ -73,7 +73,7 @@ def write_comparison(paths: Sequence[Path], out: Path) -> Path:
     title = " and ".join(flight.name for flight in flights)
     with _of_this_version(*paths):
         plots = [*compared_steps(flights), *motion_plots(flights)]
-        page = _page(title, None, flights, beside_each_other(flights), plots, None)
+        page = _page(title, None, flights, comparison_tables(flights), plots, None)
     write_whole(out, page)
     return out
 

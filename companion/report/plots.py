@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from companion.report.early_end import EarlyEnd
-from companion.report.flight_data import Curve, FlightData, Floats, Span
+from companion.recording.history import Span
+from companion.report.early_end import EndMark
+from companion.report.flight_data import Curve, FlightData, Floats
 
 MEASURED, REFERENCE, IDEAL, NEAREST = "#0072b2", "#d55e00", "#999999", "#009e73"
 CROSSED = "#c1121f"
@@ -119,7 +120,7 @@ def time_axis(flights: Sequence[FlightData], **titles: str) -> dict[str, Any]:
     }
 
 
-def end_mark(end: EarlyEnd, *, above: bool = False) -> dict[str, list[dict[str, Any]]]:
+def end_mark(end: EndMark, *, above: bool = False) -> dict[str, list[dict[str, Any]]]:
     """A line and a label at an early end, for a layout; the label is at the bottom or above."""
     label = {**_end_label(end), "y": 1.0 if above else 0.0}
     return {"shapes": [_upright(end.time)], "annotations": [label]}
@@ -190,7 +191,7 @@ def _upright(time: float) -> dict[str, Any]:
     }
 
 
-def _end_label(end: EarlyEnd) -> dict[str, Any]:
+def _end_label(end: EndMark) -> dict[str, Any]:
     """Time of an early end as a label beside the line, with the reason as a tooltip."""
     return {
         "x": end.time,

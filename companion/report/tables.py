@@ -71,7 +71,7 @@ def configuration(flight: FlightData) -> Table:
     return Table("Configuration that is not the default", ("key", "flown", "default", "unit"), rows)
 
 
-def beside_each_other(flights: Sequence[FlightData]) -> list[Table]:
+def comparison_tables(flights: Sequence[FlightData]) -> list[Table]:
     """The figures of several flights and the keys that differ, one column for each flight."""
     names = tuple(flight.name for flight in flights)
     known = [
@@ -135,7 +135,7 @@ def _rows(figures: Any) -> Iterator[tuple[str, str]]:
         ("setpoints", figures.get("setpoints"), _unit("{:,}")),
         ("frames lost", link.get("lost"), _unit("{:,}")),
     ]
-    if not figures.get("lockstep"):  # The vehicle waits in lockstep, so its wall time says nothing.
+    if not figures.get("lockstep"):  # Vehicle time has no latency.
         wanted += [
             ("missed deadlines", figures.get("missed_deadlines"), _unit("{:,}")),
             ("latency, median", latency.get("p50"), _unit("{:.0f} µs")),

@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 from typing import Any
 
-from companion.report.flight_data import FlightData, Span
+from companion.recording.history import Span
+from companion.report.flight_data import FlightData
 from companion.report.plots import IDEAL, MEASURED, REFERENCE, Plot, axes, end_mark
 
 _COLOURS = {2: MEASURED, 3: "#e69f00", 4: REFERENCE}

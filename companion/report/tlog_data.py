@@ -6,12 +6,14 @@ from pathlib import Path
 import numpy as np
 
 from companion.attitude import coefficients
+from companion.attitude.kinematics import tilt_angle
 from companion.attitude.representation import is_unit
 from companion.mavlink.errors import LogError
 from companion.mavlink.messages import Message
 from companion.mavlink.tlog_file import messages
-from companion.recording.mcap_file.happenings import Event
-from companion.report.flight_data import Curve, FlightData, Floats, Span, spans
+from companion.recording.history import Span
+from companion.recording.mcap_file.flight_events import Event
+from companion.report.flight_data import Curve, FlightData, Floats, spans
 from companion.vehicle.flight_log import read_flight_log
 from companion.vehicle.registry import BY_NUMBER
 
@@ -105,13 +107,14 @@ class _Reader:
                 return
             c = coefficients(q)
             self._attitudes.append((self._now, c.north, c.east))
-            tilt = np.arcsin(min(np.hypot(c.north, c.east), 1.0))
+            tilt = tilt_angle(message.q2, message.q3)
         self._tilts.append((self._now, float(np.degrees(tilt))))
 
     def _text(self, message: Message) -> None:
         severity = message.severity
-        level = _ERROR if severity <= _MAV_ERROR else _INFORMATION
-        level = _WARNING if severity == _MAV_WARNING else level
+        level = _INFORMATION
+        if severity <= _MAV_WARNING:
+            level = _ERROR if severity <= _MAV_ERROR else _WARNING
         self.events.append(Event(self._now, message.text, level, "autopilot"))
 
     def modes(self) -> tuple[Span, ...]:
@@ -138,7 +141,7 @@ def _rows(rows: Iterable[tuple[float, ...]], columns: int) -> Floats:
 
 
 def _control(path: Path, began: float) -> dict[str, Curve]:
-    """Rates and thrust of a log with setpoints that the autopilot obeyed; else empty."""
+    """Rates and thrust, if the log has setpoints that the autopilot obeyed; else empty."""
     try:
         log = read_flight_log(path)
     except LogError:

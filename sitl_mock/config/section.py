@@ -67,7 +67,7 @@ def explain(error: ValidationError, model: type[BaseModel]) -> str:
         beside = owner.model_fields if owner else ()
         elsewhere = [place for place in _places_of(path[-1], model) if place != where]
         if elsewhere and not any(key.startswith(f"{path[-1]}_") for key in beside):
-            return f"{where} stands in the wrong place; write {' or '.join(elsewhere)}"
+            return f"{where} is in the wrong section; write {' or '.join(elsewhere)}"
         hint = suggestion(path[-1], beside) if owner else ""
         return f"unknown key {where}{hint}"
     if detail["type"] in ("float_parsing", "int_parsing"):

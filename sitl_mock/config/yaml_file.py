@@ -127,8 +127,8 @@ def explain_yaml(error: Exception) -> str:
     mark = getattr(error, "problem_mark", None)
     if mark is not None and "'\\t'" in str(getattr(error, "problem", "")):
         return (
-            f"line {mark.line + 1}: a tab stands where YAML wants spaces; indent with two spaces "
-            "for each level"
+            f"line {mark.line + 1}: a tab is used where YAML requires spaces; indent with two "
+            "spaces for each level"
         )
     problem = " ".join(str(error).split())
     return f"is not valid YAML: {problem:.300}"

@@ -77,7 +77,7 @@ def config(tmp_path, text):
         ("link: {backend: mavsdk, lockstep: true}", "neither fly in lockstep nor sign"),
         ("link: {backend: mavsdk, signing_key_file: key}", "neither fly in lockstep nor sign"),
         ("realtime: {scheduler: fifo, priority: 95}", "`realtime.priority`"),
-        ("limits: {max_tilt_deg: 30, max_tilt_deg: 40}", "stands there twice"),
+        ("limits: {max_tilt_deg: 30, max_tilt_deg: 40}", "is given twice"),
         ("link: 3", "`link`"),
         ("vehicle: {dead_time_ms: true}", "`vehicle.dead_time_ms`: must not be true or false"),
         ("flight: {slow_down: 1.5}", "`flight.slow_down`"),

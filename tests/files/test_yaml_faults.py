@@ -22,7 +22,7 @@ def told(tmp_path, text):
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("limits:\n\tmax_tilt_deg: 20\n", "line 2: a tab stands where YAML wants spaces"),
+        ("limits:\n\tmax_tilt_deg: 20\n", "line 2: a tab is used where YAML requires spaces"),
         ("limits:\n  max_tilt_deg: 20 deg\n", "line 2: `limits.max_tilt_deg` must be a number: "),
         (
             "limits: {max_tilt_deg: 20 deg}",
@@ -38,8 +38,8 @@ def told(tmp_path, text):
         ("deadman: {telemetry_stale_ms: 0.1}", "if it is in s, write 100"),
         ("thrust: {hover_thrust: 49}", "if it is in %, write 0.49"),
         ("guidance: {disturbance_bandwidth_rad_s: 100}", "if it is in °/s, write 1.745"),
-        ("max_tilt_deg: 20", "stands in the wrong place; write `limits.max_tilt_deg`"),
-        ("limits: {gain_per_s: 4}", "stands in the wrong place; write `planner.gain_per_s`"),
+        ("max_tilt_deg: 20", "is in the wrong section; write `limits.max_tilt_deg`"),
+        ("limits: {gain_per_s: 4}", "is in the wrong section; write `planner.gain_per_s`"),
         ("duration_s: 4", "write `hover.duration_s` or `steps.duration_s` or `corners.duration_s`"),
         ("radius: 4", "did you mean `circle.radius_m`?"),
         ("max_tlt_deg: 4", "did you mean `limits.max_tilt_deg`?"),
@@ -55,7 +55,7 @@ def told(tmp_path, text):
             "recording: {directory: 5}",
             "`recording.directory`: must name a file or a folder (got 5)",
         ),
-        ("limits.max_tilt_deg: 20", "holds a point; write `limits: {max_tilt_deg: 20}`"),
+        ("limits.max_tilt_deg: 20", "contains a dot; write `limits: {max_tilt_deg: 20}`"),
         ("deadman: {stale_ms: 100}", "did you mean `telemetry_stale_ms`?"),
     ],
 )
@@ -79,7 +79,7 @@ def test_every_key_in_the_wrong_section_is_told_its_own(tmp_path, key):
     if key.name in Config().model_dump()[wrong]:
         pytest.skip("both sections have such a key")
     sentence = told(tmp_path, f"{wrong}: {{{key.name}: 1}}\n")
-    assert f"`{wrong}.{key.name}` stands in the wrong place; write `" in sentence
+    assert f"`{wrong}.{key.name}` is in the wrong section; write `" in sentence
     owners = [one.section for one in keys(Config()) if one.name == key.name]
     assert f"`{owners[0]}.{key.name}`" in sentence
 

@@ -19,7 +19,7 @@ from companion import demo
 from companion.config.files import changed, load
 from companion.flight.observer import SilentObserver, decline_landing
 from companion.flight.session import Session
-from companion.live.door import open_door
+from companion.live.addresses import open_page_socket
 from companion.live.helper import Helper, HelperTasks
 from companion.mavlink import loop as link_loop
 from tests.live.browser import chromium
@@ -69,12 +69,14 @@ def _flight(seconds: float, *, page: bool) -> tuple[list[float], list[float]]:
         )
         helper, observer = None, SilentObserver()
         if page:
-            door = open_door("127.0.0.1:0")
-            helper = observer = Helper(HelperTasks(None, config, door, None, True, folder), config)
+            page_socket = open_page_socket("127.0.0.1:0")
+            helper = observer = Helper(
+                HelperTasks(None, config, page_socket, None, True, folder), config
+            )
             stack.callback(helper.close, "over")
-            door.listening.close()
+            page_socket.listening.close()
             tab = stack.enter_context(chromium())()
-            tab.open(f"http://127.0.0.1:{door.port}/")
+            tab.open(f"http://127.0.0.1:{page_socket.port}/")
         session = Session(config, folder if page else None, observer, decline_landing)
         flight = session.fly()
         if helper is not None:

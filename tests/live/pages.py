@@ -6,7 +6,7 @@ from math import cos, pi, sin
 
 from companion.config import Config
 from companion.flight.status import FlightStatus
-from companion.live.door import open_door
+from companion.live.addresses import open_page_socket
 from companion.live.helper import Helper, HelperTasks
 
 
@@ -61,18 +61,20 @@ class Page:
     """A live page, told of the circle by a thread until `end`.
 
     Attributes:
-        door: of the page.
+        page_socket: of the page.
         helper: the flight's side of its process.
         notes: what the process had to say.
         url: of the page.
     """
 
     def __init__(self, folder=None, address="127.0.0.1:0"):
-        self.door, self.notes = open_door(address), []
-        self.helper = Helper(HelperTasks(None, Config(), self.door, None, True, folder), Config())
+        self.page_socket, self.notes = open_page_socket(address), []
+        self.helper = Helper(
+            HelperTasks(None, Config(), self.page_socket, None, True, folder), Config()
+        )
         self.helper.note = self.notes.append
-        self.door.listening.close()
-        self.url = f"http://127.0.0.1:{self.door.port}/"
+        self.page_socket.listening.close()
+        self.url = f"http://127.0.0.1:{self.page_socket.port}/"
         self._over = threading.Event()
         self._thread = threading.Thread(target=asyncio.run, args=(self._serve(),))
         self._thread.start()

@@ -20,8 +20,8 @@ from companion.config import Config
 from companion.files.yaml_file import ConfigError
 from companion.flight.observer import SilentObserver, decline_landing
 from companion.flight.session import Session
+from companion.live.addresses import stream_address
 from companion.live.channel import Feed
-from companion.live.door import stream_address
 from companion.live.helper import Helper, HelperTasks
 from companion.recording.flight_record import read_flight
 from companion.recording.mcap_file import cdr

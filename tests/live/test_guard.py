@@ -6,7 +6,7 @@ import socket
 import pytest
 
 from companion.files.yaml_file import ConfigError
-from companion.live.door import Door, open_door
+from companion.live.addresses import PageSocket, open_page_socket
 from companion.live.page.guard import Guard
 
 TOKEN = "secret"
@@ -73,35 +73,35 @@ def test_another_computer_needs_the_token_and_keeps_a_cookie_that_only_watches()
 @pytest.mark.parametrize("address", ["nowhere", "127.0.0.1:x", ":99999", "1.2.3", "host:80"])
 def test_a_wrong_address_is_one_sentence(address):
     with pytest.raises(ConfigError, match="--live"):
-        open_door(address)
+        open_page_socket(address)
 
 
 def test_a_port_in_use_is_named():
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = other.getsockname()[1]
         with pytest.raises(ConfigError, match=f"port {port} of 127.0.0.1"):
-            open_door(str(port))
+            open_page_socket(str(port))
 
 
 def test_an_address_of_another_computer_is_not_a_matter_of_the_port():
     with pytest.raises(ConfigError, match=r"has that address; use --live 0\.0\.0\.0:8090"):
-        open_door("192.0.2.1")
+        open_page_socket("192.0.2.1")
 
 
 def test_the_door_is_of_this_computer_and_has_a_new_token_each_time():
-    first, second = open_door(":0"), open_door("0")
+    first, second = open_page_socket(":0"), open_page_socket("0")
     assert first.host == second.host == "127.0.0.1"
     assert first.token != second.token
     assert len(first.token) >= 12
     assert f"127.0.0.1:{first.port}" in first.words()
-    for door in (first, second):
-        door.listening.close()
+    for page_socket in (first, second):
+        page_socket.listening.close()
 
 
 def test_a_door_for_other_computers_is_told_with_its_name_and_token():
-    told = Door("0.0.0.0", 8090, "secret", None).words()
+    told = PageSocket("0.0.0.0", 8090, "secret", None).words()
     assert told == f"Live page: http://{socket.gethostname()}:8090/?token=secret"
-    assert "http://[2001:db8::1]:8090/?token=" in Door("2001:db8::1", 8090, "s", None).words()
+    assert "http://[2001:db8::1]:8090/?token=" in PageSocket("2001:db8::1", 8090, "s", None).words()
 
 
 def test_a_cookie_that_cannot_be_read_admits_nobody():

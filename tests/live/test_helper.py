@@ -68,7 +68,7 @@ def test_edits_of_the_file_reach_the_flight(tmp_path):
 
 
 def test_without_an_answer_a_change_may_have_been_applied(monkeypatch):
-    monkeypatch.setattr(helper_process, "_ANSWER", 0.02)
+    monkeypatch.setattr(helper_process, "_ANSWER_TIMEOUT", 0.02)
 
     async def ask():
         ours, theirs = Channel.pair()

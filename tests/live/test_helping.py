@@ -22,7 +22,7 @@ from companion.drag import Drag
 from companion.extras import MissingExtraError
 from companion.files.yaml_file import ConfigError
 from companion.flight.environment import THIS_COMPUTER
-from companion.live.door import open_door
+from companion.live.addresses import open_page_socket
 from companion.live.helper import Helper, HelperTasks
 from tests.live.pages import status
 
@@ -67,7 +67,7 @@ def test_the_page_is_served_until_the_next_flight_needs_its_port(tmp_path):
             urlopen(Request(url[1], headers={"Origin": "http://example.com"}), timeout=60)
         assert (refusal.value.code, refusal.value.read()[:12]) == (403, b"another site")
         assert beside._process.poll() is None
-    next_one = open_door(f"127.0.0.1:{url[2]}")
+    next_one = open_page_socket(f"127.0.0.1:{url[2]}")
     next_one.listening.close()
     assert beside._process.wait(20.0) == 0
     assert (tmp_path / "live.log").read_text() == ""
@@ -76,7 +76,7 @@ def test_the_page_is_served_until_the_next_flight_needs_its_port(tmp_path):
 @pytest.mark.skipif(find_spec("foxglove") is None, reason="the extra `foxglove` is missing")
 def test_a_stream_that_lost_its_port_is_noted_and_the_flight_goes_on(monkeypatch):
     """Another program takes the port after the check of the command line."""
-    with open_door("127.0.0.1:0").listening as other:
+    with open_page_socket("127.0.0.1:0").listening as other:
         taken = other.getsockname()
         monkeypatch.setattr(
             "companion.cli.helping.stream_address", lambda _: argparse.Namespace(
@@ -128,6 +128,8 @@ def test_a_killed_process_is_also_noted_by_the_next_message():
         beside.phase("hover", "the maneuver to end")
     assert notes == ["the file watcher has ended by itself; the flight goes on without it"]
     assert beside.dropped == 1
+    asyncio.run(beside.serve_beside(asyncio.sleep(0.05)))
+    assert len(notes) == 1
     beside.close("the flight is over")
 
 

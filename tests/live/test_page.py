@@ -59,7 +59,7 @@ def _watch_and_change(new_tab, page, folder):
     tab.wait(f"{_SAID}.includes('this is not the token')")
     _change(tab, "limits.max_climb_m_s", "1.5", "refused: give the token first")
     assert page.helper.changes.made == []
-    tab.type("token", page.door.token)
+    tab.type("token", page.page_socket.token)
     tab.click("unlock")
     tab.wait(f"{_SAID}.includes('can be changed')")
     _change(tab, "limits.max_climb_m_s", "1.5", "from 2 to 1.5")
@@ -102,7 +102,7 @@ def test_the_page(tmp_path):
             tab.wait(
                 "document.getElementById('live-over').innerText.includes('the flight is over')"
             )
-            later = Page(address=f"127.0.0.1:{page.door.port}")
+            later = Page(address=f"127.0.0.1:{page.page_socket.port}")
             tab.wait("window.live && document.getElementById('live-over').hidden", 100.0)
             tab.wait(_SHOWN, 60.0)
             _moves(tab)

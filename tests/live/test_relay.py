@@ -10,10 +10,10 @@ from companion.config.files import changed
 from companion.files.yaml_file import ConfigError
 from companion.flight.changes import ChangeRefusedError
 from companion.live import after_flight, helper_process
-from companion.live.after_flight import until_alone
+from companion.live.addresses import ask_to_leave, leave_address
+from companion.live.after_flight import until_unused
 from companion.live.channel import Channel, datagrams
 from companion.live.checks import ChangeChecks
-from companion.live.door import ask_to_leave, leave_address
 from companion.live.watched_file import Edit
 
 SLOWER = {"planner": {"gain_per_s": 4.0}}
@@ -124,7 +124,7 @@ def test_what_becomes_of_an_edit_is_noted(monkeypatch, tmp_path, answer, said, a
             seen.append("accepted")
 
     monkeypatch.setattr(helper_process, "WatchedFile", Watched)
-    monkeypatch.setattr(helper_process, "_ANSWER", 0.02)
+    monkeypatch.setattr(helper_process, "_ANSWER_TIMEOUT", 0.02)
     monkeypatch.setattr(helper_process, "_LOOK_PERIOD", 0.001)
 
     async def use(relay, flight):
@@ -145,7 +145,7 @@ def test_what_becomes_of_an_edit_is_noted(monkeypatch, tmp_path, answer, said, a
 def test_a_process_whose_flight_never_began_ends():
     ours, theirs = Channel.pair()
     ours.close()
-    asyncio.run(helper_process._help(theirs.detach(), -1, -1))
+    asyncio.run(helper_process._serve(theirs.detach(), -1, -1))
 
 
 def test_an_end_that_broke_counts_as_closed():
@@ -196,11 +196,11 @@ def test_a_page_stays_while_it_is_open_and_some_seconds_more(monkeypatch):
         return tasks, set()
 
     monkeypatch.setattr(after_flight.asyncio, "wait", sleep)
-    asyncio.run(until_alone(0, lambda: len(slept) < 5))
+    asyncio.run(until_unused(0, lambda: len(slept) < 5))
     assert len(slept) == 5 + 2
     slept.clear()
     monkeypatch.setattr(after_flight, "_LONGEST", 20.0)
-    asyncio.run(until_alone(0, lambda: True))
+    asyncio.run(until_unused(0, lambda: True))
     assert len(slept) == 20
 
 
@@ -212,7 +212,7 @@ def test_a_page_leaves_for_the_same_user_only(monkeypatch):
 
     async def asked(getuid):
         monkeypatch.setattr(after_flight.os, "getuid", getuid)
-        staying = asyncio.create_task(until_alone(port, lambda: True))
+        staying = asyncio.create_task(until_unused(port, lambda: True))
         await asyncio.sleep(0.05)
         answer = await asyncio.to_thread(ask_to_leave, port)
         done, _ = await asyncio.wait({staying}, timeout=0.3)
@@ -227,4 +227,4 @@ def test_a_page_whose_name_is_taken_stays_all_the_same(monkeypatch):
     monkeypatch.setattr(after_flight, "_LONGEST_UNUSED", 0.0)
     with socket.socket(socket.AF_UNIX) as other:
         other.bind(leave_address(1))
-        asyncio.run(asyncio.wait_for(until_alone(1, lambda: False), 5.0))
+        asyncio.run(asyncio.wait_for(until_unused(1, lambda: False), 5.0))

@@ -83,7 +83,7 @@ def test_what_waits_is_written_in_slices(tmp_path, count, size):
 
 
 def test_a_disk_that_does_not_answer_does_not_keep_the_flight_from_ending(tmp_path, monkeypatch):
-    monkeypatch.setattr(background_file, "_LONGEST_CLOSE", 0.1)
+    monkeypatch.setattr(background_file, "DISK_TIMEOUT", 0.1)
     told = []
     writer = ToSlices(tmp_path / "file", told.append)
     for number in range(50):
@@ -96,7 +96,7 @@ def test_a_disk_that_does_not_answer_does_not_keep_the_flight_from_ending(tmp_pa
 
 
 def test_figures_do_not_wait_for_such_a_disk_either(tmp_path, monkeypatch):
-    monkeypatch.setattr(series, "_LONGEST_WAIT", 0.1)
+    monkeypatch.setattr(series, "DISK_TIMEOUT", 0.1)
     answers = threading.Event()
     monkeypatch.setattr(series.SpooledFile, "append", lambda *_: answers.wait(10.0))
     spool = series.Spool(tmp_path)

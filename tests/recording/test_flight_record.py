@@ -15,7 +15,7 @@ from companion.recording.flight_record import RecordError, read_flight
 from companion.recording.folder import flight_folder
 from companion.recording.mcap_file import cdr, reader, writer
 from companion.recording.mcap_file.batch import _FULL, Batch, messages_of
-from companion.recording.mcap_file.channels import CHANNELS, RESOURCES, WORDS
+from companion.recording.mcap_file.channels import CHANNELS, OTHER_CHANNELS, RESOURCES
 from companion.recording.mcap_file.loop_channels import ACTION, INPUT, REASONS, SETPOINT
 from companion.recording.mcap_file.scene import Entity, scene_message
 from companion.recording.mcap_file.writer import McapWriter
@@ -89,7 +89,7 @@ def test_what_is_written_is_read_again_by_both_readers(tmp_path):
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         for schema, channel, _, message in reader.iter_decoded_messages():
             official.setdefault(channel.topic, []).append((schema.name, message))
-    assert set(official) == {*(channel.topic for channel in CHANNELS), *WORDS}
+    assert set(official) == {*(channel.topic for channel in CHANNELS), *OTHER_CHANNELS}
     for channel in CHANNELS:
         newest = official[channel.topic][-1][1]
         for name in channel.dtype.names:

@@ -72,3 +72,9 @@ def test_a_pipe_or_a_directory_in_its_place_is_no_file(tmp_path):
     with pytest.raises(OSError):  # noqa: PT011  whichever the system names
         folder.save(DRAG, 5.0)
     assert not [path for path in tmp_path.iterdir() if path.suffix not in (".json",)]
+
+
+def test_a_path_that_cannot_be_looked_at_is_told_and_does_not_end_the_flight(tmp_path):
+    kept, trouble = LearnedFile(tmp_path, "4" * 300).load()
+    assert kept is None
+    assert "cannot be used (cannot read it: File name too long)" in trouble

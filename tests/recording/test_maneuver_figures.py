@@ -91,3 +91,10 @@ def test_a_thrust_that_another_program_commands_has_no_height_error():
     (one,) = measure_maneuvers(thrust, RATES, [ManeuverMark(0.0, 0.0, "mine")], 0.0)
     assert np.isnan([one.height_rms, one.height_max]).all()
     assert one.as_dict()["height_rms_m"] is None
+
+
+def test_without_a_height_reference_the_beginning_has_no_distance_either():
+    thrust = np.array(rows(0.0, 4.0, lambda _: (1.0, 0.0, nan), lambda _: (0.0, 0.0, -5.0)))
+    (one,) = measure_maneuvers(thrust, RATES, [ManeuverMark(0.0, 0.0, "mine")], 0.0)
+    assert one.level_max == 1.0
+    assert one.as_dict()["beginning_max_m"] is None

@@ -19,10 +19,12 @@ from companion.cli.main import main
 from companion.config.files import changed, load
 from companion.config.known_drag import prior_of
 from companion.drag import Drag
+from companion.files.yaml_file import ConfigError
 from companion.guidance.drag_estimate import ANY_VEHICLE
-from companion.recording.flight_record import read_flight
-from companion.recording.mcap_file.channels import CHANNELS, WORDS
-from companion.recording.mcap_file.happenings import ValuesChange
+from companion.recording.flight_record import RecordError, read_flight
+from companion.recording.learned_file import LearnedFile
+from companion.recording.mcap_file.channels import CHANNELS, OTHER_CHANNELS
+from companion.recording.mcap_file.flight_events import ValuesChange
 from companion.recording.measurements.recorded_summary import derived_summary, summary_of
 from companion.replay.recorded import RecordedAction, Setpoint
 from companion.replay.replay import Replay, ReplayedSample
@@ -185,7 +187,7 @@ def test_other_readers_read_the_files(good):
         metadata = {each.name: each.metadata for each in reader.iter_metadata()}
     assert newest is not None
     elsewhere = {"/attitude_target", "/alarm", "/change"}  # nothing of these in this flight
-    assert set(counts) == {*(channel.topic for channel in CHANNELS), *WORDS} - elsewhere
+    assert set(counts) == {*(channel.topic for channel in CHANNELS), *OTHER_CHANNELS} - elsewhere
     assert schemas["/tf"] == "foxglove_msgs/msg/FrameTransform"
     assert counts["/setpoint"] == summary["setpoints"]
     assert metadata["flight"]["plan"] == "configuration"
@@ -349,3 +351,27 @@ def test_a_change_of_values_is_replayed_as_it_was_made(good):
     made._slew = slew = Loops()
     made._change(ValuesChange(7.0, False, slower))
     assert slew.asked == []
+
+
+def test_maneuvers_are_made_with_the_drag_of_that_time_not_with_what_was_learned_since(
+    good, tmp_path
+):
+    folder, _ = good
+    circle = {
+        "flight": {"maneuvers": ["circle"]},
+        "circle": {"radius_m": 5.0, "speed_m_s": 5.0},
+        "limits": {"max_tilt_deg": 34.0},
+        "guidance": {"drag_per_s": None},
+        "recording": {"directory": str(tmp_path)},
+    }
+    LearnedFile(tmp_path, "aa").save(Drag(1.2), 5.0)  # the circle would not fit the limits
+    config = changed(load(folder / "config.yaml"), circle, "a test")
+    record = read_flight(folder)
+    flight = record.metadata["flight"]
+    with pytest.raises(ConfigError, match=r"needs 3[56].*tilt"):
+        Replay(record, config)  # the flight was configured with 1.0 1/s
+    flight["assumed_drag_per_s"] = "0.7"
+    Replay(record, config)
+    flight["assumed_drag_per_s"] = "much"
+    with pytest.raises(RecordError, match="not as a flight records it"):
+        Replay(record, config)

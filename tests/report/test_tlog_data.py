@@ -8,8 +8,9 @@ from pymavlink.dialects.v20 import common as dialect
 
 from companion.config import Config
 from companion.mavlink.errors import LogError
+from companion.recording.history import Span
 from companion.report.early_end import early_end
-from companion.report.flight_data import FlightData, Span
+from companion.report.flight_data import FlightData
 from companion.report.plots import time_axis
 from companion.report.tables import events_at_end, extremes
 from companion.report.timeline import timeline
@@ -98,6 +99,13 @@ def test_a_quaternion_that_is_none_is_left_out(tmp_path):
     coefficients = flight.curves["coefficients"]
     assert coefficients.time.tolist() == [0.0, 2.0]
     assert coefficients.values == pytest.approx(np.array([[0.0, 0.0], [0.0, 1.0]]), abs=1e-6)
+
+
+def test_a_vehicle_on_its_back_is_tilted_by_more_than_90_degrees(tmp_path):
+    half = np.radians(150.0) / 2.0
+    rolled = quaternion(1000, np.cos(half), np.sin(half), 0.0, 0.0)
+    flight = logged(written(tmp_path / "a.tlog", heartbeat(), rolled, position(1000)))
+    assert flight.curves["motion"].values[0, 2] == pytest.approx(150.0, abs=1e-3)
 
 
 def test_without_an_attitude_the_tilt_is_unknown(tmp_path):

@@ -17,7 +17,7 @@ from companion.live.page.store import Store
 
 _BY = "the live page"
 _FILE = "changed.yaml"
-_WRONG = 1.0
+_WRONG_TOKEN_DELAY = 1.0
 """Delay of the answer to a wrong token, s."""
 
 
@@ -61,7 +61,7 @@ class Panel:
                     self._unlocked = True
                     self._say("values can be changed in this tab now")
                 else:
-                    await asyncio.sleep(_WRONG)
+                    await asyncio.sleep(_WRONG_TOKEN_DELAY)
                     self._say("this is not the token; the program showed it when it started")
 
             ui.button("Unlock", on_click=unlock).props("id=live-unlock")

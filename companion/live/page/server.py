@@ -1,4 +1,4 @@
-"""Serves the live page during the flight, and after it as long as `until_alone` says."""
+"""Serves the live page during the flight, and after it as long as `until_unused` says."""
 
 import asyncio
 import os
@@ -6,7 +6,7 @@ import socket
 import tempfile
 
 from companion.config import Config
-from companion.live.after_flight import until_alone
+from companion.live.after_flight import until_unused
 from companion.live.helper_process import Relay
 from companion.live.page.guard import Guard
 from companion.live.page.store import Store
@@ -45,7 +45,7 @@ async def _serve(relay: Relay, listening: socket.socket) -> None:
     def is_open() -> bool:
         return any(client.has_socket_connection for client in Client.instances.values())
 
-    alone = asyncio.create_task(until_alone(int(relay.first["port"]), is_open))
+    alone = asyncio.create_task(until_unused(int(relay.first["port"]), is_open))
     await asyncio.wait({alone, serving}, return_when=asyncio.FIRST_COMPLETED)
     alone.cancel()
     server.should_exit = True

@@ -1,4 +1,4 @@
-"""All channels of `flight.mcap`; those of the status, ten times or once a second, are defined here.
+"""All channels of `flight.mcap`. The status channels, once or ten times a second, are defined here.
 
 The columns follow the conventions of `companion.recording.mcap_file.loop_channels`, but `time_s` of
 MOTION counts from the beginning of the flight.
@@ -37,12 +37,12 @@ MOTION = Channel(
     "/motion",
     "The motion in all phases, ten times a second.",
     (
-        Field("time_s", "s since the flight began."),
+        Field("time_s", "When, since the flight began, s."),
         VEHICLE_TIME,
         Field("height_m", "Height above home, m."),
         Field("speed_m_s", "Speed, m/s."),
         Field("tilt_deg", "Tilt, degrees."),
-        Field("error_m", "Distance from the reference, m."),
+        Field("error_m", "Distance from the reference, m. NaN: no reference, or open loop."),
     ),
 )
 RESOURCES = Channel(
@@ -76,7 +76,7 @@ CHANNELS = (
     RESOURCES,
 )
 """The channels of numbers."""
-WORDS = {
+OTHER_CHANNELS = {
     "/phase": cdr.PHASE,
     "/maneuver": cdr.MANEUVER,
     "/alarm": cdr.ALARM,
@@ -89,7 +89,7 @@ WORDS = {
     "/paths": SCENE_UPDATE,
     "/fence": SCENE_UPDATE,
 }
-"""The other channels, and their types."""
+"""The channels whose messages are not only numbers, and their types."""
 
 
 class Topic(NamedTuple):
@@ -108,7 +108,7 @@ class Topic(NamedTuple):
 
 TOPICS = (
     *(Topic(channel.topic, channel.schema_name, channel.schema) for channel in CHANNELS),
-    *(Topic(name, kind.name, kind.schema) for name, kind in WORDS.items()),
+    *(Topic(name, kind.name, kind.schema) for name, kind in OTHER_CHANNELS.items()),
 )
 """All channels."""
 ENCODING, SCHEMA_ENCODING = "cdr", "ros2msg"

@@ -15,7 +15,7 @@ CDR = b"\x00\x01\x00\x00"
 """Header of a little-endian CDR message."""
 PACKAGE = "companion_msgs/msg"
 
-Row = NDArray[np.void]
+Rows = NDArray[np.void]
 """A structured array: one row per message, one named field per column."""
 
 
@@ -99,7 +99,7 @@ class Channel:
             + [(code.name, "u1") for code in self.codes]
         )
 
-    def rows(self, messages: list[bytes]) -> Row:
+    def rows(self, messages: list[bytes]) -> Rows:
         """All messages of the channel as a structured array.
 
         Args:

@@ -23,7 +23,7 @@ REASONS = (
     "invalid_setpoint",
     "not_sent",
 )
-"""Why a sample is unanswered, by number: two codes of our own, then the values of `Unanswered`."""
+"""Why a sample is unanswered, by number: `Unanswered`, after "answered" and "control_off"."""
 ACTIONS = (
     "stand_by",
     "hold_here",
@@ -68,13 +68,13 @@ SAMPLE = Channel(
     ),
     (
         Code("unanswered", "Why it is unanswered; 0: it was answered.", REASONS),
-        Code("misfit", "Why its stamp does not fit.", ("none", "not_newer", "ahead")),
-        Code("age_known", "Whether `age_s` is absolute."),
+        Code("misfit", "Why its stamp does not fit the clock.", ("none", "not_newer", "ahead")),
+        Code("age_known", "Whether `age_s` is absolute; else relative to the quickest sample."),
         Code("on", "Whether samples are answered at all."),
         Code("taking_over", "Whether offboard was requested."),
         Code("offboard_active", "Whether the autopilot obeys the setpoints."),
         Code("awaiting_mode", "Whether the mode must be confirmed after a gap."),
-        Code("same_vehicle", "Whether it is of the vehicle that was checked."),
+        Code("same_vehicle", "Whether it comes from the vehicle that was checked."),
     ),
 )
 SETPOINT = Channel(
@@ -128,7 +128,10 @@ GUIDANCE = Channel(
     (
         Code("holds_position", "Whether the vehicle should be at the horizontal reference."),
         Code("holds_height", "Whether the vehicle should be at the height of the reference."),
-        Code("height_steady", "Whether the commanded thrust is steady: no doublet, no own thrust."),
+        Code(
+            "height_steady",
+            "Whether the thrust is steady: no doublet, no rates or thrust of a program.",
+        ),
         Code("offboard_active", "Whether the autopilot obeys the setpoints."),
     ),
 )
@@ -190,7 +193,7 @@ ATTITUDE_TARGET = Channel(
 )
 ACTION = Channel(
     "/action",
-    "A call of a phase to guidance or the control loop, between steps; for `companion replay`.",
+    "A call by which a phase controls guidance or the control loop; for `companion replay`.",
     (
         Field("time_s", "When, on our clock, s."),
         Field("clock_offset_s", "Vehicle time minus our time, s; NaN: not known."),

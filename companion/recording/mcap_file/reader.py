@@ -1,4 +1,4 @@
-"""Reads a `.mcap` with the format's own library, also one that was cut off anywhere."""
+"""Reads a `.mcap` with the library `mcap`, also one that was cut off anywhere."""
 
 import struct
 from collections import defaultdict

@@ -45,7 +45,7 @@ class Cylinder(NamedTuple):
 
 
 class Line(NamedTuple):
-    """A line, with its thickness in pixels.
+    """A line, 2 pixels thick.
 
     Attributes:
         points: x, y and z of each point, m.

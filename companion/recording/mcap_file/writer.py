@@ -1,4 +1,4 @@
-"""Writes `flight.mcap` with the format's own library."""
+"""Writes `flight.mcap` with the library `mcap`."""
 
 import os
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Tracking of each maneuver by itself, since errors of different maneuvers do not compare."""
+"""Tracking figures of each maneuver: errors of different maneuvers cannot be compared."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -14,10 +14,8 @@ from companion.recording.trace import ManeuverMark
 Floats = NDArray[np.float64]
 
 LEFT_OUT = 2.0
-"""Time left out at the beginning of a maneuver, s: the vehicle still comes from the previous
-maneuver, which is not an error of this one.
-"""
-_MOST_OF_IT = 0.25
+"""Time left out at the beginning of a maneuver, s, while it comes from the previous one."""
+_LARGEST_SHARE = 0.25
 """Largest share of a maneuver that is left out."""
 _AT_REST = 0.05
 """A reference that is never faster than this is at rest, m/s."""
@@ -130,7 +128,7 @@ def _beginning(rows: Floats) -> float:
     """Time that is left out at the beginning of a maneuver, s."""
     if _is_open_loop(rows):
         return 0.0
-    return min(LEFT_OUT, _MOST_OF_IT * float(rows[-1, 0] - rows[0, 0]))
+    return min(LEFT_OUT, _LARGEST_SHARE * float(rows[-1, 0] - rows[0, 0]))
 
 
 def _swing(figures: ManeuverFigures, rates: Floats, begin: float, end: float) -> Swing:
@@ -158,13 +156,11 @@ def _measured(name: str, begin: float, rows: Floats) -> ManeuverFigures:
         duration,
         open_loop,
         beginning,
-        level_rms=nan if open_loop else _rms(level[~early]),
-        level_max=nan if open_loop else float(level[~early].max()),
-        height_rms=_rms(height[~early & held]),
-        height_max=float(height[~early & held].max(initial=0.0)) if held.any() else nan,
-        beginning_max=float(np.nanmax(np.hypot(level, height)[early], initial=0.0))
-        if early.any()
-        else nan,
+        level_rms=nan if open_loop else rms(level[~early]),
+        level_max=nan if open_loop else _largest(level[~early]),
+        height_rms=rms(height[~early & held]),
+        height_max=_largest(height[~early & held]),
+        beginning_max=_largest(np.hypot(level, height)[early & held]),
         drift=float(np.hypot(away[:, 0], away[:, 1]).max()),
         speed=_speed(time, reference),
     )
@@ -175,9 +171,14 @@ def _speed(time: Floats, reference: Floats) -> float:
     spans = np.diff(time)
     steps = np.linalg.norm(np.diff(reference, axis=0), axis=1)
     speeds = steps[spans > 0.0] / spans[spans > 0.0]
-    # A percentile: one row that came late must not count as a sprint.
+    # A percentile, so that one late row does not look like a high speed.
     return float(np.percentile(speeds, 95)) if np.isfinite(speeds).all() and len(speeds) else nan
 
 
-def _rms(values: Floats) -> float:
+def _largest(values: Floats) -> float:
+    return float(values.max()) if len(values) else nan
+
+
+def rms(values: Floats) -> float:
+    """The root mean square; NaN without values."""
     return float(np.sqrt(np.mean(values**2))) if len(values) else nan

@@ -18,7 +18,8 @@ from companion.recording.measurements.course import Course, EarlyEnd
 from companion.recording.measurements.summary import LoopCounts, Summary
 from companion.recording.trace import FlightTrace
 
-_LONGEST = 1 << 26
+_MOST_BYTES = 1 << 26
+"""Largest `summary.json` that is read, bytes."""
 _AXES = "roll", "pitch", "yaw"
 _SENT = ["received_s", *(f"commanded_{axis}_rad_s" for axis in _AXES), "thrust"]
 _STEP = ["q_w", "q_x", "q_y", "q_z", "target_north", "target_east"]
@@ -31,8 +32,8 @@ _KEYS = frozenset(
     )
 )
 """Keys that `summary.json` of this version must have; without them it is not used."""
-_NO_REASONS = 2
-"""Number of the first codes of `REASONS` that do not mean an unanswered sample."""
+_NOT_COUNTED = 2
+"""The first codes of `REASONS` that do not count as unanswered: "answered" and "control_off"."""
 
 
 def summary_of(record: FlightRecord) -> tuple[dict[str, Any], bool]:
@@ -106,10 +107,10 @@ def _trace(record: FlightRecord) -> FlightTrace:
     sample, setpoint, guidance = map(record.rows, ("sample", "setpoint", "guidance"))
     sample = sample[sample["unanswered"] == 0]
     # Matched by the vehicle's stamps, because two samples may arrive at the same time.
-    answers = _answers(sample["vehicle_time_s"], setpoint["vehicle_time_s"])
+    numbers = _sample_indices(sample["vehicle_time_s"], setpoint["vehicle_time_s"])
     measured = np.column_stack([sample[f"measured_{axis}_rad_s"] for axis in _AXES])
     ages = np.where(sample["age_known"] == 1, sample["age_s"], np.nan)
-    for row, number in zip(setpoint, answers.tolist(), strict=True):
+    for row, number in zip(setpoint, numbers.tolist(), strict=True):
         trace.add_latency(round(1e3 * float(row["latency_us"])))
         time = float(row["vehicle_time_s"])
         if row["offboard_active"] and number >= 0:  # else its sample was not recorded
@@ -138,7 +139,9 @@ def tracking_rows(guidance: NDArray[np.void]) -> NDArray[np.float64]:
     return np.column_stack(columns)
 
 
-def _answers(samples: NDArray[np.float64], setpoints: NDArray[np.float64]) -> NDArray[np.int64]:
+def _sample_indices(
+    samples: NDArray[np.float64], setpoints: NDArray[np.float64]
+) -> NDArray[np.int64]:
     """The index of each setpoint's sample; −1: the sample was not recorded."""
     if len(samples) == 0:
         return np.full(len(setpoints), -1)
@@ -150,7 +153,7 @@ def _counts(record: FlightRecord, deadline: float) -> LoopCounts:
     sample, setpoint = record.rows("sample"), record.rows("setpoint")
     taken = sample[sample["unanswered"] != REASONS.index("control_off")]
     found = np.bincount(taken["unanswered"], minlength=len(REASONS)).tolist()
-    unanswered = dict(zip(REASONS[_NO_REASONS:], found[_NO_REASONS:], strict=True))
+    unanswered = dict(zip(REASONS[_NOT_COUNTED:], found[_NOT_COUNTED:], strict=True))
     refused = sum(unanswered[name] for name in _REFUSALS)
     return LoopCounts(
         samples=len(taken),
@@ -202,7 +205,7 @@ def _last(values: NDArray[np.float64]) -> float | None:
 def _written(path: Path) -> dict[str, Any] | None:
     """`summary.json`; None if it is missing, incomplete, or of another version."""
     try:
-        found = json.loads(read_text(path, _LONGEST))
+        found = json.loads(read_text(path, _MOST_BYTES))
     except (FileRefusedError, ValueError, RecursionError):
         return None
     return found if isinstance(found, dict) and found.keys() >= _KEYS else None

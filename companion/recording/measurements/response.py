@@ -110,11 +110,11 @@ def _time_constant(runs: list[StepRun], axis: int, start: float) -> float:
     steps = [run.steps() for run in stepped]
     measured = np.concatenate([run.measured for run in stepped])
 
-    def apart(unknown: Floats) -> tuple[Floats, Floats]:
+    def residuals(unknown: Floats) -> tuple[Floats, Floats]:
         tau = float(np.exp(unknown[0]))
         paths = np.concatenate([_first_order(each, tau) for each in steps])
         return np.empty(0), (measured - paths).ravel()
 
     lowest, highest = np.log(_TIME_CONSTANT)
-    found = minimise(apart, np.log([start]), np.array([lowest]), np.array([highest]))
+    found = minimise(residuals, np.log([start]), np.array([lowest]), np.array([highest]))
     return float(np.exp(found.unknown[0]))

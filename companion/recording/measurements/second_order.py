@@ -31,6 +31,12 @@ class StepRun(NamedTuple):
     measured: Floats
     target: Floats
 
+    @property
+    def direction(self) -> Floats:
+        """(2,), direction of the first target in the plane of the coefficients."""
+        first: Floats = self.target[0]
+        return first / max(float(np.hypot(*first)), 1e-9)
+
     def steps(self) -> list["StepRun"]:
         """The single steps: each from one change of the target to the next."""
         return [StepRun(*parts) for parts in zip(*self._split(), strict=True)]
@@ -150,7 +156,7 @@ def nearest_second_order(runs: list[StepRun]) -> SecondOrderFit:
     thinned = [RunData.of(run, thinning) for run in runs]
     measured = np.concatenate([run.measured[::thinning] for run in runs])
 
-    def apart(unknown: Floats) -> tuple[Floats, Floats]:
+    def residuals(unknown: Floats) -> tuple[Floats, Floats]:
         fit = _fit(unknown)
         paths = np.concatenate([fit.along(data) for data in thinned])
         return np.empty(0), (measured - paths).ravel()
@@ -161,9 +167,9 @@ def nearest_second_order(runs: list[StepRun]) -> SecondOrderFit:
         for damping in _TRIED_DAMPINGS
         for dead_time in _TRIED_DEAD_TIMES
     ]
-    start = min(grid, key=lambda point: float(np.sum(apart(point)[1] ** 2)))
+    start = min(grid, key=lambda point: float(np.sum(residuals(point)[1] ** 2)))
     lowest, highest = np.array([np.log(_LAG), np.log(_DAMPING), _DEAD_TIME]).T
-    return _fit(minimise(apart, start, lowest, highest).unknown)
+    return _fit(minimise(residuals, start, lowest, highest).unknown)
 
 
 def _fit(unknown: Floats) -> SecondOrderFit:

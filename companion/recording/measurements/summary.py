@@ -11,7 +11,11 @@ import numpy as np
 
 from companion.recording.measurements.course import Course
 from companion.recording.measurements.dead_time import DeadTimes
-from companion.recording.measurements.maneuver_figures import ManeuverFigures, measure_maneuvers
+from companion.recording.measurements.maneuver_figures import (
+    ManeuverFigures,
+    measure_maneuvers,
+    rms,
+)
 from companion.recording.measurements.response import StepResponse, measure_response
 from companion.recording.measurements.verdict import checks, is_good
 from companion.recording.trace import FlightTrace
@@ -189,9 +193,9 @@ def tracking_errors(rows: "np.ndarray[Any, np.dtype[np.float64]]") -> dict[str, 
     error = rows[:, 4:7] - rows[:, 1:4]
     distance = np.linalg.norm(error[~np.isnan(error).any(axis=1)], axis=1)
     return {
-        "position_rms_m": _rms(distance),
+        "position_rms_m": rms(distance),
         "position_max_m": float(distance.max()) if len(distance) else math.nan,
-        "height_rms_m": _rms(error[~np.isnan(error[:, 2]), 2]),
+        "height_rms_m": rms(error[~np.isnan(error[:, 2]), 2]),
     }
 
 
@@ -229,10 +233,6 @@ def _dead_times_as_dict(dead_times: DeadTimes) -> dict[str, float | None]:
         **{name: axis.measured for name, axis in dead_times.axes.items()},
         **_without_nan({"sample_age_p50": age.p50, "sample_age_p99": age.p99}),
     }
-
-
-def _rms(values: "np.ndarray[Any, np.dtype[np.float64]]") -> float:
-    return float(np.sqrt(np.mean(values**2))) if len(values) else math.nan
 
 
 def _without_nan(values: dict[str, float]) -> dict[str, float | None]:

@@ -3,7 +3,7 @@
 Body rates are integrated to angles. A moving mean removes slow motion, because wind and slow
 corrections are not a swing. The autocorrelation of the rest shows what repeats. On the mock
 vehicles, in hovers of 3 to 8 s, gusts of 1 to 2 m/s reach 0.71 at most and mostly less than 0.4;
-weights of the hold that are 2.5 times too large reach 0.8 to 1.
+weights of the position hold that are 2.5 times too large reach 0.8 to 1.
 """
 
 from math import nan

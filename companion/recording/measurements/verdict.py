@@ -24,7 +24,7 @@ UNANSWERED = 0.01
 LOST = 0.02
 """Largest share of the vehicle's frames that may be lost."""
 BATTERY_MARGIN = 0.10
-"""By how much the charge at the end must exceed `limits.min_battery_percent`, 0..1."""
+"""Charge required at the end beyond `limits.min_battery_percent`, 0..1."""
 
 
 LOST_ROWS = "rows of the flight's figures were lost"

@@ -11,7 +11,7 @@ from companion.attitude import BodyRates, Target
 from companion.recording.measurements.course import Course
 from companion.recording.measurements.dead_time import AxisDeadTime, DeadTimes, SampleAge
 from companion.recording.measurements.summary import LoopCounts, PredictiveFigures, Summary
-from companion.recording.report import flight_table
+from companion.recording.summary_tables import flight_table
 from companion.recording.trace import FlightTrace
 from tests.recording.test_summary import trace_of
 
@@ -139,8 +139,6 @@ def test_predictive_control_is_counted_with_what_it_left_to_linear_guidance():
 
     assert told(PredictiveFigures(3, {"late": 2, "failed": 1}, (0.001, 0.002, 0.009))) == (
         "predictive control: 3 answers flown, computed in 2.0 ms (p99 8.9 ms); linear guidance "
-        "flew 2 late, 1 failed instead"
+        "replaced 3: 2 late, 1 failed"
     )
-    assert told(PredictiveFigures(0, {}, ())) == (
-        "predictive control: 0 answers flown; linear guidance flew none instead"
-    )
+    assert told(PredictiveFigures(0, {}, ())) == "predictive control: 0 answers flown"

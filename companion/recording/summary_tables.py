@@ -60,16 +60,22 @@ def _response(summary: Summary) -> RenderableType:
         ("east", response.time_constant_east_s),
     ):
         table.add_row(f"time constant {axis}", _number(value, "s", 3), f"{ideal:.3f} s")
-    table.add_row("largest deviation from ċ = p(c_d − c)", _pure(response.model_deviation_max), "0")
     table.add_row(
-        "straightness: largest distance from a step's line", _pure(response.cross_axis_max), "0"
+        "largest deviation from ċ = p(c_d − c)", _coefficient(response.model_deviation_max), "0"
+    )
+    table.add_row(
+        "straightness: largest distance from a step's line",
+        _coefficient(response.cross_axis_max),
+        "0",
     )
     model = response.second_order
     table.add_section()
     table.add_row("nearest second order: frequency ω", f"{model.frequency:.1f} rad/s", "")
     table.add_row("damping ζ", f"{model.damping:.2f}", "")
     table.add_row("dead time", f"{1e3 * model.dead_time:.0f} ms", "")
-    table.add_row("largest deviation from it", _pure(response.second_order_deviation_max), "0")
+    table.add_row(
+        "largest deviation from it", _coefficient(response.second_order_deviation_max), "0"
+    )
     return table
 
 
@@ -79,7 +85,9 @@ def _dead_times(summary: Summary) -> list[RenderableType]:
     if not found.lag_known:
         words = "dead time not measured: vehicle.lag_ms is not set (`companion identify` finds it)"
         return [Text(words, style="dim")]
-    table = _table("Dead time, from a sample to its answer's effect", "measured", "configured")
+    table = _table(
+        "Dead time, from a sample to the effect of its setpoint", "measured", "configured"
+    )
     for name, axis in found.axes.items():
         table.add_row(name, _measured(axis), _milliseconds(axis.configured))
     age = found.sample_age
@@ -125,8 +133,10 @@ def _predictive_words(figures: PredictiveFigures) -> Text:
     words = f"predictive control: {figures.flown} answers flown"
     if figures.flown:
         words += f", computed in {times['p50']:.1f} ms (p99 {times['p99']:.1f} ms)"
-    missed = ", ".join(f"{count} {name}" for name, count in figures.troubles.items())
-    return Text(f"{words}; linear guidance flew {missed or 'none'} instead")
+    replaced = ", ".join(f"{count} {name}" for name, count in figures.troubles.items())
+    if replaced:
+        words += f"; linear guidance replaced {sum(figures.troubles.values())}: {replaced}"
+    return Text(words)
 
 
 def _loop(summary: Summary) -> RenderableType:
@@ -154,7 +164,7 @@ def _loop_words(summary: Summary) -> Text:
     )
 
 
-def _pure(value: float) -> str:
+def _coefficient(value: float) -> str:
     """A coefficient, which has no unit, as text."""
     return f"{value:.4f}"
 

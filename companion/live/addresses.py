@@ -12,13 +12,13 @@ from companion.files.yaml_file import ConfigError
 PORT = 8090
 STREAM_PORT = 8765
 """Port of the live stream; Foxglove and Lichtblick propose this one."""
-_ANSWERS = 0.5
+_ANSWER_TIMEOUT = 0.5
 """Time allowed for the process of a flight that has just ended to answer, s."""
-_GIVES_WAY = 8.0
+_RELEASE_TIMEOUT = 8.0
 """Time allowed for the process of an ended flight to release its port, s."""
 
 
-class Door(NamedTuple):
+class PageSocket(NamedTuple):
     """A listening socket, and the token that admits users.
 
     Attributes:
@@ -71,14 +71,14 @@ def _shown(host: str) -> str:
     return f"[{name}]" if ":" in name else name
 
 
-def open_door(address: str) -> Door:
+def open_page_socket(address: str) -> PageSocket:
     """Listen at [HOST][:PORT]; the default is port 8090, for this computer only.
 
     Raises:
         ConfigError: the address is not valid, or the port is in use.
     """
     host, listening = _listening(address, "--live", PORT)
-    return Door(host, listening.getsockname()[1], secrets.token_urlsafe(9), listening)
+    return PageSocket(host, listening.getsockname()[1], secrets.token_urlsafe(9), listening)
 
 
 def stream_address(address: str) -> StreamAddress:
@@ -147,13 +147,13 @@ def _bind(listening: socket.socket, host: str, port: int) -> None:
     Raises:
         OSError: another program uses the port.
     """
-    deadline, leaving = time.monotonic() + _ANSWERS, False
+    deadline, leaving = time.monotonic() + _ANSWER_TIMEOUT, False
     while True:
         try:
             listening.bind((host, port))
         except OSError as error:
             if not leaving and ask_to_leave(port):
-                deadline, leaving = time.monotonic() + _GIVES_WAY, True
+                deadline, leaving = time.monotonic() + _RELEASE_TIMEOUT, True
             if error.errno != errno.EADDRINUSE or time.monotonic() > deadline:
                 raise
             time.sleep(0.05)
