@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from companion.cli.exit_codes import EXIT_OK
-from companion.cli.tool_options import STARTS
+from companion.cli.tool_options import STARTING_FILES
 from companion.config import Config
 from companion.config.doubts import doubts
 from companion.config.files import json_schema, load, shipped
@@ -20,7 +20,7 @@ from companion.guidance.follow import Follow
 
 
 def show(options: argparse.Namespace) -> int:
-    """Print the configuration: all of it, one key, what a file changes, or the schema."""
+    """Print the configuration, in whole or in part, as YAML, or its tables or schema."""
     if options.schema:
         text = json_schema()
     elif options.markdown:
@@ -56,7 +56,7 @@ def init(options: argparse.Namespace) -> int:
     Raises:
         ConfigError: the file exists or cannot be written.
     """
-    text = shipped(f"{STARTS[options.name]}.yaml").read_text(encoding="utf-8")
+    text = shipped(f"{STARTING_FILES[options.name]}.yaml").read_text(encoding="utf-8")
     lines = []
     for line in text.splitlines(keepends=True):
         if line.startswith("# yaml-language-server"):
@@ -65,7 +65,7 @@ def init(options: argparse.Namespace) -> int:
             lines.append(line)
             continue
         included = shipped(line.split()[1]).read_text(encoding="utf-8")
-        lines.append("# How the rate loop answers; `companion identify` measures yours.\n")
+        lines.append("# Response of the rate loop; `companion identify` measures yours.\n")
         lines.append(included[included.index("vehicle:\n") :])
     out = Path(options.out)
     if out.exists() or out.is_symlink():

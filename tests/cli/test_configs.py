@@ -10,7 +10,7 @@ import yaml
 from pydantic import BaseModel
 
 from companion.cli.main import main
-from companion.cli.tool_options import STARTS
+from companion.cli.tool_options import STARTING_FILES
 from companion.config import Config
 from companion.config.files import assigned, changed, json_schema, load
 from companion.config.flight import CircleConfig
@@ -121,12 +121,12 @@ def test_the_page_of_the_configuration_is_the_one_that_is_printed(capsys):
     assert printed in (DOCS / "configuration.md").read_text()
 
 
-@pytest.mark.parametrize("name", STARTS)
+@pytest.mark.parametrize("name", STARTING_FILES)
 def test_a_starting_file_can_be_checked_and_is_never_replaced(name, tmp_path, capsys):
     out = tmp_path / "mine.yaml"
     assert main(["init", name, "--out", str(out)]) == 0
     assert main(["check-config", str(out)]) == 0
-    shipped = load(CONFIGS / f"{STARTS[name]}.yaml")
+    shipped = load(CONFIGS / f"{STARTING_FILES[name]}.yaml")
     assert load(out).model_copy(update={"include": shipped.include}) == shipped
     before = out.read_text()
     assert main(["init", name, "--out", str(out)]) == 2
