@@ -18,6 +18,7 @@ _UNITS = {
     "_deg_s2": "°/s²",
     "_rad_s": "rad/s",
     "_deg_s": "°/s",
+    "_m_s3": "m/s³",
     "_m_s2": "m/s²",
     "_m_s": "m/s",
     "_per_s4": "1/s⁴",
@@ -41,7 +42,7 @@ _BOUNDS = (
 _WIDTH = 98
 
 
-class Key(NamedTuple):
+class ConfigKey(NamedTuple):
     """One key of a section.
 
     Attributes:
@@ -73,12 +74,12 @@ def sections() -> dict[str, type[BaseModel]]:
     }
 
 
-def keys(config: Config) -> Iterator[Key]:
+def keys(config: Config) -> Iterator[ConfigKey]:
     """Every key, with its value in a configuration."""
     values, defaults = config.model_dump(mode="json"), Config().model_dump(mode="json")
     for section, described in _descriptions().items():
         for name, words in described.items():
-            yield Key(section, name, values[section][name], defaults[section][name], *words)
+            yield ConfigKey(section, name, values[section][name], defaults[section][name], *words)
 
 
 @cache
@@ -98,12 +99,12 @@ def _descriptions() -> dict[str, dict[str, tuple[str, str, str]]]:
     return described
 
 
-def differences(config: Config) -> Iterator[Key]:
+def changed_keys(config: Config) -> Iterator[ConfigKey]:
     """The keys whose values are not the default."""
     return (key for key in keys(config) if key.value != key.default)
 
 
-def as_yaml(described: Iterable[Key]) -> str:
+def as_yaml(described: Iterable[ConfigKey]) -> str:
     """Keys as commented YAML that is a valid configuration."""
     models, lines, section = sections(), list[str](), ""
     for key in described:
@@ -119,7 +120,7 @@ def as_yaml(described: Iterable[Key]) -> str:
     return "\n".join(lines).strip() + "\n"
 
 
-def as_markdown(described: Iterable[Key]) -> str:
+def as_markdown(described: Iterable[ConfigKey]) -> str:
     """Keys as Markdown tables, one for each section."""
     models, lines, section = sections(), list[str](), ""
     for key in described:

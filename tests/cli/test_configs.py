@@ -14,7 +14,7 @@ from companion.cli.tool_options import STARTING_FILES
 from companion.config import Config
 from companion.config.files import assigned, changed, json_schema, load
 from companion.config.flight import CircleConfig
-from companion.config.reference import differences
+from companion.config.reference import changed_keys, keys
 from companion.config.vehicle import VehicleConfig
 from companion.files.yaml_file import parse
 from sitl_mock.settings import MockSettings, load_settings
@@ -40,7 +40,7 @@ def test_a_shipped_configuration_is_right_and_short(path, capsys):
 def test_a_shipped_configuration_holds_only_what_differs(path):
     """But for the maneuvers, arming and what the vehicle's file says."""
     told = yaml.safe_load(path.read_text())
-    differ = {(key.section, key.name) for key in differences(load(path))}
+    differ = {(key.section, key.name) for key in changed_keys(load(path))}
     for section, values in told.items():
         if section not in ("include", "mock"):
             assert {(section, name) for name in values} <= differ, section
@@ -113,6 +113,12 @@ def test_one_key_or_one_section_is_printed(capsys):
     )
     assert main(["config", "--get", "max_tilt"]) == 2
     assert "did you mean limits.max_tilt_deg" in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_key_whose_name_ends_in_a_unit_shows_it():
+    units = {key.name: key.unit for key in keys(Config())}
+    assert units["max_jerk_m_s3"] == "m/s³"
+    assert [name for name, unit in units.items() if name[-1].isdigit() and not unit] == []
 
 
 def test_the_page_of_the_configuration_is_the_one_that_is_printed(capsys):
