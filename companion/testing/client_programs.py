@@ -10,7 +10,7 @@ from companion.mavlink.framing import FrameScanner
 from companion.mavlink.messages import CRC_EXTRA, Message, dialect
 from companion.serve.network.client import Client
 from companion.serve.session import ServeSession
-from companion.testing.flying import Configuration, environment, as_config, in_memory
+from companion.testing.flying import Configuration, as_config, environment, in_memory
 from companion.testing.vehicle import MockVehicle
 
 _LOOK_PERIOD = 0.02
