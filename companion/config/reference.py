@@ -12,27 +12,9 @@ from pydantic import BaseModel
 
 from companion.config import Config
 from companion.config.markers import IN_FLIGHT
+from companion.config.units import unit_of
 from companion.files import bounded_yaml
 
-_UNITS = {
-    "_deg_s2": "°/s²",
-    "_rad_s": "rad/s",
-    "_deg_s": "°/s",
-    "_m_s3": "m/s³",
-    "_m_s2": "m/s²",
-    "_m_s": "m/s",
-    "_per_s4": "1/s⁴",
-    "_per_s2": "1/s²",
-    "_per_s": "1/s",
-    "_per_m": "1/m",
-    "_deg": "°",
-    "_percent": "%",
-    "_ms": "ms",
-    "_hz": "Hz",
-    "_m": "m",
-    "_s": "s",
-}
-"""Unit by suffix of the key; the first suffix that fits is used."""
 _BOUNDS = (
     ("minimum", "at least {:g}"),
     ("exclusiveMinimum", "more than {:g}"),
@@ -90,7 +72,7 @@ def _descriptions() -> dict[str, dict[str, tuple[str, str, str]]]:
         schema = model.model_json_schema()["properties"]
         described[section] = {
             name: (
-                next((unit for end, unit in _UNITS.items() if name.endswith(end)), ""),
+                unit_of(name),
                 _allowed(schema[name]),
                 _one_line(field.description or ""),
             )
