@@ -168,14 +168,14 @@ def _figures(vehicle: IdentifiedVehicle) -> dict[str, Any]:
 
 
 def _second_order(response: RateResponse) -> dict[str, float] | None:
-    nearer = response.second_order
-    if nearer is None:
+    fit = response.second_order
+    if fit is None:
         return None
     return {
-        "frequency_rad_s": round(nearer.frequency, 2),
-        "damping": round(nearer.damping, 3),
-        "dead_time_ms": round(1e3 * nearer.dead_time, 1),
-        "explained": round(nearer.explained, 4),
+        "frequency_rad_s": round(fit.frequency, 2),
+        "damping": round(fit.damping, 3),
+        "dead_time_ms": round(1e3 * fit.dead_time, 1),
+        "explained": round(fit.explained, 4),
     }
 
 

@@ -42,11 +42,11 @@ def tune(options: argparse.Namespace) -> int:
     config, included = _configuration(source, vehicle, options.config)
     config = _with_learned_drag(config, source)
     log = source / _LOG
-    disturbances, nearer = Disturbances(), {}
+    disturbances, second_order = Disturbances(), {}
     if source.is_dir() and log.exists():
         disturbances = measured_disturbances(log, drag_prior(config).drag.linear, disturbances)
-        nearer = _second_order(log)
-    proposal = propose(config, disturbances, vehicle=nearer)
+        second_order = _second_order(log)
+    proposal = propose(config, disturbances, vehicle=second_order)
     flights = {} if options.no_flights else _flights(proposal, console)
     known = _relative(vehicle, output) if included else _vehicle_of(proposal.tuned)
     console.print("\n".join(summary_lines(proposal, flights)))  # kept if the disk is full

@@ -262,11 +262,11 @@ def test_our_own_workers_ignore_ctrl_c_and_end_with_the_run():
         cluster.wait_for_workers(client)
         (ended,) = cluster.run_tasks(client, {7: (signal.pthread_sigmask, signal.SIG_BLOCK, [])})
         assert ended.number == 7
-        assert signal.SIGINT in ended.flown
+        assert signal.SIGINT in ended.result
         (ended,) = cluster.run_tasks(client, {8: (os.getpid,)})
-        assert ended.flown != os.getpid()
+        assert ended.result != os.getpid()
     with pytest.raises(ProcessLookupError):
-        os.kill(ended.flown, 0)
+        os.kill(ended.result, 0)
 
 
 def test_progress_counts_what_earlier_runs_flew(tmp_path, dask, on_dask, capsys):
