@@ -118,9 +118,9 @@ def bundled_vehicle(config: Path, wire: Wire, log: Path, *, lockstep: bool) -> I
     command += ["--end-with-stdin"]
     # No link for a ground station: its fixed port may be in use.
     command += [*wire.vehicle_arguments, "--gcs-port", "0", *(["--lockstep"] if lockstep else [])]
-    with log.open("wb") as words:
+    with log.open("wb") as output:
         process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=words, stderr=words, start_new_session=True
+            command, stdin=subprocess.PIPE, stdout=output, stderr=output, start_new_session=True
         )
         try:
             _await_ready(process, log)

@@ -36,7 +36,7 @@ class Drag(NamedTuple):
         share = self.linear + self.quadratic * _speed(velocity)
         return share * north, share * east, share * down
 
-    def growth(
+    def deceleration_rate(
         self, velocity: tuple[Number, Number, Number], acceleration: tuple[Number, Number, Number]
     ) -> tuple[Number, Number, Number]:
         """The time derivative of `deceleration`, m/s³, at a velocity and an acceleration."""
@@ -81,7 +81,7 @@ class AxisDrag(NamedTuple):
             return 0.0, 0.0
         return along_axes(self.coefficient, cos(self.heading), sin(self.heading), north, east)
 
-    def growth(
+    def deceleration_rate(
         self,
         velocity: tuple[float, float],
         acceleration: tuple[float, float],
@@ -99,15 +99,15 @@ class AxisDrag(NamedTuple):
         cosine, sine = cos(self.heading), sin(self.heading)
         forward, right = _in_axes(cosine, sine, *velocity)
         a_forward, a_right = _in_axes(cosine, sine, *acceleration)
-        # Growth of the components along the axes, which turn.
+        # Derivatives of the components along the axes, which turn.
         g_forward, g_right = a_forward + heading_rate * right, a_right - heading_rate * forward
         speed = _speed((forward, right, 0.0))
-        usual = _MEAN_SHARE * speed
-        speeding = _MEAN_SHARE * (forward * g_forward + right * g_right) / speed
-        f_forward = forward * (abs(forward) - usual)
-        f_right = right * (abs(right) - usual)
-        h_forward = g_forward * (2.0 * abs(forward) - usual) - speeding * forward
-        h_right = g_right * (2.0 * abs(right) - usual) - speeding * right
+        mean = _MEAN_SHARE * speed
+        mean_rate = _MEAN_SHARE * (forward * g_forward + right * g_right) / speed
+        f_forward = forward * (abs(forward) - mean)
+        f_right = right * (abs(right) - mean)
+        h_forward = g_forward * (2.0 * abs(forward) - mean) - mean_rate * forward
+        h_right = g_right * (2.0 * abs(right) - mean) - mean_rate * right
         forward = self.coefficient * (h_forward - heading_rate * f_right)
         right = self.coefficient * (h_right + heading_rate * f_forward)
         return cosine * forward - sine * right, sine * forward + cosine * right
@@ -118,9 +118,9 @@ def along_axes(
 ) -> tuple[Number, Number]:
     """The deceleration of `AxisDrag` with this cosine and sine of its heading, m/s²."""
     forward, right = _in_axes(cosine, sine, north, east)
-    usual = _MEAN_SHARE * _speed((forward, right, 0.0 * right))
-    forward = coefficient * forward * (abs(forward) - usual)
-    right = coefficient * right * (abs(right) - usual)
+    mean = _MEAN_SHARE * _speed((forward, right, 0.0 * right))
+    forward = coefficient * forward * (abs(forward) - mean)
+    right = coefficient * right * (abs(right) - mean)
     return cosine * forward - sine * right, sine * forward + cosine * right
 
 

@@ -170,11 +170,11 @@ def _advanced(
     width = _CACHE_LINE * max(1, ceil(q.shape[1] / blocks / _CACHE_LINE))
     for low in range(0, q.shape[1], width):
         block = slice(low, min(low + width, q.shape[1]))
-        there, spare, aim, room = _work_space(block.stop - block.start)
-        there[...] = q[:, block]
-        aim[...] = targets[:, block]
-        loops.advance(there, spare, aim, room, dt, planner.constants, steps)
-        after[:, block] = spare if steps % 2 else there
+        even, odd, goals, rates_of_step = _work_space(block.stop - block.start)
+        even[...] = q[:, block]
+        goals[...] = targets[:, block]
+        loops.advance(even, odd, goals, rates_of_step, dt, planner.constants, steps)
+        after[:, block] = odd if steps % 2 else even
     return after
 
 

@@ -17,7 +17,7 @@ from companion.attitude.types import InvalidQuaternionError, InvalidTargetError,
 from companion.batch.compiler import Compiler
 from companion.batch.loops import Array
 
-_AS_GOOD_AS_ONE = 1e-14
+_UNIT_TOLERANCE = 1e-14
 """A quaternion whose squared norm is this close to 1 is not normalised again."""
 
 
@@ -49,7 +49,7 @@ def all_fit(q: Array, targets: Array, longest: float) -> bool:
         norm_square = q[0, i] * q[0, i] + q[1, i] * q[1, i] + q[2, i] * q[2, i] + q[3, i] * q[3, i]
         length_square = targets[0, i] * targets[0, i] + targets[1, i] * targets[1, i]
         fit = (
-            (abs(norm_square - 1.0) <= _AS_GOOD_AS_ONE)
+            (abs(norm_square - 1.0) <= _UNIT_TOLERANCE)
             & (length_square <= longest * longest)
             & (abs(targets[2, i]) < pi)
             & (abs(targets[3, i]) <= LARGEST_HEADING_RATE)

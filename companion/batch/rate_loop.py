@@ -1,8 +1,7 @@
 """One vehicle behind its rate loop: dead time, slew limit and lag of each axis, compiled.
 
 Unlike the loops over many vehicles this one goes through the samples of one vehicle. Each vehicle
-may have limits, gains and a rate loop of its own, and what is stored does not grow with their
-number.
+may have limits, gains and a rate loop of its own, and the memory does not grow with their number.
 """
 
 from collections.abc import Callable, Sequence

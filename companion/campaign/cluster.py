@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from companion.campaign.unit import Flown
+from companion.campaign.unit import UnitResult
 from companion.campaign.versions import VersionError, as_versions, require_equal, versions
 from companion.extras import require
 from companion.files.yaml_file import ConfigError
@@ -41,17 +41,17 @@ class ClusterError(Exception):
     """The connection to the cluster was lost, or a unit of work was given up."""
 
 
-class Ended(NamedTuple):
+class EndedUnit(NamedTuple):
     """A unit that ended.
 
     Attributes:
         number: number of the unit.
-        flown: rows of the unit and their times; None: the unit was given up.
+        result: rows of the unit and their times; None: the unit was given up.
         reason: why the unit was given up.
     """
 
     number: int
-    flown: Flown | None
+    result: UnitResult | None
     reason: str = ""
 
 
@@ -95,7 +95,7 @@ def connected(scheduler: str | None, workers: int | None) -> "Iterator[Client]":
                 raise ConfigError(f"no Dask scheduler answers at {scheduler}: {error}") from error
             cluster = None
         else:
-            with _interrupts_blocked(), _terminations_later():
+            with _interrupts_blocked(), _termination_deferred():
                 cluster = LocalCluster(
                     n_workers=workers or local_workers(),
                     threads_per_worker=1,  # flights are pure Python
@@ -135,8 +135,8 @@ def _interrupts_blocked() -> Iterator[None]:
 
 
 @contextmanager
-def _terminations_later() -> Iterator[None]:
-    """Handle SIGTERM at the end of the block: Dask cannot close a cluster that is half made.
+def _termination_deferred() -> Iterator[None]:
+    """Handle SIGTERM only after the block: Dask cannot close a cluster that is half made.
 
     The signal is not blocked, because Dask ends worker processes by it.
     """
@@ -193,14 +193,14 @@ def _of_dask(versions: Mapping[str, Any]) -> dict[str, str]:
     return {"python": python, "distributed": str(versions["packages"]["distributed"])}
 
 
-def run_tasks(client: "Client", tasks: Mapping[int, tuple[Any, ...]]) -> Iterator[Ended]:
+def run_tasks(client: "Client", tasks: Mapping[int, tuple[Any, ...]]) -> Iterator[EndedUnit]:
     """Run tasks on the cluster; yield each unit when it ends, in any order.
 
     Dask queues them, sends them, and repeats those whose worker died.
 
     Args:
         client: client of the cluster.
-        tasks: unit number -> function and its arguments; the function returns `Flown`.
+        tasks: unit number -> function and its arguments; the function returns `UnitResult`.
 
     Raises:
         ClusterError: the connection to the scheduler is lost.
@@ -220,7 +220,7 @@ def run_tasks(client: "Client", tasks: Mapping[int, tuple[Any, ...]]) -> Iterato
             client.cancel(list(futures), force=True)
 
 
-def _ended(number: int, future: "Future") -> Ended:
+def _ended(number: int, future: "Future") -> EndedUnit:
     """The unit of a future that ended.
 
     Raises:
@@ -230,9 +230,9 @@ def _ended(number: int, future: "Future") -> Ended:
     """
     try:
         if future.status == "finished":
-            return Ended(number, future.result())
+            return EndedUnit(number, future.result())
         if future.status == "error":
-            return Ended(number, None, _reason(future.exception()))
+            return EndedUnit(number, None, _reason(future.exception()))
     except (OSError, CancelledError) as error:  # it was lost while the rows were on their way
         raise ClusterError(_LOST) from error
     raise ClusterError(_LOST)

@@ -10,10 +10,17 @@ from companion.campaign import store
 from companion.campaign.campaign import Campaign
 from companion.campaign.campaign_file import CampaignFile
 from companion.campaign.case import Case
-from companion.campaign.cluster import ClusterError, Ended, number_of_workers, run_tasks
+from companion.campaign.cluster import ClusterError, EndedUnit, number_of_workers, run_tasks
 from companion.campaign.flight import INTERNAL_ERROR
 from companion.campaign.folder import Description
-from companion.campaign.unit import Row, described, fly_cases, fly_samples, ranges, size_of_units
+from companion.campaign.unit import (
+    Row,
+    first_and_last,
+    fly_cases,
+    fly_samples,
+    ranges,
+    size_of_units,
+)
 from companion.campaign.versions import versions
 
 if TYPE_CHECKING:
@@ -74,13 +81,15 @@ def run(
     return progress
 
 
-def _keep(ended: Ended, unit: range, campaign: Campaign, folder: Path, progress: Progress) -> None:
-    if ended.flown is None:
+def _keep(
+    ended: EndedUnit, unit: range, campaign: Campaign, folder: Path, progress: Progress
+) -> None:
+    if ended.result is None:
         cases = f"cases {unit.start} to {unit.stop - 1}"
         progress.lost.append(f"unit {ended.number} ({cases}): {ended.reason}")
         return
-    timing = {**described(unit), "wall_s": ended.flown.wall_s, "worker": ended.flown.worker}
-    store.write_unit(folder, campaign.file, ended.number, ended.flown.rows, timing)
+    timing = {**first_and_last(unit), "wall_s": ended.result.wall_s, "worker": ended.result.worker}
+    store.write_unit(folder, campaign.file, ended.number, ended.result.rows, timing)
     progress.flown += len(unit)
 
 
@@ -92,14 +101,14 @@ def internal_errors(folder: Path, file: CampaignFile) -> Counter[str]:
     return Counter(result for result in results if result.startswith(INTERNAL_ERROR))
 
 
-def rows(client: "Client", kind: str, cases: Sequence[Case], case_s: float) -> list[Row]:
-    """Run cases that need not belong to a campaign; return their rows in order, without a folder.
+def run_on_cluster(client: "Client", kind: str, cases: Sequence[Case], case_s: float) -> list[Row]:
+    """Run cases that need not belong to a campaign; return their rows in order; nothing is written.
 
     Args:
         client: client of the cluster.
         kind: "flights" or "batch".
         cases: cases to be flown.
-        case_s: time that a case takes, s; see `companion.campaign.estimate.measured`.
+        case_s: time that a case takes, s; see `companion.campaign.estimate.case_time`.
 
     Raises:
         ClusterError: the connection to the scheduler is lost, or a unit was given up.
@@ -114,7 +123,7 @@ def rows(client: "Client", kind: str, cases: Sequence[Case], case_s: float) -> l
     }
     found: dict[int, list[Row]] = {}
     for ended in run_tasks(client, tasks):
-        if ended.flown is None:
+        if ended.result is None:
             raise ClusterError(f"a unit of work was given up: {ended.reason}")
-        found[ended.number] = ended.flown.rows
+        found[ended.number] = ended.result.rows
     return [row for number in range(len(units)) for row in found[number]]

@@ -22,7 +22,7 @@ They share one planner, because compiling one takes 2 s.
 """
 
 
-def measured(kind: str, cases: Sequence[Case]) -> float:
+def case_time(kind: str, cases: Sequence[Case]) -> float:
     """Measure the time that a case takes in one process here, s.
 
     A first run, which imports and compiles, is not measured; of flights it flies only 1 s.
@@ -66,7 +66,7 @@ def check_size(campaign: Campaign, case_s: float, workers: int) -> None:
         return
     raise ConfigError(
         f"{campaign.name}: {size_in_words(campaign, seconds, workers)}, more than {key} allows"
-        f" ({allowed}): reduce it, raise {key}, or say --yes"
+        f" ({allowed}): reduce it, raise {key}, or add --yes"
     )
 
 

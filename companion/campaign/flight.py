@@ -24,7 +24,7 @@ _TRUTH_EVERY = 5
 """Steps of the mock vehicle between two true positions."""
 _AFTERWARDS_S = 10.0
 """Time for which a vehicle that is still armed is watched after the flight, s."""
-_PILOTED = ("POSCTL", "ALTCTL", "STABILIZED", "MANUAL", "LOITER", "ALT_HOLD", "STABILIZE")
+_PILOT_MODES = ("POSCTL", "ALTCTL", "STABILIZED", "MANUAL", "LOITER", "ALT_HOLD", "STABILIZE")
 
 
 def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
@@ -77,7 +77,7 @@ class CaseFlight:
         """Fly the case; return its outcomes."""
         vehicle, case = self._vehicle, self._case
         vehicle.after_step.append(self._note_truth)
-        fault = _BeginFault(vehicle, case.fault)
+        fault = _FaultInjector(vehicle, case.fault)
         flight = session(self._config, vehicle, folder, fault)
 
         def end() -> None:
@@ -133,7 +133,7 @@ class CaseFlight:
             self._truth.append((self._vehicle.time, *state["position"], tilt_angle(x, y)))
 
 
-class _BeginFault(SilentObserver):
+class _FaultInjector(SilentObserver):
     """Injects the faults of a scenario at a set time after the beginning of a phase.
 
     Args:
@@ -163,7 +163,7 @@ class _BeginFault(SilentObserver):
 
 def _ending(state: Truth, result: str) -> str:
     """Classify the end of a flight by the names of `FaultScenario.ends`."""
-    if "took over: mode" in result and state["mode"] in _PILOTED:
+    if "took over: mode" in result and state["mode"] in _PILOT_MODES:
         return "pilot" if state["armed"] else "ground"
     if state["armed"]:
         return "held"

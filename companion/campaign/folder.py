@@ -132,8 +132,9 @@ def require_version(folder: Path, description: Description) -> None:
     found = difference(description.versions, versions())
     if found:
         raise VersionError(
-            f"{folder} was begun by another version: here is {found}. Results of two versions must "
-            "not be mixed: go on with the version that began it, or begin anew with another --out"
+            f"{folder} was begun by another version: this one has {found}. Results of two versions "
+            "must not be mixed: continue with the version that began it, or start again with "
+            "another --out"
         )
 
 

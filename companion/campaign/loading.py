@@ -38,10 +38,10 @@ def load(path: Path) -> Campaign:
     Raises:
         ConfigError: a file cannot be read, or holds an unknown key or a bad value.
     """
-    return _Reading(path).campaign()
+    return _CampaignReader(path).campaign()
 
 
-class _Reading:
+class _CampaignReader:
     """Reads one campaign file.
 
     Args:

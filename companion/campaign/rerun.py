@@ -56,7 +56,7 @@ def rerun(place: Path, index: int) -> Rerun:
     row = fly_case(case, recording)
     lines = [f"{case.described()}: {_judged(row)}"]
     if other := difference(description.versions, versions()):
-        lines.append(f"The campaign was flown by another version: here is {other}.")
+        lines.append(f"The campaign was flown by another version: this one has {other}.")
     before = _row(place, campaign, description, index)
     if before is None:
         return Rerun(row, recording, True, (*lines, "The campaign has not flown this case yet."))

@@ -96,7 +96,7 @@ class _Run:
         begun = folder.begun(self._place)
         if begun:
             folder.resume(self._place, self._campaign)
-        number, case_s = (0, None) if begun else self._checked()
+        number, case_s = (0, None) if begun else self._check_all_cases()
         try:
             with (
                 interruptible(),
@@ -107,7 +107,7 @@ class _Run:
                     wait_for_workers(client)
                 workers = number_of_workers(client)
                 with folder.locked(self._place):
-                    description = self._opened(number, case_s, workers)
+                    description = self._open_folder(number, case_s, workers)
                     self._console.print(f"Dask's dashboard: {client.dashboard_link}")
                     return self._run_with_progress(client, description)
         except KeyboardInterrupt:
@@ -115,7 +115,7 @@ class _Run:
         except ClusterError as error:
             return self._stopped(str(error))
 
-    def _checked(self) -> tuple[int, float | None]:
+    def _check_all_cases(self) -> tuple[int, float | None]:
         """Check every case; return their number and the time for one, s (None: unknown).
 
         Raises:
@@ -126,17 +126,17 @@ class _Run:
         if campaign.number_of_cases > estimate.most_cases(campaign) and not self._options.yes:
             # Only one case: to check all would take long, and they are not flown.
             first = [campaign.case(next(campaign.samples()))]
-            estimate.check_size(campaign, estimate.measured(kind, first), workers)
+            estimate.check_size(campaign, estimate.case_time(kind, first), workers)
         cases = list(campaign.cases())
         check_cases(kind, cases)
         if len(cases) <= _FEW * workers:
             return len(cases), None
-        case_s = estimate.measured(kind, cases)
+        case_s = estimate.case_time(kind, cases)
         if not self._options.yes:
             estimate.check_size(campaign, case_s, workers)
         return len(cases), case_s
 
-    def _opened(self, cases: int, case_s: float | None, workers: int) -> Description:
+    def _open_folder(self, cases: int, case_s: float | None, workers: int) -> Description:
         """Continue the campaign in its folder, or write the folder of a new one."""
         if folder.begun(self._place):
             return folder.resume(self._place, self._campaign)
@@ -171,14 +171,13 @@ class _Run:
             return self._stopped(f"{len(progress.lost)} units were given up")
         errors = engine.internal_errors(self._place, self._campaign.file)
         for error, times in errors.most_common(_MOST_SHOWN):
-            say(f"{times} of the {self._noun} failed by the program's own fault: {error}")
+            say(f"{times} of the {self._noun} ended by an {error}")
         results = Results.read(self._place)
         say(f"{results.good.sum()} of {progress.flown} {self._noun} were good.")
         if results.documented.size:
             kept, faulty = results.documented.sum(), results.documented.size
             say(f"{kept} of {faulty} flights with a fault ended as documented.")
-        say(f"All are in {self._place};")
-        say("see them with")
+        say(f"The results are in {self._place}. Write their report with")
         say(f"  companion campaign report {shlex.quote(str(self._place))}")
         return FAILED if errors else DONE
 
@@ -194,7 +193,7 @@ class _Run:
         if self._options.scheduler:
             command += f" --scheduler {self._options.scheduler}"
         self._console.print(
-            f"{why}; the results of {kept} of {description.cases} {self._noun} are kept. Go on "
+            f"{why}; the results of {kept} of {description.cases} {self._noun} are kept. Continue "
             f"with\n  {command}"
         )
         return FAILED

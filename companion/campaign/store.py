@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from companion.campaign.campaign import Campaign
 from companion.campaign.campaign_file import CampaignFile
+from companion.campaign.outcomes import FLOAT_OUTCOMES
 from companion.campaign.swept import Value
+from companion.config.units import unit_of
 from companion.files.write_whole import sync_folder, write_whole
 from companion.files.yaml_file import ConfigError
 
@@ -19,24 +21,6 @@ RESULTS = "results"
 """Folder of the units within the folder of a campaign."""
 METADATA = b"companion.campaign"
 """Key of the schema's metadata; its value is JSON with `name`, `kind` and `factors`."""
-_UNITS = (
-    ("_rad_s", "rad/s"),
-    ("_deg_s2", "°/s²"),
-    ("_deg_s", "°/s"),
-    ("_m_s2", "m/s²"),
-    ("_m_s", "m/s"),
-    ("_per_s", "1/s"),
-    ("_per_m", "1/m"),
-    ("_percent", "%"),
-    ("_deg", "°"),
-    ("_ms", "ms"),
-    ("_hz", "Hz"),
-    ("_kg", "kg"),
-    ("_rad", "rad"),
-    ("_m", "m"),
-    ("_s", "s"),
-)
-"""Unit by suffix of the key; the first suffix that fits is used."""
 _OUTCOMES = {
     "flights": (
         ("ok", "bool"),
@@ -45,22 +29,7 @@ _OUTCOMES = {
         ("phase", "string"),
         ("crashed", "bool"),
         ("as_documented", "bool"),
-        ("position_rms_m", "float64"),
-        ("position_max_m", "float64"),
-        ("height_rms_m", "float64"),
-        ("estimated_rms_m", "float64"),
-        ("level_rms_m", "float64"),
-        ("estimated_level_rms_m", "float64"),
-        ("estimate_level_rms_m", "float64"),
-        ("cross_axis_max", "float64"),
-        ("model_deviation_max", "float64"),
-        ("time_constant_s", "float64"),
-        ("rate_rms_rad_s", "float64"),
-        ("rate_max_rad_s", "float64"),
-        ("thrust_rms", "float64"),
-        ("saturated_share", "float64"),
-        ("max_tilt_rad", "float64"),
-        ("flight_s", "float64"),
+        *((name, "float64") for name in FLOAT_OUTCOMES),
         ("setpoints", "int64"),
         ("digest", "string"),
     ),
@@ -85,7 +54,7 @@ def schema(file: CampaignFile) -> "pa.Schema":
     factors = [(name, _type(file, name)) for name in file.sweep]
     columns = [("case", "int64"), ("seed", "int64"), *factors, *_OUTCOMES[file.kind]]
     described = {
-        name: {**each.described(), "unit": physical_unit(name)} for name, each in file.sweep.items()
+        name: {**each.described(), "unit": unit_of(name)} for name, each in file.sweep.items()
     }
     contents = {"name": file.name, "kind": file.kind, "factors": described}
     return pa.schema(
@@ -101,11 +70,6 @@ def _type(file: CampaignFile, name: str) -> str:
     return "float64" if swept.is_number else "string"
 
 
-def physical_unit(name: str) -> str:
-    """The physical unit of a key or an outcome, from its suffix; empty without a unit."""
-    return next((unit for end, unit in _UNITS if name.endswith(end)), "")
-
-
 def table(file: CampaignFile, rows: Sequence[Mapping[str, Value]]) -> "pa.Table":
     """Rows as a table with the campaign's columns."""
     import pyarrow as pa  # noqa: PLC0415  an extra
@@ -118,11 +82,8 @@ def table(file: CampaignFile, rows: Sequence[Mapping[str, Value]]) -> "pa.Table"
 
 
 def _cell(value: Value, kind: Any) -> Value:
-    text = str(kind)
-    if value is None or text == "bool":
-        return value
-    if text == "string":
-        return value if isinstance(value, str) else json.dumps(value)
+    if str(kind) == "string" and value is not None and not isinstance(value, str):
+        return json.dumps(value)
     return value
 
 

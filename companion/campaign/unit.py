@@ -24,7 +24,7 @@ Rounding may give fewer units; many cases give more, because a unit has a limite
 """
 
 
-class Flown(NamedTuple):
+class UnitResult(NamedTuple):
     """The result that a worker returns for a unit.
 
     Attributes:
@@ -38,7 +38,7 @@ class Flown(NamedTuple):
     worker: str
 
 
-def fly_samples(campaign: Campaign, samples: Sequence[Sample], expected: Versions) -> Flown:
+def fly_samples(campaign: Campaign, samples: Sequence[Sample], expected: Versions) -> UnitResult:
     """Build the cases of some samples, and fly them.
 
     Raises:
@@ -46,13 +46,13 @@ def fly_samples(campaign: Campaign, samples: Sequence[Sample], expected: Version
         VersionError: this process has other versions than the client.
     """
     require_equal(expected, versions(), f"the worker {_worker()}")
-    return _flown(campaign.file.kind, [campaign.case(sample) for sample in samples])
+    return _run(campaign.file.kind, [campaign.case(sample) for sample in samples])
 
 
-def fly_cases(kind: str, cases: Sequence[Case], expected: Versions) -> Flown:
+def fly_cases(kind: str, cases: Sequence[Case], expected: Versions) -> UnitResult:
     """Fly cases that the client has built; otherwise like `fly_samples`."""
     require_equal(expected, versions(), f"the worker {_worker()}")
-    return _flown(kind, cases)
+    return _run(kind, cases)
 
 
 def run_cases(kind: str, cases: Sequence[Case]) -> list[Row]:
@@ -62,17 +62,17 @@ def run_cases(kind: str, cases: Sequence[Case]) -> list[Row]:
         kind: "flights" or "batch".
         cases: cases to be flown.
     """
-    return _flown(kind, cases).rows
+    return _run(kind, cases).rows
 
 
-def _flown(kind: str, cases: Sequence[Case]) -> Flown:
+def _run(kind: str, cases: Sequence[Case]) -> UnitResult:
     rows: list[Row] = []
     wall_s: list[float] = []
     for part in [cases] if kind == "batch" else [[case] for case in cases]:
         began = perf_counter()
-        rows += _of_kind(kind)(part)
+        rows += _runner(kind)(part)
         wall_s.append(round(perf_counter() - began, 4))
-    return Flown(rows, wall_s, _worker())
+    return UnitResult(rows, wall_s, _worker())
 
 
 def check_cases(kind: str, cases: Sequence[Case]) -> None:
@@ -88,7 +88,7 @@ def check_cases(kind: str, cases: Sequence[Case]) -> None:
             check_case(case)
 
 
-def _of_kind(kind: str) -> Callable[[Sequence[Case]], list[Row]]:
+def _runner(kind: str) -> Callable[[Sequence[Case]], list[Row]]:
     if kind == "flights":
         return lambda cases: [fly_case(case) for case in cases]
     from companion.campaign.kinematics import run_cases as fly_batch  # noqa: PLC0415  as above
@@ -124,6 +124,6 @@ def ranges(cases: int, size: int) -> list[range]:
     return [range(first, min(first + size, cases)) for first in range(0, cases, size)]
 
 
-def described(numbers: range) -> dict[str, Any]:
+def first_and_last(numbers: range) -> dict[str, Any]:
     """The cases of a unit for its timing file."""
     return {"first": numbers.start, "last": numbers.stop - 1}

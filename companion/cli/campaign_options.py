@@ -1,10 +1,10 @@
 """The options of `companion campaign` and its sub-commands."""
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
-from companion.cli.tool_options import Commands
+from companion.cli.tool_options import Commands, whole_number
 
 _CAMPAIGN, _RUN = "campaign", "run"
 _SUB_COMMANDS = (_RUN, "report", "rerun", "tune", "-h", "--help")
@@ -70,7 +70,7 @@ def add_cluster_options(command: argparse.ArgumentParser) -> None:
     )
     where.add_argument(
         "--workers",
-        type=_count_up_to(1024),
+        type=whole_number(1, 1024),
         metavar="NUMBER",
         help="worker processes on this computer (one for each core)",
     )
@@ -120,18 +120,9 @@ def _add_tune(kinds: Commands) -> None:
     )
     tune.add_argument(
         "--trials",
-        type=_count_up_to(100_000),
+        type=whole_number(1, 100_000),
         metavar="NUMBER",
         help="number of trials; replaces tune.trials of the file",
     )
     add_cluster_options(tune)
     tune.set_defaults(run="campaign.tune")
-
-
-def _count_up_to(largest: int) -> Callable[[str], int]:
-    def count(text: str) -> int:
-        if not text.isdecimal() or not 1 <= int(text) <= largest:
-            raise argparse.ArgumentTypeError(f"must be a whole number from 1 to {largest}")
-        return int(text)
-
-    return count

@@ -49,7 +49,6 @@ def _parser() -> argparse.ArgumentParser:
     tool_options.add_benches(commands)
     tool_options.add_study(commands)
     add_campaign(commands)
-    tool_options.add_tools(commands)
     add_recordings(commands)
     tool_options.add_config(commands)
     return parser
@@ -60,18 +59,18 @@ def _add_flights(commands: Commands) -> None:
     shared_options.add_required_config(fly)
     _add_link_options(fly)
     fly.set_defaults(run="flights.fly")
-    show = commands.add_parser("demo", help="start the bundled vehicle and fly it")
-    show.add_argument(
+    demo = commands.add_parser("demo", help="start the bundled vehicle and fly it")
+    demo.add_argument(
         "--config",
         type=Path,
         metavar="FILE",
         help="configuration (default: the shipped mock-px4.yaml)",
     )
-    show.add_argument(
+    demo.add_argument(
         "--open", action="store_true", help="open the report in the browser after the flight"
     )
-    show.set_defaults(run="flights.demo")
-    for command in (fly, show):
+    demo.set_defaults(run="flights.demo")
+    for command in (fly, demo):
         command.add_argument(
             "--maneuvers",
             type=lambda text: tuple(text.split(",")),

@@ -5,11 +5,11 @@ import sys
 from pathlib import Path
 
 from companion.cli.exit_codes import EXIT_OK
-from companion.cli.tool_options import STARTS
+from companion.cli.tool_options import STARTING_FILES
 from companion.config import Config
-from companion.config.doubts import doubts
 from companion.config.files import json_schema, load, shipped
-from companion.config.reference import Key, as_markdown, as_yaml, differences, keys
+from companion.config.reference import ConfigKey, as_markdown, as_yaml, changed_keys, keys
+from companion.config.suspect_values import suspect_values
 from companion.control.expected_response import expectations
 from companion.demo import check_mock
 from companion.files.write_whole import write_whole
@@ -20,13 +20,13 @@ from companion.guidance.follow import Follow
 
 
 def show(options: argparse.Namespace) -> int:
-    """Print the configuration: all of it, one key, what a file changes, or the schema."""
+    """Print the configuration, in whole or in part, as YAML, or its tables or schema."""
     if options.schema:
         text = json_schema()
     elif options.markdown:
         text = as_markdown(keys(Config()))
     elif options.diff:
-        changes = list(differences(load(options.diff)))
+        changes = list(changed_keys(load(options.diff)))
         text = as_yaml(changes) if changes else f"# {options.diff} changes no default\n"
     else:
         config = load(options.file) if options.file else Config()
@@ -35,7 +35,7 @@ def show(options: argparse.Namespace) -> int:
     return EXIT_OK
 
 
-def _found(config: Config, name: str) -> list[Key]:
+def _found(config: Config, name: str) -> list[ConfigKey]:
     """The key with that name, or all keys of a section.
 
     Raises:
@@ -56,7 +56,7 @@ def init(options: argparse.Namespace) -> int:
     Raises:
         ConfigError: the file exists or cannot be written.
     """
-    text = shipped(f"{STARTS[options.name]}.yaml").read_text(encoding="utf-8")
+    text = shipped(f"{STARTING_FILES[options.name]}.yaml").read_text(encoding="utf-8")
     lines = []
     for line in text.splitlines(keepends=True):
         if line.startswith("# yaml-language-server"):
@@ -65,7 +65,7 @@ def init(options: argparse.Namespace) -> int:
             lines.append(line)
             continue
         included = shipped(line.split()[1]).read_text(encoding="utf-8")
-        lines.append("# How the rate loop answers; `companion identify` measures yours.\n")
+        lines.append("# Response of the rate loop; `companion identify` measures yours.\n")
         lines.append(included[included.index("vehicle:\n") :])
     out = Path(options.out)
     if out.exists() or out.is_symlink():
@@ -99,7 +99,7 @@ def check(options: argparse.Namespace) -> int:
             print("\n".join(part.notes))
     for text in expectations(config):
         print(text)
-    for doubt in doubts(config):
-        print(f"warning: {doubt.sentence()}")
+    for value in suspect_values(config):
+        print(f"warning: {value.sentence()}")
     print(f"{options.file}: ok")
     return EXIT_OK

@@ -2,6 +2,6 @@
 
 EXIT_OK = 0
 EXIT_FLIGHT = 1
-"""The flight or command failed, gave no usable result, or `doctor` found what forbids a flight."""
+"""The flight or command failed, gave no usable result, or `doctor` found something unsafe."""
 EXIT_USAGE = 2
 """The command line or the configuration is wrong, or something that it names cannot be used."""

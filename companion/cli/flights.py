@@ -5,7 +5,7 @@ import webbrowser
 
 from companion.cli import flying
 from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
-from companion.cli.helping import helper
+from companion.cli.helper_process import helper_process
 from companion.cli.terminal import FlightConsole
 from companion.config.files import load
 from companion.recording.folder import flight_folder
@@ -20,8 +20,10 @@ def fly(options: argparse.Namespace) -> int:
     folder = flight_folder(config.recording.directory)
     invocation = flying.invocation(options)
     console = _console(options)
-    with helper(options, config, options.config, read, folder, console, follows=True) as beside:
-        summary = flying.fly(config, folder, console, invocation, beside)
+    with helper_process(
+        options, config, options.config, read, folder, console, follows=True
+    ) as helper:
+        summary = flying.fly(config, folder, console, invocation, helper)
     return _ended(summary, options)
 
 

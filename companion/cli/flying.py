@@ -1,4 +1,4 @@
-"""What all flying commands share: changes of the configuration, the folder, and the end."""
+"""What all flying commands share: options into configuration, the flight, and its report."""
 
 import argparse
 import shutil
@@ -10,7 +10,7 @@ from typing import Any
 
 from companion import demo
 from companion.cli import interrupts
-from companion.cli.helping import environment, helper
+from companion.cli.helper_process import environment, helper_process
 from companion.cli.signals import fly_interruptibly
 from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
@@ -58,7 +58,7 @@ def with_options(config: Config, options: argparse.Namespace, planner: str | Non
     changes = {"link": link, "flight": flight, "planner": {"name": planner} if planner else {}}
     flown_config = changed(config, assigned(options.set), "--set")
     flown_config = changed(flown_config, changes, "the command line")
-    # What cannot be flown is to be found out before anything is begun.
+    # Refuse what cannot be flown before anything starts.
     check_link(flown_config)
     configured_maneuvers(flown_config)
     check_control(flown_config)
@@ -81,7 +81,7 @@ def fly(
     folder: Path,
     console: FlightConsole,
     invocation: Invocation | None = None,
-    beside: Helper | None = None,
+    helper: Helper | None = None,
 ) -> Summary:
     """Fly as configured, record in `folder`, and print phases, tables and summary to `console`.
 
@@ -90,7 +90,7 @@ def fly(
         folder: folder for the flight's files.
         console: console for messages.
         invocation: this call, for the suggested next command; None: no suggestion.
-        beside: helper process that watches a file or serves the live page, or None.
+        helper: helper process that watches a file or serves the live page, or None.
 
     Raises:
         LinkError: the link could not be opened; nothing was sent.
@@ -98,14 +98,14 @@ def fly(
         RealtimeError: what `realtime` requires is not granted; nothing was sent.
     """
     observer = TerminalObserver(console)
-    observers = observer if beside is None else SeveralObservers(observer, beside)
+    observers = observer if helper is None else SeveralObservers(observer, helper)
     session = Session(
-        config, folder, observers, observer.ask_landing, environment=environment(beside)
+        config, folder, observers, observer.ask_landing, environment=environment(helper)
     )
     flight = fly_interruptibly(session)
-    if beside is not None:
-        beside.changes, beside.note = session.changes, session.note
-        flight = beside.serve_beside(flight)
+    if helper is not None:
+        helper.changes, helper.note = session.changes, session.note
+        flight = helper.serve_beside(flight)
     run: Callable[..., Summary] = lockstep.run if config.link.lockstep else link_loop.run
     with ExitStack() as stack:
         stack.callback(observer.close)
@@ -114,7 +114,7 @@ def fly(
         except (EndpointError, RealtimeError, SigningError):
             shutil.rmtree(folder)  # nothing was flown, so there is nothing to keep
             raise
-    # From here on the vehicle is in other hands, and all is on the disk.
+    # The vehicle is handed back and the record is complete: signals may interrupt again.
     interrupts.raise_interrupt(interrupts.unhandled())
     with suppress(OSError):
         console.print(flight_table(summary))
@@ -167,7 +167,7 @@ def fly_bundled(
         folder = flight_folder(config.recording.directory)
         in_lockstep = config.link.lockstep
         with (
-            helper(options, config, path, read, folder, console, follows=True) as beside,
+            helper_process(options, config, path, read, folder, console, follows=True) as helper,
             demo.bundled_vehicle(path, wire, folder / "mock.log", lockstep=in_lockstep),
         ):
-            return fly(config, folder, console, invocation, beside)
+            return fly(config, folder, console, invocation, helper)

@@ -45,20 +45,19 @@ def identify(options: argparse.Namespace) -> int:
     if options.log is not None:
         log = options.log / _LOG if options.log.is_dir() else options.log
         out = options.out or log.with_name(_FRAGMENT)
-        if log.exists():  # else it is the log that is to be mended
+        if log.exists():  # else report the missing log, not the output file
             require_writable(out, "--out", force=options.force)
-        return _fitted(log, out, options, console)
+        return _fit(log, out, options, console)
     if options.out is not None:
-        # Before the flight, not after it.
         require_writable(options.out, "--out", force=options.force)
-    summary = _flown(options, console)
+    summary = _fly_doublets(options, console)
     if summary.result != "ok" or summary.log is None:
         _print_json(options, {"result": summary.result, "log": str(summary.log)})
         return EXIT_FLIGHT
     log = summary.log / _LOG
     out = options.out or log.with_name(_FRAGMENT)
     try:
-        return _fitted(log, out, options, console)
+        return _fit(log, out, options, console)
     except KeyboardInterrupt:
         reason = (
             f"interrupted while fitting; the flight is kept in {summary.log}; "
@@ -70,7 +69,7 @@ def identify(options: argparse.Namespace) -> int:
         return EXIT_FLIGHT
 
 
-def _flown(options: argparse.Namespace, console: FlightConsole) -> Summary:
+def _fly_doublets(options: argparse.Namespace, console: FlightConsole) -> Summary:
     options.maneuvers = (_MANEUVER,)
     if options.bundled is not None:
         path = None if options.bundled == SHIPPED else options.bundled
@@ -79,13 +78,13 @@ def _flown(options: argparse.Namespace, console: FlightConsole) -> Summary:
     return flying.fly(config, flight_folder(config.recording.directory), console)
 
 
-def _fitted(log: Path, out: Path, options: argparse.Namespace, console: FlightConsole) -> int:
-    """Fit the data of a log, show the fit, and write it to `out` if it is usable."""
+def _fit(log: Path, out: Path, options: argparse.Namespace, console: FlightConsole) -> int:
+    """Fit the data of a log, show the fit, write it to `out` if it is usable; the exit code."""
     with suppress(OSError):
         console.print("fitting…")
     rows = read_flight_log(log)
     vehicle = identify_vehicle(rows.setpoints, rows.rates, rows.specific_thrust)
-    known = _known(log)
+    known = _configured_axes(log)
     try:
         text = vehicle_fragment(vehicle, GRAVITY, known, _flight_name(log))
     except BadFitError as error:
@@ -96,7 +95,7 @@ def _fitted(log: Path, out: Path, options: argparse.Namespace, console: FlightCo
                 console.print(f"  {axis}: {reason}", soft_wrap=True)
         _print_json(options, {"result": str(error), "log": str(log), **_figures(vehicle)})
         return EXIT_FLIGHT
-    _replace(out, text)
+    _write_fit(out, text)
     kept = {
         axis: f"kept from the configuration ({keys.described()}): {vehicle.axes[axis].reason()}"
         for axis, keys in kept_axes(vehicle, known).items()
@@ -111,7 +110,7 @@ def _fitted(log: Path, out: Path, options: argparse.Namespace, console: FlightCo
     return EXIT_OK
 
 
-def _known(log: Path) -> dict[str, AxisKeys]:
+def _configured_axes(log: Path) -> dict[str, AxisKeys]:
     """The response of each axis according to the configuration beside the log; may be empty."""
     try:
         return load(log.with_name(_CONFIG)).vehicle.axes
@@ -125,7 +124,7 @@ def _flight_name(log: Path) -> str:
     return (path.parent.name if path.name == _LOG else path.name)[:_LONGEST_NAME]
 
 
-def _replace(out: Path, text: str) -> None:
+def _write_fit(out: Path, text: str) -> None:
     """Write a file completely or not at all, because a flight may read it.
 
     Raises:
@@ -169,14 +168,14 @@ def _figures(vehicle: IdentifiedVehicle) -> dict[str, Any]:
 
 
 def _second_order(response: RateResponse) -> dict[str, float] | None:
-    nearer = response.second_order
-    if nearer is None:
+    fit = response.second_order
+    if fit is None:
         return None
     return {
-        "frequency_rad_s": round(nearer.frequency, 2),
-        "damping": round(nearer.damping, 3),
-        "dead_time_ms": round(1e3 * nearer.dead_time, 1),
-        "explained": round(nearer.explained, 4),
+        "frequency_rad_s": round(fit.frequency, 2),
+        "damping": round(fit.damping, 3),
+        "dead_time_ms": round(1e3 * fit.dead_time, 1),
+        "explained": round(fit.explained, 4),
     }
 
 

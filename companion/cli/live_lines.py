@@ -23,7 +23,7 @@ def can_redraw(file: IO[str]) -> bool:
 def status_lines(status: FlightStatus) -> list[str]:
     """The three lines: maneuver; motion of the vehicle; safety, setpoints and battery."""
     return [
-        f"{status.phase:<9} {_times(status)}   {_doing(status)}",
+        f"{status.phase:<9} {status.time:.0f} s   {_doing(status)}",
         f"{'':<9} height {_number(status.height, '.1f', 'm')}   "
         f"speed {_number(status.speed, '.1f', 'm/s')}   "
         f"tilt {_number(None if status.tilt is None else degrees(status.tilt), '.0f', '°')}   "
@@ -42,10 +42,6 @@ def _doing(status: FlightStatus) -> str:
 def allowed_time(elapsed: float, timeout: float) -> str:
     """Time that a phase has lasted, and its limit, s."""
     return f"{elapsed:.0f} s" if isinf(timeout) else f"{elapsed:.0f} of at most {timeout:.0f} s"
-
-
-def _times(status: FlightStatus) -> str:
-    return f"{status.time:.0f} s"
 
 
 def _loop(status: FlightStatus) -> str:

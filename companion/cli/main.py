@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return EXIT_FLIGHT
     finally:
         interrupts.restore(ours)
-        if arguments is None and signal.SIGINT in ours:  # the rest may be ended at once
+        if arguments is None and signal.SIGINT in ours:  # Ctrl-C may end the interpreter exit
             signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 

@@ -1,4 +1,4 @@
-"""The check of an output file, before the work whose result it is to hold."""
+"""Checks that an output file can be written, before the work starts."""
 
 import os
 from pathlib import Path

@@ -7,10 +7,20 @@ from companion.cli.tool_options import Commands
 
 
 def add_recordings(commands: Commands) -> None:
-    """Add `report`, `compare`, `export` and `replay`."""
+    """Add `plot`, `report`, `compare`, `export` and `replay`."""
+    _add_plot(commands)
     _add_reports(commands)
     _add_export(commands)
     _add_replay(commands)
+
+
+def _add_plot(commands: Commands) -> None:
+    plot = commands.add_parser("plot", help="draw a recorded flight (extra `plot`)")
+    plot.add_argument("folder", type=Path, metavar="FOLDER", help="the flight's folder")
+    plot.add_argument(
+        "--out", type=Path, metavar="FILE", help="picture (default: FOLDER/flight.png)"
+    )
+    plot.set_defaults(run="recordings.plot")
 
 
 def _add_export(commands: Commands) -> None:

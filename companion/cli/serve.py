@@ -8,8 +8,8 @@ import time
 from typing import Any
 
 from companion.cli.exit_codes import EXIT_OK
-from companion.cli.helping import environment, helper
-from companion.cli.signals import LEAVE_AFTER, hang_up
+from companion.cli.helper_process import environment, helper_process
+from companion.cli.signals import LEAVE_AFTER, hangup_signal
 from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
 from companion.config.files import assigned, changed, load
@@ -37,18 +37,20 @@ def serve(options: argparse.Namespace) -> int:
     def note(text: str) -> None:
         observers.event(time.monotonic() - began, text)
 
-    with helper(options, config, options.config, read, None, console, follows=False) as beside:
-        observers = observer if beside is None else SeveralObservers(observer, beside)
+    with helper_process(
+        options, config, options.config, read, None, console, follows=False
+    ) as helper:
+        observers = observer if helper is None else SeveralObservers(observer, helper)
         session = ServeSession(
-            config, note, observers, environment(beside), config.recording.directory
+            config, note, observers, environment(helper), config.recording.directory
         )
         pages = ReportPages()
         if config.recording.report:
             session.records.on_recorded = pages.write
         serving = _until_stopped(session, pages)
-        if beside is not None:
-            beside.changes, beside.note = session.changes, note
-            serving = beside.serve_beside(serving)
+        if helper is not None:
+            helper.changes, helper.note = session.changes, note
+            serving = helper.serve_beside(serving)
         try:
             counters = link_loop.run(serving)
         finally:
@@ -95,7 +97,7 @@ async def _until_stopped(session: ServeSession, pages: ReportPages) -> dict[str,
             pages.leave()
 
     loop.add_signal_handler(signal.SIGINT, interrupt)
-    for number in (signal.SIGTERM, *hang_up()):
+    for number in (signal.SIGTERM, *hangup_signal()):
         loop.add_signal_handler(number, stop)
     return await session.run()
 

@@ -16,7 +16,7 @@ HOW_TO_LEAVE = (
 )
 
 
-class Signals:
+class SignalHandler:
     """Handles the signals that arrive while a session flies.
 
     A terminal that closes sends several: the shell and the kernel each send SIGHUP, and SIGTERM may
@@ -40,17 +40,17 @@ class Signals:
         self._gave_up = False
         self._ctrl_c_at: float | None = None
 
-    def take(self, number: signal.Signals) -> None:
+    def handle(self, number: signal.Signals) -> None:
         """Handle one signal."""
         match number:
             case signal.SIGINT:
-                self._take_ctrl_c()
+                self._handle_ctrl_c()
             case signal.SIGHUP:
                 self._hand_back("SIGHUP (the terminal went away)")
             case _:
                 self._hand_back(number.name)
 
-    def _take_ctrl_c(self) -> None:
+    def _handle_ctrl_c(self) -> None:
         before, self._ctrl_c_at = self._ctrl_c_at, self._clock()
         if before is None:
             self._hand_back("the user (Ctrl-C)")
@@ -65,7 +65,7 @@ class Signals:
 
 
 async def fly_interruptibly(session: Session) -> Summary:
-    """Fly a session; `Signals` handles SIGINT (Ctrl-C), SIGTERM and SIGHUP.
+    """Fly a session; `SignalHandler` handles SIGINT (Ctrl-C), SIGTERM and SIGHUP.
 
     Under `nohup` a terminal that closes changes nothing.
 
@@ -74,14 +74,14 @@ async def fly_interruptibly(session: Session) -> Summary:
         LinkError, OSError, RealtimeError: see `Session.fly`.
     """
     flight = asyncio.ensure_future(session.fly())
-    signals = Signals(session, flight.cancel)
+    handler = SignalHandler(session, flight.cancel)
     loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM, *hang_up()):
-        loop.add_signal_handler(number, signals.take, number)
+    for number in (signal.SIGINT, signal.SIGTERM, *hangup_signal()):
+        loop.add_signal_handler(number, handler.handle, number)
     return await flight
 
 
-def hang_up() -> list[signal.Signals]:
+def hangup_signal() -> list[signal.Signals]:
     """SIGHUP, unless whoever started this process ignores it, as `nohup` does."""
     ignored = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     return [] if ignored else [signal.SIGHUP]

@@ -14,16 +14,16 @@ from rich.console import Console
 from companion.cli.live_lines import LiveLines, allowed_time, can_redraw, status_lines
 from companion.flight.status import FlightStatus
 
-_REPEAT = 5.0
+_STATUS_PERIOD = 5.0
 """Period of plain status lines on output that cannot be redrawn, s."""
 
-_REDRAW = 0.2
+_REDRAW_PERIOD = 0.2
 """Shortest period between redraws, s of wall time; a flight in lockstep may outrun the terminal."""
 
-_WAITING = 1000
-"""Lines queued for a stalled terminal; further lines are dropped."""
+_QUEUE_LENGTH = 1000
+"""Most lines queued for a stalled terminal; further lines are dropped."""
 
-_PATIENCE = 2.0
+_CLOSE_TIMEOUT = 2.0
 """Longest wait at the end for room in a stalled terminal's queue, and then for its lines, s."""
 
 
@@ -31,7 +31,7 @@ class _PrintThread:
     """Prints in its own thread, so that a terminal that stalls or closes cannot stop a flight."""
 
     def __init__(self) -> None:
-        self._lines: queue.Queue[Callable[[], None] | None] = queue.Queue(_WAITING)
+        self._lines: queue.Queue[Callable[[], None] | None] = queue.Queue(_QUEUE_LENGTH)
         self._thread = threading.Thread(target=self._print_lines, name="terminal", daemon=True)
         self._thread.start()
 
@@ -46,10 +46,10 @@ class _PrintThread:
     def close(self) -> None:
         if self._thread.is_alive():
             try:
-                self._lines.put(None, timeout=_PATIENCE)
+                self._lines.put(None, timeout=_CLOSE_TIMEOUT)
             except queue.Full:
                 return
-            self._thread.join(_PATIENCE)
+            self._thread.join(_CLOSE_TIMEOUT)
 
     def _print_lines(self) -> None:
         broken = False
@@ -107,7 +107,7 @@ class TerminalObserver:
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
         """Print from time to time what the phase waits for; live lines always show it."""
-        if self._live is None and elapsed - self._said >= _REPEAT:
+        if self._live is None and elapsed - self._said >= _STATUS_PERIOD:
             self._said = elapsed
             text = f"{name}: {detail or 'working'} ({allowed_time(elapsed, timeout)})"
             self._printer.say(lambda: self._print(f"           {text}"))
@@ -116,7 +116,7 @@ class TerminalObserver:
         """Redraw the live lines if they are old; a stalled terminal skips states."""
         self._newest = status
         now = time.monotonic()
-        if self._live is None or self._asking or self._queued or now - self._drawn < _REDRAW:
+        if self._live is None or self._asking or self._queued or now - self._drawn < _REDRAW_PERIOD:
             return
         self._drawn = now
         self._queued = self._printer.say(self._draw)

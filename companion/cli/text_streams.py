@@ -33,8 +33,8 @@ def print_anything() -> None:
 class _Output(io.TextIOWrapper):
     """Standard output that remembers a failed write.
 
-    A later flush does not fail if the text was too long for a buffer, or if there is none, as with
-    PYTHONUNBUFFERED or `python -u`.
+    The next flush does not repeat the failure if the text was longer than the buffer, or if there
+    is no buffer, as with PYTHONUNBUFFERED or `python -u`.
 
     Attributes:
         failure: the first failure, or None.

@@ -10,7 +10,7 @@ from companion.cli.shared_options import add_endpoint, add_live, add_required_co
 from companion.study import registry
 
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
-STARTS = {"px4": "px4", "ardupilot": "ardupilot", "mock": "mock-px4"}
+STARTING_FILES = {"px4": "px4", "ardupilot": "ardupilot", "mock": "mock-px4"}
 """The shipped file from which `init` makes a new one, by the name that the user gives."""
 
 
@@ -161,16 +161,6 @@ def add_study(commands: Commands) -> None:
     study.set_defaults(run="tools.study")
 
 
-def add_tools(commands: Commands) -> None:
-    """Add `plot`."""
-    plot = commands.add_parser("plot", help="draw a recorded flight (extra `plot`)")
-    plot.add_argument("folder", type=Path, metavar="FOLDER", help="the flight's folder")
-    plot.add_argument(
-        "--out", type=Path, metavar="FILE", help="picture (default: FOLDER/flight.png)"
-    )
-    plot.set_defaults(run="recordings.plot")
-
-
 def add_config(commands: Commands) -> None:
     """Add `config`, `init` and `check-config`."""
     show = commands.add_parser(
@@ -193,7 +183,7 @@ def add_config(commands: Commands) -> None:
     show.set_defaults(run="config.show")
 
     start = commands.add_parser("init", help="write a commented starting configuration")
-    start.add_argument("name", choices=list(STARTS), help="vehicle of the configuration")
+    start.add_argument("name", choices=list(STARTING_FILES), help="vehicle of the configuration")
     start.add_argument(
         "--out",
         type=Path,

@@ -21,7 +21,7 @@ from companion.identification import identify_vehicle, second_order_keys
 from companion.mavlink.errors import LogError
 from companion.recording.learned_file import newest
 from companion.tuning import Disturbances, Proposal, propose
-from companion.tuning.flights import COURSES, Flown, autopilot_like, flown
+from companion.tuning.flights import COURSES, CourseResult, autopilot_like, fly_course
 from companion.tuning.noise import measured_disturbances
 from companion.tuning.writing import proposal_text, summary_lines
 from companion.vehicle.flight_log import read_flight_log
@@ -42,11 +42,11 @@ def tune(options: argparse.Namespace) -> int:
     config, included = _configuration(source, vehicle, options.config)
     config = _with_learned_drag(config, source)
     log = source / _LOG
-    disturbances, nearer = Disturbances(), {}
+    disturbances, second_order = Disturbances(), {}
     if source.is_dir() and log.exists():
         disturbances = measured_disturbances(log, drag_prior(config).drag.linear, disturbances)
-        nearer = _second_order(log)
-    proposal = propose(config, disturbances, vehicle=nearer)
+        second_order = _second_order(log)
+    proposal = propose(config, disturbances, vehicle=second_order)
     flights = {} if options.no_flights else _flights(proposal, console)
     known = _relative(vehicle, output) if included else _vehicle_of(proposal.tuned)
     console.print("\n".join(summary_lines(proposal, flights)))  # kept if the disk is full
@@ -124,21 +124,21 @@ def _relative(vehicle: Path, output: Path) -> Path:
     return Path(os.path.relpath(vehicle.resolve(), output.resolve().parent))
 
 
-def _flights(proposal: Proposal, console: Console) -> dict[str, tuple[Flown, Flown]]:
+def _flights(proposal: Proposal, console: Console) -> dict[str, tuple[CourseResult, CourseResult]]:
     """Fly each course with the previous configuration and with the proposal."""
     autopilot = autopilot_like(proposal.tuned)
     flights = {}
     for course in COURSES:
         console.print(f"flying the {course.name} on the {autopilot} mock vehicle…")
         flights[course.name] = (
-            flown(proposal.untuned, course, autopilot),
-            flown(proposal.tuned, course, autopilot),
+            fly_course(proposal.untuned, course, autopilot),
+            fly_course(proposal.tuned, course, autopilot),
         )
     return flights
 
 
 def _figures(
-    proposal: Proposal, flights: dict[str, tuple[Flown, Flown]], output: Path
+    proposal: Proposal, flights: dict[str, tuple[CourseResult, CourseResult]], output: Path
 ) -> dict[str, Any]:
     """The figures for `--json`; a value that a failed flight did not measure is null."""
     expected = {}

@@ -35,7 +35,8 @@ class LinkConfig(Section):
     attitude_rate_hz: Annotated[float, Field(ge=20.0, le=1000.0)] = 250.0
     """Rate requested for ATTITUDE_QUATERNION. The control loop runs at the rate that arrives."""
     min_attitude_rate_hz: Annotated[float, Field(ge=10.0, le=1000.0)] = 50.0
-    """Refuse to fly at a lower rate of attitudes; in flight, hand back if it is lower for 1 s."""
+    """Refuse to fly at a lower rate of attitudes; in flight, hand back if setpoints are sent at a
+    lower rate for 1 s."""
     position_rate_hz: Annotated[float, Field(ge=5.0, le=200.0)] = 50.0
     """Rate requested for LOCAL_POSITION_NED."""
     min_position_rate_hz: Annotated[float, Field(ge=1.0, le=200.0)] = 10.0

@@ -16,14 +16,14 @@ from companion.files.yaml_faults import dotted_keys, shortened
 from companion.files.yaml_file import ConfigError, Contents, UnreadableFileError
 
 _INCLUDE = "include"
-FILES_READ: tuple[tuple[str, ...], ...] = (
+FILE_KEYS: tuple[tuple[str, ...], ...] = (
     ("flight", "trajectory"),
     ("link", "signing_key_file"),
     ("mock", "signing", "passphrase_file"),
 )
 """Keys that name a file to read; the path is relative to the file with the key, as for an include.
 """
-_DEEPEST = 4
+_MAX_DEPTH = 4
 """Largest depth of nested includes."""
 
 
@@ -38,7 +38,7 @@ def load(path: Path) -> Config:
     """
     own = _read(path)
     merged = Contents({}, {})
-    _Reading(merged).add_included((path,), own.keys)
+    _IncludeReader(merged).add_included((path,), own.keys)
     _merge(merged, own)
     _drop_foreign_identified(merged)
     return yaml_file.validated(merged.keys, str(path), Config, merged.places)
@@ -49,16 +49,16 @@ def files_of(path: Path) -> tuple[Path, ...]:
 
     Reading stops at the first file that is missing or faulty, which is then the last of the result.
     """
-    reading = _Reading(Contents({}, {}))
+    reader = _IncludeReader(Contents({}, {}))
     with suppress(ConfigError):
-        reading.add_included((path,), _read(path).keys)
-    return (path, *reading.files)
+        reader.add_included((path,), _read(path).keys)
+    return (path, *reader.files)
 
 
 def _read(path: Path) -> Contents:
     """Read one file, and resolve its paths against its own folder."""
     contents = yaml_file.read(path, Config)
-    for *sections, key in FILES_READ:
+    for *sections, key in FILE_KEYS:
         values: Any = contents.keys
         for section in sections:
             values = values.get(section) if isinstance(values, dict) else None
@@ -71,16 +71,16 @@ def _read(path: Path) -> Contents:
 def _drop_foreign_identified(merged: Contents) -> None:
     """Drop `vehicle.identified` if another key of `vehicle` comes from another file."""
     mark = merged.places.get(("vehicle", "identified"))
-    times = {
+    files = {
         place.file
         for where, place in merged.places.items()
         if where[:1] == ("vehicle",) and len(where) > 1
     }
-    if mark is not None and times != {mark.file}:
+    if mark is not None and files != {mark.file}:
         merged.keys["vehicle"]["identified"] = None
 
 
-class _Reading:
+class _IncludeReader:
     """Reads included files; an including file overrides them.
 
     Args:
@@ -115,8 +115,8 @@ class _Reading:
         if realpath(path) in map(realpath, chain[:-1]):
             names = " includes ".join(str(one) for one in chain)
             raise ConfigError(f"{chain[0]}: a file must not include itself: {names}")
-        if len(chain) - 1 > _DEEPEST:
-            raise ConfigError(f"{by}: an include must not be deeper than {_DEEPEST} files")
+        if len(chain) - 1 > _MAX_DEPTH:
+            raise ConfigError(f"{by}: an include must not be deeper than {_MAX_DEPTH} files")
         try:
             part = _read(path)
         except UnreadableFileError as error:

@@ -12,7 +12,7 @@ Seconds = Annotated[float, Field(gt=0.0, le=3600.0)]
 ACCELERATION_STEPS = ("steps", "corners")
 """Maneuvers that are steps of the acceleration, flown by the attitude without feedback."""
 OPEN_LOOP = (*ACCELERATION_STEPS, "identify")
-"""Maneuvers without a reference from which a distance is measured."""
+"""Maneuvers without a position reference, so without a tracking error."""
 
 
 class FlightConfig(Section):
@@ -72,7 +72,7 @@ class StepsConfig(Section):
 
 
 class CornersConfig(Section):
-    """Maneuver `corners`: acceleration steps, none through level; in them planners differ."""
+    """Maneuver `corners`: acceleration steps that avoid level, to show how planners differ."""
 
     north_coefficient: Annotated[float, Field(gt=0.0, le=0.8)] = 0.35
     """North coefficient of each corner, up to its sign. The tilt's sine is √(north² + east²)."""

@@ -67,8 +67,8 @@ class GuidanceConfig(Section):
     stiffer position hold. null: k/T⁴. k is 2 if dead time + lag/2 + s/2 is at most 65 ms, 1 if
     it is at least 80 ms or unknown, and interpolated between them. s is the time the rate loop
     needs to slew to limits.max_tilt_rate_deg_s; 0 without a known slew limit. T is the delay of
-    the attitude behind its target plus half a guidance period. That delay follows from
-    planner.gain_per_s and `vehicle`; an unknown rate loop counts as 0.12 s.
+    the attitude behind its target plus half a guidance period, at least 0.275 s. That delay
+    follows from planner.gain_per_s and `vehicle`; an unknown rate loop counts as 0.12 s.
     """
     velocity_weight_per_s2: Annotated[float, Field(ge=0.0, le=10000.0)] | None = Field(
         default=None, json_schema_extra=ANY

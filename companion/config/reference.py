@@ -12,26 +12,9 @@ from pydantic import BaseModel
 
 from companion.config import Config
 from companion.config.markers import IN_FLIGHT
+from companion.config.units import unit_of
 from companion.files import bounded_yaml
 
-_UNITS = {
-    "_deg_s2": "°/s²",
-    "_rad_s": "rad/s",
-    "_deg_s": "°/s",
-    "_m_s2": "m/s²",
-    "_m_s": "m/s",
-    "_per_s4": "1/s⁴",
-    "_per_s2": "1/s²",
-    "_per_s": "1/s",
-    "_per_m": "1/m",
-    "_deg": "°",
-    "_percent": "%",
-    "_ms": "ms",
-    "_hz": "Hz",
-    "_m": "m",
-    "_s": "s",
-}
-"""Unit by suffix of the key; the first suffix that fits is used."""
 _BOUNDS = (
     ("minimum", "at least {:g}"),
     ("exclusiveMinimum", "more than {:g}"),
@@ -41,7 +24,7 @@ _BOUNDS = (
 _WIDTH = 98
 
 
-class Key(NamedTuple):
+class ConfigKey(NamedTuple):
     """One key of a section.
 
     Attributes:
@@ -73,12 +56,12 @@ def sections() -> dict[str, type[BaseModel]]:
     }
 
 
-def keys(config: Config) -> Iterator[Key]:
+def keys(config: Config) -> Iterator[ConfigKey]:
     """Every key, with its value in a configuration."""
     values, defaults = config.model_dump(mode="json"), Config().model_dump(mode="json")
     for section, described in _descriptions().items():
         for name, words in described.items():
-            yield Key(section, name, values[section][name], defaults[section][name], *words)
+            yield ConfigKey(section, name, values[section][name], defaults[section][name], *words)
 
 
 @cache
@@ -89,7 +72,7 @@ def _descriptions() -> dict[str, dict[str, tuple[str, str, str]]]:
         schema = model.model_json_schema()["properties"]
         described[section] = {
             name: (
-                next((unit for end, unit in _UNITS.items() if name.endswith(end)), ""),
+                unit_of(name),
                 _allowed(schema[name]),
                 _one_line(field.description or ""),
             )
@@ -98,12 +81,12 @@ def _descriptions() -> dict[str, dict[str, tuple[str, str, str]]]:
     return described
 
 
-def differences(config: Config) -> Iterator[Key]:
+def changed_keys(config: Config) -> Iterator[ConfigKey]:
     """The keys whose values are not the default."""
     return (key for key in keys(config) if key.value != key.default)
 
 
-def as_yaml(described: Iterable[Key]) -> str:
+def as_yaml(described: Iterable[ConfigKey]) -> str:
     """Keys as commented YAML that is a valid configuration."""
     models, lines, section = sections(), list[str](), ""
     for key in described:
@@ -119,7 +102,7 @@ def as_yaml(described: Iterable[Key]) -> str:
     return "\n".join(lines).strip() + "\n"
 
 
-def as_markdown(described: Iterable[Key]) -> str:
+def as_markdown(described: Iterable[ConfigKey]) -> str:
     """Keys as Markdown tables, one for each section."""
     models, lines, section = sections(), list[str](), ""
     for key in described:

@@ -142,8 +142,8 @@ def _thrust_contradictions(config: Config) -> list[tuple[bool, str]]:
         (
             hover < most and tilt < limits.max_tilt_deg,
             f"limits.max_tilt_deg {limits.max_tilt_deg:g} does not fit limits.max_thrust "
-            f"{limits.max_thrust:g}: with thrust.hover_thrust {thrust.hover_thrust:g} it holds the "
-            f"height up to {tilt:.0f}°; {remedy}",
+            f"{limits.max_thrust:g}: with thrust.hover_thrust {thrust.hover_thrust:g} the "
+            f"vehicle holds its height only up to {tilt:.0f}°; {remedy}",
         )
     ]
 

@@ -31,9 +31,9 @@ _MOST_COLUMNS_SHOWN = 10
 
 
 class _Shape(Protocol):
-    """A section that describes a trajectory; paths in it are relative to `folder`."""
+    """A section that describes a trajectory."""
 
-    def trajectory(self, folder: Path) -> Trajectory: ...
+    def trajectory(self) -> Trajectory: ...
 
 
 class CsvShape(Section):
@@ -74,7 +74,7 @@ class CsvShape(Section):
             trajectory = from_samples(table, options, self.file.stem)
         except TrajectoryError as error:
             raise TrajectoryError(f"{path}: {error}") from error
-        return LoadedTrajectory(trajectory, _understood(path, frame, table.unused))
+        return LoadedTrajectory(trajectory, _table_notes(path, frame, table.unused))
 
     def _frame(self, named: str | None, path: Path) -> Frame | None:
         """The frame that this file or the table names; None if neither does."""
@@ -109,7 +109,7 @@ _AXES = {
 }
 
 
-def _understood(path: Path, frame: Frame | None, unused: tuple[str, ...]) -> tuple[str, ...]:
+def _table_notes(path: Path, frame: Frame | None, unused: tuple[str, ...]) -> tuple[str, ...]:
     """The frame of a table, with a remark if it is assumed, and the columns that are not read."""
     axes = f"{path.name} is read in s, m and rad with {_AXES[frame or Frame.ENU]}"
     if frame is None:
@@ -117,8 +117,8 @@ def _understood(path: Path, frame: Frame | None, unused: tuple[str, ...]) -> tup
             ", because it names no frame; to name one, write `# frame: ned` in its first line, or "
             "csv.frame in a YAML file that names it"
         )
-    left = f"{path.name}: these columns are not used: {', '.join(unused[:_MOST_COLUMNS_SHOWN])}"
-    return (axes, left) if unused else (axes,)
+    unread = f"{path.name}: these columns are not used: {', '.join(unused[:_MOST_COLUMNS_SHOWN])}"
+    return (axes, unread) if unused else (axes,)
 
 
 class TrajectoryFile(Section):
@@ -149,7 +149,7 @@ class TrajectoryFile(Section):
             return self.csv.read(folder)
         (name,) = self.model_fields_set
         shape: _Shape = getattr(self, name)
-        return LoadedTrajectory(shape.trajectory(folder))
+        return LoadedTrajectory(shape.trajectory())
 
 
 def is_table(path: Path) -> bool:
@@ -180,7 +180,7 @@ def read(path: Path) -> LoadedTrajectory:
                 if is_table(path)
                 else yaml_file.load(path, TrajectoryFile).read(path.parent)
             )
-            loaded.trajectory.check_times()
+            loaded.trajectory.check_times()  # may overflow too
             return loaded
     except TrajectoryError as error:
         named = is_table(path) and str(error).startswith(str(path))  # a table's errors name it

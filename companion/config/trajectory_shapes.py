@@ -1,7 +1,6 @@
 """The built-in trajectory shapes, as sections of a YAML file."""
 
 from math import radians
-from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -37,7 +36,7 @@ class HoverShape(Section):
     duration_s: Annotated[float, Field(ge=0.01, le=LONGEST)]
     """Duration."""
 
-    def trajectory(self, folder: Path) -> Trajectory:
+    def trajectory(self) -> Trajectory:
         """The trajectory of this shape."""
         return Hover(self.duration_s)
 
@@ -56,13 +55,13 @@ class LineShape(Section):
     heading: FixedOrAlong = "fixed"
     """fixed: the heading at the start. along: facing along the path."""
 
-    def trajectory(self, folder: Path) -> Trajectory:
+    def trajectory(self) -> Trajectory:
         """The trajectory of this shape."""
         along = self.heading == "along"
         return line(self.to_m, self.speed_m_s, self.acceleration_m_s2, self.jerk_m_s3, along)
 
 
-class _Rounds(Section):
+class _LapShape(Section):
     """Keys of all shapes with laps."""
 
     laps: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
@@ -81,7 +80,7 @@ class _Rounds(Section):
         return Laps(speed, self.laps, self.acceleration_m_s2, direction, along)
 
 
-class CircleShape(_Rounds):
+class CircleShape(_LapShape):
     """A circle, anticlockwise from above; it begins and ends where the vehicle is."""
 
     radius_m: Metres
@@ -89,7 +88,7 @@ class CircleShape(_Rounds):
     speed_m_s: Speed
     """Speed along the path after acceleration."""
 
-    def trajectory(self, folder: Path) -> Trajectory:
+    def trajectory(self) -> Trajectory:
         """The trajectory of this shape."""
         return circle(self.radius_m, self._laps(self.speed_m_s))
 
@@ -100,12 +99,12 @@ class HelixShape(CircleShape):
     rise_m: Annotated[float, Field(ge=-1000.0, le=1000.0)]
     """Climb in each lap; negative: descent."""
 
-    def trajectory(self, folder: Path) -> Trajectory:
+    def trajectory(self) -> Trajectory:
         """The trajectory of this shape."""
         return helix(self.radius_m, self.rise_m, self._laps(self.speed_m_s))
 
 
-class FigureEightShape(_Rounds):
+class FigureEightShape(_LapShape):
     """A figure-eight about the start, its long side along direction_deg."""
 
     half_width_m: Metres
@@ -116,7 +115,7 @@ class FigureEightShape(_Rounds):
     """gerono: (A sin φ, A sin φ cos φ). bernoulli: the same over 1 + cos² φ, with rounder loops.
     φ increases at a constant rate."""
 
-    def trajectory(self, folder: Path) -> Trajectory:
+    def trajectory(self) -> Trajectory:
         """The trajectory of this shape."""
         eight = gerono_eight if self.shape == "gerono" else bernoulli_eight
         return eight(self.half_width_m, self._laps(self.peak_speed_m_s))
@@ -142,7 +141,7 @@ class WaypointsShape(Section):
             raise ValueError("give either heading or headings_deg")
         return self
 
-    def trajectory(self, folder: Path) -> Trajectory:
+    def trajectory(self) -> Trajectory:
         """The trajectory of this shape."""
         headings = [None if h is None else radians(h) for h in self.headings_deg or ()]
         along = self.heading == "along"

@@ -1,10 +1,38 @@
-"""The only place that converts the units of YAML keys to SI."""
+"""The units of YAML keys: their names, and the only place that converts them to SI."""
 
 from collections.abc import Callable
 from math import radians
 from typing import Any, Self, overload
 
 Conversion = Callable[[float], float]
+
+
+_UNITS = {
+    "_deg_s2": "°/s²",
+    "_rad_s": "rad/s",
+    "_deg_s": "°/s",
+    "_m_s3": "m/s³",
+    "_m_s2": "m/s²",
+    "_m_s": "m/s",
+    "_per_s4": "1/s⁴",
+    "_per_s2": "1/s²",
+    "_per_s": "1/s",
+    "_per_m": "1/m",
+    "_percent": "%",
+    "_deg": "°",
+    "_rad": "rad",
+    "_kg": "kg",
+    "_hz": "Hz",
+    "_ms": "ms",
+    "_m": "m",
+    "_s": "s",
+}
+"""Unit by suffix of a key; the first suffix that fits is used."""
+
+
+def unit_of(name: str) -> str:
+    """The unit of a key or a measured figure, from its suffix; empty without a unit."""
+    return next((unit for end, unit in _UNITS.items() if name.endswith(end)), "")
 
 
 def seconds(milliseconds: float) -> float:

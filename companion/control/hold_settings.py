@@ -73,10 +73,17 @@ def _hold_quickness(config: Config) -> float:
     A rate loop that slews slowly is late only in large motions. After one, a stiff hold would
     oscillate without end, as on the ArduPilot mock at 200 °/s.
     """
-    limits = config.vehicle.axes["roll"], config.vehicle.axes["pitch"]
-    slews = [axis.acceleration_limit for axis in limits if axis.acceleration_limit is not None]
-    slewing = config.limits.max_tilt_rate / min(slews) if slews else 0.0
-    return _quickness(_lateness(config) + 0.5 * slewing, _HOLD_RANGE)
+    return _quickness(_lateness(config) + slewing_delay(config), _HOLD_RANGE)
+
+
+def slewing_delay(config: Config) -> float:
+    """Delay of the rate loop while it slews to the largest roll-pitch rate: half that time, s.
+
+    It is 0 without a known slew limit.
+    """
+    axes = config.vehicle.axes["roll"], config.vehicle.axes["pitch"]
+    slews = [axis.acceleration_limit for axis in axes if axis.acceleration_limit is not None]
+    return 0.5 * config.limits.max_tilt_rate / min(slews) if slews else 0.0
 
 
 def _lateness(config: Config) -> float:

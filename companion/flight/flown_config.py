@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.config import Config
-from companion.config.files import FILES_READ
+from companion.config.files import FILE_KEYS
 from companion.config.known_drag import KnownDrag
 from companion.config.trajectory_file import TrajectoryFile, is_table
 from companion.files import bounded_yaml, yaml_file
@@ -38,7 +38,7 @@ def record(config: Config, folder: Path, *, follows: bool = True) -> None:
         OSError: a file cannot be read or written.
     """
     data = config.model_dump(mode="json")
-    for place in FILES_READ:
+    for place in FILE_KEYS:
         _make_absolute(data, place)
     path = config.flight.trajectory
     if follows and path is not None and "trajectory" in config.flight.maneuvers:

@@ -176,6 +176,6 @@ def fit_rate_response(
         found.span,
         found.excited,
     )
-    nearer = found.second_order
-    gain_found = found.gain if nearer is None else nearer.gain
-    return RateResponse(found.dead_time, found.lag, gain_found, found.slew, quality, nearer)
+    second_order = found.second_order
+    gain_found = found.gain if second_order is None else second_order.gain
+    return RateResponse(found.dead_time, found.lag, gain_found, found.slew, quality, second_order)

@@ -55,8 +55,8 @@ def identify_vehicle(setpoints: Rows, rates: Rows, specific_thrust: Rows) -> Ide
     a loop of another order or gain, they are the best approximation.
 
     Args:
-        setpoints: (n, 5), setpoints that the vehicle obeyed: vehicle time of the sample to which
-            the setpoint responds in s, roll, pitch and yaw rate in rad/s, normalised thrust.
+        setpoints: (n, 5), setpoints that controlled the vehicle: vehicle time of the sample to
+            which the setpoint responds in s, roll, pitch and yaw rate in rad/s, normalised thrust.
         rates: (m, 4), vehicle time in s, measured roll, pitch and yaw rate in rad/s.
         specific_thrust: (k, 2), vehicle time in s, m/s²; may be empty.
 
@@ -94,12 +94,12 @@ def vehicle_table(vehicle: IdentifiedVehicle, gravity: float) -> RenderableType:
         table.add_column(column, justify="right")
     for name, response in vehicle.axes.items():
         table.add_row(name, *_cells(response))
-    nearer = [
+    second_order = [
         Text(f"{name}: clearly better: {response.second_order.described}")
         for name, response in vehicle.axes.items()
         if response.second_order is not None
     ]
-    return Group(table, *nearer, Text(_thrust_line(vehicle.thrust, gravity)))
+    return Group(table, *second_order, Text(_thrust_line(vehicle.thrust, gravity)))
 
 
 def _cells(response: RateResponse) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from companion.nmpc.model import (
 from companion.nmpc.reference import Node
 from companion.nmpc.settings import Settings
 
-_LEAST_SQUARE = 0.01
+_SMALLEST_COS_SQUARED = 0.01
 """Lower bound of cos²(tilt) in the prediction, since a Newton step may tilt beyond 90°."""
 _SIDE_PAIRS = 6
 """Number of pairs of opposite sides of the polygon that approximates a disc: a corner each 30°."""
@@ -133,7 +133,7 @@ def _tilt_rate(c: ca.SX, speed: ca.SX) -> ca.SX:
 
 
 def _cos_tilt(c: ca.SX) -> ca.SX:
-    return ca.sqrt(ca.fmax(1.0 - ca.sumsqr(c), _LEAST_SQUARE))
+    return ca.sqrt(ca.fmax(1.0 - ca.sumsqr(c), _SMALLEST_COS_SQUARED))
 
 
 def _polygon_terms(vector: ca.SX, radius: Any) -> ca.SX:

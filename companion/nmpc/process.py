@@ -26,7 +26,7 @@ from companion.nmpc.messages import READY, Answer, Request, Status, pack_request
 from companion.nmpc.settings import Settings
 from companion.realtime import schedule_as_usual
 
-_LARGEST_MESSAGE = 4096
+_LARGEST_MESSAGE = 4096  # bytes
 _EXIT_TIME = 0.02
 """Time allowed for the process to exit after its socket has closed, s; it usually takes < 1 ms."""
 _TOLERANCE = 0.02

@@ -73,11 +73,12 @@ def node_of(
         disturbance: w, acceleration by wind and other unmodelled forces, m/s².
     """
     velocity, acceleration, jerk = sample.velocity, sample.acceleration, sample.jerk
-    slowed, growing = drag.deceleration(velocity), drag.growth(velocity, acceleration)
+    slowed, growing = drag.deceleration(velocity), drag.deceleration_rate(velocity, acceleration)
     heading = nearby_heading + wrap_angle(start.turned + sample.heading - nearby_heading)
     along_axes = AxisDrag(axis_drag, heading)
     more = *along_axes.deceleration(*velocity[:2]), 0.0
-    growing_more = *along_axes.growth(velocity[:2], acceleration[:2], sample.heading_rate), 0.0
+    turn = sample.heading_rate
+    growing_more = *along_axes.deceleration_rate(velocity[:2], acceleration[:2], turn), 0.0
     f_n, f_e, f_d = (acceleration[i] + slowed[i] + more[i] - disturbance[i] for i in range(3))
     f_d = min(f_d - gravity, -_LEAST_LIFT * gravity)
     d_n, d_e, d_d = (jerk[i] + growing[i] + growing_more[i] for i in range(3))

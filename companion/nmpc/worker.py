@@ -34,7 +34,7 @@ from companion.nmpc.settings import Settings
 
 _WARM_UP = 5
 """Number of solves before the first request, which fill caches and allocate memory."""
-_LARGEST_MESSAGE = 65536
+_LARGEST_MESSAGE = 65536  # bytes
 
 
 class Worker:
@@ -130,7 +130,7 @@ def _no_answer(request: Request, status: Status, use: float, seconds: float) -> 
 
 
 def main() -> None:
-    """Answer the newest request, time and again, until the socket is closed."""
+    """Answer the newest request, again and again, until the socket is closed."""
     # Ctrl-C reaches this process too, but the flight handles it and then closes the socket.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     connection = socket.socket(fileno=int(sys.argv[1]))

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from companion.attitude.planner import FIRST_ORDER
 from companion.config import Config
-from companion.config.doubts import doubts
 from companion.config.guidance import AUTO
+from companion.config.suspect_values import suspect_values
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
 from companion.recording.measurements.dead_time import AxisDeadTime, DeadTimes
@@ -73,9 +73,9 @@ def dead_time(config: Config, evidence: Evidence) -> Iterator[Finding]:
 
 def doubtful_values(config: Config, _: Evidence) -> Iterator[Finding]:
     """Values that are probably a mistake, or not measured on this vehicle."""
-    for doubt in doubts(config):
-        key = doubt.key if doubt.key in (Key.IDENTIFIED, Key.BODY_RATE) else Key.UNITS
-        yield Finding(key, INEFFECTIVE, doubt.found, doubt.because, doubt.fix, doubt.key)
+    for value in suspect_values(config):
+        key = value.key if value.key in (Key.IDENTIFIED, Key.BODY_RATE) else Key.UNITS
+        yield Finding(key, INEFFECTIVE, value.found, value.because, value.fix, value.key)
 
 
 def tilt_compensation(config: Config, evidence: Evidence) -> Iterator[Finding]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from companion.config import Config
 from companion.config.files import load
-from companion.config.reference import Key, differences
+from companion.config.reference import ConfigKey, changed_keys
 from companion.files.yaml_file import ConfigError
 from companion.recording.flight_record import FlightRecord, read_flight
 from companion.recording.history import Span
@@ -67,7 +67,7 @@ class FlightData:
     modes: tuple[Span, ...] = ()
     maneuvers: tuple[Span, ...] = ()
     events: tuple[Event, ...] = ()
-    differences: tuple[Key, ...] | None = None
+    differences: tuple[ConfigKey, ...] | None = None
     runs: list[StepRun] = field(default_factory=list)
     gain: float = float("nan")
     end: EndMark | None = None
@@ -97,7 +97,7 @@ def recorded(folder: Path) -> FlightData:
         phases=phases,
         maneuvers=_maneuvers(record, phases),
         events=tuple(each for each in record.events if each.source != "phase"),
-        differences=None if config is None else tuple(differences(config)),
+        differences=None if config is None else tuple(changed_keys(config)),
         runs=step_runs(trace_of(record).response_rows()),
         gain=float(record.metadata["flight"].get("gain_per_s", "nan")),
         end=early_end(figures, record, config),

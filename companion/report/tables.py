@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from companion.config.reference import Key
+from companion.config.reference import ConfigKey
 from companion.report.flight_data import FlightData
 
 _EMPTY = "–"
@@ -104,7 +104,7 @@ def comparison_tables(flights: Sequence[FlightData]) -> list[Table]:
     return [table for table in tables if table.rows]
 
 
-def _compared(key: Key) -> tuple[str, str]:
+def _compared(key: ConfigKey) -> tuple[str, str]:
     """Value and default of a key; for an endpoint without its port, which `demo` varies."""
     value, default = _value(key.value), _value(key.default)
     if key.name != "endpoint":

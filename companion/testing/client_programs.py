@@ -10,10 +10,11 @@ from companion.mavlink.framing import FrameScanner
 from companion.mavlink.messages import CRC_EXTRA, Message, dialect
 from companion.serve.network.client import Client
 from companion.serve.session import ServeSession
-from companion.testing.flying import Configuration, environment, in_memory, known
+from companion.testing.flying import Configuration, as_config, environment, in_memory
 from companion.testing.vehicle import MockVehicle
 
 _LOOK_PERIOD = 0.02
+"""Period of the checks while `serving` and `Program.hears` wait, s of vehicle time."""
 
 
 @asynccontextmanager
@@ -40,8 +41,10 @@ async def serving(
         EndpointError, LinkError, SigningError: see `ServeSession.run`.
         RuntimeError: the session ended before its network was open.
     """
-    here = changed(in_memory(known(config), vehicle), {"serve": {"clients": ()}}, "the test")
-    session = ServeSession(here, note, None, environment, folder)
+    served_config = changed(
+        in_memory(as_config(config), vehicle), {"serve": {"clients": ()}}, "the test"
+    )
+    session = ServeSession(served_config, note, None, environment, folder)
     running = asyncio.ensure_future(session.run())
     try:
         while session.network is None:

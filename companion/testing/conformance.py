@@ -23,8 +23,8 @@ from companion.testing.flying import fly
 from companion.testing.vehicle import MockVehicle
 
 _LIMITS = Limits(max_tilt=radians(40.0), max_tilt_rate=radians(200.0), max_yaw_rate=radians(90.0))
-_GAIN = 5.0
-_DT = 0.004
+_GAIN = 5.0  # 1/s
+_DT = 0.004  # s
 _CASES = 200
 _SETTLING_TIME = 3.0
 """Time allowed for a step, s: 15 time constants of `_GAIN`."""

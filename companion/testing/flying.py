@@ -89,11 +89,11 @@ def session(
     Raises:
         ConfigError: the configuration is wrong.
     """
-    whole = in_memory(known(config), vehicle)
+    flown_config = in_memory(as_config(config), vehicle)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
     return Session(
-        whole,
+        flown_config,
         folder,
         observer or SilentObserver(),
         ask_landing or decline_landing,
@@ -148,8 +148,8 @@ async def connect(
         ConfigError: the configuration is wrong.
         FlightEnded, LinkError, OSError: see `companion.connect`.
     """
-    whole = in_memory(known(config), vehicle)
-    async with flying(whole, folder, observer, environment) as connected:
+    flown_config = in_memory(as_config(config), vehicle)
+    async with flying(flown_config, folder, observer, environment) as connected:
         yield connected
 
 
@@ -166,8 +166,8 @@ def in_memory(config: Config, vehicle: MockVehicle) -> Config:
     return config
 
 
-def known(config: Configuration) -> Config:
-    """The configuration that a test names.
+def as_config(config: Configuration) -> Config:
+    """The configuration, complete.
 
     Raises:
         ConfigError: the configuration is wrong.

@@ -52,6 +52,6 @@ def _put(section: dict[str, Any], path: list[str], value: Any) -> None:
         inner = section.get(name)
         if name in section and not isinstance(inner, dict):
             where = ".".join(["mock", *path[: depth + 1]])
-            raise ConfigError(f"{where} is {inner!r:.40}, so mock.{'.'.join(path)} has no place")
+            raise ConfigError(f"{where} is {inner!r:.40}, so there is no mock.{'.'.join(path)}")
         section = section.setdefault(name, {})
     section[path[-1]] = value

@@ -91,7 +91,7 @@ class MockVehicle:
         self.settings = known
         self._simulation = Simulation(known, plant=_plant(compiled))
         self._exchange = Exchange(known, self._simulation)
-        self._exchange.on_message = self._note
+        self._exchange.on_message = self._record_setpoint
         self._arrived: list[Arrived] = []
         self._begun = False
 
@@ -234,7 +234,7 @@ class MockVehicle:
         relay = self.to_companion
         return datagrams if relay is None else [out for one in datagrams for out in relay(one)]
 
-    def _note(self, message: Any) -> None:
+    def _record_setpoint(self, message: Any) -> None:
         setpoint = received_setpoint(message, self.time)
         if setpoint is not None:
             self.setpoints.append(setpoint)

@@ -117,14 +117,15 @@ class FreeWire(Wire):
         super().__init__(vehicle, clock)
         self._delay = vehicle.delay_s
         self._burst = vehicle.settings.burst_ms * 1e-3
-        # All datagrams need the same time, so they arrive in the order of sending.
+        # (arrival, s; whether to the program; datagram). All take the same time, so the order of
+        # sending is that of arrival.
         self._under_way: deque[tuple[float, bool, bytes]] = deque()
-        self._slipped = clock.now - vehicle.time
+        self._slipped = clock.now - vehicle.time  # of the vehicle behind the clock, s
         vehicle.set_clock(lambda: round((clock.now - self._slipped) * 1e9))
 
     def deliver_due(self) -> None:
         """Deliver what arrives at the present time, in the order of sending."""
-        self._reached_program()
+        self._deliver_due()
 
     def advance(self, until: float) -> None:
         """Advance until something reaches the program, but at most to `until`."""
@@ -133,20 +134,20 @@ class FreeWire(Wire):
         while True:
             arrival = under_way[0][0] if under_way else step_at
             clock.now = max(clock.now, min(until, arrival, step_at))
-            reached = clock.now >= arrival and self._reached_program()
+            reached = clock.now >= arrival and self._deliver_due()
             if clock.now >= step_at:
                 self._send(self._vehicle.begin())
                 self._send(self._vehicle.step())
                 self._slipped += self._vehicle.take_slip()
                 step_at = self._next_step_at()
-                reached = self._reached_program() or reached
+                reached = self._deliver_due() or reached
             if reached or clock.now >= until:
                 return
 
     def _next_step_at(self) -> float:
         return in_burst(self._vehicle.next_step_at, self._burst) + self._slipped
 
-    def _reached_program(self) -> bool:
+    def _deliver_due(self) -> bool:
         """Deliver what is due; return whether the program received something."""
         under_way, now, reached = self._under_way, self._clock.now, False
         while under_way and under_way[0][0] <= now:

@@ -135,8 +135,10 @@ def expected_errors(loop: Loop, disturbances: Disturbances, period: float) -> Er
         sqrt(sum(2.0 * _variance(omega, response[0], density) for response, density in part))
         for part in parts
     )
-    turned = sum(2.0 * _variance(omega, r[1], density) for part in parts for r, density in part)
-    return Errors(by_gusts, on_path, by_noise, sqrt(turned))
+    rate_variance = sum(
+        2.0 * _variance(omega, r[1], density) for part in parts for r, density in part
+    )
+    return Errors(by_gusts, on_path, by_noise, sqrt(rate_variance))
 
 
 def _slow(omega: Floats, deviation: float, time: float) -> Floats:

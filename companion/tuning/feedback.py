@@ -70,8 +70,8 @@ def guidance_feedback(
         speed_then = speed + (age + ahead) * (disturbance + known)
         span = age + ahead
         place_then = place + span * speed + 0.5 * span * span * (disturbance + known)
-        pull = max(known, 0.0)  # the measured velocity enters by the observed one
-        acceleration = pull - drag * speed_now + disturbance
+        by_tilt = max(known, 0.0)  # drag acts on the observed velocity, not on the measured one
+        acceleration = by_tilt - drag * speed_now + disturbance
         gains = guidance.gains
         wanted = (
             gains.position * place_then

@@ -18,7 +18,7 @@ _Rows = np.ndarray[Any, np.dtype[np.float64]]
 GUSTS: Mapping[str, float] = {"speed_m_s": 3.0, "gust_m_s": 1.0}
 """Wind of the flights in gusts, m/s: mean and standard deviation."""
 _MAX_THRUST = 0.95
-_FENCE = 50.0
+_FENCE = 50.0  # m
 _WIRE_S = 0.0005
 """Delay of each datagram between program and mock vehicle, s."""
 _TRUTH_EVERY = 5
@@ -53,7 +53,7 @@ COURSES = (CIRCLE, EIGHT, CIRCLE_IN_GUSTS, EIGHT_IN_GUSTS)
 
 
 @dataclass(frozen=True, slots=True)
-class Flown:
+class CourseResult:
     """Tracking of a course; NaN if the flight failed.
 
     Attributes:
@@ -86,7 +86,7 @@ def autopilot_like(config: Config) -> str:
     return "px4" if slews[0] is None else "ardupilot"
 
 
-def flown(config: Config, course: Course, autopilot: str, seed: int = 3) -> Flown:
+def fly_course(config: Config, course: Course, autopilot: str, seed: int = 3) -> CourseResult:
     """Fly a course on the mock vehicle, with this configuration's gains and vehicle times.
 
     Limits of tilt and tilt rate are the configured ones: a course that needs more is slowed down.
@@ -113,17 +113,19 @@ def flown(config: Config, course: Course, autopilot: str, seed: int = 3) -> Flow
         wind=dict(course.wind),
         parameters={**parameters, **_QUICK[autopilot]},
     )
-    flown_config = _configured(config, course, mock)
+    flown_config = _flight_config(config, course, mock)
     with _truth(vehicle) as rows:
         summary = fly(flown_config, vehicle)
     if summary.result == LEFT_BY_USER:
         raise KeyboardInterrupt
     if summary.result != "ok":
-        return Flown(summary.result)
+        return CourseResult(summary.result)
     return _tracking(summary.trace.tracking_rows(), np.array(rows), vehicle, flown_config)
 
 
-def _tracking(tracking: _Rows, truth: _Rows, vehicle: MockVehicle, flown_config: Config) -> Flown:
+def _tracking(
+    tracking: _Rows, truth: _Rows, vehicle: MockVehicle, flown_config: Config
+) -> CourseResult:
     """How a course was tracked while its reference moved.
 
     Args:
@@ -143,7 +145,7 @@ def _tracking(tracking: _Rows, truth: _Rows, vehicle: MockVehicle, flown_config:
         if time[moving[0]] <= each.time <= time[moving[-1]]
     ]
     rates, limit = np.array(during), flown_config.limits.max_tilt_rate
-    return Flown(
+    return CourseResult(
         "ok",
         _rms(tracking[part, 4:6] - reference[part]),
         _rms(true[part] - reference[part]),
@@ -176,7 +178,7 @@ def _truth(vehicle: MockVehicle) -> Iterator[list[tuple[float, float, float]]]:
     vehicle.after_step.remove(note)
 
 
-def _configured(config: Config, course: Course, mock: Config) -> Config:
+def _flight_config(config: Config, course: Course, mock: Config) -> Config:
     """The configuration for a flight of the mock vehicle."""
     return changed(
         config,

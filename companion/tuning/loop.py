@@ -111,7 +111,7 @@ def control_loop(config: Config, s: Complex, error: ModelError = EXACT) -> Loop:
         )
     guidance, drag = linear_settings(config), drag_prior(config).drag.linear
     forward, back = _planner(config, s)
-    axis, times = _believed(config), error.time_factor
+    axis, times = _slower_axis(config), error.time_factor
     late = np.exp(-s * (times * axis.dead_time + error.delay))
     rates = error.gain * late / (1.0 + times * s * (axis.lag + times * s * axis.square)) / s
     held = hold_element(s, 1.0 / config.link.attitude_rate_hz)
@@ -136,7 +136,7 @@ def control_loop(config: Config, s: Complex, error: ModelError = EXACT) -> Loop:
     )
 
 
-def _believed(config: Config) -> AxisResponse:
+def _slower_axis(config: Config) -> AxisResponse:
     """The configured response of the slower of roll and pitch; a usual one if there is none."""
     if not config.vehicle.known:
         return AxisResponse(_USUAL_LAG, _USUAL_DEAD_TIME)
@@ -156,7 +156,7 @@ def _planner(config: Config, s: Complex) -> tuple[Complex, float]:
     gain = config.planner.gain_per_s
     if config.planner_name != MODEL_FOLLOWING:
         return np.full_like(s, gain), gain
-    axis = _believed(config)
+    axis = _slower_axis(config)
     back, slowest = feedback_gain(gain, axis), model_lag(gain, axis.lag)
     braking = 1.0 + gain * braking_lead(gain, slowest)
     model = gain / (s * (braking + s * (slowest + s * axis.square)) + gain)

@@ -48,9 +48,11 @@ def measured_disturbances(log: Path, drag: float, usual: Disturbances) -> Distur
     mean_slope = np.diff(_integral(time, slopes), axis=0) / step
     mean_speed = 0.5 * (speed[1:] + speed[:-1])
     unexplained_speed = np.diff(place, axis=0) / step - mean_speed
-    pushed = np.diff(speed, axis=0) / step - GRAVITY * mean_slope + drag * mean_speed
+    unexplained_acceleration = (
+        np.diff(speed, axis=0) / step - GRAVITY * mean_slope + drag * mean_speed
+    )
     wander, place_noise = _densities(time[1:], unexplained_speed)
-    shake, speed_noise = _densities(time[1:], pushed)
+    shake, speed_noise = _densities(time[1:], unexplained_acceleration)
     if not np.isfinite([wander, shake]).all():
         return usual
     return replace(
@@ -64,7 +66,10 @@ def measured_disturbances(log: Path, drag: float, usual: Disturbances) -> Distur
 
 
 def _telemetry(log: Path) -> tuple[Floats, Floats]:
-    """Motion (n, 5): time, north, east, velocities; and slopes (m, 3): time, north, east."""
+    """Motion (n, 5): time, position and velocity north and east; slopes (m, 3): time, north, east.
+
+    A slope is the horizontal part of the thrust over its vertical part.
+    """
     vehicle: tuple[int, int] | None = None
     motion: list[tuple[float, ...]] = []
     slopes: list[tuple[float, ...]] = []

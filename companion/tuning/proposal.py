@@ -9,7 +9,7 @@ from companion.files.yaml_file import ConfigError
 from companion.tuning.expectation import Disturbances, Expectation, expectation, stability
 from companion.tuning.loop import ModelError
 from companion.tuning.margins import Margins
-from companion.tuning.search import Aims, Design, errors_to_bear, searched
+from companion.tuning.search import Aims, Design, errors_to_tolerate, search
 
 _ANALYSED = ("hover",)
 """The analysis assumes a hover: a configuration for `identify` would be analysed with low gains."""
@@ -94,7 +94,7 @@ def propose(
     untuned = config.model_copy(update={"flight": flight})
     before = expectation(untuned, disturbances)
     known = changed(untuned, {"vehicle": dict(vehicle)}, "the vehicle") if vehicle else untuned
-    design = searched(known, disturbances, aims)
+    design = search(known, disturbances, aims)
     tuned = design.applied(known)
     after = expectation(tuned, disturbances)
     found = after.margins
@@ -107,7 +107,7 @@ def propose(
             f"no values keep {aims.gain_db:g} dB and {aims.phase_deg:g}° of margin with this "
             "vehicle; check vehicle.lag_ms and vehicle.dead_time_ms"
         )
-    errors = tuple((error, stability(tuned, error)) for error in errors_to_bear(tuned, aims))
+    errors = tuple((error, stability(tuned, error)) for error in errors_to_tolerate(tuned, aims))
     return Proposal(
         untuned, tuned, design, vehicle or {}, before, after, errors, disturbances, aims
     )

@@ -6,7 +6,7 @@ from math import exp, inf, log
 from typing import NamedTuple
 
 from companion.config import Config
-from companion.control.hold_settings import attitude_delay
+from companion.control.hold_settings import attitude_delay, slewing_delay
 from companion.control.inner_loop import sensible_gain
 from companion.tuning.expectation import Disturbances, expected_errors
 from companion.tuning.loop import ModelError, control_loop
@@ -91,17 +91,6 @@ Without any, a figure-eight in gusts could swing by more than 1 m on the mock ve
 """
 
 
-def slewing_delay(config: Config) -> float:
-    """Additional delay of the rate loop while it slews to the largest roll-pitch rate, s.
-
-    It is half the time for which the rate loop slews, as in `hold_settings.hold_weights`.
-    """
-    axes = config.vehicle.axes
-    slews = [axes[name].acceleration_limit for name in ("roll", "pitch")]
-    known = [slew for slew in slews if slew is not None]
-    return 0.5 * config.limits.max_tilt_rate / min(known) if known else 0.0
-
-
 def largest_gain(config: Config) -> float:
     """The largest sensible planner gain, as in `companion check-config`, but at most 20, 1/s."""
     return min(_LARGEST.gain, sensible_gain(config))
@@ -114,7 +103,7 @@ def largest_design(config: Config) -> Design:
     return _LARGEST._replace(gain=largest_gain(config), bandwidth=bandwidth)
 
 
-def searched(config: Config, disturbances: Disturbances, aims: Aims) -> Design:
+def search(config: Config, disturbances: Disturbances, aims: Aims) -> Design:
     """The design with the smallest cost (expected error, missed aims), by a pattern search.
 
     Args:
@@ -148,7 +137,7 @@ def _improved(
 
 
 def _starts(config: Config) -> Iterator[Design]:
-    """Designs near the program's rule (`hold_settings.hold_weights`) for a delay of any length.
+    """Designs near the program's rule (`hold_settings.hold_weights`), which scale with the delay.
 
     Their velocity weights are lower and their observers quicker than by this rule. The pattern
     search finds only the nearest minimum, so it has three starts.
@@ -192,7 +181,7 @@ def _cost(
     missed = _missed(exact, aims.gain_db, aims.phase_deg)
     missed += max(0.0, 3.0 * expected.rate / (aims.rate_share * config.limits.max_tilt_rate) - 1.0)
     cost = log(expected.position) + _PENALTY * missed
-    for error in errors_to_bear(tried, aims):
+    for error in errors_to_tolerate(tried, aims):
         if cost >= most:
             break
         loop = control_loop(tried, s, error)
@@ -202,7 +191,7 @@ def _cost(
     return cost
 
 
-def errors_to_bear(config: Config, aims: Aims) -> list[ModelError]:
+def errors_to_tolerate(config: Config, aims: Aims) -> list[ModelError]:
     """Errors of the vehicle's times for which the loop must keep margins; see `Aims`."""
     errors = [ModelError(time_factor=each) for each in (aims.mismatch, 1.0 / aims.mismatch)]
     delay = slewing_delay(config)

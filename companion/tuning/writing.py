@@ -5,16 +5,16 @@ from math import degrees
 from pathlib import Path
 from typing import Any
 
-from companion.control.hold_settings import disturbance_bandwidth, hold_weights
+from companion.control.hold_settings import disturbance_bandwidth, hold_weights, slewing_delay
 from companion.control.inner_loop import LARGEST_PRODUCT, sensible_gain
 from companion.files import bounded_yaml
 from companion.tuning.expectation import Expectation
-from companion.tuning.flights import Flown
+from companion.tuning.flights import CourseResult
 from companion.tuning.loop import ModelError
 from companion.tuning.proposal import Proposal
-from companion.tuning.search import largest_gain, slewing_delay
+from companion.tuning.search import largest_gain
 
-Flights = Mapping[str, tuple[Flown, Flown]]
+Flights = Mapping[str, tuple[CourseResult, CourseResult]]
 """Flights before and with the proposal, by the name of the course."""
 
 
@@ -40,7 +40,7 @@ def proposal_text(
     reasons = _reasons(proposal)
     for section, keys in proposal.changes.items():
         if section == "vehicle" and not included:
-            continue  # it stands above
+            continue  # written above
         lines += ["", f"{section}:"]
         for key, value in keys.items():
             lines += [f"  # {reasons[key]}", f"  {key}: {value:g}"]
@@ -64,7 +64,7 @@ def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
     used = 3.0 * degrees(after.errors.rate)
     lines.append(
         f"cost: these disturbances command up to {used:.0f}°/s (3 standard deviations) of the "
-        f"{limit:.0f}°/s that limits.max_tilt_rate_deg_s allows, before "
+        f"{limit:.0f}°/s that limits.max_tilt_rate_deg_s allows; before: "
         f"{3.0 * degrees(before.errors.rate):.0f}°/s"
     )
     if flights:
@@ -97,7 +97,7 @@ def _error(error: ModelError) -> str:
     return f"with lag and dead time {percent} % {change}"
 
 
-def _flight_line(name: str, before: Flown, after: Flown) -> str:
+def _flight_line(name: str, before: CourseResult, after: CourseResult) -> str:
     if not (before.ok and after.ok):
         return f"{name}: {before.result} -> {after.result}"
     return (
@@ -121,7 +121,8 @@ def _reasons(proposal: Proposal) -> dict[str, str]:
     elif slewing:
         why = (
             f"below {limit:.1f}, the largest sensible gain, because the rate loop needs "
-            f"{2e3 * slewing:.0f} ms to reach limits.max_tilt_rate_deg_s; after a change tune again"
+            f"{2e3 * slewing:.0f} ms to reach limits.max_tilt_rate_deg_s; tune again after "
+            "a change of that limit"
         )
     else:
         why = f"below {limit:.2f}, the largest sensible gain, for the margins"

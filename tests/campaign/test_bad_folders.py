@@ -79,7 +79,7 @@ def test_unknown_versions_are_other_versions(begun, capsys):
     path = out / "campaign.json"
     path.write_text(json.dumps({**json.loads(path.read_text()), "versions": {}}))
     assert main(["campaign", str(out)]) == 2
-    assert "was begun by another version: here is companion " in capsys.readouterr().err
+    assert "was begun by another version: this one has companion " in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -201,7 +201,7 @@ def test_a_case_flown_again_is_compared_with_its_row(begun, monkeypatch):
     assert not found.identical
     judged, version, differs = found.lines
     assert judged.endswith("not good: touchdown")
-    assert version.startswith("The campaign was flown by another version: here is numpy")
+    assert version.startswith("The campaign was flown by another version: this one has numpy")
     assert differs == "It differs from the campaign's flight in ok, failed_checks, digest."
 
 

@@ -189,15 +189,15 @@ def test_too_few_samples_are_said(tmp_path):
 
 
 def test_too_many_flights_are_refused_with_their_number_and_time(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(estimate, "measured", lambda _, cases: 2.0 * len(cases))
+    monkeypatch.setattr(estimate, "case_time", lambda _, cases: 2.0 * len(cases))
     path = written(tmp_path, samples=30_000, sweep={"limits.max_tilt_deg": [20, 30]})
     assert main(["campaign", str(path), "--workers", "3", "--out", str(tmp_path / "out")]) == 2
     said = capsys.readouterr().err
     # Only one of the cases was measured.
     assert "60000 flights, about 11 h with 3 workers, more than limits.max_cases allows" in said
-    assert "raise limits.max_cases, or say --yes" in said
+    assert "raise limits.max_cases, or add --yes" in said
     path = written(tmp_path, samples=1000, sweep={"limits.max_tilt_deg": [20, 30]})
-    monkeypatch.setattr(estimate, "measured", lambda *_: 60.0)
+    monkeypatch.setattr(estimate, "case_time", lambda *_: 60.0)
     assert main(["campaign", str(path), "--workers", "3", "--out", str(tmp_path / "out")]) == 2
     said = capsys.readouterr().err
     assert "2000 flights, about 11 h with 3 workers, more than limits.max_hours allows (4)" in said

@@ -170,7 +170,7 @@ def _refusals(file, out, capsys):
     told = json.loads(path.read_text())
     path.write_text(json.dumps({**told, "versions": {**told["versions"], "numpy": "1.0"}}))
     assert main(["campaign", str(out)]) == 2
-    assert "begun by another version: here is numpy" in capsys.readouterr().err
+    assert "begun by another version: this one has numpy" in capsys.readouterr().err
     with (
         folder.locked(out),
         pytest.raises(ConfigError, match="another process"),
@@ -205,7 +205,7 @@ def test_what_ends_a_run_early_loses_no_finished_unit(quick, threads, capsys, mo
     monkeypatch.setattr(store, "write_unit", store_write)
     assert main(["campaign", str(out)]) == 1  # all is flown, but the program failed in it
     said = capsys.readouterr().out
-    assert "1 of the flights failed by the program's own fault: internal error: oops" in said
+    assert "1 of the flights ended by an internal error: oops" in said
     assert store.read(out)["case"].to_pylist() == [0, 1, 2]
 
 

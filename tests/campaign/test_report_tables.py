@@ -10,7 +10,7 @@ import pytest
 
 from companion.campaign import outcomes
 from companion.campaign.case import Fault
-from companion.campaign.flight import _BeginFault, _ending
+from companion.campaign.flight import _ending, _FaultInjector
 from companion.campaign.report import page, plots, tables
 from companion.campaign.report.results import Results
 from companion.campaign.report.sensitivity import Influence, influences
@@ -182,7 +182,7 @@ class Vehicle:
 def test_a_fault_of_the_stream_begins_in_the_first_of_its_phases_once(phases):
     vehicle = Vehicle()
     fault = Fault("x", ({"kind": "gps_loss"},), "stream", 0.5, ("held",))
-    injector = _BeginFault(vehicle, fault)
+    injector = _FaultInjector(vehicle, fault)
     begun = []
     for phase in phases:
         injector.phase(phase, "")

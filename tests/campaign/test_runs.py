@@ -52,14 +52,14 @@ def test_a_unit_that_is_given_up_is_told_and_can_be_gone_on_with(
     assert f"3 flights; results in {out}\n" in told
     assert "not flown: unit 1 (cases 1 to 1): RuntimeError: [oops]\n" in told
     assert (
-        "1 units were given up; the results of 2 of 3 flights are kept. Go on with\n"
+        "1 units were given up; the results of 2 of 3 flights are kept. Continue with\n"
         f"  companion campaign '{out}' --scheduler tcp://192.0.2.1:8786\n"
     ) in told
     monkeypatch.setattr(unit, "fly_case", row_of)
     assert main(["campaign", str(out)]) == 0
     told = capsys.readouterr().out
     assert "3 of 3 flights were good.\n" in told
-    assert f"All are in {out};\n" in told
+    assert f"The results are in {out}. Write their report with\n" in told
     assert f"  companion campaign report '{out}'\n" in told
 
 
@@ -90,11 +90,11 @@ def test_cases_without_a_folder_come_back_in_order_or_not_at_all(
     tmp_path, dask, on_dask, monkeypatch
 ):
     cases = list(load(tmp_path, sweep=TILT).cases())
-    rows = engine.rows(dask, "flights", cases, 0.1)
+    rows = engine.run_on_cluster(dask, "flights", cases, 0.1)
     assert [row["case"] for row in rows] == [0, 1, 2]
     monkeypatch.setattr(unit, "fly_case", lambda _: 1 / 0)
     with pytest.raises(ClusterError, match="given up: ZeroDivisionError: division by zero"):
-        engine.rows(dask, "flights", cases, 0.1)
+        engine.run_on_cluster(dask, "flights", cases, 0.1)
 
 
 def test_endings_with_a_fault_are_counted(tmp_path, on_dask, monkeypatch, capsys):
@@ -110,7 +110,7 @@ def test_endings_with_a_fault_are_counted(tmp_path, on_dask, monkeypatch, capsys
 
 
 def test_more_cases_than_a_few_are_measured_and_shared_out(tmp_path, on_dask, monkeypatch, capsys):
-    monkeypatch.setattr(estimate, "measured", lambda *_: 0.5)
+    monkeypatch.setattr(estimate, "case_time", lambda *_: 0.5)
     file, out = written(tmp_path, sweep=TILT), tmp_path / "out"
     assert main(["campaign", str(file), "--out", str(out), "--workers", "1"]) == 0
     assert "3 flights, about 1.5 s with 1 worker; results in" in capsys.readouterr().out
@@ -132,12 +132,12 @@ def test_a_case_is_measured_by_some_cases_and_never_by_its_first_run(tmp_path, m
     monkeypatch.setattr(estimate, "perf_counter", lambda: now[0])
     cases = list(load(tmp_path, samples=3, sweep=TILT).cases())
     usual = cases[0].flight_s
-    assert estimate.measured("flights", cases) == 2.0
+    assert estimate.case_time("flights", cases) == 2.0
     assert ran == [[(0, 1.0)], [(0, usual), (4, usual), (8, usual)]]
     ran.clear()
     planners = {"planner.name": ["exact", "so3"]}
     cases = list(load(tmp_path, samples=100, sweep=planners).cases())
-    assert estimate.measured("batch", cases) == 2.0
+    assert estimate.case_time("batch", cases) == 2.0
     assert [index for index, _ in ran[0]] == list(range(0, 128, 2))
     assert ran[0] == ran[1]
 
@@ -262,11 +262,11 @@ def test_our_own_workers_ignore_ctrl_c_and_end_with_the_run():
         cluster.wait_for_workers(client)
         (ended,) = cluster.run_tasks(client, {7: (signal.pthread_sigmask, signal.SIG_BLOCK, [])})
         assert ended.number == 7
-        assert signal.SIGINT in ended.flown
+        assert signal.SIGINT in ended.result
         (ended,) = cluster.run_tasks(client, {8: (os.getpid,)})
-        assert ended.flown != os.getpid()
+        assert ended.result != os.getpid()
     with pytest.raises(ProcessLookupError):
-        os.kill(ended.flown, 0)
+        os.kill(ended.result, 0)
 
 
 def test_progress_counts_what_earlier_runs_flew(tmp_path, dask, on_dask, capsys):
@@ -284,7 +284,7 @@ def test_a_termination_waits_until_the_cluster_is_made():
     handled = []
     before = signal.signal(signal.SIGTERM, lambda *_: handled.append("ended"))
     try:
-        with cluster._terminations_later():
+        with cluster._termination_deferred():
             signal.raise_signal(signal.SIGTERM)
             assert handled == []
         assert handled == ["ended"]
@@ -296,7 +296,7 @@ def test_outside_the_main_thread_signals_are_left_alone():
     before, seen = signal.getsignal(signal.SIGTERM), []
 
     def work():
-        with cluster._terminations_later():
+        with cluster._termination_deferred():
             seen.append(signal.getsignal(signal.SIGTERM))
 
     thread = threading.Thread(target=work)

@@ -71,8 +71,8 @@ def test_a_search_without_a_good_candidate_says_what_to_widen(tmp_path, quick, c
 @pytest.mark.parametrize(
     ("error", "code", "said"),
     [
-        (KeyboardInterrupt(), 1, "interrupted; the candidates so far are kept. Go on with\n"),
-        (ClusterError("[x] lost"), 1, "[x] lost; the candidates so far are kept. Go on with\n"),
+        (KeyboardInterrupt(), 1, "interrupted; the candidates so far are kept. Continue with\n"),
+        (ClusterError("[x] lost"), 1, "[x] lost; the candidates so far are kept. Continue with\n"),
         (VersionError("the worker has another"), 2, "companion: the worker has another\n"),
     ],
 )

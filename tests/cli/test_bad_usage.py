@@ -134,8 +134,8 @@ def test_a_command_that_is_ended_by_a_signal_says_so(tmp_path, number):
 
 def test_nohup_keeps_a_flight_when_its_terminal_goes():
     code = (
-        "import signal; from companion.cli.signals import hang_up; from companion.cli import "
-        "interrupts; print(hang_up() == [], signal.SIGHUP in interrupts.unhandled())"
+        "import signal; from companion.cli.signals import hangup_signal; from companion.cli import "
+        "interrupts; print(hangup_signal() == [], signal.SIGHUP in interrupts.unhandled())"
     )
     done = subprocess.run(
         ["nohup", sys.executable, "-c", code],

@@ -10,11 +10,11 @@ import yaml
 from pydantic import BaseModel
 
 from companion.cli.main import main
-from companion.cli.tool_options import STARTS
+from companion.cli.tool_options import STARTING_FILES
 from companion.config import Config
 from companion.config.files import assigned, changed, json_schema, load
 from companion.config.flight import CircleConfig
-from companion.config.reference import differences
+from companion.config.reference import changed_keys, keys
 from companion.config.vehicle import VehicleConfig
 from companion.files.yaml_file import parse
 from sitl_mock.settings import MockSettings, load_settings
@@ -40,7 +40,7 @@ def test_a_shipped_configuration_is_right_and_short(path, capsys):
 def test_a_shipped_configuration_holds_only_what_differs(path):
     """But for the maneuvers, arming and what the vehicle's file says."""
     told = yaml.safe_load(path.read_text())
-    differ = {(key.section, key.name) for key in differences(load(path))}
+    differ = {(key.section, key.name) for key in changed_keys(load(path))}
     for section, values in told.items():
         if section not in ("include", "mock"):
             assert {(section, name) for name in values} <= differ, section
@@ -115,18 +115,24 @@ def test_one_key_or_one_section_is_printed(capsys):
     assert "did you mean limits.max_tilt_deg" in " ".join(capsys.readouterr().err.split())
 
 
+def test_a_key_whose_name_ends_in_a_unit_shows_it():
+    units = {key.name: key.unit for key in keys(Config())}
+    assert units["max_jerk_m_s3"] == "m/s³"
+    assert [name for name, unit in units.items() if name[-1].isdigit() and not unit] == []
+
+
 def test_the_page_of_the_configuration_is_the_one_that_is_printed(capsys):
     assert main(["config", "--markdown"]) == 0
     printed = capsys.readouterr().out
     assert printed in (DOCS / "configuration.md").read_text()
 
 
-@pytest.mark.parametrize("name", STARTS)
+@pytest.mark.parametrize("name", STARTING_FILES)
 def test_a_starting_file_can_be_checked_and_is_never_replaced(name, tmp_path, capsys):
     out = tmp_path / "mine.yaml"
     assert main(["init", name, "--out", str(out)]) == 0
     assert main(["check-config", str(out)]) == 0
-    shipped = load(CONFIGS / f"{STARTS[name]}.yaml")
+    shipped = load(CONFIGS / f"{STARTING_FILES[name]}.yaml")
     assert load(out).model_copy(update={"include": shipped.include}) == shipped
     before = out.read_text()
     assert main(["init", name, "--out", str(out)]) == 2

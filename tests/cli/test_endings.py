@@ -265,7 +265,7 @@ def test_a_flight_is_served_beside_its_helper(monkeypatch, tmp_path, beside):
     console = flying.FlightConsole(file=io.StringIO(), highlight=False)
     config = changed(Config(), {"recording": {"report": False}}, "a test")
     folder = tmp_path / "a [b]"
-    assert flying.fly(config, folder, console, beside=beside) is summary
+    assert flying.fly(config, folder, console, helper=beside) is summary
     flight = ("flight", session)
     assert ran == [flight if beside is None else ("beside", flight)]
     assert console.file.getvalue() == f"table\nRecorded in {folder}\nwords\n"
@@ -281,7 +281,7 @@ def test_serve_writes_pages_if_asked_to_and_tells_its_counters(
     session = SimpleNamespace(changes="changes", records=SimpleNamespace(on_recorded=None))
     monkeypatch.setattr(serving, "ServeSession", lambda *_: session)
     monkeypatch.setattr(serving, "_until_stopped", lambda *told: ("serving", told[0]))
-    monkeypatch.setattr(serving, "helper", lambda *_, **__: contextlib.nullcontext(beside))
+    monkeypatch.setattr(serving, "helper_process", lambda *_, **__: contextlib.nullcontext(beside))
     ran = []
     monkeypatch.setattr(serving.link_loop, "run", lambda work: (ran.append(work), {"in": 7})[1])
     config = tmp_path / "c.yaml"
@@ -318,7 +318,7 @@ def test_a_folder_that_this_user_cannot_write_is_refused_before_the_flight(monke
 def test_an_option_of_fly_replaces_its_key(monkeypatch, options, told):
     flown = []
     monkeypatch.setattr(flights, "flight_folder", lambda _: None)
-    monkeypatch.setattr(flights, "helper", lambda *_, **__: contextlib.nullcontext(None))
+    monkeypatch.setattr(flights, "helper_process", lambda *_, **__: contextlib.nullcontext(None))
     monkeypatch.setattr(flights, "_ended", lambda *_: 0)
     monkeypatch.setattr(flying, "fly", lambda config, *_: flown.append(config))
     config = shipped("px4.yaml")

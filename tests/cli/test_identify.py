@@ -250,7 +250,7 @@ def test_an_interrupted_fit_says_where_the_flight_is(capsys, fitted, monkeypatch
         raise KeyboardInterrupt
 
     flown = SimpleNamespace(result="ok", log=fitted)
-    monkeypatch.setattr(identify, "_flown", lambda *_: flown)
+    monkeypatch.setattr(identify, "_fly_doublets", lambda *_: flown)
     monkeypatch.setattr(identify, "identify_vehicle", interrupted)
     code, out, err = run(capsys, "--config", fitted / "my.yaml", "--json")
     assert code == 1

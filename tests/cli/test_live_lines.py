@@ -199,7 +199,7 @@ def on_a_pty(monkeypatch):
     """An observer that writes to a pseudo-terminal, and a function that reads what it shows."""
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.delenv("NO_COLOR", raising=False)
-    monkeypatch.setattr(terminal, "_REDRAW", 0.0)
+    monkeypatch.setattr(terminal, "_REDRAW_PERIOD", 0.0)
     ours, theirs = pty.openpty()
     written = []
 
@@ -270,7 +270,7 @@ def test_a_stalled_terminal_gets_the_newest_state_only(monkeypatch):
     """The states that could not be shown take no room from the events."""
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.delenv("NO_COLOR", raising=False)
-    monkeypatch.setattr(terminal, "_REDRAW", 0.0)
+    monkeypatch.setattr(terminal, "_REDRAW_PERIOD", 0.0)
 
     class Stalled(Terminal):
         stalled = True
@@ -283,7 +283,7 @@ def test_a_stalled_terminal_gets_the_newest_state_only(monkeypatch):
     out = Stalled()
     observer = TerminalObserver(FlightConsole(file=out, highlight=False, width=80))
     began = time.monotonic()
-    for k in range(3 * terminal._WAITING):
+    for k in range(3 * terminal._QUEUE_LENGTH):
         observer.status(HOVERING._replace(time=float(k)))
     observer.event(1.0, "the last event")
     assert time.monotonic() - began < 1.0
@@ -319,8 +319,8 @@ class Stalled:
 
 
 def test_lines_for_a_terminal_that_stalls_are_dropped_and_the_end_does_not_wait(monkeypatch):
-    monkeypatch.setattr(terminal, "_WAITING", 3)
-    monkeypatch.setattr(terminal, "_PATIENCE", 0.05)
+    monkeypatch.setattr(terminal, "_QUEUE_LENGTH", 3)
+    monkeypatch.setattr(terminal, "_CLOSE_TIMEOUT", 0.05)
     printer, line = terminal._PrintThread(), Stalled()
     said = [printer.say(line(number)) for number in range(9)]
     assert said[:3] == [True] * 3

@@ -10,7 +10,7 @@ import yaml
 from companion.cli import tune as command
 from companion.cli.main import main
 from companion.config.files import load, shipped
-from companion.tuning.flights import COURSES, Flown
+from companion.tuning.flights import COURSES, CourseResult
 from tests.tuning.test_noise import Log, flown, white
 
 
@@ -133,9 +133,13 @@ def test_both_configurations_are_flown_on_each_course_and_told(vehicle, capsys, 
     def fly(config, course, autopilot):
         asked.append((course.name, autopilot, config.planner.gain_per_s))
         ok = len(asked) != 2
-        return Flown("ok", 0.2, 0.3, 0.1, 0.5, 0.0, 5.0) if ok else Flown("the fence was left")
+        return (
+            CourseResult("ok", 0.2, 0.3, 0.1, 0.5, 0.0, 5.0)
+            if ok
+            else CourseResult("the fence was left")
+        )
 
-    monkeypatch.setattr(command, "flown", fly)
+    monkeypatch.setattr(command, "fly_course", fly)
     config = vehicle.with_name("my.yaml")
     config.write_text("guidance: {drag_per_s: 1.0}\nplanner: {gain_per_s: 4.0}\n")
     code, out, error = run(capsys, vehicle, "--config", config, "--json")

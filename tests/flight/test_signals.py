@@ -11,7 +11,7 @@ import sys
 import pytest
 import yaml
 
-from companion.cli.signals import HOW_TO_LEAVE, Signals, fly_interruptibly
+from companion.cli.signals import HOW_TO_LEAVE, SignalHandler, fly_interruptibly
 from companion.mavlink import lockstep
 from companion.recording.flight_record import read_flight
 from companion.vehicle.link import Link
@@ -46,9 +46,9 @@ class Asked:
 def asked(*signals, flies=True):
     """What comes of signals, given as (when in s, which)."""
     session, now = Asked(flies), 0.0
-    judge = Signals(session, session.give_up, lambda: now)
+    judge = SignalHandler(session, session.give_up, lambda: now)
     for now, number in signals:  # noqa: B007 - the clock reads it
-        judge.take(number)
+        judge.handle(number)
     return session.asked
 
 
@@ -103,16 +103,16 @@ def test_signals_while_the_link_is_closed_do_not_cost_the_record(tmp_path, monke
 
     async def interrupted(link, *error):
         for number in (INT, TERM, HUP):
-            judge.take(number)
+            judge.handle(number)
         now[0] += 2.0
-        judge.take(INT)
+        judge.handle(INT)
         await closed(link, *error)
 
     monkeypatch.setattr(Link, "__aexit__", interrupted)
     with mock_vehicle(tmp_path) as mock:
-        observer = When("maneuvers", lambda: judge.take(TERM), after=1.0)
+        observer = When("maneuvers", lambda: judge.handle(TERM), after=1.0)
         session, now = session_for(mock, tmp_path / "log", observer), [0.0]
-        judge = Signals(session, pytest.fail, lambda: now[0])
+        judge = SignalHandler(session, pytest.fail, lambda: now[0])
         summary = lockstep.run(session.fly())
     assert summary.result == "interrupted by SIGTERM"
     written = json.loads((tmp_path / "log" / "summary.json").read_text())

@@ -44,7 +44,7 @@ def test_limits_that_do_not_fit_the_thrust_are_refused_with_values_that_do():
         loaded(text.format(50, 0.55))
     told = str(refused.value)
     assert "limits.max_tilt_deg 50 does not fit limits.max_thrust 0.55" in told
-    assert "with thrust.hover_thrust 0.5 it holds the height up to 17°" in told
+    assert "with thrust.hover_thrust 0.5 the vehicle holds its height only up to 17°" in told
     assert "lower limits.max_tilt_deg to 16 or raise limits.max_thrust to 0.82" in told
     loaded(text.format(16, 0.55))
     loaded(text.format(50, 0.82))

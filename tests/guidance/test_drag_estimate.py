@@ -121,12 +121,14 @@ def test_bad_data_and_bumps_hardly_move_it():
 
 
 @pytest.mark.parametrize("drag", [Drag(0.7), Drag(0.25, 0.033), Drag(0.0, 0.1)])
-def test_the_growth_of_the_deceleration_is_its_derivative(drag):
+def test_the_deceleration_rate_is_the_derivative_of_the_deceleration(drag):
     velocity, acceleration, h = np.array([3.0, -2.0, 1.0]), np.array([-1.0, 4.0, 0.5]), 1e-6
     ahead, behind = (drag.deceleration(tuple(velocity + k * h * acceleration)) for k in (1, -1))
     expected = (np.array(ahead) - behind) / (2.0 * h)
-    assert drag.growth(tuple(velocity), tuple(acceleration)) == pytest.approx(expected, abs=1e-7)
-    at_rest = drag.growth((0.0, 0.0, 0.0), tuple(acceleration))
+    assert drag.deceleration_rate(tuple(velocity), tuple(acceleration)) == pytest.approx(
+        expected, abs=1e-7
+    )
+    at_rest = drag.deceleration_rate((0.0, 0.0, 0.0), tuple(acceleration))
     assert at_rest == pytest.approx(drag.linear * acceleration, abs=1e-5)
     speed = np.linalg.norm(velocity)
     assert np.linalg.norm(drag.deceleration(tuple(velocity))) == pytest.approx(

@@ -266,7 +266,7 @@ def test_a_client_hears_what_comes_next_until_it_disconnects():
 
 
 def test_a_key_below_one_that_is_no_section_is_refused():
-    with pytest.raises(ConfigError, match=r"mock\.seed is 1, so mock\.seed\.deep has no place"):
+    with pytest.raises(ConfigError, match=r"mock\.seed is 1, so there is no mock\.seed\.deep"):
         mock_with({"seed": 1}, {"seed.deep": 2})
 
 

@@ -16,7 +16,7 @@ from companion.tuning.flights import (
     EIGHT,
     EIGHT_IN_GUSTS,
     autopilot_like,
-    flown,
+    fly_course,
 )
 
 LIMITS = {"max_tilt_deg": 54.0, "max_tilt_rate_deg_s": 135.0}
@@ -43,8 +43,8 @@ def started(autopilot, factor=1.0):
 
 def test_in_gusts_the_error_is_much_smaller():
     config = started("px4")
-    before = flown(config, CIRCLE_IN_GUSTS, "px4")
-    after = flown(propose(config).tuned, CIRCLE_IN_GUSTS, "px4")
+    before = fly_course(config, CIRCLE_IN_GUSTS, "px4")
+    after = fly_course(propose(config).tuned, CIRCLE_IN_GUSTS, "px4")
     assert before.ok, before
     assert after.ok, after
     assert after.reported <= 0.75 * before.reported
@@ -58,8 +58,8 @@ def test_what_an_identified_ardupilot_gets_does_not_swing_in_gusts():
     mock = load(shipped("mock-ardupilot.yaml"))
     keys = {"vehicle": vehicle, "guidance": drag, "limits": LIMITS}
     config = changed(mock, keys, "as `identify` writes it")
-    before = flown(config, EIGHT_IN_GUSTS, "ardupilot", seed=5)
-    after = flown(propose(config).tuned, EIGHT_IN_GUSTS, "ardupilot", seed=5)
+    before = fly_course(config, EIGHT_IN_GUSTS, "ardupilot", seed=5)
+    after = fly_course(propose(config).tuned, EIGHT_IN_GUSTS, "ardupilot", seed=5)
     assert before.ok, before
     assert after.ok, after
     assert after.reported < 0.15
@@ -69,7 +69,7 @@ def test_what_an_identified_ardupilot_gets_does_not_swing_in_gusts():
 def test_a_pilots_small_limits_are_kept_and_slow_the_course_down():
     limits = {"max_tilt_deg": 20.0, "max_tilt_rate_deg_s": 45.0}
     config = changed(started("px4"), {"limits": limits}, "test")
-    flight = flown(config, EIGHT, "px4")
+    flight = fly_course(config, EIGHT, "px4")
     assert flight.ok, flight
     assert 1.0 < flight.speed < 4.5
     assert flight.rate < radians(45.0)
@@ -82,7 +82,7 @@ def test_ctrl_c_ends_more_than_the_flight_in_which_it_comes(monkeypatch):
 
     monkeypatch.setattr(flights, "fly", lambda *_: Left())
     with pytest.raises(KeyboardInterrupt):
-        flown(load(shipped("mock-px4.yaml")), EIGHT, "px4")
+        fly_course(load(shipped("mock-px4.yaml")), EIGHT, "px4")
 
 
 def test_the_mock_vehicle_is_like_the_identified_one():
@@ -96,7 +96,7 @@ def test_the_mock_vehicle_is_like_the_identified_one():
 def test_it_flies_with_lag_and_dead_time_wrong_by_30_percent(autopilot, factor):
     tuned = propose(started(autopilot, factor)).tuned
     for course in COURSES:
-        result = flown(tuned, course, autopilot)
+        result = fly_course(tuned, course, autopilot)
         assert result.ok, result
         assert result.reported <= 0.2
 
@@ -106,6 +106,6 @@ def test_a_flight_that_fails_is_told_with_its_reason(monkeypatch):
         result = "the fence was left"
 
     monkeypatch.setattr(flights, "fly", lambda *_: Failed())
-    told = flown(load(shipped("mock-px4.yaml")), EIGHT, "px4")
+    told = fly_course(load(shipped("mock-px4.yaml")), EIGHT, "px4")
     assert not told.ok
     assert told.result == "the fence was left"

@@ -10,7 +10,7 @@ from companion.config import Config
 from companion.config.files import changed, load, shipped
 from companion.files.yaml_file import ConfigError
 from companion.tuning import ModelError, propose, stability
-from companion.tuning.flights import Flown
+from companion.tuning.flights import CourseResult
 from companion.tuning.margins import Margins
 from companion.tuning.search import largest_gain
 from companion.tuning.writing import _error, proposal_text, summary_lines
@@ -106,9 +106,11 @@ def test_a_vehicle_without_good_values_is_refused(monkeypatch):
 
 def test_flights_stand_in_the_text_with_their_errors_or_their_reasons():
     proposal = propose(VEHICLES["px4"])
-    before = Flown("ok", 0.2, 0.3, 0.1, 0.5, 0.0, 5.0)
-    after = Flown("ok", 0.1, 0.2, 0.1, 0.5, 0.0, 5.0)
-    lines = summary_lines(proposal, {"circle": (before, after), "eight": (before, Flown("lost"))})
+    before = CourseResult("ok", 0.2, 0.3, 0.1, 0.5, 0.0, 5.0)
+    after = CourseResult("ok", 0.1, 0.2, 0.1, 0.5, 0.0, 5.0)
+    lines = summary_lines(
+        proposal, {"circle": (before, after), "eight": (before, CourseResult("lost"))}
+    )
     assert lines[-1] == "eight: ok -> lost"
     assert lines[-2].startswith("circle, flown at up to 5.0 m/s: reported 0.200 -> 0.100, true ")
     assert lines[-3].startswith("Flown on the mock vehicle")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from companion.campaign import store
 from companion.campaign.folder import read_description
-from companion.campaign.store import physical_unit
+from companion.config.units import unit_of
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -48,7 +48,7 @@ LABELS = {
 def label(name: str) -> str:
     """Name and unit of an outcome or a factor on the page."""
     words = LABELS.get(name, name)
-    return f"{words}, {physical_unit(name)}" if physical_unit(name) else words
+    return f"{words}, {unit_of(name)}" if unit_of(name) else words
 
 
 @dataclass(frozen=True)

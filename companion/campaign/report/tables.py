@@ -10,8 +10,8 @@ from companion.campaign.campaign import Campaign
 from companion.campaign.report.results import LABELS, RATES, Results, label
 from companion.campaign.report.sensitivity import Influence
 from companion.campaign.report.statistics import levels, share_of, worst
-from companion.campaign.store import physical_unit
 from companion.config.reference import keys
+from companion.config.units import unit_of
 from companion.flight.flown_config import flat
 from companion.report.tables import Table
 from companion.testing.settings import complete_mock
@@ -61,7 +61,7 @@ def configuration(campaign: Campaign) -> Table:
     mock = complete_mock(campaign.base.mock or {})
     usual = flat(complete_mock({"autopilot": mock["autopilot"]}))
     rows += [
-        (f"mock.{key}", value, usual.get(key, EMPTY), physical_unit(key))
+        (f"mock.{key}", value, usual.get(key, EMPTY), unit_of(key))
         for key, value in flat(mock).items()
         if value != usual.get(key)
     ]

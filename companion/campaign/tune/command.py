@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
             why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
             command = f"companion campaign tune {shlex.quote(str(options.file))}"
             command += f" --out {shlex.quote(str(place))}"
-            console.print(f"{why}; the candidates so far are kept. Go on with\n  {command}")
+            console.print(f"{why}; the candidates so far are kept. Continue with\n  {command}")
             return FAILED
 
 
@@ -82,10 +82,10 @@ def _begin(place: Path, campaign: Campaign) -> None:
 def _fly_on(client: "Client", campaign: Campaign) -> Fly:
     """A function that flies cases on the cluster."""
     kind = campaign.file.kind
-    case_s = estimate.measured(kind, list(campaign.cases())[:1])
+    case_s = estimate.case_time(kind, list(campaign.cases())[:1])
 
     def fly(some: Sequence[Case]) -> Sequence[Row]:
-        return engine.rows(client, kind, some, case_s)
+        return engine.run_on_cluster(client, kind, some, case_s)
 
     return fly
 

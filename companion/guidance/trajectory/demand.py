@@ -97,7 +97,7 @@ def demand(motion: Motion, drag: Drag, gravity: float) -> Demand:
     velocity, acceleration = _columns(motion.velocity), _columns(motion.acceleration)
     slowed = np.stack(drag.deceleration(velocity), axis=1)
     force = motion.acceleration + slowed - np.array([0.0, 0.0, gravity])
-    growth = motion.jerk + np.stack(drag.growth(velocity, acceleration), axis=1)
+    growth = motion.jerk + np.stack(drag.deceleration_rate(velocity, acceleration), axis=1)
     thrust = np.linalg.norm(force, axis=1)
     tilt = np.arctan2(np.hypot(force[:, 0], force[:, 1]), -force[:, 2])
     # Without thrust there is no axis that could turn; the thrust limit then refuses the motion.

@@ -5,7 +5,7 @@ from typing import Any
 
 from companion.config import Config
 from companion.config.in_flight import changeable, differences
-from companion.config.reference import Key, keys
+from companion.config.reference import ConfigKey, keys
 from companion.files.bounded_yaml import dump_value
 from companion.live.channel import Message
 
@@ -70,7 +70,7 @@ class Store:
         new = min(self.event_count - count, len(self.events))
         return list(self.events)[len(self.events) - new :]
 
-    def values(self) -> list[Key]:
+    def values(self) -> list[ConfigKey]:
         """The keys that may change in flight, with their present values."""
         return [key for key in keys(self.config) if (key.section, key.name) in changeable()]
 

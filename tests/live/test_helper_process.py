@@ -14,7 +14,7 @@ from urllib.request import Request, urlopen
 import pytest
 from rich.console import Console
 
-from companion.cli.helping import environment, helper
+from companion.cli.helper_process import environment, helper_process
 from companion.config import Config
 from companion.config.files import load
 from companion.config.known_drag import KnownDrag
@@ -34,13 +34,15 @@ def started(console=None, folder=None, path=None, **options):
     asked = {"watch": False, "live": None, "foxglove": None, **options}
     read = Config() if path is None else load(path)
     shown = console or Console(file=io.StringIO())
-    return helper(argparse.Namespace(**asked), read, path, read, folder, shown, follows=True)
+    return helper_process(
+        argparse.Namespace(**asked), read, path, read, folder, shown, follows=True
+    )
 
 
 def test_without_the_options_nothing_is_started():
-    with started() as beside:
-        assert beside is None
-    assert environment(beside) is THIS_COMPUTER
+    with started() as helper:
+        assert helper is None
+    assert environment(helper) is THIS_COMPUTER
 
 
 @pytest.mark.parametrize(
@@ -56,20 +58,20 @@ def test_a_missing_extra_is_told_before_a_port_is_opened(monkeypatch, option, pa
 @pytest.mark.timeout(120)
 def test_the_page_is_served_until_the_next_flight_needs_its_port(tmp_path):
     shown = Console(file=io.StringIO())
-    with started(shown, tmp_path, live="127.0.0.1:0") as beside:
-        assert environment(beside) is THIS_COMPUTER  # there is no stream
+    with started(shown, tmp_path, live="127.0.0.1:0") as helper:
+        assert environment(helper) is THIS_COMPUTER  # there is no stream
         told = shown.file.getvalue()
         url = re.match(r"Live page: (http://127\.0\.0\.1:(\d+)/)  token", told)
-        beside.status(status(1.0))
+        helper.status(status(1.0))
         page = urlopen(url[1], timeout=60).read().decode()
         assert 'id=\\"live-over\\"' in page
         with pytest.raises(HTTPError) as refusal:
             urlopen(Request(url[1], headers={"Origin": "http://example.com"}), timeout=60)
         assert (refusal.value.code, refusal.value.read()[:12]) == (403, b"another site")
-        assert beside._process.poll() is None
+        assert helper._process.poll() is None
     next_one = open_page_socket(f"127.0.0.1:{url[2]}")
     next_one.listening.close()
-    assert beside._process.wait(20.0) == 0
+    assert helper._process.wait(20.0) == 0
     assert (tmp_path / "live.log").read_text() == ""
 
 
@@ -79,65 +81,65 @@ def test_a_stream_that_lost_its_port_is_noted_and_the_flight_goes_on(monkeypatch
     with open_page_socket("127.0.0.1:0").listening as other:
         taken = other.getsockname()
         monkeypatch.setattr(
-            "companion.cli.helping.stream_address", lambda _: argparse.Namespace(
+            "companion.cli.helper_process.stream_address", lambda _: argparse.Namespace(
                 host=taken[0], port=taken[1], words=lambda: "there"
             )
         )  # fmt: skip
-        with started(foxglove="127.0.0.1:0") as beside:
-            assert environment(beside).stream == beside.feed.send
-            note = noted(beside)
+        with started(foxglove="127.0.0.1:0") as helper:
+            assert environment(helper).stream == helper.feed.send
+            note = noted(helper)
     assert note.startswith("there is no live stream: ")
     assert note.endswith("; the flight goes on without it")
-    assert beside._process.wait(20.0) == 0
+    assert helper._process.wait(20.0) == 0
 
 
-def noted(beside, work=lambda: None):
+def noted(helper, work=lambda: None):
     """The next note of the process."""
     notes = asyncio.Queue()
-    beside.note = notes.put_nowait
+    helper.note = notes.put_nowait
 
     async def until():
         work()
         return await notes.get()
 
-    return asyncio.run(asyncio.wait_for(beside.serve_beside(until()), 30.0))
+    return asyncio.run(asyncio.wait_for(helper.serve_beside(until()), 30.0))
 
 
 def test_a_process_that_is_killed_is_noted_once_and_the_flight_goes_on(tmp_path):
     path = tmp_path / "flown.yaml"
     path.write_text("{}\n")
-    with started(path=path, watch=True) as beside:
-        assert noted(beside) == "edits of flown.yaml are applied from now on"
-        ended = noted(beside, lambda: beside._process.send_signal(signal.SIGKILL))
+    with started(path=path, watch=True) as helper:
+        assert noted(helper) == "edits of flown.yaml are applied from now on"
+        ended = noted(helper, lambda: helper._process.send_signal(signal.SIGKILL))
         assert ended == "the file watcher has ended by itself; the flight goes on without it"
         again = []
-        beside.note = again.append
-        beside.event(1.0, "the flight goes on")
-        beside.status(status(1.0))
+        helper.note = again.append
+        helper.event(1.0, "the flight goes on")
+        helper.status(status(1.0))
         assert again == []
-        beside._process.wait()
+        helper._process.wait()
 
 
 def test_a_killed_process_is_also_noted_by_the_next_message():
-    beside = Helper(HelperTasks(None, Config(), None, None, False, None), Config())
+    helper = Helper(HelperTasks(None, Config(), None, None, False, None), Config())
     notes = []
-    beside.note = notes.append
-    beside._process.kill()
-    beside._process.wait()
+    helper.note = notes.append
+    helper._process.kill()
+    helper._process.wait()
     for _ in range(3):
-        beside.phase("hover", "the maneuver to end")
+        helper.phase("hover", "the maneuver to end")
     assert notes == ["the file watcher has ended by itself; the flight goes on without it"]
-    assert beside.dropped == 1
-    asyncio.run(beside.serve_beside(asyncio.sleep(0.05)))
+    assert helper.dropped == 1
+    asyncio.run(helper.serve_beside(asyncio.sleep(0.05)))
     assert len(notes) == 1
-    beside.close("the flight is over")
+    helper.close("the flight is over")
 
 
 def test_requests_of_the_process_are_answered():
-    beside = Helper(HelperTasks(None, Config(), None, None, False, None), Config())
+    helper = Helper(HelperTasks(None, Config(), None, None, False, None), Config())
     sent = []
-    beside._send = lambda kind, **content: sent.append((kind, content))
-    beside.changes.on_change, beside.changes.on_drag = beside._tell_change, beside._tell_drag
+    helper._send = lambda kind, **content: sent.append((kind, content))
+    helper.changes.on_change, helper.changes.on_drag = helper._tell_change, helper._tell_drag
     requests = (
         {"kind": "change", "id": 1, "values": CLIMB, "by": "a test"},
         {"kind": "undo", "id": 2, "by": "a test"},
@@ -148,17 +150,17 @@ def test_requests_of_the_process_are_answered():
 
     async def handle():
         for message in requests:
-            beside._handle(message)
+            helper._handle(message)
 
     asyncio.run(handle())
-    beside._tell_drag(KnownDrag(Drag(0.2, 0.1), Path("learned-aa.json")))
-    beside._tell_drag(KnownDrag(None, None))
+    helper._tell_drag(KnownDrag(Drag(0.2, 0.1), Path("learned-aa.json")))
+    helper._tell_drag(KnownDrag(None, None))
     assert sent[-2:] == [
         ("drag", {"drag": [0.2, 0.1], "source": "learned-aa.json"}),
         ("drag", {"drag": None, "source": None}),
     ]
-    beside._process.kill()
-    beside._process.wait()
+    helper._process.kill()
+    helper._process.wait()
     answers = [content for kind, content in sent if kind == "answer"]
     assert [each["id"] for each in answers] == [1, 2, 3, 4, 5]
     assert "max_climb_m_s from 2 to 1.5" in answers[0]["text"]

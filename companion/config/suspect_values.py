@@ -17,7 +17,7 @@ _MIN_MEANT_SHARE = 1.0 / 5.0
 """And if it is above this share of the usual value when read in the other unit."""
 
 
-class Doubt(NamedTuple):
+class SuspectValue(NamedTuple):
     """A suspect value of the configuration.
 
     Attributes:
@@ -37,12 +37,12 @@ class Doubt(NamedTuple):
         return f"{self.found}: {self.because}; {self.fix}"
 
 
-def doubts(config: Config) -> Iterator[Doubt]:
+def suspect_values(config: Config) -> Iterator[SuspectValue]:
     """All suspect values of a configuration."""
     yield from _units(config)
     yield from _body_rate(config)
     if config.vehicle.known and config.vehicle.identified is None and config.mock is None:
-        yield Doubt(
+        yield SuspectValue(
             "vehicle.identified",
             "vehicle.lag_ms and vehicle.dead_time_ms were not measured on this vehicle",
             "the response is less exact than after `companion identify`; steps are still "
@@ -51,12 +51,12 @@ def doubts(config: Config) -> Iterator[Doubt]:
         )
 
 
-def _body_rate(config: Config) -> Iterator[Doubt]:
+def _body_rate(config: Config) -> Iterator[SuspectValue]:
     """Whether the planner may command rates at which a safety monitor ends the flight."""
     limits, allowed = config.limits, config.safety.max_body_rate_deg_s
     commanded = hypot(limits.max_tilt_rate_deg_s, limits.max_yaw_rate_deg_s)
     if allowed <= commanded:
-        yield Doubt(
+        yield SuspectValue(
             BODY_RATE,
             f"{BODY_RATE} is {allowed:g} °/s, and the planner may command {commanded:.0f} °/s",
             "a turn at the commanded rate trips the body-rate monitor, which ends the flight",
@@ -64,7 +64,7 @@ def _body_rate(config: Config) -> Iterator[Doubt]:
         )
 
 
-def _units(config: Config) -> Iterator[Doubt]:
+def _units(config: Config) -> Iterator[SuspectValue]:
     """Values that are probably radians for degrees, seconds for milliseconds, or shares for %."""
     for key in keys(config):
         if isinstance(key.value, bool) or not isinstance(key.value, int | float) or key.value <= 0:
@@ -81,7 +81,7 @@ def _units(config: Config) -> Iterator[Doubt]:
             and meant > usual * _MIN_MEANT_SHARE
         ):
             name = f"{key.section}.{key.name}"
-            yield Doubt(
+            yield SuspectValue(
                 name,
                 f"{name} is {key.value:g} {key.unit}",
                 f"that is unusually small; {key.value:g} {unit} would be {meant:.4g} {key.unit}",

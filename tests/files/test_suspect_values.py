@@ -4,8 +4,8 @@ import pytest
 
 from companion.cli.main import main
 from companion.config import Config
-from companion.config.doubts import doubts
 from companion.config.files import load, shipped
+from companion.config.suspect_values import suspect_values
 
 MOCK = {"mock": {}}
 
@@ -22,7 +22,7 @@ MOCK = {"mock": {}}
     ],
 )
 def test_a_value_in_another_unit_is_doubted(section, key, value, meant):
-    (doubt,) = doubts(Config.model_validate({**MOCK, section: {key: value}}))
+    (doubt,) = suspect_values(Config.model_validate({**MOCK, section: {key: value}}))
     assert doubt.key == f"{section}.{key}"
     assert f"{value:g}" in doubt.found
     assert doubt.fix == f"write {meant} if that was meant"
@@ -30,18 +30,18 @@ def test_a_value_in_another_unit_is_doubted(section, key, value, meant):
 
 def test_no_shipped_value_is_doubted():
     for name in ("px4", "ardupilot", "mock-px4", "mock-ardupilot"):
-        found = {doubt.key for doubt in doubts(load(shipped(f"{name}.yaml")))}
+        found = {doubt.key for doubt in suspect_values(load(shipped(f"{name}.yaml")))}
         assert found == (set() if "mock" in name else {"vehicle.identified"})
 
 
 def test_times_that_identify_wrote_are_the_vehicles_own():
     times = {"lag_ms": 47.0, "dead_time_ms": 40.0}
-    assert [doubt.key for doubt in doubts(Config.model_validate({"vehicle": times}))] == [
+    assert [doubt.key for doubt in suspect_values(Config.model_validate({"vehicle": times}))] == [
         "vehicle.identified"
     ]
     own = {"vehicle": {**times, "identified": "2026-11-22T10-54-16Z"}}
-    assert list(doubts(Config.model_validate(own))) == []
-    assert list(doubts(Config())) == []
+    assert list(suspect_values(Config.model_validate(own))) == []
+    assert list(suspect_values(Config())) == []
 
 
 def test_a_key_of_ones_own_beside_identified_times_takes_the_mark_away(tmp_path):
@@ -71,7 +71,9 @@ def test_check_config_says_what_to_expect_and_what_to_look_at_again(tmp_path, ca
 def test_a_limit_of_body_rates_below_the_commanded_ones_is_doubted():
     def doubted(limit):
         return list(
-            doubts(Config.model_validate({**MOCK, "safety": {"max_body_rate_deg_s": limit}}))
+            suspect_values(
+                Config.model_validate({**MOCK, "safety": {"max_body_rate_deg_s": limit}})
+            )
         )
 
     (doubt,) = doubted(108.0)  # √(90² + 60²) = 108.2

@@ -16,7 +16,7 @@ from companion.live.helper import Helper, HelperTasks
 
 
 @contextmanager
-def helper(
+def helper_process(
     options: argparse.Namespace,
     config: Config,
     path: Path,
@@ -56,19 +56,19 @@ def helper(
         if each is not None:
             console.print(each.words(), highlight=False, soft_wrap=True)
     watched = path if options.watch else None
-    made = Helper(HelperTasks(watched, config_as_read, page, stream, follows, folder), config)
+    helper = Helper(HelperTasks(watched, config_as_read, page, stream, follows, folder), config)
     if page is not None:
-        page.listening.close()  # the process has it
-    words = "the program has ended"
+        page.listening.close()  # the helper process has its own copy
+    reason = "the program has ended"
     try:
-        yield made
-        words = "the flight is over"
+        yield helper
+        reason = "the flight is over"
     finally:
-        made.close(words)
+        helper.close(reason)
 
 
-def environment(beside: Helper | None) -> Environment:
+def environment(helper: Helper | None) -> Environment:
     """What a flight gets from this computer, with the live stream of the helper process."""
-    if beside is None or beside.feed is None:
+    if helper is None or helper.feed is None:
         return THIS_COMPUTER
-    return replace(THIS_COMPUTER, stream=beside.feed.send)
+    return replace(THIS_COMPUTER, stream=helper.feed.send)
