@@ -220,4 +220,4 @@ def _stop_moving(context: FlightContext) -> None:
         context.guidance_loop.hold_here()
     except Exception as error:  # the exit must go on whatever fails in guidance
         context.note(internal(error))
-        context.release()
+        context.end_stream()

@@ -4,10 +4,11 @@ from math import exp, radians
 
 import pytest
 
-from companion.attitude import BodyRates, Target, attitude, coefficients, heading
+from companion.attitude import BodyRates, Limits, Target, attitude, coefficients, heading
 from companion.attitude.rotation import turned_about_vertical
 from companion.attitude.types import Coefficients
 from companion.control.estimator_resets import EstimatorResets
+from companion.control.guidance_command import GuidanceCommand
 from companion.control.planner_runner import PlannerRunner
 from companion.vehicle.records import AttitudeSample
 
@@ -33,7 +34,7 @@ class Vehicle:
 
     def __init__(self):
         self.resets, self.planner = EstimatorResets(), Seeing()
-        self.runner = PlannerRunner(self.planner, self.resets)
+        self.runner = PlannerRunner(self.planner, self.resets, Limits(0.6, 1.5, 1.0))
         self.error, self.time = 0.0, 5.0
 
     def fly(self, seconds, rate_deg_s=0.0, *, is_step, dt=DT):
@@ -43,7 +44,8 @@ class Vehicle:
             q = turned_about_vertical(TRUE, self.error)
             sample = AttitudeSample(0, self.time, self.time, 0, q, STILL)
             self.resets.on_attitude(sample)
-            self.runner.rates(sample, TARGET, dt, is_step=is_step)
+            command = GuidanceCommand(TARGET, 0.0, self.time, is_step=is_step)
+            self.runner.rates(sample, command, dt)
         return self.planner
 
 
