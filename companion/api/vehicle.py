@@ -154,7 +154,7 @@ class Vehicle:
     async def control(self, name: str = "the program") -> AsyncGenerator[Control, None]:
         """Command the vehicle from this coroutine while the block runs.
 
-        After the block the vehicle is held under our control. If the commands stop for longer than
+        After the block the vehicle stops and is held by us. If the commands stop for longer than
         `deadman.target_stale_ms` or the block raises, it is handed back and the flight ends.
 
         Args:

@@ -25,6 +25,7 @@ from companion.config.safety import SafetyConfig
 from companion.config.serve import ServeConfig
 from companion.config.vehicle import ThrustConfig, VehicleConfig
 from companion.files.yaml_file import Section
+from companion.guidance.fence import Fence
 from companion.guidance.thrust import FOR_TILT, ThrustCurve, largest_tilt
 
 FileName = Annotated[str, Field(max_length=1000)]
@@ -84,6 +85,20 @@ class Config(Section):
         if self.planner.name != AUTO:
             return self.planner.name
         return MODEL_FOLLOWING if self.vehicle.known else FIRST_ORDER
+
+    @property
+    def fence(self) -> Fence:
+        """The fence, for a vehicle whose motion is known without delay."""
+        limits, safety = self.limits, self.safety
+        return Fence(
+            limits.fence_radius_m,
+            limits.fence_ceiling_m,
+            limits.fence_floor_m,
+            safety.fence_polygon_m,
+            safety.fence_polygon_deg,
+            safety.braking_m_s2,
+            safety.reaction_s,
+        )
 
     @model_validator(mode="after")
     def _consistent(self) -> "Config":

@@ -16,7 +16,6 @@ from companion.attitude import (
     Planner,
     is_unit,
 )
-from companion.attitude.rotation import limit_rates
 from companion.control.estimator_resets import EstimatorResets
 from companion.control.guidance_command import GuidanceCommand
 from companion.control.loop_record import Deadlines, LoopRecord, Unanswered
@@ -34,6 +33,8 @@ SendSetpoint = Callable[[int, BodyRates, float], bool]
 lockstep the link keeps them until the step ends, and sends only the last ones of a step."""
 
 _MISFITS = {Misfit.NOT_NEWER: Unanswered.NOT_NEWER, Misfit.AHEAD: Unanswered.AHEAD}
+_END_THE_STREAM = {None, Unanswered.OLD_TARGET, Unanswered.AWAITING_MODE}
+"""Outcomes of a sample after which `end_stream` needs no other: sent, or too late to be sent."""
 
 
 class ControlLoop:
@@ -70,12 +71,9 @@ class ControlLoop:
         clock_ns: Callable[[], int] = perf_counter_ns,
     ) -> None:
         self.command: GuidanceCommand | None = None
-        self.on = False
-        self.taking_over = False
-        self.offboard_active = False
-        self.awaiting_mode = False
+        self.on = self.taking_over = self.offboard_active = self.awaiting_mode = False
         self.resets = EstimatorResets()
-        self.planner = PlannerRunner(planner, self.resets)
+        self.planner = PlannerRunner(planner, self.resets, limits)
         self.record = LoopRecord()
         self.ask_mode: Callable[[], None] = lambda: None
         self.is_same_vehicle: Callable[[], bool] = lambda: True
@@ -85,7 +83,7 @@ class ControlLoop:
         self._clock_ns = clock_ns
         self._deadlines = deadlines
         self._trace = trace
-        self._limits = limits
+        self._last_command: GuidanceCommand | None = None
         self._recorder = SampleRecorder(
             trace.recorder, self.planner, limits, hover_thrust.limits, clock
         )
@@ -96,9 +94,8 @@ class ControlLoop:
         Raises:
             TypeError: the planner is of another package and cannot change them.
         """
-        self.planner.retune(constants)
+        self.planner.retune(constants, limits)
         self._recorder.retune(limits)
-        self._limits = limits
 
     def on_sample(self, sample: AttitudeSample) -> None:
         """Answer `sample` or count why not, when it arrives (in lockstep: when its step ends)."""
@@ -124,7 +121,7 @@ class ControlLoop:
         if not self.on:
             return
         record.samples += 1
-        command = self.command
+        command = self._last_command or self.command
         reason: Unanswered | None
         if not self.is_same_vehicle():
             reason = Unanswered.ANOTHER_VEHICLE
@@ -143,6 +140,8 @@ class ControlLoop:
         record.reason = reason
         if reason is not None:
             record.unanswered[reason] += 1
+        if self._last_command is not None and reason in _END_THE_STREAM:
+            self.release()
 
     def _after_gap(self, now: float) -> bool:
         """Whether the mode must be confirmed because of a gap; request the mode once a gap."""
@@ -192,17 +191,7 @@ class ControlLoop:
             if command.thrust is None
             else self._hover_thrust.within_limits(command.thrust)
         )
-        return self._rates(sample, command, period), thrust
-
-    def _rates(self, sample: AttitudeSample, command: GuidanceCommand, period: float) -> BodyRates:
-        """The body rates of the planner or of guidance, within the limits."""
-        rates = command.body_rates
-        if rates is None:
-            target = command.target_at(sample.received - sample.age)
-            target = self.resets.target(target, command.turn)
-            rates = self.planner.rates(sample, target, period, is_step=command.is_step)
-        limits = self._limits
-        return BodyRates(*limit_rates(*rates, limits.tilt_rate, limits.yaw_rate))
+        return self.planner.rates(sample, command, period), thrust
 
     def _note_answer(
         self, sample: AttitudeSample, command: GuidanceCommand, rates: BodyRates, thrust: float
@@ -234,10 +223,19 @@ class ControlLoop:
         self.command = None
         self._recorder.action("drop_command")
 
-    def stop_turning(self) -> None:
-        """Replace the rates of the newest command by zero, until guidance makes another one."""
-        if self.command is not None:
-            self.command = self.command.without_turning()
+    def release(self) -> None:
+        """Send nothing from here on."""
+        self.on = self.offboard_active = self.taking_over = False
+
+    def end_stream(self) -> None:
+        """Answer one more fresh sample, then none: with zero body rates, if the autopilot obeys us.
+
+        The autopilot keeps them for seconds. Later commands of guidance are not sent.
+        """
+        if self.on and self.offboard_active and self.command is not None:
+            self._last_command = self._last_command or self.command.without_turning()
+        else:
+            self.release()
         self._recorder.action("stop_turning")
 
     def restart_planner(self) -> None:

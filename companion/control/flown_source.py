@@ -1,6 +1,6 @@
 """The source that guidance flies now: none, a held pose, or a source of references."""
 
-from math import dist
+from math import dist, inf
 
 from companion.control.predictive import Following
 from companion.guidance import Pose, Reference, VehicleMotion
@@ -11,6 +11,8 @@ from companion.guidance.source import ManeuverSource, Source
 
 _REJOINED = 1.0
 """Distance from the reference at which the vehicle counts as returned after open loop, m."""
+_RETURN_TIME = 10.0
+"""After this time of closed loop the vehicle must have returned, s; 10 m take 4 s."""
 
 
 class FlownSource:
@@ -28,6 +30,7 @@ class FlownSource:
         self.begun_at: float | None = None
         self._braking: Braking | None = None
         self._off_reference = False
+        self._returning_since = inf
 
     def clear(self) -> None:
         """Fly no source and hold no pose."""
@@ -95,13 +98,19 @@ class FlownSource:
         reference = self.source.reference(now, motion)(now)
         return None if reference.body_rates is None else self.source.name
 
-    def tracking_error(self, reference: Reference, motion: VehicleMotion) -> float | None:
-        """Distance from the reference, m.
+    def tracking_error(
+        self, now: float, reference: Reference, motion: VehicleMotion
+    ) -> float | None:
+        """Distance from the reference, m; `now` in s of event-loop time.
 
         It is None without a pose, in open loop, while the reference drifts, and until the vehicle
-        has returned from either.
+        has returned from either, for which it has `_RETURN_TIME`.
         """
         distance = dist(reference.position_ned, motion.position_ned)
-        returning = self._off_reference and distance > _REJOINED
-        self._off_reference = not reference.holds_position or returning
+        if not reference.holds_position:
+            self._off_reference, self._returning_since = True, inf
+        elif self._off_reference:
+            self._returning_since = min(now, self._returning_since)
+            late = now - self._returning_since > _RETURN_TIME
+            self._off_reference = distance > _REJOINED and not late
         return None if self.pose is None or self._off_reference else distance

@@ -215,7 +215,7 @@ class GuidanceLoop:
         self.motion, self.acceleration = inputs.now, inputs.acceleration
         self.hold.begin_if_tilted(now, inputs.now, self._q, self._heading())
         reference = self._write_command(now, inputs)
-        self.off_course = self.flown.tracking_error(reference, inputs.now)
+        self.off_course = self.flown.tracking_error(now, reference, inputs.now)
         if not standing:
             self.learning.step(
                 now,

@@ -3,10 +3,20 @@
 from collections.abc import Callable
 from math import inf
 
-from companion.attitude import BodyRates, Constants, LawPlanner, Planner, Quaternion, Target
+from companion.attitude import (
+    BodyRates,
+    Constants,
+    LawPlanner,
+    Limits,
+    Planner,
+    Quaternion,
+    Target,
+)
 from companion.attitude.history import PlannedTilt
 from companion.attitude.model_following import ModelFollowingPlanner
+from companion.attitude.rotation import limit_rates
 from companion.control.estimator_resets import EstimatorResets
+from companion.control.guidance_command import GuidanceCommand
 from companion.control.step_frame import StepFrame
 from companion.vehicle.records import AttitudeSample, AttitudeTarget
 
@@ -22,6 +32,7 @@ class PlannerRunner:
     Args:
         planner: the planner.
         resets: the estimator resets, which the planner must not see.
+        limits: limits of all body rates.
 
     Attributes:
         attitude_target: returns the newest ATTITUDE_TARGET of an autopilot that takes body rates
@@ -30,13 +41,13 @@ class PlannerRunner:
         asked: attitude and target of the newest sample, as the planner saw them, or None.
     """
 
-    def __init__(self, planner: Planner, resets: EstimatorResets) -> None:
+    def __init__(self, planner: Planner, resets: EstimatorResets, limits: Limits) -> None:
         self.attitude_target: Callable[[], AttitudeTarget | None] = lambda: None
         self.on_attitude_target: Callable[[AttitudeTarget], None] | None = None
         self.asked: tuple[Quaternion, Target] | None = None
         self._planner = planner
         self._follower = planner if isinstance(planner, ModelFollowingPlanner) else None
-        self._resets = resets
+        self._resets, self._limits = resets, limits
         self._frame = StepFrame()
         self._planned_at = -inf
         self._period = 0.0
@@ -44,7 +55,7 @@ class PlannerRunner:
         self._told: AttitudeTarget | None = None
         self._turn, self._turned_ms = 0.0, -1
 
-    def retune(self, constants: Constants) -> None:
+    def retune(self, constants: Constants, limits: Limits) -> None:
         """Use other gains and limits from the next sample on.
 
         Raises:
@@ -53,6 +64,7 @@ class PlannerRunner:
         if not isinstance(self._planner, LawPlanner | ModelFollowingPlanner):
             raise TypeError(f"{type(self._planner).__name__} cannot be retuned")
         self._planner.retune(constants)
+        self._limits = limits
 
     def restart(self) -> None:
         """Reset the planner at the next sample, because its state is not valid any more."""
@@ -68,18 +80,32 @@ class PlannerRunner:
         return self._frame.attitude(self._resets.attitude(q))
 
     def rates(
-        self, sample: AttitudeSample, target: Target, arrival_period: float, *, is_step: bool
+        self, sample: AttitudeSample, command: GuidanceCommand, arrival_period: float
     ) -> BodyRates:
-        """Body rates for a sample, rad/s; resets the planner first after a gap or a restart.
+        """Body rates for a sample within the limits, rad/s: those of guidance, or the planner's.
 
         Args:
             sample: the sample to answer.
-            target: target in the frame without resets.
+            command: the command of guidance.
             arrival_period: vehicle time since the usable sample before, s.
-            is_step: whether the target is an open-loop step.
 
         Raises:
             AttitudeError: the planner cannot use this attitude or target.
+        """
+        rates = command.body_rates
+        if rates is None:
+            target = command.target_at(sample.received - sample.age)
+            target = self._resets.target(target, command.turn)
+            rates = self._planned_rates(sample, target, arrival_period, is_step=command.is_step)
+        limits = self._limits
+        return BodyRates(*limit_rates(*rates, limits.tilt_rate, limits.yaw_rate))
+
+    def _planned_rates(
+        self, sample: AttitudeSample, target: Target, arrival_period: float, *, is_step: bool
+    ) -> BodyRates:
+        """Ask the planner; reset it first after a gap or a restart.
+
+        The target is in the frame without resets.
         """
         period = sample.vehicle_time - self._planned_at
         # Over a gap the body rates are not known, so the frame does not follow the estimator.

@@ -72,33 +72,28 @@ class FlightContext:
 
     def release(self) -> None:
         """Stop answering samples; no setpoint is sent after this."""
-        self.loop.on = False
-        self.loop.offboard_active = self.loop.taking_over = False
+        self.loop.release()
+        self.guidance_loop.stand_by()
+
+    def end_stream(self) -> None:
+        """Stop answering samples; if the autopilot obeys us, the last answer has zero body rates.
+
+        It is for ends that are ours. After a takeover, or without trust in the data, `release`.
+        """
+        self.loop.end_stream()
         self.guidance_loop.stand_by()
 
     async def stop(self, tasks: Iterable[asyncio.Task[Any]]) -> None:
-        """Stop the tasks beside the phases, then the setpoints, the last with zero body rates."""
+        """Stop the tasks beside the phases, then the stream, and wait for its last answer."""
         try:
             for task in tasks:
                 await cancel(task)
-            await self._stop_turning()
+            self.loop.end_stream()
+            with suppress(TimeoutError):
+                async with asyncio.timeout(_LAST_SETPOINT_TIMEOUT):
+                    await self.until(lambda: not self.loop.on)
         finally:
             self.release()
-
-    async def _stop_turning(self) -> None:
-        """If the autopilot still obeys us, send zero body rates, because it keeps the last ones.
-
-        They answer the next sample; without one within `_LAST_SETPOINT_TIMEOUT`, nothing is sent.
-        Guidance must have stopped, because its next command would replace the zero rates.
-        """
-        loop = self.loop
-        if not (loop.on and loop.offboard_active):
-            return
-        loop.stop_turning()
-        sent_before = loop.record.setpoints
-        with suppress(TimeoutError):
-            async with asyncio.timeout(_LAST_SETPOINT_TIMEOUT):
-                await self.until(lambda: loop.record.setpoints > sent_before)
 
     async def until(self, condition: Callable[[], bool], detail: str | None = None) -> None:
         """Wait until `condition` holds; `detail` tells the user what the phase waits for."""

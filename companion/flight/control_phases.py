@@ -52,9 +52,14 @@ async def fly_maneuvers(context: FlightContext, sequence: ManeuverSequence) -> N
 
 
 async def fly_commanded(context: FlightContext, source: Source) -> None:
-    """Fly the commands of another program until it ends its control, then hold the position."""
+    """Fly the commands of another program until it ends its control, then brake and hold.
+
+    It waits for the stop, because an autopilot that gets a moving vehicle brakes it harder.
+    """
     await _fly(context, source, lambda: f"commanded by {source.name}")
     context.guidance_loop.hold_here()
+    context.detail = "the vehicle to stop"
+    await asyncio.sleep(context.guidance_loop.braking_left)
 
 
 async def _fly(context: FlightContext, source: Source, progress: Callable[[], str]) -> None:
@@ -220,4 +225,4 @@ def _stop_moving(context: FlightContext) -> None:
         context.guidance_loop.hold_here()
     except Exception as error:  # the exit must go on whatever fails in guidance
         context.note(internal(error))
-        context.release()
+        context.end_stream()

@@ -90,7 +90,7 @@ class Flight:
         if self.failed_in is None:
             self.end(FlightEnded(reason))
             return
-        self._context.release()
+        self._context.end_stream()
         if all(text != reason for _, text in self.events):
             self.note(reason)
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from math import cos, hypot, inf, pi, radians, sin
+from math import cos, hypot, inf, pi, radians, remainder, sin
 from typing import Any, NamedTuple
 
 from companion.guidance.reference import Vector
@@ -189,11 +189,14 @@ def circle_corners(radius: float, number: int) -> tuple[Corner, ...]:
 
 def local_polygon(places: tuple[Corner, ...], origin: Place) -> tuple[Corner, ...]:
     """Convert corners from (latitude, longitude) in degrees to m north and east of `origin`."""
-    narrower = cos(radians(origin.latitude))
-    return tuple(
-        (
-            EARTH_RADIUS * radians(latitude - origin.latitude),
-            EARTH_RADIUS * radians(longitude - origin.longitude) * narrower,
-        )
-        for latitude, longitude in places
+    return tuple(local_offset(Place(*corner), origin) for corner in places)
+
+
+def local_offset(place: Place, origin: Place) -> Corner:
+    """How far a place lies from `origin`, m north and east, the short way across ±180°."""
+    return (
+        EARTH_RADIUS * radians(place.latitude - origin.latitude),
+        EARTH_RADIUS
+        * radians(remainder(place.longitude - origin.longitude, 360.0))
+        * cos(radians(origin.latitude)),
     )

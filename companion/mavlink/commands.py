@@ -1,6 +1,9 @@
 """COMMAND_LONG with its COMMAND_ACK. Source: the MAVLink command protocol."""
 
 import asyncio
+from collections import deque
+from dataclasses import dataclass
+from math import inf
 from typing import NamedTuple
 
 from companion.mavlink.errors import CommandRefused, CommandTimeout, CommandUnfinished
@@ -35,6 +38,8 @@ class Command(NamedTuple):
 _ACCEPTED = 0
 _IN_PROGRESS = 5
 _IN_PROGRESS_TIMEOUT_S = 30.0  # from the ACK "in progress" to the final one
+_STALL_S = 0.1  # a timeout that ends this late means that our process stood still
+_BACKLOG_S = 0.5  # after a stall the backlog of frames is read within this time
 _REASON_DELAY_S = 0.3  # the reason of a refusal may come as a STATUSTEXT this long after the ACK
 
 
@@ -50,10 +55,25 @@ def result_name(result: int) -> str:
     return entry.name.removeprefix("MAV_RESULT_") if entry is not None else f"RESULT {result}"
 
 
+@dataclass(slots=True)
+class _Try:
+    """A COMMAND_LONG that was sent and has no final ACK yet.
+
+    Attributes:
+        answers: where its ACKs go.
+        until: time until which its ACK is expected, s of event-loop time; inf while a call waits.
+    """
+
+    answers: Pending[int]
+    until: float = inf
+
+
 class CommandClient:
     """Sends commands and waits for their ACKs.
 
     An ACK names only the command, so a call waits until an earlier call with the same command ends.
+    ACKs come in the order of the tries. So the ACK of a call that was cancelled, or that waited in
+    the backlog while our process stood still, does not count for the next call.
     """
 
     def __init__(
@@ -67,7 +87,7 @@ class CommandClient:
         self._settings, self._outbox, self._registry = settings, outbox, registry
         self._texts = texts
         self._locks: dict[int, asyncio.Lock] = {}
-        self._waiting: dict[int, Pending[int]] = {}
+        self._unanswered: dict[int, deque[_Try]] = {}
         router.subscribe("COMMAND_ACK", self._on_ack)
 
     async def send(
@@ -93,11 +113,7 @@ class CommandClient:
         async with lock:
             began = asyncio.get_running_loop().time()
             with Pending[int](self._registry) as answers:
-                self._waiting[command] = answers
-                try:
-                    result = await self._exchange(command, params, timeout_s, retries, answers)
-                finally:
-                    del self._waiting[command]
+                result = await self._exchange(command, params, timeout_s, retries, answers)
             if result != _ACCEPTED:
                 await asyncio.sleep(_REASON_DELAY_S)
                 words = self._texts.since(began)
@@ -111,13 +127,18 @@ class CommandClient:
         retries: int,
         answers: Pending[int],
     ) -> int:
+        time = asyncio.get_running_loop().time
         for confirmation in range(retries + 1):
+            sent, ends = _Try(answers), time() + timeout_s
+            self._expected(command).append(sent)
             self._send_try(command, params, confirmation)
             try:
                 result = await answers.next(timeout_s)
-            except TimeoutError:
-                continue
-            return await self._final(command, answers) if result == _IN_PROGRESS else result
+                return await self._final(command, answers) if result == _IN_PROGRESS else result
+            except TimeoutError:  # lost; but after a stall the ACK may be in the backlog
+                ends = time() + _BACKLOG_S if time() - ends > _STALL_S else -inf
+            finally:
+                sent.until = ends
         raise CommandTimeout(
             f"{command_name(command)}: no answer after {retries + 1} tries of {timeout_s:g} s; "
             f"is system {self._settings.target_system} still there?"
@@ -157,6 +178,19 @@ class CommandClient:
             return
         if message.target_component not in (0, self._settings.source_component):
             return
-        answers = self._waiting.get(message.command)
-        if answers is not None:
-            answers.put(message.result)
+        expected = self._expected(message.command)
+        if not expected:
+            return
+        expected[0].answers.put(message.result)
+        if message.result != _IN_PROGRESS:
+            expected.popleft()
+
+    def _expected(self, command: int) -> deque[_Try]:
+        """The tries of a command whose ACK may still come, oldest first."""
+        now, tries = (
+            asyncio.get_running_loop().time(),
+            self._unanswered.setdefault(command, deque()),
+        )
+        while tries and tries[0].until < now:
+            tries.popleft()
+        return tries

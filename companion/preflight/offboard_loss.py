@@ -4,6 +4,7 @@ A fence in latitude and longitude (`safety.fence_polygon_deg`) is not checked he
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from math import exp, hypot
 from typing import NamedTuple
 
@@ -88,17 +89,8 @@ def worst_reach(
 
     `hold_time`, `drag` and `brakes` are `held`, `drag` and `brakes` of `LossFailsafe`.
     """
-    limits, safety = config.limits, config.safety
-    fence = Fence(
-        limits.fence_radius_m,
-        limits.fence_ceiling_m,
-        limits.fence_floor_m,
-        safety.fence_polygon_m,
-        (),
-        safety.braking_m_s2,
-        safety.reaction_s,
-    )
-    max_tilt_rate = limits.max_tilt_rate
+    fence = replace(config.fence, places=())
+    max_tilt_rate = config.limits.max_tilt_rate
     loss, worst = LossFailsafe(hold_time, brakes, drag, max_tilt_rate, fence), WorstReach()
     motion_before: MotionAtLoss | None = None
     for time, motion in _motions(config, maneuvers, drag):

@@ -123,12 +123,13 @@ def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 def gps(_: Config, evidence: Evidence) -> Iterator[Finding]:
     """Whether a GPS that had a fix still has it."""
-    fault, source = evidence.state.gps_fault, "GPS_RAW_INT"
+    fault, newest, source = evidence.state.gps_fault, evidence.state.gps, "GPS_RAW_INT"
     if fault is not None:
+        seen = None if newest is None else newest.satellites
         yield Finding(
             Key.GPS,
             UNSAFE,
-            fault,
+            fault if seen is None else f"{fault}; satellites in its last message: {seen}",
             "the vehicle does not know where it is",
             "wait for its fix, in the open",
             source,

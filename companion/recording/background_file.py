@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from math import inf
 from pathlib import Path
 from time import monotonic, sleep
-from types import TracebackType
 from typing import Generic, Protocol, Self, TypeVar
 
 from companion.files.os_errors import DISK_HANGS, DISK_TIMEOUT, reason_of
@@ -114,12 +113,7 @@ class BackgroundFile(ABC, Generic[T]):
         self.open()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

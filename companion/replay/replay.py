@@ -137,7 +137,7 @@ class Replay:
         loop.on_sample(sample)
         self._guidance.note_attitude(sample)
         reason = loop.record.reason
-        code = REASONS[1] if not loop.on else REASONS[0] if reason is None else reason.value
+        code = REASONS[1] if not flags.on else REASONS[0] if reason is None else reason.value
         sent = self._sent if code == REASONS[0] else None
         return ReplayedSample(
             sample.received, sample.vehicle_time, entry.setpoint, sent, entry.reason, code
@@ -163,7 +163,7 @@ class Replay:
             case "restart_planner":
                 self._loop.restart_planner()
             case "stop_turning":
-                self._loop.stop_turning()
+                self._loop.end_stream()
             case "drag_prior":
                 prior = ANY_VEHICLE if entry.drag is None else prior_of(entry.drag)
                 guidance.estimate.drag.begin(prior)

@@ -4,6 +4,8 @@ To add a monitor, write its judge beside the others (`*_judges.py`), its row her
 `companion.recording.what_to_do`.
 """
 
+from dataclasses import replace
+
 from companion.config import Config
 from companion.guidance.fence import Fence
 from companion.safety import autopilot_judges, link_judges, motion_judges
@@ -106,14 +108,4 @@ def _link(config: Config) -> tuple[Monitor, ...]:
 
 def fence_of(config: Config) -> Fence:
     """The fence from the sections `limits` and `safety`; it allows for a late estimate."""
-    limits, safety = config.limits, config.safety
-    return Fence(
-        limits.fence_radius_m,
-        limits.fence_ceiling_m,
-        limits.fence_floor_m,
-        safety.fence_polygon_m,
-        safety.fence_polygon_deg,
-        safety.braking_m_s2,
-        safety.reaction_s,
-        _ESTIMATE_LATE,
-    )
+    return replace(config.fence, late=_ESTIMATE_LATE)

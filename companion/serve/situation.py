@@ -10,7 +10,7 @@ from math import cos, degrees, hypot, radians
 
 from companion.attitude import is_unit
 from companion.attitude.rotation import euler_angles
-from companion.guidance.fence import EARTH_RADIUS
+from companion.guidance.fence import EARTH_RADIUS, Place, local_offset
 from companion.guidance.reference import Vector
 from companion.mavlink.codec import decode_attitude
 from companion.mavlink.errors import LinkError
@@ -142,12 +142,14 @@ class OriginEstimate:
         if estimate is None or _distance(estimate, measured) > _NEW_ORIGIN_DISTANCE:
             self.origin = measured
             return
+        # The average must not go half round the earth where the longitude changes its sign.
+        turns = round((measured.longitude - estimate.longitude) / 360.0)
+        measured = measured._replace(longitude=measured.longitude - 360.0 * turns)
         self.origin = Origin(
             *(a + _NEW_ORIGIN_WEIGHT * (b - a) for a, b in zip(estimate, measured, strict=True))
         )
 
 
 def _distance(a: Origin, b: Origin) -> float:
-    north = radians(a.latitude - b.latitude) * EARTH_RADIUS
-    east = radians(a.longitude - b.longitude) * EARTH_RADIUS * cos(radians(a.latitude))
-    return hypot(north, east, a.altitude - b.altitude)
+    offset = local_offset(Place(a.latitude, a.longitude), Place(b.latitude, b.longitude))
+    return hypot(*offset, a.altitude - b.altitude)

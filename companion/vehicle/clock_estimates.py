@@ -108,13 +108,12 @@ class TelemetryDelay:
     Attributes:
         known: Whether the delay is known.
         seconds: The delay, s; 0 while it is not known.
-        error: Largest error of `seconds`, s.
         unknown: Why the delay is not known; without meaning while it is known.
     """
 
     def __init__(self) -> None:
         self.known = False
-        self.seconds = self.error = 0.0
+        self.seconds = 0.0
         self.unknown = DelayUnknown.UNANSWERED
         self._exchanges: deque[_Exchange] = deque(maxlen=round(LIFETIME) + 10)
         self._odd: _Exchange | None = None
@@ -185,7 +184,7 @@ class TelemetryDelay:
         """Forget all exchanges: the delay is not known any more, because of `why`."""
         self._exchanges.clear()
         self.known, self.unknown = False, why
-        self.seconds = self.error = 0.0
+        self.seconds = 0.0
 
     def expire(self, now: float) -> None:
         """Forget exchanges too old at event-loop time `now` (s); use the best of the others."""
@@ -198,4 +197,3 @@ class TelemetryDelay:
         self.known = True
         best = min(exchanges, key=lambda each: each.error(now))
         self.seconds = max(0.0, best.delay)
-        self.error = best.error(now)

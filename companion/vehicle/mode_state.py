@@ -98,7 +98,6 @@ class ModeState:
         self.heartbeat = Heartbeat(
             self._clock(),
             message.autopilot,
-            message.type,
             mode,
             message.custom_mode,
             armed,

@@ -57,7 +57,6 @@ class Heartbeat(NamedTuple):
     Attributes:
         received: Event-loop time, s.
         autopilot: MAV_AUTOPILOT.
-        vehicle_type: MAV_TYPE.
         mode: The autopilot's name for the mode.
         custom_mode: The autopilot's number for the mode.
         armed: Whether the vehicle is armed.
@@ -66,7 +65,6 @@ class Heartbeat(NamedTuple):
 
     received: float
     autopilot: int
-    vehicle_type: int
     mode: str
     custom_mode: int
     armed: bool

@@ -58,8 +58,6 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
         super().__init__(state, origin, identity, vehicle)
         self._initialised = initialised
         self._origin_set = origin_set
-        self._used_as = 0.0
-        self._used_at_us = 0
 
     def builders(self) -> dict[int, Builder]:
         """Return message id -> builder."""
@@ -104,13 +102,10 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
 
     def battery_status(self) -> Message:
         """Return BATTERY_STATUS, with the charge used since boot."""
-        now_us = self._state.time_us
-        self._used_as += self._vehicle.battery.current_a * (now_us - self._used_at_us) / 1e6
-        self._used_at_us = now_us
         return self._battery_status(
             dialect.MAV_BATTERY_FUNCTION_UNKNOWN,
             dialect.MAV_BATTERY_TYPE_UNKNOWN,
-            round(self._used_as / 3.6),
+            round(self._vehicle.battery.used_as / 3.6),
             0,
         )
 

@@ -11,6 +11,7 @@ class BatteryState(NamedTuple):
     voltage_v: float
     current_a: float
     remaining: float  # charge left, 0..1
+    used_as: float = 0.0  # charge drawn since the boot, A s
 
 
 class Battery:
@@ -43,8 +44,9 @@ class Battery:
         if current is None:
             load = thrust / self._hover_thrust
             current = config.idle_current_a + config.hover_current_a * load**1.5
-        remaining = max(0.0, self.state.remaining - current * dt / self._capacity_as)
+        drawn = current * dt
+        remaining = max(0.0, self.state.remaining - drawn / self._capacity_as)
         cell = config.empty_cell_v + (config.full_cell_v - config.empty_cell_v) * remaining
         voltage = max(0.0, config.cells * cell - config.resistance_ohm * current)
-        self.state = BatteryState(voltage, current, remaining)
+        self.state = BatteryState(voltage, current, remaining, self.state.used_as + drawn)
         self.thrust_factor = (voltage / self._reference_v) ** config.thrust_exponent

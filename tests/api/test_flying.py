@@ -102,6 +102,29 @@ def test_accelerations_from_a_coroutine_stop_the_vehicle_where_it_wants(autopilo
     assert errors[0] < 0.15
 
 
+@BOTH
+def test_a_landing_right_after_control_at_speed_begins_at_rest(autopilot):
+    speeds = {}
+
+    def look():
+        state = mock.state()
+        speeds[state["mode"]] = hypot(*state["velocity"][:2])
+
+    async def program(vehicle):
+        await vehicle.take_off()
+        async with vehicle.control() as control:
+            async for _ in control.states(seconds=2.5):
+                control.accelerate((2.0, 0.0, 0.0))
+        await vehicle.land()
+
+    mock = QuickVehicle(autopilot)
+    mock.after_step.append(look)
+    summary, events = flown(program, mock)
+    assert summary.result == "ok", events
+    ours = {"px4": "OFFBOARD", "ardupilot": "GUIDED"}[autopilot]
+    assert speeds[ours] < 0.5, speeds  # it was 4.6
+
+
 @pytest.mark.parametrize(
     ("autopilot", "period", "with_jerk"),
     [("px4", 0.02, False), ("px4", 0.04, True), ("ardupilot", 0.02, False)],
@@ -406,8 +429,8 @@ def test_a_fast_vehicle_that_is_to_hold_stops_and_does_not_swing_back(autopilot)
             async for state in control.states(seconds=5.0):
                 north, east, down = state.velocity_ned
                 control.accelerate((2.0 * (5.0 - north), -2.0 * east, -2.0 * down))
-        watching = asyncio.ensure_future(watch(vehicle))
-        await vehicle.hold(4.0)
+            watching = asyncio.ensure_future(watch(vehicle))
+        await vehicle.hold(2.0)
         watching.cancel()
         await vehicle.land()
 

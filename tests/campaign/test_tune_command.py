@@ -1,10 +1,14 @@
 """The command `companion campaign tune`, with flights that take no time; and the first flights."""
 
+import errno
+import os
 from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
 
 import pytest
+from sqlalchemy import event
+from sqlalchemy.pool import Pool
 
 from companion.campaign import unit
 from companion.campaign.cluster import ClusterError
@@ -110,6 +114,56 @@ def test_a_damaged_storage_is_one_sentence(tmp_path, quick, capsys):
     (out / "tune.db").write_bytes(b"no database at all, " * 300)
     assert tune(tmp_path, out) == 2
     assert f"companion: {out / 'tune.db'}: cannot be used: " in capsys.readouterr().err
+
+
+@pytest.fixture
+def fill_disk():
+    """A function after which SQLite gets no further page, as on a full disk."""
+    is_full = []
+
+    def on_checkout(connection, *_):
+        if is_full:
+            connection.execute("PRAGMA max_page_count = 1")
+
+    event.listen(Pool, "checkout", on_checkout)
+    yield lambda: is_full.append(True)
+    event.remove(Pool, "checkout", on_checkout)
+
+
+def test_a_disk_that_fills_during_the_search_ends_it_and_shows_the_best_so_far(
+    tmp_path, quick, monkeypatch, capsys, fill_disk
+):
+    flown = []
+
+    def row(case):
+        flown.append(case)
+        if len(flown) == 30:
+            fill_disk()
+        return row_of(case)
+
+    monkeypatch.setattr(unit, "fly_case", row)
+    campaign(tmp_path)
+    out = tmp_path / "out"
+    assert tune(tmp_path, out, "--trials", "200") == 1
+    told = capsys.readouterr()
+    assert "Traceback" not in told.err
+    assert f"{out / 'tune.db'}: cannot be used: database or disk is full" in told.out
+    assert "; the candidates so far are kept. Go on with\n  companion campaign tune" in told.out
+    assert "# The best candidate so far, not checked on unseen flights, RMS 0." in told.out
+    assert "\nplanner:\n  gain_per_s: " in told.out
+
+
+def test_a_result_that_cannot_be_written_is_shown(tmp_path, quick, monkeypatch, capsys):
+    def full(path, _):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+
+    monkeypatch.setattr(command, "write_whole", full)
+    campaign(tmp_path)
+    assert tune(tmp_path, tmp_path / "out", "--trials", "4") == 1
+    told = capsys.readouterr()
+    assert "4 candidates over 4 flights each" in told.out
+    assert "\nplanner:\n  # " in told.out
+    assert "No space left on device" in told.err
 
 
 def test_a_vehicle_that_no_proposal_covers_starts_without_one(tmp_path, monkeypatch):

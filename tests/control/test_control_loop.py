@@ -471,3 +471,55 @@ def test_after_a_jump_of_the_heading_the_target_is_told_without_it():
     told = AttitudeTarget(3000 + 4 * 5, facing(0.8))
     bench.run(1, q=facing(0.5))
     assert planner.noted == [(pytest.approx(0.3), pytest.approx(0.0))]
+
+
+def turning(rates):
+    return rates != BodyRates(0.0, 0.0, 0.0)
+
+
+def test_the_last_answer_of_a_stream_that_is_obeyed_turns_nothing():
+    """The autopilot keeps it for seconds; what guidance commands later is not sent."""
+    bench = Bench()
+    bench.loop.offboard_active = True
+    bench.run(10)
+    bench.loop.end_stream()
+    bench.loop.end_stream()
+    bench.run(10)
+    assert [turning(rates) for _, rates, _ in bench.sent] == [*10 * [True], False]
+    assert (bench.loop.on, bench.loop.offboard_active) == (False, False)
+
+
+@pytest.mark.parametrize("what", ["on", "offboard_active", "command"])
+def test_a_stream_that_nobody_obeys_ends_without_a_last_answer(what):
+    bench = Bench()
+    bench.loop.offboard_active = True
+    bench.run(10)
+    setattr(bench.loop, what, None if what == "command" else False)
+    bench.loop.end_stream()
+    bench.run(10)
+    assert len(bench.sent) == 10
+
+
+@pytest.mark.parametrize("gap", [0.12, 0.2])
+def test_the_last_answer_is_not_sent_after_a_gap(gap):
+    """0.12 s: the mode would have to be confirmed; 0.2 s: the command is old, too."""
+    bench = Bench()
+    bench.loop.offboard_active = True
+    bench.run(10)
+    bench.loop.end_stream()
+    bench.time += gap
+    bench.run(10)
+    bench.loop.resume()
+    bench.run(10)
+    assert (len(bench.sent), bench.loop.on) == (10, False)
+
+
+def test_an_unusable_sample_leaves_the_last_answer_to_the_next_one():
+    bench = Bench()
+    bench.loop.offboard_active = True
+    bench.run(10)
+    bench.loop.end_stream()
+    bench.run(2, q=(0.0, 0.0, 0.0, 0.0))
+    assert len(bench.sent) == 10
+    bench.run(3)
+    assert [turning(rates) for _, rates, _ in bench.sent[10:]] == [False]

@@ -12,7 +12,7 @@ from companion.control.estimator_resets import EstimatorResets
 from companion.control.guidance_command import GuidanceCommand
 from companion.control.guidance_loop import GuidanceLoop
 from companion.control.outer_loop import make_guidance, motion_estimate
-from companion.guidance import Doublets, ManeuverSequence
+from companion.guidance import Doublets, ManeuverSequence, Pose
 from companion.guidance.braking import AssumedBraking
 from companion.guidance.source import ManeuverSource
 from companion.recording.trace import FlightTrace
@@ -120,6 +120,22 @@ def test_on_the_way_back_from_a_doublet_the_vehicle_is_not_off_its_course():
     bench.fly(IN_HOLD - 0.3, position=(9.0, 4.0, -5.0))
     assert bench.guidance_loop.off_course is None
     bench.fly(IN_HOLD + 0.3)  # so much later that it is no jump of the estimate
+    assert bench.guidance_loop.off_course < 1.0
+
+
+def test_a_vehicle_that_never_comes_back_from_open_loop_is_off_its_course():
+    """A doublet pushes it away, and the hold that follows does not bring it nearer."""
+    bench, away = Bench(), (9.0, 4.0, -5.0)
+    bench.fly(IN_FIRST_DOUBLET, position=away)
+    bench.guidance_loop.flown.clear()
+    bench.guidance_loop.flown.pose = Pose(HERE, 0.0)
+    held_from = IN_FIRST_DOUBLET + 0.02
+    for step in range(24):
+        bench.fly(held_from + 0.4 * step, position=away)
+        assert bench.guidance_loop.off_course is None
+    bench.fly(held_from + 10.1, position=away)
+    assert bench.guidance_loop.off_course > 5.0
+    bench.fly(held_from + 13.0)  # so much later that it is no jump of the estimate
     assert bench.guidance_loop.off_course < 1.0
 
 

@@ -102,9 +102,10 @@ def test_a_change_of_values_reaches_both_loops():
 
 
 def test_a_planner_of_another_package_keeps_its_gains():
-    runner = PlannerRunner(SimpleNamespace(), EstimatorResets())
+    values = tuning(CONFIG)
+    runner = PlannerRunner(SimpleNamespace(), EstimatorResets(), values.limits)
     with pytest.raises(TypeError, match="SimpleNamespace cannot be retuned"):
-        runner.retune(tuning(CONFIG).constants)
+        runner.retune(values.constants, values.limits)
 
 
 @pytest.mark.parametrize(
@@ -198,7 +199,7 @@ def test_both_loops_are_made_and_answer_a_sample():
     assert (loop.record.latency_ns, loop.record.missed_deadlines) == (3_003_000, 1)
     assert (len(trace.rates_rows()), trace.newest_latency_ns) == (1, 3_003_000)
     assert loop._deadlines == Deadlines(telemetry_stale=0.09, target_stale=0.14, deadline=0.003)
-    assert loop._limits == Limits(radians(30.0), radians(80.0), radians(50.0))
+    assert loop.planner._limits == Limits(radians(30.0), radians(80.0), radians(50.0))
     assert loop._hover_thrust is guidance_loop.learning._hover_thrust
     assert guidance_loop.hold.max_tilt == pytest.approx(radians(30.0))
     assert loop.command.period == pytest.approx(0.025)

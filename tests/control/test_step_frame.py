@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from companion.attitude import BodyRates, Target, attitude, coefficients, heading
+from companion.attitude import BodyRates, Limits, Target, attitude, coefficients, heading
 from companion.attitude.rotation import turned_about_vertical
 from companion.attitude.types import Coefficients
 from companion.control.estimator_resets import EstimatorResets
+from companion.control.guidance_command import GuidanceCommand
 from companion.control.planner_runner import PlannerRunner
 from companion.vehicle.records import AttitudeSample, AttitudeTarget
 
@@ -38,18 +39,25 @@ class Vehicle:
 
     def __init__(self):
         self.resets, self.planner = EstimatorResets(), Seeing()
-        self.runner = PlannerRunner(self.planner, self.resets)
-        self.error, self.time = 0.0, 5.0
+        self.runner = PlannerRunner(self.planner, self.resets, Limits(0.6, 1.5, 1.0))
+        self.error, self.time, self.body_rates = 0.0, 5.0, STILL
 
     def fly(self, seconds, rate_deg_s=0.0, *, is_step, dt=DT):
         for _ in range(round(seconds / dt)):
             self.error += radians(rate_deg_s) * dt
             self.time += dt
-            q = turned_about_vertical(TRUE, self.error)
-            sample = AttitudeSample(0, self.time, self.time, 0, q, STILL)
+            q, ms = self.estimated(), round(1e3 * self.time)
+            sample = AttitudeSample(ms, self.time, self.time, 0, q, self.body_rates)
             self.resets.on_attitude(sample)
-            self.runner.rates(sample, TARGET, dt, is_step=is_step)
+            command = GuidanceCommand(TARGET, 0.0, self.time, is_step=is_step)
+            self.move(self.runner.rates(sample, command, dt), dt)
         return self.planner
+
+    def estimated(self):
+        return turned_about_vertical(TRUE, self.error)
+
+    def move(self, rates, dt):
+        pass
 
 
 def test_a_corrected_heading_does_not_turn_the_line_of_a_step():
@@ -105,26 +113,23 @@ class TargetFollower(Vehicle):
 
     def __init__(self):
         super().__init__()
-        self.body = Rotation.from_quat(TRUE, scalar_first=True)
-        self.target = self.body
-        self.turning = np.zeros(3)
+        self.body = self.target = Rotation.from_quat(TRUE, scalar_first=True)
+        self.runner.attitude_target = self.attitude_target
 
-    def fly(self, seconds, rate_deg_s=0.0, *, is_step, dt=DT):
-        for _ in range(round(seconds / dt)):
-            self.error += radians(rate_deg_s) * dt
-            self.time += dt
-            estimated = Rotation.from_rotvec([0.0, 0.0, self.error]) * self.body
-            q = tuple(estimated.as_quat(scalar_first=True))
-            ms = round(1e3 * self.time)
-            sample = AttitudeSample(ms, self.time, self.time, 0, q, BodyRates(*self.turning))
-            told = AttitudeTarget(ms, tuple(self.target.as_quat(scalar_first=True)))
-            self.runner.attitude_target = lambda told=told: told
-            self.resets.on_attitude(sample)
-            rates = self.runner.rates(sample, TARGET, dt, is_step=is_step)
-            self.turning = np.array(rates) + 4.5 * (estimated.inv() * self.target).as_rotvec()
-            self.body *= Rotation.from_rotvec(self.turning * dt)
-            self.target *= Rotation.from_rotvec(np.array(rates) * dt)
-        return self.planner
+    def estimated(self):
+        estimated = Rotation.from_rotvec([0.0, 0.0, self.error]) * self.body
+        return tuple(estimated.as_quat(scalar_first=True))
+
+    def attitude_target(self):
+        q = tuple(self.target.as_quat(scalar_first=True))
+        return AttitudeTarget(round(1e3 * self.time), q)
+
+    def move(self, rates, dt):
+        estimated = Rotation.from_quat(self.estimated(), scalar_first=True)
+        turning = np.array(rates) + 4.5 * (estimated.inv() * self.target).as_rotvec()
+        self.body_rates = BodyRates(*turning)
+        self.body *= Rotation.from_rotvec(turning * dt)
+        self.target *= Rotation.from_rotvec(np.array(rates) * dt)
 
 
 def test_a_vehicle_that_follows_its_estimator_keeps_its_attitude_in_steps():

@@ -6,6 +6,7 @@ from math import asin, degrees, hypot
 import pytest
 
 from companion.config.files import load
+from companion.control.guidance_loop import GuidanceLoop
 from companion.recording.flight_record import read_flight
 from companion.replay.replay import Replay
 from tests.flight.fly import mock_vehicle, run, session_for
@@ -63,3 +64,38 @@ def test_without_a_sample_to_answer_nothing_is_sent_in_leaving():
     assert summary.result == "left at once by the user"
     assert state["time"] - state["last_setpoint"] == pytest.approx(0.15, abs=0.03)
     assert state["last_setpoint"] > began
+
+
+def broken(*_):
+    raise ZeroDivisionError("a fault of ours")
+
+
+def failing_exit(monkeypatch, fault, autopilot):
+    """The setpoints from the moment on at which `fault` breaks guidance in a turn, in an exit."""
+    with mock_vehicle(autopilot=autopilot, delay_s=0.025) as mock:
+
+        def fail_in_a_turn():
+            if turning(mock.state()) > 1.0:
+                monkeypatch.setattr(GuidanceLoop, fault, broken)
+                mock.setpoints.clear()
+                session.interrupt("Ctrl-C")
+            else:
+                asyncio.get_running_loop().call_later(0.01, fail_in_a_turn)
+
+        observer = When("maneuvers", fail_in_a_turn)
+        session = session_for(mock, None, observer, flight={"maneuvers": ["steps"]})
+        summary = run(mock, session.fly())
+        assert not mock.state()["crashed"]
+    assert "internal error: ZeroDivisionError('a fault of ours')" in [
+        text for _, text in summary.events
+    ]
+    return mock.setpoints
+
+
+@pytest.mark.parametrize("autopilot", HELD)
+@pytest.mark.parametrize("fault", ["step", "hold_here"])
+def test_a_fault_of_ours_in_an_exit_ends_the_stream_without_turning(monkeypatch, fault, autopilot):
+    """Its command is on the way for 0.1 s, during which the autopilot keeps the last setpoint."""
+    setpoints = failing_exit(monkeypatch, fault, autopilot)
+    assert [each.rates for each in setpoints].count((0.0, 0.0, 0.0)) == 1
+    assert setpoints[-1].rates == (0.0, 0.0, 0.0)

@@ -90,6 +90,26 @@ def test_a_fence_on_the_map_needs_to_know_where_it_is():
     assert flat == pytest.approx([value for corner in SQUARE for value in corner], abs=1e-5)
 
 
+@pytest.mark.parametrize("origin", [180.0, -180.0, 179.99999, -179.99999])
+def test_a_fence_on_the_map_may_lie_across_the_date_line(origin):
+    """Fiji: some corners have positive longitudes, the others negative ones."""
+    home = Place(-17.0, origin)
+    degree = EARTH_RADIUS * radians(1.0)
+    corners = tuple(
+        (
+            -17.0 + north / degree,
+            (origin + east / (degree * cos(radians(17.0))) + 180.0) % 360.0 - 180.0,
+        )
+        for north, east in SQUARE
+    )
+    assert {longitude > 0.0 for _, longitude in corners} == {True, False}
+    flat = [value for corner in local_polygon(corners, home) for value in corner]
+    assert flat == pytest.approx([value for corner in SQUARE for value in corner], abs=1e-5)
+    fence = replace(FENCE, places=corners)
+    assert breach(9.9, -9.9, fence=fence, origin=home) is None
+    assert breach(9.9, -10.1, fence=fence, origin=home).limit == "safety.fence_polygon_deg"
+
+
 def test_it_stops_after_the_reaction_and_the_braking():
     """v·t + v²/(2a): 5 m/s needs 2.5 + 6.25 m, 2 m/s down 1 + 1 m."""
     stop = FENCE.stop((1.0, 2.0, -5.0), (3.0, -4.0, 2.0))

@@ -1,7 +1,7 @@
 """ArduCopter's failsafes: ground station by system id, battery, position; and the pilot."""
 
 import pytest
-from ardupilot_rig import FAILED, GUIDED, HOVER, LOITER, RTL, THRUST_IS_THRUST, ArduRig
+from ardupilot_rig import FAILED, GUIDED, HOVER, LAND, LOITER, RTL, THRUST_IS_THRUST, ArduRig
 from mock_rig import ACCEPTED
 from pymavlink.dialects.v20 import development as dialect
 
@@ -90,6 +90,20 @@ def test_a_low_battery_does_what_its_parameters_say():
     rig.run(0.2)
     assert rig.state.mode.name == "LAND"
     assert rig.texts()[-1].startswith("Battery 1 is critical")
+
+
+def test_the_charge_used_is_counted_by_vehicle_time_not_by_messages():
+    """Asked for once after a flight, it is the charge that the battery has lost."""
+    rig = ArduRig()
+    rig.lift(3.0)
+    rig.switch(LAND)
+    rig.run_until(lambda: not rig.state.armed, 15.0)
+    rig.run(1.0)  # the current is small again
+    rig.command(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_BATTERY_STATUS)
+    rig.run(0.1)
+    used_mah = 1000.0 * 3.3 * (1.0 - rig.simulation.vehicle.battery.remaining)
+    assert used_mah > 10.0
+    assert rig.messages("BATTERY_STATUS")[-1].current_consumed == pytest.approx(used_mah, abs=1.0)
 
 
 def test_without_a_position_it_lands_and_refuses_the_modes_that_need_one():

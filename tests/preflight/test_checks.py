@@ -17,7 +17,7 @@ from companion.preflight.parameter_survey import Survey
 from companion.preflight.parameters import parameters
 from companion.vehicle.autopilot import Readiness
 from companion.vehicle.parameter_rules import CheckResult
-from companion.vehicle.records import Battery, GlobalPosition
+from companion.vehicle.records import Battery, GlobalPosition, Gps
 from companion.vehicle.registry import autopilot_for
 from companion.vehicle.streams import StreamRate
 from tests.preflight.vehicles import amiss
@@ -40,6 +40,7 @@ def state(**changes):
         "global_position": GlobalPosition(0.0, 47.0, 8.0),
         "readiness": READY,
         "estimator": SimpleNamespace(flags=0x3FF),
+        "gps": None,
         "gps_fault": None,
         "landed": True,
         "flying": False,
@@ -237,6 +238,15 @@ def test_what_the_link_says_of_signatures_is_told_with_its_remedy():
 def test_the_state_of_the_vehicle(changes, expected):
     evidence = replace(GOOD, state=state(**changes))
     assert amiss(run_checks(CONFIG, evidence)) == expected
+
+
+@pytest.mark.parametrize(("seen", "told"), [(4, "last message: 4"), (None, "GPS position lost")])
+def test_a_lost_gps_tells_its_satellites(seen, told):
+    lost = state(gps=Gps(0.0, 1, seen, 500.0), gps_fault="GPS position lost")
+    (finding,) = vehicle_checks.gps(CONFIG, replace(GOOD, state=lost))
+    assert (finding.key, finding.result) == (Key.GPS, UNSAFE)
+    assert finding.found.startswith("GPS position lost")
+    assert finding.found.endswith(told)
 
 
 BOOTING = Readiness(prearm_good=False, estimator_flags=None, position=False, home=False)

@@ -178,34 +178,28 @@ def test_a_stream_that_begins_elsewhere_is_joined_within_limits():
     assert math.dist(rows[-1].position_ned, circle(now, 10.0, 2.0)[0]) < 1e-6
 
 
-def test_a_frozen_stream_that_is_repeated_for_ever_stops_at_its_last_position():
+@pytest.mark.parametrize(
+    ("velocity", "acceleration", "axis", "most"),
+    [
+        ((5.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0, 2.0 + 5.0 * TIMEOUT + 5.0**2 / ACCELERATION + 2.0),
+        ((0.0, 0.0, 0.0), (0.0, 2.0, 0.0), 1, 5.0),  # the first point of a circle
+    ],
+)
+def test_a_setpoint_that_is_repeated_for_ever_stops_at_its_position(
+    velocity, acceleration, axis, most
+):
     """MAVSDK repeats the last setpoint of a program that hangs: position, velocity and all."""
     motion = begun()
-    frozen = request((2.0, 0.0, 0.0), (5.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    frozen = request((2.0, 0.0, 0.0), velocity, acceleration)
     furthest = 0.0
     for number in range(200):
         now = 0.05 * number
         motion.command(frozen, now, STILL)
-        furthest = max(furthest, motion.reference(now).position_ned[0])
+        furthest = max(furthest, abs(motion.reference(now).position_ned[axis]))
     end = motion.reference(now)
     assert end.position_ned == pytest.approx((2.0, 0.0, 0.0), abs=1e-3)
     assert end.velocity_ned == pytest.approx(ORIGIN, abs=1e-3)
-    assert furthest < 2.0 + 5.0 * TIMEOUT + 5.0**2 / ACCELERATION + 2.0
-
-
-def test_the_first_point_of_a_circle_that_is_repeated_for_ever_does_not_run_away():
-    """Its velocity is zero, its acceleration is not: a program that hangs before it begins."""
-    motion = begun()
-    frozen = request((2.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 2.0, 0.0))
-    furthest = 0.0
-    for number in range(200):
-        now = 0.05 * number
-        motion.command(frozen, now, STILL)
-        furthest = max(furthest, abs(motion.reference(now).position_ned[1]))
-    end = motion.reference(now)
-    assert end.position_ned == pytest.approx((2.0, 0.0, 0.0), abs=1e-3)
-    assert end.velocity_ned == pytest.approx(ORIGIN, abs=1e-3)
-    assert furthest < 5.0
+    assert furthest < most
 
 
 def test_stopping_comes_to_rest_within_limits():

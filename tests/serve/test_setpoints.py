@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from companion.guidance.fence import EARTH_RADIUS
 from companion.mavlink.framing import FrameScanner
 from companion.mavlink.messages import CRC_EXTRA
 from companion.serve.network.addresses import Address
@@ -23,6 +24,7 @@ from companion.serve.setpoints.request import (
     Situation,
 )
 from companion.serve.setpoints.understand import understand as understand_frame
+from companion.serve.situation import OriginEstimate
 
 LOCAL, OFFSET, BODY, BODY_OFFSET, BODY_FRD = 1, 7, 8, 9, 12
 POSITION, VELOCITY, ACCELERATION = (3.0, -4.0, -5.5), (1.25, 2.5, -0.5), (0.5, -0.25, 0.125)
@@ -300,3 +302,13 @@ def test_a_wild_rate_is_refused_where_it_is_used(axis, value):
 def test_an_attitude_for_another_vehicle_is_refused():
     with pytest.raises(RefusedSetpoint, match="target_system is 2"):
         understand(attitude(128, target=(2, 1)))
+
+
+def test_the_origin_is_averaged_across_the_date_line():
+    """A vehicle in Fiji flies to and fro over 180° of longitude: the origin stays where it is."""
+    estimate, metre = OriginEstimate(), math.degrees(1.0 / (EARTH_RADIUS * math.cos(0.3)))
+    estimate.note((0.0, 0.0, 0.0), math.degrees(0.3), 180.0 - 5.0 * metre, 100.0, 0.0)
+    for east in (10.0, -10.0) * 5:
+        longitude = (180.0 + (east - 5.0) * metre + 180.0) % 360.0 - 180.0
+        estimate.note((0.0, east, 0.0), math.degrees(0.3), longitude, 100.0, 0.0)
+        assert estimate.origin.longitude == pytest.approx(180.0 - 5.0 * metre, abs=1e-3 * metre)

@@ -3,6 +3,7 @@
 import asyncio
 import math
 import struct
+import time
 
 import pytest
 from pymavlink.dialects.v20 import common as dialect
@@ -22,7 +23,7 @@ from companion.mavlink.errors import (
 from companion.vehicle.px4.autopilot import Px4
 from tests.mavlink.fakes import attitude, linked, until
 
-ARM = 400
+ARM, SET_MODE = 400, 176
 ARDUPILOT = 3
 INT32, REAL32 = 6, 9
 
@@ -130,6 +131,51 @@ def test_a_command_that_stays_in_progress_is_no_silence(run, monkeypatch):
                     await link.command(ARM, timeout_s=0.5, retries=1)
             repeating.cancel()
             assert len(vehicle.of("COMMAND_LONG")) == 1
+
+    run(scene())
+
+
+def test_a_late_ack_of_a_cancelled_command_does_not_count_for_the_next_one(run):
+    """A hold is cancelled; its ACK must not count for the landing, which the autopilot refuses."""
+
+    async def scene():
+        async with linked() as (link, vehicle):
+            cancelled = asyncio.create_task(link.command(SET_MODE, 1.0, 4.0))
+            await until(lambda: vehicle.of("COMMAND_LONG"))
+            cancelled.cancel()
+            vehicle.answers["COMMAND_LONG"] = lambda message: [ack(SET_MODE, 0), ack(SET_MODE, 4)]
+            with pytest.raises(CommandRefused, match="FAILED"):
+                await link.command(SET_MODE, 1.0, 6.0)
+            vehicle.answers["COMMAND_LONG"] = lambda message: [ack(SET_MODE, 0)]
+            await link.command(SET_MODE, 1.0, 6.0)
+
+    run(scene())
+
+
+def test_a_cancelled_command_that_was_lost_costs_the_next_one_a_repetition(run):
+    async def scene():
+        async with linked() as (link, vehicle):
+            cancelled = asyncio.create_task(link.command(SET_MODE, 1.0, 4.0))
+            await until(lambda: vehicle.of("COMMAND_LONG"))
+            cancelled.cancel()
+            vehicle.answers["COMMAND_LONG"] = lambda message: [ack(SET_MODE, 0)]
+            await link.command(SET_MODE, 1.0, 6.0, timeout_s=0.02)
+            assert len(vehicle.of("COMMAND_LONG")) == 3
+
+    run(scene())
+
+
+def test_an_ack_that_waited_while_we_stood_still_does_not_count_for_the_next_command(run):
+    async def scene():
+        async with linked() as (link, vehicle):
+            stalled = asyncio.create_task(link.command(SET_MODE, 4.0, timeout_s=0.02, retries=0))
+            await until(lambda: vehicle.of("COMMAND_LONG"))
+            time.sleep(0.15)  # noqa: ASYNC251 - the process stands still
+            with pytest.raises(CommandTimeout):
+                await stalled
+            vehicle.answers["COMMAND_LONG"] = lambda message: [ack(SET_MODE, 0), ack(SET_MODE, 4)]
+            with pytest.raises(CommandRefused, match="FAILED"):
+                await link.command(SET_MODE, 1.0, 6.0)
 
     run(scene())
 
@@ -352,8 +398,9 @@ def test_timesync_tells_how_old_a_sample_was_when_it_arrived(run):
                 stamp = round(1000 * (clock() + ahead - 0.5))
                 vehicle.send(dialect.MAVLink_attitude_quaternion_message(stamp, 1, *6 * [0]))
                 await asyncio.sleep(0.02)
-            error = link.clock.delay.error + link.timesync.round_trip_s
-            assert link.clock.delay.seconds == pytest.approx(0.5, abs=0.05 + error)
+            delay = link.clock.delay
+            error = delay.largest_possible(clock()) - delay.seconds + link.timesync.round_trip_s
+            assert delay.seconds == pytest.approx(0.5, abs=0.05 + error)
             age = link.clock.age(clock() + ahead - 1.0, clock())
             assert age == pytest.approx(1.0, abs=0.05 + error)
 

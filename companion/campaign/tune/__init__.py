@@ -5,6 +5,7 @@ first_flight  what flights of the vehicle teach before the search
 candidates  the values that are searched, and where the search starts
 scores      how good a candidate is on some cases
 search      the search itself, with Optuna; it can be interrupted and continued
+storage     errors of the file in which Optuna keeps the search
 certainty   the comparison with the unchanged configuration on cases that the search has not seen
 writing     the result as YAML with its reasons
 command     `companion campaign tune`

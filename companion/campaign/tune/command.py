@@ -21,7 +21,13 @@ from companion.campaign.tune.certainty import compared
 from companion.campaign.tune.scores import Row, scored
 from companion.campaign.tune.search import Fly, Found, Search
 from companion.campaign.tune.section import Tune
-from companion.campaign.tune.writing import Result, result_text, summary_lines
+from companion.campaign.tune.storage import StorageError
+from companion.campaign.tune.writing import (
+    Result,
+    best_so_far_text,
+    result_text,
+    summary_lines,
+)
 from companion.campaign.versions import VersionError
 from companion.extras import require
 from companion.files.write_whole import write_whole
@@ -58,12 +64,12 @@ def run(options: argparse.Namespace) -> int:
                 wait_for_workers(client)
                 console.print(f"Dask's dashboard: {client.dashboard_link}")
                 fly = _fly_on(client, campaign)
-                search = Search(campaign, tune, place, fly)
+                search = _search(campaign, tune, place, fly)
                 found = _searched(search, options.trials or tune.trials, console)
                 return _concluded(campaign, tune, place, fly, found, console)
         except VersionError as error:
             raise ConfigError(str(error)) from error
-        except (KeyboardInterrupt, ClusterError) as error:
+        except (KeyboardInterrupt, ClusterError, StorageError) as error:
             why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
             command = f"companion campaign tune {shlex.quote(str(options.file))}"
             command += f" --out {shlex.quote(str(place))}"
@@ -90,10 +96,31 @@ def _fly_on(client: "Client", campaign: Campaign) -> Fly:
     return fly
 
 
+def _search(campaign: Campaign, tune: Tune, place: Path, fly: Fly) -> Search:
+    """Begin or continue the search; raises `ConfigError` if its storage cannot be used."""
+    try:
+        return Search(campaign, tune, place, fly)
+    except StorageError as error:
+        raise ConfigError(str(error)) from error
+
+
 def _searched(search: Search, trials: int, console: Console) -> Found:
-    with _progress(console, trials) as show:
-        found = search.run(trials, show)
-        show(found)
+    """Search; if the storage fails meanwhile, show the best candidate so far and raise."""
+    newest = Found()
+    try:
+        with _progress(console, trials) as show:
+
+            def keep(found: Found) -> None:
+                nonlocal newest
+                newest = found
+                show(found)
+
+            found = search.run(trials, keep)
+            show(found)
+    except (StorageError, OSError):
+        if newest.best is not None:
+            console.print(best_so_far_text(newest.best), end="")
+        raise
     return found
 
 
@@ -126,9 +153,13 @@ def _concluded(
     after = scored(fly(cases(other, found.best.values)), tune.envelope_m)
     comparison = compared(before, after, tune.check_samples)
     result = Result(campaign, found, found.best, before, after, comparison)
-    path = place / RESULT
-    write_whole(path, result_text(result, set_values(campaign.base, tune.search)))
+    path, text = place / RESULT, result_text(result, set_values(campaign.base, tune.search))
     for line in summary_lines(result):
         console.print(line)
+    try:
+        write_whole(path, text)
+    except OSError:  # hours of flights must not be lost for want of a file
+        console.print(text, end="")
+        raise
     console.print(f"Written to {path}; let your configuration include it.")
     return DONE

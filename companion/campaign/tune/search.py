@@ -21,6 +21,7 @@ from companion.campaign.tune.candidates import (
 from companion.campaign.tune.first_flight import learned
 from companion.campaign.tune.scores import Row, Score, pooled, scored
 from companion.campaign.tune.section import Tune
+from companion.campaign.tune.storage import storage_errors
 from companion.config import Config
 from companion.files.yaml_file import ConfigError
 
@@ -94,7 +95,11 @@ class Search:
             was measured, or None if nothing was.
 
     Raises:
-        ConfigError: the storage in the folder is damaged, or the first case cannot be flown.
+        ConfigError: the first case cannot be flown.
+        StorageError: the storage in the folder cannot be used.
+
+    Attributes:
+        path: the storage.
     """
 
     def __init__(
@@ -106,30 +111,33 @@ class Search:
         learning_flight: Callable[[Campaign], Config | None] = learned,
     ) -> None:
         import optuna  # noqa: PLC0415  an extra
-        from sqlalchemy.exc import DBAPIError  # noqa: PLC0415  comes with Optuna
 
         optuna.logging.set_verbosity(optuna.logging.ERROR)
         self._optuna = optuna
         self._campaign, self._tune, self._fly = campaign, tune, fly
-        try:
+        self.path = folder / STORAGE
+        with storage_errors(self.path):
             self._study: Study = optuna.create_study(
-                storage=f"sqlite:///{folder / STORAGE}",
+                storage=f"sqlite:///{self.path}",
                 study_name=_NAME,
                 sampler=self._sampler(0),
                 load_if_exists=True,
             )
-        except DBAPIError as error:
-            raise ConfigError(f"{folder / STORAGE}: cannot be used: {error.orig}") from error
-        self._begin(learning_flight)
+            self._begin(learning_flight)
 
     def run(self, trials: int, on_trial: Callable[[Found], None] = lambda _: None) -> Found:
-        """Try candidates until there are `trials` of them, including those of earlier runs."""
-        while len(self._ended()) < trials:
-            on_trial(self.found())
-            # Each trial has its own seed, so an interruption does not change the candidates.
-            self._study.sampler = self._sampler(len(self._ended()))
-            self._try(self._interrupted() or self._study.ask())
-        return self.found()
+        """Try candidates until there are `trials` of them, including those of earlier runs.
+
+        Raises:
+            StorageError: the storage cannot be used any more, perhaps because the disk is full.
+        """
+        with storage_errors(self.path):
+            while len(self._ended()) < trials:
+                on_trial(self.found())
+                # Each trial has its own seed, so an interruption does not change the candidates.
+                self._study.sampler = self._sampler(len(self._ended()))
+                self._try(self._interrupted() or self._study.ask())
+            return self.found()
 
     def found(self) -> Found:
         """The results so far."""

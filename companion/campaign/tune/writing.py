@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from companion.campaign.campaign import Campaign
 from companion.campaign.swept import Swept
+from companion.campaign.tune.candidates import Values
 from companion.campaign.tune.certainty import Comparison
 from companion.campaign.tune.scores import Score
 from companion.campaign.tune.search import Candidate, Found
@@ -100,15 +101,31 @@ def result_text(result: Result, present: Mapping[str, Any]) -> str:
     name = result.campaign.file.name
     lines = [f"# Found by `companion campaign tune` for the campaign {name}.", "#"]
     lines += [f"# {line}" for line in summary_lines(result)]
+    reasons = {
+        key: _reason(key, tune.search[key], result, present.get(key)) for key in result.best.values
+    }
+    return "\n".join([*lines, *_values_lines(result.best.values, reasons)]) + "\n"
+
+
+def best_so_far_text(best: Candidate) -> str:
+    """The best candidate of a search that was ended early, as YAML."""
+    said = (
+        f"# The best candidate so far, not checked on unseen flights, RMS {best.score.rms:.3f} m:"
+    )
+    return "\n".join([said, *_values_lines(best.values, {})]) + "\n"
+
+
+def _values_lines(values: Values, reasons: Mapping[str, str]) -> Iterator[str]:
+    """Values of dotted keys as lines of YAML, each below its reason, if there is one."""
     sections: dict[str, list[str]] = {}
-    for key, value in result.best.values.items():
+    for key, value in values.items():
         section, _, short = key.partition(".")
-        reason = _reason(key, tune.search[key], result, present.get(key))
-        dumped = bounded_yaml.dump_value(value)
-        sections.setdefault(section, []).extend([f"  # {reason}", f"  {short}: {dumped}"])
-    for section, lines_of_section in sections.items():
-        lines += ["", f"{section}:", *lines_of_section]
-    return "\n".join(lines) + "\n"
+        lines = sections.setdefault(section, [])
+        if key in reasons:
+            lines.append(f"  # {reasons[key]}")
+        lines.append(f"  {short}: {bounded_yaml.dump_value(value)}")
+    for section, lines in sections.items():
+        yield from ("", f"{section}:", *lines)
 
 
 def _reason(key: str, swept: Swept, result: Result, before: Any) -> str:

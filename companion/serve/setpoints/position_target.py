@@ -6,10 +6,10 @@ MAV_FRAME_BODY_NED is refused, and a yaw in a body frame is interpreted as by th
 autopilot.
 """
 
-from math import cos, hypot, isfinite, pi, radians
+from math import hypot, isfinite, pi
 from typing import NamedTuple
 
-from companion.guidance.fence import EARTH_RADIUS
+from companion.guidance.fence import Place, local_offset
 from companion.guidance.reference import Vector, rotated
 from companion.mavlink.messages import Message, dialect
 from companion.serve.setpoints.request import (
@@ -207,8 +207,7 @@ def _picked(values: _Values, axes: tuple[int, ...]) -> tuple[float, ...] | None:
 def _to_local(message: Message, origin: Origin, *, above_home: bool) -> Vector:
     """A place in the local frame; the earth counts as flat over the distances flown."""
     degrees = 1e-7
-    north = radians(message.lat_int * degrees - origin.latitude) * EARTH_RADIUS
-    east = radians((message.lon_int * degrees - origin.longitude + 180.0) % 360.0 - 180.0)
-    east *= EARTH_RADIUS * cos(radians(origin.latitude))
+    place = Place(message.lat_int * degrees, message.lon_int * degrees)
+    north, east = local_offset(place, Place(origin.latitude, origin.longitude))
     reference = origin.home_altitude if above_home else 0.0
     return north, east, origin.altitude - reference - message.alt
