@@ -74,7 +74,7 @@ class SafetyConfig(Section):
     """Action if the vehicle is faster for 0.3 s."""
     max_tracking_error_m: Annotated[float, Field(ge=0.05, le=100.0)] = 5.0
     """Largest distance from the reference. After open-loop steps the monitor waits until the
-    vehicle has returned.
+    vehicle has returned, at most 10 s.
     """
     tracking_action: AnyAction = "hold"
     """Action if the distance is larger for 1 s."""

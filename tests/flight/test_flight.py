@@ -38,6 +38,7 @@ class Bench:
             ground=SimpleNamespace(standing=False),
             same_vehicle=SimpleNamespace(begin=self.begin),
             release=lambda: None,
+            end_stream=lambda: None,
             stop=self.stop,
             detail="",
         )
