@@ -16,14 +16,13 @@ import numba
 import numpy as np
 from numba.extending import intrinsic, register_jitable
 
-from sitl_mock.physics.multirotor_step import Rings, empty_rings
+from sitl_mock.physics.multirotor_step import Conditions, Rings, empty_rings
 from sitl_mock.physics.navigation_error import TrailRow
 from sitl_mock.physics.quaternion import Vector
 from sitl_mock.physics.sensors import Estimate, SensorLaw, SensorState, estimate, white_noise
 from sitl_mock.physics.vehicle import Vehicle
 from sitl_mock.physics.vehicle_step import (
     ActuatorCommand,
-    Conditions,
     Outcome,
     VehicleLaw,
     VehicleState,

@@ -4,6 +4,7 @@ from sitl_mock.config.airframe import AirframeConfig
 from sitl_mock.config.rate_loop import RateLoopConfig
 from sitl_mock.physics.multirotor_step import (
     ZERO,
+    Conditions,
     at_rest,
     drive,
     empty_rings,
@@ -15,6 +16,8 @@ from sitl_mock.physics.multirotor_step import (
 from sitl_mock.physics.quaternion import Quaternion, Vector
 from sitl_mock.physics.rigid_body import Load
 from sitl_mock.physics.rotors import Mix
+
+_STILL_AIR = Conditions(1.0, ZERO, ZERO)
 
 
 class Multirotor:
@@ -88,9 +91,7 @@ class Multirotor:
             setpoint,
             throttle,
             controlled,
-            1.0,
-            ZERO,
-            ZERO,
+            _STILL_AIR,
         )
         self._steps += 1
         return load

@@ -66,6 +66,17 @@ class Rings(NamedTuple):
     shaped: Ring
 
 
+class Conditions(NamedTuple):
+    """Slowly changing conditions, constant during the steps of one call."""
+
+    thrust_factor: float
+    """Factor of the battery voltage on the thrust of every rotor."""
+    wind: Vector
+    """Velocity of the air, NED, m/s."""
+    attitude_error: Vector
+    """Small rotation of the estimated attitude against the true one, rad, NED."""
+
+
 def multirotor_law(airframe: AirframeConfig, rate_loop: RateLoopConfig) -> MultirotorLaw:
     """Return the constants of an airframe with its rate controller."""
     dt = 1.0 / airframe.physics_rate_hz
@@ -115,9 +126,7 @@ def drive(
     setpoint: Vector,
     throttle: float,
     controlled: bool,
-    thrust_factor: float,
-    wind: Vector,
-    attitude_error: Vector,
+    conditions: Conditions,
 ) -> tuple[Load, Actuation]:
     """Run controller, allocation and rotors for one step; return the load and their new state.
 
@@ -131,16 +140,13 @@ def drive(
             are shaped, NaN holds the shaped rate, and infinity lets it grow without limit.
         throttle: collective; NaN or <= 0 stops the rotors, values above 1 mean 1.
         controlled: whether the rate loop runs; otherwise it idles.
-        thrust_factor: factor of the battery voltage on the thrust of every rotor.
-        wind: velocity of the air, NED, m/s.
-        attitude_error: small rotation of the estimated attitude against the true one, rad, NED.
-            Only the shaping knows an attitude.
+        conditions: battery, wind, and the error of the attitude, which only the shaping knows.
     """
     mixed, thrusts, axes, shaped = actuation
     motion, _, angular_acceleration = body
     _, _, _, w, x, y, z, p, q, r = motion
     if law.shapes:
-        estimated = rotated_slightly(attitude_error, (w, x, y, z))
+        estimated = rotated_slightly(conditions.attitude_error, (w, x, y, z))
         setpoint, shaped = _shaped(law, rings, shaped, estimated, step, setpoint, controlled)
     setpoint = delayed(rings.shaped, law.rates.delays, step, setpoint)
     if controlled:
@@ -157,8 +163,8 @@ def drive(
     else:
         axes = ZERO_STATE
     mixed = _mixed(law, axes, throttle)
-    thrusts, wrench = rotor_step(law.rotors, thrusts, mixed[0], thrust_factor)
-    return _load(law, wrench, wind), (mixed, thrusts, axes, shaped)
+    thrusts, wrench = rotor_step(law.rotors, thrusts, mixed[0], conditions.thrust_factor)
+    return _load(law, wrench, conditions.wind), (mixed, thrusts, axes, shaped)
 
 
 def _shaped(

@@ -10,6 +10,7 @@ from sitl_mock.physics.battery import Battery, BatteryState
 from sitl_mock.physics.environment import Wind, ground_law
 from sitl_mock.physics.multirotor_step import (
     ZERO,
+    Conditions,
     at_rest,
     initial_actuation,
     multirotor_law,
@@ -21,7 +22,6 @@ from sitl_mock.physics.rotors import Four
 from sitl_mock.physics.sensors import Estimate, Estimator
 from sitl_mock.physics.vehicle_step import (
     ActuatorCommand,
-    Conditions,
     Plant,
     PythonPlant,
     VehicleLaw,

@@ -9,6 +9,7 @@ from typing import NamedTuple, Protocol
 from sitl_mock.physics.environment import GroundLaw, levelled, survives
 from sitl_mock.physics.multirotor_step import (
     Actuation,
+    Conditions,
     Kinematics,
     MultirotorLaw,
     Rings,
@@ -49,17 +50,6 @@ class VehicleState(NamedTuple):
     on_ground: bool
     crashed: bool
     touchdown_speed: float  # m/s down at the latest touchdown, NaN before the first
-
-
-class Conditions(NamedTuple):
-    """Slowly changing conditions, constant during the steps of one call."""
-
-    thrust_factor: float
-    """Factor of the battery voltage on the thrust of every rotor."""
-    wind: Vector
-    """Velocity of the air, NED, m/s."""
-    attitude_error: Vector
-    """Small rotation of the estimated attitude against the true one, rad, NED."""
 
 
 class VehicleLaw(NamedTuple):
@@ -108,9 +98,7 @@ def advance(
             (roll, pitch, yaw),
             thrust if armed and not crashed else 0.0,
             armed and not on_ground,
-            conditions.thrust_factor,
-            conditions.wind,
-            conditions.attitude_error,
+            conditions,
         )
         steps += 1
         body, position, on_ground, crashed, touchdown_speed = _settled(

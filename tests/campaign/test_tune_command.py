@@ -148,7 +148,7 @@ def test_a_disk_that_fills_during_the_search_ends_it_and_shows_the_best_so_far(
     told = capsys.readouterr()
     assert "Traceback" not in told.err
     assert f"{out / 'tune.db'}: cannot be used: database or disk is full" in told.out
-    assert "; the candidates so far are kept. Go on with\n  companion campaign tune" in told.out
+    assert "; the candidates so far are kept. Continue with\n  companion campaign tune" in told.out
     assert "# The best candidate so far, not checked on unseen flights, RMS 0." in told.out
     assert "\nplanner:\n  gain_per_s: " in told.out
 

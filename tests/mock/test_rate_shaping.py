@@ -17,6 +17,7 @@ from sitl_mock.config.airframe import AirframeConfig
 from sitl_mock.config.rate_loop import AxisShaping, RateLoopConfig
 from sitl_mock.physics.multirotor import Multirotor
 from sitl_mock.physics.multirotor_step import (
+    Conditions,
     at_rest,
     drive,
     empty_rings,
@@ -182,9 +183,8 @@ def test_the_body_follows_a_correction_of_the_estimated_attitude():
     actuation = initial_actuation(law, throttle)
     for step in range(4000):
         error = (0.0, 0.0, 0.0) if step < 1000 else (0.004, -0.003, 0.02)
-        load, actuation = drive(
-            law, rings, actuation, body, step, REST, throttle, True, 1.0, REST, error
-        )
+        conditions = Conditions(1.0, REST, error)
+        load, actuation = drive(law, rings, actuation, body, step, REST, throttle, True, conditions)
         body, _ = move(law, body, load)
     w, x, y, z = body[0][3:7]
     turn = Rotation.from_quat([x, y, z, w]).as_rotvec()
