@@ -18,6 +18,8 @@ HOVER_AND_PARAMETER = {
 }
 PROGRAMS = {"mavsdk_native.py": "mavsdk", "mavsdk_grpc_program.py": "mavsdk_grpc"}
 LEAST_PARAMETERS = {"px4": 90, "ardupilot": 40}
+LARGEST_RMS = {"px4": 0.10, "ardupilot": 0.13}
+"""Of the true distance, m; ArduPilot's estimate alone is off by 0.10 on such a circle."""
 LOITER = {"px4": "long DO_SET_MODE 1 4 3\n", "ardupilot": "long DO_SET_MODE 1 5\n"}
 
 
@@ -99,7 +101,7 @@ def test_mavsdk_flies_every_setpoint_while_mavproxy_reads_uploads_and_wins(
         report = report_of(run, 90.0)
 
     check_flown(report, served.said)
-    assert truth.rms(report["wanted"]) <= 0.10
+    assert truth.rms(report["wanted"]) <= LARGEST_RMS[autopilot]
     assert not truth.crashed
     assert served.said.count("took over: mode") >= 2, "by MAVProxy, and by the program's landing"
     counters = served.counters
