@@ -13,8 +13,8 @@ from companion.guidance.reference import Vector
 class State(NamedTuple):
     """The vehicle at one instant.
 
-    Positions and headings are in the estimator's frame, corrected for its resets, so they never
-    jump.
+    Position, attitude and heading are in the estimator's frame, corrected for its resets, so they
+    never jump.
 
     Attributes:
         time: time of the state, s on the clock of the event loop.
@@ -24,7 +24,7 @@ class State(NamedTuple):
         body_rates: rad/s, about body x, y, z (FRD).
         heading: heading, rad, clockwise from north: the turn about the vertical that is left when
             the tilt is taken out; it differs from the Euler yaw in tilted attitudes.
-        height: height above home, m; None until the autopilot has reported it.
+        height: height above home, m, as the autopilot reports it, so it may jump; None until then.
     """
 
     time: float

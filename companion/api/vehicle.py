@@ -145,6 +145,7 @@ class Vehicle:
         Raises:
             ConfigError: the file cannot be read, the trajectory cannot be computed, or the limits
                 or the fence do not allow it; nothing was flown.
+            FlightEnded: the vehicle is not under our control.
         """
         if isinstance(trajectory, Path | str):
             trajectory = await beside_the_loop(trajectory_file.load, Path(trajectory))

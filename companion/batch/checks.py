@@ -40,8 +40,9 @@ def compiled_check() -> Any:
 
 
 def all_fit(q: Array, targets: Array, longest: float) -> bool:
-    """Whether the law accepts every vehicle unchanged; arrays (4, n) and (4, n).
+    """Whether no quaternion needs normalising and no target needs limiting, for n vehicles.
 
+    `q` and `targets` are (4, n); `longest` is the largest length of a target's coefficients.
     Conditions are joined by `&` and counted: without branches the loop is vectorised.
     """
     unfit = 0

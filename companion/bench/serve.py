@@ -1,4 +1,4 @@
-"""`companion bench serve`: what other programs on the link cost the time from sample to setpoint.
+"""`companion bench serve`: how much other programs on the link delay the setpoints.
 
 Two processes answer the same samples and telemetry in turn, in short rounds. The first forwards
 them to nobody. The second forwards them to three clients that read everything, and to a fourth that

@@ -25,7 +25,7 @@ They share one planner, because compiling one takes 2 s.
 def case_time(kind: str, cases: Sequence[Case]) -> float:
     """Measure the time that a case takes in one process here, s.
 
-    A first run, which imports and compiles, is not measured; of flights it flies only 1 s.
+    A first run, which imports and compiles, is not measured; for flights it lasts 1 s.
 
     Args:
         kind: "flights" or "batch".

@@ -11,7 +11,7 @@ from companion.files.yaml_file import Section
 
 Value = float | int | str | bool | None
 """A value of a factor, as stored in a row of the results."""
-Pair = tuple[float, float]
+TwoNumbers = tuple[float, float]
 KeyName = Annotated[str, Field(max_length=100)]
 
 _GRID = ("values", "range")
@@ -29,17 +29,17 @@ class Swept(Section):
 
     values: Annotated[tuple[Any, ...], Field(min_length=1, max_length=_MOST_VALUES)] | None = None
     """Every one of these values."""
-    range: Pair | None = None
+    range: TwoNumbers | None = None
     """`count` values at equal distances, from the first to the second."""
     count: Annotated[int, Field(ge=2, le=_MOST_VALUES)] | None = None
     """Number of values of `range`."""
-    uniform: Pair | None = None
+    uniform: TwoNumbers | None = None
     """Uniform between the two values."""
-    loguniform: Pair | None = None
+    loguniform: TwoNumbers | None = None
     """Uniform in the logarithm between the two values."""
-    normal: Pair | None = None
+    normal: TwoNumbers | None = None
     """Normal distribution: mean and standard deviation."""
-    within: Pair | None = None
+    within: TwoNumbers | None = None
     """Bounds of `normal`, which is truncated there."""
     choice: Annotated[tuple[Any, ...], Field(min_length=2, max_length=_MOST_VALUES)] | None = None
     """One of these values at random, all equally likely."""
@@ -151,7 +151,7 @@ class Swept(Section):
         }
 
 
-def _normal(normal: Pair, within: Pair | None, share: float) -> float:
+def _normal(normal: TwoNumbers, within: TwoNumbers | None, share: float) -> float:
     distribution = NormalDist(*normal)
     low, high = (0.0, 1.0) if within is None else map(distribution.cdf, within)
     share = min(max(low + (high - low) * share, 1e-12), 1.0 - 1e-12)

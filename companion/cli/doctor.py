@@ -154,8 +154,9 @@ class _DoctorRun:
             link = vehicle.link
             if not undo.meant_for(link, await identify(link)):
                 raise ConfigError(
-                    f"{path} belongs to another vehicle ({undo.autopilot}, system {undo.system}); "
-                    "nothing was set"
+                    f"{path} was written for another vehicle ({undo.autopilot}, system "
+                    f"{undo.system}, hardware id {undo.uid or 'unknown'}); nothing was set; "
+                    "connect that vehicle, or name the undo file of this one"
                 )
             await restore(link, undo, self._note)
         self.result = {"changes": [outcome_as_dict(outcome) for outcome in self._outcomes]}

@@ -9,7 +9,7 @@ from typing import Any
 
 from companion.cli.exit_codes import EXIT_OK
 from companion.cli.helper_process import environment, helper_process
-from companion.cli.signals import LEAVE_AFTER, hangup_signal
+from companion.cli.signals import SECOND_CTRL_C_AFTER, hangup_signal
 from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
 from companion.config.files import assigned, changed, load
@@ -92,7 +92,7 @@ async def _until_stopped(session: ServeSession, pages: ReportPages) -> dict[str,
         if stopped_at is None:
             stopped_at = loop.time()
             stop()
-        elif loop.time() - stopped_at >= LEAVE_AFTER:
+        elif loop.time() - stopped_at >= SECOND_CTRL_C_AFTER:
             session.leave()
             pages.leave()
 

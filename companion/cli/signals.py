@@ -8,11 +8,12 @@ from collections.abc import Callable
 from companion.flight.session import Session
 from companion.recording.measurements.summary import Summary
 
-LEAVE_AFTER = 1.0
+SECOND_CTRL_C_AFTER = 1.0
 """Shortest time between two Ctrl-C for the second one to leave, s; a key may bounce."""
 
 HOW_TO_LEAVE = (
-    f"Ctrl-C again, {LEAVE_AFTER:g} s later or more, stops the setpoints and ends the flight"
+    f"Ctrl-C again, {SECOND_CTRL_C_AFTER:g} s later or more, stops the setpoints and ends the "
+    "flight"
 )
 
 
@@ -55,7 +56,7 @@ class SignalHandler:
         if before is None:
             self._hand_back("the user (Ctrl-C)")
             self._session.note(HOW_TO_LEAVE)
-        elif self._ctrl_c_at - before >= LEAVE_AFTER:
+        elif self._ctrl_c_at - before >= SECOND_CTRL_C_AFTER:
             self._session.leave()
 
     def _hand_back(self, name: str) -> None:

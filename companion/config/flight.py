@@ -80,8 +80,8 @@ class CornersConfig(Section):
     """East coefficient of each corner. North 0.4 and east 0.5 give the steps of the paper's
     figure 2."""
     duration_s: Annotated[float, Field(ge=0.3, le=3.0)] = 1.2
-    """Duration of each corner step. What is left of a step bends the line of the next one, so a
-    low gain needs longer steps; these lead farther away."""
+    """Duration of each corner step. A step that has not settled bends the line of the next one,
+    so a low gain needs longer steps. Longer steps carry the vehicle farther."""
     settle_s: Annotated[float, Field(ge=0.5, le=60.0)] = 3.0
     """Position hold at the end."""
 

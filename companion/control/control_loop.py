@@ -144,7 +144,7 @@ class ControlLoop:
             self.release()
 
     def _after_gap(self, now: float) -> bool:
-        """Whether the mode must be confirmed because of a gap; request the mode once a gap."""
+        """Whether setpoints wait for the mode after a gap; each gap requests the mode once."""
         if not (self.offboard_active or self.taking_over):
             return False
         gap = now - self.record.gap_from

@@ -22,7 +22,7 @@ from companion.control.rate_lag import RateLag
 from companion.guidance.reference import Vector, minus, rotated
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
-_LONGEST = 0.1
+_LONGEST_GAP = 0.1
 """Longest time between two compared attitudes, s; the rates between them are unknown."""
 _LONGEST_STEP = 0.025
 """Longest time between two attitudes for a correction, s; beyond it the rates are too uncertain."""
@@ -71,7 +71,7 @@ class EstimatorResets:
         if before is None:
             return False
         dt = sample.vehicle_time - before.vehicle_time
-        if not 0.0 < dt <= _LONGEST:
+        if not 0.0 < dt <= _LONGEST_GAP:
             return False
         rates = self.rate_lag.mean(before.body_rates, sample.body_rates, dt)
         predicted = turned(before.q, rates, dt)

@@ -125,8 +125,8 @@ async def change_mode(
             return True
         if state.mode_received > accepted_at + _MODE_REPORT_TIMEOUT:
             raise FlightEnded(
-                "the autopilot accepted the mode but left it again without our command: "
-                f"{state.mode}",
+                "the autopilot accepted the change of mode, but reports a mode that we did not "
+                f"command: {state.mode}",
                 Exit.RELEASE,
             )
         return False

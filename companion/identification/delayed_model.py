@@ -38,7 +38,7 @@ class Model(Protocol):
         """(m,), response at the times `at` (m,), s, from the steady state of the first command."""
         ...
 
-    def decay(self, shape: Floats, since: Floats) -> Floats:
+    def free_responses(self, shape: Floats, since: Floats) -> Floats:
         """(m, k), k independent free responses, `since` (m,) seconds after the start.
 
         Their weighted sum is the effect of any initial state.
@@ -55,8 +55,8 @@ class FirstOrder:
         """The response of this lag; see `Model.response`."""
         return lagged(commands, exp(shape[0]), at)
 
-    def decay(self, shape: Floats, since: Floats) -> Floats:
-        """The free responses of this lag; see `Model.decay`."""
+    def free_responses(self, shape: Floats, since: Floats) -> Floats:
+        """The free responses of this lag; see `Model.free_responses`."""
         return np.asarray(np.exp(-since / exp(shape[0])))[:, np.newaxis]
 
 
@@ -72,8 +72,8 @@ class SecondOrder:
         """The response of this lag; see `Model.response`."""
         return second_order(commands, *frequency_damping(shape), at)
 
-    def decay(self, shape: Floats, since: Floats) -> Floats:
-        """The free responses of this lag; see `Model.decay`."""
+    def free_responses(self, shape: Floats, since: Floats) -> Floats:
+        """The free responses of this lag; see `Model.free_responses`."""
         return second_order_decay(since, *frequency_damping(shape))
 
 
@@ -208,7 +208,7 @@ class DelayedModel:
         decayed to nearly nothing at the samples, and its weight would be unbounded.
         """
         shape = unknown[: self._dead_time_index]
-        decays = [self.model.decay(shape, times - times[0]) for times in self.times]
+        decays = [self.model.free_responses(shape, times - times[0]) for times in self.times]
         columns = np.zeros((self.measured.size, 1 + sum(each.shape[1] for each in decays)))
         columns[:, 0] = 1.0
         row, column = 0, 1

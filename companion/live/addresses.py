@@ -75,7 +75,8 @@ def open_page_socket(address: str) -> PageSocket:
     """Listen at [HOST][:PORT]; the default is port 8090, for this computer only.
 
     Raises:
-        ConfigError: the address is not valid, or the port is in use.
+        ConfigError: the address is not valid or not of this computer, or the port is in use or
+            not permitted.
     """
     host, listening = _listening(address, "--live", PORT)
     return PageSocket(host, listening.getsockname()[1], secrets.token_urlsafe(9), listening)
@@ -87,7 +88,8 @@ def stream_address(address: str) -> StreamAddress:
     The library of the live stream opens the port itself, later.
 
     Raises:
-        ConfigError: the address is not valid, or the port is in use.
+        ConfigError: the address is not valid or not of this computer, or the port is in use or
+            not permitted.
     """
     host, listening = _listening(address, "--foxglove", STREAM_PORT)
     with listening:
@@ -98,7 +100,8 @@ def _listening(address: str, option: str, usual: int) -> tuple[str, socket.socke
     """Listen at the address given to an option; return host and socket.
 
     Raises:
-        ConfigError: the address is not valid, or the port is in use.
+        ConfigError: the address is not valid or not of this computer, or the port is in use or
+            not permitted.
     """
     host, port = _parts(address, option, usual)
     family = socket.AF_INET6 if ":" in host else socket.AF_INET

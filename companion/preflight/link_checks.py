@@ -83,7 +83,7 @@ def _rate_fault(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, s
     if rate.granted < _MIN_RATE_SHARE * asked:
         return (
             f"{name}: asked for {asked:g} Hz, granted {rate.granted:g} Hz",
-            "ask for less, or let the autopilot's loop run faster",
+            "lower its rate in section link, or let the autopilot's loop run faster",
         )
     asked = min(asked, _SENT_ON_CHANGE.get(name, asked))
     countable = asked * evidence.window >= _MIN_EXPECTED_COUNT
@@ -91,7 +91,7 @@ def _rate_fault(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, s
         return None
     return (
         f"{name} arrives at {achieved:.0f} Hz, asked for {asked:g} Hz",
-        "raise the link's speed, or ask for fewer messages, so that nothing has to wait",
+        "raise the link's speed, or lower link.attitude_rate_hz and link.position_rate_hz",
     )
 
 
@@ -106,7 +106,9 @@ def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
         result,
         f"{100.0 * share:.1f} % of the vehicle's messages are lost",
         "our setpoints are lost, too, and we see the pilot's mode changes late" if bad else "",
-        "ask for lower rates, or use a faster or better link" if bad else "",
+        "lower link.attitude_rate_hz and link.position_rate_hz, or use a better link"
+        if bad
+        else "",
         "gaps in MAVLink sequence numbers",
     )
     if link.damaged > _MAX_DAMAGED_SHARE * max(1, link.frames):

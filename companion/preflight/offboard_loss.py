@@ -23,7 +23,7 @@ from companion.guidance.offboard_loss import (
 from companion.guidance.reference import Vector
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
-from companion.vehicle.parameter_checks import LONGEST_HELD, shortest_hold
+from companion.vehicle.parameter_checks import LONGEST_HELD, shortest_rate_hold
 from companion.vehicle.parameter_rules import CheckResult
 
 _PERIOD = 0.05
@@ -68,7 +68,7 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
     if worst.breach is None:
         yield Finding(Key.OFFBOARD_LOSS, CheckResult.SAFE, reach_text, source=source)
         return
-    shortest = shortest_hold(config.deadman.silence_limit)
+    shortest = shortest_rate_hold(config.deadman.silence_limit)
     shorter_hold = f"set {failsafe.parameter} to {shortest:g}, " if hold_time > shortest else ""
     yield Finding(
         Key.OFFBOARD_LOSS,

@@ -220,5 +220,7 @@ async def _set(link: Link, change: Change) -> Outcome:
     if isclose(value_held, change.new, rel_tol=_FLOAT32_RESOLUTION, abs_tol=_FLOAT32_RESOLUTION):
         return Outcome(change)
     return Outcome(
-        change, f"{change.parameter}: {value_held:g} was read back instead of {change.new:g}"
+        change,
+        f"{change.parameter}: {value_held:g} was read back instead of {change.new:g}; "
+        "set it with a ground station, and check again",
     )

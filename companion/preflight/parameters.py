@@ -85,7 +85,7 @@ def _unread(evidence: Evidence) -> Iterator[Finding]:
         yield Finding(
             Key.PARAMETERS,
             CheckResult.INEFFECTIVE,
-            f"not received: {', '.join(unread)}",
+            f"parameters not received: {', '.join(unread)}",
             "the autopilot has no such parameter, or the link lost the answer; so their values "
             "were not checked",
             "fix the link, or check them with a ground station",

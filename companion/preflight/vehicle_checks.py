@@ -57,7 +57,7 @@ def battery(config: Config, state: VehicleState) -> Finding:
         return Finding(
             Key.BATTERY,
             UNSAFE,
-            f"battery at {100 * remaining:.0f} %, below limits.min_battery_percent",
+            f"battery at {100 * remaining:.0f} %, below limits.min_battery_percent = {least:g}",
             fix="charge it",
             source=source,
         )

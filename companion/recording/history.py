@@ -58,7 +58,7 @@ class Marks:
         phases: beginning and name of each phase.
         maneuvers: the maneuvers, in order.
         end: time when the flight ended early, or None.
-        reason: result of the flight: the reason if it ended early.
+        reason: why the flight ended, if it ended early; else its result.
     """
 
     phases: Sequence[tuple[float, str]] = ()

@@ -24,7 +24,7 @@ class CrossedLimit:
         curve: name of the curve that it bounds: "speed", "tilt", "error", "rate", "thrust",
             "latency", "height" or "track".
         key: configuration key of the limit.
-        levels: values that the curve must not cross ("latency": not often), in its unit.
+        levels: values that the curve must not cross, in its unit; "latency" may do so rarely.
         outline: (N, 2) north and east, m: the fence around the track; empty for other curves.
     """
 

@@ -157,7 +157,7 @@ def _columns(rows: Rows, *names: str) -> Floats:
 
 
 def _place(rows: Rows, whose: str) -> Floats:
-    """North, east and height, m."""
+    """Columns (n, 3) north, east and height of `whose`, "estimated" or "reference", m."""
     return _columns(rows, *(f"{whose}_{axis}_m" for axis in ("north", "east", "down"))) * (1, 1, -1)
 
 

@@ -31,7 +31,13 @@ _LONGEST_EDGE = 1.2
 
 def motion_plots(flights: Sequence[FlightData]) -> Iterator[Plot]:
     """The plots of the motion, without plots that have no curves."""
-    found = (_plan(flights), _space(flights), _height(flights), _error(flights), _speed(flights))
+    found = (
+        _plan(flights),
+        _space(flights),
+        _height(flights),
+        _error_plot(flights),
+        _speed(flights),
+    )
     yield from (plot for plot in found if plot.traces)
 
 
@@ -140,7 +146,7 @@ def _height(flights: Sequence[FlightData]) -> Plot:
     return Plot("Height", note, traces, layout)
 
 
-def _error(flights: Sequence[FlightData]) -> Plot:
+def _error_plot(flights: Sequence[FlightData]) -> Plot:
     traces = _lines(flights, "error", "distance from the reference") + limit_lines(flights, "error")
     layout = time_axis(flights, y="error, m")
     note = "Distance from the reference by the autopilot's estimate. In gaps there is no reference."

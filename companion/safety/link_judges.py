@@ -41,7 +41,7 @@ def _missing_command_cause(now: float, control: Control, limit: float) -> str:
     if now - control.placed > limit:
         return "no position from the vehicle"
     if not control.position_fresh:
-        return "position arrives later than deadman.position_stale_ms"
+        return "positions arrive, but older than deadman.position_stale_ms"
     return Unanswered.OLD_TARGET.words
 
 

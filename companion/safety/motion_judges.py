@@ -53,7 +53,9 @@ def speed(limit: float) -> Judge:
         velocity = hypot(*snapshot.motion.velocity)
         if velocity <= released(limit, raised):
             return None
-        return f"{velocity:.1f} m/s, faster than safety.max_speed_m_s"
+        return (
+            f"the vehicle flies at {velocity:.1f} m/s, faster than safety.max_speed_m_s = {limit:g}"
+        )
 
     return judge
 

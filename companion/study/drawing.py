@@ -52,7 +52,7 @@ def draw_response(
 
 
 def label_response(north: Axes, east: Axes) -> None:
-    """Set titles and units of the two panels of a response."""
+    """Set titles and axis labels of the two panels of a response."""
     north.set(title="Response, north", xlabel="time, s", ylabel="$a_N$")
     east.set(title="Response, east", xlabel="time, s", ylabel="$a_E$")
 

@@ -86,7 +86,7 @@ def check_guidance(name: str) -> None:
     }
     for autopilot, hover in (("px4", 0.49), ("ardupilot", 0.364)):
         vehicle = MockVehicle(
-            autopilot, prearm_delay_s=_BOOT_S, parameters=_SAFE.get(autopilot, {})
+            autopilot, prearm_delay_s=_BOOT_S, parameters=_SAFE_PARAMETERS.get(autopilot, {})
         )
         summary = fly({**changes, "thrust": {"hover_thrust": hover}}, vehicle)
         assert summary.result == "ok", f"{autopilot}: {summary.result}"
@@ -97,7 +97,7 @@ def check_guidance(name: str) -> None:
 _BOOT_S = 0.5
 """Boot time of the mock autopilots here, s; real ones need 4 to 42 s, which does not matter here.
 """
-_SAFE = {"ardupilot": {"GUID_OPTIONS": 8, "ATC_ANGLE_BOOST": 0, "GUID_TIMEOUT": 1.0}}
+_SAFE_PARAMETERS = {"ardupilot": {"GUID_OPTIONS": 8, "ATC_ANGLE_BOOST": 0, "GUID_TIMEOUT": 1.0}}
 """Parameters without which the preflight checks refuse the vehicle."""
 
 

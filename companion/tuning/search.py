@@ -75,7 +75,7 @@ class Design(NamedTuple):
 
 _LARGEST = Design(20.0, 10000.0, 10000.0, 14.0)
 """Largest values that are searched."""
-_SMALLEST = Design(1.0, 0.01, 0.01, 0.3)
+_SMALLEST_DESIGN = Design(1.0, 0.01, 0.01, 0.3)
 """Smallest values that are searched."""
 _LARGEST_BANDWIDTH_SLEWING = 8.0
 """Largest bandwidth for a rate loop with a slew limit (ArduPilot), rad/s.
@@ -163,7 +163,7 @@ def _neighbours(design: Design, step: float, largest: Design) -> Iterator[Design
     ]  # fmt: skip
     for scale in scales:
         moved = Design(*(value * by for value, by in zip(design, scale, strict=True)))
-        yield Design(*map(max, _SMALLEST, map(min, largest, moved)))
+        yield Design(*map(max, _SMALLEST_DESIGN, map(min, largest, moved)))
 
 
 def _cost(

@@ -93,7 +93,7 @@ def bit_clear(result: CheckResult, bit: int, because: str) -> Check:
     return check
 
 
-def shortest_hold(silence_limit: float) -> float:
+def shortest_rate_hold(silence_limit: float) -> float:
     """Shortest time for which the autopilot must hold the last rates, s.
 
     It is longer than `silence_limit` (s), so that `companion` releases control first.
@@ -103,7 +103,7 @@ def shortest_hold(silence_limit: float) -> float:
 
 def rates_held(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
     """Check that the last rates are held longer than `silence_limit`, at most `LONGEST_HELD`."""
-    set_to = shortest_hold(settings.silence_limit)
+    set_to = shortest_rate_hold(settings.silence_limit)
     if value <= settings.silence_limit:
         return Problem(
             UNSAFE,

@@ -69,7 +69,7 @@ class PositionHold:
         """Held heading, rad."""
 
     def begin(self) -> None:
-        """Start a hold: stop ahead, keep heading and climb rate."""
+        """Start a hold: stop ahead, at the present heading, from the present climb rate."""
         estimate = self._state.estimate
         x, y, z = estimate.position_ned
         vx, vy, vz = estimate.velocity_ned

@@ -241,6 +241,6 @@ _VELOCITY_COVARIANCE = upper_triangle(_VELOCITY_VARIANCES)
 
 
 def clip(value: float, bits: int) -> int:
-    """Return the value rounded and clamped to a signed integer of ``bits`` bits plus sign."""
+    """Return the value rounded and limited to ±(2**bits - 1)."""
     limit = (1 << bits) - 1
     return max(-limit, min(limit, round(value)))

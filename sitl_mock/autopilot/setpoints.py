@@ -102,7 +102,7 @@ class OffboardStream:
         self.fresh = False
 
     def accept(self, setpoint: Setpoint, now_us: int) -> None:
-        """Accept a setpoint; it is valid until the next one."""
+        """Accept a setpoint that was received at `now_us`; it replaces the one before."""
         self.setpoint = setpoint
         self.received += 1
         self.last_us = now_us

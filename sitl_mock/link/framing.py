@@ -27,7 +27,7 @@ _PAYLOAD_AT = 10
 _UNKNOWN_LENGTH = -1
 
 _HEADER = struct.Struct("<BBBBBBHB")
-_CRC = struct.Struct("<H")
+_CRC_LAYOUT = struct.Struct("<H")
 
 _decoder = dialect.MAVLink(None)
 
@@ -150,4 +150,4 @@ class Framer:
         )
         self._sequence = (self._sequence + 1) & 0xFF
         body += payload
-        return b"\xfd" + body + _CRC.pack(crc16.mcrf4xx(body + bytes((crc_extra,))))
+        return b"\xfd" + body + _CRC_LAYOUT.pack(crc16.mcrf4xx(body + bytes((crc_extra,))))

@@ -29,11 +29,11 @@ vehicle would seem to turn infinitely fast."""
 _COMPASS_S = 20.0
 """Time constant with which the heading follows the compass without acceleration, s."""
 _UNCERTAINTY = 0.1
-"""Uncertainty of the heading after a long time without acceleration. Uncertainty times squared
-acceleration, (m/s^2)^2, is the rate, 1/s, at which fixes correct the heading; they reduce the
-uncertainty as in a Kalman filter."""
+"""Uncertainty of the heading after a long time without acceleration, s^3/m^2. Times the squared
+acceleration it is the rate, 1/s, at which fixes correct the heading. Fixes reduce it as in a Kalman
+filter."""
 _UNCERTAINTY_GROWTH = 0.0002
-"""Growth of the uncertainty, per s."""
+"""Growth of the uncertainty, s^2/m^2."""
 
 
 class NavigationFilter:
@@ -216,7 +216,10 @@ class NavigationFilter:
         noise: tuple[complex, complex],
         kick: float,
     ) -> TrackState:
-        """Return the errors corrected by a fix whose own errors are `seen`; add a random tilt."""
+        """Return the errors corrected by a fix whose own errors are `seen`.
+
+        A random tilt error is added; `kick`, m/s^2 of acceleration, is its standard deviation.
+        """
         place, speed, tilt = errors
         off, faster = seen[0] - place, seen[1] - speed
         first, second, third = (

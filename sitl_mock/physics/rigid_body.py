@@ -69,9 +69,9 @@ def derivative(
 ) -> Motion:
     """Return the time derivative of a `Motion` (Newton, Euler, quaternion kinematics).
 
-    m v' = m g - T z_body - (drag + quadratic |v - wind|) (v - wind) - f, where f has the components
-    (axis_drag_i |u_i| + momentum_drag_i sqrt(T / (m g))) u_i along the body axes and u = v - wind;
-    J w' = torque - damping w - w x J w; q' = q (0, w) / 2.
+    v' = g - T z_body - (drag + quadratic |u|) u - f with u = v - wind, specific thrust T and drag
+    per mass; f has the components (axis_drag_i |u_i| + momentum_drag_i sqrt(T / g)) u_i along the
+    body axes. J w' = torque - damping w - w x J w; q' = q (0, w) / 2.
     """
     thrust, torque_x, torque_y, torque_z, wind_n, wind_e, wind_d = load
     jx, jy, jz, drag, quadratic, axis, momentum, damping, gravity = body

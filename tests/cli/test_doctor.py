@@ -98,7 +98,7 @@ def test_it_finds_mends_and_undoes(capsys, tmp_path, family):
         (tmp_path / "other.yaml").write_text(yaml.safe_dump(undo))
         code, _, err = doctor(capsys, "--config", config, "--undo", tmp_path / "other.yaml")
         assert code == 2
-        assert "belongs to another vehicle (" in err
+        assert "was written for another vehicle (" in err
         assert held(tmp_path, mock, wrong) == wrong
 
 

@@ -254,9 +254,9 @@ def test_a_hold_right_after_our_take_over_is_respected(tmp_path, monkeypatch):
     with mock_vehicle(tmp_path) as mock:
         summary = fly(mock, tmp_path / "log")
         assert mock.state()["mode"] == "LOITER"
-    assert (
-        summary.result
-        == "the autopilot accepted the mode but left it again without our command: AUTO.LOITER"
+    assert summary.result == (
+        "the autopilot accepted the change of mode, but reports a mode that we did not command: "
+        "AUTO.LOITER"
     )
     assert commands(summary)[-1][1] == SET_MODE  # nothing is commanded any more
 

@@ -18,7 +18,7 @@ import pytest
 import yaml
 from pymavlink import mavutil
 
-from companion.cli.signals import HOW_TO_LEAVE, LEAVE_AFTER
+from companion.cli.signals import HOW_TO_LEAVE, SECOND_CTRL_C_AFTER
 from companion.control.guidance_loop import GuidanceLoop
 from tests.flight import fly as memory
 from tests.flight import sockets
@@ -158,7 +158,7 @@ def test_a_second_ctrl_c_leaves_at_once_and_keeps_the_record(tmp_path, ways):
         for number in (signal.SIGINT, signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             process.send_signal(number)  # none of these leaves
             time.sleep(0.1)
-        time.sleep(LEAVE_AFTER)
+        time.sleep(SECOND_CTRL_C_AFTER)
         assert process.poll() is None
         process.send_signal(signal.SIGINT)
         began = time.monotonic()

@@ -25,7 +25,7 @@ def flown(folder, way, delay_ms=0, *, from_the_start=False, **changes):
 
 def test_positions_that_come_late_end_control():
     summary, truth = flown(None, "late", 400)
-    assert summary.result == "position arrives later than deadman.position_stale_ms"
+    assert summary.result == "positions arrive, but older than deadman.position_stale_ms"
     assert (truth["mode"], truth["crashed"]) == ("LOITER", False)
 
 

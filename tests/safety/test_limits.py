@@ -174,7 +174,7 @@ def silent(reason=None, **changes):
         (silent(Unanswered.NO_TARGET, placed=NOW - 0.6), "no position from the vehicle"),
         (
             silent(Unanswered.OLD_TARGET, position_fresh=False),
-            "position arrives later than deadman.position_stale_ms",
+            "positions arrive, but older than deadman.position_stale_ms",
         ),
     ],
 )

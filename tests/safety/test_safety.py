@@ -220,7 +220,9 @@ def test_over_the_limit_is_over_only_well_within_it():
     assert (verdict.action, after) == (HOLD, pytest.approx(0.3, abs=0.021))
     verdict, after = climb.see(less, 5.0)
     assert (verdict.action, after) == (LAND, pytest.approx(3.0, abs=0.021))
-    assert climb.told == ["safety: speed: 15.1 m/s, faster than safety.max_speed_m_s → hold"]
+    assert climb.told == [
+        "safety: speed: the vehicle flies at 15.1 m/s, faster than safety.max_speed_m_s = 15 → hold"
+    ]
 
 
 def test_a_hold_that_mends_it_ends_by_landing_with_what_it_was_for():

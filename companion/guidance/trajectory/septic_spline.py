@@ -23,13 +23,13 @@ def derivative_rows(fractions: Floats, derivative: int) -> Floats:
     return rows
 
 
-def _from_ends() -> Floats:
+def _coefficients_from_ends() -> Floats:
     """Matrix (8, 8) from the states at u = 0 and u = 1 to the coefficients of 1, u, … u⁷."""
     ends = [derivative_rows(np.array([u]), k)[0] for u in (0.0, 1.0) for k in range(ORDER)]
     return np.round(np.linalg.inv(np.array(ends)) * 6.0) / 6.0
 
 
-FROM_ENDS = _from_ends()
+FROM_ENDS = _coefficients_from_ends()
 """Matrix (8, 8) from end states to coefficients. Its entries are multiples of 1/6 and exact."""
 
 

@@ -235,11 +235,12 @@ def _parts(motion: Motion, law: SlowerTime, envelope: Envelope) -> Iterator[Slow
             float(times[end - 1]),
             float(factors[slowest]),
             float(times[slowest]),
-            _limit(motion, envelope, begin + near) or _limit(motion, envelope, slice(begin, end)),
+            _most_exceeded_limit(motion, envelope, begin + near)
+            or _most_exceeded_limit(motion, envelope, slice(begin, end)),
         )
 
 
-def _limit(motion: Motion, envelope: Envelope, moments: Any) -> str:
+def _most_exceeded_limit(motion: Motion, envelope: Envelope, moments: Any) -> str:
     """The limit that `moments` exceed most at the original speed; the fence if they exceed none."""
     most = {name: float(over[moments].max()) for name, over in excess(motion, envelope).items()}
     limit = max(most, key=most.__getitem__, default="")

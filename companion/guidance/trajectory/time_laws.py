@@ -221,7 +221,7 @@ class LimitedJerk:
             return Progress(self._length)
         index = sum(time >= end for end in self._ends)
         start, state, jerk = self._pieces[index]
-        return _moved(state, jerk, time - start)
+        return _after_constant_jerk(state, jerk, time - start)
 
 
 _Piece = tuple[float, Progress, float]
@@ -234,11 +234,11 @@ def _joined(jerks: Sequence[tuple[float, float]]) -> list[_Piece]:
     start, state = 0.0, Progress(0.0)
     for duration, jerk in jerks:
         pieces.append((start, state, jerk))
-        start, state = start + duration, _moved(state, jerk, duration)
+        start, state = start + duration, _after_constant_jerk(state, jerk, duration)
     return pieces
 
 
-def _moved(state: Progress, jerk: float, time: float) -> Progress:
+def _after_constant_jerk(state: Progress, jerk: float, time: float) -> Progress:
     """State after `time` s of constant jerk."""
     s, v, a, _ = state
     return Progress(

@@ -12,9 +12,9 @@ class EarlyEnd:
         time: time since the flight began, s.
         since_takeoff: time since `Course.takeoff`, s; None: the vehicle had not left the ground.
         phase: the phase that failed.
-        maneuver: the maneuver at that time, or the last one if a hold had ended it before; None:
-            another phase ran, or no maneuver had begun.
-        into_maneuver: time from its beginning to this end, or to the hold, s.
+        maneuver: the maneuver that ran, or the last one before a hold; None: another phase ran, or
+            no maneuver had begun.
+        into_maneuver: time from its beginning to this end, or to the hold, s; None: no maneuver.
         monitor: name of the safety monitor that ended the flight, or None.
     """
 
