@@ -143,8 +143,7 @@ class Vehicle:
             trajectory: a trajectory, or the path of its file (the format of `flight.trajectory`).
 
         Raises:
-            ConfigError: the file cannot be read, the trajectory cannot be computed, or the limits
-                or the fence do not allow it; nothing was flown.
+            ConfigError: the trajectory cannot be read, computed or flown within the limits.
             FlightEnded: the vehicle is not under our control.
         """
         if isinstance(trajectory, Path | str):

@@ -120,5 +120,5 @@ def test_a_command_that_stays_in_progress_is_told_so():
 
 def test_a_mode_that_was_entered_and_left_again_is_somebodys(monkeypatch):
     monkeypatch.setattr("companion.flight.commands._MODE_REPORT_TIMEOUT", 0.01)
-    with pytest.raises(FlightEnded, match=r"left it again without our command: Role\.HOLD"):
+    with pytest.raises(FlightEnded, match=r"reports a mode that we did not command: Role\.HOLD"):
         run(Vehicle((None, Role.HOLD)), change_mode)
