@@ -90,6 +90,12 @@ def turned_about_vertical(q: Quaternion, angle: float) -> Quaternion:
     return c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w
 
 
+def down_in_body(q: Quaternion) -> tuple[float, float, float]:
+    """The world's down axis in the body's frame, FRD; its last component is cos(tilt)."""
+    w, x, y, z = q
+    return 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
+
+
 def euler_angles(q: Quaternion) -> tuple[float, float, float]:
     """Roll, pitch, yaw in rad of the sequence Z-Y-X, as autopilots report them."""
     w, x, y, z = q

@@ -225,6 +225,7 @@ class ControlLoop:
 
     def release(self) -> None:
         """Send nothing from here on."""
+        self._last_command = None
         self.on = self.offboard_active = self.taking_over = False
 
     def end_stream(self) -> None:

@@ -29,8 +29,7 @@ class FlownSource:
         self.source: Source | None = None
         self.begun_at: float | None = None
         self._braking: Braking | None = None
-        self._off_reference = False
-        self._returning_since = inf
+        self._returning_since: float | None = None  # inf: still off the reference
 
     def clear(self) -> None:
         """Fly no source and hold no pose."""
@@ -108,9 +107,9 @@ class FlownSource:
         """
         distance = dist(reference.position_ned, motion.position_ned)
         if not reference.holds_position:
-            self._off_reference, self._returning_since = True, inf
-        elif self._off_reference:
-            self._returning_since = min(now, self._returning_since)
-            late = now - self._returning_since > _RETURN_TIME
-            self._off_reference = distance > _REJOINED and not late
-        return None if self.pose is None or self._off_reference else distance
+            self._returning_since = inf
+        elif self._returning_since is not None:
+            self._returning_since = since = min(now, self._returning_since)
+            if distance <= _REJOINED or now - since > _RETURN_TIME:
+                self._returning_since = None
+        return None if self.pose is None or self._returning_since is not None else distance

@@ -17,7 +17,8 @@ too. The rates of such an autopilot get the rotation of this frame added.
 from math import exp, radians
 
 from companion.attitude import BodyRates, Quaternion, Target
-from companion.attitude.rotation import clamp, turned_about_vertical
+from companion.attitude.reference import first_order_step
+from companion.attitude.rotation import clamp, down_in_body, turned_about_vertical
 from companion.guidance.reference import rotated
 
 _LARGEST = radians(3.0)
@@ -55,8 +56,8 @@ class StepFrame:
             self.turn *= exp(-dt / _DECAY_S)
             self._zero = corrections - self.turn
         if dt > 0.0:
-            share = 1.0 - exp(-dt / _FOLLOWING_S)
-            self.turn_rate += share * ((self.turn - before) / dt - self.turn_rate)
+            turning = (self.turn - before) / dt
+            _, self.turn_rate = first_order_step(self.turn_rate, turning, _FOLLOWING_S, dt)
 
     def attitude(self, q: Quaternion) -> Quaternion:
         """An attitude of the estimator's frame in this frame."""
@@ -64,12 +65,12 @@ class StepFrame:
 
     def rates(self, q: Quaternion, rates: BodyRates) -> BodyRates:
         """Body rates in the estimator's frame, from body rates in this frame at attitude `q`."""
-        w, x, y, z = q
         turn_rate = self.turn_rate
+        if turn_rate == 0.0:
+            return rates
+        x, y, z = down_in_body(q)
         return BodyRates(
-            rates.roll + 2.0 * (x * z - w * y) * turn_rate,
-            rates.pitch + 2.0 * (y * z + w * x) * turn_rate,
-            rates.yaw + (1.0 - 2.0 * (x * x + y * y)) * turn_rate,
+            rates.roll + x * turn_rate, rates.pitch + y * turn_rate, rates.yaw + z * turn_rate
         )
 
     def target(self, target: Target) -> Target:

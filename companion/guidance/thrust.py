@@ -3,7 +3,7 @@
 from math import acos, hypot, isfinite, sqrt
 
 from companion.attitude import BodyRates, Quaternion
-from companion.attitude.kinematics import cos_tilt
+from companion.attitude.rotation import down_in_body
 from companion.guidance.reference import GRAVITY, Vector
 
 FOR_TILT = 0.95
@@ -31,9 +31,8 @@ def cos_tilt_ahead(q: Quaternion, body_rates: BodyRates, ahead: float) -> float:
     Thrust for this tilt instead of the present one compensates the lag of the rotors while the
     vehicle tilts, to first order (T + lag·Ṫ). Source: third row of Ṙ = R·[ω]ₓ.
     """
-    w, x, y, z = q
-    north, east = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x)
-    cosine = cos_tilt(x, y) + ahead * (north * body_rates.pitch - east * body_rates.roll)
+    x, y, z = down_in_body(q)
+    cosine = z + ahead * (x * body_rates.pitch - y * body_rates.roll)
     return min(max(cosine, -1.0), 1.0)
 
 

@@ -135,14 +135,19 @@ def test_a_command_that_stays_in_progress_is_no_silence(run, monkeypatch):
     run(scene())
 
 
+async def cancel_once_sent(link, vehicle):
+    """A command whose call is cancelled before its ACK comes."""
+    cancelled = asyncio.create_task(link.command(SET_MODE, 1.0, 4.0))
+    await until(lambda: vehicle.of("COMMAND_LONG"))
+    cancelled.cancel()
+
+
 def test_a_late_ack_of_a_cancelled_command_does_not_count_for_the_next_one(run):
     """A hold is cancelled; its ACK must not count for the landing, which the autopilot refuses."""
 
     async def scene():
         async with linked() as (link, vehicle):
-            cancelled = asyncio.create_task(link.command(SET_MODE, 1.0, 4.0))
-            await until(lambda: vehicle.of("COMMAND_LONG"))
-            cancelled.cancel()
+            await cancel_once_sent(link, vehicle)
             vehicle.answers["COMMAND_LONG"] = lambda message: [ack(SET_MODE, 0), ack(SET_MODE, 4)]
             with pytest.raises(CommandRefused, match="FAILED"):
                 await link.command(SET_MODE, 1.0, 6.0)
@@ -155,9 +160,7 @@ def test_a_late_ack_of_a_cancelled_command_does_not_count_for_the_next_one(run):
 def test_a_cancelled_command_that_was_lost_costs_the_next_one_a_repetition(run):
     async def scene():
         async with linked() as (link, vehicle):
-            cancelled = asyncio.create_task(link.command(SET_MODE, 1.0, 4.0))
-            await until(lambda: vehicle.of("COMMAND_LONG"))
-            cancelled.cancel()
+            await cancel_once_sent(link, vehicle)
             vehicle.answers["COMMAND_LONG"] = lambda message: [ack(SET_MODE, 0)]
             await link.command(SET_MODE, 1.0, 6.0, timeout_s=0.02)
             assert len(vehicle.of("COMMAND_LONG")) == 3
