@@ -53,6 +53,7 @@ class ModelFollowingPlanner:
         self._forward = FeedForward(constants, response, LONGEST_SAMPLE)
         self._hold = SampleHold()
         self._started = False
+        self._target: Target | None = None
         self.planned: PlannedTilt | None = None
         self.retune(constants)
 
@@ -83,6 +84,7 @@ class ModelFollowingPlanner:
 
     def _start(self, q: Quaternion, body_rates: BodyRates | None) -> None:
         self._hold.restart()
+        self._target = None
         self._forward.start(q, body_rates)
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
@@ -126,7 +128,6 @@ class ModelFollowingPlanner:
         dt = min(max(SHORTEST_SAMPLE, dt), LONGEST_SAMPLE)  # in this order NaN is short, too
         north, east, heading = -2.0 * ay, 2.0 * ax, heading_of(sqrt(square), w, z)
         self._hold.take(dt)
-        dt = self._hold.step
         by_tilt, by_yaw = forward.plans.in_effect(self._hold.late)
         self.planned = by_tilt
         north_speed, east_speed, turn = self._feedback(by_tilt, by_yaw, north, east, heading)
@@ -138,13 +139,31 @@ class ModelFollowingPlanner:
             heading += (forward.dead_time + forward.lag) * unpredicted
         heading += by_tilt.still - by_yaw.turned
         ahead = forward.frame.lead(heading, forward.plans)
-        roll, pitch, yaw = forward.advance(target, heading, more_yaw + turn, dt)
+        roll, pitch, yaw = self._advance(target, heading, more_yaw + turn)
         roll, pitch = self._hold.rates(roll, pitch)
         ahead = 0.5 * (ahead + forward.frame.lead(heading, forward.plans))
         roll, pitch = into_body(cos(ahead), sin(ahead), roll + more_roll, pitch + more_pitch)
         return BodyRates(
             *limit_rates(roll, pitch, yaw, constants.max_tilt_rate, constants.max_yaw_rate)
         )
+
+    def _advance(
+        self, target: Target, heading: float, yaw_feedback: float
+    ) -> tuple[float, float, float]:
+        """Advance the plan to when the next sample is expected; see `FeedForward.advance`.
+
+        A new target did not apply in the time by which the sample was late: there the plan follows
+        the target before it. Else the rates would make up for a motion that nobody had asked for.
+        """
+        hold, forward = self._hold, self._forward
+        before, self._target = self._target, target
+        if before is None or before == target or hold.late < SHORTEST_SAMPLE:
+            return forward.advance(target, heading, yaw_feedback, hold.step)
+        late, coming = hold.late, hold.step - hold.late
+        late_roll, late_pitch, _ = forward.advance(before, heading, yaw_feedback, late)
+        roll, pitch, yaw = forward.advance(target, heading, yaw_feedback, coming)
+        share = late / hold.step
+        return roll + share * (late_roll - roll), pitch + share * (late_pitch - pitch), yaw
 
     def _feedback(
         self, by_tilt: PlannedTilt, by_yaw: PlannedYaw, north: float, east: float, heading: float

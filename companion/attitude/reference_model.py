@@ -64,7 +64,9 @@ class ReferenceModel:
     The whole vector v is scaled, so a step moves on a straight line. The scale keeps the body rates
     of the motion within the limits. The rates that are sent compensate the lag of the vehicle
     (τ and σ) and stay within the limits too. If the autopilot has a slew limit, v changes no
-    faster, and is small enough to be slowed down in time: the slew limit is never reached.
+    faster, and is small enough to be slowed down in time: the slew limit is never reached. Behind a
+    lag of second order, a large step of v would saturate the motors, and the response would not be
+    linear: there v takes at least τ from rest to the largest rate.
 
     Args:
         constants: gains and limits.
@@ -82,6 +84,7 @@ class ReferenceModel:
         "_braking",
         "_constants",
         "_lag",
+        "_slew_limit",
         "_slope_east",
         "_slope_north",
         "_square",
@@ -101,7 +104,7 @@ class ReferenceModel:
         acceleration: float = inf,
         square: float = 0.0,
     ) -> None:
-        self._acceleration, self._square = acceleration, square
+        self._slew_limit, self._square = acceleration, square
         self.retune(constants, lag)
         self.start_at(Coefficients(0.0, 0.0), Coefficients(0.0, 0.0))
 
@@ -110,6 +113,8 @@ class ReferenceModel:
         self._constants = constants
         self._braking = braking_lead(constants.gain, lag)
         self._lag = Lag(lag, self._square)
+        gentle = constants.max_tilt_rate / lag if self._square > 0.0 else inf
+        self._acceleration = min(self._slew_limit, gentle)
         # Near the target v falls by p·v a second.
         slowed_in_time = self._acceleration / constants.gain
         self._tilt_rate_weight = max(constants.tilt_rate_weight, slowed_in_time**-2)

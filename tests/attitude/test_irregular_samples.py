@@ -49,3 +49,14 @@ def test_the_step_of_figure_2_stays_straight(steps, bends):
     """Without `SampleHold` PX4's samples bent it by 0.0009, a tenth of what it may bend there."""
     assert largest_cross_axis(STEPS[steps], 400.0) < bends
     assert largest_cross_axis(STEPS[steps], 90.0) < 0.3 * bends
+
+
+def test_a_target_that_comes_with_a_late_sample_asks_for_no_spike():
+    """The target did not apply before; twice the rates would saturate the motors."""
+    planner = make_planner("model-following", 4.0, lag=0.047, dead_time=0.04)
+    level, tilted = Target(0.0, 0.0, 0.0), Target(0.0, 0.4, 0.0)
+    for _ in range(50):
+        planner.rates((1.0, 0.0, 0.0, 0.0), level, 0.004)
+    late = planner.rates((1.0, 0.0, 0.0, 0.0), tilted, 0.008)
+    next_one = planner.rates((1.0, 0.0, 0.0, 0.0), tilted, 0.004)
+    assert 0.9 * next_one.roll < late.roll < 1.01 * next_one.roll
