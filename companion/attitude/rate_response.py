@@ -8,6 +8,9 @@ _LONGEST = 1.0
 _SMALLEST_LAG = 1e-3
 """Smallest lag that `model-following` computes with, s."""
 
+FIRST_ORDER_SHARE = 0.63
+"""The first-order lag that is closest to PX4's second-order lag, as a share of the latter; the rest
+is nearly a dead time."""
 SHARE_OF_LARGEST_GAIN = 0.25
 """The feedback gain is at most this share of the largest stable gain: a gain margin of 4."""
 

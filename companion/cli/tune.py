@@ -17,14 +17,11 @@ from companion.config.files import changed, load
 from companion.config.known_drag import drag_prior
 from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
-from companion.identification import identify_vehicle, second_order_keys
-from companion.mavlink.errors import LogError
 from companion.recording.learned_file import newest
 from companion.tuning import Disturbances, Proposal, propose
 from companion.tuning.flights import COURSES, CourseResult, autopilot_like, fly_course
 from companion.tuning.noise import measured_disturbances
 from companion.tuning.writing import proposal_text, summary_lines
-from companion.vehicle.flight_log import read_flight_log
 
 _VEHICLE, _CONFIG, _LOG = "vehicle.yaml", "config.yaml", "flight.tlog"
 _OUTPUT = "tuned.yaml"
@@ -42,11 +39,10 @@ def tune(options: argparse.Namespace) -> int:
     config, included = _configuration(source, vehicle, options.config)
     config = _with_learned_drag(config, source)
     log = source / _LOG
-    disturbances, second_order = Disturbances(), {}
+    disturbances = Disturbances()
     if source.is_dir() and log.exists():
         disturbances = measured_disturbances(log, drag_prior(config).drag.linear, disturbances)
-        second_order = _second_order(log)
-    proposal = propose(config, disturbances, vehicle=second_order)
+    proposal = propose(config, disturbances)
     flights = {} if options.no_flights else _flights(proposal, console)
     known = _relative(vehicle, output) if included else _vehicle_of(proposal.tuned)
     console.print("\n".join(summary_lines(proposal, flights)))  # kept if the disk is full
@@ -96,15 +92,6 @@ def _with_learned_drag(config: Config, source: Path) -> Config:
         "quadratic_drag_per_m": learned.drag.quadratic,
     }
     return changed(config, {"guidance": drag}, str(learned.path))
-
-
-def _second_order(log: Path) -> dict[str, float]:
-    """Keys of a second-order rate loop, if the doublets of this flight clearly show one."""
-    try:
-        rows = read_flight_log(log)
-    except LogError:  # nothing in it was flown by body rates
-        return {}
-    return second_order_keys(identify_vehicle(rows.setpoints, rows.rates, rows.specific_thrust))
 
 
 def _flyable(config: Config) -> Config:

@@ -1,10 +1,11 @@
 """Gains of the position hold and of its observer, computed from the response of the rate loop."""
 
-from math import inf
+from math import inf, isfinite
 
+from companion.attitude.rate_response import FIRST_ORDER_SHARE
 from companion.config import Config
 from companion.config.known_drag import drag_prior
-from companion.control.inner_loop import sensible_gain, slower_tilt, tilt_response
+from companion.control.inner_loop import sensible_gain, slower_tilt, tilt_damping, tilt_response
 from companion.guidance import ObserverSettings, Weights, chain_gains
 from companion.guidance.feedback import ChainGains
 from companion.guidance.position_correction import CorrectionSettings
@@ -19,6 +20,9 @@ the time in which the rate loop slews to the largest roll-pitch rate, s."""
 _SHORTEST_DELAY = 0.275
 """Shortest delay for which the hold is made stiffer, s. Higher weights multiply the noise of the
 estimate so much that the autopilot's rate loop always slews, and the vehicle swings."""
+_SECOND_ORDER_SHARE = 0.2
+"""Share of a lag of second order by which it counts as longer in the hold's delay. It keeps the
+margins of the hold that flew PX4's rate loop as if it were of first order."""
 _OBSERVER_RANGE = 0.035, 0.06
 """Range over which the observer changes from quick to normal: dead time plus half the lag, s."""
 _GAIN_RANGE = 5.0, 7.0
@@ -87,9 +91,13 @@ def slewing_delay(config: Config) -> float:
 
 
 def _lateness(config: Config) -> float:
-    """Dead time plus half the lag of the rate loop, s; infinite if it is not identified."""
+    """Dead time plus half the lag of the rate loop, s; infinite if it is not identified.
+
+    Both are those of first order: a lag of second order delays quick commands more.
+    """
     lag, dead_time = slower_tilt(config)
-    return dead_time + 0.5 * lag if config.vehicle.known else inf
+    share = FIRST_ORDER_SHARE if isfinite(tilt_damping(config)) else 1.0
+    return dead_time + (1.0 - 0.5 * share) * lag if config.vehicle.known else inf
 
 
 def observer_quickness(config: Config) -> float:
@@ -151,6 +159,8 @@ def attitude_delay(config: Config) -> float:
     """
     excess = 1.0 / sensible_gain(config) - 1.0 / config.planner.gain_per_s
     delay = feedback_delay(config) + max(0.0, excess)
+    if isfinite(tilt_damping(config)):
+        delay += _SECOND_ORDER_SHARE * slower_tilt(config)[0]
     return delay if config.vehicle.known else delay + _USUAL_RATE_LOOP
 
 

@@ -137,6 +137,12 @@ def slower_tilt(config: Config) -> tuple[float, float]:
     )
 
 
+def tilt_damping(config: Config) -> float:
+    """The lower damping ratio of roll and pitch; infinite where both are of first order."""
+    axes = config.vehicle.axes
+    return min(axes[name].damping or inf for name in ("roll", "pitch"))
+
+
 def sensible_gain(config: Config) -> float:
     """Largest sensible gain of the planner, 1/s; infinite if the rate loop is not identified."""
     delay = sum(slower_tilt(config))

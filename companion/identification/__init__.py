@@ -21,7 +21,6 @@ A whole vehicle
     vehicle_table             the fits as a table for the terminal
     vehicle_fragment          the fits as YAML for a configuration
     kept_axes                 configured values of the axes whose fit is bad
-    second_order_keys         keys for a vehicle whose roll and pitch are clearly of second order
 
 One axis
     fit_rate_response         lag, dead time, gain and slew limit: a `RateResponse`
@@ -42,7 +41,6 @@ from companion.identification.correlation import (
 )
 from companion.identification.delayed_model import SecondOrderFit as SecondOrderFit
 from companion.identification.fragment import kept_axes as kept_axes
-from companion.identification.fragment import second_order_keys as second_order_keys
 from companion.identification.fragment import vehicle_fragment as vehicle_fragment
 from companion.identification.response import BadFitError as BadFitError
 from companion.identification.response import FitNeeds as FitNeeds

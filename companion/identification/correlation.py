@@ -8,6 +8,7 @@ with a delay of 40 ms, and steps with 87 ms. At high frequencies the rate loop i
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from companion.attitude.rate_response import FIRST_ORDER_SHARE
 from companion.identification.lags import held_commands, lagged, slewed, value_at
 from companion.identification.record import LONGEST_DEAD_TIME, Stretch, stretches
 
@@ -21,8 +22,6 @@ _PHASE = 0.38
 _FREQUENCIES = 5.0, 9.0
 """Range of the centre frequency, rad/s. At 8 rad/s on PX4 and 9 rad/s on ArduPilot, the dead times
 measured in steps, circles, figure-eights and doublets agree within 3 ms."""
-_FIRST_ORDER_SHARE = 0.63
-"""The first-order lag that is closest to PX4's second-order lag, as a share of the latter."""
 _REACH = 3.5
 """Half width of the filter, in its standard deviations."""
 _EXPLAINED = 0.985
@@ -87,7 +86,7 @@ def _frequency(lag: float, damping: float) -> float:
     """Centre frequency of the filter, rad/s."""
     slowest, quickest = _FREQUENCIES
     if damping < np.inf:
-        lag *= _FIRST_ORDER_SHARE
+        lag *= FIRST_ORDER_SHARE
     return min(max(_PHASE / max(lag, _GRID), slowest), quickest)
 
 

@@ -12,12 +12,15 @@ Known = Mapping[str, Sequence[float | None]]
 """Lag (ms), dead time (ms), acceleration limit (°/s²) and damping by axis, as configured."""
 
 _PREFIX = {"roll": "", "pitch": "pitch_", "yaw": "yaw_"}
+_KEYS = "lag_ms", "dead_time_ms", "acceleration_limit_deg_s2", "damping"
 _UNLIMITED = 100_000.0
 """Slew limit written for an axis that has none while roll has one, °/s²; null would mean roll's."""
 _SAME_MS = 3.0
 """Lags and dead times of roll and pitch that differ by at most this count as the same, ms."""
 _SAME_SLEW = 0.1
 """Slew limits of roll and pitch that differ by at most this share count as the same."""
+_SAME_DAMPING = 0.05
+"""Damping ratios of roll and pitch that differ by at most this count as the same."""
 _DAMPINGS = 0.3, 10.0
 """Damping ratios that `vehicle.damping` takes."""
 
@@ -45,24 +48,26 @@ class AxisValues(NamedTuple):
 
 
 def vehicle_fragment(
-    vehicle: IdentifiedVehicle, gravity: float, known: Known, flight: str = ""
+    vehicle: IdentifiedVehicle,
+    gravity: float,
+    known: Known,
+    flight: str = "",
+    second_order: bool = True,
 ) -> str:
     """YAML for the configuration to include, with a comment on the quality of each fit.
 
     An axis with a good fit gets its fitted values. An axis with a bad fit keeps its configured
     values, and a comment says so. If roll and pitch hardly differ, their mean values are written as
-    those of roll. A slew limit is written only if there is one, or to say that the axis has none
-    while roll has one. The hover thrust is written only if the thrust map is good.
+    those of roll. The hover thrust is written only if the thrust map is good.
 
-    A second-order fit is written only as a comment. With its values, the steps of a real PX4 at
-    90 °/s were straighter (deviation 0.002 instead of 0.004), but those at 400 °/s less straight
-    (0.006 instead of 0.004).
+    Roll and pitch are written as lags of second order if this is clearly better for both.
 
     Args:
         vehicle: the identified vehicle.
         gravity: gravity, m/s², which gives the hover thrust.
         known: present configuration of each axis; axes may be missing, values None.
         flight: name of the flight, written as `identified`; empty: it is not written.
+        second_order: whether lags of second order may be written.
 
     Raises:
         BadFitError: no fit is good, or an axis with a bad fit has no configured values; the message
@@ -75,31 +80,31 @@ def vehicle_fragment(
         lines.append(f"# thrust: {thrust.described()}")
         lines += ["thrust:", f"  hover_thrust: {thrust.normalised(gravity):.3f}"]
     axes = {name: kept.get(name) or _fitted_values(each) for name, each in vehicle.axes.items()}
+    if second_order:
+        axes |= _of_second_order(vehicle)
     mark = [f"  identified: {bounded_yaml.dump_value(flight)}"] if flight else []
     lines += ["vehicle:", *mark, *_tilt_keys(axes["roll"], axes["pitch"])]
     lines += _axis_keys("yaw", axes["yaw"], axes["roll"].slew)
     return "\n".join(lines) + "\n"
 
 
-def second_order_keys(vehicle: IdentifiedVehicle) -> dict[str, float]:
-    """Keys of the section `vehicle` that describe roll and pitch as lags of second order.
+def _of_second_order(vehicle: IdentifiedVehicle) -> dict[str, AxisValues]:
+    """Roll and pitch as lags of second order.
 
-    Returns:
-        The keys; empty unless both axes have a good fit, and second order without a slew limit is
-        clearly better on both, with a damping ratio that the configuration accepts.
+    Empty unless both have a good fit, and second order without a slew limit is clearly better on
+    both, with a damping ratio that the configuration accepts.
     """
-    keys: dict[str, float] = {}
+    axes = {}
     for name in ("roll", "pitch"):
-        response, prefix = vehicle.axes[name], _PREFIX[name]
+        response = vehicle.axes[name]
         fit = response.second_order
         if fit is None or fit.slew is not None or not response.is_good():
             return {}
         if not _DAMPINGS[0] <= fit.damping <= _DAMPINGS[1]:
             return {}
-        keys[f"{prefix}lag_ms"] = round(2e3 * fit.damping / fit.frequency, 1)
-        keys[f"{prefix}dead_time_ms"] = round(1e3 * fit.dead_time, 1)
-        keys[f"{prefix}damping"] = round(fit.damping, 2)
-    return keys
+        lag = 2e3 * fit.damping / fit.frequency
+        axes[name] = AxisValues(lag, 1e3 * fit.dead_time, None, fit.damping)
+    return axes
 
 
 def kept_axes(vehicle: IdentifiedVehicle, known: Known) -> dict[str, AxisValues]:
@@ -125,42 +130,49 @@ def _fitted_values(response: RateResponse) -> AxisValues:
 
 
 def _tilt_keys(roll: AxisValues, pitch: AxisValues) -> list[str]:
-    """Lines of roll and pitch; if they hardly differ, lines of roll with their mean values."""
-    if _nearly_same(roll, pitch):
-        slews = [axis.slew for axis in (roll, pitch) if axis.slew is not None]
-        slew = sum(slews) / len(slews) if slews else None
-        mean = AxisValues(
-            0.5 * (roll.lag + pitch.lag),
-            0.5 * (roll.dead_time + pitch.dead_time),
-            slew,
-            roll.damping,
-        )
-        return _axis_keys("roll", mean)
-    return _axis_keys("roll", roll) + _axis_keys("pitch", pitch, roll.slew)
+    """Lines of roll and pitch; if they hardly differ, mean values for roll, null for pitch."""
+    if not _nearly_same(roll, pitch):
+        return _axis_keys("roll", roll) + _axis_keys("pitch", pitch, roll.slew)
+    mean = AxisValues(
+        0.5 * (roll.lag + pitch.lag),
+        0.5 * (roll.dead_time + pitch.dead_time),
+        _mean(roll.slew, pitch.slew),
+        _mean(roll.damping, pitch.damping),
+    )
+    return _axis_keys("roll", mean) + [f"  pitch_{key}: null" for key in _KEYS]
+
+
+def _mean(one: float | None, other: float | None) -> float | None:
+    return None if one is None or other is None else 0.5 * (one + other)
 
 
 def _nearly_same(one: AxisValues, other: AxisValues) -> bool:
-    if one.slew is not None and other.slew is not None:
-        if abs(one.slew - other.slew) > _SAME_SLEW * max(one.slew, other.slew):
-            return False
-    elif one.slew != other.slew:
-        return False
-    if one.damping != other.damping:
-        return False
-    apart = max(abs(one.lag - other.lag), abs(one.dead_time - other.dead_time))
-    return apart <= _SAME_MS
+    return (
+        max(abs(one.lag - other.lag), abs(one.dead_time - other.dead_time)) <= _SAME_MS
+        and _near(one.slew, other.slew, _SAME_SLEW * max(one.slew or 0.0, other.slew or 0.0))
+        and _near(one.damping, other.damping, _SAME_DAMPING)
+    )
+
+
+def _near(one: float | None, other: float | None, apart: float) -> bool:
+    """Whether both are None, or differ by at most `apart`."""
+    return one == other or (one is not None and other is not None and abs(one - other) <= apart)
 
 
 def _axis_keys(name: str, axis: AxisValues, inherited: float | None = None) -> list[str]:
-    """Lines of one axis; `inherited` is roll's slew limit, which counts if none is written."""
-    prefix = _PREFIX[name]
-    lines = [f"  {prefix}lag_ms: {axis.lag:.1f}", f"  {prefix}dead_time_ms: {axis.dead_time:.1f}"]
+    """Lines of one axis; `inherited` is roll's slew limit, which counts if none is written.
+
+    Keys without a value are written as null, so that no value of another file remains in force.
+    """
     slew = axis.slew if axis.slew is not None or inherited is None else _UNLIMITED
-    if slew is not None:
-        lines.append(f"  {prefix}acceleration_limit_deg_s2: {slew:.0f}")
-    if axis.damping is not None:
-        lines.append(f"  {prefix}damping: {axis.damping:.2f}")
-    return lines
+    values = {
+        "lag_ms": f"{axis.lag:.1f}",
+        "dead_time_ms": f"{axis.dead_time:.1f}",
+        "acceleration_limit_deg_s2": "null" if slew is None else f"{slew:.0f}",
+        "damping": "null" if axis.damping is None else f"{axis.damping:.2f}",
+    }
+    keys = _KEYS[:-1] if name == "yaw" else _KEYS  # there is no yaw_damping
+    return [f"  {_PREFIX[name]}{key}: {values[key]}" for key in keys]
 
 
 def _comment(name: str, response: RateResponse, kept: Mapping[str, AxisValues]) -> str:

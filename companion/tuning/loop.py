@@ -5,7 +5,6 @@ It contains planner, rate loop, tilt, motion and guidance near hover, within all
 """
 
 from dataclasses import dataclass
-from math import inf
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from companion.config import Config
 from companion.config.guidance import LINEAR
 from companion.config.known_drag import drag_prior
 from companion.control.hold_settings import observer_settings
-from companion.control.inner_loop import slower_tilt
+from companion.control.inner_loop import slower_tilt, tilt_damping
 from companion.control.outer_loop import linear_settings
 from companion.files.yaml_file import ConfigError
 from companion.guidance import GRAVITY
@@ -141,9 +140,7 @@ def _slower_axis(config: Config) -> AxisResponse:
     if not config.vehicle.known:
         return AxisResponse(_USUAL_LAG, _USUAL_DEAD_TIME)
     lag, dead_time = slower_tilt(config)
-    axes = config.vehicle.axes
-    dampings = [axes[name].damping for name in ("roll", "pitch")]
-    return AxisResponse(lag, dead_time, damping=min(d or inf for d in dampings))
+    return AxisResponse(lag, dead_time, damping=tilt_damping(config))
 
 
 def _planner(config: Config, s: Complex) -> tuple[Complex, float]:

@@ -1,10 +1,8 @@
 """Proposes gain, weights and bandwidth for an identified vehicle."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from companion.config import Config
-from companion.config.files import changed
 from companion.files.yaml_file import ConfigError
 from companion.tuning.expectation import Disturbances, Expectation, expectation, stability
 from companion.tuning.loop import ModelError
@@ -23,7 +21,6 @@ class Proposal:
         untuned: configuration before.
         tuned: configuration with the proposal.
         design: the proposed values.
-        vehicle: proposed keys of the section `vehicle`; may be empty.
         before: expectation of `untuned`.
         after: expectation of `tuned`.
         with_errors: margins of `tuned` if the vehicle's times differ from the identified ones.
@@ -35,7 +32,6 @@ class Proposal:
     untuned: Config
     tuned: Config
     design: Design
-    vehicle: Mapping[str, float]
     before: Expectation
     after: Expectation
     with_errors: tuple[tuple[ModelError, Margins], ...]
@@ -52,9 +48,7 @@ class Proposal:
         known = {}
         if drag is not None:
             known = {"drag_per_s": drag.linear, "quadratic_drag_per_m": drag.quadratic}
-        vehicle = {"vehicle": dict(self.vehicle)} if self.vehicle else {}
         return {
-            **vehicle,
             "planner": {"gain_per_s": design.gain},
             "guidance": {
                 "position_weight_per_s4": design.position,
@@ -69,7 +63,6 @@ def propose(
     config: Config,
     disturbances: Disturbances | None = None,
     aims: Aims | None = None,
-    vehicle: Mapping[str, float] | None = None,
 ) -> Proposal:
     """Propose values with the smallest expected position error within the stability margins.
 
@@ -77,12 +70,10 @@ def propose(
         config: the configuration to tune; `vehicle` must be identified.
         disturbances: disturbances of the vehicle; None: the usual ones.
         aims: margins to keep; None: the default ones.
-        vehicle: keys of the section `vehicle` that describe the vehicle better than `config`, from
-            `companion.identification.second_order_keys`; they are proposed too.
 
     Raises:
         ConfigError: lag and dead time are unknown, the analysis does not support planner or
-            guidance, a key of `vehicle` is refused, or no values keep the margins.
+            guidance, or no values keep the margins.
     """
     if not config.vehicle.known:
         raise ConfigError(
@@ -93,9 +84,8 @@ def propose(
     flight = config.flight.model_copy(update={"maneuvers": _ANALYSED})
     untuned = config.model_copy(update={"flight": flight})
     before = expectation(untuned, disturbances)
-    known = changed(untuned, {"vehicle": dict(vehicle)}, "the vehicle") if vehicle else untuned
-    design = search(known, disturbances, aims)
-    tuned = design.applied(known)
+    design = search(untuned, disturbances, aims)
+    tuned = design.applied(untuned)
     after = expectation(tuned, disturbances)
     found = after.margins
     # The values are rounded after the search, which costs up to a twentieth of a margin.
@@ -108,6 +98,4 @@ def propose(
             "vehicle; check vehicle.lag_ms and vehicle.dead_time_ms"
         )
     errors = tuple((error, stability(tuned, error)) for error in errors_to_tolerate(tuned, aims))
-    return Proposal(
-        untuned, tuned, design, vehicle or {}, before, after, errors, disturbances, aims
-    )
+    return Proposal(untuned, tuned, design, before, after, errors, disturbances, aims)

@@ -32,15 +32,12 @@ def proposal_text(
     """
     lines = [f"# Proposed by `companion tune` for {where}.", "#"]
     lines += [f"# {line}".rstrip() for line in summary_lines(proposal, flights)]
-    included = isinstance(vehicle, Path)
     if isinstance(vehicle, Path):
         lines += ["", f"include: {bounded_yaml.dump_value(str(vehicle))}  # the identified vehicle"]
     else:
         lines += ["", *bounded_yaml.dump(dict(vehicle)).splitlines()]
     reasons = _reasons(proposal)
     for section, keys in proposal.changes.items():
-        if section == "vehicle" and not included:
-            continue  # written above
         lines += ["", f"{section}:"]
         for key, value in keys.items():
             lines += [f"  # {reasons[key]}", f"  {key}: {value:g}"]
@@ -127,9 +124,7 @@ def _reasons(proposal: Proposal) -> dict[str, str]:
     else:
         why = f"below {limit:.2f}, the largest sensible gain, for the margins"
     drag = "as configured, or learned in an earlier flight of this vehicle"
-    order = "the log shows clearly that the rate loop is of second order"
     return {
-        **dict.fromkeys(proposal.vehicle, order),
         "drag_per_s": drag,
         "quadratic_drag_per_m": drag,
         "gain_per_s": f"before {untuned.planner.gain_per_s:g}; {why}",

@@ -63,7 +63,7 @@ def test_the_grid_is_flown_with_every_sample(tmp_path):
     # A Latin hypercube has one sample in each eighth of the range.
     assert [int((wind - 2.0) / 0.5) for wind in winds] == list(range(8))
     for case in cases:
-        assert case.config.vehicle.lag_ms == 47.0 * case.factors["wrong"]
+        assert case.config.vehicle.lag_ms == 74.8 * case.factors["wrong"]
         assert case.mock["wind"]["gust_m_s"] == 0.0  # as it was
         assert case.mock["seed"] == case.seed == seed_of(1, case.index)
     assert len({case.seed for case in cases}) == len(cases)

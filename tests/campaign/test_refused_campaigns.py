@@ -81,9 +81,13 @@ def test_a_fault_cannot_be_called_none_nor_be_in_a_batch(tmp_path):
     ("told", "words"),
     [
         (
-            {"sweep": {"x": {"uniform": [1, 2], "times_base": True, "keys": ["vehicle.damping"]}}},
-            "sweep.x: times_base needs a number in the base configuration, and vehicle.damping is "
-            "None",
+            {
+                "sweep": {
+                    "x": {"uniform": [1, 2], "times_base": True, "keys": ["vehicle.pitch_damping"]}
+                }
+            },
+            "sweep.x: times_base needs a number in the base configuration, and "
+            "vehicle.pitch_damping is None",
         ),
         (
             {"sweep": {"link.signing_key_file": ["a", "b"]}},

@@ -9,6 +9,7 @@ from math import cos, exp, sin, tan
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import expm
 
 from companion.attitude import BodyRates
 from companion.config import Config
@@ -26,7 +27,8 @@ _GUIDANCE, _POSITION, _POSITION_LATE = 5, 5, 3
 class Airframe(NamedTuple):
     """The true vehicle: s, s, 1/s.
 
-    `strength` multiplies the acceleration by tilt, `rate_gain` the commanded body rate.
+    `strength` multiplies the acceleration by tilt, `rate_gain` the commanded body rate. A `damping`
+    makes the lag one of second order, 2ζ/ω.
     """
 
     lag: float
@@ -34,6 +36,18 @@ class Airframe(NamedTuple):
     drag: float = 0.5
     strength: float = 1.0
     rate_gain: float = 1.0
+    damping: float | None = None
+
+
+def rate_loop(vehicle: Airframe):
+    """Transition matrix of (rate, slope) over DT, and what a unit command adds."""
+    if vehicle.damping is None:
+        kept = exp(-DT / vehicle.lag)
+        return np.diag([kept, 0.0]), np.array([1.0 - kept, 0.0])
+    square = (0.5 * vehicle.lag / vehicle.damping) ** 2
+    moves = np.array([[0.0, 1.0], [-1.0 / square, -vehicle.lag / square]])
+    kept = expm(DT * moves)
+    return kept, np.array([1.0, 0.0]) - kept[:, 0]
 
 
 def hold(config: Config, vehicle: Airframe, seconds=12.0, off=0.5, noise=(0.0, 0.0), seed=0):
@@ -50,7 +64,8 @@ def hold(config: Config, vehicle: Airframe, seconds=12.0, off=0.5, noise=(0.0, 0
     rng, law, guidance = np.random.default_rng(seed), planner(config), make_guidance(config)
     estimate = motion_estimate(config, lambda: 0.0)
     late = round(vehicle.dead_time / DT)
-    asked, fade = deque([0.0] * (late + 1), maxlen=late + 1), exp(-DT / vehicle.lag)
+    asked = deque([0.0] * (late + 1), maxlen=late + 1)
+    (kept, added), turning = rate_loop(vehicle), np.zeros(2)
     told = deque(maxlen=_POSITION_LATE + 1)
     roll = rate = place = speed = 0.0
     command, places = None, np.full(round(seconds / DT), np.nan)
@@ -72,7 +87,8 @@ def hold(config: Config, vehicle: Airframe, seconds=12.0, off=0.5, noise=(0.0, 0
             target, later, down = guidance.command(lambda _, held=held: held, time, inputs)
             command = GuidanceCommand(target, down, time, later=later, period=_GUIDANCE * DT)
         asked.append(vehicle.rate_gain * law.rates(q, command.target_at(time), DT, rates).roll)
-        rate = asked[0] + fade * (rate - asked[0])
+        turning = kept @ turning + added * asked[0]
+        rate = float(turning[0])
         roll += DT * rate
         if abs(roll) > 1.2:
             return places

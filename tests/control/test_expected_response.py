@@ -1,13 +1,14 @@
 """The expected response against planners that fly a rate loop, and the words about it."""
 
 from math import exp
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from companion.attitude import Coefficients, Target, attitude, coefficients
 from companion.config import Config
-from companion.config.files import changed
+from companion.config.files import changed, load
 from companion.control.expected_response import (
     ExpectedResponse,
     expectations,
@@ -20,6 +21,7 @@ from companion.control.inner_loop import planner
 from companion.control.outer_loop import linear_settings
 from companion.study.lag_loop import LagLoop
 
+CONFIGS = Path(__file__).parents[2] / "configs"
 PX4 = {"lag_ms": 47, "dead_time_ms": 40}
 BASE = Config.model_validate({"vehicle": PX4})
 STEP = 0.25
@@ -133,9 +135,10 @@ def test_the_gains_that_are_told_are_those_that_fly():
 @pytest.mark.parametrize(("lag", "dead_time"), [(20, 15), (47, 40), (73, 54), (100, 80)])
 def test_the_times_of_another_vehicle_do_less_harm_than_none(lag, dead_time):
     """The decision behind the shipped files, at their gain and their tilt: docs/identify.md."""
+    shipped = load(CONFIGS / "vehicle-px4.yaml").vehicle.axes["roll"]._asdict()
     bends, overshoots = [], []
     for name in ("model-following", "first-order"):
-        config = configured(name, 4.0)
+        config = configured(name, 4.0, **shipped)
         found = flown(config, lag, dead_time, (-0.15, -0.2), (0.15, -0.2))
         bends.append(np.abs(found[:, 1] + 0.2).max())
         overshoots.append(found[:, 0].max() - 0.15)

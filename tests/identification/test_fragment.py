@@ -8,6 +8,7 @@ import yaml
 from rich.console import Console
 
 from companion.config import Config
+from companion.config.files import changed
 from companion.identification import (
     BadFitError,
     FitQuality,
@@ -17,7 +18,6 @@ from companion.identification import (
     ThrustMap,
     fit_thrust_map,
     identify_vehicle,
-    second_order_keys,
     vehicle_fragment,
     vehicle_table,
 )
@@ -101,27 +101,70 @@ def test_pitch_is_written_where_it_differs_from_roll():
     assert axes["pitch"].acceleration_limit_deg_s2 == pytest.approx(np.degrees(16.0), abs=0.5)
 
 
-def test_a_second_order_that_is_nearer_is_not_written_but_a_configured_one_is_kept():
-    nearer = replace(ROLL, second_order=SecondOrderFit(14.4, 0.82, 0.006, 1.08, None, 0.998))
-    assert configured(replace(VEHICLE, roll=nearer)).vehicle.damping is None
+NEARER = SecondOrderFit(20.0, 0.75, 0.0084, 1.05, None, 0.998)
+SECOND_ORDER = replace(
+    VEHICLE, roll=replace(ROLL, second_order=NEARER), pitch=replace(PITCH, second_order=NEARER)
+)
+
+
+def test_a_second_order_that_is_nearer_on_roll_and_pitch_is_written():
+    axes = configured(SECOND_ORDER).vehicle.axes
+    assert axes["roll"] == axes["pitch"] == (75.0, 8.4, None, 0.75)
+    assert axes["yaw"] == (370.0, 102.0, None, None)
+    slower = replace(SECOND_ORDER.pitch, second_order=replace(NEARER, frequency=15.0))
+    axes = configured(replace(SECOND_ORDER, pitch=slower)).vehicle.axes
+    assert axes["roll"].lag_ms == 75.0
+    assert axes["pitch"] == (100.0, 8.4, None, 0.75)
+    damped = replace(SECOND_ORDER.pitch, second_order=replace(NEARER, damping=0.78, frequency=20.8))
+    assert configured(replace(SECOND_ORDER, pitch=damped)).vehicle.damping == 0.77
+
+
+@pytest.mark.parametrize(
+    "pitch",
+    [
+        PITCH,
+        bad(SECOND_ORDER.pitch),
+        replace(PITCH, second_order=replace(NEARER, slew=9.0)),
+        replace(PITCH, second_order=replace(NEARER, damping=0.2)),
+    ],
+)
+def test_a_second_order_of_one_axis_or_with_a_slew_limit_is_not_written(pitch):
+    known = {"pitch": (49.0, 42.0, None, None)}
+    axes = configured(replace(SECOND_ORDER, pitch=pitch), known).vehicle.axes
+    assert axes["roll"].damping is axes["pitch"].damping is None
+
+
+def test_a_second_order_is_not_written_where_it_is_not_wanted():
+    text = vehicle_fragment(SECOND_ORDER, GRAVITY, {}, second_order=False)
+    assert Config.model_validate(yaml.safe_load(text)).vehicle.axes["roll"].damping is None
+    assert "clearly better: second order" in text
+
+
+def test_a_configured_second_order_is_kept_where_the_fit_is_bad():
     known = {"roll": (74.5, 8.5, None, 0.73)}
     axes = configured(replace(VEHICLE, roll=bad(ROLL)), known).vehicle.axes
     assert axes["roll"] == (74.5, 8.5, None, 0.73)
     assert axes["pitch"] == (49.0, 42.0, None, None)
 
 
-def test_the_keys_of_a_second_order_need_both_axes_without_a_slew_limit():
-    nearer = SecondOrderFit(20.0, 0.75, 0.0084, 1.05, None, 0.998)
-    roll, pitch = replace(ROLL, second_order=nearer), replace(PITCH, second_order=nearer)
-    both = replace(VEHICLE, roll=roll, pitch=pitch)
-    keys = second_order_keys(both)
-    axis = {"lag_ms": 75.0, "dead_time_ms": 8.4, "damping": 0.75}
-    assert keys == axis | {f"pitch_{key}": value for key, value in axis.items()}
-    assert Config.model_validate({"vehicle": keys}).vehicle.axes["pitch"].damping == 0.75
-    too_damped = replace(nearer, damping=0.2)
-    for other in (PITCH, bad(pitch), replace(pitch, second_order=replace(nearer, slew=9.0))):
-        assert second_order_keys(replace(both, pitch=other)) == {}
-    assert second_order_keys(replace(both, roll=replace(ROLL, second_order=too_damped))) == {}
+def test_nothing_of_another_vehicles_file_remains_in_force():
+    other = Config.model_validate(
+        {
+            "vehicle": {
+                "lag_ms": 75.0,
+                "dead_time_ms": 8.0,
+                "damping": 0.73,
+                "acceleration_limit_deg_s2": 1100.0,
+                "pitch_lag_ms": 60.0,
+                "pitch_dead_time_ms": 9.0,
+                "pitch_damping": 0.6,
+                "yaw_lag_ms": 60.0,
+                "yaw_acceleration_limit_deg_s2": 270.0,
+            }
+        }
+    )
+    keys = yaml.safe_load(vehicle_fragment(VEHICLE, GRAVITY, {}))
+    assert changed(other, keys, "test").vehicle.axes == configured(VEHICLE).vehicle.axes
 
 
 def test_an_axis_with_a_bad_fit_keeps_what_the_configuration_knows_and_says_so():

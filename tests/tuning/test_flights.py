@@ -73,7 +73,7 @@ def test_a_pilots_small_limits_are_kept_and_slow_the_course_down():
     assert flight.ok, flight
     assert 1.0 < flight.speed < 4.5
     assert flight.rate < radians(45.0)
-    assert flight.rate_limited < 0.02
+    assert flight.rate_limited < 0.05  # without knowledge of the drag
 
 
 def test_ctrl_c_ends_more_than_the_flight_in_which_it_comes(monkeypatch):

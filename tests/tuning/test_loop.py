@@ -92,8 +92,9 @@ def test_guidance_and_planner_answer_as_the_formulas_say(name, omega):
 def growth(config, **vehicle):
     """Standard deviation of the position after 6 s, per that before."""
     lag, dead_time = slower_tilt(config)
-    late = vehicle.pop("late", 0.0)
-    places = hold(config, Airframe(lag, dead_time + late, DRAG, **vehicle), seconds=10.0, off=0.02)
+    late, damping = vehicle.pop("late", 0.0), config.vehicle.axes["roll"].damping
+    flown = Airframe(lag, dead_time + late, DRAG, damping=damping, **vehicle)
+    places = hold(config, flown, seconds=10.0, off=0.02)
     second, last = places[500:1000], places[-500:]
     return np.inf if not np.isfinite(places).all() else last.std() / second.std()
 

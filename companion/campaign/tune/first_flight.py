@@ -15,7 +15,6 @@ from companion.guidance.reference import GRAVITY
 from companion.identification import (
     BadFitError,
     identify_vehicle,
-    second_order_keys,
     vehicle_fragment,
 )
 from companion.mavlink.errors import LogError
@@ -52,10 +51,9 @@ def _identified(config: Config, case: Case, *, damped: bool) -> Config:
         try:
             rows = read_flight_log(folder / "flight.tlog")
             vehicle = identify_vehicle(rows.setpoints, rows.rates, rows.specific_thrust)
-            fragment.write_text(vehicle_fragment(vehicle, GRAVITY, config.vehicle.axes))
+            axes = config.vehicle.axes
+            fragment.write_text(vehicle_fragment(vehicle, GRAVITY, axes, second_order=damped))
             identified = load(fragment).model_dump(exclude_unset=True, include={"vehicle"})
-            if damped:
-                identified["vehicle"] |= second_order_keys(vehicle)
             return changed(config, identified, "the identified vehicle")
         except (LogError, BadFitError, ConfigError):
             return config
