@@ -105,6 +105,8 @@ class ModelFollowingPlanner:
     ) -> BodyRates:
         """Body rates to send at attitude `q`, rad/s; `dt` is the time since the last sample, s.
 
+        `body_rates` are the measured ones, rad/s; None or implausible: they count as predicted.
+
         Raises:
             InvalidQuaternionError: `q` is not a unit quaternion.
             InvalidTargetError: `target` is not three or four finite numbers of usable size.
@@ -127,16 +129,16 @@ class ModelFollowingPlanner:
         north, east, heading = -2.0 * ay, 2.0 * ax, heading_of(sqrt(square), w, z)
         self._hold.take(dt)
         dt = self._hold.step
-        by_tilt, by_yaw = forward.plans.in_effect(self._hold.late)
-        self.planned = by_tilt
-        north_speed, east_speed, turn = self._feedback(by_tilt, by_yaw, north, east, heading)
+        tilt_plan, yaw_plan = forward.plans.in_effect(self._hold.late)
+        self.planned = tilt_plan
+        north_speed, east_speed, turn = self._feedback(tilt_plan, yaw_plan, north, east, heading)
         more_roll, more_pitch, more_yaw = speed_to_rates(
             w, z, ax, ay, 1.0 / square, 1.0 / cosine, east_speed, -north_speed
         )
         if plausible is not None:  # an unpredicted yaw rate lasts until these rates take effect
-            unpredicted = plausible.yaw - by_yaw.turning
+            unpredicted = plausible.yaw - yaw_plan.turning
             heading += (forward.dead_time + forward.lag) * unpredicted
-        heading += by_tilt.still - by_yaw.turned
+        heading += tilt_plan.still_angle - yaw_plan.turned
         ahead = forward.frame.lead(heading, forward.plans)
         roll, pitch, yaw = forward.advance(target, heading, more_yaw + turn, dt)
         roll, pitch = self._hold.rates(roll, pitch)
@@ -147,7 +149,12 @@ class ModelFollowingPlanner:
         )
 
     def _feedback(
-        self, by_tilt: PlannedTilt, by_yaw: PlannedYaw, north: float, east: float, heading: float
+        self,
+        tilt_plan: PlannedTilt,
+        yaw_plan: PlannedYaw,
+        north: float,
+        east: float,
+        heading: float,
     ) -> tuple[float, float, float]:
         """Feedback towards the plan: speed of north, east (1/s) and heading (rad/s).
 
@@ -156,8 +163,8 @@ class ModelFollowingPlanner:
         speed_north = speed_east = turn = 0.0
         forward = self._forward
         if forward.plans.time >= forward.dead_time:
-            speed_north = self._gain * (by_tilt.north - north)
-            speed_east = self._gain * (by_tilt.east - east)
+            speed_north = self._gain * (tilt_plan.north - north)
+            speed_east = self._gain * (tilt_plan.east - east)
         if forward.plans.time >= forward.yaw.dead_time:
-            turn = self._yaw_gain * wrap_angle(by_yaw.heading - heading)
+            turn = self._yaw_gain * wrap_angle(yaw_plan.heading - heading)
         return speed_north, speed_east, turn

@@ -61,7 +61,7 @@ def cos_and_sinc(square: float) -> tuple[float, float]:
     return cos(h), sin(h) / h if h > _SMALL_ANGLE else 1.0
 
 
-def turned(q: Quaternion, rates: tuple[float, float, float], dt: float) -> Quaternion:
+def after_constant_rates(q: Quaternion, rates: tuple[float, float, float], dt: float) -> Quaternion:
     """The attitude after `dt` seconds at constant body rates (rad/s): q ⊗ exp(ω·dt/2)."""
     w, x, y, z = q
     roll, pitch, yaw = rates

@@ -17,7 +17,7 @@ from collections import deque
 from math import asin, atan2, hypot, radians, sqrt
 
 from companion.attitude import Quaternion, Target, is_unit
-from companion.attitude.rotation import short_way, turned, turned_about_vertical
+from companion.attitude.rotation import after_constant_rates, short_way, turned_about_vertical
 from companion.control.rate_lag import RateLag
 from companion.guidance.reference import Vector, minus, rotated
 from companion.vehicle.records import AttitudeSample, LocalPosition
@@ -74,7 +74,7 @@ class EstimatorResets:
         if not 0.0 < dt <= _LONGEST_GAP:
             return False
         rates = self.rate_lag.mean(before.body_rates, sample.body_rates, dt)
-        predicted = turned(before.q, rates, dt)
+        predicted = after_constant_rates(before.q, rates, dt)
         yaw, tilt, threshold = _attitude_jump(before, sample, predicted, dt)
         jumped = tilt > threshold
         if abs(yaw) > threshold:

@@ -7,9 +7,9 @@ from companion import plugins
 from companion.attitude import PLANNER_NAMES, Constants, Limits, Planner, Target, make_planner
 from companion.attitude.limits import make_constants
 from companion.attitude.planner import MODEL_FOLLOWING
+from companion.attitude.plugin_planner import PlannerFaultError, PluginPlanner
 from companion.attitude.reference_model import model_lag, model_response
 from companion.attitude.types import AttitudeError
-from companion.attitude.within_limits import PlannerFaultError, WithinLimits
 from companion.config import Config
 from companion.config.known_drag import drag_prior
 from companion.files.yaml_file import ConfigError
@@ -45,7 +45,7 @@ def planner(config: Config) -> Planner:
     law = plugin(plugins.PLANNERS, name)
     try:
         # A planner may remember what it was asked, so the one that flies is another.
-        asked, flown = (WithinLimits(made(law), limits) for _ in range(2))
+        asked, flown = (PluginPlanner(made(law), limits) for _ in range(2))
     except Exception as error:
         raise ConfigError(f"planner.name: {name} cannot be made: {error!r}") from error
     try:

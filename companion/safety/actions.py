@@ -2,7 +2,7 @@
 
 from enum import Enum
 
-from companion.attitude.within_limits import PlannerFaultError
+from companion.attitude.plugin_planner import PlannerFaultError
 
 
 class Action(Enum):
