@@ -46,7 +46,7 @@ _WORDS = {
     Unanswered.NOT_NEWER: "the vehicle's clock stands still: new attitude samples carry no later "
     "time stamp",
     Unanswered.AHEAD: "attitude is stamped far ahead of the vehicle's clock",
-    Unanswered.LATE: "attitude arrives later than deadman.telemetry_stale_ms",
+    Unanswered.LATE: "attitude arrives, but older than deadman.telemetry_stale_ms",
     Unanswered.NO_TARGET: "guidance makes no commands",
     Unanswered.OLD_TARGET: "guidance makes no commands any more",
     Unanswered.AWAITING_MODE: "after a gap in telemetry the autopilot did not confirm offboard",

@@ -102,7 +102,7 @@ class SnapshotBuilder:
             self._start = minus(centre.position_ned, resets.shift)
             self._origin = centre.place
         self._began_at, self._turn, self._shift = now, resets.turn, resets.shift
-        resets.largest_tilt = 0.0
+        resets.largest_tilt_jump = 0.0
         self._good_flags = 0 if state.estimator is None else state.estimator.flags
         self._clock_changes = self._link.clock.changes
         self._counted.clear()
@@ -239,7 +239,7 @@ class SnapshotBuilder:
             sum(at > since for at in resets.times),
             dist(resets.shift, self._shift),
             wrap_angle(resets.turn - self._turn),
-            resets.largest_tilt,
+            resets.largest_tilt_jump,
         )
 
     def _place(self, now: float) -> Place | None:
