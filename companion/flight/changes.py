@@ -18,7 +18,7 @@ from companion.control.slew import Slew
 from companion.files.yaml_file import ConfigError
 from companion.flight.change_bounds import require_moderate
 from companion.recording.recorder import FlightRecorder
-from companion.safety.actions import internal
+from companion.safety.actions import fault_message
 
 _MAX_UNDO_COUNT = 200
 """Number of changes that can be undone; older ones stay in force."""
@@ -190,7 +190,7 @@ class Changes:
                 self._retuning.apply(values)
         except Exception as error:  # the flight goes on with the values it has
             self._slew.stop()
-            self.note(internal(error))
+            self.note(fault_message(error))
 
     def _begin(self, wanted: Config, by: str) -> str:
         """Begin to move from the present values to `wanted`.

@@ -20,7 +20,7 @@ from companion.guidance import ManeuverSequence
 from companion.guidance.source import ManeuverSource, Source
 from companion.mavlink.commands import Command
 from companion.mavlink.errors import CommandTimeout
-from companion.safety.actions import Exit, FlightEnded, internal
+from companion.safety.actions import Exit, FlightEnded, fault_message
 from companion.vehicle.autopilot import Role
 
 _SELF_DISARM_TIMEOUT = 8.0
@@ -224,5 +224,5 @@ def _stop_moving(context: FlightContext) -> None:
         context.loop.restart_planner()  # the estimator may have been reset
         context.guidance_loop.hold_here()
     except Exception as error:  # the exit must go on whatever fails in guidance
-        context.note(internal(error))
+        context.note(fault_message(error))
         context.end_stream()

@@ -12,7 +12,7 @@ from companion.config import Config
 from companion.identification import dead_time_by_correlation
 from companion.recording.measurements.dead_time import AxisDeadTime, DeadTimes, SampleAge
 from companion.recording.trace import FlightTrace
-from companion.safety.actions import internal
+from companion.safety.actions import fault_message
 
 _PERIOD = 2.0
 """Time between two measurements, s; the axes take turns."""
@@ -92,7 +92,7 @@ class DeadTimeWatch:
             self._measure_next_axis()
         except Exception as error:  # a mere measurement must not end a flight
             self._due = inf
-            self._note(f"the dead time is no longer measured: {internal(error)}")
+            self._note(f"the dead time is no longer measured: {fault_message(error)}")
 
     def _measure_next_axis(self) -> None:
         self._rows.append(len(self._trace.rates))

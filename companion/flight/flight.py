@@ -13,7 +13,7 @@ from companion.flight.plan import Plan
 from companion.flight.vehicle_identity import ChecksVoid
 from companion.flight.watch import Watch
 from companion.mavlink.errors import LinkError
-from companion.safety.actions import Exit, FlightEnded, internal
+from companion.safety.actions import Exit, FlightEnded, fault_message
 
 AskLanding = Callable[[], Coroutine[Any, Any, bool]]
 
@@ -86,7 +86,7 @@ class Flight:
 
         An exit that is under way continues without our setpoints, which may have caused the fault.
         """
-        reason = internal(error)
+        reason = fault_message(error)
         if self.failed_in is None:
             self.end(FlightEnded(reason))
             return
@@ -141,7 +141,7 @@ class Flight:
             except FlightEnded:
                 raise
             except Exception as error:  # of the plan: the vehicle must not be left to nobody
-                raise FlightEnded(internal(error)) from error
+                raise FlightEnded(fault_message(error)) from error
             else:
                 return
         raise FlightEnded(
@@ -179,7 +179,7 @@ class Flight:
         except LinkError as error:
             raise FlightEnded(str(error)) from error
         except Exception as error:
-            raise FlightEnded(internal(error)) from error
+            raise FlightEnded(fault_message(error)) from error
         finally:
             await cancel(task)
 

@@ -18,7 +18,7 @@ from companion.flight.wiring import connected
 from companion.realtime import RealtimeSettings
 from companion.recording.closing_words import LEFT_BY_USER
 from companion.recording.measurements.summary import Summary
-from companion.safety.actions import internal
+from companion.safety.actions import fault_message
 from companion.vehicle.link import Link
 
 
@@ -141,4 +141,4 @@ class Session:
         try:
             await assembled.reporter.run()
         except Exception as error:
-            assembled.flight.note(internal(error))
+            assembled.flight.note(fault_message(error))

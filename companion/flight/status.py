@@ -15,7 +15,7 @@ from companion.flight.status_rows import StatusRows
 from companion.flight.view import view
 from companion.recording.trace import FlightTrace
 from companion.safety import SafetyLadder
-from companion.safety.actions import internal
+from companion.safety.actions import fault_message
 from companion.vehicle.records import Battery, LocalPosition
 
 _PERIOD = 0.1
@@ -147,7 +147,7 @@ class StatusReporter:
             self._show(self.status())
         except Exception as error:
             self._show = None
-            self._context.note(internal(error))
+            self._context.note(fault_message(error))
 
     def record(self) -> None:
         """Record the motion, and note the take-off."""

@@ -10,7 +10,7 @@ from companion.flight.context import FlightContext
 from companion.flight.phases import Phase
 from companion.mavlink.errors import LinkError
 from companion.safety import SafetyLadder
-from companion.safety.actions import EXITS, Action, Exit, FlightEnded
+from companion.safety.actions import EXIT_OF_ACTION, Action, Exit, FlightEnded
 from companion.safety.snapshot import Health
 from companion.vehicle.autopilot import Role
 from companion.vehicle.link import Link
@@ -154,7 +154,7 @@ class Watch:
             return
         if verdict.mutes:
             self._context.release()
-        raise FlightEnded(verdict.reason, EXITS[verdict.action])
+        raise FlightEnded(verdict.reason, EXIT_OF_ACTION[verdict.action])
 
     def _judge_heartbeat(self) -> None:
         state, now = self._context.link.state, self._clock()
