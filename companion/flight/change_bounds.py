@@ -58,7 +58,7 @@ def _why_not(before: Config, after: Config, change: Difference) -> str | None:
         return f"{key} must not become 0 in flight"
     smallest = _SMALLEST_VALUES.get(key)
     if smallest is not None and change.after < smallest:
-        return f"{key} {shown(change.after)} is less than {smallest:g}, the least in flight"
+        return f"{key} must be at least {smallest:g} in flight, not {shown(change.after)}"
     old = value_in_effect(before, change, change.before)
     new = value_in_effect(after, change, change.after)
     low, high = min(old, new), max(old, new)

@@ -57,13 +57,14 @@ class Changes:
     steps on the event loop, between samples. Monitors, fence and deadman keep their limits.
 
     Attributes:
+        start: the configuration before the first change.
         wanted: the configuration after the newest change.
         made: all changes, in order.
-        flown: configuration in the record of the flight: the one at its start.
-        note: shows a change while there is no flight.
+        flown: the configuration when the flight began, which its record contains.
+        note: called with each change in words; a flight replaces it while it runs.
         on_change: called with `wanted` after each change.
-        on_drag: called with what is known of the vehicle's drag once the vehicle is identified; the
-            slow checks of a change need it.
+        on_drag: called with what is known of the vehicle's drag, once the vehicle is identified;
+            some checks of a change need it.
 
     Args:
         start: the configuration before the first change.
@@ -76,18 +77,13 @@ class Changes:
         self.note: Callable[[str], None] = lambda _: None
         self.on_change: Callable[[Config], None] = lambda _: None
         self.on_drag: Callable[[KnownDrag], None] = lambda _: None
-        self._start = start
+        self.start = start
         self._slew = Slew(start)
         self._earlier: list[Config] = []
         self._made_before = 0
         self._retuning: Retuning | None = None
         self._refuses: Callable[[Config, Config], str | None] = _refuse_nothing
         self._record: FlightRecorder | None = None
-
-    @property
-    def start(self) -> Config:
-        """The configuration before the first change."""
-        return self._start
 
     @property
     def can_undo(self) -> bool:
@@ -114,7 +110,7 @@ class Changes:
                 is too large. Nothing is changed.
         """
         try:
-            wanted = changed_in_flight(self._start, self.wanted, values, by)
+            wanted = changed_in_flight(self.start, self.wanted, values, by)
             require_moderate(self._slew.settled, wanted, by)
             require_moderate(self.wanted, wanted, by)
         except ConfigError as error:
@@ -166,7 +162,7 @@ class Changes:
             record: records the values for a replay, or None.
         """
         self._retuning, self._record = retuning, record
-        if self.wanted is not self._start:
+        if self.wanted is not self.start:
             self._slew.jump(self.wanted)
             retuning.apply(tuning(self.wanted))
         if self.wanted is not self.flown:
@@ -198,7 +194,7 @@ class Changes:
         Raises:
             ChangeRefusedError: these loops cannot change, or the values are equal.
         """
-        fixed = fixed_because(self._start)
+        fixed = fixed_because(self.start)
         if fixed is not None:
             raise ChangeRefusedError(f"{by}: {fixed}; nothing has changed")
         keys = tuple(differences(self.wanted, wanted))

@@ -18,8 +18,8 @@ from companion.safety.actions import Exit, FlightEnded, fault_message
 AskLanding = Callable[[], Coroutine[Any, Any, bool]]
 
 _WATCH_PERIOD, _PROGRESS_PERIOD = 0.02, 1.0
-_ATTEMPTS = 5
-"""Number of times the checks run if another vehicle may have come meanwhile."""
+_MAX_CHECK_RUNS = 5
+"""Largest number of times that the checks run, if the vehicle may have been replaced each time."""
 
 
 class Flight:
@@ -127,7 +127,7 @@ class Flight:
         Raises:
             FlightEnded: the first failure.
         """
-        for _ in range(_ATTEMPTS):
+        for _ in range(_MAX_CHECK_RUNS):
             try:
                 async with aclosing(self._plan.phases(self._context)) as phases:
                     async for phase in phases:
@@ -145,7 +145,7 @@ class Flight:
             else:
                 return
         raise FlightEnded(
-            f"the vehicle was lost, restarted or replaced {_ATTEMPTS} times before arming; "
+            f"the vehicle was lost, restarted or replaced {_MAX_CHECK_RUNS} times before arming; "
             "check the link and its power"
         )
 

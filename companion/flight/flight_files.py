@@ -58,7 +58,7 @@ class FlightFiles:
         follows: bool,
     ) -> None:
         self._config, self.folder, self._note = config, folder, note
-        self._counted: dict[str, int] = {}
+        self._counted_before: dict[str, int] = {}
         self._ended = 0.0
         self._failed = self._opened = False
         self.tap: TlogWriter | None = None
@@ -130,7 +130,7 @@ class FlightFiles:
 
     def begin_counting(self, stats: LinkStats) -> None:
         """Count the link's frames from now on, if the link was already open."""
-        self._counted = _counters(stats)
+        self._counted_before = _counters(stats)
 
     def summary(
         self,
@@ -166,7 +166,8 @@ class FlightFiles:
             gain=self._config.planner.gain_per_s,
             counts=assembled.counts(),
             link={
-                name: value - self._counted.get(name, 0) for name, value in _counters(stats).items()
+                name: value - self._counted_before.get(name, 0)
+                for name, value in _counters(stats).items()
             },
             trace=trace,
             events=list(flight.events),

@@ -30,8 +30,8 @@ def configured_maneuvers(config: Config, drag: KnownDrag | None = None) -> Maneu
     return ManeuverSequence([_part(config, name, drag) for name in config.flight.maneuvers])
 
 
-def unbegun(sequence: ManeuverSequence) -> ManeuverSequence:
-    """A copy without state: `Follow` remembers the pose where it began."""
+def not_begun(sequence: ManeuverSequence) -> ManeuverSequence:
+    """A copy whose maneuvers have not begun: `Follow` remembers the pose where it began."""
     return ManeuverSequence(
         [
             replace(part, _turned=None, _pose=None) if isinstance(part, Follow) else part

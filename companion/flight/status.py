@@ -44,7 +44,7 @@ class FlightStatus(NamedTuple):
         error: distance from the reference, m.
         rate: rate of setpoints, Hz.
         latency: time from the last answered sample to its setpoint, s; None in lockstep, and while
-            no samples are answered.
+            the control loop is off.
         missed: deadlines missed so far; None in lockstep.
         battery: battery of the vehicle.
         monitored: whether the safety monitors are active.
@@ -97,7 +97,7 @@ class StatusReporter:
     Attributes:
         takeoff: time when the vehicle left the ground, s on our clock; None: it has not.
         battery_at_takeoff: remaining charge at that time, 0..1, or None.
-        real_time: as the argument.
+        real_time: whether latencies are meaningful.
 
     Args:
         context: context of the flight.
@@ -107,7 +107,7 @@ class StatusReporter:
         phase: returns the running phase.
         show: called with the state; it must return at once. None: the state is not shown.
         clock: our clock, s.
-        real_time: whether latencies are meaningful; they are not if the vehicle waits for us.
+        real_time: whether latencies are meaningful: False if the vehicle waits for us.
     """
 
     def __init__(
@@ -187,7 +187,7 @@ class StatusReporter:
             speed=self._speed(now),
             tilt=self._tilt(now),
             error=self._error(),
-            rate=self._rate(now, record),
+            rate=self._setpoint_rate(now, record),
             latency=1e-9 * record.latency_ns if self.real_time and context.loop.on else None,
             missed=record.missed_deadlines if self.real_time else None,
             battery=context.link.state.battery,
@@ -196,7 +196,7 @@ class StatusReporter:
             view=view(context, now),
         )
 
-    def _rate(self, now: float, record: LoopRecord) -> float | None:
+    def _setpoint_rate(self, now: float, record: LoopRecord) -> float | None:
         """Setpoints in the last second, Hz; None while none are sent."""
         counted = self._counted
         counted.append((now, record.setpoints))

@@ -1,4 +1,4 @@
-"""The vehicle's identity: is it still the checked one, and what did earlier flights learn?"""
+"""The vehicle's identity: whether it is still the checked one, and what earlier flights learned."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +12,8 @@ from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.link import Link
 
 LONGEST_SILENCE = 2.0
-"""A connected vehicle sends a frame within this time, s, even on the worst permitted link."""
+"""After a longer silence the vehicle may be another one, s; on the worst permitted link it sends a
+frame earlier."""
 _LONGEST_UPDATE = 0.1
 """A longer interval between two updates is our own stall and does not count as silence, s."""
 

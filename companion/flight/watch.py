@@ -36,23 +36,23 @@ class RateRequester:
 
     Args:
         link: link to the vehicle.
-        section: the configured rates.
+        link_config: section `link` with the wanted and the smallest rates.
     """
 
-    def __init__(self, link: Link, section: LinkConfig) -> None:
+    def __init__(self, link: Link, link_config: LinkConfig) -> None:
         self.note: Callable[[str], None] = lambda _: None
         self._link = link
-        self._section = section
+        self._link_config = link_config
         self._tasks: dict[str, asyncio.Task[None]] = {}
 
     def check(self, health: Health) -> None:
         """Request each message whose rate is too low now."""
-        section = self._section
+        wanted = self._link_config
         answers, positions = health.answer_rate, health.position_rate
-        if health.gaps or (answers is not None and answers < section.min_attitude_rate_hz):
-            self._request_once("ATTITUDE_QUATERNION", section.attitude_rate_hz)
-        if positions is not None and positions < section.min_position_rate_hz:
-            self._request_once("LOCAL_POSITION_NED", section.position_rate_hz)
+        if health.gaps or (answers is not None and answers < wanted.min_attitude_rate_hz):
+            self._request_once("ATTITUDE_QUATERNION", wanted.attitude_rate_hz)
+        if positions is not None and positions < wanted.min_position_rate_hz:
+            self._request_once("LOCAL_POSITION_NED", wanted.position_rate_hz)
 
     def _request_once(self, message: str, rate: float) -> None:
         if message not in self._tasks:
@@ -67,7 +67,7 @@ class RateRequester:
 
 
 class Watch:
-    """Detects what the control loop cannot: silence, takeovers and breaches of the monitors.
+    """Detects what the control loop cannot: silence, takeovers and breaches of safety limits.
 
     Args:
         context: context of the flight.
