@@ -26,9 +26,9 @@ class Control:
 
     Args:
         program: knows whether the flight has ended.
-        context: of the flight.
+        context: context of the flight.
         newest: the state of the vehicle.
-        loop: of the flight.
+        loop: loop of the flight.
         source: takes the references.
         flown: future that is done when control has ended.
     """
@@ -57,7 +57,7 @@ class Control:
         """Yield the state at each new attitude sample; skip samples while the caller works.
 
         Args:
-            seconds: time after which the iteration ends.
+            seconds: time after which the iteration ends, s.
 
         Raises:
             FlightEnded: control has ended.

@@ -12,7 +12,7 @@ from companion.vehicle.held_rates import HeldRates
 from companion.vehicle.link import Link
 
 _HEARTBEAT = dialect.MAVLINK_MSG_ID_HEARTBEAT
-_TYPE_AT = 4
+_TYPE_OFFSET = 4
 """Offset of `type` in HEARTBEAT's payload."""
 _ONBOARD_CONTROLLER = bytes([dialect.MAV_TYPE_ONBOARD_CONTROLLER])
 _SETPOINTS = frozenset(
@@ -55,7 +55,7 @@ class LinkListener:
         self.resets = 0
 
     def __enter__(self) -> "LinkListener":
-        self._before, self._link.on_foreign = self._link.on_foreign, self._on_foreign
+        self._on_foreign_before, self._link.on_foreign = self._link.on_foreign, self._on_foreign
         self._unsubscribe = [
             self._link.subscribe("ATTITUDE_QUATERNION", self._on_attitude),
             self._link.subscribe("ATTITUDE_TARGET", self._on_target),
@@ -64,7 +64,7 @@ class LinkListener:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._link.on_foreign = self._before
+        self._link.on_foreign = self._on_foreign_before
         for unsubscribe in self._unsubscribe:
             unsubscribe()
 
@@ -107,7 +107,7 @@ class LinkListener:
             self._steering.add(source)
         if (
             frame.message_id == _HEARTBEAT
-            and frame.payload[_TYPE_AT : _TYPE_AT + 1] == _ONBOARD_CONTROLLER
+            and frame.payload[_TYPE_OFFSET : _TYPE_OFFSET + 1] == _ONBOARD_CONTROLLER
         ):
             self._companions.add(source)
 
