@@ -39,7 +39,8 @@ class FeedForward:
     """
 
     def __init__(self, constants: Constants, response: RateResponse, longest_sample: float) -> None:
-        roll, pitch, yaw = (axis.with_least_lag() for axis in response.axes)
+        axes = response.roll, response.pitch, response.yaw
+        roll, pitch, yaw = (axis.with_least_lag() for axis in axes)
         self.tilt = tilt = roll, pitch
         self.yaw = yaw
         self.lag = max(axis.lag for axis in tilt)

@@ -68,11 +68,6 @@ class RateResponse:
                 raise ValueError(f"{prefix}acceleration must be positive, not {axis.acceleration}")
 
     @property
-    def axes(self) -> tuple[AxisResponse, AxisResponse, AxisResponse]:
-        """Roll, pitch, yaw."""
-        return self.roll, self.pitch, self.yaw
-
-    @property
     def lead_time(self) -> float:
         """`frame_lead`, or an estimate of it if it is None, s.
 

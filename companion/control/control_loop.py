@@ -196,7 +196,6 @@ class ControlLoop:
     def _note_answer(
         self, sample: AttitudeSample, command: GuidanceCommand, rates: BodyRates, thrust: float
     ) -> None:
-        """Count and record a setpoint that was sent."""
         record, deadlines = self.record, self._deadlines
         record.note_answer(sample.received, thrust, deadlines.telemetry_stale)
         latency = record.latency_ns = self._clock_ns() - sample.received_ns

@@ -43,7 +43,7 @@ def planner(config: Config) -> Planner:
 
     if name in PLANNER_NAMES:
         return made(name)
-    law = plugin(plugins.PLANNERS, name)
+    law = plugin("planner.name", plugins.PLANNERS, name)
     try:
         # A planner may remember the trial, so the one that flies is another.
         tried, flown = (PluginPlanner(made(law), limits) for _ in range(2))
@@ -67,8 +67,8 @@ def law_constants(config: Config) -> Constants:
     )
 
 
-def plugin(group: str, name: str) -> Any:
-    """The class or function of another package that makes a planner or guidance.
+def plugin(key: str, group: str, name: str) -> Any:
+    """The class or function of another package that the configuration names in `key`.
 
     Raises:
         ConfigError: it is not installed or cannot be loaded.
@@ -76,7 +76,7 @@ def plugin(group: str, name: str) -> Any:
     try:
         return plugins.load(group, name)
     except plugins.PluginError as error:
-        raise ConfigError(str(error)) from error
+        raise ConfigError(f"{key}: {error}") from error
 
 
 def rate_limits(config: Config) -> Limits:

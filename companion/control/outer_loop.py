@@ -47,7 +47,7 @@ def make_guidance(config: Config) -> Guidance:
     settings, kind = linear_settings(config), config.guidance.kind
     if kind in GUIDANCE_NAMES:
         return LinearGuidance(settings)
-    factory = plugin(plugins.GUIDANCE, kind)
+    factory = plugin("guidance.kind", plugins.GUIDANCE, kind)
     try:
         made: Guidance = factory(settings)
     except Exception as error:

@@ -19,9 +19,10 @@ from companion.flight.flight import AskLanding, Flight
 from companion.flight.flown_config import description, flattened
 from companion.flight.maneuvers import not_begun
 from companion.flight.observer import EventRecorder
+from companion.flight.phases import Phase
 from companion.flight.plan import Plan
 from companion.flight.preflight_checks import PreflightChecks
-from companion.flight.status import PhaseNow, StatusReporter
+from companion.flight.status import StatusReporter
 from companion.flight.vehicle_identity import SameVehicle, VehicleMemory
 from companion.flight.watch import RateRequester, Watch
 from companion.guidance.follow import Follow
@@ -208,9 +209,8 @@ def _reporter(
 ) -> StatusReporter:
     """The reporter of the flight's state; it shows the state only if an observer uses it."""
 
-    def phase() -> PhaseNow:
-        now, entered = flight.phase, recorder.phases[-1][0] if recorder.phases else flight.began
-        return PhaseNow(now.name, now.timeout, now.monitored, entered)
+    def phase() -> tuple[Phase, float]:
+        return flight.phase, recorder.phases[-1][0] if recorder.phases else flight.began
 
     return StatusReporter(
         context,

@@ -222,7 +222,7 @@ class Changes:
         return str(change)
 
     def _record_change(self, before: Config, *, at_once: bool) -> None:
-        """Record the present change for a replay."""
+        """Record for a replay the values in which `wanted` differs from `before`."""
         if self._record is not None:
             values: dict[str, dict[str, Any]] = {}
             for each in differences(before, self.wanted):

@@ -89,7 +89,7 @@ class FenceCheck:
         return fence.stop_breach(offset, velocity, height, self.origin, MARGIN, (north, east))
 
     def _begin_time(self, motion: Motion, worst: float) -> float:
-        """Time of the first breach, s."""
+        """Time of the first breach among the checked moments, s; at most `worst`."""
         stride = max(1, motion.times.size // _MAX_MOMENTS)
         for k in range(0, motion.times.size, stride):
             if motion.times[k] >= worst or self._breach(motion, k) is not None:

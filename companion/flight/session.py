@@ -121,7 +121,6 @@ class Session:
         return record.save(summary)
 
     async def _run(self, link: Link, assembled: Assembled) -> str:
-        """Fly over the open link."""
         flight = assembled.flight
         with connected(link, assembled):
             # In a task of its own: `leave` ends the flight but not the writing of the files.

@@ -11,6 +11,7 @@ from companion.attitude.kinematics import tilt_angle
 from companion.control.loop_record import LoopRecord
 from companion.control.tracking_record import flown_part
 from companion.flight.context import FlightContext
+from companion.flight.phases import Phase
 from companion.flight.status_rows import StatusRows
 from companion.flight.view import view
 from companion.recording.trace import FlightTrace
@@ -75,22 +76,6 @@ class FlightStatus(NamedTuple):
     view: Mapping[str, Any] = MappingProxyType({})
 
 
-class PhaseNow(NamedTuple):
-    """The running phase.
-
-    Attributes:
-        name: shown to the user.
-        timeout: timeout, s.
-        monitored: whether the safety monitors are active in it.
-        entered: when it began, s on our clock.
-    """
-
-    name: str
-    timeout: float
-    monitored: bool
-    entered: float
-
-
 class StatusReporter:
     """Records the motion in all phases, and shows the state of the flight.
 
@@ -104,7 +89,7 @@ class StatusReporter:
         ladder: the safety monitors.
         trace: receives the motion.
         began: when the flight began, s on our clock.
-        phase: returns the running phase.
+        phase: returns the running phase, and when it began, s on our clock.
         show: called with the state; it must return at once. None: the state is not shown.
         clock: our clock, s.
         real_time: whether latencies are meaningful: False if the vehicle waits for us.
@@ -116,7 +101,7 @@ class StatusReporter:
         ladder: SafetyLadder,
         trace: FlightTrace,
         began: float,
-        phase: Callable[[], PhaseNow],
+        phase: Callable[[], tuple[Phase, float]],
         show: Callable[[FlightStatus], None] | None,
         clock: Callable[[], float],
         *,
@@ -170,15 +155,15 @@ class StatusReporter:
 
     def status(self) -> FlightStatus:
         """The present state."""
-        now, context, phase = self._clock(), self._context, self._phase()
-        record = context.loop.record
+        now, context = self._clock(), self._context
+        (phase, entered), record = self._phase(), context.loop.record
         flown = flown_part(context.guidance_loop.flown, now)
         return FlightStatus(
             time=now - self._began,
             airborne=None if self.takeoff is None else now - self.takeoff,
             phase=phase.name,
             detail=context.detail,
-            elapsed=now - phase.entered,
+            elapsed=now - entered,
             timeout=phase.timeout,
             maneuver=None if flown is None else flown.name,
             maneuver_elapsed=0.0 if flown is None else flown.elapsed,
@@ -197,7 +182,7 @@ class StatusReporter:
         )
 
     def _setpoint_rate(self, now: float, record: LoopRecord) -> float | None:
-        """Setpoints in the last second, Hz; None while none are sent."""
+        """Rate of setpoints over the last second, Hz; None if none was sent."""
         counted = self._counted
         counted.append((now, record.setpoints))
         while len(counted) > 2 and now - counted[1][0] >= _RATE_WINDOW:

@@ -41,7 +41,7 @@ async def check_standing(context: FlightContext) -> None:
 async def _check(
     context: FlightContext, stage: Stage, require: Callable[[FlightContext], None]
 ) -> None:
-    """Run the checks of a stage; call `require` before and after, which raises in a wrong state."""
+    """Run the checks of a stage; before and after them, `require` raises if the state is wrong."""
     context.same_vehicle.begin()
     context.same_vehicle.commit()
     context.heartbeat_limit = INITIAL_HEARTBEAT_LIMIT

@@ -256,7 +256,7 @@ def test_predictive_control():
 
 def test_a_plugin_that_is_not_installed_is_named():
     with pytest.raises(ConfigError, match="nobodys-planner"):
-        plugin("companion.planners", "nobodys-planner")
+        plugin("planner.name", "companion.planners", "nobodys-planner")
 
 
 @pytest.mark.parametrize(
