@@ -27,7 +27,7 @@ class FeedForward:
     Args:
         constants: gains and limits.
         response: response of the vehicle's rate loop.
-        longest_sample: longest sample period, s.
+        longest_period: longest sample period, s.
 
     Attributes:
         plans: the plans of tilt and heading, and when they take effect.
@@ -38,7 +38,7 @@ class FeedForward:
         dead_time: the larger dead time of roll and pitch, s.
     """
 
-    def __init__(self, constants: Constants, response: RateResponse, longest_sample: float) -> None:
+    def __init__(self, constants: Constants, response: RateResponse, longest_period: float) -> None:
         axes = response.roll, response.pitch, response.yaw
         roll, pitch, yaw = (axis.with_least_lag() for axis in axes)
         self.tilt = tilt = roll, pitch
@@ -54,7 +54,7 @@ class FeedForward:
         )
         self._heading = HeadingModel(constants, yaw)
         self._body = YawModel(yaw)
-        self.plans = PlanHistory(dead_time, yaw.dead_time, longest_sample)
+        self.plans = PlanHistory(dead_time, yaw.dead_time, longest_period)
         self._roll = AxisLead(ROLL, roll, dead_time - roll.dead_time, self.plans)
         self._pitch = AxisLead(PITCH, pitch, dead_time - pitch.dead_time, self.plans)
         self._max_yaw_rate = constants.max_yaw_rate

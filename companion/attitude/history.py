@@ -4,7 +4,7 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from typing import Generic, NamedTuple, TypeVar
 
-_DROPPED_TOGETHER = 64
+_ROWS_PER_DROP = 64
 """Number of rows, older than the longest delay, that are dropped at a time."""
 
 
@@ -84,8 +84,8 @@ class History(Generic[Row]):
         times = self._times
         times.append(time)
         self._rows.append(row)
-        if len(times) > _DROPPED_TOGETHER and times[_DROPPED_TOGETHER] < time - self._span:
-            del times[:_DROPPED_TOGETHER], self._rows[:_DROPPED_TOGETHER]
+        if len(times) > _ROWS_PER_DROP and times[_ROWS_PER_DROP] < time - self._span:
+            del times[:_ROWS_PER_DROP], self._rows[:_ROWS_PER_DROP]
 
     @property
     def newest(self) -> Row:
@@ -119,7 +119,7 @@ class PlanHistory:
     Args:
         dead_time: the larger dead time of roll and pitch, s.
         yaw_dead_time: dead time of yaw, s.
-        longest_sample: longest sample period, s.
+        longest_period: longest sample period, s.
 
     Attributes:
         time: time of the newest plan, s since the start.
@@ -129,9 +129,9 @@ class PlanHistory:
 
     __slots__ = ("_dead_time", "_turn", "_turn_plan", "_yaw_dead_time", "tilt", "time", "yaw")
 
-    def __init__(self, dead_time: float, yaw_dead_time: float, longest_sample: float) -> None:
+    def __init__(self, dead_time: float, yaw_dead_time: float, longest_period: float) -> None:
         self._dead_time, self._yaw_dead_time = dead_time, yaw_dead_time
-        span = max(dead_time, yaw_dead_time) + longest_sample
+        span = max(dead_time, yaw_dead_time) + longest_period
         self.time = 0.0
         self.tilt: History[PlannedTilt] = History(span)
         self.yaw: History[PlannedYaw] = History(span)

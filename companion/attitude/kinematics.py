@@ -98,8 +98,8 @@ SMALLEST_A = 1e-12
 def share_of_law(cosine: float, cos_recovery: float, slope: float) -> float:
     """Weight of the law against the rotation to level, a smooth function of the tilt's `cosine`.
 
-    It is 1 at the recovery angle and 0 from `limits.RECOVERY_BLEND` (10°) beyond it. Below the
-    recovery angle only the law acts, and this formula is not valid. `slope` is
+    It is 1 at the recovery angle and 0 from `limits.RECOVERY_BLEND_ANGLE` (10°) beyond it. Below
+    the recovery angle only the law acts, and this formula is not valid. `slope` is
     `Constants.recovery_slope`.
     """
     ratio = 1.0 + slope * (cosine - cos_recovery)

@@ -67,7 +67,7 @@ class Limits:
 
 RECOVERY_ANGLE = radians(75.0)
 """Tilt from which a planner begins to rotate the vehicle towards level, rad; the default."""
-RECOVERY_BLEND = radians(10.0)
+RECOVERY_BLEND_ANGLE = radians(10.0)
 """Range of tilt beyond the recovery angle over which the law fades out, rad."""
 
 
@@ -125,5 +125,5 @@ def make_constants(
         speed_weight=max_speed**-2,
         longest_target=sin(max_tilt),
         cos_recovery=cos(recovery_angle),
-        recovery_slope=1.0 / (cos(recovery_angle) - cos(recovery_angle + RECOVERY_BLEND)),
+        recovery_slope=1.0 / (cos(recovery_angle) - cos(recovery_angle + RECOVERY_BLEND_ANGLE)),
     )

@@ -23,7 +23,7 @@ from companion.attitude.representation import (
 from companion.attitude.rotation import limit_rates
 from companion.attitude.types import BodyRates, Quaternion, Target
 
-SHORTEST_SAMPLE, LONGEST_SAMPLE = 1e-4, 0.2  # s
+SHORTEST_PERIOD, LONGEST_PERIOD = 1e-4, 0.2  # s
 
 
 class ModelFollowingPlanner:
@@ -50,7 +50,7 @@ class ModelFollowingPlanner:
     """
 
     def __init__(self, constants: Constants, response: RateResponse) -> None:
-        self._forward = FeedForward(constants, response, LONGEST_SAMPLE)
+        self._forward = FeedForward(constants, response, LONGEST_PERIOD)
         self._hold = SampleHold()
         self._started = False
         self.planned: PlannedTilt | None = None
@@ -125,7 +125,7 @@ class ModelFollowingPlanner:
         if not self._started:
             self._start(q, plausible)
             self._started = True
-        dt = min(max(SHORTEST_SAMPLE, dt), LONGEST_SAMPLE)  # in this order NaN is short, too
+        dt = min(max(SHORTEST_PERIOD, dt), LONGEST_PERIOD)  # in this order NaN is short, too
         north, east, heading = -2.0 * ay, 2.0 * ax, heading_of(sqrt(square), w, z)
         self._hold.take(dt)
         dt = self._hold.step

@@ -129,7 +129,7 @@ def limit_rates(
     return roll, pitch, clamp(yaw, max_yaw_rate)
 
 
-def short_way(angle: float) -> float:
+def wrap_difference(angle: float) -> float:
     """Wrap an angle between −2π and 2π, such as a difference of two headings, to (−π, π]."""
     if angle > pi:
         return angle - TWO_PI

@@ -94,7 +94,7 @@ OLDEST_ATTITUDE_TARGET = 0.25
 _BODY_BEHIND_TARGET = 0.008
 """Dead time of roll and pitch from ArduPilot's attitude target to the body, s (measured)."""
 
-_DROPPED_TOGETHER = 128
+_ROWS_PER_DROP = 128
 """Number of samples that are dropped at a time once they are too old."""
 
 
@@ -157,10 +157,10 @@ class TargetFrame:
         times.append(self._time)
         self._turns.append(self._turns[-1] + (self._aim - still) * dt)
         if (
-            len(times) > _DROPPED_TOGETHER
-            and times[_DROPPED_TOGETHER] < self._time - OLDEST_ATTITUDE_TARGET - self._delay
+            len(times) > _ROWS_PER_DROP
+            and times[_ROWS_PER_DROP] < self._time - OLDEST_ATTITUDE_TARGET - self._delay
         ):
-            del times[:_DROPPED_TOGETHER], self._turns[:_DROPPED_TOGETHER]
+            del times[:_ROWS_PER_DROP], self._turns[:_ROWS_PER_DROP]
 
     def lead(self, heading: float, plans: PlanHistory) -> float:
         """Angle by which the target leads the body in yaw when the rates sent now take effect, rad.

@@ -17,7 +17,7 @@ from collections import deque
 from math import asin, atan2, hypot, radians, sqrt
 
 from companion.attitude import Quaternion, Target, is_unit
-from companion.attitude.rotation import after_constant_rates, short_way, turned_about_vertical
+from companion.attitude.rotation import after_constant_rates, turned_about_vertical, wrap_difference
 from companion.control.rate_lag import RateLag
 from companion.guidance.reference import Vector, minus, rotated
 from companion.vehicle.records import AttitudeSample, LocalPosition
@@ -79,7 +79,7 @@ class EstimatorResets:
         yaw, tilt, threshold = _attitude_jump(before, sample, predicted, dt)
         jumped = tilt > threshold
         if abs(yaw) > threshold:
-            self.turn = short_way(self.turn + yaw)
+            self.turn = wrap_difference(self.turn + yaw)
         elif not jumped:
             if dt <= _LONGEST_CORRECTED_GAP:
                 self.corrections += yaw
@@ -159,7 +159,7 @@ def _attitude_jump(
     r_x = -a * x + b * w - c * z + d * y
     r_y = -a * y + b * z + c * w - d * x
     r_z = -a * z - b * y + c * x + d * w
-    yaw = short_way(2.0 * atan2(r_z, r_w))
+    yaw = wrap_difference(2.0 * atan2(r_z, r_w))
     tilt = 2.0 * asin(min(1.0, hypot(r_x, r_y)))
     change = sqrt((new_p - p) ** 2 + (new_q - q) ** 2 + (new_r - r) ** 2)
     return yaw, tilt, _SMALLEST_ATTITUDE_JUMP + 0.5 * change * dt

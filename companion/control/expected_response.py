@@ -10,11 +10,11 @@ from companion.control.hold_settings import attitude_delay, hold_gains, hold_wei
 from companion.control.inner_loop import LARGEST_GAIN_TIMES_DELAY, sensible_gain, tilt_response
 from companion.guidance import InnerResponse
 
-_NOTICEABLE = 0.99
+_NOTICEABLE_SHARE = 0.99
 """A change is reported if it reduces the time constant to less than this share of it."""
 
 _GAIN_KEY, _RATE_LIMIT_KEY = "planner.gain_per_s", "limits.max_tilt_rate_deg_s"
-_LAG, _DEAD_TIME = "the vehicle's lag", "the vehicle's dead time"
+_LAG_CAUSE, _DEAD_TIME_CAUSE = "the vehicle's lag", "the vehicle's dead time"
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class ExpectedResponse:
         changes = ", ".join(
             f"{time:.2f} s {'with twice' if name == _GAIN_KEY else 'without'} {name}"
             for name, time in self.time_constants_without.items()
-            if time < _NOTICEABLE * self.time_constant
+            if time < _NOTICEABLE_SHARE * self.time_constant
         )
         tilt = degrees(asin(self.coefficient))
         return (
@@ -112,8 +112,8 @@ def _without_the_vehicle(config: Config, response: InnerResponse, speed: float) 
     axes = {"lag_ms": 0.0, "pitch_lag_ms": None, "damping": None, "pitch_damping": None}
     unlagged = config.model_copy(update={"vehicle": config.vehicle.model_copy(update=axes)})
     return {
-        _LAG: tilt_response(unlagged).step_time(step, speed),
-        _DEAD_TIME: replace(response, dead_time=0.0).step_time(step, speed),
+        _LAG_CAUSE: tilt_response(unlagged).step_time(step, speed),
+        _DEAD_TIME_CAUSE: replace(response, dead_time=0.0).step_time(step, speed),
     }
 
 

@@ -11,7 +11,7 @@ from companion.guidance.thrust import largest_tilt
 _CLEAR_HEIGHT = 1.0
 """Height above home from which there is neither ground contact nor ground effect, m."""
 
-_THRUST_STALE = 0.3
+_MAX_THRUST_AGE = 0.3
 """Largest age of an ATTITUDE_TARGET that gives the present thrust, s; PX4 sends it at 10 Hz."""
 
 _MISMATCH_SHARE = 0.15
@@ -99,7 +99,7 @@ class HoverLearning:
     def _note_autopilot_thrust(self, now: float, q: Quaternion) -> bool:
         """Note the autopilot's own thrust; False if it is unknown or the vehicle does not fly."""
         target, height = self._state.attitude_target_thrust, self._state.height
-        if target is None or now - target.received > _THRUST_STALE:
+        if target is None or now - target.received > _MAX_THRUST_AGE:
             return False
         if not self._state.armed or height is None or height < _CLEAR_HEIGHT:
             return False

@@ -11,7 +11,7 @@ from companion.guidance.reference import Vector
 
 _LARGEST_LAG = 0.03
 """Largest lag that is learned, s; a low pass of 20 Hz has 11 ms."""
-_HALF_LEARNED = 0.01
+_HALF_LEARNED_SQUARES = 0.01
 """Sum of squared rate changes, rad²/s², after which half of the lag is learned."""
 
 
@@ -33,7 +33,7 @@ class RateLag:
     def __init__(self) -> None:
         self.seconds = 0.0
         self._products = 0.0
-        self._squares = _HALF_LEARNED
+        self._squares = _HALF_LEARNED_SQUARES
 
     def mean(self, before: Vector, now: Vector, dt: float) -> Vector:
         """The mean body rates between two samples `dt` s apart, corrected for the lag, rad/s."""

@@ -25,7 +25,7 @@ from companion.recording.mcap_file.scene import (
 from companion.recording.mcap_file.writer import McapWriter
 
 _HALF_ROOT = sqrt(0.5)
-_MOST_POINTS = 100
+_MAX_PATH_POINTS = 100
 """Number of points in a path: 20 s with guidance at 50 Hz."""
 _POINT_EACH, _PATHS_EACH, _BODY_EACH = 2, 5, 10
 """With guidance at 50 Hz the thrust is drawn every 0.1 s. Every second drawing adds a point to the
@@ -46,19 +46,19 @@ _THRUST_COLOR: Color = (0.1, 0.7, 0.3, 1.0)
 _COMMANDED_THRUST_COLOR: Color = (0.85, 0.2, 0.75, 0.7)
 _FLOWN_COLOR: Color = (0.1, 0.5, 0.95, 1.0)
 _REFERENCE_COLOR: Color = (0.95, 0.65, 0.1, 1.0)
-_ARM = 0.18
+_ROTOR_DISTANCE = 0.18
 """Distance of a rotor from the axes of the body, m."""
 
 _ROTORS = tuple(
     Cylinder(
-        (x * _ARM, y * _ARM, 0.05, 0.0, 0.0, 0.0, 1.0),
+        (x * _ROTOR_DISTANCE, y * _ROTOR_DISTANCE, 0.05, 0.0, 0.0, 0.0, 1.0),
         (0.22, 0.22, 0.02),
         _FRONT_COLOR if x > 0 else _BACK_COLOR,
     )
     for x in (1, -1)
     for y in (1, -1)
 )
-_BODY = Entity(
+_BODY_ENTITY = Entity(
     "body",
     "vehicle",
     follows=True,
@@ -72,8 +72,8 @@ class SceneRows:
 
     def __init__(self) -> None:
         self._command: GuidanceCommand | None = None
-        self._flown: deque[Vector] = deque(maxlen=_MOST_POINTS)
-        self._reference: deque[Vector] = deque(maxlen=_MOST_POINTS)
+        self._flown: deque[Vector] = deque(maxlen=_MAX_PATH_POINTS)
+        self._reference: deque[Vector] = deque(maxlen=_MAX_PATH_POINTS)
         self._count = self._newest_ns = 0
 
     def note_command(self, command: GuidanceCommand) -> None:
@@ -93,7 +93,7 @@ class SceneRows:
             reference: position of the reference, m ENU.
         """
         thrust = Entity("thrust", "vehicle", follows=True, arrows=self._arrows(q))
-        scene = (thrust,) if self._count % _BODY_EACH else (_BODY, thrust)
+        scene = (thrust,) if self._count % _BODY_EACH else (_BODY_ENTITY, thrust)
         writer.message("/scene", time_ns, scene_message(time_ns, scene))
         if time_ns - self._newest_ns > _GAP_NS:
             self._flown.clear()

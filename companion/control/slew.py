@@ -5,7 +5,7 @@ from companion.control.retuning import Tuning, interpolated, tuning
 
 SLEW_TIME = 0.7
 """Time over which a change takes effect, s."""
-_PERIOD = 0.035
+_SHORTEST_STEP = 0.035
 """Shortest time between two steps of a change, s, because each step computes the gains again."""
 
 
@@ -43,7 +43,7 @@ class Slew:
         Raises:
             ValueError: gains cannot be computed from the new values.
         """
-        if self._began_at is None or now - self._stepped_at < _PERIOD:
+        if self._began_at is None or now - self._stepped_at < _SHORTEST_STEP:
             return None
         self._stepped_at = now
         share = (now - self._began_at) / SLEW_TIME

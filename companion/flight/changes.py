@@ -79,8 +79,8 @@ class Changes:
         self.on_drag: Callable[[KnownDrag], None] = lambda _: None
         self.start = start
         self._slew = Slew(start)
-        self._earlier: list[Config] = []
-        self._made_before = 0
+        self._earlier_configs: list[Config] = []
+        self._count_before_flight = 0
         self._retuning: Retuning | None = None
         self._refuses: Callable[[Config, Config], str | None] = _refuse_nothing
         self._record: FlightRecorder | None = None
@@ -88,16 +88,16 @@ class Changes:
     @property
     def can_undo(self) -> bool:
         """Whether there is a change to undo."""
-        return bool(self._earlier)
+        return bool(self._earlier_configs)
 
     @property
     def made_in_flight(self) -> tuple[Change, ...]:
         """The changes since the flight began, in order."""
-        return tuple(self.made[self._made_before :])
+        return tuple(self.made[self._count_before_flight :])
 
     def begin_flight(self) -> Config:
         """Begin a flight; return the configuration at its start, for its record."""
-        self.flown, self._made_before = self.wanted, len(self.made)
+        self.flown, self._count_before_flight = self.wanted, len(self.made)
         return self.flown
 
     def change(self, values: Values, by: str) -> str:
@@ -119,7 +119,7 @@ class Changes:
             raise ChangeRefusedError(f"{by}: {error}; nothing has changed") from error
         before = self.wanted
         text = self._begin(wanted, by)
-        self._earlier = [*self._earlier, before][-_MAX_UNDO_COUNT:]
+        self._earlier_configs = [*self._earlier_configs, before][-_MAX_UNDO_COUNT:]
         self.on_change(wanted)
         return text
 
@@ -129,10 +129,10 @@ class Changes:
         Raises:
             ChangeRefusedError: there is nothing to undo, or the change is refused.
         """
-        if not self._earlier:
+        if not self._earlier_configs:
             raise ChangeRefusedError(f"{by}: there is no change to undo")
-        text = self._begin(self._earlier[-1], by)
-        self._earlier.pop()
+        text = self._begin(self._earlier_configs[-1], by)
+        self._earlier_configs.pop()
         self.on_change(self.wanted)
         return text
 

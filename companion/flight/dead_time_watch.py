@@ -13,7 +13,7 @@ from companion.recording.measurements.dead_time import AxisDeadTime, DeadTimes, 
 from companion.recording.trace import FlightTrace
 from companion.safety.actions import fault_message
 
-_PERIOD = 2.0
+_MEASURING_PERIOD = 2.0
 """Time between two measurements, s; the axes take turns."""
 _WINDOW_PERIODS = 4
 """Length of a measurement in these periods; the first measurement is a period shorter."""
@@ -58,10 +58,10 @@ class DeadTimeWatch:
         dead_time_by_correlation(time, np.sin(time), time, np.sin(time))  # the first use is slow
 
     def after_answer(self, now: float) -> None:
-        """Measure one axis, if `_PERIOD` is over; `now` in s on our clock."""
+        """Measure one axis, if `_MEASURING_PERIOD` is over; `now` in s on our clock."""
         if now < self._due:
             return
-        self._due = now + _PERIOD
+        self._due = now + _MEASURING_PERIOD
         try:
             self._measure_next_axis()
         except Exception as error:  # a mere measurement must not end a flight

@@ -19,7 +19,7 @@ from companion.safety import SafetyLadder
 from companion.safety.actions import fault_message
 from companion.vehicle.records import Battery, LocalPosition
 
-_PERIOD = 0.1
+_STATUS_PERIOD = 0.1
 _RATE_WINDOW = 1.0
 """Time over which the rate of setpoints is counted, s."""
 _MAX_TELEMETRY_AGE = 1.0
@@ -121,7 +121,7 @@ class StatusReporter:
         while True:
             self.record()
             self._show_status()
-            due = max(due + _PERIOD, self._clock())
+            due = max(due + _STATUS_PERIOD, self._clock())
             await asyncio.sleep(due - self._clock())
 
     def _show_status(self) -> None:

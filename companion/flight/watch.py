@@ -16,7 +16,7 @@ from companion.vehicle.autopilot import Role
 from companion.vehicle.link import Link
 from companion.vehicle.records import outdated
 
-_STATUS_PERIOD = 0.45
+_CURRENT_MODE_PERIOD = 0.45
 """Time since the last CURRENT_MODE below which a new one reports a change, s; PX4 sends one every
 0.5 s.
 """
@@ -119,7 +119,7 @@ class Watch:
             FlightEnded: the phase must end; see `judge`.
         """
         now = self._clock()
-        early, self._status_at = now - self._status_at < _STATUS_PERIOD, now
+        early, self._status_at = now - self._status_at < _CURRENT_MODE_PERIOD, now
         asking = self._heartbeat_request is not None and not self._heartbeat_request.done()
         if early and not asking and now - self._heartbeat_asked_at >= _HEARTBEAT_REQUEST_PERIOD:
             self._heartbeat_asked_at = now

@@ -111,7 +111,7 @@ class _Requests:
         self.names: dict[str, str] = {}
         self._link = link
         self._frames, self._lost = link.stats.frames, link.stats.lost
-        self._free = asyncio.Semaphore(_MAX_OPEN_REQUESTS)
+        self._request_slots = asyncio.Semaphore(_MAX_OPEN_REQUESTS)
         self._skipped_names: set[str] = set()
         self._repeated = False
 
@@ -143,7 +143,7 @@ class _Requests:
         await asyncio.gather(*(self._ask_under_each_name(rule, policy) for rule in rules))
 
     async def _ask_under_each_name(self, rule: ParameterRule, policy: RetryPolicy) -> None:
-        async with self._free:
+        async with self._request_slots:
             for name in rule.names:
                 value = None if name in self._skipped_names else await self._value(name, policy)
                 if value is not None:

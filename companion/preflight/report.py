@@ -21,7 +21,7 @@ _TITLES = {
     CheckResult.SAFE: ("SAFE", "bold green"),
 }
 
-_RESULTS = {
+_RESULT_WORDS = {
     CheckResult.NOT_CONNECTED: "not connected",
     CheckResult.UNSAFE: "unsafe",
     CheckResult.NOT_READY: "not ready",
@@ -87,7 +87,7 @@ def as_dict(config: Config, findings: Sequence[Finding]) -> dict[str, Any]:
         result.value: sum(finding.result is result for finding in findings) for result in _TITLES
     }
     return {
-        "result": _RESULTS[overall_result(config, findings)],
+        "result": _RESULT_WORDS[overall_result(config, findings)],
         **counts,
         "findings": [_finding_as_dict(config, finding) for finding in findings],
     }

@@ -13,8 +13,8 @@ from companion.attitude.rotation import (
     body_error,
     cos_and_sinc,
     euler_angles,
-    short_way,
     turned_about_vertical,
+    wrap_difference,
 )
 from tests.attitude.independent import attitudes, held, wrapped
 
@@ -97,7 +97,7 @@ def test_cos_and_sinc(angle):
 
 def test_the_short_way_is_the_same_direction_at_most_half_a_turn_off():
     for angle in np.linspace(-2 * math.pi, 2 * math.pi, 81).tolist():
-        brought = short_way(angle)
+        brought = wrap_difference(angle)
         assert -math.pi < brought <= math.pi
         assert math.cos(brought - angle) == pytest.approx(1.0, abs=1e-14)
 
