@@ -142,7 +142,7 @@ def test_the_planner_may_fly(said: dict[str, str]) -> None:
 
 def test_the_monitor_judges_in_flight(said: dict[str, str]) -> None:
     """With a limit of 0.2 m/s, a descent breaks it: the vehicle holds, then lands."""
-    assert "safety: sinking: sinks at" in said["descent"], said["descent"]
+    assert "safety: sinking: the vehicle sinks at" in said["descent"], said["descent"]
     assert "→ hold" in said["descent"]
 
 

@@ -77,7 +77,7 @@ async def flying(
     environment: Environment = THIS_COMPUTER,
 ) -> AsyncGenerator[Vehicle, None]:
     """Like `connect`, for a complete configuration; nothing is recorded without a folder."""
-    loop, is_lost = flight_loop(), False
+    loop, wait_cancelled = flight_loop(), False
     try:
         session, program = await loop.start(_begin(config, folder, observer, environment))
         loop.on_lost(partial(_end, session, program))
@@ -87,12 +87,12 @@ async def flying(
                 async with _vehicle(loop, session, program, flight) as vehicle:
                     yield vehicle
         finally:
-            is_lost = True  # if the next line is cancelled
+            wait_cancelled = True  # if the next line is cancelled
             await asyncio.wait({flight})
-            is_lost = False
+            wait_cancelled = False
         flight.result()
     finally:
-        loop.close(wait=not is_lost)
+        loop.close(wait=not wait_cancelled)
 
 
 @asynccontextmanager

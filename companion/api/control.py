@@ -14,8 +14,8 @@ from companion.guidance.reference import Reference, Vector
 from companion.guidance.source import CommandedSource
 from companion.safety.actions import FlightEnded
 
-_ZERO = (0.0, 0.0, 0.0)
-_AXES = 3
+_ZERO_VECTOR = (0.0, 0.0, 0.0)
+_COMPONENTS = 3
 
 
 class Control:
@@ -26,9 +26,9 @@ class Control:
 
     Args:
         program: knows whether the flight has ended.
-        context: of the flight.
+        context: context of the flight.
         newest: the state of the vehicle.
-        loop: of the flight.
+        loop: loop of the flight.
         source: takes the references.
         flown: future that is done when control has ended.
     """
@@ -57,7 +57,7 @@ class Control:
         """Yield the state at each new attitude sample; skip samples while the caller works.
 
         Args:
-            seconds: time after which the iteration ends.
+            seconds: time after which the iteration ends, s.
 
         Raises:
             FlightEnded: control has ended.
@@ -102,7 +102,7 @@ class Control:
                 drifting=True,
                 holds_height=False,
             ),
-            _ZERO,
+            _ZERO_VECTOR,
         )
 
     def follow(self, reference: Reference, jerk_ned: Vector | None = None) -> None:
@@ -120,7 +120,7 @@ class Control:
             ValueError: a number is not finite or missing; the newest command still counts.
             FlightEnded: control has ended.
         """
-        _require_usable(reference, jerk_ned or _ZERO)
+        _require_usable(reference, jerk_ned or _ZERO_VECTOR)
         self._require_control()
         self._command = reference, self._loop.time(), jerk_ned
         if not self._posted:  # else the flight has yet to take a command, and takes this one
@@ -185,10 +185,10 @@ def _require_usable(reference: Reference, jerk_ned: Vector) -> None:
         reference.position_ned,
         reference.velocity_ned,
         reference.acceleration_ned,
-        reference.body_rates or _ZERO,
+        reference.body_rates or _ZERO_VECTOR,
         jerk_ned,
     ]
-    if any(len(vector) != _AXES for vector in vectors):
+    if any(len(vector) != _COMPONENTS for vector in vectors):
         raise ValueError(f"each vector must have three components; got {reference}")
     values = [
         *chain.from_iterable(vectors),

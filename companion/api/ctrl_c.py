@@ -9,8 +9,8 @@ from types import FrameType
 
 from companion.api.flight_loop import FlightLoop, OwnThread
 
-REACTS_WITHIN = 0.5
-"""Time after Ctrl-C in which the program's event loop must run, s."""
+REACTION_TIMEOUT = 0.5
+"""Time after Ctrl-C within which the program's event loop must run, s."""
 
 
 @contextmanager
@@ -53,16 +53,16 @@ class _Reaction:
     """
 
     def __init__(self, loop: FlightLoop, interrupt: Callable[[str], object]) -> None:
-        self._loop, self._interrupt, self._came = loop, interrupt, False
+        self._loop, self._interrupt, self._reacted = loop, interrupt, False
 
     def expect(self) -> None:
         """Begin to wait for the program's loop to run."""
-        self._loop.tell(self._note_ctrl_c)
-        asyncio.get_running_loop().call_later(REACTS_WITHIN, self._judge)
+        self._loop.tell(self._note_reaction)
+        asyncio.get_running_loop().call_later(REACTION_TIMEOUT, self._judge)
 
-    def _note_ctrl_c(self) -> None:
-        self._came = True
+    def _note_reaction(self) -> None:
+        self._reacted = True
 
     def _judge(self) -> None:
-        if not self._came:
+        if not self._reacted:
             self._interrupt("interrupted by the user (Ctrl-C)")

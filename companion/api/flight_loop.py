@@ -167,7 +167,7 @@ class OwnThread:
         return ending or not thread.is_alive() or self._program.is_closed()
 
 
-_switching = threading.Lock()
+_switch_interval_lock = threading.Lock()
 _intervals_before: list[float] = []
 """Python's previous switch interval, once for each running flight."""
 
@@ -175,13 +175,13 @@ _intervals_before: list[float] = []
 @contextmanager
 def quick_switches() -> Iterator[None]:
     """Let Python switch threads after `SWITCH_INTERVAL` while any flight runs."""
-    with _switching:
+    with _switch_interval_lock:
         _intervals_before.append(sys.getswitchinterval())
         sys.setswitchinterval(min(SWITCH_INTERVAL, _intervals_before[0]))
     try:
         yield
     finally:
-        with _switching:
+        with _switch_interval_lock:
             before = _intervals_before[0]
             _intervals_before.pop()
             if not _intervals_before:

@@ -71,7 +71,7 @@ class Program:
             self.connected.set_result(context)
         while True:
             if not self._waiting:
-                yield self._wait(context)
+                yield self._waiting_phase(context)
             self._running = request = self._waiting.popleft()
             for phase in request.phases(context):
                 yield phase
@@ -86,11 +86,11 @@ class Program:
     ) -> None:
         """Run phases, and wait until they have ended.
 
+        Cancelling this ends the flight, whether the phases run already or not.
+
         Args:
             phases: function that returns the phases for the flight's context.
             last: whether the flight ends after these phases.
-
-        Cancelling this ends the flight: a waiting request is dropped, a running one interrupted.
 
         Raises:
             FlightEnded: the flight has ended; we do not control the vehicle any more.
@@ -117,7 +117,7 @@ class Program:
         return self._running is not None or bool(self._waiting)
 
     def end(self, reason: Exception) -> None:
-        """Note that the flight has ended: raise `reason` where the program waits for it."""
+        """Note that the flight has ended; calls that wait, and all later ones, raise `reason`."""
         self.ended, self.over = reason, True
         if not self.connected.done():
             self.connected.set_exception(reason)
@@ -126,7 +126,7 @@ class Program:
                 request.done.set_exception(reason)
                 request.done.exception()  # nobody may wait for it any more
 
-    def _wait(self, context: FlightContext) -> Phase:
+    def _waiting_phase(self, context: FlightContext) -> Phase:
         if context.loop.offboard_active:
             return program_phase("hold", _NEXT_CALL, self._next_request, inf)
         return Phase("stand by", _NEXT_CALL, self._next_request, inf)

@@ -13,8 +13,8 @@ from companion.guidance.reference import Vector
 class State(NamedTuple):
     """The vehicle at one instant.
 
-    Position, attitude and heading are in the estimator's frame, corrected for its resets, so they
-    never jump.
+    Estimator resets do not make position and heading jump: the jumps are taken out of them. A reset
+    of the tilt stays in the attitude.
 
     Attributes:
         time: time of the state, s on the clock of the event loop.
@@ -24,7 +24,7 @@ class State(NamedTuple):
         body_rates: rad/s, about body x, y, z (FRD).
         heading: heading, rad, clockwise from north: the turn about the vertical that is left when
             the tilt is taken out; it differs from the Euler yaw in tilted attitudes.
-        height: height above home, m, as the autopilot reports it, so it may jump; None until then.
+        height: height above home, m, as the autopilot reports it, so it may jump; None: unknown.
     """
 
     time: float

@@ -95,6 +95,7 @@ class Vehicle:
         """Hold the position and the heading for a time, s.
 
         Raises:
+            FlightEnded: the vehicle is not under our control.
             ValueError: the time is negative or not a number; nothing was flown.
         """
         if not seconds >= 0.0:
@@ -122,6 +123,7 @@ class Vehicle:
 
         Raises:
             ConfigError: the configured limits or the fence do not allow it; nothing was flown.
+            FlightEnded: the vehicle is not under our control.
             TrajectoryError: a limit given here is not positive, or the vehicle is there already.
         """
         here = self._pose()
@@ -143,7 +145,7 @@ class Vehicle:
             trajectory: a trajectory, or the path of its file (the format of `flight.trajectory`).
 
         Raises:
-            ConfigError: the trajectory cannot be read, computed or flown within the limits.
+            ConfigError: the trajectory cannot be read or computed, or breaks a limit or the fence.
             FlightEnded: the vehicle is not under our control.
         """
         if isinstance(trajectory, Path | str):
@@ -207,7 +209,7 @@ class Vehicle:
                 flown.result()
 
     async def _fly(self, maneuver: Maneuver) -> None:
-        self._require_control()
+        self._pose()  # raises if the vehicle is not under our control
         await beside_the_loop(self._require_followable, maneuver)
         sequence = ManeuverSequence((maneuver,))
         work = partial(fly_maneuvers, sequence=sequence)
@@ -223,9 +225,6 @@ class Vehicle:
         require_followable(
             self._context.config, maneuver, (north, east, down), self._context.known_drag
         )
-
-    def _require_control(self) -> None:
-        self._pose()
 
     def _pose(self) -> Pose:
         """The held pose.

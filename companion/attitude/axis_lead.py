@@ -22,11 +22,11 @@ class AxisLead:
         plans: plans of tilt and heading.
     """
 
-    __slots__ = ("_index", "_lag", "_plan", "_plans", "_square", "_turn", "_wait")
+    __slots__ = ("_index", "_lag", "_plan", "_plans", "_sigma", "_turn", "_wait")
 
     def __init__(self, index: int, axis: AxisResponse, wait: float, plans: PlanHistory) -> None:
         self._index = index
-        self._lag, self._square = axis.lag, axis.square
+        self._lag, self._sigma = axis.lag, axis.sigma
         self._wait = wait
         self._plans = plans
 
@@ -38,7 +38,7 @@ class AxisLead:
         self._turn = plans.predicted_turn(planned_for, self._plan)
 
     def command(self, dt: float, heading: float) -> float:
-        """Advance to the next plan; return the rate that leads from the last plan to it, rad/s.
+        """Advance to the next plan; return the rate to send from the last plan to it, rad/s.
 
         Both plans are rotated into the body axes, by the headings predicted for their times.
 
@@ -52,14 +52,14 @@ class AxisLead:
         return (
             0.5 * (rate + rate_then)
             + self._lag / dt * (rate_then - rate)
-            + self._square / dt * (slope_then - slope)
+            + self._sigma / dt * (slope_then - slope)
         )
 
     def _planned_rate(self, start_heading: float) -> tuple[float, float]:
         """The planned rate about this body axis, rad/s, and its derivative, rad/s²."""
         plan, heading = self._plan, start_heading + self._turn.angle
         cosine, sine = cos(heading), sin(heading)
-        roll, pitch = into_body(cosine, sine, plan.x, plan.y)
+        roll, pitch = into_body(cosine, sine, plan.x_rate, plan.y_rate)
         roll_slope, pitch_slope = into_body(cosine, sine, plan.x_slope, plan.y_slope)
         if self._index == ROLL:
             return roll, roll_slope + self._turn.rate * pitch

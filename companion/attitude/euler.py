@@ -3,7 +3,7 @@
 from math import cos, sin
 
 from companion.attitude.limits import Constants
-from companion.attitude.rotation import attitude_of, euler_angles, limit_rates, short_way
+from companion.attitude.rotation import attitude_of, euler_angles, limit_rates, wrap_difference
 from companion.attitude.types import Quaternion, Target
 
 
@@ -15,9 +15,9 @@ def euler(
     north, east, heading, heading_rate = target
     roll, pitch, yaw = euler_angles(q)
     roll_d, pitch_d, yaw_d = euler_angles(attitude_of(north, east, heading))
-    e_roll = gain * short_way(roll_d - roll)
-    e_pitch = gain * short_way(pitch_d - pitch)
-    e_yaw = gain * short_way(yaw_d - yaw)
+    e_roll = gain * wrap_difference(roll_d - roll)
+    e_pitch = gain * wrap_difference(pitch_d - pitch)
+    e_yaw = gain * wrap_difference(yaw_d - yaw)
     turning = e_yaw * cos(pitch)
     return limit_rates(
         e_roll - e_yaw * sin(pitch),

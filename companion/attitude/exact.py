@@ -12,17 +12,17 @@ from companion.attitude.kinematics import (
 )
 from companion.attitude.limits import Constants
 from companion.attitude.reference import distance_left
-from companion.attitude.rotation import angle_per_sine, clamp, limit_rates, short_way
+from companion.attitude.rotation import angle_per_sine, clamp, limit_rates, wrap_difference
 from companion.attitude.types import Quaternion, Target
 
-SHORTEST_SAMPLE = 1e-4
+SHORTEST_PERIOD = 1e-4
 """A shorter sample period counts as this one, s; the rates then change by at most 1e-4·p
 (relative).
 """
-LONGEST_SAMPLE = 1.0
+LONGEST_PERIOD = 1.0
 """A longer sample period counts as this, s."""
 
-_SETTLED = 1e-14
+_SETTLED_CHANGE = 1e-14
 """The fixed-point iteration ends when its factor changes by less than this."""
 _MAX_ITERATIONS = 20
 """Largest number of fixed-point iterations; 4 are usual, each leaves about θ²/12 of the error."""
@@ -40,8 +40,8 @@ def exact(
     into a rotation towards level, as in `first-order`. Rates are in rad/s.
     """
     gain, yaw_gain, max_rate, max_yaw_rate, max_speed, _, _, _, cos_recovery, slope = constants
-    dt = dt if dt > SHORTEST_SAMPLE else SHORTEST_SAMPLE
-    dt = dt if dt < LONGEST_SAMPLE else LONGEST_SAMPLE
+    dt = dt if dt > SHORTEST_PERIOD else SHORTEST_PERIOD
+    dt = dt if dt < LONGEST_PERIOD else LONGEST_PERIOD
     w, x, y, z = q
     north, east, heading, heading_rate = target
     a, b, tilt_x, tilt_y, yaw_z = split(w, x, y, z)
@@ -52,7 +52,7 @@ def exact(
         remaining_north, remaining_east = north + 2.0 * a * tilt_y, east - 2.0 * a * tilt_x
         distance = sqrt(remaining_north * remaining_north + remaining_east * remaining_east)
         part = 1.0 - distance_left(1.0, gain, max_speed / distance if distance > 0.0 else inf, dt)
-        error = short_way(heading - heading_of(a, w, z))
+        error = wrap_difference(heading - heading_of(a, w, z))
         turn = (1.0 - exp(-yaw_gain * dt)) * error + heading_rate * dt
         r_x, r_y, r_z = _rotation(
             a,
@@ -119,7 +119,9 @@ def _rotation(
         before = f
         f = angle_per_sine(r_w, sqrt(r_x * r_x + r_y * r_y + r_z * r_z))
         free = reached == part and max_yaw_angle == inf
-        if abs(f - before) < _SETTLED or (free and f * sqrt(r_x * r_x + r_y * r_y) <= max_angle):
+        if abs(f - before) < _SETTLED_CHANGE or (
+            free and f * sqrt(r_x * r_x + r_y * r_y) <= max_angle
+        ):
             break
     return f * r_x, f * r_y, f * r_z
 

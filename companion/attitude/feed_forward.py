@@ -27,10 +27,10 @@ class FeedForward:
     Args:
         constants: gains and limits.
         response: response of the vehicle's rate loop.
-        longest_sample: longest sample period, s.
+        longest_period: longest sample period, s.
 
     Attributes:
-        plans: the planned motion since its start, and when it takes effect.
+        plans: the plans of tilt and heading, and when they take effect.
         frame: heading of ArduPilot's attitude target.
         tilt: responses of roll and pitch.
         yaw: response of yaw.
@@ -38,8 +38,9 @@ class FeedForward:
         dead_time: the larger dead time of roll and pitch, s.
     """
 
-    def __init__(self, constants: Constants, response: RateResponse, longest_sample: float) -> None:
-        roll, pitch, yaw = (axis.with_least_lag() for axis in response.axes)
+    def __init__(self, constants: Constants, response: RateResponse, longest_period: float) -> None:
+        axes = response.roll, response.pitch, response.yaw
+        roll, pitch, yaw = (axis.with_least_lag() for axis in axes)
         self.tilt = tilt = roll, pitch
         self.yaw = yaw
         self.lag = max(axis.lag for axis in tilt)
@@ -49,15 +50,15 @@ class FeedForward:
             constants,
             model_lag(constants.gain, self.lag),
             min(axis.acceleration for axis in tilt),
-            max(axis.square for axis in tilt),
+            max(axis.sigma for axis in tilt),
         )
         self._heading = HeadingModel(constants, yaw)
         self._body = YawModel(yaw)
-        self.plans = PlanHistory(dead_time, yaw.dead_time, longest_sample)
+        self.plans = PlanHistory(dead_time, yaw.dead_time, longest_period)
         self._roll = AxisLead(ROLL, roll, dead_time - roll.dead_time, self.plans)
         self._pitch = AxisLead(PITCH, pitch, dead_time - pitch.dead_time, self.plans)
         self._max_yaw_rate = constants.max_yaw_rate
-        self._still = 0.0
+        self._still_rate = 0.0
 
     def retune(self, constants: Constants) -> None:
         """Use these gains and limits from the next sample on; the planned motion continues."""
@@ -85,13 +86,13 @@ class FeedForward:
         self._heading.start_at(heading, turn_rate)
         self._body.start(yaw_rate)
         self.frame.forget()
-        x, y, self._still = model.rates()
+        x, y, self._still_rate = model.rates()
         plans = self.plans
         plans.time = 0.0
         plans.tilt.start(
             0.0,
-            PlannedTilt(model.north, model.east, 0.0, x, y, 0.0, 0.0, self._still),
-            PlannedTilt(north, east, self._still, 0.0, 0.0, 0.0, 0.0, 0.0),
+            PlannedTilt(model.north, model.east, 0.0, x, y, 0.0, 0.0, self._still_rate),
+            PlannedTilt(north, east, self._still_rate, 0.0, 0.0, 0.0, 0.0, 0.0),
         )
         plans.yaw.start(
             0.0, PlannedYaw(heading, 0.0, yaw_rate), PlannedYaw(turn_rate, yaw_rate, 0.0)
@@ -110,7 +111,7 @@ class FeedForward:
             yaw_feedback: feedback to add to the yaw rate, rad/s.
             dt: time by which the plan advances, s.
         """
-        still_before, turn_before = self._still, self._heading.turn_rate
+        still_before, turn_before = self._still_rate, self._heading.turn_rate
         self._model.advance(target, dt)
         self._heading.advance(target, dt)
         x, y, still_after = self._model.rates()
@@ -122,23 +123,26 @@ class FeedForward:
         )
         yaw = clamp(yaw, self._max_yaw_rate)
         self._body.advance(yaw, dt)
-        self._still = still_after
-        still = 0.5 * (still_before + still_after)
-        self.frame.advance(yaw, still, dt)
-        self._append_plan(x, y, still * dt, dt)
+        self._still_rate = still_after
+        mean_still = 0.5 * (still_before + still_after)
+        self.frame.advance(yaw, mean_still, dt)
+        self._append_plan(x, y, mean_still * dt, dt)
         return self._roll.command(dt, heading), self._pitch.command(dt, heading), yaw
 
     def _append_plan(self, x: float, y: float, still_turn: float, dt: float) -> None:
         """Append the plan for the time `dt` seconds later.
 
-        `x`, `y`: planned roll and pitch rate at heading 0, rad/s. `still_turn`: yaw during `dt`
-        that keeps the heading constant, rad.
+        Args:
+            x: planned roll rate at heading 0, rad/s.
+            y: planned pitch rate at heading 0, rad/s.
+            still_turn: yaw during `dt` that keeps the heading still, rad.
+            dt: s.
         """
         model, body = self._model, self._body
-        still = self.plans.tilt.newest.still + still_turn
+        still_angle = self.plans.tilt.newest.still_angle + still_turn
         slopes = model.rate_slopes(x, y)
         self.plans.add(
             dt,
-            PlannedTilt(model.north, model.east, still, x, y, *slopes, self._still),
+            PlannedTilt(model.north, model.east, still_angle, x, y, *slopes, self._still_rate),
             PlannedYaw(self._heading.heading, body.turned, body.rate),
         )

@@ -11,7 +11,7 @@ from companion.attitude.kinematics import (
     tilt_products,
 )
 from companion.attitude.limits import Constants
-from companion.attitude.rotation import clamp, short_way
+from companion.attitude.rotation import clamp, wrap_difference
 from companion.attitude.types import Quaternion, Target
 
 
@@ -55,6 +55,6 @@ def first_order(
         roll *= scale
         pitch *= scale
         still *= scale
-    error = short_way(heading - heading_of(a, w, z))
+    error = wrap_difference(heading - heading_of(a, w, z))
     yaw = share * (yaw_gain * error + heading_rate) + still
     return roll, pitch, clamp(yaw, max_yaw_rate)

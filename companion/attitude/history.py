@@ -1,19 +1,19 @@
-"""The plan over time: what was planned, when it takes effect, how long a command is held."""
+"""The plan of `model-following` over time, and its correction for late and early samples."""
 
 from bisect import bisect_right
 from collections.abc import Sequence
 from typing import Generic, NamedTuple, TypeVar
 
-_DROPPED_TOGETHER = 64
-"""Rows older than the longest delay are dropped in blocks of this many."""
+_ROWS_PER_DROP = 64
+"""Number of rows, older than the longest delay, that are dropped at a time."""
 
 
-def between(times: Sequence[float], time: float) -> tuple[int, float]:
-    """Find `time` in at least two ascending `times`, for linear interpolation.
+def locate_time(times: Sequence[float], time: float) -> tuple[int, float]:
+    """Find `time` in at least two ascending `times`, for linear interpolation or extrapolation.
 
     Returns:
-        The index i of the later neighbour, and the share of the way from times[i − 1] to times[i]:
-        below 0 before the first time, above 1 after the last.
+        The index i of the later neighbour, and the share of the interval from times[i − 1] to
+        times[i] that has passed at `time`: below 0 before the first time, above 1 after the last.
     """
     later, last = bisect_right(times, time), len(times) - 1
     later = 1 if later < 1 else last if later > last else later
@@ -26,20 +26,20 @@ class PlannedTilt(NamedTuple):
 
     Attributes:
         north, east: coefficients.
-        still: integral of `z` since the start, rad.
-        x, y: planned roll and pitch rate at heading 0, rad/s.
-        x_slope, y_slope: derivatives of `x` and `y`, rad/s².
-        z: R_z, the yaw rate that keeps the heading still while the tilt changes, rad/s.
+        still_angle: integral of `still_rate` since the start, rad.
+        x_rate, y_rate: planned roll and pitch rate at heading 0, rad/s.
+        x_slope, y_slope: derivatives of `x_rate` and `y_rate`, rad/s².
+        still_rate: R_z, the yaw rate that keeps the heading still while the tilt changes, rad/s.
     """
 
     north: float
     east: float
-    still: float
-    x: float
-    y: float
+    still_angle: float
+    x_rate: float
+    y_rate: float
     x_slope: float
     y_slope: float
-    z: float
+    still_rate: float
 
 
 class PlannedYaw(NamedTuple):
@@ -60,7 +60,7 @@ Row = TypeVar("Row", PlannedTilt, PlannedYaw)
 
 
 class History(Generic[Row]):
-    """The plan over time, interpolated linearly between rows; a row is the plan at one time.
+    """Rows of a plan, each for one time; the plan between them is interpolated linearly.
 
     Args:
         span: the longest delay that is looked up, s.
@@ -74,7 +74,7 @@ class History(Generic[Row]):
         self._rows: list[Row] = []
 
     def start(self, time: float, row: Row, motion: Row) -> None:
-        """Start again at `row`; before it, the plan moved steadily by `motion` per second."""
+        """Start again with `row` at `time`, s; before it, the plan changed by `motion` a second."""
         earlier = type(row)(*[a - self._span * b for a, b in zip(row, motion, strict=True)])
         self._times[:] = [time - self._span, time]
         self._rows[:] = [earlier, row]
@@ -84,8 +84,8 @@ class History(Generic[Row]):
         times = self._times
         times.append(time)
         self._rows.append(row)
-        if len(times) > _DROPPED_TOGETHER and times[_DROPPED_TOGETHER] < time - self._span:
-            del times[:_DROPPED_TOGETHER], self._rows[:_DROPPED_TOGETHER]
+        if len(times) > _ROWS_PER_DROP and times[_ROWS_PER_DROP] < time - self._span:
+            del times[:_ROWS_PER_DROP], self._rows[:_ROWS_PER_DROP]
 
     @property
     def newest(self) -> Row:
@@ -94,17 +94,17 @@ class History(Generic[Row]):
 
     def at(self, time: float) -> Row:
         """The plan at `time`: linear between rows and beyond them."""
-        later, share = between(self._times, time)
+        later, share = locate_time(self._times, time)
         before, after = self._rows[later - 1], self._rows[later]
         return type(before)(*[a + share * (b - a) for a, b in zip(before, after, strict=True)])
 
 
 class Turn(NamedTuple):
-    """Predicted turn of the body's heading when a plan takes effect.
+    """Predicted change of the body's heading when a plan takes effect.
 
     Attributes:
-        angle: turn since the plans began, rad.
-        rate: rate of the turn, rad/s.
+        angle: change of the heading since the plans began, rad.
+        rate: its rate, rad/s.
     """
 
     angle: float
@@ -112,14 +112,14 @@ class Turn(NamedTuple):
 
 
 class PlanHistory:
-    """The plan of tilt and heading since the start, and when it takes effect.
+    """The plans of tilt and heading, and when they take effect.
 
     A plan for time t takes effect at t plus the dead time, which differs for tilt and heading.
 
     Args:
         dead_time: the larger dead time of roll and pitch, s.
         yaw_dead_time: dead time of yaw, s.
-        longest_sample: longest sample period, s.
+        longest_period: longest sample period, s.
 
     Attributes:
         time: time of the newest plan, s since the start.
@@ -127,16 +127,16 @@ class PlanHistory:
         yaw: the plan of the heading.
     """
 
-    __slots__ = ("_dead_time", "_turn", "_turning", "_yaw_dead_time", "tilt", "time", "yaw")
+    __slots__ = ("_dead_time", "_turn", "_turn_plan", "_yaw_dead_time", "tilt", "time", "yaw")
 
-    def __init__(self, dead_time: float, yaw_dead_time: float, longest_sample: float) -> None:
+    def __init__(self, dead_time: float, yaw_dead_time: float, longest_period: float) -> None:
         self._dead_time, self._yaw_dead_time = dead_time, yaw_dead_time
-        span = max(dead_time, yaw_dead_time) + longest_sample
+        span = max(dead_time, yaw_dead_time) + longest_period
         self.time = 0.0
         self.tilt: History[PlannedTilt] = History(span)
         self.yaw: History[PlannedYaw] = History(span)
-        self._turning: PlannedTilt | None = None
-        self._turn = Turn(0.0, 0.0)  # when `_turning` takes effect
+        self._turn_plan: PlannedTilt | None = None
+        self._turn = Turn(0.0, 0.0)  # when `_turn_plan` takes effect
 
     def add(self, dt: float, tilt: PlannedTilt, yaw: PlannedYaw) -> None:
         """Add a plan for a time `dt` seconds later than that of the newest plan."""
@@ -150,21 +150,21 @@ class PlanHistory:
         return self.tilt.at(now - self._dead_time), self.yaw.at(now - self._yaw_dead_time)
 
     def predicted_turn(self, planned_for: float, plan: PlannedTilt) -> Turn:
-        """How far the heading has turned when `plan`, made for `planned_for` (s), takes effect.
+        """How far the heading has turned when `plan` for the time `planned_for` (s) takes effect.
 
-        The heading turns by the yaw rate less the part of it that keeps the heading still.
+        The heading turns at the body's yaw rate less the yaw rate that keeps it still.
         """
-        if plan is not self._turning:  # both axes and the attitude target ask for the newest plan
+        if plan is not self._turn_plan:  # both axes and the attitude target ask for the newest plan
             acts = planned_for + self._dead_time
             body = self.yaw.at(acts - self._yaw_dead_time)
-            self._turn = Turn(body.turned - plan.still, body.turning - plan.z)
-            self._turning = plan
+            self._turn = Turn(body.turned - plan.still_angle, body.turning - plan.still_rate)
+            self._turn_plan = plan
         return self._turn
 
-    def turn_within(self, lead: float) -> float:
-        """Turn of the body, rad, in the `lead` seconds after the newest tilt plan takes effect."""
+    def yaw_within(self, seconds: float) -> float:
+        """Yaw of the body, rad, in the `seconds` after the newest tilt plan takes effect."""
         acts = self.time + self._dead_time - self._yaw_dead_time
-        return self.yaw.at(acts + lead).turned - self.yaw.at(acts).turned
+        return self.yaw.at(acts + seconds).turned - self.yaw.at(acts).turned
 
 
 _PERIOD_WEIGHT = 0.05
@@ -174,10 +174,10 @@ _PERIOD_WEIGHT = 0.05
 class SampleHold:
     """Corrects the rates for samples that come earlier or later than expected.
 
-    Each plan reaches ahead by the expected sample period, and the vehicle holds its rates until the
-    next sample. If the next sample is late or early (PX4: after 4 or 8 ms, ArduPilot: some in
-    pairs), the vehicle has turned too far or not far enough, and a step would not be straight. The
-    next rates correct this, for a delay of one period at most.
+    The rates of each step of the plan are meant for the expected sample period, but the vehicle
+    keeps them until the next sample. If that is late or early (PX4: after 4 or 8 ms, ArduPilot:
+    some in pairs), the vehicle has turned too far or not far enough, and a step would not be
+    straight. The next rates correct this, for a delay of one period at most.
 
     Attributes:
         late: how much later than expected the sample came, s.

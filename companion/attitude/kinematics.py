@@ -69,10 +69,10 @@ def into_body(cosine: float, sine: float, r_x: float, r_y: float) -> tuple[float
 def rates_to_speed(
     w: float, x: float, y: float, z: float, roll: float, pitch: float, yaw: float
 ) -> tuple[float, float, float]:
-    """Inverse of `speed_to_rates`: speed of the coefficients (1/s) and of the heading (rad/s).
+    """Speed of the coefficients (north, east; 1/s) and of the heading (rad/s) under body rates.
 
-    Under body rates ω in rad/s the thrust axis −R·e_z moves with −R·(ω × e_z). The heading moves
-    with the yaw rate less the R_z that would keep it still.
+    It is the inverse of `speed_to_rates`. Under body rates ω in rad/s the thrust axis −R·e_z moves
+    with −R·(ω × e_z). The heading turns at the yaw rate less the R_z that would keep it still.
     """
     north = 2.0 * (x * y - w * z) * roll - (1.0 - 2.0 * (y * y + z * z)) * pitch
     east = (1.0 - 2.0 * (x * x + z * z)) * roll - 2.0 * (x * y + w * z) * pitch
@@ -98,8 +98,9 @@ SMALLEST_A = 1e-12
 def share_of_law(cosine: float, cos_recovery: float, slope: float) -> float:
     """Weight of the law against the rotation to level, a smooth function of the tilt's `cosine`.
 
-    It is 1 at the recovery angle and 0 from `limits.RECOVERY_BLEND` (10°) beyond it. Below the
-    recovery angle only the law acts, and this formula is not valid.
+    It is 1 at the recovery angle and 0 from `limits.RECOVERY_BLEND_ANGLE` (10°) beyond it. Below
+    the recovery angle only the law acts, and this formula is not valid. `slope` is
+    `Constants.recovery_slope`.
     """
     ratio = 1.0 + slope * (cosine - cos_recovery)
     if ratio <= 0.0:

@@ -51,7 +51,10 @@ class Limits:
 
     @property
     def coefficient_speed(self) -> float:
-        """Largest speed of the coefficients, 1/s: W_M·cos(max_tilt) (33); infinite if "tight"."""
+        """Largest speed of the coefficients, 1/s: W_M·cos(max_tilt) (33) in the shape "paper".
+
+        It is infinite in the shape "tight" and without a limit of tilt or tilt rate.
+        """
         if self.shape != "paper" or self.max_tilt is None:
             return inf
         return self.tilt_rate * cos(self.max_tilt)
@@ -64,7 +67,7 @@ class Limits:
 
 RECOVERY_ANGLE = radians(75.0)
 """Tilt from which a planner begins to rotate the vehicle towards level, rad; the default."""
-RECOVERY_BLEND = radians(10.0)
+RECOVERY_BLEND_ANGLE = radians(10.0)
 """Range of tilt beyond the recovery angle over which the law fades out, rad."""
 
 
@@ -89,13 +92,15 @@ class Constants(NamedTuple):
 def make_constants(
     gain: float, yaw_gain: float, limits: Limits, recovery_angle: float = RECOVERY_ANGLE
 ) -> Constants:
-    """Check the options of a planner and turn them into the numbers of its law.
+    """Check gains, limits and recovery angle, and compute the constants of a law.
 
     Args:
         gain: p, 1/s.
         yaw_gain: proportional gain on the heading error, 1/s.
         limits: bounds; see `Limits`.
-        recovery_angle: rad; at least `limits.max_tilt`, at most 80°.
+        recovery_angle: tilt from which the planner rotates towards level, rad; at least
+            `limits.max_tilt`, at most 80°. It is the largest tilt of a target if there is no
+            `limits.max_tilt`.
 
     Raises:
         ValueError: a gain or the recovery angle is out of range.
@@ -120,5 +125,5 @@ def make_constants(
         speed_weight=max_speed**-2,
         longest_target=sin(max_tilt),
         cos_recovery=cos(recovery_angle),
-        recovery_slope=1.0 / (cos(recovery_angle) - cos(recovery_angle + RECOVERY_BLEND)),
+        recovery_slope=1.0 / (cos(recovery_angle) - cos(recovery_angle + RECOVERY_BLEND_ANGLE)),
     )

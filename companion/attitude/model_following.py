@@ -23,7 +23,7 @@ from companion.attitude.representation import (
 from companion.attitude.rotation import limit_rates
 from companion.attitude.types import BodyRates, Quaternion, Target
 
-SHORTEST_SAMPLE, LONGEST_SAMPLE = 1e-4, 0.2  # s
+SHORTEST_PERIOD, LONGEST_PERIOD = 1e-4, 0.2  # s
 
 
 class ModelFollowingPlanner:
@@ -50,7 +50,7 @@ class ModelFollowingPlanner:
     """
 
     def __init__(self, constants: Constants, response: RateResponse) -> None:
-        self._forward = FeedForward(constants, response, LONGEST_SAMPLE)
+        self._forward = FeedForward(constants, response, LONGEST_PERIOD)
         self._hold = SampleHold()
         self._started = False
         self._target: Target | None = None
@@ -107,6 +107,8 @@ class ModelFollowingPlanner:
     ) -> BodyRates:
         """Body rates to send at attitude `q`, rad/s; `dt` is the time since the last sample, s.
 
+        `body_rates` are the measured ones, rad/s; None or implausible: they count as predicted.
+
         Raises:
             InvalidQuaternionError: `q` is not a unit quaternion.
             InvalidTargetError: `target` is not three or four finite numbers of usable size.
@@ -125,19 +127,19 @@ class ModelFollowingPlanner:
         if not self._started:
             self._start(q, plausible)
             self._started = True
-        dt = min(max(SHORTEST_SAMPLE, dt), LONGEST_SAMPLE)  # in this order NaN is short, too
+        dt = min(max(SHORTEST_PERIOD, dt), LONGEST_PERIOD)  # in this order NaN is short, too
         north, east, heading = -2.0 * ay, 2.0 * ax, heading_of(sqrt(square), w, z)
         self._hold.take(dt)
-        by_tilt, by_yaw = forward.plans.in_effect(self._hold.late)
-        self.planned = by_tilt
-        north_speed, east_speed, turn = self._feedback(by_tilt, by_yaw, north, east, heading)
+        tilt_plan, yaw_plan = forward.plans.in_effect(self._hold.late)
+        self.planned = tilt_plan
+        north_speed, east_speed, turn = self._feedback(tilt_plan, yaw_plan, north, east, heading)
         more_roll, more_pitch, more_yaw = speed_to_rates(
             w, z, ax, ay, 1.0 / square, 1.0 / cosine, east_speed, -north_speed
         )
         if plausible is not None:  # an unpredicted yaw rate lasts until these rates take effect
-            unpredicted = plausible.yaw - by_yaw.turning
+            unpredicted = plausible.yaw - yaw_plan.turning
             heading += (forward.dead_time + forward.lag) * unpredicted
-        heading += by_tilt.still - by_yaw.turned
+        heading += tilt_plan.still_angle - yaw_plan.turned
         ahead = forward.frame.lead(heading, forward.plans)
         roll, pitch, yaw = self._advance(target, heading, more_yaw + turn)
         roll, pitch = self._hold.rates(roll, pitch)
@@ -157,7 +159,7 @@ class ModelFollowingPlanner:
         """
         hold, forward = self._hold, self._forward
         before, self._target = self._target, target
-        if before is None or before == target or hold.late < SHORTEST_SAMPLE:
+        if before is None or before == target or hold.late < SHORTEST_PERIOD:
             return forward.advance(target, heading, yaw_feedback, hold.step)
         late, coming = hold.late, hold.step - hold.late
         late_roll, late_pitch, _ = forward.advance(before, heading, yaw_feedback, late)
@@ -166,7 +168,12 @@ class ModelFollowingPlanner:
         return roll + share * (late_roll - roll), pitch + share * (late_pitch - pitch), yaw
 
     def _feedback(
-        self, by_tilt: PlannedTilt, by_yaw: PlannedYaw, north: float, east: float, heading: float
+        self,
+        tilt_plan: PlannedTilt,
+        yaw_plan: PlannedYaw,
+        north: float,
+        east: float,
+        heading: float,
     ) -> tuple[float, float, float]:
         """Feedback towards the plan: speed of north, east (1/s) and heading (rad/s).
 
@@ -175,8 +182,8 @@ class ModelFollowingPlanner:
         speed_north = speed_east = turn = 0.0
         forward = self._forward
         if forward.plans.time >= forward.dead_time:
-            speed_north = self._gain * (by_tilt.north - north)
-            speed_east = self._gain * (by_tilt.east - east)
+            speed_north = self._gain * (tilt_plan.north - north)
+            speed_east = self._gain * (tilt_plan.east - east)
         if forward.plans.time >= forward.yaw.dead_time:
-            turn = self._yaw_gain * wrap_angle(by_yaw.heading - heading)
+            turn = self._yaw_gain * wrap_angle(yaw_plan.heading - heading)
         return speed_north, speed_east, turn

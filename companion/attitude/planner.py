@@ -27,7 +27,13 @@ class Planner(Protocol):
     def rates(
         self, q: Quaternion, target: Target, dt: float, body_rates: BodyRates | None = None
     ) -> BodyRates:
-        """Body rates to send at attitude `q`, rad/s; `dt` is the sample period in s.
+        """Body rates to send at attitude `q`, rad/s.
+
+        Args:
+            q: measured attitude.
+            target: target of guidance.
+            dt: sample period, s.
+            body_rates: measured rates, rad/s; None: unknown.
 
         Raises:
             AttitudeError: the input cannot be used; nothing is sent for this sample.
@@ -35,7 +41,7 @@ class Planner(Protocol):
         ...
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
-        """Take the attitude target (ATTITUDE_TARGET) of `age` s before the newest sample.
+        """Take an attitude target (ATTITUDE_TARGET), `age` s older than the newest sample.
 
         Called only for an autopilot that takes body rates along the axes of this target
         (ArduPilot). Others take them along the axes of the body.
@@ -43,7 +49,10 @@ class Planner(Protocol):
         ...
 
     def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
-        """Begin a new plan at `q`: after a gap, a change of mode, or a jump of the estimate."""
+        """Begin a new plan at `q`: after a gap, a change of mode, or a jump of the estimate.
+
+        `body_rates`: measured rates, rad/s; None: unknown.
+        """
         ...
 
 
@@ -66,7 +75,7 @@ class LawPlanner:
     def rates(
         self, q: Quaternion, target: Target, dt: float, body_rates: BodyRates | None = None
     ) -> BodyRates:
-        """Body rates to send at attitude `q`, rad/s; `dt` is the sample period in s.
+        """Body rates of the law, rad/s; `dt` is the sample period in s.
 
         Raises:
             InvalidQuaternionError: `q` is not a unit quaternion.
@@ -173,19 +182,18 @@ def _model_following(
     frame_lead: float | None = None,
     **options: Any,
 ) -> Planner:
-    first_order = inf
     roll = AxisResponse(
         lag,
         dead_time,
         inf if acceleration is None else acceleration,
-        first_order if damping is None else damping,
+        inf if damping is None else damping,
     )
     if pitch_damping is None:
-        pitch_damping = roll.damping if pitch_lag is None else first_order
+        pitch_damping = roll.damping if pitch_lag is None else inf
     response = RateResponse(
         roll,
         _like_roll(roll, pitch_lag, pitch_dead_time, pitch_acceleration, pitch_damping),
-        _like_roll(roll, yaw_lag, yaw_dead_time, yaw_acceleration, first_order),
+        _like_roll(roll, yaw_lag, yaw_dead_time, yaw_acceleration, inf),
         frame_lead,
     )
     return ModelFollowingPlanner(make_constants(gain, yaw_gain, limits, **options), response)

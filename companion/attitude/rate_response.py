@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from math import atan2, hypot, inf, pi, sqrt
 
-_LONGEST = 1.0
+_LONGEST_TIME = 1.0
 """Longest lag, dead time or lead that is accepted, s."""
 _SMALLEST_LAG = 1e-3
 """Smallest lag that `model-following` computes with, s."""
@@ -32,11 +32,11 @@ class AxisResponse:
     damping: float = inf
 
     def with_least_lag(self) -> "AxisResponse":
-        """The same with a lag of at least 1 ms: a shorter one makes no difference."""
+        """This response with a lag of at least 1 ms: a shorter one makes no difference."""
         return replace(self, lag=max(self.lag, _SMALLEST_LAG))
 
     @property
-    def square(self) -> float:
+    def sigma(self) -> float:
         """σ of the lag σ·r̈ + lag·ṙ + r = command, s²; 0 for first order."""
         half = 0.5 * self.lag / self.damping
         return half * half
@@ -49,10 +49,10 @@ class RateResponse:
     Attributes:
         roll, pitch, yaw: response of each axis.
         frame_lead: time by which ArduPilot's attitude target leads the body in yaw, s; ArduPilot
-            takes the rates along the axes of that target. None: `lead` derives it.
+            takes the rates along the axes of that target. None: `lead_time` derives it.
 
     Raises:
-        ValueError: a time is negative, longer than 1 s or not finite, or a limit not positive.
+        ValueError: a time is negative, longer than 1 s or NaN, or a slew limit is not positive.
     """
 
     roll: AxisResponse = AxisResponse()
@@ -71,13 +71,8 @@ class RateResponse:
                 raise ValueError(f"{prefix}acceleration must be positive, not {axis.acceleration}")
 
     @property
-    def axes(self) -> tuple[AxisResponse, AxisResponse, AxisResponse]:
-        """Roll, pitch, yaw."""
-        return self.roll, self.pitch, self.yaw
-
-    @property
-    def lead(self) -> float:
-        """`frame_lead`, or where it is None an estimate of it, s.
+    def lead_time(self) -> float:
+        """`frame_lead`, or an estimate of it if it is None, s.
 
         An autopilot with a slew limit in yaw is taken to behave like ArduPilot: its attitude target
         turns as soon as roll and pitch begin to respond, and the body follows after the dead time
@@ -91,7 +86,7 @@ class RateResponse:
 
     @property
     def tilt(self) -> AxisResponse:
-        """Mean lag and dead time of roll and pitch, with the lower of their slew limits."""
+        """A lag of first order with the mean times of roll and pitch, and the lower slew limit."""
         roll, pitch = self.roll, self.pitch
         return AxisResponse(
             0.5 * (roll.lag + pitch.lag),
@@ -101,11 +96,11 @@ class RateResponse:
 
 
 def _check_time(name: str, value: float) -> None:
-    if not 0.0 <= value <= _LONGEST:
-        raise ValueError(f"{name} must be from 0 to {_LONGEST:g} s, not {value}")
+    if not 0.0 <= value <= _LONGEST_TIME:
+        raise ValueError(f"{name} must be from 0 to {_LONGEST_TIME:g} s, not {value}")
 
 
-def largest_gain(lag: float, dead_time: float, square: float = 0.0) -> float:
+def largest_gain(lag: float, dead_time: float, sigma: float = 0.0) -> float:
     """Largest stable feedback gain (1/s) of an integrator in series with e^(−θs)/(σs² + τs + 1).
 
     At the frequency ω where ωθ + ∠(1 − σω² + jωτ) = π/2 the phase of the loop is −180°. The loop is
@@ -115,23 +110,23 @@ def largest_gain(lag: float, dead_time: float, square: float = 0.0) -> float:
     Args:
         lag: τ, s.
         dead_time: θ, s.
-        square: σ, s²; 0 for a lag of first order.
+        sigma: σ, s²; 0 for a lag of first order.
     """
-    if dead_time <= 0.0 and square <= 0.0:
+    if dead_time <= 0.0 and sigma <= 0.0:
         return inf
     low, high = 0.0, 0.5 * pi / dead_time if dead_time > 0.0 else inf
-    if square > 0.0:
-        high = min(high, 1.0 / sqrt(square))  # there the lag alone gives that phase
+    if sigma > 0.0:
+        high = min(high, 1.0 / sqrt(sigma))  # there the lag alone gives that phase
     for _ in range(60):
         middle = 0.5 * (low + high)
-        if middle * dead_time + atan2(middle * lag, 1.0 - square * middle * middle) < 0.5 * pi:
+        if middle * dead_time + atan2(middle * lag, 1.0 - sigma * middle * middle) < 0.5 * pi:
             low = middle
         else:
             high = middle
-    return low * hypot(1.0 - square * low * low, low * lag)
+    return low * hypot(1.0 - sigma * low * low, low * lag)
 
 
 def feedback_gain(gain: float, axis: AxisResponse) -> float:
     """The wanted `gain` (1/s), reduced if `axis` needs it for a gain margin of 4."""
-    stable = SHARE_OF_LARGEST_GAIN * largest_gain(axis.lag, axis.dead_time, axis.square)
+    stable = SHARE_OF_LARGEST_GAIN * largest_gain(axis.lag, axis.dead_time, axis.sigma)
     return min(gain, stable)

@@ -119,34 +119,35 @@ def lag_step(
     aim: float,
     dt: float,
     lag: float,
-    square: float,
+    sigma: float,
     transition: tuple[float, float, float, float],
 ) -> tuple[float, float, float]:
-    """One step of square·r̈ + lag·ṙ = aim − r: the integral of r over `dt`, and r and ṙ at the end.
+    """One step of σ·r̈ + lag·ṙ = aim − r: the integral of r over `dt`, and r and ṙ at the end.
 
-    `transition` is that of `Lag.transition`. In first order `slope` has no effect and ṙ is 0.
+    `sigma` is σ, s²; `slope` is ṙ at the start; `transition` is that of `Lag.transition`. In first
+    order `slope` has no effect, and 0 is returned for ṙ.
     """
     left, from_slope, falls, kept = transition
     later = aim + left * (rate - aim) + from_slope * slope
     steeper = falls * (rate - aim) + kept * slope
-    return aim * dt - lag * (later - rate) - square * (steeper - slope), later, steeper
+    return aim * dt - lag * (later - rate) - sigma * (steeper - slope), later, steeper
 
 
 class Lag:
-    """A lag of first or second order: square·r̈ + lag·ṙ = aim − r.
+    """A lag of first or second order: σ·r̈ + lag·ṙ = aim − r.
 
     Args:
         lag: s.
-        square: s²; 0 makes it first order.
+        sigma: σ, s²; 0 makes it first order.
     """
 
-    __slots__ = ("_lag", "_model", "_square")
+    __slots__ = ("_lag", "_model", "_sigma")
 
-    def __init__(self, lag: float, square: float = 0.0) -> None:
-        self._lag, self._square = lag, square
+    def __init__(self, lag: float, sigma: float = 0.0) -> None:
+        self._lag, self._sigma = lag, sigma
         self._model = None
-        if square > 0.0:
-            self._model = SecondOrderReference(1.0 / sqrt(square), 0.5 * lag / sqrt(square))
+        if sigma > 0.0:
+            self._model = SecondOrderReference(1.0 / sqrt(sigma), 0.5 * lag / sqrt(sigma))
 
     def after(self, rate: float, slope: float, aim: float, dt: float) -> tuple[float, float, float]:
         """The integral of r over `dt`, and r and ṙ at the end.
@@ -161,7 +162,7 @@ class Lag:
             moved, later = first_order_step(rate, aim, self._lag, dt)
             return moved, later, (aim - later) / self._lag
         transition = self.transition(dt)
-        return lag_step(rate, slope, aim, dt, self._lag, self._square, transition)
+        return lag_step(rate, slope, aim, dt, self._lag, self._sigma, transition)
 
     def transition(self, dt: float) -> tuple[float, float, float, float]:
         """Transition matrix of the state (r − aim, ṙ) over `dt` seconds, row by row."""

@@ -12,7 +12,7 @@ _LONGEST_REFERENCE = sin(1.4)
 body rates grow without bound."""
 _FOUR_ZETA_SQUARED = 2.7
 """Smallest 4·ζ² of the model, where ζ is its damping ratio."""
-_LONGEST_STEP = 0.1
+_LARGEST_GAIN_TIMES_STEP = 0.1
 """Largest p·dt of one step of the model; a longer sample is divided into several steps."""
 _DIFFERENCE_STEP = 1e-4
 """Time step of the finite differences of rates, s."""
@@ -63,16 +63,16 @@ class ReferenceModel:
 
     The whole vector v is scaled, so a step moves on a straight line. The scale keeps the body rates
     of the motion within the limits. The rates that are sent compensate the lag of the vehicle
-    (τ and σ) and stay within the limits too. If the autopilot has a slew limit, v changes no
-    faster, and is small enough to be slowed down in time: the slew limit is never reached. Behind a
-    lag of second order, a large step of v would saturate the motors, and the response would not be
-    linear: there v takes at least τ from rest to the largest rate.
+    (τ and σ) and stay within the limits too. If the autopilot has a slew limit, v changes no faster
+    than that, and stays so small that it can be slowed down in time. Behind a lag of second order, a
+    large step of v would saturate the motors, and the response would not be linear: there v takes
+    at least τ from rest to the largest rate.
 
     Args:
         constants: gains and limits.
         lag: τ, s.
         acceleration: slew limit of the autopilot, rad/s².
-        square: σ, s²; 0 if the lag of the vehicle is of first order.
+        sigma: σ, s²; 0 if the lag of the vehicle is of first order.
 
     Attributes:
         north, east: coefficients of the reference.
@@ -84,10 +84,10 @@ class ReferenceModel:
         "_braking",
         "_constants",
         "_lag",
+        "_sigma",
         "_slew_limit",
         "_slope_east",
         "_slope_north",
-        "_square",
         "_tilt_rate_weight",
         "_v_east",
         "_v_north",
@@ -102,9 +102,9 @@ class ReferenceModel:
         constants: Constants,
         lag: float,
         acceleration: float = inf,
-        square: float = 0.0,
+        sigma: float = 0.0,
     ) -> None:
-        self._slew_limit, self._square = acceleration, square
+        self._slew_limit, self._sigma = acceleration, sigma
         self.retune(constants, lag)
         self.start_at(Coefficients(0.0, 0.0), Coefficients(0.0, 0.0))
 
@@ -112,8 +112,8 @@ class ReferenceModel:
         """Use other gains and limits, and the τ (s) that belongs to them; the motion continues."""
         self._constants = constants
         self._braking = braking_lead(constants.gain, lag)
-        self._lag = Lag(lag, self._square)
-        gentle = constants.max_tilt_rate / lag if self._square > 0.0 else inf
+        self._lag = Lag(lag, self._sigma)
+        gentle = constants.max_tilt_rate / lag if self._sigma > 0.0 else inf
         self._acceleration = min(self._slew_limit, gentle)
         # Near the target v falls by p·v a second.
         slowed_in_time = self._acceleration / constants.gain
@@ -148,7 +148,7 @@ class ReferenceModel:
 
     def advance(self, target: Target, dt: float) -> None:
         """Advance by `dt` seconds towards an admissible target."""
-        parts = ceil(dt * self._constants.gain / _LONGEST_STEP)
+        parts = ceil(dt * self._constants.gain / _LARGEST_GAIN_TIMES_STEP)
         for _ in range(parts):
             self._step(target, dt / parts)
 
@@ -193,7 +193,7 @@ class ReferenceModel:
     def _stay_inside(self, north: float, east: float, dt: float) -> None:
         """Keep the reference within the largest tilt.
 
-        If the step began beyond it, at (north, east), the reference moves no further out.
+        If the step of `dt` s began beyond it, at (north, east), it moves no further out.
         """
         length = hypot(self.north, self.east)
         if length <= self._constants.longest_target:

@@ -104,7 +104,7 @@ LARGEST_HEADING_RATE = 1e9
 
 
 def limited_target(target: Target, longest: float) -> Target:
-    """`target` with its coefficients shortened to `longest` and its heading wrapped to (−π, π].
+    """`target` with coefficients no longer than `longest`, and its heading wrapped to (−π, π].
 
     Raises:
         InvalidTargetError: `target` is not three or four numbers, or a value is not finite or far

@@ -61,7 +61,7 @@ def cos_and_sinc(square: float) -> tuple[float, float]:
     return cos(h), sin(h) / h if h > _SMALL_ANGLE else 1.0
 
 
-def turned(q: Quaternion, rates: tuple[float, float, float], dt: float) -> Quaternion:
+def after_constant_rates(q: Quaternion, rates: tuple[float, float, float], dt: float) -> Quaternion:
     """The attitude after `dt` seconds at constant body rates (rad/s): q ⊗ exp(ω·dt/2)."""
     w, x, y, z = q
     roll, pitch, yaw = rates
@@ -129,7 +129,7 @@ def limit_rates(
     return roll, pitch, clamp(yaw, max_yaw_rate)
 
 
-def short_way(angle: float) -> float:
+def wrap_difference(angle: float) -> float:
     """Wrap an angle between −2π and 2π, such as a difference of two headings, to (−π, π]."""
     if angle > pi:
         return angle - TWO_PI

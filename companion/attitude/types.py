@@ -7,7 +7,10 @@ Quaternion = tuple[float, float, float, float]
 
 
 class TiltYaw(NamedTuple):
-    """Equation 9: an attitude as tilt ⊗ yaw = [a, x, y, 0] ⊗ [b, 0, 0, z]; a = 0 only inverted."""
+    """An attitude as tilt ⊗ yaw = [a, x, y, 0] ⊗ [b, 0, 0, z] (equation 9).
+
+    a is cos(tilt/2), so it is 0 only for an exactly inverted vehicle.
+    """
 
     a: float
     b: float
@@ -17,7 +20,7 @@ class TiltYaw(NamedTuple):
 
 
 class Coefficients(NamedTuple):
-    """Equation 10: horizontal acceleration per specific thrust, (a_N, a_E); |c| = sin(tilt)."""
+    """Horizontal acceleration per specific thrust, (a_N, a_E) (equation 10); |c| = sin(tilt)."""
 
     north: float
     east: float

@@ -2,7 +2,7 @@
 
 from math import inf, radians
 
-from companion.attitude.history import PlanHistory, between
+from companion.attitude.history import PlanHistory, locate_time
 from companion.attitude.limits import Constants
 from companion.attitude.rate_response import AxisResponse, RateResponse
 from companion.attitude.reference import first_order_step
@@ -23,7 +23,7 @@ class HeadingModel:
         turn_rate: ψ̇, rad/s.
     """
 
-    __slots__ = ("_acceleration", "_fastest", "_gain", "_lag", "_v", "heading", "turn_rate")
+    __slots__ = ("_acceleration", "_gain", "_lag", "_max_rate", "_v", "heading", "turn_rate")
 
     def __init__(self, constants: Constants, yaw: AxisResponse) -> None:
         self._lag = yaw.lag
@@ -35,9 +35,9 @@ class HeadingModel:
         """Use another gain and limit; the planned heading continues."""
         self._gain = constants.yaw_gain
         # Near the target v falls by k·v a second.
-        self._fastest = constants.max_yaw_rate
+        self._max_rate = constants.max_yaw_rate
         if self._gain > 0.0:
-            self._fastest = min(self._fastest, self._acceleration / self._gain)
+            self._max_rate = min(self._max_rate, self._acceleration / self._gain)
 
     def start_at(self, heading: float, turn_rate: float) -> None:
         """Start at this heading (rad), turning at this rate (rad/s)."""
@@ -47,7 +47,7 @@ class HeadingModel:
     def advance(self, target: Target, dt: float) -> None:
         """Advance by `dt` seconds towards an admissible target."""
         wanted = self._gain * wrap_angle(target.heading - self.heading) + target.heading_rate
-        change = clamp(wanted, self._fastest) - self._v
+        change = clamp(wanted, self._max_rate) - self._v
         v = self._v = self._v + clamp(change, self._acceleration * dt)
         moved, self.turn_rate = first_order_step(self.turn_rate, v, self._lag, dt)
         self.heading += moved
@@ -64,7 +64,7 @@ class YawModel:
         turned: integral of `rate` since the start, rad.
     """
 
-    __slots__ = ("_acceleration", "_aimed", "_lag", "rate", "turned")
+    __slots__ = ("_acceleration", "_aim", "_lag", "rate", "turned")
 
     def __init__(self, response: AxisResponse) -> None:
         self._lag = response.lag
@@ -73,29 +73,29 @@ class YawModel:
 
     def start(self, rate: float) -> None:
         """Start at a steady `rate`, rad/s, and set `turned` to 0."""
-        self.rate = self._aimed = rate
+        self.rate = self._aim = rate
         self.turned = 0.0
 
     def advance(self, command: float, dt: float) -> None:
         """Advance by `dt` seconds in which the yaw rate `command` (rad/s) is sent."""
-        before, most = self._aimed, self._acceleration * dt
-        aimed = self._aimed = before + clamp(command - before, most) if most < inf else command
+        before, most = self._aim, self._acceleration * dt
+        aim = self._aim = before + clamp(command - before, most) if most < inf else command
         # Uses the aim at the end of the sample: at most half a sample early.
-        moved, self.rate = first_order_step(self.rate, aimed, self._lag, dt)
+        moved, self.rate = first_order_step(self.rate, aim, self._lag, dt)
         self.turned += moved
 
 
 LARGEST_LEAD = radians(45.0)
 """Largest lead in yaw of ArduPilot's attitude target over the body, rad; ArduPilot clamps it."""
 
-OLDEST = 0.25
-"""An attitude target older than this is not used, s."""
+OLDEST_ATTITUDE_TARGET = 0.25
+"""Largest age of an attitude target that is used, s."""
 
 _BODY_BEHIND_TARGET = 0.008
 """Dead time of roll and pitch from ArduPilot's attitude target to the body, s (measured)."""
 
-_DROPPED_TOGETHER = 128
-"""Rows that are too old are dropped in blocks of this many."""
+_ROWS_PER_DROP = 128
+"""Number of samples that are dropped at a time once they are too old."""
 
 
 class TargetFrame:
@@ -112,7 +112,7 @@ class TargetFrame:
         "_acceleration",
         "_aim",
         "_delay",
-        "_lead",
+        "_lead_time",
         "_offset",
         "_reported_at",
         "_time",
@@ -122,7 +122,7 @@ class TargetFrame:
 
     def __init__(self, response: RateResponse) -> None:
         self._acceleration = response.yaw.acceleration
-        self._lead = response.lead
+        self._lead_time = response.lead_time
         self._delay = max(0.0, response.tilt.dead_time - _BODY_BEHIND_TARGET)
         self._times: list[float] = []
         self._turns: list[float] = []
@@ -137,9 +137,9 @@ class TargetFrame:
     def note(self, heading: float, age: float) -> None:
         """Take the target's heading (rad), measured `age` seconds before the newest sample.
 
-        A heading older than `OLDEST` is ignored.
+        A heading older than `OLDEST_ATTITUDE_TARGET` is ignored.
         """
-        if not 0.0 <= age <= OLDEST:
+        if not 0.0 <= age <= OLDEST_ATTITUDE_TARGET:
             return
         self._reported_at = self._time - age
         self._offset = heading - self._turn_until(self._reported_at - self._delay)
@@ -157,16 +157,17 @@ class TargetFrame:
         times.append(self._time)
         self._turns.append(self._turns[-1] + (self._aim - still) * dt)
         if (
-            len(times) > _DROPPED_TOGETHER
-            and times[_DROPPED_TOGETHER] < self._time - OLDEST - self._delay
+            len(times) > _ROWS_PER_DROP
+            and times[_ROWS_PER_DROP] < self._time - OLDEST_ATTITUDE_TARGET - self._delay
         ):
-            del times[:_DROPPED_TOGETHER], self._turns[:_DROPPED_TOGETHER]
+            del times[:_ROWS_PER_DROP], self._turns[:_ROWS_PER_DROP]
 
     def lead(self, heading: float, plans: PlanHistory) -> float:
         """Angle by which the target leads the body in yaw when the rates sent now take effect, rad.
 
-        It is computed from the newest attitude target. If that is missing, older than `OLDEST` or
-        more than `LARGEST_LEAD` ahead or behind, it follows from `RateResponse.lead`.
+        It is computed from the newest attitude target. If that is missing, older than
+        `OLDEST_ATTITUDE_TARGET`, or more than `LARGEST_LEAD` ahead or behind, it follows from
+        `RateResponse.lead_time`.
 
         Args:
             heading: heading of the body minus its predicted turn since the plans began, rad.
@@ -178,20 +179,20 @@ class TargetFrame:
             lead = wrap_angle(reported - heading - turn.angle)
             if abs(lead) <= LARGEST_LEAD:
                 return lead
-        return 0.0 if self._lead == 0.0 else plans.turn_within(self._lead)
+        return 0.0 if self._lead_time == 0.0 else plans.yaw_within(self._lead_time)
 
     def heading(self) -> float | None:
         """The target's heading when the rates sent now take effect, rad; None: not known."""
-        if self._time - self._reported_at > OLDEST:
+        if self._time - self._reported_at > OLDEST_ATTITUDE_TARGET:
             return None
         return self._offset + self._turns[-1]
 
     def _turn_until(self, time: float) -> float:
         """How far the rates sent until `time` turn the target, rad; linear between samples."""
-        times, ways = self._times, self._turns
+        times, turns = self._times, self._turns
         if time < times[0]:
-            return ways[0]
+            return turns[0]
         if time >= times[-1]:
-            return ways[-1]
-        later, share = between(times, time)
-        return ways[later - 1] + share * (ways[later] - ways[later - 1])
+            return turns[-1]
+        later, share = locate_time(times, time)
+        return turns[later - 1] + share * (turns[later] - turns[later - 1])

@@ -83,7 +83,7 @@ def advance(
     steps: int,
     compiled: bool | None = None,
 ) -> Array:
-    """Attitudes (4, n) after `steps` samples, each with constant body rates (`rotation.turned`).
+    """Attitudes (4, n) after `steps` samples, each with constant body rates.
 
     Arguments and errors are those of `rates`; a negative `steps` raises ValueError.
     """

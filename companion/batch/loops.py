@@ -68,7 +68,7 @@ def compiled_loops(law: Law, any_angle: bool = False) -> Loops:
 @cache
 def _compiled_turn(any_angle: bool) -> _Turn:
     compiler = _compiler(any_angle)
-    turned = compiler.function(rotation.turned)
+    turned = compiler.function(rotation.after_constant_rates)
 
     def turn(q: Array, rates: Array, after: Array, dt: float) -> None:
         for i in range(q.shape[1]):
@@ -84,7 +84,7 @@ def _compiled_turn(any_angle: bool) -> _Turn:
 def plain_loops(law: Law) -> Loops:
     """`law` called for one vehicle after the other, on floats as in flight."""
     one_law: Any = law
-    turned: Any = rotation.turned
+    turned: Any = rotation.after_constant_rates
 
     def apply(q: Array, targets: Array, rates: Array, dt: float, constants: Constants) -> None:
         vehicles = zip(q.T.tolist(), targets.T.tolist(), strict=True)

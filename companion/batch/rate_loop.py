@@ -17,7 +17,7 @@ from companion.attitude.limits import Constants
 from companion.attitude.planner import Law, LawPlanner
 from companion.attitude.rate_response import AxisResponse
 from companion.attitude.reference import Lag, lag_step
-from companion.attitude.rotation import clamp, turned
+from companion.attitude.rotation import after_constant_rates, clamp
 from companion.attitude.types import Quaternion
 from companion.batch.compiler import Compiler
 from companion.batch.loops import Array
@@ -77,12 +77,12 @@ def fly_steps(
 
 
 def _rate_loop(axes: Sequence[AxisResponse]) -> tuple[Array, NDArray[np.int64]]:
-    """(3, 7) lag, square, slew per step and transition of each axis; (3,) dead times in steps."""
+    """(3, 7) lag, σ (s²), slew per step and transition of each axis; (3,) dead times in steps."""
     rows = []
     for axis in (each.with_least_lag() for each in axes):
         slew = axis.acceleration / STEP_HZ if isfinite(axis.acceleration) else _UNLIMITED
-        transition = Lag(axis.lag, axis.square).transition(1.0 / STEP_HZ)
-        rows.append((axis.lag, axis.square, slew, *transition))
+        transition = Lag(axis.lag, axis.sigma).transition(1.0 / STEP_HZ)
+        rows.append((axis.lag, axis.sigma, slew, *transition))
     return np.array(rows), np.array([round(axis.dead_time * STEP_HZ) for axis in axes])
 
 
@@ -90,7 +90,7 @@ def _rate_loop(axes: Sequence[AxisResponse]) -> tuple[Array, NDArray[np.int64]]:
 def _compiled(law: Law) -> Callable[..., Quaternion]:
     """The flight of one vehicle under `law`."""
     compiler = Compiler({})
-    one_law, turn = compiler.function(law), compiler.function(turned)
+    one_law, turn = compiler.function(law), compiler.function(after_constant_rates)
     lagged, limited = compiler.function(lag_step), compiler.function(clamp)
     products = compiler.function(tilt_products)
     dt = 1.0 / STEP_HZ

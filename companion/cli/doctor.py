@@ -106,7 +106,7 @@ def _response(config: Config) -> list[Finding]:
     if config.planner_name not in PLANNER_NAMES:
         return []
     response = expected_response(config)
-    result = CheckResult.INEFFECTIVE if response.too_quick else CheckResult.SAFE
+    result = CheckResult.INEFFECTIVE if response.gain_is_too_high else CheckResult.SAFE
     source = f"planner, rate loop and limits; {hold_sentence(config)}"
     return [
         Finding(Key.RESPONSE, result, response.gain_sentence(), response.sentence(), source=source)

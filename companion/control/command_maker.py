@@ -85,7 +85,7 @@ class CommandMaker:
         target, later = (self._learning.limit_tilt(each, down) for each in (target, later))
         if not all(map(isfinite, (*target, *later, down))):
             return reference, None
-        self._estimate.vertical = GRAVITY - down if offboard_active else GRAVITY
+        self._estimate.vertical_thrust = GRAVITY - down if offboard_active else GRAVITY
         command = GuidanceCommand(
             target,
             down,

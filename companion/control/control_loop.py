@@ -32,9 +32,9 @@ SendSetpoint = Callable[[int, BodyRates, float], bool]
 """Sends the sample's time_boot_ms, body rates and thrust; False if the link does not accept it. In
 lockstep the link keeps them until the step ends, and sends only the last ones of a step."""
 
-_MISFITS = {Misfit.NOT_NEWER: Unanswered.NOT_NEWER, Misfit.AHEAD: Unanswered.AHEAD}
+_MISFIT_REASONS = {Misfit.NOT_NEWER: Unanswered.NOT_NEWER, Misfit.AHEAD: Unanswered.AHEAD}
 _END_THE_STREAM = {None, Unanswered.OLD_TARGET, Unanswered.AWAITING_MODE}
-"""Outcomes of a sample after which `end_stream` needs no other: sent, or too late to be sent."""
+"""Outcomes of the last sample after `end_stream`: answered (None), or no later one can be."""
 
 
 class ControlLoop:
@@ -126,7 +126,7 @@ class ControlLoop:
         if not self.is_same_vehicle():
             reason = Unanswered.ANOTHER_VEHICLE
         elif sample.misfit is not None:
-            reason = _MISFITS[sample.misfit]
+            reason = _MISFIT_REASONS[sample.misfit]
         elif not sample.age <= self._deadlines.telemetry_stale:
             reason = Unanswered.LATE
         elif command is None:
@@ -196,7 +196,6 @@ class ControlLoop:
     def _note_answer(
         self, sample: AttitudeSample, command: GuidanceCommand, rates: BodyRates, thrust: float
     ) -> None:
-        """Count and record a setpoint that was sent."""
         record, deadlines = self.record, self._deadlines
         record.note_answer(sample.received, thrust, deadlines.telemetry_stale)
         latency = record.latency_ns = self._clock_ns() - sample.received_ns
@@ -229,9 +228,9 @@ class ControlLoop:
         self.on = self.offboard_active = self.taking_over = False
 
     def end_stream(self) -> None:
-        """Answer one more fresh sample, then none: with zero body rates, if the autopilot obeys us.
+        """Answer one more fresh sample with zero body rates, which the autopilot keeps for seconds.
 
-        The autopilot keeps them for seconds. Later commands of guidance are not sent.
+        If it does not obey us, or there is no command, nothing more is sent.
         """
         if self.on and self.offboard_active and self.command is not None:
             self._last_command = self._last_command or self.command.without_turning()

@@ -17,24 +17,25 @@ from collections import deque
 from math import asin, atan2, hypot, radians, sqrt
 
 from companion.attitude import Quaternion, Target, is_unit
-from companion.attitude.rotation import short_way, turned, turned_about_vertical
+from companion.attitude.rotation import after_constant_rates, turned_about_vertical, wrap_difference
 from companion.control.rate_lag import RateLag
 from companion.guidance.reference import Vector, minus, rotated
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
-_LONGEST_GAP = 0.1
-"""Longest time between two compared attitudes, s; the rates between them are unknown."""
-_LONGEST_STEP = 0.025
-"""Longest time between two attitudes for a correction, s; beyond it the rates are too uncertain."""
-_ANGLE = radians(4.0)
+_LONGEST_ATTITUDE_GAP = 0.1
+"""Longest time between two compared attitudes, s; over a longer time the body rates are unknown."""
+_LONGEST_CORRECTED_GAP = 0.025
+"""Longest time between two attitudes whose unexplained turn is added to `corrections`, s; over a
+longer time the body rates are too uncertain."""
+_SMALLEST_ATTITUDE_JUMP = radians(4.0)
 """Smallest attitude jump that is recognised, rad; smaller ones count as noise."""
-_DISTANCE = 0.2
+_SMALLEST_POSITION_JUMP = 0.2
 """Smallest position jump that is recognised, m; smaller ones count as noise."""
-_LONGEST_POSITIONS = 0.5
+_LONGEST_POSITION_GAP = 0.5
 """Longest time between two compared positions, s."""
-_ACCELERATION_CHANGE = 10.0
+_LARGEST_ACCELERATION_CHANGE = 10.0
 """Largest change of the acceleration between two positions, m/s²."""
-_ONE_RESET = 0.5
+_ONE_RESET_TIME = 0.5
 """Jumps within this time count as one reset, s; ODOMETRY comes at 10 Hz."""
 
 
@@ -47,7 +48,7 @@ class EstimatorResets:
         corrections: sum of the heading changes that body rates do not explain and that are no
             jumps, rad; see `StepFrame`.
         rate_lag: how late the body rates are against the attitude, as learned.
-        largest_tilt: largest jump of the thrust axis, rad; no reference frame compensates it.
+        largest_tilt_jump: largest jump of the thrust axis, rad; no reference frame compensates it.
         newest: the newest attitude, or None.
         times: when the latest resets were found, s of event-loop time.
     """
@@ -57,11 +58,11 @@ class EstimatorResets:
         self.shift: Vector = (0.0, 0.0, 0.0)
         self.corrections = 0.0
         self.rate_lag = RateLag()
-        self.largest_tilt = 0.0
+        self.largest_tilt_jump = 0.0
         self.times: deque[float] = deque(maxlen=32)
         self.newest: AttitudeSample | None = None
-        self._raw: LocalPosition | None = None
-        self._counter: int | None = None
+        self._newest_position: LocalPosition | None = None
+        self._reset_counter: int | None = None
 
     def on_attitude(self, sample: AttitudeSample) -> bool:
         """Compare a newer sample with the last one; return whether the thrust axis jumped."""
@@ -71,39 +72,39 @@ class EstimatorResets:
         if before is None:
             return False
         dt = sample.vehicle_time - before.vehicle_time
-        if not 0.0 < dt <= _LONGEST_GAP:
+        if not 0.0 < dt <= _LONGEST_ATTITUDE_GAP:
             return False
         rates = self.rate_lag.mean(before.body_rates, sample.body_rates, dt)
-        predicted = turned(before.q, rates, dt)
+        predicted = after_constant_rates(before.q, rates, dt)
         yaw, tilt, threshold = _attitude_jump(before, sample, predicted, dt)
         jumped = tilt > threshold
         if abs(yaw) > threshold:
-            self.turn = short_way(self.turn + yaw)
+            self.turn = wrap_difference(self.turn + yaw)
         elif not jumped:
-            if dt <= _LONGEST_STEP:
+            if dt <= _LONGEST_CORRECTED_GAP:
                 self.corrections += yaw
                 self.rate_lag.learn(before.body_rates, sample.body_rates, predicted, sample.q)
             return False
         self._count_reset(sample.received)
-        self.largest_tilt = max(self.largest_tilt, tilt if jumped else 0.0)
+        self.largest_tilt_jump = max(self.largest_tilt_jump, tilt if jumped else 0.0)
         return jumped
 
     def without_jumps(self, position: LocalPosition) -> LocalPosition:
         """The position in the frame without jumps; a new position is first checked for a jump."""
-        before, self._raw = self._raw, position
+        before, self._newest_position = self._newest_position, position
         if before is not None:
             self._find_position_jump(before, position)
         return position._replace(position_ned=minus(position.position_ned, self.shift))
 
     def forget(self) -> None:
         """Forget all jumps: the frame without jumps is now the estimator's. Used on the ground."""
-        self.turn, self.shift, self._raw = 0.0, (0.0, 0.0, 0.0), None
+        self.turn, self.shift, self._newest_position = 0.0, (0.0, 0.0, 0.0), None
 
     def on_counter(self, counter: int | None, now: float) -> None:
         """Take ODOMETRY's `reset_counter`, which also counts resets too small to be detected."""
-        if counter is not None and self._counter not in (None, counter):
+        if counter is not None and self._reset_counter not in (None, counter):
             self._count_reset(now)
-        self._counter = counter
+        self._reset_counter = counter
 
     def attitude(self, q: Quaternion) -> Quaternion:
         """The attitude without the heading jumps."""
@@ -113,8 +114,8 @@ class EstimatorResets:
         """Turn the horizontal part of a target from the estimator's frame to the one without jumps.
 
         Args:
-            target: The target; its heading has no jumps already, and stays.
-            turn: The value of `self.turn` when the target was made, rad.
+            target: the target; its heading stays, because it is in the frame without jumps already.
+            turn: the value of `self.turn` when the target was made, rad.
         """
         if turn == 0.0:
             return target
@@ -123,7 +124,7 @@ class EstimatorResets:
 
     def _find_position_jump(self, before: LocalPosition, position: LocalPosition) -> None:
         dt = position.vehicle_time - before.vehicle_time
-        if not 0.0 < dt <= _LONGEST_POSITIONS:
+        if not 0.0 < dt <= _LONGEST_POSITION_GAP:
             return
         jump = [
             new - old - 0.5 * dt * (v_old + v_new)
@@ -135,13 +136,13 @@ class EstimatorResets:
                 strict=True,
             )
         ]
-        if hypot(*jump) > _DISTANCE + _ACCELERATION_CHANGE * dt * dt / 8.0:
+        if hypot(*jump) > _SMALLEST_POSITION_JUMP + _LARGEST_ACCELERATION_CHANGE * dt * dt / 8.0:
             north, east, down = self.shift
             self.shift = (north + jump[0], east + jump[1], down + jump[2])
             self._count_reset(position.received)
 
     def _count_reset(self, now: float) -> None:
-        if not self.times or now - self.times[-1] > _ONE_RESET:
+        if not self.times or now - self.times[-1] > _ONE_RESET_TIME:
             self.times.append(now)
 
 
@@ -158,7 +159,7 @@ def _attitude_jump(
     r_x = -a * x + b * w - c * z + d * y
     r_y = -a * y + b * z + c * w - d * x
     r_z = -a * z - b * y + c * x + d * w
-    yaw = short_way(2.0 * atan2(r_z, r_w))
+    yaw = wrap_difference(2.0 * atan2(r_z, r_w))
     tilt = 2.0 * asin(min(1.0, hypot(r_x, r_y)))
     change = sqrt((new_p - p) ** 2 + (new_q - q) ** 2 + (new_r - r) ** 2)
-    return yaw, tilt, _ANGLE + 0.5 * change * dt
+    return yaw, tilt, _SMALLEST_ATTITUDE_JUMP + 0.5 * change * dt

@@ -7,14 +7,14 @@ from companion.attitude import PLANNER_NAMES
 from companion.attitude.reference_model import rates_along
 from companion.config import Config
 from companion.control.hold_settings import attitude_delay, hold_gains, hold_weights
-from companion.control.inner_loop import LARGEST_PRODUCT, sensible_gain, tilt_response
+from companion.control.inner_loop import LARGEST_GAIN_TIMES_DELAY, sensible_gain, tilt_response
 from companion.guidance import InnerResponse
 
-_NOTICEABLE = 0.99
+_NOTICEABLE_SHARE = 0.99
 """A change is reported if it reduces the time constant to less than this share of it."""
 
-_GAIN, _RATE = "planner.gain_per_s", "limits.max_tilt_rate_deg_s"
-_LAG, _DEAD_TIME = "the vehicle's lag", "the vehicle's dead time"
+_GAIN_KEY, _RATE_LIMIT_KEY = "planner.gain_per_s", "limits.max_tilt_rate_deg_s"
+_LAG_CAUSE, _DEAD_TIME_CAUSE = "the vehicle's lag", "the vehicle's dead time"
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,16 +42,16 @@ class ExpectedResponse:
         return min(self.time_constants_without, key=self.time_constants_without.__getitem__)
 
     @property
-    def too_quick(self) -> bool:
+    def gain_is_too_high(self) -> bool:
         """Whether the gain is larger than the largest sensible gain."""
         return self.largest_gain is not None and self.gain > self.largest_gain
 
     def sentence(self) -> str:
         """A message for the user: time constant, its main limit, and the effect of each change."""
         changes = ", ".join(
-            f"{time:.2f} s {'with twice' if name == _GAIN else 'without'} {name}"
+            f"{time:.2f} s {'with twice' if name == _GAIN_KEY else 'without'} {name}"
             for name, time in self.time_constants_without.items()
-            if time < _NOTICEABLE * self.time_constant
+            if time < _NOTICEABLE_SHARE * self.time_constant
         )
         tilt = degrees(asin(self.coefficient))
         return (
@@ -79,7 +79,7 @@ def _gain_sentence(gain: float, largest: float) -> str:
     remedy = "; lower it, for above that the response overshoots and the hold may swing"
     return (
         f"planner.gain_per_s is {gain:g}, and {largest:.1f} is the largest sensible one "
-        f"({LARGEST_PRODUCT} / (lag + dead time)){remedy if gain > largest else ''}"
+        f"({LARGEST_GAIN_TIMES_DELAY} / (lag + dead time)){remedy if gain > largest else ''}"
     )
 
 
@@ -90,8 +90,8 @@ def expected_response(config: Config) -> ExpectedResponse:
     twice = config.planner.model_copy(update={"gain_per_s": 2.0 * config.planner.gain_per_s})
     quicker = tilt_response(config.model_copy(update={"planner": twice}))
     time_constants_without = {
-        _GAIN: quicker.step_time(step, speed),
-        _RATE: response.step_time(step),
+        _GAIN_KEY: quicker.step_time(step, speed),
+        _RATE_LIMIT_KEY: response.step_time(step),
         **_without_the_vehicle(config, response, speed),
     }
     largest = sensible_gain(config)
@@ -112,13 +112,13 @@ def _without_the_vehicle(config: Config, response: InnerResponse, speed: float) 
     axes = {"lag_ms": 0.0, "pitch_lag_ms": None, "damping": None, "pitch_damping": None}
     unlagged = config.model_copy(update={"vehicle": config.vehicle.model_copy(update=axes)})
     return {
-        _LAG: tilt_response(unlagged).step_time(step, speed),
-        _DEAD_TIME: replace(response, dead_time=0.0).step_time(step, speed),
+        _LAG_CAUSE: tilt_response(unlagged).step_time(step, speed),
+        _DEAD_TIME_CAUSE: replace(response, dead_time=0.0).step_time(step, speed),
     }
 
 
 def _largest_speed(config: Config) -> float:
-    """Speed (1/s) of the coefficients at the largest tilt rate, at half the largest coefficient."""
+    """Speed (1/s) of the coefficients at the largest tilt rate, at half the steps' coefficient."""
     roll, pitch, _ = rates_along(0.5 * config.steps.coefficient, 0.0, 1.0, 0.0)
     return config.limits.max_tilt_rate / hypot(roll, pitch)
 
@@ -135,10 +135,11 @@ def expectations(config: Config) -> list[str]:
 
 
 def hold_sentence(config: Config) -> str:
-    """A message for the user: the gains of the position hold, and the weights they follow from."""
+    """A message for the user: gains and weights of the position hold, and the attitude's delay."""
     gains, weights, delay = hold_gains(config), hold_weights(config), attitude_delay(config)
     return (
         f"the hold has gains of {gains.position:.1f} 1/s² on position, {gains.velocity:.1f} 1/s on "
         f"velocity and {gains.acceleration:.2f} on acceleration, from the weights "
-        f"{weights.position:.4g} 1/s⁴ and {weights.velocity:.3g} 1/s² (T = {delay:.2f} s)"
+        f"{weights.position:.4g} 1/s⁴ and {weights.velocity:.3g} 1/s² (the attitude is "
+        f"{delay:.2f} s late)"
     )

@@ -9,10 +9,10 @@ from companion.guidance.follow import Follow
 from companion.guidance.reference import ReferenceAt
 from companion.guidance.source import ManeuverSource, Source
 
-_REJOINED = 1.0
+_REJOINED_DISTANCE = 1.0
 """Distance from the reference at which the vehicle counts as returned after open loop, m."""
 _RETURN_TIME = 10.0
-"""After this time of closed loop the vehicle must have returned, s; 10 m take 4 s."""
+"""Closed-loop time after which the vehicle counts as returned in any case, s; 10 m take 4 s."""
 
 
 class FlownSource:
@@ -90,7 +90,7 @@ class FlownSource:
             return None
         return Following(part, elapsed, self.pose, turn)
 
-    def steers_by_rates(self, now: float, motion: VehicleMotion) -> str | None:
+    def source_commanding_rates(self, now: float, motion: VehicleMotion) -> str | None:
         """Name of the source if it commands body rates in open loop at `now`; else None."""
         if self.source is None:
             return None
@@ -102,14 +102,14 @@ class FlownSource:
     ) -> float | None:
         """Distance from the reference, m; `now` in s of event-loop time.
 
-        It is None without a pose, in open loop, while the reference drifts, and until the vehicle
-        has returned from either, for which it has `_RETURN_TIME`.
+        It is None without a pose, in open loop, and while the reference drifts. After open loop or
+        drifting it stays None until the vehicle is back at the reference, or for `_RETURN_TIME`.
         """
         distance = dist(reference.position_ned, motion.position_ned)
         if not reference.holds_position:
             self._returning_since = inf
         elif self._returning_since is not None:
             self._returning_since = since = min(now, self._returning_since)
-            if distance <= _REJOINED or now - since > _RETURN_TIME:
+            if distance <= _REJOINED_DISTANCE or now - since > _RETURN_TIME:
                 self._returning_since = None
         return None if self.pose is None or self._returning_since is not None else distance

@@ -4,21 +4,21 @@ from collections.abc import Callable
 
 from companion.vehicle.state import GROUND_HEIGHT, VehicleState
 
-_STILL = 0.5
+_STILL_SPEED = 0.5
 """Largest estimated vertical speed of a vehicle on the ground, m/s."""
-_LIFTED = 1.0
+_LIFTED_HEIGHT = 1.0
 """A climb by more than this since the take-off command means that the vehicle has lifted off, m."""
 _MAX_SPEED_AGE = 0.5
 """A vertical speed older than this is ignored, s."""
-_SETTLED = 0.5
+_LANDED_TIME = 0.5
 """The landed flag must be set for this long after a landing, s."""
 
 
 class GroundContact:
     """Compares the landed flag (EXTENDED_SYS_STATE) with height, vertical speed and sent commands.
 
-    One wrong "on ground" in flight must not stop the motors. While the flag says landed but height
-    or vertical speed contradict it, zero thrust counts as unsafe.
+    A wrong flag in flight must not stop the motors. So while height or vertical speed contradict
+    the flag, zero thrust counts as unsafe.
 
     Args:
         state: the vehicle's telemetry.
@@ -33,7 +33,7 @@ class GroundContact:
         self.takeoff_commanded = False
         self._state, self._clock = state, clock
         self._start_height: float | None = None
-        self._left = False
+        self._left_ground = False
         self._landed_since: float | None = None
 
     def command_takeoff(self) -> None:
@@ -43,7 +43,7 @@ class GroundContact:
 
     def note_flying(self) -> None:
         """Note that the vehicle already flies: this program did not command the take-off."""
-        self.takeoff_commanded = self._left = True
+        self.takeoff_commanded = self._left_ground = True
 
     def update(self) -> None:
         """Take the newest telemetry; the watch calls this at least 50 times a second."""
@@ -53,35 +53,38 @@ class GroundContact:
         elif self._landed_since is None:
             self._landed_since = self._clock()
         if self.takeoff_commanded and (state.flying or self._lifted()):
-            self._left = True
+            self._left_ground = True
 
     @property
     def may_idle(self) -> bool:
         """Whether zero thrust is safe: on the ground by all signs, and no take-off commanded."""
-        return self.standing and not self.takeoff_commanded and self._plausible()
+        return self.standing and not self.takeoff_commanded and self._plausibly_on_ground()
 
     @property
     def standing(self) -> bool:
-        """Whether the flag says landed, and the vehicle neither left the ground nor rises."""
-        rising = self.takeoff_commanded and self._vertical_speed() < -_STILL
-        return self._state.landed and not self._left and not rising
+        """Whether the flag says landed, and the vehicle has not lifted off.
+
+        After a take-off command it has lifted off as soon as it rises.
+        """
+        rising = self.takeoff_commanded and self._vertical_speed() < -_STILL_SPEED
+        return self._state.landed and not self._left_ground and not rising
 
     @property
     def touched_down(self) -> bool:
         """Whether the vehicle has landed: flag set for 0.5 s and small vertical speed."""
         since = self._landed_since
-        if not self._state.landed or since is None or self._clock() - since < _SETTLED:
+        if not self._state.landed or since is None or self._clock() - since < _LANDED_TIME:
             return False
-        return abs(self._vertical_speed()) < _STILL
+        return abs(self._vertical_speed()) < _STILL_SPEED
 
-    def _plausible(self) -> bool:
+    def _plausibly_on_ground(self) -> bool:
         height = self._state.height
         high = height is not None and abs(height) > GROUND_HEIGHT
-        return not high and abs(self._vertical_speed()) < _STILL
+        return not high and abs(self._vertical_speed()) < _STILL_SPEED
 
     def _lifted(self) -> bool:
         height, start = self._state.height, self._start_height
-        return height is not None and start is not None and height - start > _LIFTED
+        return height is not None and start is not None and height - start > _LIFTED_HEIGHT
 
     def _vertical_speed(self) -> float:
         """Vertical speed, positive down, m/s; 0 if it is no longer received."""

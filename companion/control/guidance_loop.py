@@ -23,7 +23,7 @@ from companion.guidance.source import Source
 from companion.recording.trace import FlightTrace
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
-_LEVEL = Target(0.0, 0.0, 0.0)
+_LEVEL_TARGET = Target(0.0, 0.0, 0.0)
 
 
 class GuidanceLoop:
@@ -206,7 +206,7 @@ class GuidanceLoop:
             self.learning.on_ground()
             self._loop.resets.forget()
             if may_idle:
-                self._loop.command = GuidanceCommand(_LEVEL, 0.0, now, idle=True)
+                self._loop.command = GuidanceCommand(_LEVEL_TARGET, 0.0, now, idle=True)
                 return None
         position = self._loop.resets.without_jumps(position)
         self.estimate.turn_to(self._loop.resets.turn)

@@ -19,7 +19,7 @@ class Hold:
         maker: makes the commands, and knows the motion of the vehicle.
         learning: learns the hover thrust, which limits the tilt at which the height is held.
         max_tilt: largest tilt in open loop, rad.
-        assumed: braking that the monitor of the fence assumes.
+        assumed: reaction and braking that the monitors of the fence assume.
 
     Attributes:
         max_tilt: largest tilt in open loop, rad; it may change in flight.
@@ -57,13 +57,15 @@ class Hold:
         self, now: float, motion: VehicleMotion, q: Quaternion, heading: float
     ) -> None:
         """Give up a source that steers by rates and hold, if the attitude `q` is tilted too far."""
-        name = self._flown.steers_by_rates(now, motion)
+        name = self._flown.source_commanding_rates(now, motion)
         if name is None:
             return
         tilt, most = tilt_angle(q[1], q[2]), self._largest_tilt()
         if tilt <= most:
             return
-        limit = "limits.max_tilt_deg" if most == self.max_tilt else "the thrust can hold"
+        limit = f"limits.max_tilt_deg = {degrees(most):.0f}"
+        if most < self.max_tilt:
+            limit = f"the {degrees(most):.0f}° up to which limits.max_thrust holds the height"
         self.given_up = f"{name} was given up at {degrees(tilt):.0f}° of tilt, more than {limit}"
         self.begin(now, heading)
 

@@ -10,11 +10,11 @@ from companion.guidance import ObserverSettings, Weights, chain_gains
 from companion.guidance.feedback import ChainGains
 from companion.guidance.position_correction import CorrectionSettings
 
-_CALM = Weights(position=1.0, velocity=1.5)
+_CALM_WEIGHTS = Weights(position=1.0, velocity=1.5)
 """Low weights of the hold between doublets, so that its commands do not disturb `identify`."""
-_USUAL_RATE_LOOP = 0.12
+_USUAL_RATE_LOOP_DELAY = 0.12
 """Lag plus dead time of a heavy vehicle's rate loop, assumed if none is identified, s."""
-_HOLD_RANGE = 0.065, 0.08
+_HOLD_LATENESS_RANGE = 0.065, 0.08
 """Range over which the hold changes from stiff to normal: dead time, plus half the lag, plus half
 the time in which the rate loop slews to the largest roll-pitch rate, s."""
 _SHORTEST_DELAY = 0.275
@@ -23,25 +23,25 @@ estimate so much that the autopilot's rate loop always slews, and the vehicle sw
 _SECOND_ORDER_SHARE = 0.2
 """Share of a lag of second order by which it counts as longer in the hold's delay. It keeps the
 margins of the hold that flew PX4's rate loop as if it were of first order."""
-_OBSERVER_RANGE = 0.035, 0.06
+_OBSERVER_LATENESS_RANGE = 0.035, 0.06
 """Range over which the observer changes from quick to normal: dead time plus half the lag, s."""
 _GAIN_RANGE = 5.0, 7.0
 """Range over which the observer changes from quick to normal: gain of the planner, 1/s."""
-_SHARPENING = 0.6
+_BANDWIDTH_INCREASE = 0.6
 """Relative increase of the observer's bandwidth with a quick rate loop."""
 _CALM_BANDWIDTH = 1.0
 """Bandwidth of the disturbance estimate while the vehicle is identified, rad/s."""
-_POSITION_TIME = 0.1
+_POSITION_TIME_CONSTANT = 0.1
 """Time constant with which the estimated position follows the measured one, s."""
 _POSITION_PULL = 4.0, 8.0
 """Gain from the position error to the observed velocity, with a slow and a quick rate loop, 1/s. It
 is needed because the velocities of PX4 and ArduPilot are off by 0.05 m/s for seconds (measured)."""
-_TRUSTED_PULL = 5.0
+_TRUSTED_PULL_INCREASE = 5.0
 """Increase of that gain with a quick rate loop and trusted positions, 1/s: recorded errors of both
 estimators then move the vehicle 5 to 25 % less."""
-_CORRECTS_WITHIN = 0.65
+_CORRECTION_TIME_CONSTANT = 0.65
 """Time constant of the position corrections of PX4's and ArduPilot's estimators (measured), s."""
-_CORRECTION_WINDOW = 0.1, 0.04
+_CORRECTION_FILTER_TIMES = 0.1, 0.04
 """Time constant of the two low-pass filters on the position correction in motion, with a normal and
 a quick observer, s."""
 _LARGEST_CORRECTION = 0.2
@@ -54,8 +54,8 @@ def hold_weights(config: Config) -> Weights:
     T is the delay of the attitude behind its target (`attitude_delay`), but at least 0.275 s.
 
     The weights 1/T⁴ and 1/T² place the three poles of the hold about 1/T from 0. A quick rate loop
-    allows twice the position weight. `tests/control/test_margins.py` checks the stability margins
-    against errors of T and of the thrust.
+    allows up to twice the position weight. `tests/control/test_margins.py` checks the stability
+    margins against errors of T and of the thrust.
     """
     guidance, delay = config.guidance, _hold_delay(config)
     position, velocity = guidance.position_weight_per_s4, guidance.velocity_weight_per_s2
@@ -66,18 +66,18 @@ def hold_weights(config: Config) -> Weights:
 
 
 def _quickness(late: float, quick_and_slow: tuple[float, float]) -> float:
-    """Interpolates: 1 for a rate loop that is at most `quick` s late, 0 from `slow` s on."""
+    """1 up to the first number of the range, 0 from the second on, linear between them."""
     quick, slow = quick_and_slow
     return min(max(0.0, (slow - late) / (slow - quick)), 1.0)
 
 
 def _hold_quickness(config: Config) -> float:
-    """1 if the rate loop allows a stiff hold, 0 if not.
+    """How stiff a hold the rate loop allows, from 0 (normal) to 1 (stiff).
 
     A rate loop that slews slowly is late only in large motions. After one, a stiff hold would
     oscillate without end, as on the ArduPilot mock at 200 °/s.
     """
-    return _quickness(_lateness(config) + slewing_delay(config), _HOLD_RANGE)
+    return _quickness(_lateness(config) + slewing_delay(config), _HOLD_LATENESS_RANGE)
 
 
 def slewing_delay(config: Config) -> float:
@@ -101,20 +101,20 @@ def _lateness(config: Config) -> float:
 
 
 def observer_quickness(config: Config) -> float:
-    """1 if rate loop and planner's gain allow a quick observer of the motion, 0 if not.
+    """How quick a motion observer rate loop and gain allow, from 0 (normal) to 1 (quick).
 
-    It is 0, too, if the bandwidth of the wind estimate is configured or the flight identifies.
+    It is 0 if the bandwidth of the wind estimate is configured or the flight identifies.
 
     A quick observer follows the corrected position, so errors of the autopilot's velocity matter
     less. Its commands are less calm: on a rate loop like PX4's, body rates in hover double.
     """
     if config.guidance.disturbance_bandwidth_rad_s is not None or flies_identify(config):
         return 0.0
-    return _quickness(_lateness(config), _OBSERVER_RANGE) * _gain_quickness(config)
+    return _quickness(_lateness(config), _OBSERVER_LATENESS_RANGE) * _gain_quickness(config)
 
 
 def _gain_quickness(config: Config) -> float:
-    """1 if the planner's gain is low enough for a quick observer, whose noise it multiplies.
+    """How quick an observer the planner's gain allows, 0..1: it multiplies the observer's noise.
 
     At 90 °/s the mock ArduPilot oscillated without end with a gain of 7.5 and a quick observer.
     """
@@ -123,22 +123,22 @@ def _gain_quickness(config: Config) -> float:
 
 def observer_settings(config: Config) -> ObserverSettings:
     """The settings of the motion observer."""
-    (slow, quick), quickness = _POSITION_PULL, _quickness(_lateness(config), _HOLD_RANGE)
+    (slow, quick), quickness = _POSITION_PULL, _quickness(_lateness(config), _HOLD_LATENESS_RANGE)
     return ObserverSettings(
         _CALM_BANDWIDTH if flies_identify(config) else disturbance_bandwidth(config),
-        _POSITION_TIME,
+        _POSITION_TIME_CONSTANT,
         slow + quickness * (quick - slow),
         config.guidance.max_disturbance_m_s2,
-        _SHARPENING * observer_quickness(config),
-        quickness * _TRUSTED_PULL,
+        _BANDWIDTH_INCREASE * observer_quickness(config),
+        quickness * _TRUSTED_PULL_INCREASE,
     )
 
 
 def correction_settings(config: Config) -> CorrectionSettings:
     """The settings of the position correction."""
-    slow, quick = _CORRECTION_WINDOW
+    slow, quick = _CORRECTION_FILTER_TIMES
     return CorrectionSettings(
-        _CORRECTS_WITHIN,
+        _CORRECTION_TIME_CONSTANT,
         slow + observer_quickness(config) * (quick - slow),
         _LARGEST_CORRECTION,
         config.guidance.position_lateness,
@@ -161,7 +161,7 @@ def attitude_delay(config: Config) -> float:
     delay = feedback_delay(config) + max(0.0, excess)
     if isfinite(tilt_damping(config)):
         delay += _SECOND_ORDER_SHARE * slower_tilt(config)[0]
-    return delay if config.vehicle.known else delay + _USUAL_RATE_LOOP
+    return delay if config.vehicle.known else delay + _USUAL_RATE_LOOP_DELAY
 
 
 def _hold_delay(config: Config) -> float:
@@ -180,7 +180,7 @@ def hold_gains(config: Config) -> ChainGains:
     Raises:
         ValueError: no positive and finite gains follow.
     """
-    weights = _CALM if flies_identify(config) else hold_weights(config)
+    weights = _CALM_WEIGHTS if flies_identify(config) else hold_weights(config)
     return chain_gains(weights, feedback_delay(config), drag_prior(config).drag.linear)
 
 

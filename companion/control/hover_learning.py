@@ -8,14 +8,14 @@ from companion.guidance import GRAVITY, HoverThrust
 from companion.guidance.reference import limited
 from companion.guidance.thrust import largest_tilt
 
-_CLEAR = 1.0
+_CLEAR_HEIGHT = 1.0
 """Height above home from which there is neither ground contact nor ground effect, m."""
 
-_THRUST_STALE = 0.3
+_MAX_THRUST_AGE = 0.3
 """Largest age of an ATTITUDE_TARGET that gives the present thrust, s; PX4 sends it at 10 Hz."""
 
-_MISMATCH = 0.15
-"""A larger relative error of the configured hover thrust is reported."""
+_MISMATCH_SHARE = 0.15
+"""Largest relative error of the configured hover thrust that is not reported."""
 
 
 class HoverLearning:
@@ -87,9 +87,9 @@ class HoverLearning:
             self._hover_thrust.pause()
 
     def mismatch_warning(self) -> str | None:
-        """Advice to change thrust.hover_thrust if the learned one differs from it; else None."""
+        """Advice to set thrust.hover_thrust, if the learned one differs by over 15 %; else None."""
         configured, learned = self._hover_thrust.configured, self._hover_thrust.learned
-        if not self._had_control or abs(learned - configured) <= _MISMATCH * configured:
+        if not self._had_control or abs(learned - configured) <= _MISMATCH_SHARE * configured:
             return None
         return (
             f"the vehicle hovers at a thrust of {learned:.2f}, but thrust.hover_thrust is "
@@ -99,9 +99,9 @@ class HoverLearning:
     def _note_autopilot_thrust(self, now: float, q: Quaternion) -> bool:
         """Note the autopilot's own thrust; False if it is unknown or the vehicle does not fly."""
         target, height = self._state.attitude_target_thrust, self._state.height
-        if target is None or now - target.received > _THRUST_STALE:
+        if target is None or now - target.received > _MAX_THRUST_AGE:
             return False
-        if not self._state.armed or height is None or height < _CLEAR:
+        if not self._state.armed or height is None or height < _CLEAR_HEIGHT:
             return False
         self._hover_thrust.sent(target.thrust, q)
         return True

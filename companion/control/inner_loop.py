@@ -7,18 +7,19 @@ from companion import plugins
 from companion.attitude import PLANNER_NAMES, Constants, Limits, Planner, Target, make_planner
 from companion.attitude.limits import make_constants
 from companion.attitude.planner import MODEL_FOLLOWING
+from companion.attitude.plugin_planner import PlannerFaultError, PluginPlanner
 from companion.attitude.reference_model import model_lag, model_response
 from companion.attitude.types import AttitudeError
-from companion.attitude.within_limits import PlannerFaultError, WithinLimits
 from companion.config import Config
 from companion.config.known_drag import drag_prior
 from companion.files.yaml_file import ConfigError
 from companion.guidance import GRAVITY, HoverThrust, InnerResponse, ThrustSettings
 
-_QUESTION = (1.0, 0.0, 0.0, 0.0), Target(0.1, 0.1, 0.0), 0.004
-"""What a planner of another package is asked before it may fly: a step to 8° of tilt from level."""
+_TRIAL_INPUT = (1.0, 0.0, 0.0, 0.0), Target(0.1, 0.1, 0.0), 0.004
+"""Attitude, target and period with which the planner of another package is tried before it may fly:
+a step from level to 8° of tilt."""
 
-LARGEST_PRODUCT = 0.45
+LARGEST_GAIN_TIMES_DELAY = 0.45
 """Largest sensible gain · (lag + dead time); above it, the response overshoots."""
 
 
@@ -26,7 +27,7 @@ def planner(config: Config) -> Planner:
     """The configured planner with its limits; `model-following` gets the vehicle's response too.
 
     Raises:
-        ConfigError: the planner of another package cannot be loaded, made or asked.
+        ConfigError: the planner of another package cannot be loaded or made, or fails a trial.
     """
     name, limits = config.planner_name, rate_limits(config)
 
@@ -42,14 +43,14 @@ def planner(config: Config) -> Planner:
 
     if name in PLANNER_NAMES:
         return made(name)
-    law = plugin(plugins.PLANNERS, name)
+    law = plugin("planner.name", plugins.PLANNERS, name)
     try:
-        # A planner may remember what it was asked, so the one that flies is another.
-        asked, flown = (WithinLimits(made(law), limits) for _ in range(2))
+        # A planner may remember the trial, so the one that flies is another.
+        tried, flown = (PluginPlanner(made(law), limits) for _ in range(2))
     except Exception as error:
         raise ConfigError(f"planner.name: {name} cannot be made: {error!r}") from error
     try:
-        asked.rates(*_QUESTION)
+        tried.rates(*_TRIAL_INPUT)
     except (AttitudeError, PlannerFaultError) as error:
         raise ConfigError(
             f"planner.name: {name} cannot be flown: {error}; "
@@ -66,8 +67,8 @@ def law_constants(config: Config) -> Constants:
     )
 
 
-def plugin(group: str, name: str) -> Any:
-    """The class or function of another package that makes a planner or guidance.
+def plugin(key: str, group: str, name: str) -> Any:
+    """The class or function of another package that the configuration names in `key`.
 
     Raises:
         ConfigError: it is not installed or cannot be loaded.
@@ -75,7 +76,7 @@ def plugin(group: str, name: str) -> Any:
     try:
         return plugins.load(group, name)
     except plugins.PluginError as error:
-        raise ConfigError(str(error)) from error
+        raise ConfigError(f"{key}: {error}") from error
 
 
 def rate_limits(config: Config) -> Limits:
@@ -115,7 +116,7 @@ def thrust_limits(config: Config) -> tuple[float, float]:
 
 
 def tilt_response(config: Config) -> InnerResponse:
-    """Response of the coefficients to their targets: planner and rate loop together."""
+    """Response of the acceleration coefficients to their targets: planner and rate loop."""
     gain, (lag, dead_time) = config.planner.gain_per_s, slower_tilt(config)
     follows = config.planner_name == MODEL_FOLLOWING
     if follows:
@@ -146,7 +147,7 @@ def tilt_damping(config: Config) -> float:
 def sensible_gain(config: Config) -> float:
     """Largest sensible gain of the planner, 1/s; infinite if the rate loop is not identified."""
     delay = sum(slower_tilt(config))
-    return LARGEST_PRODUCT / delay if config.vehicle.known and delay > 0.0 else inf
+    return LARGEST_GAIN_TIMES_DELAY / delay if config.vehicle.known and delay > 0.0 else inf
 
 
 def heading_response(config: Config) -> InnerResponse:

@@ -29,7 +29,7 @@ class Unanswered(Enum):
     @property
     def words(self) -> str:
         """The reason in words, for messages."""
-        return _WORDS[self]
+        return _REASON_WORDS[self]
 
     @property
     def is_refusal(self) -> bool:
@@ -41,12 +41,12 @@ class Unanswered(Enum):
         return self in _REFUSALS
 
 
-_WORDS = {
+_REASON_WORDS = {
     Unanswered.ANOTHER_VEHICLE: "this may be another vehicle than the one that was checked",
     Unanswered.NOT_NEWER: "the vehicle's clock stands still: new attitude samples carry no later "
     "time stamp",
     Unanswered.AHEAD: "attitude is stamped far ahead of the vehicle's clock",
-    Unanswered.LATE: "attitude arrives later than deadman.telemetry_stale_ms",
+    Unanswered.LATE: "attitude arrives, but older than deadman.telemetry_stale_ms",
     Unanswered.NO_TARGET: "guidance makes no commands",
     Unanswered.OLD_TARGET: "guidance makes no commands any more",
     Unanswered.AWAITING_MODE: "after a gap in telemetry the autopilot did not confirm offboard",

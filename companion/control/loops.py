@@ -39,7 +39,8 @@ def make_loops(
         ConfigError: a planner or guidance of another package cannot be loaded or made.
     """
     thrust = hover_thrust(config)
-    limits, deadlines = rate_limits(config), _deadlines(config)
+    limits, deadman = rate_limits(config), config.deadman
+    deadlines = Deadlines(deadman.telemetry_stale, deadman.target_stale, deadman.deadline)
     loop = ControlLoop(planner(config), thrust, send, deadlines, trace, limits, clock, clock_ns)
     guidance_loop = GuidanceLoop(
         loop,
@@ -52,17 +53,8 @@ def make_loops(
         max_tilt=config.limits.max_tilt,
         assumed_braking=AssumedBraking(config.safety.reaction_s, config.safety.braking_m_s2),
         period=1.0 / config.guidance.rate_hz,
-        position_stale=config.deadman.position_stale,
+        position_stale=deadman.position_stale,
         clock=clock,
         vehicle_clock=vehicle_clock,
     )
     return loop, guidance_loop
-
-
-def _deadlines(config: Config) -> Deadlines:
-    deadman = config.deadman
-    return Deadlines(
-        telemetry_stale=deadman.telemetry_stale,
-        target_stale=deadman.target_stale,
-        deadline=deadman.deadline,
-    )

@@ -21,12 +21,12 @@ from companion.guidance.reference import Horizontal
 from companion.nmpc import Vehicle
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
-_LEAST_COSINE = 0.2
+_LEAST_COS_TILT = 0.2
 """Lower limit of the cosine of the tilt (78°), so that the slope of the thrust stays bounded."""
-_LONGEST = 0.2
-"""Longest time between two positions from which an acceleration is computed, s."""
-_MISMATCH = 0.15
-"""A larger error of the assumed drag is reported, 1/s."""
+_LONGEST_POSITION_GAP = 0.2
+"""Two positions farther apart in time than this give no acceleration, s."""
+_DRAG_MISMATCH = 0.15
+"""Largest error of the assumed drag that is not reported, 1/s."""
 
 
 class MotionEstimate:
@@ -40,7 +40,7 @@ class MotionEstimate:
             gives the age of a position.
 
     Attributes:
-        vertical: upward part of the commanded specific thrust, m/s².
+        vertical_thrust: upward part of the commanded specific thrust, m/s².
         drag: the drag estimate.
     """
 
@@ -51,7 +51,7 @@ class MotionEstimate:
         drag: DragEstimate,
         offset: Callable[[], float | None] = lambda: None,
     ) -> None:
-        self.vertical = GRAVITY
+        self.vertical_thrust = GRAVITY
         self._observer = observer
         self._correction = correction
         self.drag = drag
@@ -80,11 +80,11 @@ class MotionEstimate:
         self._correction.retune(correction)
 
     def note_attitude(self, sample: AttitudeSample) -> None:
-        """Take an attitude, which gives the direction of the thrust."""
+        """Take a measured attitude, which gives the direction of the thrust."""
         self._q, self._body_rates = sample.q, sample.body_rates
         self._heading = 2.0 * atan2(sample.q[3], sample.q[0])
         square, ax, ay = tilt_products(*sample.q)
-        cosine = max(2.0 * square - 1.0, _LEAST_COSINE)
+        cosine = max(2.0 * square - 1.0, _LEAST_COS_TILT)
         self._slopes.add(sample.vehicle_time, (-2.0 * ay / cosine, 2.0 * ax / cosine))
 
     def turn_to(self, turn: float) -> None:
@@ -141,7 +141,7 @@ class MotionEstimate:
         slope = self._slopes.mean(self._position.vehicle_time, time + ahead)
         later = self._observer.at(time + ahead, self._modelled_acceleration(slope, motion)) or still
         north, east = self._slopes.newest
-        thrust = self.vertical * north, self.vertical * east
+        thrust = self.vertical_thrust * north, self.vertical_thrust * east
         disturbance, drag = self._observer.disturbance, self.drag.drag
         return GuidanceInput(
             motion, later, thrust, disturbance, drag, thrust_limits, self._axis_drag
@@ -178,7 +178,7 @@ class MotionEstimate:
         """Advice to change the drag keys if the learned drag differs from them; else None."""
         assumed, learned, speed = self.drag.prior_drag, self.drag.drag, self.drag.top_speed
         error = learned.per_velocity(speed) - assumed.per_velocity(speed)
-        if not self.drag.certain or abs(error) <= _MISMATCH:
+        if not self.drag.certain or abs(error) <= _DRAG_MISMATCH:
             return None
         return (
             f"the vehicle's drag at {speed:.1f} m/s is {learned.per_velocity(speed):.2f} 1/s, but "
@@ -188,16 +188,16 @@ class MotionEstimate:
 
     def _learn_drag(self, before: LocalPosition, now: LocalPosition, slope: Horizontal) -> None:
         dt = now.vehicle_time - before.vehicle_time
-        if not 0.0 < dt < _LONGEST:
+        if not 0.0 < dt < _LONGEST_POSITION_GAP:
             return
         old, new = before.velocity_ned, now.velocity_ned
         north, east, down = ((b - a) / dt for a, b in zip(old, new, strict=True))
         # The measured acceleration gives the actual thrust, which differs from the commanded one.
-        vertical = GRAVITY - down
+        vertical_thrust = GRAVITY - down
         self.drag.observe(
             dt,
             (0.5 * (old[0] + new[0]), 0.5 * (old[1] + new[1]), 0.5 * (old[2] + new[2])),
-            (north - vertical * slope[0], east - vertical * slope[1]),
+            (north - vertical_thrust * slope[0], east - vertical_thrust * slope[1]),
             self._heading,
         )
 
@@ -207,6 +207,6 @@ class MotionEstimate:
         slowed = self.drag.drag.deceleration(motion.velocity_ned)
         more_north, more_east = self._axis_drag.deceleration(north, east)
         return (
-            self.vertical * slope[0] - slowed[0] - more_north,
-            self.vertical * slope[1] - slowed[1] - more_east,
+            self.vertical_thrust * slope[0] - slowed[0] - more_north,
+            self.vertical_thrust * slope[1] - slowed[1] - more_east,
         )

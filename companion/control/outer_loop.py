@@ -47,7 +47,7 @@ def make_guidance(config: Config) -> Guidance:
     settings, kind = linear_settings(config), config.guidance.kind
     if kind in GUIDANCE_NAMES:
         return LinearGuidance(settings)
-    factory = plugin(plugins.GUIDANCE, kind)
+    factory = plugin("guidance.kind", plugins.GUIDANCE, kind)
     try:
         made: Guidance = factory(settings)
     except Exception as error:
@@ -84,11 +84,11 @@ def linear_settings(config: Config) -> LinearSettings:
 def motion_estimate(
     config: Config, offset: Callable[[], float | None] = lambda: None
 ) -> MotionEstimate:
-    """The motion observer with the drag for the feedforward.
+    """The motion estimate with its observer, position correction and drag estimate.
 
     Args:
         config: configuration of the flight.
-        offset: returns vehicle time minus event-loop time, s, or None.
+        offset: returns vehicle time minus event-loop time, s; None: not known yet.
     """
     return MotionEstimate(
         MotionObserver(observer_settings(config)),
@@ -102,7 +102,7 @@ def predictive(config: Config, part: Follow, note: Callable[[str], None]) -> Pre
     """Predictive control of one trajectory; starts its process.
 
     Raises:
-        ConfigError: the planner's response is too fast for the steps of the horizon.
+        ConfigError: see `predictive_settings`.
         MissingExtraError: the solver is not installed.
     """
     settings = predictive_settings(config)

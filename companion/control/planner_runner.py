@@ -20,7 +20,7 @@ from companion.control.guidance_command import GuidanceCommand
 from companion.control.step_frame import StepFrame
 from companion.vehicle.records import AttitudeSample, AttitudeTarget
 
-_LONGEST_STEP = 0.1
+_LONGEST_PERIOD = 0.1
 """Longest period that a planner integrates over, s; after a longer one it is reset."""
 
 
@@ -51,9 +51,9 @@ class PlannerRunner:
         self._frame = StepFrame()
         self._planned_at = -inf
         self._period = 0.0
-        self._noted: AttitudeTarget | None = None
-        self._told: AttitudeTarget | None = None
-        self._turn, self._turned_ms = 0.0, -1
+        self._passed_target: AttitudeTarget | None = None
+        self._reported_target: AttitudeTarget | None = None
+        self._turn, self._turned_at_ms = 0.0, -1
 
     def retune(self, constants: Constants, limits: Limits) -> None:
         """Use other gains and limits from the next sample on.
@@ -109,21 +109,21 @@ class PlannerRunner:
         """
         period = sample.vehicle_time - self._planned_at
         # Over a gap the body rates are not known, so the frame does not follow the estimator.
-        stepping = is_step and period <= _LONGEST_STEP
+        stepping = is_step and period <= _LONGEST_PERIOD
         self._frame.advance(self._resets.corrections, min(abs(period), 10.0), stepping=stepping)
         q = self.attitude(sample.q)
         if not is_step:
             target = self._frame.target(target)
-        if period > _LONGEST_STEP:
+        if period > _LONGEST_PERIOD:
             self._planner.reset(q, sample.body_rates)
             # A gap is not the period of the samples, so an earlier period is used.
-            period = self._period or min(arrival_period, _LONGEST_STEP)
+            period = self._period or min(arrival_period, _LONGEST_PERIOD)
         self._period = period
         self._planned_at = sample.vehicle_time
         self._note_attitude_target(sample)
         self.asked = q, target
         rates = self._planner.rates(q, target, period, sample.body_rates)
-        return rates if self._noted is None else self._frame.rates(q, rates)
+        return rates if self._passed_target is None else self._frame.rates(q, rates)
 
     def _note_attitude_target(self, sample: AttitudeSample) -> None:
         """Pass a new ATTITUDE_TARGET to the planner once a sample is at least as new.
@@ -131,14 +131,14 @@ class PlannerRunner:
         One from before a heading reset is ignored, because its frame is not known.
         """
         if self._resets.turn != self._turn:
-            self._turn, self._turned_ms = self._resets.turn, sample.time_boot_ms
+            self._turn, self._turned_at_ms = self._resets.turn, sample.time_boot_ms
         target = self.attitude_target()
-        if target is None or target is self._noted:
+        if target is None or target is self._passed_target:
             return
-        if target is not self._told and self.on_attitude_target is not None:
-            self._told = target
+        if target is not self._reported_target and self.on_attitude_target is not None:
+            self._reported_target = target
             self.on_attitude_target(target)
-        if self._turned_ms < target.time_boot_ms <= sample.time_boot_ms:
-            self._noted = target
+        if self._turned_at_ms < target.time_boot_ms <= sample.time_boot_ms:
+            self._passed_target = target
             age = 1e-3 * (sample.time_boot_ms - target.time_boot_ms)
             self._planner.note_attitude_target(self.attitude(target.q), age)

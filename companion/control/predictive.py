@@ -13,9 +13,9 @@ from companion.guidance import GRAVITY, LinearCommand, Pose
 from companion.guidance.follow import Follow
 from companion.nmpc import Answer, Input, Request, Solver, Start, Trouble, Vehicle
 
-_LONGEST_START = 30.0
+_LONGEST_SOLVER_START = 30.0
 """In lockstep, longest wait for the solver to start, s of wall time."""
-_LONGEST_WAIT = 1.0
+_LONGEST_ANSWER_WAIT = 1.0
 """In lockstep, longest wait for an answer, s of wall time."""
 
 
@@ -113,12 +113,13 @@ class Predictive:
         """Take the solver's answer for this step, else `linear`, and request the next answer.
 
         Args:
-            linear: target and downward acceleration (m/s²) of linear guidance.
+            linear: target, in the estimator's frame, and downward acceleration (m/s²) of linear
+                guidance.
             vehicle: present state of the vehicle.
             following: the trajectory that is followed, or None.
 
         Returns:
-            Target and downward acceleration (m/s²) to fly.
+            Target and downward acceleration (m/s²) to fly, likewise.
         """
         chosen = linear
         if following is not None:
@@ -135,7 +136,7 @@ class Predictive:
     def _answer(self, now: float) -> Answer | None:
         if self._lockstep:
             self._wait_until_ready()
-        answer = self._solver.take(_LONGEST_WAIT if self._lockstep else 0.0)
+        answer = self._solver.take(_LONGEST_ANSWER_WAIT if self._lockstep else 0.0)
         # The answer may be for an earlier step, if guidance has missed steps.
         if answer is None or abs(answer.time - now) > self._period:
             return None
@@ -158,7 +159,7 @@ class Predictive:
         self._inputs.append(Input(now, target.north, target.east, target.heading, thrust))
 
     def _wait_until_ready(self) -> None:
-        until = monotonic() + _LONGEST_START
+        until = monotonic() + _LONGEST_SOLVER_START
         while self._solver.alive and not self._solver.ready and monotonic() < until:
             sleep(0.01)
 

@@ -1,25 +1,25 @@
-"""How late the body rates of telemetry are against the attitude beside them.
+"""How far the body rates in telemetry lag behind the attitude in the same message.
 
-Autopilots send body rates behind the low pass of their gyro, and an attitude that they integrate
-from the gyro before it. Measured: PX4 5 ms, ArduPilot 11 ms. At 400°/s such rates explain the
-turn of the heading in a corner only within 0.5°.
+Autopilots send body rates after a low-pass filter, but integrate the attitude from the unfiltered
+gyro. Measured lags: PX4 5 ms, ArduPilot 11 ms. With them, rates of 400°/s explain the turn of the
+heading in a corner only within 0.5°.
 """
 
 from companion.attitude import Quaternion
 from companion.attitude.rotation import body_error, clamp
 from companion.guidance.reference import Vector
 
-_LONGEST = 0.03
-"""Largest lag that is believed, s; a low pass of 20 Hz has 11 ms."""
-_HALF_BELIEVED = 0.01
-"""Sum of squared changes of the rates, rad²/s², by which half of a lag is believed."""
+_LARGEST_LAG = 0.03
+"""Largest lag that is learned, s; a low pass of 20 Hz has 11 ms."""
+_HALF_LEARNED_SQUARES = 0.01
+"""Sum of squared rate changes, rad²/s², after which half of the lag is learned."""
 
 
 class RateLag:
     """Learns the lag from the rotations that the mean of two body rates does not explain.
 
-    Rates that are late by a lag miss this lag times their change. Only roll and pitch count:
-    corrections of the heading are no rotations of the body.
+    Such a rotation is the lag times the change of the rates. Only roll and pitch count, because the
+    estimator's corrections of the heading are no rotations of the body.
 
     All rotations count alike, so a lag that changes in flight, as when the autopilot's filter is
     switched, is followed slowly. That matters little: 11 ms more after one maneuver of corners
@@ -33,7 +33,7 @@ class RateLag:
     def __init__(self) -> None:
         self.seconds = 0.0
         self._products = 0.0
-        self._squares = _HALF_BELIEVED
+        self._squares = _HALF_LEARNED_SQUARES
 
     def mean(self, before: Vector, now: Vector, dt: float) -> Vector:
         """The mean body rates between two samples `dt` s apart, corrected for the lag, rad/s."""
@@ -60,4 +60,4 @@ class RateLag:
         square = p * p + q * q
         self._products += 2.0 * (x * p + y * q) + self.seconds * square
         self._squares += square
-        self.seconds = clamp(self._products / self._squares, _LONGEST)
+        self.seconds = clamp(self._products / self._squares, _LARGEST_LAG)

@@ -93,7 +93,7 @@ class Retuning:
 
 
 def fixed_because(config: Config) -> str | None:
-    """Why this configuration permits no change in flight, as a sentence; None: it does."""
+    """Why this configuration permits no changes in flight, as a sentence; None: it permits them."""
     if config.guidance.kind != LINEAR:
         return f"guidance.kind {config.guidance.kind} keeps the values with which the flight began"
     if config.planner_name not in PLANNER_NAMES:
@@ -101,7 +101,7 @@ def fixed_because(config: Config) -> str | None:
     return None
 
 
-def between(before: Config, after: Config, share: float) -> Config:
+def interpolated(before: Config, after: Config, share: float) -> Config:
     """A configuration between two others; only keys that differ are interpolated.
 
     Positive values are interpolated geometrically, others linearly. A value that is null is

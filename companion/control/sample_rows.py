@@ -18,12 +18,13 @@ from companion.recording.mcap_file.writer import McapWriter
 from companion.vehicle.clock_jumps import Misfit
 from companion.vehicle.records import AttitudeSample, AttitudeTarget
 
-_CODES: dict[Unanswered | None, int] = {None: 0}
-_CODES.update({reason: number for number, reason in enumerate(Unanswered, start=2)})
+_REASON_CODES: dict[Unanswered | None, int] = {None: 0}
+_REASON_CODES.update({reason: number for number, reason in enumerate(Unanswered, start=2)})
 CONTROL_OFF = 1
 """Code of a sample that came while the loop was off."""
-_MISFITS = {None: 0, Misfit.NOT_NEWER: 1, Misfit.AHEAD: 2}
-_AT_LIMIT = 1.0 - 1e-9
+_MISFIT_CODES = {None: 0, Misfit.NOT_NEWER: 1, Misfit.AHEAD: 2}
+_LIMIT_REACHED_SHARE = 1.0 - 1e-9
+"""From this share of a limit on, a body rate counts as limited."""
 _NO_TARGET = Target(nan, nan, nan, nan)
 
 
@@ -89,14 +90,14 @@ class SampleRows:
     """
 
     def __init__(self, limits: Limits, thrust_limits: tuple[float, float]) -> None:
-        self._tilt_rate = _AT_LIMIT * limits.tilt_rate
-        self._yaw_rate = _AT_LIMIT * limits.yaw_rate
+        self._tilt_rate = _LIMIT_REACHED_SHARE * limits.tilt_rate
+        self._yaw_rate = _LIMIT_REACHED_SHARE * limits.yaw_rate
         self._thrust_limits = thrust_limits
 
     def sample(self, writer: McapWriter, time_ns: int, entry: SampleEntry) -> None:
         """Write a sample, and the setpoint that answers it."""
         sample, reason, flags, checked_at, answer = entry
-        code = _CODES[reason] if flags.on else CONTROL_OFF
+        code = _REASON_CODES[reason] if flags.on else CONTROL_OFF
         data = SAMPLE.packing.pack(
             CDR,
             sample.received,
@@ -107,7 +108,7 @@ class SampleRows:
             *sample.body_rates,
             checked_at,
             code,
-            _MISFITS[sample.misfit],
+            _MISFIT_CODES[sample.misfit],
             sample.age_known,
             *flags,
         )

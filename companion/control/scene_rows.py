@@ -25,7 +25,7 @@ from companion.recording.mcap_file.scene import (
 from companion.recording.mcap_file.writer import McapWriter
 
 _HALF_ROOT = sqrt(0.5)
-_MOST_POINTS = 100
+_MAX_PATH_POINTS = 100
 """Number of points in a path: 20 s with guidance at 50 Hz."""
 _POINT_EACH, _PATHS_EACH, _BODY_EACH = 2, 5, 10
 """With guidance at 50 Hz the thrust is drawn every 0.1 s. Every second drawing adds a point to the
@@ -39,30 +39,30 @@ _METRES_PER_M_S2 = 0.1
 """Length of a thrust arrow, m per m/s²."""
 _LEAST_COS = 0.2
 """Smallest cosine of the tilt for the length of an arrow."""
-_GREY: Color = (0.25, 0.25, 0.28, 1.0)
-_FRONT: Color = (0.85, 0.35, 0.1, 0.8)
-_BACK: Color = (0.3, 0.3, 0.35, 0.8)
-_THRUST: Color = (0.1, 0.7, 0.3, 1.0)
+_GREY_COLOR: Color = (0.25, 0.25, 0.28, 1.0)
+_FRONT_COLOR: Color = (0.85, 0.35, 0.1, 0.8)
+_BACK_COLOR: Color = (0.3, 0.3, 0.35, 0.8)
+_THRUST_COLOR: Color = (0.1, 0.7, 0.3, 1.0)
 _COMMANDED_THRUST_COLOR: Color = (0.85, 0.2, 0.75, 0.7)
-_FLOWN: Color = (0.1, 0.5, 0.95, 1.0)
-_REFERENCE: Color = (0.95, 0.65, 0.1, 1.0)
-_ARM = 0.18
+_FLOWN_COLOR: Color = (0.1, 0.5, 0.95, 1.0)
+_REFERENCE_COLOR: Color = (0.95, 0.65, 0.1, 1.0)
+_ROTOR_DISTANCE = 0.18
 """Distance of a rotor from the axes of the body, m."""
 
 _ROTORS = tuple(
     Cylinder(
-        (x * _ARM, y * _ARM, 0.05, 0.0, 0.0, 0.0, 1.0),
+        (x * _ROTOR_DISTANCE, y * _ROTOR_DISTANCE, 0.05, 0.0, 0.0, 0.0, 1.0),
         (0.22, 0.22, 0.02),
-        _FRONT if x > 0 else _BACK,
+        _FRONT_COLOR if x > 0 else _BACK_COLOR,
     )
     for x in (1, -1)
     for y in (1, -1)
 )
-_BODY = Entity(
+_BODY_ENTITY = Entity(
     "body",
     "vehicle",
     follows=True,
-    cubes=(Cube((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0), (0.3, 0.16, 0.08), _GREY),),
+    cubes=(Cube((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0), (0.3, 0.16, 0.08), _GREY_COLOR),),
     cylinders=_ROTORS,
 )
 
@@ -72,11 +72,11 @@ class SceneRows:
 
     def __init__(self) -> None:
         self._command: GuidanceCommand | None = None
-        self._flown: deque[Vector] = deque(maxlen=_MOST_POINTS)
-        self._reference: deque[Vector] = deque(maxlen=_MOST_POINTS)
+        self._flown: deque[Vector] = deque(maxlen=_MAX_PATH_POINTS)
+        self._reference: deque[Vector] = deque(maxlen=_MAX_PATH_POINTS)
         self._count = self._newest_ns = 0
 
-    def commanded(self, command: GuidanceCommand) -> None:
+    def note_command(self, command: GuidanceCommand) -> None:
         """Take a new command from guidance."""
         self._command = command
 
@@ -93,7 +93,7 @@ class SceneRows:
             reference: position of the reference, m ENU.
         """
         thrust = Entity("thrust", "vehicle", follows=True, arrows=self._arrows(q))
-        scene = (thrust,) if self._count % _BODY_EACH else (_BODY, thrust)
+        scene = (thrust,) if self._count % _BODY_EACH else (_BODY_ENTITY, thrust)
         writer.message("/scene", time_ns, scene_message(time_ns, scene))
         if time_ns - self._newest_ns > _GAP_NS:
             self._flown.clear()
@@ -104,7 +104,7 @@ class SceneRows:
             self._reference.append(reference)
         self._count += 1
         if self._count % _PATHS_EACH == 0:
-            lines = (Line(self._reference, _REFERENCE), Line(self._flown, _FLOWN))
+            lines = (Line(self._reference, _REFERENCE_COLOR), Line(self._flown, _FLOWN_COLOR))
             paths = (Entity("paths", "world", lines=lines),)
             writer.message("/paths", time_ns, scene_message(time_ns, paths))
 
@@ -114,7 +114,7 @@ class SceneRows:
         if command is None or command.idle:
             return ()
         lift = GRAVITY - (command.acceleration_down if command.thrust is None else 0.0)
-        arrows = [_arrow(q, q, lift, _THRUST)]
+        arrows = [_arrow(q, q, lift, _THRUST_COLOR)]
         wanted = _wanted_attitude(command)
         if wanted is not None:
             arrows.append(_arrow(q, wanted, lift, _COMMANDED_THRUST_COLOR))
@@ -129,10 +129,10 @@ def _wanted_attitude(command: GuidanceCommand) -> Quaternion | None:
     return attitude_of(north, east, 0.0)
 
 
-def _up(turn: Quaternion) -> Pose:
-    """Pose, in the frame of the body, of an arrow along the thrust after a turn of the body (FRD).
+def _thrust_arrow_pose(turn: Quaternion) -> Pose:
+    """Pose (FLU) of an arrow along the thrust axis of a body that is turned by `turn` (FRD).
 
-    It is the turn in FLU ⊗ (√½, 0, −√½, 0), which turns x upwards.
+    Its rotation is the turn in FLU ⊗ (√½, 0, −√½, 0), which turns x upwards.
     """
     w, x, y, z = turn
     return (
@@ -154,4 +154,4 @@ def _arrow(q: Quaternion, goal: Quaternion, lift: float, color: Color) -> Arrow:
     cosine = max(cos_tilt(goal[1], goal[2]), _LEAST_COS)
     length = max(_METRES_PER_M_S2 * lift / cosine, 0.01)
     head = min(0.15, 0.4 * length)
-    return Arrow(_up(body_error(q, goal)), length - head, 0.03, head, 0.07, color)
+    return Arrow(_thrust_arrow_pose(body_error(q, goal)), length - head, 0.03, head, 0.07, color)

@@ -1,16 +1,16 @@
 """Moves the values of the loops from one configuration to another in small steps."""
 
 from companion.config import Config
-from companion.control.retuning import Tuning, between, tuning
+from companion.control.retuning import Tuning, interpolated, tuning
 
-SLEW = 0.7
+SLEW_TIME = 0.7
 """Time over which a change takes effect, s."""
-_PERIOD = 0.035
+_SHORTEST_STEP = 0.035
 """Shortest time between two steps of a change, s, because each step computes the gains again."""
 
 
 class Slew:
-    """Interpolates from the present configuration to the wanted one. Times are s on one clock.
+    """Interpolates from the present configuration to the wanted one; times are in s on one clock.
 
     Attributes:
         settled: the newest configuration that was fully in effect.
@@ -20,22 +20,22 @@ class Slew:
     """
 
     def __init__(self, config: Config) -> None:
-        self._now = self._from = self._wanted = self.settled = config
-        self._began: float | None = None
-        self._stepped = 0.0
+        self._present = self._start = self._wanted = self.settled = config
+        self._began_at: float | None = None
+        self._stepped_at = 0.0
 
     def jump(self, wanted: Config) -> None:
         """Take the wanted values at once, while no loop flies or before one begins."""
-        self._now = self._wanted = self.settled = wanted
-        self._began = None
+        self._present = self._wanted = self.settled = wanted
+        self._began_at = None
 
     def begin(self, wanted: Config, now: float) -> None:
         """Begin to move from the present values to the wanted ones."""
-        self._from, self._wanted, self._began = self._now, wanted, now
+        self._start, self._wanted, self._began_at = self._present, wanted, now
 
     def stop(self) -> None:
         """Stay at the present values."""
-        self._began = None
+        self._began_at = None
 
     def step(self, now: float) -> Tuning | None:
         """The values to use from now on; None: no change.
@@ -43,12 +43,12 @@ class Slew:
         Raises:
             ValueError: gains cannot be computed from the new values.
         """
-        if self._began is None or now - self._stepped < _PERIOD:
+        if self._began_at is None or now - self._stepped_at < _SHORTEST_STEP:
             return None
-        self._stepped = now
-        share = (now - self._began) / SLEW
-        self._now = between(self._from, self._wanted, share)
-        values = tuning(self._now)
+        self._stepped_at = now
+        share = (now - self._began_at) / SLEW_TIME
+        self._present = interpolated(self._start, self._wanted, share)
+        values = tuning(self._present)
         if share >= 1.0:
-            self._began, self.settled = None, self._wanted
+            self._began_at, self.settled = None, self._wanted
         return values

@@ -21,7 +21,7 @@ from companion.attitude.reference import first_order_step
 from companion.attitude.rotation import clamp, down_in_body, turned_about_vertical
 from companion.guidance.reference import rotated
 
-_LARGEST = radians(3.0)
+_LARGEST_TURN = radians(3.0)
 """Largest turn of the frame, rad: it limits what a wrong gyro can do."""
 _DECAY_S = 2.0
 """Time constant with which the turn decays after the steps, s."""
@@ -39,7 +39,7 @@ class StepFrame:
 
     def __init__(self) -> None:
         self.turn = self.turn_rate = 0.0
-        self._zero = 0.0
+        self._corrections_at_zero = 0.0  # `corrections` at which the turn is 0
 
     def advance(self, corrections: float, dt: float, *, stepping: bool) -> None:
         """Follow the estimator's corrections during steps; let the turn decay otherwise.
@@ -51,10 +51,10 @@ class StepFrame:
         """
         before = self.turn
         if stepping:
-            self.turn = clamp(corrections - self._zero, _LARGEST)
+            self.turn = clamp(corrections - self._corrections_at_zero, _LARGEST_TURN)
         else:
             self.turn *= exp(-dt / _DECAY_S)
-            self._zero = corrections - self.turn
+            self._corrections_at_zero = corrections - self.turn
         if dt > 0.0:
             turning = (self.turn - before) / dt
             _, self.turn_rate = first_order_step(self.turn_rate, turning, _FOLLOWING_S, dt)

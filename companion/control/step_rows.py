@@ -108,14 +108,14 @@ class StepRows:
     def step(self, writer: McapWriter, time_ns: int, entry: StepEntry) -> None:
         """Write the inputs, the result and the command of a step."""
         read, made, command = entry
-        writer.message("/guidance_input", time_ns, INPUT.packing.pack(CDR, *_input(read)))
+        writer.message("/guidance_input", time_ns, INPUT.packing.pack(CDR, *_input_row(read)))
         if command is not None:
-            data = TARGET.packing.pack(CDR, *_target(command))
+            data = TARGET.packing.pack(CDR, *_target_row(command))
             writer.message("/target", time_ns, data)
-            self._scene.commanded(command)
+            self._scene.note_command(command)
         if made is not None:
             data = GUIDANCE.packing.pack(
-                CDR, read.time, *_guidance(made), read.flags.offboard_active
+                CDR, read.time, *_guidance_row(made), read.flags.offboard_active
             )
             writer.message("/guidance", time_ns, data)
             self._count += 1
@@ -135,7 +135,7 @@ class StepRows:
         writer.message("/reference", time_ns, self._pose.message(time_ns, there))
 
 
-def _input(read: StepInput) -> tuple[float, ...]:
+def _input_row(read: StepInput) -> tuple[float, ...]:
     position, battery, thrust = read.position, read.battery, read.autopilot_thrust
     return (
         read.time,
@@ -149,25 +149,25 @@ def _input(read: StepInput) -> tuple[float, ...]:
                 *position.velocity_ned,
             )
         ),
-        _number(read.clock_offset),
+        _nan_if_none(read.clock_offset),
         nan if battery is None else battery.received,
-        nan if battery is None else _number(battery.voltage_v),
+        nan if battery is None else _nan_if_none(battery.voltage_v),
         nan if thrust is None else thrust.received,
         nan if thrust is None else thrust.thrust,
-        _number(read.height),
+        _nan_if_none(read.height),
         read.armed is True,
         *read.flags,
     )
 
 
-def _target(command: GuidanceCommand) -> tuple[float, ...]:
+def _target_row(command: GuidanceCommand) -> tuple[float, ...]:
     return (
         command.made_at,
         *command.target,
         *(command.later or _NO_TARGET),
         command.acceleration_down,
         *(command.body_rates or _NO_VECTOR),
-        _number(command.thrust),
+        _nan_if_none(command.thrust),
         command.turn,
         command.period,
         command.idle,
@@ -175,7 +175,7 @@ def _target(command: GuidanceCommand) -> tuple[float, ...]:
     )
 
 
-def _guidance(made: StepOutput) -> tuple[float, ...]:
+def _guidance_row(made: StepOutput) -> tuple[float, ...]:
     inputs, reference = made.inputs, made.reference
     return (
         made.measured_at,
@@ -184,7 +184,7 @@ def _guidance(made: StepOutput) -> tuple[float, ...]:
         reference.heading,
         *inputs.now.position_ned,
         *inputs.now.velocity_ned,
-        _number(made.error),
+        _nan_if_none(made.error),
         *inputs.disturbance,
         inputs.drag.linear,
         inputs.drag.quadratic,
@@ -194,7 +194,7 @@ def _guidance(made: StepOutput) -> tuple[float, ...]:
     )
 
 
-def _number(value: float | None) -> float:
+def _nan_if_none(value: float | None) -> float:
     return nan if value is None else value
 
 

@@ -52,7 +52,7 @@ class TrackingRecord:
         self.note: Callable[[str], None] = lambda _: None
         self._trace = trace
         self._flown = flown
-        self._recorded: object = None
+        self._recorded_part: object = None
 
     def add(
         self, now: float, vehicle_time: float, reference: Reference, motion: VehicleMotion
@@ -67,8 +67,8 @@ class TrackingRecord:
         """
         flown = flown_part(self._flown, now)
         part = None if flown is None else flown.part
-        if part is not self._recorded:
-            self._recorded = part
+        if part is not self._recorded_part:
+            self._recorded_part = part
             name = None if flown is None else flown.name
             self._trace.begin_maneuver(now, vehicle_time, name)
             if name is not None:

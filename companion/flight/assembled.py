@@ -50,5 +50,5 @@ class Assembled:
             stale=record.stale,
             refused=record.refused,
             unanswered={reason.value: count for reason, count in record.unanswered.items()},
-            rate_hz=self.context.rate_hz,
+            rate_hz=self.context.setpoint_rate_hz,
         )

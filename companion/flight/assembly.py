@@ -13,15 +13,16 @@ from companion.control.outer_loop import predictive
 from companion.flight.assembled import Assembled
 from companion.flight.changes import Changes
 from companion.flight.context import FlightContext
-from companion.flight.dead_time_watch import DeadTimeWatch, rate_loops
+from companion.flight.dead_time_watch import DeadTimeWatch
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.flight import AskLanding, Flight
-from companion.flight.flown_config import description, flat
-from companion.flight.maneuvers import unbegun
+from companion.flight.flown_config import description, flattened
+from companion.flight.maneuvers import not_begun
 from companion.flight.observer import EventRecorder
+from companion.flight.phases import Phase
 from companion.flight.plan import Plan
 from companion.flight.preflight_checks import PreflightChecks
-from companion.flight.status import PhaseNow, StatusReporter
+from companion.flight.status import StatusReporter
 from companion.flight.vehicle_identity import SameVehicle, VehicleMemory
 from companion.flight.watch import RateRequester, Watch
 from companion.guidance.follow import Follow
@@ -131,11 +132,11 @@ def assemble(
     memory = _vehicle_memory(context, folder, flight.note, changes)
     _prepare_trajectories(context, flight.note)
     if record is not None:
-        record.metadata("configuration", flat(changes.flown.model_dump(mode="json")))
+        record.metadata("configuration", flattened(changes.flown.model_dump(mode="json")))
         record.begin(flight.began, description(changes.flown, plan, real_time=real_time))
         ladder.on_change = record.alarm
         memory.on_begin = partial(_record_drag, record, clock)
-    dead_time_watch = DeadTimeWatch(trace, rate_loops(config), flight.note)
+    dead_time_watch = DeadTimeWatch(trace, config.vehicle.axes, flight.note)
     reporter = _reporter(flight, context, ladder, trace, recorder, real_time=real_time)
     return Assembled(flight, context, trace, dead_time_watch, memory, ladder, reporter, changes)
 
@@ -162,7 +163,7 @@ def _context(
     )
     same_vehicle = SameVehicle(link, clock)
     loop.is_same_vehicle = lambda: same_vehicle.same
-    preflight = PreflightChecks(config, link, same_vehicle, unbegun(plan.maneuvers))
+    preflight = PreflightChecks(config, link, same_vehicle, not_begun(plan.maneuvers))
     return FlightContext(
         config,
         link,
@@ -179,7 +180,7 @@ def _context(
 def _vehicle_memory(
     context: FlightContext, folder: Path | None, note: Callable[[str], None], changes: Changes
 ) -> VehicleMemory:
-    """What earlier flights learned of the vehicle, for the checks and for guidance."""
+    """The memory of earlier flights, which gives the drag to the checks and to guidance."""
     remembered = None if folder is None else folder.parent
     memory = VehicleMemory(context.config, remembered, context.guidance_loop.estimate.drag, note)
     memory.on_known = changes.on_drag
@@ -208,9 +209,8 @@ def _reporter(
 ) -> StatusReporter:
     """The reporter of the flight's state; it shows the state only if an observer uses it."""
 
-    def phase() -> PhaseNow:
-        now, entered = flight.phase, recorder.phases[-1][0] if recorder.phases else flight.began
-        return PhaseNow(now.name, now.timeout, now.monitored, entered)
+    def phase() -> tuple[Phase, float]:
+        return flight.phase, recorder.phases[-1][0] if recorder.phases else flight.began
 
     return StatusReporter(
         context,

@@ -8,11 +8,11 @@ from companion.control.hold_settings import flies_identify
 from companion.control.retuning import value_in_effect
 from companion.files.yaml_file import ConfigError
 
-LARGEST_FACTOR = 3.0
+LARGEST_CHANGE_FACTOR = 3.0
 """Largest factor by which a change may multiply or divide a value."""
 _SMALLEST_VALUES = {"limits.max_tilt_deg": 5.0, "limits.max_tilt_rate_deg_s": 20.0}
 """Smallest values in flight; with less tilt or tilt rate the vehicle cannot hold against wind."""
-_NEVER_ZERO = frozenset(
+_NEVER_ZERO_KEYS = frozenset(
     {"planner.yaw_gain_per_s", "guidance.height_gain_per_s", "guidance.climb_gain_per_s"}
 )
 """Gains that must not be 0, because yaw or height would be uncontrolled."""
@@ -32,8 +32,8 @@ def require_moderate(before: Config, after: Config, name: str) -> None:
         name: name of the change in error messages.
 
     Raises:
-        ConfigError: a value changes by more than `LARGEST_FACTOR`, becomes too small to control the
-            vehicle, or cannot change in this flight.
+        ConfigError: a value changes by more than `LARGEST_CHANGE_FACTOR`, becomes too small to
+            control the vehicle, or cannot change in this flight.
         ValueError: weights cannot be computed from the configuration.
     """
     for each in differences(before, after):
@@ -54,17 +54,17 @@ def _why_not(before: Config, after: Config, change: Difference) -> str | None:
             f"{key} must not change between null and a number in flight; begin the next flight "
             "with a number to change it in flight"
         )
-    if key in _NEVER_ZERO and change.after == 0.0:
+    if key in _NEVER_ZERO_KEYS and change.after == 0.0:
         return f"{key} must not become 0 in flight"
     smallest = _SMALLEST_VALUES.get(key)
     if smallest is not None and change.after < smallest:
-        return f"{key} {shown(change.after)} is less than {smallest:g}, the least in flight"
+        return f"{key} must be at least {smallest:g} in flight, not {shown(change.after)}"
     old = value_in_effect(before, change, change.before)
     new = value_in_effect(after, change, change.after)
     low, high = min(old, new), max(old, new)
-    if (high / low if low > 0.0 else inf) > LARGEST_FACTOR * (1.0 + 1e-9):
+    if (high / low if low > 0.0 else inf) > LARGEST_CHANGE_FACTOR * (1.0 + 1e-9):
         return (
-            f"{key} from {old:g} to {new:g} is more than a factor of {LARGEST_FACTOR:g}; change it "
-            "in several smaller steps"
+            f"{key} from {old:g} to {new:g} is more than a factor of {LARGEST_CHANGE_FACTOR:g}; "
+            "change it in several smaller steps"
         )
     return None

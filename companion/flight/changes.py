@@ -18,7 +18,7 @@ from companion.control.slew import Slew
 from companion.files.yaml_file import ConfigError
 from companion.flight.change_bounds import require_moderate
 from companion.recording.recorder import FlightRecorder
-from companion.safety.actions import internal
+from companion.safety.actions import fault_message
 
 _MAX_UNDO_COUNT = 200
 """Number of changes that can be undone; older ones stay in force."""
@@ -57,13 +57,14 @@ class Changes:
     steps on the event loop, between samples. Monitors, fence and deadman keep their limits.
 
     Attributes:
+        start: the configuration before the first change.
         wanted: the configuration after the newest change.
         made: all changes, in order.
-        flown: configuration in the record of the flight: the one at its start.
-        note: shows a change while there is no flight.
+        flown: the configuration when the flight began, which its record contains.
+        note: called with each change in words; a flight replaces it while it runs.
         on_change: called with `wanted` after each change.
-        on_drag: called with what is known of the vehicle's drag once the vehicle is identified; the
-            slow checks of a change need it.
+        on_drag: called with what is known of the vehicle's drag, once the vehicle is identified;
+            some checks of a change need it.
 
     Args:
         start: the configuration before the first change.
@@ -76,32 +77,27 @@ class Changes:
         self.note: Callable[[str], None] = lambda _: None
         self.on_change: Callable[[Config], None] = lambda _: None
         self.on_drag: Callable[[KnownDrag], None] = lambda _: None
-        self._start = start
+        self.start = start
         self._slew = Slew(start)
-        self._earlier: list[Config] = []
-        self._made_before = 0
+        self._earlier_configs: list[Config] = []
+        self._count_before_flight = 0
         self._retuning: Retuning | None = None
         self._refuses: Callable[[Config, Config], str | None] = _refuse_nothing
         self._record: FlightRecorder | None = None
 
     @property
-    def start(self) -> Config:
-        """The configuration before the first change."""
-        return self._start
-
-    @property
     def can_undo(self) -> bool:
         """Whether there is a change to undo."""
-        return bool(self._earlier)
+        return bool(self._earlier_configs)
 
     @property
     def made_in_flight(self) -> tuple[Change, ...]:
         """The changes since the flight began, in order."""
-        return tuple(self.made[self._made_before :])
+        return tuple(self.made[self._count_before_flight :])
 
     def begin_flight(self) -> Config:
         """Begin a flight; return the configuration at its start, for its record."""
-        self.flown, self._made_before = self.wanted, len(self.made)
+        self.flown, self._count_before_flight = self.wanted, len(self.made)
         return self.flown
 
     def change(self, values: Values, by: str) -> str:
@@ -114,7 +110,7 @@ class Changes:
                 is too large. Nothing is changed.
         """
         try:
-            wanted = changed_in_flight(self._start, self.wanted, values, by)
+            wanted = changed_in_flight(self.start, self.wanted, values, by)
             require_moderate(self._slew.settled, wanted, by)
             require_moderate(self.wanted, wanted, by)
         except ConfigError as error:
@@ -123,7 +119,7 @@ class Changes:
             raise ChangeRefusedError(f"{by}: {error}; nothing has changed") from error
         before = self.wanted
         text = self._begin(wanted, by)
-        self._earlier = [*self._earlier, before][-_MAX_UNDO_COUNT:]
+        self._earlier_configs = [*self._earlier_configs, before][-_MAX_UNDO_COUNT:]
         self.on_change(wanted)
         return text
 
@@ -133,10 +129,10 @@ class Changes:
         Raises:
             ChangeRefusedError: there is nothing to undo, or the change is refused.
         """
-        if not self._earlier:
+        if not self._earlier_configs:
             raise ChangeRefusedError(f"{by}: there is no change to undo")
-        text = self._begin(self._earlier[-1], by)
-        self._earlier.pop()
+        text = self._begin(self._earlier_configs[-1], by)
+        self._earlier_configs.pop()
         self.on_change(self.wanted)
         return text
 
@@ -166,7 +162,7 @@ class Changes:
             record: records the values for a replay, or None.
         """
         self._retuning, self._record = retuning, record
-        if self.wanted is not self._start:
+        if self.wanted is not self.start:
             self._slew.jump(self.wanted)
             retuning.apply(tuning(self.wanted))
         if self.wanted is not self.flown:
@@ -190,7 +186,7 @@ class Changes:
                 self._retuning.apply(values)
         except Exception as error:  # the flight goes on with the values it has
             self._slew.stop()
-            self.note(internal(error))
+            self.note(fault_message(error))
 
     def _begin(self, wanted: Config, by: str) -> str:
         """Begin to move from the present values to `wanted`.
@@ -198,7 +194,7 @@ class Changes:
         Raises:
             ChangeRefusedError: these loops cannot change, or the values are equal.
         """
-        fixed = fixed_because(self._start)
+        fixed = fixed_because(self.start)
         if fixed is not None:
             raise ChangeRefusedError(f"{by}: {fixed}; nothing has changed")
         keys = tuple(differences(self.wanted, wanted))
@@ -226,7 +222,7 @@ class Changes:
         return str(change)
 
     def _record_change(self, before: Config, *, at_once: bool) -> None:
-        """Record the present change for a replay."""
+        """Record for a replay the values in which `wanted` differs from `before`."""
         if self._record is not None:
             values: dict[str, dict[str, Any]] = {}
             for each in differences(before, self.wanted):

@@ -14,12 +14,12 @@ from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import Role
 from companion.vehicle.link import Link
 
-_TRIES = 4
+_MAX_TRIES = 4
 _EFFECT_TIMEOUT = 3.0
 """Longest time from a command to its effect, s; a take-off takes longer than a mode change."""
 _MODE_REPORT_TIMEOUT = 1.0
 """An accepted mode that is not reported within this time was left again, s."""
-_OFFBOARD = frozenset({Role.OFFBOARD})
+_OFFBOARD_ONLY = frozenset({Role.OFFBOARD})
 
 Done = Callable[[], bool]
 """Returns whether the vehicle does what was commanded; may raise `FlightEnded` instead."""
@@ -80,7 +80,7 @@ async def command_if_ours(
         CommandUnfinished: the autopilot answered "in progress", and did not finish in time.
         LinkLost: the connection dropped while waiting.
     """
-    for attempt in range(_TRIES):
+    for attempt in range(_MAX_TRIES):
         await context.fresh_heartbeat()
         context.same_vehicle.require()
         if attempt > 0 and done():
@@ -104,7 +104,7 @@ async def command_if_ours(
     await context.fresh_heartbeat()
     if not done():
         name = command_name(command.command)
-        raise CommandTimeout(f"{name}: no answer to {_TRIES} tries; does the uplink work?")
+        raise CommandTimeout(f"{name}: no answer to {_MAX_TRIES} tries; does the uplink work?")
 
 
 async def change_mode(
@@ -145,7 +145,7 @@ async def ask_to_hold(context: FlightContext, require_ours: RequireOurs) -> None
 
 
 async def leave_offboard(
-    context: FlightContext, cannot_arm_in: frozenset[Role] = _OFFBOARD
+    context: FlightContext, cannot_arm_in: frozenset[Role] = _OFFBOARD_ONLY
 ) -> None:
     """Ask a vehicle that stands disarmed in offboard to hold, because it could not be armed again.
 

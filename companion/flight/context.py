@@ -20,10 +20,10 @@ from companion.safety.snapshot_builder import FenceCentre, SnapshotBuilder
 from companion.vehicle.link import Link
 from companion.vehicle.records import LocalPosition
 
-SLOWEST_HEARTBEAT = 3.0
-"""Largest age of a known mode, s, until the checks have measured the heartbeat rate."""
+INITIAL_HEARTBEAT_LIMIT = 3.0
+"""Largest age of a known mode until the checks have counted the heartbeats, s."""
 
-_POLL = 0.02
+_POLL_PERIOD = 0.02
 """Period with which a condition is checked, s; telemetry is slower."""
 
 _LAST_SETPOINT_TIMEOUT = 0.1
@@ -41,9 +41,9 @@ class FlightContext:
     """The parts of one flight, and the state that its phases share.
 
     Attributes:
-        known_drag: knowledge of the vehicle's drag when the checks ended.
+        known_drag: what was known of the vehicle's drag when the checks ended.
         detail: what the running phase waits for, shown to the user.
-        rate_hz: rate of setpoints over the maneuvers, Hz.
+        setpoint_rate_hz: rate of setpoints over the maneuvers, Hz.
         heartbeat_limit: largest age of a known mode, s; the checks set it from the heartbeat rate.
         mode_at_checks: the mode when the checks ended; another one before arming is a takeover.
         arm_sent: whether we commanded arming.
@@ -63,8 +63,8 @@ class FlightContext:
     same_vehicle: SameVehicle
     known_drag: KnownDrag = field(default_factory=KnownDrag)
     detail: str = ""
-    rate_hz: float = 0.0
-    heartbeat_limit: float = SLOWEST_HEARTBEAT
+    setpoint_rate_hz: float = 0.0
+    heartbeat_limit: float = INITIAL_HEARTBEAT_LIMIT
     mode_at_checks: str | None = None
     arm_sent: bool = False
     fence_centre: FenceCentre | None = None
@@ -78,7 +78,7 @@ class FlightContext:
     def end_stream(self) -> None:
         """Stop answering samples; if the autopilot obeys us, the last answer has zero body rates.
 
-        It is for ends that are ours. After a takeover, or without trust in the data, `release`.
+        It is for ends that we decide. After a takeover or with doubtful data, use `release`.
         """
         self.loop.end_stream()
         self.guidance_loop.stand_by()
@@ -100,7 +100,7 @@ class FlightContext:
         if detail is not None:
             self.detail = detail
         while not condition():  # noqa: ASYNC110 - telemetry sets no events
-            await asyncio.sleep(_POLL)
+            await asyncio.sleep(_POLL_PERIOD)
 
     async def fresh_heartbeat(self) -> None:
         """Wait for a heartbeat that left the vehicle after this call.

@@ -20,7 +20,7 @@ from companion.guidance import ManeuverSequence
 from companion.guidance.source import ManeuverSource, Source
 from companion.mavlink.commands import Command
 from companion.mavlink.errors import CommandTimeout
-from companion.safety.actions import Exit, FlightEnded, internal
+from companion.safety.actions import Exit, FlightEnded, fault_message
 from companion.vehicle.autopilot import Role
 
 _SELF_DISARM_TIMEOUT = 8.0
@@ -29,7 +29,7 @@ _SELF_DISARM_TIMEOUT = 8.0
 _MIN_HOLDING_TILT = 5.0
 """Smallest tilt that the thrust must allow to hold against a breeze, °."""
 
-_CONTROLLED_ROLES = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
+_ROLES_BEFORE_LANDING = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
 
 
 async def maneuvers(context: FlightContext) -> None:
@@ -77,7 +77,9 @@ async def _fly(context: FlightContext, source: Source, progress: Callable[[], st
 
     def over() -> bool:
         elapsed = now() - began
-        context.rate_hz = (context.loop.record.setpoints - sent) / elapsed if elapsed > 0.0 else 0.0
+        context.setpoint_rate_hz = (
+            (context.loop.record.setpoints - sent) / elapsed if elapsed > 0.0 else 0.0
+        )
         if context.guidance_loop.hold.given_up is not None:
             raise FlightEnded(context.guidance_loop.hold.given_up)
         if source.failure is not None:
@@ -122,7 +124,7 @@ class _TiltMargin:
 async def hand_back(context: FlightContext) -> None:
     """Stop the motion, and send setpoints until the autopilot holds by itself."""
     context.detail = "the autopilot to hold"
-    require_ours = in_roles(context.link, _CONTROLLED_ROLES)
+    require_ours = in_roles(context.link, _ROLES_BEFORE_LANDING)
     await _hand_over(
         context,
         context.link.autopilot.hold(),
@@ -156,7 +158,7 @@ async def land(context: FlightContext) -> None:
     def landing() -> bool:
         return in_role(context.link, Role.LAND) or not context.armed()
 
-    require_ours = in_roles(context.link, _CONTROLLED_ROLES | {Role.LAND})
+    require_ours = in_roles(context.link, _ROLES_BEFORE_LANDING | {Role.LAND})
     await _hand_over(context, context.link.autopilot.land(), require_ours, landing)
 
     def down() -> bool:
@@ -224,5 +226,5 @@ def _stop_moving(context: FlightContext) -> None:
         context.loop.restart_planner()  # the estimator may have been reset
         context.guidance_loop.hold_here()
     except Exception as error:  # the exit must go on whatever fails in guidance
-        context.note(internal(error))
+        context.note(fault_message(error))
         context.end_stream()

@@ -1,4 +1,4 @@
-"""What the report of a finished flight says of its course: phases, its end, advice on keys."""
+"""The course of a finished flight for its report: phases, early end, advice on keys."""
 
 import asyncio
 from collections.abc import Sequence
@@ -57,7 +57,7 @@ def course_of(
     takeoff = None if reporter.takeoff is None else reporter.takeoff - began
     early_end = None
     if flight.failed_in is not None:
-        # A flight that was left has no such event.
+        # There is no such event if the user left the flight.
         time = next((at for at, text in flight.events if text == result), now - began)
         early_end = _early_end(
             time,
@@ -106,7 +106,10 @@ def _early_end(
     breaches: dict[str, str],
     result: str,
 ) -> EarlyEnd:
-    """The end of a flight that ended early; `time` and `takeoff` in s since the flight began."""
+    """The end of a flight that ended early.
+
+    `time` and `takeoff` are in s since the flight began, `began` in s on our clock.
+    """
     name, maneuver_elapsed = None, None
     if phase == "maneuvers":
         for mark in marks:  # a hold may have ended the maneuver before the flight ended

@@ -1,20 +1,19 @@
 """Measures the dead time of the body rates, repeatedly in flight and once over the whole flight."""
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from math import inf
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.config import Config
+from companion.config.vehicle import AxisKeys
 from companion.identification import dead_time_by_correlation
 from companion.recording.measurements.dead_time import AxisDeadTime, DeadTimes, SampleAge
 from companion.recording.trace import FlightTrace
-from companion.safety.actions import internal
+from companion.safety.actions import fault_message
 
-_PERIOD = 2.0
+_MEASURING_PERIOD = 2.0
 """Time between two measurements, s; the axes take turns."""
 _WINDOW_PERIODS = 4
 """Length of a measurement in these periods; the first measurement is a period shorter."""
@@ -27,31 +26,6 @@ _COMMANDED_COLUMN, _MEASURED_COLUMN, _AGE_COLUMN = 2, 6, 9
 """Columns of `FlightTrace.rates`: first commanded rate, first measured rate, sample age."""
 
 
-class RateLoop(NamedTuple):
-    """Configured response of one axis to body rates; None where not configured.
-
-    Attributes:
-        lag: lag, s.
-        dead_time: dead time, s.
-        acceleration_limit: slew limit, rad/s².
-        damping: damping ratio of a second-order lag; None: first order.
-    """
-
-    lag: float | None = None
-    dead_time: float | None = None
-    acceleration_limit: float | None = None
-    damping: float | None = None
-
-
-def rate_loops(config: Config) -> tuple[RateLoop, RateLoop, RateLoop]:
-    """The configured responses of roll, pitch and yaw."""
-    roll, pitch, yaw = (
-        RateLoop(axis.lag, axis.dead_time, axis.acceleration_limit, axis.damping)
-        for axis in config.vehicle.axes.values()
-    )
-    return roll, pitch, yaw
-
-
 class DeadTimeWatch:
     """Correlates commanded and measured rates, and warns once if the configuration is wrong.
 
@@ -60,19 +34,19 @@ class DeadTimeWatch:
     sample by 5 ms.
 
     Args:
-        trace: the flight's rows.
-        rate_loops: responses of roll, pitch and yaw.
+        trace: records of the flight, with the commanded and the measured body rates.
+        axes: configured response of "roll", "pitch" and "yaw".
         note: called with the warning.
     """
 
     def __init__(
         self,
         trace: FlightTrace,
-        rate_loops: tuple[RateLoop, RateLoop, RateLoop],
+        axes: Mapping[str, AxisKeys],
         note: Callable[[str], None],
     ) -> None:
         self._trace = trace
-        self._rate_loops = dict(zip(_AXES, rate_loops, strict=True))
+        self._axes = axes
         self._note = note
         self._due = -inf
         self._measurements = 0
@@ -84,15 +58,15 @@ class DeadTimeWatch:
         dead_time_by_correlation(time, np.sin(time), time, np.sin(time))  # the first use is slow
 
     def after_answer(self, now: float) -> None:
-        """Measure one axis, if `_PERIOD` is over; `now` in s on our clock."""
+        """Measure one axis, if `_MEASURING_PERIOD` is over; `now` in s on our clock."""
         if now < self._due:
             return
-        self._due = now + _PERIOD
+        self._due = now + _MEASURING_PERIOD
         try:
             self._measure_next_axis()
         except Exception as error:  # a mere measurement must not end a flight
             self._due = inf
-            self._note(f"the dead time is no longer measured: {internal(error)}")
+            self._note(f"the dead time is no longer measured: {fault_message(error)}")
 
     def _measure_next_axis(self) -> None:
         self._rows.append(len(self._trace.rates))
@@ -111,18 +85,18 @@ class DeadTimeWatch:
         measured = DeadTimes(
             {name: self._dead_time(name, rows) for name in _AXES},
             SampleAge(*np.percentile(ages, (50, 99)).tolist()) if ages.size else SampleAge(),
-            lag_known=any(loop.lag is not None for loop in self._rate_loops.values()),
+            lag_known=any(axis.lag is not None for axis in self._axes.values()),
         )
         self._warn(measured)
         return measured
 
     def _dead_time(self, name: str, rows: NDArray[np.float64]) -> AxisDeadTime:
         """Measured and configured dead time of one axis."""
-        loop, axis = self._rate_loops[name], _AXES.index(name)
+        axis, column = self._axes[name], _AXES.index(name)
         dead_time = None
-        if loop.lag is not None:
+        if axis.lag is not None:
             time, commanded_rates, measured_rates = rows[
-                :, [0, _COMMANDED_COLUMN + axis, _MEASURED_COLUMN + axis]
+                :, [0, _COMMANDED_COLUMN + column, _MEASURED_COLUMN + column]
             ].T
             is_certain = time < time[-1:] - _MIN_ROW_AGE
             dead_time = dead_time_by_correlation(
@@ -130,11 +104,11 @@ class DeadTimeWatch:
                 commanded_rates[is_certain],
                 time[is_certain],
                 measured_rates[is_certain],
-                loop.lag,
-                loop.acceleration_limit,
-                inf if loop.damping is None else loop.damping,
+                axis.lag,
+                axis.acceleration_limit,
+                inf if axis.damping is None else axis.damping,
             )
-        return AxisDeadTime(dead_time, loop.dead_time)
+        return AxisDeadTime(dead_time, axis.dead_time)
 
     def _judge(self, name: str, dead_time: AxisDeadTime) -> None:
         """Warn at the second wrong measurement in a row; a gust may cause a single one."""

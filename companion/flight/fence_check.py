@@ -1,8 +1,8 @@
 """Checks before the flight that a maneuver stays far enough from the fence to trigger no monitor.
 
-`Fence.stop_breach` judges each moment of the reference with the monitor's formula. `MARGIN` allows
-for the tracking error. A vehicle that follows an accepted reference within this margin triggers no
-monitor.
+`Fence.stop_breach` judges each moment of the reference with the monitor's formula.
+`TRACKING_MARGIN` allows for the tracking error. A vehicle that follows an accepted reference within
+this margin triggers no monitor.
 """
 
 from dataclasses import dataclass, replace
@@ -14,7 +14,7 @@ from companion.guidance.reference import Vector
 from companion.guidance.trajectory.demand import Floats, Motion
 from companion.guidance.trajectory.feasibility import Violation
 
-MARGIN = 0.5
+TRACKING_MARGIN = 0.5
 """Margin between reference and fence, m, for errors of position and speed and `_POINT_DISTANCE`."""
 
 _POINT_DISTANCE = 0.25
@@ -86,10 +86,12 @@ class FenceCheck:
             fence = replace(fence, places=())
         north, east, _ = _vector(motion.acceleration[k])
         height = self.height - offset[2]
-        return fence.stop_breach(offset, velocity, height, self.origin, MARGIN, (north, east))
+        return fence.stop_breach(
+            offset, velocity, height, self.origin, TRACKING_MARGIN, (north, east)
+        )
 
     def _begin_time(self, motion: Motion, worst: float) -> float:
-        """Time of the first breach, s."""
+        """Time of the first breach among the checked moments, s; at most `worst`."""
         stride = max(1, motion.times.size // _MAX_MOMENTS)
         for k in range(0, motion.times.size, stride):
             if motion.times[k] >= worst or self._breach(motion, k) is not None:
@@ -109,7 +111,7 @@ def _text(breach: Breach, time: float, slowing_helps: bool) -> str:
         )
     return (
         f"from {time:.2f} s on {what_happens} ({breach.where}; {breach.limit} with a margin of "
-        f"{MARGIN:g} m for the tracking error)"
+        f"{TRACKING_MARGIN:g} m for the tracking error)"
     )
 
 

@@ -10,11 +10,11 @@ from companion.recording.mcap_file.writer import McapWriter
 from companion.recording.recorder import FlightRecorder
 from companion.safety.table import fence_of
 
-_PERIOD = 10.0
+_DRAWING_PERIOD = 10.0
 """Period with which the fence is drawn again, s, because a viewer may join late."""
 _CIRCLE_SIDES, _UPRIGHT_EDGES = 48, 12
 """Sides of the polygon that approximates a circle, and number of its upright edges."""
-_COLOR: Color = (0.9, 0.3, 0.3, 0.6)
+_FENCE_COLOR: Color = (0.9, 0.3, 0.3, 0.6)
 Point = tuple[float, float, float]
 
 
@@ -38,7 +38,7 @@ class FenceRows:
         origin = snapshots.origin_ned
         if now < self._due or centre is None or origin is None or motion is None or height is None:
             return
-        self._due = now + _PERIOD
+        self._due = now + _DRAWING_PERIOD
         north, east, down = origin
         heights = self._fence.floor - height - motion.position_ned[2], self._fence.ceiling - down
         outlines = [circle_corners(self._fence.radius, _CIRCLE_SIDES)]
@@ -69,5 +69,5 @@ def _edges(
 
 
 def _write(writer: McapWriter, time_ns: int, points: list[Point]) -> None:
-    fence = Entity("fence", "world", lines=(Line(points, _COLOR, pairs=True),))
+    fence = Entity("fence", "world", lines=(Line(points, _FENCE_COLOR, pairs=True),))
     writer.message("/fence", time_ns, scene_message(time_ns, (fence,)))

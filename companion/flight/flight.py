@@ -13,13 +13,13 @@ from companion.flight.plan import Plan
 from companion.flight.vehicle_identity import ChecksVoid
 from companion.flight.watch import Watch
 from companion.mavlink.errors import LinkError
-from companion.safety.actions import Exit, FlightEnded, internal
+from companion.safety.actions import Exit, FlightEnded, fault_message
 
 AskLanding = Callable[[], Coroutine[Any, Any, bool]]
 
 _WATCH_PERIOD, _PROGRESS_PERIOD = 0.02, 1.0
-_ATTEMPTS = 5
-"""Number of times the checks run if another vehicle may have come meanwhile."""
+_MAX_CHECK_RUNS = 5
+"""Largest number of times that the checks run, if the vehicle may have been replaced each time."""
 
 
 class Flight:
@@ -86,7 +86,7 @@ class Flight:
 
         An exit that is under way continues without our setpoints, which may have caused the fault.
         """
-        reason = internal(error)
+        reason = fault_message(error)
         if self.failed_in is None:
             self.end(FlightEnded(reason))
             return
@@ -127,7 +127,7 @@ class Flight:
         Raises:
             FlightEnded: the first failure.
         """
-        for _ in range(_ATTEMPTS):
+        for _ in range(_MAX_CHECK_RUNS):
             try:
                 async with aclosing(self._plan.phases(self._context)) as phases:
                     async for phase in phases:
@@ -141,11 +141,11 @@ class Flight:
             except FlightEnded:
                 raise
             except Exception as error:  # of the plan: the vehicle must not be left to nobody
-                raise FlightEnded(internal(error)) from error
+                raise FlightEnded(fault_message(error)) from error
             else:
                 return
         raise FlightEnded(
-            f"the vehicle was lost, restarted or replaced {_ATTEMPTS} times before arming; "
+            f"the vehicle was lost, restarted or replaced {_MAX_CHECK_RUNS} times before arming; "
             "check the link and its power"
         )
 
@@ -179,7 +179,7 @@ class Flight:
         except LinkError as error:
             raise FlightEnded(str(error)) from error
         except Exception as error:
-            raise FlightEnded(internal(error)) from error
+            raise FlightEnded(fault_message(error)) from error
         finally:
             await cancel(task)
 

@@ -58,9 +58,9 @@ class FlightFiles:
         follows: bool,
     ) -> None:
         self._config, self.folder, self._note = config, folder, note
-        self._counted: dict[str, int] = {}
-        self._ended = 0.0
-        self._failed = self._opened = False
+        self._counted_before: dict[str, int] = {}
+        self._ended_at = 0.0
+        self._failure_told = self._opened = False
         self.tap: TlogWriter | None = None
         self.mcap: FlightRecorder | None = None
         if folder is not None:
@@ -111,8 +111,8 @@ class FlightFiles:
 
     def _tell_failure(self, text: str) -> None:
         """Report once that the recording has stopped; a full disk stops both files."""
-        if not self._failed:
-            self._failed = True
+        if not self._failure_told:
+            self._failure_told = True
             self._note(text)
 
     def recorder(self, observer: Observer) -> EventRecorder:
@@ -130,7 +130,7 @@ class FlightFiles:
 
     def begin_counting(self, stats: LinkStats) -> None:
         """Count the link's frames from now on, if the link was already open."""
-        self._counted = _counters(stats)
+        self._counted_before = _counters(stats)
 
     def summary(
         self,
@@ -158,7 +158,7 @@ class FlightFiles:
             flight.events.append((asyncio.get_running_loop().time() - flight.began, text))
             recorder.write(text)
         assembled.memory.save()
-        self._ended = asyncio.get_running_loop().time() - flight.began
+        self._ended_at = asyncio.get_running_loop().time() - flight.began
         return Summary(
             result=result,
             phase=(flight.failed_in or flight.phase).name,
@@ -166,7 +166,8 @@ class FlightFiles:
             gain=self._config.planner.gain_per_s,
             counts=assembled.counts(),
             link={
-                name: value - self._counted.get(name, 0) for name, value in _counters(stats).items()
+                name: value - self._counted_before.get(name, 0)
+                for name, value in _counters(stats).items()
             },
             trace=trace,
             events=list(flight.events),
@@ -186,7 +187,7 @@ class FlightFiles:
         events = list(summary.events)
         failures = [file.failure for file in (self.tap, self.mcap) if file and file.failure]
         if failures and not any(text in failures for _, text in events):
-            events.append((self._ended, failures[0]))  # it was found when the files were closed
+            events.append((self._ended_at, failures[0]))  # it was found when the files were closed
         whole = replace(summary, link={**summary.link, "not_recorded": dropped}, events=events)
         folder = self.folder
         if folder is None:

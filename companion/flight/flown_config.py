@@ -81,12 +81,12 @@ def _assumed_drag(known: KnownDrag) -> dict[str, str]:
     }
 
 
-def flat(section: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
+def flattened(section: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
     """Flatten a configuration: `section.key` -> value as JSON."""
     values: dict[str, str] = {}
     for key, value in section.items():
         if isinstance(value, dict):
-            values.update(flat(value, f"{prefix}{key}."))
+            values.update(flattened(value, f"{prefix}{key}."))
         else:
             values[f"{prefix}{key}"] = json.dumps(value)
     return values

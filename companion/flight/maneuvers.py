@@ -27,11 +27,11 @@ def configured_maneuvers(config: Config, drag: KnownDrag | None = None) -> Maneu
             and the fence.
     """
     drag = drag or before_connecting(config)
-    return ManeuverSequence([_part(config, name, drag) for name in config.flight.maneuvers])
+    return ManeuverSequence([_maneuver(config, name, drag) for name in config.flight.maneuvers])
 
 
-def unbegun(sequence: ManeuverSequence) -> ManeuverSequence:
-    """A copy without state: `Follow` remembers the pose where it began."""
+def not_begun(sequence: ManeuverSequence) -> ManeuverSequence:
+    """A copy whose maneuvers have not begun: `Follow` remembers the pose where it began."""
     return ManeuverSequence(
         [
             replace(part, _turned=None, _pose=None) if isinstance(part, Follow) else part
@@ -40,15 +40,15 @@ def unbegun(sequence: ManeuverSequence) -> ManeuverSequence:
     )
 
 
-def _part(config: Config, name: str, drag: KnownDrag) -> Maneuver:
+def _maneuver(config: Config, name: str, drag: KnownDrag) -> Maneuver:
     if name == "trajectory":
         return _follow(config, drag)
-    part = _simple(config, name)
+    part = _simple_maneuver(config, name)
     require_flyable(config, part, drag)
     return part
 
 
-def _simple(config: Config, name: str) -> Maneuver:
+def _simple_maneuver(config: Config, name: str) -> Maneuver:
     corners, steps = config.corners, config.steps
     match name:
         case "hover":

@@ -84,19 +84,18 @@ async def decline_landing() -> bool:
 class EventRecorder:
     """An observer that records phases and events, and passes everything to another observer.
 
-    After the other observer has raised an exception, it receives nothing more (after one of
-    `status`: no more states), because a fault in it must not cost control of the vehicle.
+    A fault in the other observer must not cost control of the vehicle. So after an exception it
+    receives nothing more, and after an exception in `status` no more states.
 
     Attributes:
         phases: (begin in s on our clock, name) of each phase.
-        write: function that records a text with the present time.
-        file: `flight.mcap`; None: the flight is not recorded.
+        write, file: as the arguments.
 
     Args:
         observer: the other observer.
         clock: our clock, s.
-        write: see above.
-        file: see above.
+        write: records a text with the present time.
+        file: `flight.mcap`; None: the flight is not recorded.
     """
 
     def __init__(
@@ -113,7 +112,7 @@ class EventRecorder:
         self._clock = clock
 
     def phase(self, name: str, waits_for: str) -> None:
-        """Keep, record and pass on."""
+        """Keep, record and pass on the phase."""
         self.phases.append((self._clock(), name))
         self.write(f"phase: {name}")
         if self.file is not None:
@@ -130,11 +129,11 @@ class EventRecorder:
         return type(self._observer).status is not SilentObserver.status
 
     def status(self, status: FlightStatus) -> None:
-        """Pass on; the caller notes an exception of the observer, and passes no more states."""
+        """Pass the state on; if this raises, the caller notes it, and passes on no more states."""
         self._observer.status(status)
 
     def event(self, time: float, text: str) -> None:
-        """Record and pass on."""
+        """Record the event and pass it on."""
         self.write(text)
         self._tell(lambda observer: observer.event(time, text))
 

@@ -11,10 +11,10 @@ from companion.flight.context import FlightContext
 from companion.safety.actions import Exit
 from companion.vehicle.autopilot import Autopilot, ControlEntry, Role
 
-_RISING = frozenset({Role.TAKEOFF, Role.READY})
-_STANDING = frozenset({Role.READY})
-_AIRBORNE = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD})
-_UNDER_CONTROL = frozenset({Role.OFFBOARD})
+_TAKEOFF_ROLES = frozenset({Role.TAKEOFF, Role.READY})
+_STANDING_ROLES = frozenset({Role.READY})
+_AIRBORNE_ROLES = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD})
+_OFFBOARD_ROLES = frozenset({Role.OFFBOARD})
 _MANEUVER_GRACE = 10.0
 """Time that the maneuvers may take beyond their duration, s."""
 _COMMAND_TIMEOUT = 10.0
@@ -82,7 +82,7 @@ def flight_phases(
         control_phases.maneuvers,
         maneuver_duration + _MANEUVER_GRACE,
         Exit.LAND,
-        modes=_UNDER_CONTROL,
+        modes=_OFFBOARD_ROLES,
         monitored=True,
     )
     return (*takeoff_phases(config, autopilot), maneuvers, *landing_phases(config))
@@ -103,7 +103,7 @@ def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, .
             config.takeoff_timeout_s,
             Exit.LAND,
             on_failure_landed=Exit.DISARM,
-            modes=_RISING,
+            modes=_TAKEOFF_ROLES,
         ),
         Phase(
             "offboard",
@@ -111,7 +111,7 @@ def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, .
             takeoff.offboard,
             _TAKEOVER_TIMEOUT,
             Exit.LAND,
-            modes=_RISING | {Role.OFFBOARD},
+            modes=_TAKEOFF_ROLES | {Role.OFFBOARD},
             monitored=True,
         ),
     )
@@ -119,13 +119,13 @@ def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, .
 
 def takeover_phases(config: FlightConfig) -> tuple[Phase, ...]:
     """The phases that take over a vehicle which its autopilot holds in the air."""
-    checks = _checks_phase(config, "to be taken over", takeover.check_airborne, _RISING)
+    checks = _checks_phase(config, "to be taken over", takeover.check_airborne, _TAKEOFF_ROLES)
     return checks, _held_takeover_phase()
 
 
 def takeoff_for_client_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, ...]:
     """The phases that take off a vehicle which somebody else armed, and take it over."""
-    checks = _checks_phase(config, "to take off", takeover.check_standing, _STANDING)
+    checks = _checks_phase(config, "to take off", takeover.check_standing, _STANDING_ROLES)
     (takeoff_phase,) = (
         phase for phase in takeoff_phases(config, autopilot) if phase.name == "takeoff"
     )
@@ -146,7 +146,7 @@ def _held_takeover_phase() -> Phase:
         takeoff.offboard,
         _TAKEOVER_TIMEOUT,
         Exit.HOLD,
-        modes=_RISING | _UNDER_CONTROL,
+        modes=_TAKEOFF_ROLES | _OFFBOARD_ROLES,
         monitored=True,
     )
 
@@ -169,7 +169,7 @@ def program_phase(name: str, waits_for: str, work: Work, duration: float = inf) 
         work,
         duration + _MANEUVER_GRACE,
         Exit.HOLD,
-        modes=_UNDER_CONTROL,
+        modes=_OFFBOARD_ROLES,
         monitored=True,
     )
 
@@ -199,7 +199,7 @@ def hand_back_phase() -> Phase:
         control_phases.hand_back,
         _COMMAND_TIMEOUT,
         Exit.LAND,
-        modes=_AIRBORNE | {Role.OFFBOARD},
+        modes=_AIRBORNE_ROLES | {Role.OFFBOARD},
     )
 
 
@@ -218,7 +218,7 @@ def _land(config: FlightConfig) -> Phase:
         "touchdown",
         control_phases.land,
         config.landing_timeout_s,
-        modes=_AIRBORNE | {Role.OFFBOARD, Role.LAND},
+        modes=_AIRBORNE_ROLES | {Role.OFFBOARD, Role.LAND},
     )
 
 

@@ -23,7 +23,7 @@ from companion.guidance.source import Source
 
 
 class Plan(Protocol):
-    """Returns the phases one by one; each is requested when the previous one has ended."""
+    """Yields the phases one by one; each is requested when the previous one has ended."""
 
     @property
     def maneuvers(self) -> ManeuverSequence:

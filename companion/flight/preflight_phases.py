@@ -10,7 +10,7 @@ from companion.flight.commands import (
     leave_offboard,
     require_role,
 )
-from companion.flight.context import SLOWEST_HEARTBEAT, FlightContext
+from companion.flight.context import INITIAL_HEARTBEAT_LIMIT, FlightContext
 from companion.flight.maneuver_checks import require_inside, require_still_flyable
 from companion.guidance.fence import Place
 from companion.preflight import vehicle_checks
@@ -33,7 +33,7 @@ async def connect(context: FlightContext) -> None:
 async def checks(context: FlightContext) -> None:
     """Request telemetry, wait until the vehicle is ready, and run the preflight checks."""
     context.same_vehicle.begin()
-    context.heartbeat_limit = SLOWEST_HEARTBEAT
+    context.heartbeat_limit = INITIAL_HEARTBEAT_LIMIT
     context.detail = "requesting telemetry"
     await context.preflight.ask_for_telemetry()
     if context.config.flight.arm:  # a pilot who arms may have chosen the mode by a switch
@@ -110,7 +110,10 @@ async def _arm(context: FlightContext) -> None:
     *before, command = context.link.autopilot.arm()
     for each in before:
         await command_if_ours(
-            context, each, lambda: _untouched(context), lambda: in_role(context.link, Role.READY)
+            context,
+            each,
+            lambda: _require_untouched(context),
+            lambda: in_role(context.link, Role.READY),
         )
     await context.until(lambda: in_role(context.link, Role.READY))
     await context.preflight.require(Stage.GROUND)
@@ -122,7 +125,7 @@ async def _arm(context: FlightContext) -> None:
         return context.armed()
 
     def ready() -> None:
-        _refuse(vehicle_checks.armed(state))
+        _refuse_unsafe(vehicle_checks.armed(state))
         require_role(context.link, {Role.READY})
 
     context.arm_sent = True
@@ -131,10 +134,10 @@ async def _arm(context: FlightContext) -> None:
     await context.until(armed, "the vehicle to be armed")
 
 
-def _untouched(context: FlightContext) -> None:
+def _require_untouched(context: FlightContext) -> None:
     """Raise `FlightEnded` if somebody armed the vehicle or changed its mode since the checks."""
     state = context.link.state
-    _refuse(vehicle_checks.armed(state))
+    _refuse_unsafe(vehicle_checks.armed(state))
     if state.mode != context.mode_at_checks:
         raise FlightEnded(
             f"the pilot or another station took over before arming: mode {state.mode}"
@@ -161,14 +164,14 @@ def _require_flyable_by_vehicle(context: FlightContext) -> None:
 
 def _ready(context: FlightContext) -> bool:
     state = context.link.state
-    _refuse(vehicle_checks.armed(state))
-    _refuse(vehicle_checks.battery(context.config, state))
+    _refuse_unsafe(vehicle_checks.armed(state))
+    _refuse_unsafe(vehicle_checks.battery(context.config, state))
     missing = context.link.autopilot.not_ready(state.readiness)
     context.detail = "" if missing is None else f"{missing}, in mode {state.mode}"
     return missing is None
 
 
-def _refuse(finding: Finding) -> None:
+def _refuse_unsafe(finding: Finding) -> None:
     if finding.result is CheckResult.UNSAFE:
         raise FlightEnded(finding.sentence())
 

@@ -18,7 +18,7 @@ from companion.flight.wiring import connected
 from companion.realtime import RealtimeSettings
 from companion.recording.closing_words import LEFT_BY_USER
 from companion.recording.measurements.summary import Summary
-from companion.safety.actions import internal
+from companion.safety.actions import fault_message
 from companion.vehicle.link import Link
 
 
@@ -121,7 +121,6 @@ class Session:
         return record.save(summary)
 
     async def _run(self, link: Link, assembled: Assembled) -> str:
-        """Fly over the open link."""
         flight = assembled.flight
         with connected(link, assembled):
             # In a task of its own: `leave` ends the flight but not the writing of the files.
@@ -141,4 +140,4 @@ class Session:
         try:
             await assembled.reporter.run()
         except Exception as error:
-            assembled.flight.note(internal(error))
+            assembled.flight.note(fault_message(error))

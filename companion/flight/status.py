@@ -11,14 +11,15 @@ from companion.attitude.kinematics import tilt_angle
 from companion.control.loop_record import LoopRecord
 from companion.control.tracking_record import flown_part
 from companion.flight.context import FlightContext
+from companion.flight.phases import Phase
 from companion.flight.status_rows import StatusRows
 from companion.flight.view import view
 from companion.recording.trace import FlightTrace
 from companion.safety import SafetyLadder
-from companion.safety.actions import internal
+from companion.safety.actions import fault_message
 from companion.vehicle.records import Battery, LocalPosition
 
-_PERIOD = 0.1
+_STATUS_PERIOD = 0.1
 _RATE_WINDOW = 1.0
 """Time over which the rate of setpoints is counted, s."""
 _MAX_TELEMETRY_AGE = 1.0
@@ -44,7 +45,7 @@ class FlightStatus(NamedTuple):
         error: distance from the reference, m.
         rate: rate of setpoints, Hz.
         latency: time from the last answered sample to its setpoint, s; None in lockstep, and while
-            no samples are answered.
+            the control loop is off.
         missed: deadlines missed so far; None in lockstep.
         battery: battery of the vehicle.
         monitored: whether the safety monitors are active.
@@ -75,39 +76,23 @@ class FlightStatus(NamedTuple):
     view: Mapping[str, Any] = MappingProxyType({})
 
 
-class PhaseNow(NamedTuple):
-    """The running phase.
-
-    Attributes:
-        name: shown to the user.
-        timeout: timeout, s.
-        monitored: whether the safety monitors are active in it.
-        entered: when it began, s on our clock.
-    """
-
-    name: str
-    timeout: float
-    monitored: bool
-    entered: float
-
-
 class StatusReporter:
     """Records the motion in all phases, and shows the state of the flight.
 
     Attributes:
         takeoff: time when the vehicle left the ground, s on our clock; None: it has not.
         battery_at_takeoff: remaining charge at that time, 0..1, or None.
-        real_time: as the argument.
+        real_time: whether latencies are meaningful.
 
     Args:
         context: context of the flight.
         ladder: the safety monitors.
         trace: receives the motion.
         began: when the flight began, s on our clock.
-        phase: returns the running phase.
+        phase: returns the running phase, and when it began, s on our clock.
         show: called with the state; it must return at once. None: the state is not shown.
         clock: our clock, s.
-        real_time: whether latencies are meaningful; they are not if the vehicle waits for us.
+        real_time: whether latencies are meaningful: False if the vehicle waits for us.
     """
 
     def __init__(
@@ -116,7 +101,7 @@ class StatusReporter:
         ladder: SafetyLadder,
         trace: FlightTrace,
         began: float,
-        phase: Callable[[], PhaseNow],
+        phase: Callable[[], tuple[Phase, float]],
         show: Callable[[FlightStatus], None] | None,
         clock: Callable[[], float],
         *,
@@ -136,7 +121,7 @@ class StatusReporter:
         while True:
             self.record()
             self._show_status()
-            due = max(due + _PERIOD, self._clock())
+            due = max(due + _STATUS_PERIOD, self._clock())
             await asyncio.sleep(due - self._clock())
 
     def _show_status(self) -> None:
@@ -147,7 +132,7 @@ class StatusReporter:
             self._show(self.status())
         except Exception as error:
             self._show = None
-            self._context.note(internal(error))
+            self._context.note(fault_message(error))
 
     def record(self) -> None:
         """Record the motion, and note the take-off."""
@@ -170,15 +155,15 @@ class StatusReporter:
 
     def status(self) -> FlightStatus:
         """The present state."""
-        now, context, phase = self._clock(), self._context, self._phase()
-        record = context.loop.record
+        now, context = self._clock(), self._context
+        (phase, entered), record = self._phase(), context.loop.record
         flown = flown_part(context.guidance_loop.flown, now)
         return FlightStatus(
             time=now - self._began,
             airborne=None if self.takeoff is None else now - self.takeoff,
             phase=phase.name,
             detail=context.detail,
-            elapsed=now - phase.entered,
+            elapsed=now - entered,
             timeout=phase.timeout,
             maneuver=None if flown is None else flown.name,
             maneuver_elapsed=0.0 if flown is None else flown.elapsed,
@@ -187,7 +172,7 @@ class StatusReporter:
             speed=self._speed(now),
             tilt=self._tilt(now),
             error=self._error(),
-            rate=self._rate(now, record),
+            rate=self._setpoint_rate(now, record),
             latency=1e-9 * record.latency_ns if self.real_time and context.loop.on else None,
             missed=record.missed_deadlines if self.real_time else None,
             battery=context.link.state.battery,
@@ -196,8 +181,8 @@ class StatusReporter:
             view=view(context, now),
         )
 
-    def _rate(self, now: float, record: LoopRecord) -> float | None:
-        """Setpoints in the last second, Hz; None while none are sent."""
+    def _setpoint_rate(self, now: float, record: LoopRecord) -> float | None:
+        """Rate of setpoints over the last second, Hz; None if none was sent."""
         counted = self._counted
         counted.append((now, record.setpoints))
         while len(counted) > 2 and now - counted[1][0] >= _RATE_WINDOW:

@@ -4,7 +4,6 @@ import resource
 from collections.abc import Callable
 from math import nan
 from time import process_time
-from typing import Protocol
 
 from companion.flight.context import FlightContext
 from companion.flight.fence_rows import FenceRows
@@ -13,20 +12,6 @@ from companion.recording.recorder import FlightRecorder
 
 _RESOURCES_PERIOD = 1.0
 _KB_PER_MB = 1024.0
-
-
-class Recording(Protocol):
-    """A file that is being recorded."""
-
-    @property
-    def waiting(self) -> int:
-        """Number of items that wait to be written."""
-        ...
-
-    @property
-    def dropped(self) -> int:
-        """Number of items that were not recorded."""
-        ...
 
 
 class StatusRows:
@@ -71,8 +56,8 @@ class StatusRows:
             nan if remaining is None else remaining,
         )
 
-    def _resources(self, now: float, recorder: Recording) -> tuple[float, ...]:
-        """The row of `RESOURCES`; in a test the processor time includes the mock vehicle's."""
+    def _resources(self, now: float, recorder: FlightRecorder) -> tuple[float, ...]:
+        """The row of `RESOURCES`; in a test, the mock vehicle's processor time is included."""
         processor_s, before = process_time(), self._processor_s
         elapsed, self._measured_at = now - self._measured_at, now
         self._processor_s = processor_s

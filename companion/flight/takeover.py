@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Callable
 from contextlib import suppress
 
-from companion.flight.context import SLOWEST_HEARTBEAT, FlightContext
+from companion.flight.context import INITIAL_HEARTBEAT_LIMIT, FlightContext
 from companion.flight.preflight_phases import note_heartbeat_rate, report_offboard_loss
 from companion.preflight.evidence import Stage
 from companion.safety.actions import Exit, FlightEnded
@@ -41,10 +41,10 @@ async def check_standing(context: FlightContext) -> None:
 async def _check(
     context: FlightContext, stage: Stage, require: Callable[[FlightContext], None]
 ) -> None:
-    """Run the checks of a stage; call `require` before and after, which raises in a wrong state."""
+    """Run the checks of a stage; before and after them, `require` raises if the state is wrong."""
     context.same_vehicle.begin()
     context.same_vehicle.commit()
-    context.heartbeat_limit = SLOWEST_HEARTBEAT
+    context.heartbeat_limit = INITIAL_HEARTBEAT_LIMIT
     context.detail = "requesting telemetry"
     await context.preflight.ask_for_telemetry()
     state = context.link.state

@@ -21,7 +21,7 @@ def overview(trajectory: Trajectory) -> str:
 
 
 def slowing(before: Trajectory, slow_down: SlowDown) -> tuple[str, ...]:
-    """What was slowed down, where, by which limit, and the speed left; empty if nothing was."""
+    """Messages: what was slowed down, where, for which limit, and what remains; may be empty."""
     if not slow_down.parts:
         return ()
     after = slow_down.trajectory
@@ -34,12 +34,12 @@ def slowing(before: Trajectory, slow_down: SlowDown) -> tuple[str, ...]:
         note = (
             f"{before.name} is slowed down evenly, by a factor of {whole.factor:.2f}, because "
             f"{slow_down.reason}; "
-            f"{_limit(after, whole)}"
+            f"{_tightest_limit(after, whole)}"
         )
         return (f"{note}; {result}",)
     parts = "; ".join(
         f"from {part.begin:.1f} to {part.end:.1f} s by a factor of up to {part.factor:.2f}, "
-        f"{_limit(after, part)}"
+        f"{_tightest_limit(after, part)}"
         for part in slow_down.parts[:_MOST_PARTS_SHOWN]
     )
     more_count = len(slow_down.parts) - _MOST_PARTS_SHOWN
@@ -47,7 +47,7 @@ def slowing(before: Trajectory, slow_down: SlowDown) -> tuple[str, ...]:
     return (f"{before.name} is slowed down where limits ask for it: {parts}", result)
 
 
-def _limit(trajectory: Trajectory, part: SlowedPart) -> str:
+def _tightest_limit(trajectory: Trajectory, part: SlowedPart) -> str:
     north, east, down = trajectory.at(part.time).position
     return (
         f"the tightest limit: {part.limit} at {part.time:.1f} s ({north:.1f} m north, "

@@ -1,4 +1,4 @@
-"""The vehicle's identity: is it still the checked one, and what did earlier flights learn?"""
+"""The vehicle's identity: whether it is still the checked one, and what earlier flights learned."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +12,8 @@ from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.link import Link
 
 LONGEST_SILENCE = 2.0
-"""A connected vehicle sends a frame within this time, s, even on the worst permitted link."""
+"""After a longer silence the vehicle may be another one, s; on the worst permitted link it sends a
+frame earlier."""
 _LONGEST_UPDATE = 0.1
 """A longer interval between two updates is our own stall and does not count as silence, s."""
 
@@ -40,7 +41,7 @@ class SameVehicle:
         self._other_uid: str | None = None
         self._frames = 0
         self._updated_at = clock()
-        self._silent_for = self._silence = 0.0
+        self._silent_for = self._past_silence = 0.0
 
     def begin(self) -> None:
         """Begin to watch: from now on, every frame must come from one vehicle."""
@@ -48,14 +49,14 @@ class SameVehicle:
         self._uid = self._other_uid = None
         self._peers, self._restarts = self._link.stats.peers, self._link.clock.restarts
         self._frames, self._updated_at = self._link.stats.frames, self._clock()
-        self._silent_for = self._silence = 0.0
+        self._silent_for = self._past_silence = 0.0
 
     def commit(self) -> None:
         """Note that the vehicle is being armed: from now on a replacement ends the flight.
 
         Silence is then a matter of the watch and the safety monitors.
         """
-        self._committed, self._silence = True, 0.0
+        self._committed, self._past_silence = True, 0.0
 
     def update(self) -> None:
         """Measure the silence; the watch calls this 50 times a second."""
@@ -65,7 +66,7 @@ class SameVehicle:
             self._silent_for += min(since, _LONGEST_UPDATE)
             return
         if self._silent_for > LONGEST_SILENCE and not self._committed:
-            self._silence = self._silent_for
+            self._past_silence = self._silent_for
         self._frames, self._silent_for = frames, 0.0
 
     def note_identity(self, identity: Identity) -> None:
@@ -87,7 +88,7 @@ class SameVehicle:
             self._peers == self._link.stats.peers
             and self._restarts == self._link.clock.restarts
             and self._other_uid is None
-            and not self._silence
+            and not self._past_silence
             and (self._silent_for <= LONGEST_SILENCE or self._committed)
         ) or not self._begun
 
@@ -115,8 +116,8 @@ class SameVehicle:
             return f"the autopilot may have restarted: {self._link.clock.last_change}"
         if self._other_uid is not None:
             return f"another vehicle answers: hardware id {self._other_uid}, not {self._uid}"
-        if self._silence:
-            return f"the vehicle was not heard for {self._silence:.1f} s"
+        if self._past_silence:
+            return f"the vehicle was not heard for {self._past_silence:.1f} s"
         return None
 
 
@@ -147,18 +148,18 @@ class VehicleMemory:
         self._estimate, self._note = estimate, note
         self._file: LearnedFile | None = None
         self._uid: str | None = None
-        self._known: KnownDrag | None = None
+        self._known_drag: KnownDrag | None = None
         self.on_begin: Callable[[KnownDrag], None] = lambda _: None
         self.on_known: Callable[[KnownDrag], None] = lambda _: None
 
     def load(self, identity: Identity) -> KnownDrag:
         """What is known of this vehicle's drag; it is read when the vehicle is first identified."""
-        if self._known is None or identity.uid != self._uid:
+        if self._known_drag is None or identity.uid != self._uid:
             self._uid = identity.uid
-            self._known = of_vehicle(self._config, self._directory, identity.uid)
-            self._begin(self._known)
-            self.on_known(self._known)
-        return self._known
+            self._known_drag = of_vehicle(self._config, self._directory, identity.uid)
+            self._begin(self._known_drag)
+            self.on_known(self._known_drag)
+        return self._known_drag
 
     def _begin(self, known: KnownDrag) -> None:
         """Start the estimate for another vehicle; one without an id changes nothing."""

@@ -8,7 +8,7 @@ from companion.flight.context import FlightContext
 from companion.guidance.reference import GRAVITY, Reference
 
 _AXES = ("north", "east", "down")
-_RATES = ("roll", "pitch", "yaw")
+_RATE_AXES = ("roll", "pitch", "yaw")
 
 
 def view(context: FlightContext, now: float) -> dict[str, Any]:
@@ -51,7 +51,7 @@ def _attitude(context: FlightContext, now: float) -> dict[str, float | None]:
         north, east = coefficients(sample.q)
         shown.update(zip(("q_w", "q_x", "q_y", "q_z"), sample.q, strict=True))
         shown.update(measured_north=north, measured_east=east)
-        shown.update(_named("measured", sample.body_rates, "rad_s", _RATES))
+        shown.update(_named("measured", sample.body_rates, "rad_s", _RATE_AXES))
     if command is not None and loop.on:
         target = command.target_at(now)
         shown.update(target_north=target.north, target_east=target.east)

@@ -10,13 +10,13 @@ from companion.flight.context import FlightContext
 from companion.flight.phases import Phase
 from companion.mavlink.errors import LinkError
 from companion.safety import SafetyLadder
-from companion.safety.actions import EXITS, Action, Exit, FlightEnded
+from companion.safety.actions import EXIT_OF_ACTION, Action, Exit, FlightEnded
 from companion.safety.snapshot import Health
 from companion.vehicle.autopilot import Role
 from companion.vehicle.link import Link
 from companion.vehicle.records import outdated
 
-_STATUS_PERIOD = 0.45
+_CURRENT_MODE_PERIOD = 0.45
 """Time since the last CURRENT_MODE below which a new one reports a change, s; PX4 sends one every
 0.5 s.
 """
@@ -36,23 +36,23 @@ class RateRequester:
 
     Args:
         link: link to the vehicle.
-        section: the configured rates.
+        link_config: section `link` with the wanted and the smallest rates.
     """
 
-    def __init__(self, link: Link, section: LinkConfig) -> None:
+    def __init__(self, link: Link, link_config: LinkConfig) -> None:
         self.note: Callable[[str], None] = lambda _: None
         self._link = link
-        self._section = section
+        self._link_config = link_config
         self._tasks: dict[str, asyncio.Task[None]] = {}
 
     def check(self, health: Health) -> None:
         """Request each message whose rate is too low now."""
-        section = self._section
+        wanted = self._link_config
         answers, positions = health.answer_rate, health.position_rate
-        if health.gaps or (answers is not None and answers < section.min_attitude_rate_hz):
-            self._request_once("ATTITUDE_QUATERNION", section.attitude_rate_hz)
-        if positions is not None and positions < section.min_position_rate_hz:
-            self._request_once("LOCAL_POSITION_NED", section.position_rate_hz)
+        if health.gaps or (answers is not None and answers < wanted.min_attitude_rate_hz):
+            self._request_once("ATTITUDE_QUATERNION", wanted.attitude_rate_hz)
+        if positions is not None and positions < wanted.min_position_rate_hz:
+            self._request_once("LOCAL_POSITION_NED", wanted.position_rate_hz)
 
     def _request_once(self, message: str, rate: float) -> None:
         if message not in self._tasks:
@@ -67,7 +67,7 @@ class RateRequester:
 
 
 class Watch:
-    """Detects what the control loop cannot: silence, takeovers and breaches of the monitors.
+    """Detects what the control loop cannot: silence, takeovers and breaches of safety limits.
 
     Args:
         context: context of the flight.
@@ -119,7 +119,7 @@ class Watch:
             FlightEnded: the phase must end; see `judge`.
         """
         now = self._clock()
-        early, self._status_at = now - self._status_at < _STATUS_PERIOD, now
+        early, self._status_at = now - self._status_at < _CURRENT_MODE_PERIOD, now
         asking = self._heartbeat_request is not None and not self._heartbeat_request.done()
         if early and not asking and now - self._heartbeat_asked_at >= _HEARTBEAT_REQUEST_PERIOD:
             self._heartbeat_asked_at = now
@@ -154,7 +154,7 @@ class Watch:
             return
         if verdict.mutes:
             self._context.release()
-        raise FlightEnded(verdict.reason, EXITS[verdict.action])
+        raise FlightEnded(verdict.reason, EXIT_OF_ACTION[verdict.action])
 
     def _judge_heartbeat(self) -> None:
         state, now = self._context.link.state, self._clock()

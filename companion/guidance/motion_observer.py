@@ -6,7 +6,7 @@ from itertools import islice
 from math import exp
 from typing import NamedTuple
 
-from companion.attitude.history import between
+from companion.attitude.history import locate_time
 from companion.guidance.reference import Horizontal, Vector, VehicleMotion, limited, rotated
 
 _LARGEST_STEP = 0.5
@@ -231,6 +231,6 @@ class SlopeHistory:
             after = time - times[-1]
             north, east = sums[-1]
             return north + after * self.newest[0], east + after * self.newest[1]
-        later, share = between(times, time)
+        later, share = locate_time(times, time)
         (n0, e0), (n1, e1) = islice(sums, later - 1, later + 1)
         return n0 + share * (n1 - n0), e0 + share * (e1 - e0)

@@ -12,7 +12,7 @@ from companion.vehicle.parameter_rules import CheckResult
 
 Check = Callable[[Config, Evidence], Iterator[Finding]]
 
-ONCE: tuple[Check, ...] = (
+CHECKED_ONCE: tuple[Check, ...] = (
     offboard_loss,
     configuration_checks.planner,
     configuration_checks.dead_time,
@@ -25,8 +25,8 @@ ONCE: tuple[Check, ...] = (
 CHECKS: tuple[Check, ...] = (
     link_checks.signing,
     vehicle_checks.version,
-    vehicle_checks.motors,
-    vehicle_checks.power,
+    vehicle_checks.disarmed_on_ground,
+    vehicle_checks.battery_charge,
     vehicle_checks.readiness,
     vehicle_checks.gps,
     vehicle_checks.ground,
@@ -40,16 +40,16 @@ CHECKS: tuple[Check, ...] = (
     clock_checks.age,
     clock_checks.clocks,
     parameters,
-    *ONCE,
+    *CHECKED_ONCE,
 )
 
 
 def run_checks(config: Config, evidence: Evidence, *, again: bool = False) -> list[Finding]:
-    """Run all checks, but with `again` not those in `ONCE`; return all findings, also safe ones."""
+    """All findings, also safe ones; `again`: without the checks in `CHECKED_ONCE`."""
     return [
         finding
         for check in CHECKS
-        if not (again and check in ONCE)
+        if not (again and check in CHECKED_ONCE)
         for finding in check(config, evidence)
     ]
 
@@ -78,5 +78,5 @@ def overall_result(config: Config, findings: Iterable[Finding]) -> CheckResult:
 
 
 def unsafe(findings: Iterable[Finding]) -> list[Finding]:
-    """The findings that may hurt somebody or lose the vehicle."""
+    """The findings because of which somebody may be hurt or the vehicle lost."""
     return [finding for finding in findings if finding.result is CheckResult.UNSAFE]

@@ -12,8 +12,8 @@ from companion.vehicle.parameter_rules import CheckResult
 
 SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 
-_MANY_NOT_NEWER = 0.2
-_SAMPLES_NEEDED = 10
+_UNSAFE_NOT_NEWER_SHARE = 0.2
+_MIN_SAMPLES = 10
 _SHAKING_PRODUCT, _MAYBE_SHAKING_PRODUCT = 0.3, 0.15
 """Products of planner.gain_per_s and the round trip, from mock vehicles. Above the first, attitude
 oscillates at the limit of the roll-pitch rate; above the second, that of a slow vehicle may.
@@ -21,7 +21,7 @@ oscillates at the limit of the roll-pitch rate; above the second, that of a slow
 
 
 def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Age of a sample at arrival, if TIMESYNC can measure it."""
+    """Whether samples are fresh at arrival, if TIMESYNC can measure their age."""
     seconds, stale = evidence.samples.age, config.deadman.telemetry_stale
     if seconds is None:
         if evidence.link.other_clock:
@@ -39,7 +39,7 @@ def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
         Key.AGE,
         UNSAFE if late else SAFE,
         f"attitude is {1e3 * seconds:.1f} ms old when it arrives"
-        + (", longer than deadman.telemetry_stale_ms" if late else ""),
+        + (f", more than deadman.telemetry_stale_ms = {1e3 * stale:g}" if late else ""),
         "such samples would not be answered" if late else "",
         "find what holds the messages up: a router, a full queue, a slow link" if late else "",
         "TIMESYNC and ATTITUDE_QUATERNION time_boot_ms",
@@ -49,8 +49,9 @@ def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
 def round_trip(config: Config, seconds: float) -> Finding:
     """Judge whether the gain is too high for a round trip of this many seconds.
 
-    Setpoints reach the vehicle that late. Every round trip is safe in lockstep, where the vehicle
-    waits, and with a planner of another package, whose gain may mean something else.
+    A setpoint answers an attitude that is older by the round trip. Every round trip is safe in
+    lockstep, where the vehicle waits, and with a planner of another package, whose gain may mean
+    something else.
     """
     gain = config.planner.gain_per_s
     gain_matters = config.planner_name in PLANNER_NAMES and not config.link.lockstep
@@ -62,7 +63,7 @@ def round_trip(config: Config, seconds: float) -> Finding:
         f"the link's round trip takes {1e3 * seconds:.1f} ms"
         + (f", long for planner.gain_per_s {gain:g}" if late else ""),
         "the vehicle shakes, because the attitude is corrected too late" if late else "",
-        f"use a faster link, or a gain of at most {_MAYBE_SHAKING_PRODUCT / seconds:.1f}"
+        f"use a faster link, or lower planner.gain_per_s to {_MAYBE_SHAKING_PRODUCT / seconds:.1f}"
         if late
         else "",
         "TIMESYNC",
@@ -85,14 +86,14 @@ def clocks(config: Config, evidence: Evidence) -> Iterator[Finding]:
     elif samples.not_newer:
         yield Finding(
             Key.CLOCK,
-            UNSAFE if samples.not_newer > _MANY_NOT_NEWER * samples.heard else INEFFECTIVE,
+            UNSAFE if samples.not_newer > _UNSAFE_NOT_NEWER_SHARE * samples.heard else INEFFECTIVE,
             f"{samples.not_newer} of {samples.heard} samples are stamped no later than the one "
             "before",
             "they are not answered, and if that lasts, control is given back",
             "send attitude over one link only; restart the autopilot if its clock stands still",
             source,
         )
-    elif samples.heard >= _SAMPLES_NEEDED and samples.clock_rate is not None:
+    elif samples.heard >= _MIN_SAMPLES and samples.clock_rate is not None:
         yield _clock_rate(config, evidence, samples.clock_rate, source)
 
 

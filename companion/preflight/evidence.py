@@ -124,7 +124,7 @@ class Evidence:
         state: The vehicle's newest telemetry.
         survey: The parameters that matter to a flight.
         streams: Rates requested, granted and counted, by message.
-        received: Number of each of these messages since the link was opened.
+        received: Number of messages since the link was opened, for each message of `streams`.
         window: Time over which messages were counted, s.
         link: Quality of the link.
         samples: Times of the attitude samples.
@@ -155,7 +155,7 @@ class Evidence:
 
     @property
     def awaits_position(self) -> bool:
-        """Whether the vehicle has no position yet."""
+        """Whether the vehicle has no position yet, or its estimator is not ready."""
         readiness = self.state.readiness
         estimator_only = readiness._replace(position=True, home=True, prearm_good=True)
         return not readiness.position or self.autopilot.not_ready(estimator_only) is not None

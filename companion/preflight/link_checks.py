@@ -20,6 +20,10 @@ _MIN_EXPECTED_COUNT = 5.0
 _SENT_ON_CHANGE = {"CURRENT_MODE": 2.0}
 """Messages sent on change, and otherwise only at this rate, Hz, whatever rate is requested (PX4).
 """
+_RATE_KEYS = {
+    "ATTITUDE_QUATERNION": "link.attitude_rate_hz",
+    "LOCAL_POSITION_NED": "link.position_rate_hz",
+}
 _UNSAFE_LOSS_SHARE = 0.2
 _MAX_DAMAGED_SHARE = 0.01
 
@@ -36,15 +40,15 @@ def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
         fault = _rate_fault(name, rate, evidence)
         if name in evidence.awaited and rate.granted >= _MIN_RATE_SHARE * rate.asked:
             continue  # `readiness` reports it
-        even = _even_rate(name, rate, evidence)
-        if name in minimum_rates and even < minimum_rates[name][1]:
+        effective = _effective_rate(name, rate, evidence)
+        if name in minimum_rates and effective < minimum_rates[name][1]:
             key, limit = minimum_rates[name]
-            uneven = even < _MIN_RATE_SHARE * rate.achieved
-            arrives = f"arrives at {even:.0f} Hz"
+            uneven = effective < _MIN_RATE_SHARE * rate.achieved
+            arrives = f"arrives at {effective:.0f} Hz"
             if uneven:
                 arrives = (
                     f"arrives in bursts: {rate.achieved:.0f} Hz on average, but its gaps are as "
-                    f"long as at {even:.0f} Hz"
+                    f"long as at {effective:.0f} Hz"
                 )
             yield Finding(
                 f"link.{key}",
@@ -67,8 +71,8 @@ def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
         yield Finding(Key.STREAMS, SAFE, found, source="counted")
 
 
-def _even_rate(name: str, rate: StreamRate, evidence: Evidence) -> float:
-    """The effective rate, Hz. Bursts lower it, because the pauses between them count in flight."""
+def _effective_rate(name: str, rate: StreamRate, evidence: Evidence) -> float:
+    """The effective rate, Hz: for attitudes, the pauses between bursts lower it."""
     samples = evidence.samples.rate
     if name != "ATTITUDE_QUATERNION" or samples is None:
         return rate.achieved
@@ -78,12 +82,13 @@ def _even_rate(name: str, rate: StreamRate, evidence: Evidence) -> float:
 def _rate_fault(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, str] | None:
     """The fault of a message's rate, and the remedy; None: no fault."""
     asked, achieved = rate.asked, rate.achieved
+    key, faster_loop = _RATE_KEYS.get(name), "raise the rate of the autopilot's loop"
     if rate.refusal:
         return f"{name} is refused ({rate.refusal})", "a newer version of the autopilot may send it"
     if rate.granted < _MIN_RATE_SHARE * asked:
         return (
             f"{name}: asked for {asked:g} Hz, granted {rate.granted:g} Hz",
-            "lower its rate in section link, or let the autopilot's loop run faster",
+            f"lower {key}, or {faster_loop}" if key else faster_loop,
         )
     asked = min(asked, _SENT_ON_CHANGE.get(name, asked))
     countable = asked * evidence.window >= _MIN_EXPECTED_COUNT
@@ -158,7 +163,7 @@ def delays(config: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.ROUND_TRIP,
             UNSAFE,
             f"the link's round trip takes {1e3 * round_trip:.0f} ms, longer than "
-            "deadman.telemetry_stale_ms",
+            f"deadman.telemetry_stale_ms = {1e3 * stale:g}",
             fix="use a faster link",
             source="TIMESYNC",
         )
@@ -179,7 +184,7 @@ def delays(config: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.PAUSES,
             INEFFECTIVE,
             f"attitude paused for {1e3 * samples.longest_pause:.0f} ms, longer than "
-            "deadman.telemetry_stale_ms",
+            f"deadman.telemetry_stale_ms = {1e3 * stale:g}",
             "setpoints pause with it",
             "find what holds the messages up: a router, Wi-Fi, a busy computer",
             "ATTITUDE_QUATERNION",

@@ -11,11 +11,11 @@ from companion.preflight.evidence import OtherNodes, SampleTimes
 from companion.vehicle.held_rates import HeldRates
 from companion.vehicle.link import Link
 
-_HEARTBEAT = dialect.MAVLINK_MSG_ID_HEARTBEAT
-_TYPE_AT = 4
+_HEARTBEAT_ID = dialect.MAVLINK_MSG_ID_HEARTBEAT
+_TYPE_OFFSET = 4
 """Offset of `type` in HEARTBEAT's payload."""
 _ONBOARD_CONTROLLER = bytes([dialect.MAV_TYPE_ONBOARD_CONTROLLER])
-_SETPOINTS = frozenset(
+_SETPOINT_IDS = frozenset(
     {
         dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET,
         dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED,
@@ -55,7 +55,7 @@ class LinkListener:
         self.resets = 0
 
     def __enter__(self) -> "LinkListener":
-        self._before, self._link.on_foreign = self._link.on_foreign, self._on_foreign
+        self._on_foreign_before, self._link.on_foreign = self._link.on_foreign, self._on_foreign
         self._unsubscribe = [
             self._link.subscribe("ATTITUDE_QUATERNION", self._on_attitude),
             self._link.subscribe("ATTITUDE_TARGET", self._on_target),
@@ -64,7 +64,7 @@ class LinkListener:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._link.on_foreign = self._before
+        self._link.on_foreign = self._on_foreign_before
         for unsubscribe in self._unsubscribe:
             unsubscribe()
 
@@ -103,11 +103,11 @@ class LinkListener:
     def _on_foreign(self, frame: Frame) -> None:
         source = frame.system, frame.component
         self._sources.add(source)
-        if frame.message_id in _SETPOINTS:
+        if frame.message_id in _SETPOINT_IDS:
             self._steering.add(source)
         if (
-            frame.message_id == _HEARTBEAT
-            and frame.payload[_TYPE_AT : _TYPE_AT + 1] == _ONBOARD_CONTROLLER
+            frame.message_id == _HEARTBEAT_ID
+            and frame.payload[_TYPE_OFFSET : _TYPE_OFFSET + 1] == _ONBOARD_CONTROLLER
         ):
             self._companions.add(source)
 

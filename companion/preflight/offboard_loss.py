@@ -26,13 +26,13 @@ from companion.preflight.finding import Finding, Key
 from companion.vehicle.parameter_checks import LONGEST_HELD, shortest_rate_hold
 from companion.vehicle.parameter_rules import CheckResult
 
-_PERIOD = 0.05
+_POINT_PERIOD = 0.05
 """Shortest time between the points of the maneuvers that are checked, s."""
 _MAX_POINTS = 1500
 """Largest number of these points; longer maneuvers are checked at longer intervals."""
 _DERIVATIVE_STEP = 0.02
 """Time over which the rate of change of the thrust is taken, s."""
-_START = Pose((0.0, 0.0, 0.0), 0.0)
+_START_POSE = Pose((0.0, 0.0, 0.0), 0.0)
 
 
 class WorstReach(NamedTuple):
@@ -141,17 +141,17 @@ def _motions(
     In open-loop steps the tilt follows the attitude law.
     """
     gain = config.planner.gain_per_s
-    period = max(_PERIOD, maneuvers.duration / _MAX_POINTS)
+    period = max(_POINT_PERIOD, maneuvers.duration / _MAX_POINTS)
     velocity: Vector = (0.0, 0.0, 0.0)
     place: Vector = (0.0, 0.0, 0.0)
     tilt = (0.0, 0.0)
     for index in range(int(maneuvers.duration / period) + 1):
         time = index * period
-        reference = maneuvers.at(time, _START)
+        reference = maneuvers.at(time, _START_POSE)
         if reference.closed_loop:
             place, velocity = reference.position_ned, reference.velocity_ned
             thrust = path_thrust(reference.acceleration_ned, velocity, drag)
-            reference_after = maneuvers.at(time + _DERIVATIVE_STEP, _START)
+            reference_after = maneuvers.at(time + _DERIVATIVE_STEP, _START_POSE)
             thrust_after = path_thrust(
                 reference_after.acceleration_ned, reference_after.velocity_ned, drag
             )

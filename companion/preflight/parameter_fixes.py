@@ -19,7 +19,7 @@ from companion.preflight.finding import Change, Finding
 from companion.vehicle.link import Link
 
 ShortText = Annotated[str, Field(max_length=100)]
-LARGEST = 3.4028234e38
+LARGEST_FLOAT32 = 3.4028234e38
 """Largest finite 32-bit float, which is what PARAM_SET carries."""
 
 
@@ -34,7 +34,7 @@ class Undo(Section):
     """Hardware id of AUTOPILOT_VERSION; null: not received."""
     time: ShortText
     """Time when `doctor --fix` began to propose changes, UTC."""
-    parameters: dict[ShortText, Annotated[float, Field(ge=-LARGEST, le=LARGEST)]]
+    parameters: dict[ShortText, Annotated[float, Field(ge=-LARGEST_FLOAT32, le=LARGEST_FLOAT32)]]
     """Old value of each parameter, in the order in which they were set."""
 
     def meant_for(self, link: Link, identity: Identity) -> bool:

@@ -79,28 +79,28 @@ async def survey(
     Raises:
         LinkLost: The connection was lost.
     """
-    rules, questions = tuple(rules), _Questions(link)
+    rules, requests = tuple(rules), _Requests(link)
     unread: frozenset[str] = frozenset()
     if before is not None:
         unread = before.unread
         rules = tuple(rule for rule in rules if rule.name in before.values)
-        questions.leave_out(
+        requests.leave_out(
             name for rule in rules for name in rule.names if name != before.names[rule.name]
         )
-    await questions.ask(rules, at_first)
+    await requests.ask(rules, at_first)
     # An autopilot that answered nothing at all is a finding of its own.
-    if questions.values and questions.lossy:
-        await questions.ask(questions.unread(rules), once_more)
+    if requests.values and requests.lossy:
+        await requests.ask(requests.unread(rules), once_more)
     return Survey(
-        questions.values,
-        questions.names,
-        unread.union(rule.name for rule in questions.unread(rules)),
-        questions.lossy,
+        requests.values,
+        requests.names,
+        unread.union(rule.name for rule in requests.unread(rules)),
+        requests.lossy,
     )
 
 
-class _Questions:
-    """The requests to a vehicle, and its answers.
+class _Requests:
+    """The parameter requests to a vehicle, and its answers.
 
     Attributes:
         values, names: See `Survey`.
@@ -111,8 +111,8 @@ class _Questions:
         self.names: dict[str, str] = {}
         self._link = link
         self._frames, self._lost = link.stats.frames, link.stats.lost
-        self._free = asyncio.Semaphore(_MAX_OPEN_REQUESTS)
-        self._none: set[str] = set()
+        self._request_slots = asyncio.Semaphore(_MAX_OPEN_REQUESTS)
+        self._skipped_names: set[str] = set()
         self._repeated = False
 
     @property
@@ -127,15 +127,15 @@ class _Questions:
         return self._repeated or lost > SOME_LOST
 
     def leave_out(self, names: Iterable[str]) -> None:
-        """Do not request these names: the parameters have other names in this autopilot."""
-        self._none.update(names)
+        """Do not request these names, because the parameters have others in this autopilot."""
+        self._skipped_names.update(names)
 
     def unread(self, rules: Iterable[ParameterRule]) -> list[ParameterRule]:
         """The rules without a value, except parameters that the autopilot reported as unknown."""
         return [
             rule
             for rule in rules
-            if rule.name not in self.values and not self._none.issuperset(rule.names)
+            if rule.name not in self.values and not self._skipped_names.issuperset(rule.names)
         ]
 
     async def ask(self, rules: Iterable[ParameterRule], policy: RetryPolicy) -> None:
@@ -143,9 +143,9 @@ class _Questions:
         await asyncio.gather(*(self._ask_under_each_name(rule, policy) for rule in rules))
 
     async def _ask_under_each_name(self, rule: ParameterRule, policy: RetryPolicy) -> None:
-        async with self._free:
+        async with self._request_slots:
             for name in rule.names:
-                value = None if name in self._none else await self._value(name, policy)
+                value = None if name in self._skipped_names else await self._value(name, policy)
                 if value is not None:
                     self.values[rule.name], self.names[rule.name] = value, name
                     return
@@ -157,7 +157,7 @@ class _Questions:
             except UnansweredParameter:
                 continue
             except UnknownParameter:
-                self._none.add(name)
+                self._skipped_names.add(name)
                 return None
             except ParameterRefused:
                 return None

@@ -21,7 +21,7 @@ _TITLES = {
     CheckResult.SAFE: ("SAFE", "bold green"),
 }
 
-_RESULTS = {
+_RESULT_WORDS = {
     CheckResult.NOT_CONNECTED: "not connected",
     CheckResult.UNSAFE: "unsafe",
     CheckResult.NOT_READY: "not ready",
@@ -54,21 +54,21 @@ def _table(
 
 
 def _last_line(config: Config, findings: Sequence[Finding]) -> Text:
-    forbidden, amiss = not_accepted(config, findings), len(unsafe(findings))
+    refused, unsafe_count = not_accepted(config, findings), len(unsafe(findings))
     result = overall_result(config, findings)
     if result is CheckResult.NOT_CONNECTED:
         return Text("not connected: nothing was judged", style="bold red")
-    if forbidden:
-        fixable = sum(finding.change is not None for finding in forbidden)
+    if refused:
+        fixable = sum(finding.change is not None for finding in refused)
         fix = f"; `companion doctor --fix` fixes {fixable} of them" if fixable else ""
-        return Text(f"{len(forbidden)} unsafe: `companion fly` refuses{fix}", style="bold red")
+        return Text(f"{len(refused)} unsafe: `companion fly` refuses{fix}", style="bold red")
     if result is CheckResult.NOT_READY:
         return Text(
             "not ready: run again when the vehicle is ready; some checks could not be made",
             style="bold yellow",
         )
-    if amiss:
-        return Text(f"{amiss} unsafe, each excepted by flight.accept", style="bold yellow")
+    if unsafe_count:
+        return Text(f"{unsafe_count} unsafe, each excepted by flight.accept", style="bold yellow")
     return Text("nothing unsafe was found", style="bold green")
 
 
@@ -87,7 +87,7 @@ def as_dict(config: Config, findings: Sequence[Finding]) -> dict[str, Any]:
         result.value: sum(finding.result is result for finding in findings) for result in _TITLES
     }
     return {
-        "result": _RESULTS[overall_result(config, findings)],
+        "result": _RESULT_WORDS[overall_result(config, findings)],
         **counts,
         "findings": [_finding_as_dict(config, finding) for finding in findings],
     }

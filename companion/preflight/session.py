@@ -27,8 +27,8 @@ from companion.vehicle.streams import StreamRate
 
 _LISTENING_TIME = 3.0
 """Time for listening, s; enough to count messages at 2 Hz."""
-_POLL = 0.05
-_WARNING = 4
+_POLL_PERIOD = 0.05
+_WARNING_SEVERITY = 4
 """MAV_SEVERITY of a warning; a lower number is worse."""
 _RELEASE_SUFFIXES = {0: "-dev", 64: "-alpha", 128: "-beta", 192: "-rc", 255: ""}
 """FIRMWARE_VERSION_TYPE, the lowest byte of `flight_sw_version`."""
@@ -95,7 +95,7 @@ async def gather(
 
 def _warnings(link: Link, since: float) -> tuple[str, ...]:
     """The autopilot's texts of severity warning or worse since this time, s."""
-    texts = (text for text in link.state.texts if text.severity <= _WARNING)
+    texts = (text for text in link.state.texts if text.severity <= _WARNING_SEVERITY)
     return tuple(text.text for text in texts if text.time >= since)
 
 
@@ -199,7 +199,7 @@ class PreflightSession:
         with suppress(TimeoutError):
             async with asyncio.timeout(ready_within):
                 while self._is_waiting():  # noqa: ASYNC110 - telemetry sets no events
-                    await asyncio.sleep(_POLL)
+                    await asyncio.sleep(_POLL_PERIOD)
         return await gather(link, granted, _LISTENING_TIME, thorough=True, notices=self._notices)
 
     def _is_waiting(self) -> bool:

@@ -64,13 +64,13 @@ def battery(config: Config, state: VehicleState) -> Finding:
     return Finding(Key.BATTERY, SAFE, f"battery at {100 * remaining:.0f} %", source=source)
 
 
-def motors(_: Config, evidence: Evidence) -> Iterator[Finding]:
+def disarmed_on_ground(_: Config, evidence: Evidence) -> Iterator[Finding]:
     """Whether the vehicle is disarmed before a flight begins."""
     if evidence.stage is Stage.GROUND:
         yield armed(evidence.state)
 
 
-def power(config: Config, evidence: Evidence) -> Iterator[Finding]:
+def battery_charge(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """Whether the battery has enough charge; not ready while a booting vehicle reports none."""
     if evidence.booting and evidence.state.battery is None:
         yield Finding(

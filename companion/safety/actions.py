@@ -2,7 +2,7 @@
 
 from enum import Enum
 
-from companion.attitude.within_limits import PlannerFaultError
+from companion.attitude.plugin_planner import PlannerFaultError
 
 
 class Action(Enum):
@@ -23,7 +23,7 @@ class Action(Enum):
     LAND = "land"
     """Command the autopilot to land, and end offboard control."""
     LISTEN = "listen"
-    """Stop sending setpoints; command a hold once the vehicle is heard and still obeys us."""
+    """Stop sending setpoints; if the vehicle still obeys us once it is heard, command a hold."""
     RELEASE = "release"
     """Stop sending setpoints: the pilot or the autopilot's failsafe flies the vehicle."""
 
@@ -52,7 +52,7 @@ class Exit(Enum):
         return self not in (Exit.LISTEN, Exit.RELEASE)
 
 
-EXITS = {
+EXIT_OF_ACTION = {
     Action.HAND_BACK: Exit.HOLD,
     Action.LAND: Exit.LAND,
     Action.LISTEN: Exit.LISTEN,
@@ -75,8 +75,8 @@ class FlightEnded(Exception):  # noqa: N818 - it is how every flight that stops 
         self.exit = exit
 
 
-def internal(error: Exception) -> str:
-    """The message for an unexpected exception: a bug in this program or in a planner's package."""
+def fault_message(error: Exception) -> str:
+    """The message for an unexpected exception: a fault of this program or of a planner."""
     if isinstance(error, PlannerFaultError):
         return str(error)
     return f"internal error: {error!r}"

@@ -6,9 +6,9 @@ from companion.safety.monitor import Judge
 from companion.safety.snapshot import Snapshot
 from companion.vehicle.records import gps_fault, outdated
 
-ATTITUDE, VELOCITY = 0x1, 0x2 | 0x4
-HORIZONTAL = 0x8 | 0x10
-"""Bits of ESTIMATOR_STATUS_FLAGS; either bit of HORIZONTAL gives a horizontal position."""
+ATTITUDE_FLAG, VELOCITY_FLAGS = 0x1, 0x2 | 0x4
+HORIZONTAL_POSITION_FLAGS = 0x8 | 0x10
+"""Bits of ESTIMATOR_STATUS_FLAGS; the position is valid with either bit of the last."""
 
 
 def disarmed(snapshot: Snapshot, _: bool) -> str | None:
@@ -17,7 +17,7 @@ def disarmed(snapshot: Snapshot, _: bool) -> str | None:
 
 
 def landed(snapshot: Snapshot, _: bool) -> str | None:
-    """The autopilot reports landed in offboard: its land detector or the thrust sent is wrong."""
+    """The autopilot reports landed in offboard: its land detector or the sent thrust is wrong."""
     return "the autopilot says that it has landed" if snapshot.autopilot.landed else None
 
 
@@ -39,7 +39,7 @@ def battery(least: float) -> Judge:
             return None
         return (
             f"battery at {100 * newest.remaining:.0f} %, below "
-            f"limits.min_battery_percent {100 * least:.0f}"
+            f"limits.min_battery_percent = {100 * least:.0f}"
         )
 
     return judge
@@ -60,15 +60,15 @@ def estimator_flags(snapshot: Snapshot, _: bool) -> str | None:
         return None
     if outdated(estimator.received, snapshot.now):
         return "the estimator's state is not reported any more"
-    quantities = ("attitude", ATTITUDE), ("velocity", VELOCITY)
+    quantities = ("attitude", ATTITUDE_FLAG), ("velocity", VELOCITY_FLAGS)
     lost = [name for name, bits in quantities if good & bits & ~estimator.flags]
-    if good & HORIZONTAL and not estimator.flags & HORIZONTAL:
+    if good & HORIZONTAL_POSITION_FLAGS and not estimator.flags & HORIZONTAL_POSITION_FLAGS:
         lost.append("position")
     return f"the estimator reports no valid {', '.join(lost)} any more" if lost else None
 
 
-def estimator_reset(snapshot: Snapshot, _: bool) -> str | None:
-    """The estimator was reset within 30 s. References move with it, so this is only a warning."""
+def any_estimator_reset(snapshot: Snapshot, _: bool) -> str | None:
+    """The estimator was reset in the last 30 s; only a warning, as references move with it."""
     found = snapshot.resets
     if found.recent == 0:
         return None
@@ -78,25 +78,31 @@ def estimator_reset(snapshot: Snapshot, _: bool) -> str | None:
     )
 
 
-def estimator_resets(most: int, shift: float, turn: float) -> Judge:
+def too_many_estimator_resets(most: int, shift: float, turn: float) -> Judge:
     """The estimator was reset more than `most` times within 30 s, or by too much in this flight.
 
-    Too much is a sum of more than `shift` (m) or more than `turn` (rad) of heading, or one jump of
-    the thrust axis by more than half of `turn`.
+    Too much: position jumps of more than `shift` (m) in total, heading jumps of more than `turn`
+    (rad) in total, or one jump of the thrust axis by more than half of `turn`.
     """
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
         found = snapshot.resets
         if found.shift > shift:
-            return f"the autopilot's estimator was reset by {found.shift:.1f} m"
-        if abs(found.turn) > turn:
-            return (
-                f"the autopilot's estimator was reset by {degrees(abs(found.turn)):.0f}° of heading"
+            reset = f"by {found.shift:.1f} m, more than safety.max_reset_m = {shift:g}"
+        elif abs(found.turn) > turn:
+            reset = (
+                f"by {degrees(abs(found.turn)):.0f}° of heading, more than "
+                f"safety.max_reset_deg = {degrees(turn):g}"
             )
-        if found.tilt > 0.5 * turn:
-            return f"the autopilot's estimator was reset by {degrees(found.tilt):.0f}° of tilt"
-        if found.recent > most:
-            return f"the autopilot's estimator was reset {found.recent} times within 30 s"
-        return None
+        elif found.tilt > 0.5 * turn:
+            reset = (
+                f"by {degrees(found.tilt):.0f}° of tilt, more than half of "
+                f"safety.max_reset_deg = {degrees(turn):g}"
+            )
+        elif found.recent > most:
+            reset = f"{found.recent} times within 30 s, more than safety.max_resets = {most}"
+        else:
+            return None
+        return f"the autopilot's estimator was reset {reset}"
 
     return judge

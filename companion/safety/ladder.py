@@ -36,7 +36,7 @@ class SafetyLadder:
         note: called with a message when an alarm is raised or ended.
         on_change: called at the same time with: whether it is raised, the name of the monitor, the
             reason, the action; reason and action are empty if it has ended.
-        breaches: dict from the description of each breach so far to its monitor's name.
+        breaches: descriptions of all breaches so far -> name of the monitor.
     """
 
     def __init__(self, monitors: Sequence[Monitor], hold_time: float) -> None:

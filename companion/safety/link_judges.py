@@ -1,7 +1,7 @@
 """Judges of the data flow: silence, the vehicle's clock, the link, and this computer."""
 
 from companion.control.loop_record import Unanswered
-from companion.safety.monitor import Judge, released, released_minimum
+from companion.safety.monitor import Judge, minimum_with_hysteresis, with_hysteresis
 from companion.safety.snapshot import UNHEARD_S, Control, Snapshot
 
 _STALL_SHARE = 0.5
@@ -55,7 +55,7 @@ def loss(most: float) -> Judge:
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
         lost = snapshot.health.lost
-        if lost is None or lost <= released(most, raised):
+        if lost is None or lost <= with_hysteresis(most, raised):
             return None
         return (
             f"{100 * lost:.0f} % of the vehicle's frames are lost, more than "
@@ -70,7 +70,7 @@ def round_trip(most: float) -> Judge:
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
         seconds = snapshot.health.round_trip
-        if seconds is None or seconds <= released(most, raised):
+        if seconds is None or seconds <= with_hysteresis(most, raised):
             return None
         return (
             f"the link's round trip takes {1e3 * seconds:.0f} ms, longer than "
@@ -85,9 +85,12 @@ def deadlines(most: float) -> Judge:
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
         missed = snapshot.health.missed
-        if missed is None or missed <= released(most, raised):
+        if missed is None or missed <= with_hysteresis(most, raised):
             return None
-        return f"{100 * missed:.0f} % of the answers miss deadman.deadline_ms"
+        return (
+            f"{100 * missed:.0f} % of the setpoints miss deadman.deadline_ms, more than "
+            f"safety.max_missed = {most:g}"
+        )
 
     return judge
 
@@ -97,9 +100,12 @@ def starvation(most: float) -> Judge:
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
         starved = snapshot.health.starved
-        if starved is None or starved <= released(most, raised):
+        if starved is None or starved <= with_hysteresis(most, raised):
             return None
-        return f"CPU starvation: the program's timer lost {100 * starved:.0f} % of the last second"
+        return (
+            f"CPU starvation: the program's timer lost {100 * starved:.0f} % of the last second, "
+            f"more than safety.max_starved = {most:g}"
+        )
 
     return judge
 
@@ -124,7 +130,7 @@ def answer_rate(least: float) -> Judge:
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
         rate = snapshot.health.answer_rate
-        if rate is None or rate >= released_minimum(least, raised):
+        if rate is None or rate >= minimum_with_hysteresis(least, raised):
             return None
         return f"setpoints are sent at {rate:.0f} Hz, below link.min_attitude_rate_hz = {least:g}"
 
@@ -136,7 +142,7 @@ def position_rate(least: float) -> Judge:
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
         rate = snapshot.health.position_rate
-        if rate is None or rate >= released_minimum(least, raised):
+        if rate is None or rate >= minimum_with_hysteresis(least, raised):
             return None
         return f"positions come at {rate:.0f} Hz, below link.min_position_rate_hz = {least:g}"
 

@@ -8,7 +8,7 @@ from companion.safety.snapshot import Snapshot
 
 Judge = Callable[[Snapshot, bool], str | None]
 """Returns the breach in words, or None. The flag tells whether the alarm is already raised; most
-judges with a limit then use `released`, so that the alarm does not toggle at the limit.
+judges with a limit then use `with_hysteresis`, so that the alarm does not toggle at the limit.
 """
 
 HYSTERESIS = 0.9
@@ -17,13 +17,13 @@ it.
 """
 
 
-def released(limit: float, raised: bool) -> float:
-    """The largest value within an upper `limit`, with hysteresis for a raised alarm."""
+def with_hysteresis(limit: float, raised: bool) -> float:
+    """An upper `limit` of a value; while the alarm is raised, 90 % of it."""
     return HYSTERESIS * limit if raised else limit
 
 
-def released_minimum(limit: float, raised: bool) -> float:
-    """The smallest value within a lower `limit`, with hysteresis for a raised alarm."""
+def minimum_with_hysteresis(limit: float, raised: bool) -> float:
+    """A lower `limit` of a value; while the alarm is raised, the limit / 0.9."""
     return limit * (1.0 / HYSTERESIS) if raised else limit
 
 
@@ -34,7 +34,7 @@ class Monitor:
     Attributes:
         name: name in the documentation and in messages.
         judge: see `Judge`; it has no clock and no memory.
-        action: action that a breach causes.
+        action: action that a breach leads to.
         lasts: time that a breach must last before the alarm is raised, s.
         calm: time without the breach before the alarm ends, s.
         then: action that follows if a hold does not end the breach.

@@ -9,7 +9,7 @@ from math import degrees, hypot
 
 from companion.attitude.kinematics import tilt_angle
 from companion.guidance.fence import Fence
-from companion.safety.monitor import Judge, released
+from companion.safety.monitor import Judge, with_hysteresis
 from companion.safety.snapshot import Snapshot
 
 
@@ -21,10 +21,10 @@ def tilt(limit: float) -> Judge:
         if q is None:
             return None
         angle = tilt_angle(q[1], q[2])
-        if angle <= released(limit, raised):
+        if angle <= with_hysteresis(limit, raised):
             return None
         return (
-            f"{degrees(angle):.0f}° of tilt, more than limits.max_tilt_deg + "
+            f"the vehicle tilts by {degrees(angle):.0f}°, more than limits.max_tilt_deg + "
             f"safety.tilt_margin_deg = {degrees(limit):.0f}"
         )
 
@@ -36,7 +36,7 @@ def body_rate(limit: float) -> Judge:
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
         rate = hypot(*snapshot.motion.body_rates)
-        if rate <= released(limit, raised):
+        if rate <= with_hysteresis(limit, raised):
             return None
         return (
             f"the vehicle turns at {degrees(rate):.0f}°/s, faster than "
@@ -51,7 +51,7 @@ def speed(limit: float) -> Judge:
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
         velocity = hypot(*snapshot.motion.velocity)
-        if velocity <= released(limit, raised):
+        if velocity <= with_hysteresis(limit, raised):
             return None
         return (
             f"the vehicle flies at {velocity:.1f} m/s, faster than safety.max_speed_m_s = {limit:g}"
@@ -65,22 +65,25 @@ def tracking(limit: float) -> Judge:
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
         error = snapshot.motion.off_course
-        if error is None or error <= released(limit, raised):
+        if error is None or error <= with_hysteresis(limit, raised):
             return None
-        return f"{error:.1f} m off its course, more than safety.max_tracking_error_m"
+        return (
+            f"the vehicle is {error:.1f} m off its course, more than "
+            f"safety.max_tracking_error_m = {limit:g}"
+        )
 
     return judge
 
 
 def thrust(lowest: float, highest: float) -> Judge:
-    """The thrust is at one of its limits (0..1), so the height may not be held any more."""
+    """The sent thrust is at one of its limits (0..1), so the height may not be held any more."""
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
         sent = snapshot.motion.thrust
         if sent is None or lowest < sent < highest:
             return None
-        key = "min_thrust" if sent <= lowest else "max_thrust"
-        return f"thrust is at limits.{key}"
+        which, limit = ("min", lowest) if sent <= lowest else ("max", highest)
+        return f"thrust is at limits.{which}_thrust = {limit:g}"
 
     return judge
 

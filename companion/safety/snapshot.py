@@ -64,7 +64,8 @@ class Control(NamedTuple):
         placed: arrival of the last position that was newer than all before.
         heard: when the arrival of a frame of any kind from the vehicle was last noticed.
         position_fresh: whether the newest position is fresh.
-        clock_change: jump or restart of the vehicle's clock since control began, in words, or None.
+        clock_change: latest jump, stop or restart of the vehicle's clock since control began, in
+            words, or None.
         stood_still: time for which this program did not run (a stall) since the last answer, s.
     """
 

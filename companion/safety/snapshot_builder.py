@@ -22,17 +22,17 @@ from companion.safety.snapshot import (
 from companion.vehicle.held_rates import HeldRates
 from companion.vehicle.link import Link
 
-_WINDOW = 1.0
+_AVERAGING_TIME = 1.0
 """Averaging time of shares and rates, s."""
 _FILLED_SHARE = 0.9
 """Share of the window that must be filled before shares and rates are known."""
-_LONGEST_INTERVAL = 0.03
+_LONGEST_LISTENING_INTERVAL = 0.03
 """A longer interval between two calls of `listen` is a stall, s; the timer's period is 0.02 s."""
-_PLACE_LASTS = 1.0
-"""Largest age of a GLOBAL_POSITION_INT for the place where control begins, s."""
-_GAPS_WITHIN = 5.0
+_MAX_PLACE_AGE = 1.0
+"""Largest age of the GLOBAL_POSITION_INT that tells where control begins, s."""
+_GAP_COUNTING_TIME = 5.0
 """Time over which gaps in the setpoints are counted, s."""
-_RESETS_WITHIN = 30.0
+_RESET_COUNTING_TIME = 30.0
 """Time over which estimator resets are counted, s."""
 
 
@@ -79,11 +79,11 @@ class SnapshotBuilder:
         self._counted: deque[_Counters] = deque()
         self._frames_heard = 0
         self._heard_at = 0.0
-        self._start: Vector | None = None
-        self._origin: Place | None = None
+        self._fence_centre_ned: Vector | None = None
+        self._fence_place: Place | None = None
         self._began_at = 0.0
-        self._turn = 0.0
-        self._shift: Vector = (0.0, 0.0, 0.0)
+        self._turn_at_begin = 0.0
+        self._shift_at_begin: Vector = (0.0, 0.0, 0.0)
         self._good_flags = 0
         self._clock_changes = 0
 
@@ -96,13 +96,13 @@ class SnapshotBuilder:
         """
         state, resets = self._link.state, self._loop.resets
         motion = self._guidance_loop.motion
-        self._start = None if motion is None else motion.position_ned
-        self._origin = self._place(now)
+        self._fence_centre_ned = None if motion is None else motion.position_ned
+        self._fence_place = self._place(now)
         if centre is not None:
-            self._start = minus(centre.position_ned, resets.shift)
-            self._origin = centre.place
-        self._began_at, self._turn, self._shift = now, resets.turn, resets.shift
-        resets.largest_tilt = 0.0
+            self._fence_centre_ned = minus(centre.position_ned, resets.shift)
+            self._fence_place = centre.place
+        self._began_at, self._turn_at_begin, self._shift_at_begin = now, resets.turn, resets.shift
+        resets.largest_tilt_jump = 0.0
         self._good_flags = 0 if state.estimator is None else state.estimator.flags
         self._clock_changes = self._link.clock.changes
         self._counted.clear()
@@ -110,19 +110,18 @@ class SnapshotBuilder:
     @property
     def fence_centre(self) -> FenceCentre | None:
         """Centre of the fence in the autopilot's frame; None before control or without position."""
-        if self._start is None:
+        if self._fence_centre_ned is None:
             return None
         back = minus((0.0, 0.0, 0.0), self._loop.resets.shift)
-        return FenceCentre(minus(self._start, back), self._origin)
+        return FenceCentre(minus(self._fence_centre_ned, back), self._fence_place)
 
     @property
     def origin_ned(self) -> Vector | None:
-        """Centre of the fence in the frame without estimator resets, m NED; else None.
+        """Centre of the fence in the frame without estimator resets, m NED; None: not known.
 
-        It is known once control began with a known position. It is where control began, unless
-        `begin` got another centre.
+        It is where control began, unless `begin` got another centre.
         """
-        return self._start
+        return self._fence_centre_ned
 
     def unheard(self, now: float) -> float | None:
         """How long no frame has come from the vehicle at `now`, s; None: it is heard."""
@@ -137,7 +136,7 @@ class SnapshotBuilder:
             self._frames_heard, self._heard_at = stats.frames, now
         loop.resets.on_counter(self._link.state.reset_counter, now)
         counted = self._counted
-        late = max(0.0, now - counted[-1].now - _LONGEST_INTERVAL) if counted else 0.0
+        late = max(0.0, now - counted[-1].now - _LONGEST_LISTENING_INTERVAL) if counted else 0.0
         counted.append(
             _Counters(
                 now,
@@ -150,7 +149,7 @@ class SnapshotBuilder:
                 self._link.state.positions,
             )
         )
-        while len(counted) > 2 and now - counted[1].now >= _WINDOW:
+        while len(counted) > 2 and now - counted[1].now >= _AVERAGING_TIME:
             counted.popleft()
 
     def snapshot(self, now: float) -> Snapshot:
@@ -185,14 +184,14 @@ class SnapshotBuilder:
         )
 
     def stood_still(self, since: float) -> float:
-        """How long this program did not run after `since` (event-loop time, s), s.
+        """Total time, s, of the stalls that ended after `since`, s of event-loop time.
 
-        Only stalls that ended within the last second, or are the latest, are known.
+        Only stalls of the last second count, and the latest one.
         """
         return sum(counted.late for counted in self._counted if counted.now > since)
 
     def _motion(self) -> Motion:
-        guidance_loop, loop, start = self._guidance_loop, self._loop, self._start
+        guidance_loop, loop, start = self._guidance_loop, self._loop, self._fence_centre_ned
         offset, velocity = None, (0.0, 0.0, 0.0)
         if guidance_loop.motion is not None:
             (north, east, down), velocity = guidance_loop.motion
@@ -207,16 +206,16 @@ class SnapshotBuilder:
             self._link.state.height,
             guidance_loop.off_course,
             None if idle else loop.record.thrust,
-            self._origin,
+            self._fence_place,
             guidance_loop.acceleration,
         )
 
     def _health(self, now: float) -> Health:
-        since = max(self._began_at, now - _GAPS_WITHIN)
+        since = max(self._began_at, now - _GAP_COUNTING_TIME)
         gaps = sum(at > since for at in self._loop.record.gaps)
         first, last = self._counted[0], self._counted[-1]
         span = last.now - first.now
-        if span < _FILLED_SHARE * _WINDOW:
+        if span < _FILLED_SHARE * _AVERAGING_TIME:
             return Health(round_trip=self._link.timesync.round_trip_s, gaps=gaps)
         late = sum(counted.late for counted in self._counted) - first.late
         lost = last.lost - first.lost
@@ -234,17 +233,17 @@ class SnapshotBuilder:
 
     def _resets(self, now: float) -> Resets:
         resets = self._loop.resets
-        since = max(self._began_at, now - _RESETS_WITHIN)
+        since = max(self._began_at, now - _RESET_COUNTING_TIME)
         return Resets(
             sum(at > since for at in resets.times),
-            dist(resets.shift, self._shift),
-            wrap_angle(resets.turn - self._turn),
-            resets.largest_tilt,
+            dist(resets.shift, self._shift_at_begin),
+            wrap_angle(resets.turn - self._turn_at_begin),
+            resets.largest_tilt_jump,
         )
 
     def _place(self, now: float) -> Place | None:
         """Latitude and longitude of the vehicle, or None if they are old."""
         newest = self._link.state.global_position
-        if newest is None or now - newest.received > _PLACE_LASTS:
+        if newest is None or now - newest.received > _MAX_PLACE_AGE:
             return None
         return Place(newest.latitude_deg, newest.longitude_deg)

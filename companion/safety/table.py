@@ -12,13 +12,13 @@ from companion.safety import autopilot_judges, link_judges, motion_judges
 from companion.safety.actions import Action
 from companion.safety.monitor import Monitor
 
-_BACKLOG = 0.2
+_BACKLOG_TIME = 0.2
 """Time after a stall in which queued telemetry is read, s; until then it looks old."""
-_GAPS = 2
+_MAX_GAPS = 2
 """Largest number of gaps in the setpoints within 5 s."""
-_ESTIMATE_LATE = 0.08
-"""Time by which the estimated horizontal motion is behind the vehicle, s. In a run-up on the mock
-vehicles: ArduPilot's position 0.055 s and velocity up to 0.09 s, PX4's 0.02 s."""
+_ESTIMATE_DELAY = 0.08
+"""Time by which the estimated horizontal motion is behind the vehicle, s. Measured on accelerating
+mock vehicles: ArduPilot's position 0.055 s and velocity up to 0.09 s, PX4's 0.02 s."""
 _RELEASE, _HAND_BACK, _HOLD, _LAND = Action.RELEASE, Action.HAND_BACK, Action.HOLD, Action.LAND
 
 
@@ -50,16 +50,16 @@ def _fixed(config: Config) -> tuple[Monitor, ...]:
 def _autopilot(config: Config) -> tuple[Monitor, ...]:
     """Monitors of battery, GPS and estimator."""
     safety = config.safety
-    resets = autopilot_judges.estimator_resets(
+    resets = autopilot_judges.too_many_estimator_resets(
         safety.max_resets, safety.max_reset_m, safety.max_reset_angle
     )
     battery = autopilot_judges.battery(config.limits.min_battery)
     position = Action(safety.position_action)
     return (
-        Monitor("battery", battery, Action(safety.battery_action), lasts=_BACKLOG, calm=5.0),
-        Monitor("gps", autopilot_judges.gps, position, lasts=_BACKLOG),
+        Monitor("battery", battery, Action(safety.battery_action), lasts=_BACKLOG_TIME, calm=5.0),
+        Monitor("gps", autopilot_judges.gps, position, lasts=_BACKLOG_TIME),
         Monitor("estimator", autopilot_judges.estimator_flags, position, lasts=0.5),
-        Monitor("reset", autopilot_judges.estimator_reset, Action.WARN, lasts=0.1),
+        Monitor("reset", autopilot_judges.any_estimator_reset, Action.WARN, lasts=0.1),
         Monitor("resets", resets, Action(safety.reset_action)),
     )
 
@@ -95,7 +95,7 @@ def _link(config: Config) -> tuple[Monitor, ...]:
     return (
         # The vehicle keeps turning at the last rate until the next setpoint. A low rate of
         # setpoints causes errors of a few degrees; a gap of 0.4 s exceeds the whole tilt limit.
-        Monitor("answer gaps", link_judges.gaps(_GAPS), _HAND_BACK),
+        Monitor("answer gaps", link_judges.gaps(_MAX_GAPS), _HAND_BACK),
         Monitor("answer rate", answers, _HAND_BACK, lasts=1.0),
         Monitor("position rate", positions, _HAND_BACK, lasts=1.0),
         Monitor("link loss", link_judges.loss(safety.max_loss), link, lasts=2.0, calm=2.0),
@@ -108,4 +108,4 @@ def _link(config: Config) -> tuple[Monitor, ...]:
 
 def fence_of(config: Config) -> Fence:
     """The fence from the sections `limits` and `safety`; it allows for a late estimate."""
-    return replace(config.fence, late=_ESTIMATE_LATE)
+    return replace(config.fence, late=_ESTIMATE_DELAY)

@@ -16,7 +16,7 @@ from companion.flight.wiring import connected
 from companion.mavlink.framing import Frame
 from companion.mavlink.messages import dialect
 from companion.recording.measurements.summary import Summary
-from companion.safety.actions import internal
+from companion.safety.actions import fault_message
 from companion.safety.snapshot_builder import FenceCentre
 from companion.serve.component import WARNING, Component
 from companion.serve.flight_records import FlightRecords
@@ -190,7 +190,7 @@ class ServedFlight:
         try:
             await work
         except Exception as error:
-            self._assembled.flight.note(internal(error))
+            self._assembled.flight.note(fault_message(error))
 
     def _tell_alarm(self, text: str) -> None:
         """Send the text of a safety monitor to the clients."""

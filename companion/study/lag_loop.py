@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.attitude import BodyRates, Planner, Quaternion, Target
-from companion.attitude.rotation import turned
+from companion.attitude.rotation import after_constant_rates
 
 Floats = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ class LagBody:
             p, r, y = self._delayed[0]
             roll, pitch, yaw = roll - p, pitch - r, yaw - y
             rates = (p + mean * roll, r + mean * pitch, y + mean * yaw)
-            self.q = turned(self.q, rates, 1.0 / STEP_HZ)
+            self.q = after_constant_rates(self.q, rates, 1.0 / STEP_HZ)
             roll, pitch, yaw = p + kept * roll, r + kept * pitch, y + kept * yaw
         self.rates = BodyRates(roll, pitch, yaw)
 

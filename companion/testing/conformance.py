@@ -18,7 +18,7 @@ from companion.attitude import (
     coefficients,
     make_planner,
 )
-from companion.attitude.rotation import turned
+from companion.attitude.rotation import after_constant_rates
 from companion.testing.flying import fly
 from companion.testing.vehicle import MockVehicle
 
@@ -117,7 +117,7 @@ def _check_convergence(planner: str | Law | type[Planner], begin: Target, end: T
     made.reset(q, rates)
     for _ in range(round(_SETTLING_TIME / _DT)):
         rates = BodyRates(*made.rates(q, end, _DT, rates))
-        q = turned(q, rates, _DT)
+        q = after_constant_rates(q, rates, _DT)
     reached = coefficients(q)
     remaining = hypot(reached.north - end.north, reached.east - end.east)
     assert remaining < _MAX_REMAINING_ERROR, (

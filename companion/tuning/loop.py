@@ -112,7 +112,7 @@ def control_loop(config: Config, s: Complex, error: ModelError = EXACT) -> Loop:
     forward, back = _planner(config, s)
     axis, times = _slower_axis(config), error.time_factor
     late = np.exp(-s * (times * axis.dead_time + error.delay))
-    rates = error.gain * late / (1.0 + times * s * (axis.lag + times * s * axis.square)) / s
+    rates = error.gain * late / (1.0 + times * s * (axis.lag + times * s * axis.sigma)) / s
     held = hold_element(s, 1.0 / config.link.attitude_rate_hz)
     measured = guidance_feedback(
         s, guidance, observer_settings(config), drag, 1.0 / config.link.position_rate_hz
@@ -156,7 +156,7 @@ def _planner(config: Config, s: Complex) -> tuple[Complex, float]:
     axis = _slower_axis(config)
     back, slowest = feedback_gain(gain, axis), model_lag(gain, axis.lag)
     braking = 1.0 + gain * braking_lead(gain, slowest)
-    model = gain / (s * (braking + s * (slowest + s * axis.square)) + gain)
-    led = s * (1.0 + s * (axis.lag + s * axis.square))
+    model = gain / (s * (braking + s * (slowest + s * axis.sigma)) + gain)
+    led = s * (1.0 + s * (axis.lag + s * axis.sigma))
     forward = (led + back * np.exp(-s * axis.dead_time)) * model
     return forward, back

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.control.hold_settings import disturbance_bandwidth, hold_weights, slewing_delay
-from companion.control.inner_loop import LARGEST_PRODUCT, sensible_gain
+from companion.control.inner_loop import LARGEST_GAIN_TIMES_DELAY, sensible_gain
 from companion.files import bounded_yaml
 from companion.tuning.expectation import Expectation
 from companion.tuning.flights import CourseResult
@@ -112,7 +112,8 @@ def _reasons(proposal: Proposal) -> dict[str, str]:
     capped = design.gain > 0.97 * limit
     slewing = slewing_delay(tuned)
     if capped:
-        why = f"the largest sensible gain, {LARGEST_PRODUCT} / (lag + dead time) = {limit:.2f}"
+        sensible = f"{LARGEST_GAIN_TIMES_DELAY} / (lag + dead time)"
+        why = f"the largest sensible gain, {sensible} = {limit:.2f}"
         if limit < sensible_gain(tuned):
             why = f"the largest gain that is searched, {limit:g}"
     elif slewing:

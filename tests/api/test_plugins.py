@@ -8,7 +8,7 @@ from math import hypot, isfinite, nan
 import pytest
 
 from companion.attitude import BodyRates, InvalidTargetError, Limits, Target
-from companion.attitude.within_limits import InvalidRatesError, WithinLimits
+from companion.attitude.plugin_planner import InvalidRatesError, PluginPlanner
 from companion.cli.main import main
 from companion.config import Config
 from companion.control.inner_loop import planner
@@ -144,7 +144,7 @@ def test_rates_that_are_not_finite_are_refused():
             return nan, 0.0, 0.0
 
     with pytest.raises(InvalidRatesError):
-        WithinLimits(Nothing(), Limits()).rates((1.0, 0.0, 0.0, 0.0), Target(0.4, 0.3, 0.0), 0.004)
+        PluginPlanner(Nothing(), Limits()).rates((1.0, 0.0, 0.0, 0.0), Target(0.4, 0.3, 0.0), 0.004)
     with pytest.raises(InvalidTargetError):
         planner(config("planner: {name: mine}")).rates(
             (1.0, 0.0, 0.0, 0.0), Target(nan, 0.0, 0.0), 0.004
@@ -163,7 +163,7 @@ def test_the_rest_of_a_planner_is_passed_on():
             self.noted = arguments
 
     spy = Spy()
-    made = WithinLimits(spy, Limits())
+    made = PluginPlanner(spy, Limits())
     made.reset((1.0, 0.0, 0.0, 0.0), None)
     made.note_attitude_target((1.0, 0.0, 0.0, 0.0), 0.1)
     assert spy.was_reset == ((1.0, 0.0, 0.0, 0.0), None)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from companion.attitude import BodyRates, Limits, Target, make_planner
 from companion.attitude.rate_response import AxisResponse, RateResponse
-from companion.attitude.yaw import OLDEST, TargetFrame
+from companion.attitude.yaw import OLDEST_ATTITUDE_TARGET, TargetFrame
 from tests.attitude.independent import attitudes, coefficients_of
 from tests.attitude.simulate import quaternion
 
@@ -133,7 +133,7 @@ UNUSABLE = {
     "zero": lambda plant: ((0.0, 0.0, 0.0, 0.0), 0.0),
     "upside down": lambda plant: ((0.0, 1.0, 0.0, 0.0), 0.0),
     "of the future": lambda plant: (turned_away(plant, 0.5), -0.01),
-    "too old": lambda plant: (turned_away(plant, 0.5), OLDEST + 0.01),
+    "too old": lambda plant: (turned_away(plant, 0.5), OLDEST_ATTITUDE_TARGET + 0.01),
     "of no known age": lambda plant: (turned_away(plant, 0.5), nan),
     "far ahead of the body": lambda plant: (turned_away(plant, 1.0), 0.0),
 }
@@ -183,10 +183,10 @@ def test_it_turns_no_faster_than_the_slew_limit():
 def test_the_lead_is_derived_where_acceleration_is_limited():
     """Yaw's dead time and lag, less the dead time of roll and pitch; 0 where nothing is limited."""
     tilt, yaw = AxisResponse(0.02, 0.015, 20.0), AxisResponse(0.056, 0.143, 4.7)
-    assert RateResponse(tilt, tilt, yaw).lead == pytest.approx(0.184)
-    assert RateResponse(tilt, tilt, yaw, 0.04).lead == 0.04
-    assert RateResponse(tilt, tilt, yaw, 0.0).lead == 0.0
-    assert RateResponse(AxisResponse(0.047, 0.04), yaw=AxisResponse(0.37, 0.1)).lead == 0.0
+    assert RateResponse(tilt, tilt, yaw).lead_time == pytest.approx(0.184)
+    assert RateResponse(tilt, tilt, yaw, 0.04).lead_time == 0.04
+    assert RateResponse(tilt, tilt, yaw, 0.0).lead_time == 0.0
+    assert RateResponse(AxisResponse(0.047, 0.04), yaw=AxisResponse(0.37, 0.1)).lead_time == 0.0
 
 
 def test_an_older_report_is_completed_by_the_rates_sent_since_it_was_measured():
@@ -197,9 +197,9 @@ def test_an_older_report_is_completed_by_the_rates_sent_since_it_was_measured():
         frame.advance(0.5, 0.1, 0.004)
     frame.note(2.0, 0.04)  # after it was measured, ten samples turned the target
     assert frame.heading() == pytest.approx(2.0 + 0.4 * 0.04)
-    frame.note(3.0, OLDEST)  # the oldest that is used; nothing is known of before
+    frame.note(3.0, OLDEST_ATTITUDE_TARGET)  # the oldest that is used; nothing is known of before
     assert frame.heading() == pytest.approx(3.0 + 0.4 * 0.12)
-    frame.note(4.0, OLDEST + 1e-3)
+    frame.note(4.0, OLDEST_ATTITUDE_TARGET + 1e-3)
     assert frame.heading() == pytest.approx(3.0 + 0.4 * 0.12)
     frame.note(4.0, -1e-3)
     assert frame.heading() == pytest.approx(3.0 + 0.4 * 0.12)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from companion.attitude import Limits, Target, make_planner
-from companion.attitude.exact import SHORTEST_SAMPLE
+from companion.attitude.exact import SHORTEST_PERIOD
 from tests.attitude.independent import (
     attitudes,
     coefficients_of,
@@ -150,7 +150,7 @@ def test_in_the_shape_of_the_paper_the_speed_is_limited(rate):
     "limits", [{}, {"max_tilt_rate": W_M}, {"max_tilt_rate": W_M, "max_yaw_rate": YAW_RATE}]
 )
 def test_a_short_sample_is_answered_like_first_order(limits):
-    """Their rates differ by O(dt); from `SHORTEST_SAMPLE` down by nothing more."""
+    """Their rates differ by O(dt); from `SHORTEST_PERIOD` down by nothing more."""
     sample = Sample(0.01, **limits)
     asked = np.column_stack([sample.goal, sample.heading + sample.error])
     targets = [Target(*row) for row in asked.tolist()]
@@ -159,10 +159,10 @@ def test_a_short_sample_is_answered_like_first_order(limits):
     rates = answers(law, sample.r, targets, 0.01)
     apart = {
         dt: np.abs(answers(exact, sample.r, targets, dt) - rates).max() / dt
-        for dt in (1e-2, 1e-3, SHORTEST_SAMPLE)
+        for dt in (1e-2, 1e-3, SHORTEST_PERIOD)
     }
     assert max(apart.values()) < 2.0 * min(apart.values()) < 400.0
-    shortest = answers(exact, sample.r, targets, SHORTEST_SAMPLE)
+    shortest = answers(exact, sample.r, targets, SHORTEST_PERIOD)
     assert (answers(exact, sample.r, targets, 1e-6) == shortest).all()
 
 

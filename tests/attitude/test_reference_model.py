@@ -40,12 +40,12 @@ def moved(model, target, seconds, dt):
 
 
 @pytest.mark.parametrize(("dt", "error"), [(0.004, 1e-3), (0.02, 2e-2), (0.2, 2e-2)])
-@pytest.mark.parametrize("square", [0.0, 0.0015, 0.0026])
+@pytest.mark.parametrize("sigma", [0.0, 0.0015, 0.0026])
 @pytest.mark.parametrize("lag", [0.05, 0.0745, 0.12])
-def test_unlimited_it_is_the_differential_equation(lag, square, dt, error):
+def test_unlimited_it_is_the_differential_equation(lag, sigma, dt, error):
     """σ·c⃛ + τ·c̈ + (1 + p·κ)·ċ = p·(c_d − c), up to what v changes within a step."""
-    speed, order = (0.3, -0.4), 2 if square == 0.0 else 3
-    rows = moved(placed(START, lag=lag, speed=speed, square=square), Target(*GOAL, 0.3), 1.6, dt)
+    speed, order = (0.3, -0.4), 2 if sigma == 0.0 else 3
+    rows = moved(placed(START, lag=lag, speed=speed, sigma=sigma), Target(*GOAL, 0.3), 1.6, dt)
     slowed = max(1.0, (2.7 * 5.0 * lag) ** 0.5)
 
     def derivative(_, state):
@@ -53,7 +53,7 @@ def test_unlimited_it_is_the_differential_equation(lag, square, dt, error):
         push = 5.0 * (np.array(GOAL) - c) - slowed * speed_
         if order == 2:
             return np.concatenate((speed_, push / lag, (0.0, 0.0)))
-        return np.concatenate((speed_, bend, (push - lag * bend) / square))
+        return np.concatenate((speed_, bend, (push - lag * bend) / sigma))
 
     solved = solve_ivp(
         derivative,
@@ -69,17 +69,17 @@ def test_unlimited_it_is_the_differential_equation(lag, square, dt, error):
 
 @pytest.mark.parametrize(("lag", "damping"), [(0.05, 0.7), (0.0745, 0.73), (0.12, 0.7), (0.3, 1.0)])
 def test_a_slow_rate_loop_makes_it_overshoot_by_a_few_percent_at_most(lag, damping):
-    model = placed(START, lag=lag, square=(0.5 * lag / damping) ** 2)
+    model = placed(START, lag=lag, sigma=(0.5 * lag / damping) ** 2)
     rows = moved(model, Target(*GOAL, 0.3), 3.0, 0.004)
     assert rows[:, 0].max() <= GOAL[0] + 0.05 * (GOAL[0] - START[0])
     assert rows[-1, 0] == pytest.approx(GOAL[0], abs=0.02)
 
 
-@pytest.mark.parametrize("square", [0.0015, 0.0026])
-def test_what_a_second_order_is_sent_is_smooth_and_moves_it_along(square):
+@pytest.mark.parametrize("sigma", [0.0015, 0.0026])
+def test_what_a_second_order_is_sent_is_smooth_and_moves_it_along(sigma):
     """Led by τ and σ its rates keep the limit, and their slopes are what they become."""
     lag, dt = 0.0745, 0.004
-    model = placed(START, Limits(None, W_M), lag, square=square)
+    model = placed(START, Limits(None, W_M), lag, sigma=sigma)
     rates, slopes = [np.array(model.rates()[:2])], [np.array(model.rate_slopes(*model.rates()[:2]))]
     for _ in range(300):
         model.advance(Target(*GOAL, 0.3), dt)
@@ -88,7 +88,7 @@ def test_what_a_second_order_is_sent_is_smooth_and_moves_it_along(square):
     rates, slopes = np.array(rates), np.array(slopes)
     mean = 0.5 * (slopes[1:] + slopes[:-1])
     assert np.diff(rates, axis=0) / dt == pytest.approx(mean, abs=0.15)
-    led = 0.5 * (rates[1:] + rates[:-1]) + lag * mean + square * np.diff(slopes, axis=0) / dt
+    led = 0.5 * (rates[1:] + rates[:-1]) + lag * mean + sigma * np.diff(slopes, axis=0) / dt
     assert np.hypot(*led.T).max() <= 1.03 * W_M
     assert np.hypot(*led.T).max() >= 0.98 * W_M
 

@@ -7,14 +7,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from companion.attitude.rotation import (
+    after_constant_rates,
     angle_per_sine,
     attitude_of,
     body_error,
     cos_and_sinc,
     euler_angles,
-    short_way,
-    turned,
     turned_about_vertical,
+    wrap_difference,
 )
 from tests.attitude.independent import attitudes, held, wrapped
 
@@ -36,7 +36,10 @@ def angles_between(quaternions, r):
 def test_turned_is_the_rate_held(angle):
     rates = np.random.default_rng(9).normal(size=(300, 3))
     rates *= angle / np.linalg.norm(rates, axis=1, keepdims=True) / 0.02
-    found = [turned(q, w, 0.02) for q, w in zip(scalars(ROTATIONS), rates.tolist(), strict=True)]
+    found = [
+        after_constant_rates(q, w, 0.02)
+        for q, w in zip(scalars(ROTATIONS), rates.tolist(), strict=True)
+    ]
     assert angles_between(found, held(ROTATIONS, rates, 0.02)).max() < 1e-14
     assert np.linalg.norm(found, axis=1) == pytest.approx(1.0, abs=1e-15)
 
@@ -44,7 +47,7 @@ def test_turned_is_the_rate_held(angle):
 def test_turned_ten_thousand_times_is_still_a_rotation():
     q = (1.0, 0.0, 0.0, 0.0)
     for _ in range(10_000):
-        q = turned(q, (0.5, -0.3, 0.2), 0.01)
+        q = after_constant_rates(q, (0.5, -0.3, 0.2), 0.01)
     assert math.hypot(*q) == pytest.approx(1.0, abs=1e-15)
     whole = Rotation.from_rotvec([50.0, -30.0, 20.0])
     assert angles_between([q], whole).max() < 1e-11
@@ -94,15 +97,15 @@ def test_cos_and_sinc(angle):
 
 def test_the_short_way_is_the_same_direction_at_most_half_a_turn_off():
     for angle in np.linspace(-2 * math.pi, 2 * math.pi, 81).tolist():
-        brought = short_way(angle)
+        brought = wrap_difference(angle)
         assert -math.pi < brought <= math.pi
         assert math.cos(brought - angle) == pytest.approx(1.0, abs=1e-14)
 
 
 def test_a_turn_returns_a_unit_quaternion_along_one_that_is_slightly_off():
     q = (0.5, -0.5, 0.5, 0.5)
-    found = turned(tuple(1.0008 * part for part in q), (0.4, -0.3, 0.2), 0.01)
-    assert found == pytest.approx(turned(q, (0.4, -0.3, 0.2), 0.01), abs=2e-6)
+    found = after_constant_rates(tuple(1.0008 * part for part in q), (0.4, -0.3, 0.2), 0.01)
+    assert found == pytest.approx(after_constant_rates(q, (0.4, -0.3, 0.2), 0.01), abs=2e-6)
 
 
 @pytest.mark.parametrize("angle", [0.7, -2.9])

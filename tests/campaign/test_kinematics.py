@@ -18,7 +18,7 @@ from companion.attitude import (
 )
 from companion.attitude.rate_response import AxisResponse
 from companion.attitude.reference import Lag
-from companion.attitude.rotation import clamp, turned
+from companion.attitude.rotation import after_constant_rates, clamp
 from companion.batch.rate_loop import fly_steps
 from companion.batch.step_figures import step_figures
 from companion.campaign import engine, loading, store, unit
@@ -55,7 +55,7 @@ def targets():
 
 def in_python(planner, axes, q, targets):
     """The same with the objects of a flight: planner, `Lag`, dead time in a list."""
-    lags = [Lag(max(axis.lag, 1e-3), axis.square) for axis in axes]
+    lags = [Lag(max(axis.lag, 1e-3), axis.sigma) for axis in axes]
     sent, aims, state, path, commanded = [], [0.0] * 3, [(0.0, 0.0)] * 3, [], []
     for target in targets:
         path.append(coefficients(q))
@@ -70,7 +70,7 @@ def in_python(planner, axes, q, targets):
                 aims[axis] += clamp(acting - aims[axis], response.acceleration / 1000)
                 moved, *state[axis] = lag.after(*state[axis], aims[axis], 0.001)
                 mean.append(1000 * moved)
-            q = turned(q, BodyRates(*mean), 0.001)
+            q = after_constant_rates(q, BodyRates(*mean), 0.001)
     return np.array(path), np.array(commanded), q
 
 

@@ -65,7 +65,7 @@ def test_a_jump_of_the_thrust_axis_is_no_turn():
     body.step()
     assert body.step(Rotation.from_euler("x", 0.2))
     assert body.resets.turn == 0.0
-    assert body.resets.largest_tilt == pytest.approx(0.2, abs=0.01)
+    assert body.resets.largest_tilt_jump == pytest.approx(0.2, abs=0.01)
 
 
 def test_a_target_is_turned_with_the_attitude_so_that_they_differ_as_before():

@@ -83,9 +83,9 @@ def test_the_largest_sensible_gain_and_a_warning_above_it():
     assert expected_response(configured("model-following", 5.0)).largest_gain == pytest.approx(
         0.45 / 0.087
     )
-    assert not expected_response(configured("model-following", 5.0)).too_quick
+    assert not expected_response(configured("model-following", 5.0)).gain_is_too_high
     quick = expected_response(configured("first-order", 6.0))
-    assert quick.too_quick
+    assert quick.gain_is_too_high
     assert "6, and 5.2 is the largest sensible one (0.45 / (lag + dead time)); lower it" in (
         quick.gain_sentence()
     )
@@ -106,7 +106,7 @@ def test_the_words_about_a_response():
         "limits.max_tilt_rate_deg_s limits it most (0.40 s with twice planner.gain_per_s, "
         "0.30 s without limits.max_tilt_rate_deg_s)"
     )
-    assert not found.too_quick
+    assert not found.gain_is_too_high
     assert found.gain_sentence() == (
         "planner.gain_per_s is 5, and 5.0 is the largest sensible one (0.45 / (lag + dead time))"
     )

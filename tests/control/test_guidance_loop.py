@@ -106,7 +106,7 @@ def test_a_doublet_that_tilts_too_far_is_given_up_for_good():
     assert command.body_rates is None
     assert (
         bench.guidance_loop.hold.given_up
-        == "identify was given up at 31° of tilt, more than limits.max_tilt_deg"
+        == "identify was given up at 31° of tilt, more than limits.max_tilt_deg = 30"
     )
     assert bench.guidance_loop.flown.pose.position_ned == pytest.approx(HERE, abs=0.01)
     assert bench.fly(IN_FIRST_DOUBLET + 0.04).body_rates is None

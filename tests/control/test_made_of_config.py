@@ -23,7 +23,7 @@ from companion.control.loops import make_loops
 from companion.control.motion_estimate import MotionEstimate
 from companion.control.outer_loop import linear_settings, make_guidance, predictive_settings
 from companion.control.planner_runner import PlannerRunner
-from companion.control.retuning import Retuning, between, fixed_because, tuning
+from companion.control.retuning import Retuning, fixed_because, interpolated, tuning
 from companion.control.slew import Slew
 from companion.control.telemetry import FreshPosition
 from companion.drag import AxisDrag, Drag
@@ -127,15 +127,15 @@ def with_gains(**gains):
 
 def test_a_value_moves_by_equal_factors_and_from_zero_by_equal_amounts():
     before, after = with_gains(yaw_gain_per_s=0.5), with_gains(yaw_gain_per_s=0.8, gain_per_s=1.0)
-    middle = between(before, after, 0.5).planner
+    middle = interpolated(before, after, 0.5).planner
     assert middle.gain_per_s == pytest.approx(2.0)
     assert middle.yaw_gain_per_s == pytest.approx(0.4**0.5)
-    started = between(with_gains(yaw_gain_per_s=0.0), with_gains(yaw_gain_per_s=0.8), 0.25)
+    started = interpolated(with_gains(yaw_gain_per_s=0.0), with_gains(yaw_gain_per_s=0.8), 0.25)
     assert started.planner.yaw_gain_per_s == pytest.approx(0.2)
     weight = hold_weights(CONFIG).velocity
     heavier = CONFIG.guidance.model_copy(update={"velocity_weight_per_s2": 4.0 * weight})
     changed = CONFIG.model_copy(update={"guidance": heavier})
-    found = between(CONFIG, changed, 0.5).guidance.velocity_weight_per_s2
+    found = interpolated(CONFIG, changed, 0.5).guidance.velocity_weight_per_s2
     assert found == pytest.approx(2.0 * weight)
 
 
@@ -256,7 +256,7 @@ def test_predictive_control():
 
 def test_a_plugin_that_is_not_installed_is_named():
     with pytest.raises(ConfigError, match="nobodys-planner"):
-        plugin("companion.planners", "nobodys-planner")
+        plugin("planner.name", "companion.planners", "nobodys-planner")
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,8 @@ from companion.attitude.model_following import ModelFollowingPlanner
 from companion.config import Config
 from companion.config.files import changed, load
 from companion.config.in_flight import changeable, differences
-from companion.control.retuning import between
-from companion.control.slew import SLEW
+from companion.control.retuning import interpolated
+from companion.control.slew import SLEW_TIME
 from companion.flight.changes import ChangeRefusedError, Changes
 from companion.recording.flight_record import read_flight
 from companion.replay.replay import Replay
@@ -117,11 +117,11 @@ def test_the_way_of_a_change_is_even_and_null_counts_as_what_it_comes_to():
     before = Config()
     after = changed(before, {"guidance": {"position_weight_per_s4": 1000.0}}, "test")
     weights = [
-        between(before, after, 0.1 * k).guidance.position_weight_per_s4 for k in range(1, 11)
+        interpolated(before, after, 0.1 * k).guidance.position_weight_per_s4 for k in range(1, 11)
     ]
     ratios = [b / a for a, b in pairwise(weights)]
     assert max(ratios) == pytest.approx(min(ratios), rel=1e-6)
-    assert between(before, after, 1.0) is after
+    assert interpolated(before, after, 1.0) is after
     assert {each.name for each in differences(before, after)} == {"guidance.position_weight_per_s4"}
 
 
@@ -143,7 +143,7 @@ def test_a_second_change_counts_together_with_one_that_still_takes_effect():
             with pytest.raises(ChangeRefusedError, match=r"from 5 to 0\.8 is more than a factor"):
                 changes.change({"planner": {"gain_per_s": 0.8}}, "the file")
             assert changes.wanted.planner.gain_per_s == 2.0
-            changes.step(asyncio.get_running_loop().time() + SLEW)
+            changes.step(asyncio.get_running_loop().time() + SLEW_TIME)
             changes.change({"planner": {"gain_per_s": 0.8}}, "the file")
 
     asyncio.run(fly())
@@ -196,7 +196,7 @@ def test_changes_in_flight_are_slewed_recorded_and_undone(autopilot, vehicle, tm
         with pytest.raises(ChangeRefusedError):
             session.changes.change({"limits": {"fence_radius_m": 500.0}}, "a test")
         texts.append(session.changes.undo("a test"))
-        await asyncio.sleep(1.5 * SLEW)
+        await asyncio.sleep(1.5 * SLEW_TIME)
         seen.append((degrees(guidance_loop.hold.max_tilt), _constants(planner).gain, 0.0, 0.0))
         return await flight
 

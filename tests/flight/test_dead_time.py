@@ -8,8 +8,9 @@ from pymavlink import mavutil
 
 from companion.attitude import BodyRates
 from companion.config.files import load
-from companion.flight import assembly, dead_time_watch
-from companion.flight.dead_time_watch import DeadTimeWatch, RateLoop
+from companion.config.vehicle import AxisKeys
+from companion.flight import dead_time_watch
+from companion.flight.dead_time_watch import DeadTimeWatch
 from companion.recording.flight_record import read_flight
 from companion.recording.measurements.recorded_summary import trace_of
 from companion.recording.trace import FlightTrace
@@ -17,7 +18,8 @@ from tests.flight.fly import fly, mock_vehicle
 from tests.identification.vehicles import RATE_NOISE, lag_with_dead_time
 
 PERIOD, LAG = 0.004, 0.047
-TILT, YAW = RateLoop(LAG, 0.04), RateLoop(0.1, 0.08)
+TILT, YAW = AxisKeys(1e3 * LAG, 40.0, None, None), AxisKeys(100.0, 80.0, None, None)
+UNKNOWN = AxisKeys(None, None, None, None)
 
 
 class Bench:
@@ -25,7 +27,7 @@ class Bench:
 
     def __init__(self, tilt=TILT, yaw=YAW):
         self.trace, self.notes, self.now = FlightTrace(), [], 0.0
-        self.watch = DeadTimeWatch(self.trace, (tilt, tilt, yaw), self.note)
+        self.watch = DeadTimeWatch(self.trace, {"roll": tilt, "pitch": tilt, "yaw": yaw}, self.note)
 
     def note(self, text):
         self.notes.append((self.now, text))
@@ -83,7 +85,7 @@ def test_an_acceleration_limit_is_taken_out_too():
     times = PERIOD * np.arange(len(record[0]))
     shaped = lag_with_dead_time(times, record[0][:, 0], LAG, 0.04, slew=8.0)
     record[1][:, 0] = shaped
-    bench = Bench(tilt=TILT._replace(acceleration_limit=8.0))
+    bench = Bench(tilt=TILT._replace(acceleration_limit_deg_s2=math.degrees(8.0)))
     bench.fly(*record)
     assert bench.watch.over_the_flight().axes["roll"].measured == pytest.approx(0.04, abs=0.003)
 
@@ -135,7 +137,7 @@ def test_a_hover_does_not_tell_and_is_not_guessed_from():
 
 
 def test_without_a_lag_nothing_is_measured():
-    bench = Bench(RateLoop(), RateLoop())
+    bench = Bench(UNKNOWN, UNKNOWN)
     bench.fly(*turns(12.0, (0.08, 0.08, 0.2)))
     found = bench.watch.over_the_flight()
     assert not found.lag_known
@@ -164,11 +166,14 @@ def test_the_yaml_gives_each_axis_its_response_in_si(tmp_path):
         "vehicle: {lag_ms: 20, dead_time_ms: 15, acceleration_limit_deg_s2: 1100, yaw_lag_ms: 64,\n"
         "  damping: 0.7}\n"
     )
-    roll, pitch, yaw = assembly.rate_loops(load(path))
-    assert roll == pitch == RateLoop(0.02, 0.015, math.radians(1100), 0.7)
-    assert yaw == RateLoop(0.064, 0.015, math.radians(1100))
+    roll, pitch, yaw = load(path).vehicle.axes.values()
+    assert (roll.lag, roll.dead_time) == (0.02, 0.015)
+    assert (roll.acceleration_limit, roll.damping) == (math.radians(1100), 0.7)
+    assert pitch == roll
+    assert (yaw.lag, yaw.dead_time) == (0.064, 0.015)
+    assert (yaw.acceleration_limit, yaw.damping) == (math.radians(1100), None)
     path.write_text("flight: {takeoff_height_m: 5}\n")
-    assert assembly.rate_loops(load(path)) == (RateLoop(), RateLoop(), RateLoop())
+    assert set(load(path).vehicle.axes.values()) == {UNKNOWN}
 
 
 PX4 = {"lag_ms": 47, "dead_time_ms": 40, "yaw_lag_ms": 370, "yaw_dead_time_ms": 102}

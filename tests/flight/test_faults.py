@@ -52,7 +52,7 @@ FAULTS = [
     (
         "delay",
         {"kind": "delay", "delay_ms": 400.0, "direction": "to_companion"},
-        "attitude arrives later",
+        "attitude arrives, but older",
         HANDED_BACK,
         0.0,
     ),

@@ -8,7 +8,7 @@ from companion.config import Config
 from companion.config.known_drag import before_connecting
 from companion.drag import Drag
 from companion.files.yaml_file import ConfigError, parse
-from companion.flight.fence_check import MARGIN, FenceCheck
+from companion.flight.fence_check import TRACKING_MARGIN, FenceCheck
 from companion.flight.maneuver_checks import require_inside
 from companion.flight.maneuvers import configured_maneuvers
 from companion.guidance import Pose
@@ -184,7 +184,7 @@ def test_what_is_accepted_never_makes_the_monitor_speak(seed):
     (part,) = configured_maneuvers(config).parts
     for moment in predict(part):
         off = rng.normal(size=3)
-        off *= 0.999 * (MARGIN - 0.13) / np.linalg.norm(off)
+        off *= 0.999 * (TRACKING_MARGIN - 0.13) / np.linalg.norm(off)
         place = tuple((np.array(moment.offset) + off).tolist())
         now = Now(
             offset=place,
@@ -210,7 +210,7 @@ def test_the_worst_moment_is_found_among_all():
         change, none = rng.uniform(-3, 3, (20, 3)), np.zeros((20, 3))
         motion = Motion(np.arange(20.0), place, speed, change, none, none[:, 0])
         each = [
-            fence.stop_breach(tuple(p), tuple(v), 5.0 - p[2], None, MARGIN, (a[0], a[1]))
+            fence.stop_breach(tuple(p), tuple(v), 5.0 - p[2], None, TRACKING_MARGIN, (a[0], a[1]))
             for p, v, a in zip(place.tolist(), speed.tolist(), change.tolist(), strict=True)
         ]
         found = FenceCheck(fence, 5.0)(motion)

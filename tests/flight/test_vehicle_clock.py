@@ -77,5 +77,5 @@ def test_telemetry_that_is_late_from_the_start_is_refused_where_timesync_tells_i
     with mock_vehicle() as mock:
         ClockRelay(mock).late_ms = 400
         summary = fly(mock)
-    assert "old when it arrives, longer than deadman.telemetry_stale_ms" in summary.result
+    assert "old when it arrives, more than deadman.telemetry_stale_ms" in summary.result
     assert summary.counts.setpoints == 0

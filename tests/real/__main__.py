@@ -20,7 +20,7 @@ DISTURBED = (
     "stood still",
     "deadman.deadline_ms",
     "timer is late",
-    "arrives later than deadman",
+    "arrives, but older than deadman",
     "comes too rarely",
     "clock went back",
     "jumped ahead",

@@ -79,7 +79,7 @@ def test_counts_and_shares_at_their_limit_are_allowed():
         autopilot_judges.battery(0.25)(autopilot(battery=Battery(inf, 14.0, 0.25)), False) is None
     )
     found = at(resets=Resets(3, 1.0, -0.5, 0.25))
-    assert autopilot_judges.estimator_resets(3, 1.0, 0.5)(found, False) is None
+    assert autopilot_judges.too_many_estimator_resets(3, 1.0, 0.5)(found, False) is None
 
 
 def autopilot(**told):
@@ -103,7 +103,7 @@ SAID = [
         "the estimator's state is not reported any more",
     ),
     (
-        lambda: autopilot_judges.estimator_reset,
+        lambda: autopilot_judges.any_estimator_reset,
         at(resets=Resets(1, 0.5, 0.3)),
         "the estimator was reset: 0.5 m and 17° of heading in total; the references moved with it",
     ),
@@ -115,7 +115,7 @@ SAID = [
     (
         lambda: autopilot_judges.battery(0.7),
         autopilot(battery=Battery(inf, 14.0, 0.6)),
-        "battery at 60 %, below limits.min_battery_percent 70",
+        "battery at 60 %, below limits.min_battery_percent = 70",
     ),
     (
         lambda: link_judges.loss(0.2),
@@ -130,12 +130,13 @@ SAID = [
     (
         lambda: link_judges.deadlines(0.2),
         at(health=Health(missed=0.6)),
-        "60 % of the answers miss deadman.deadline_ms",
+        "60 % of the setpoints miss deadman.deadline_ms, more than safety.max_missed = 0.2",
     ),
     (
         lambda: link_judges.starvation(0.2),
         at(health=Health(starved=0.6)),
-        "CPU starvation: the program's timer lost 60 % of the last second",
+        "CPU starvation: the program's timer lost 60 % of the last second, "
+        "more than safety.max_starved = 0.2",
     ),
     (
         lambda: link_judges.gaps(2),

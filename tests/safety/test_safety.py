@@ -64,7 +64,7 @@ OLD = NOW - 0.6
 SILENT = {"answered": OLD, "sampled": OLD}
 WARN, HOLD, HAND_BACK, LAND, LISTEN, RELEASE = Action
 STOOD_STILL = "this program did not run for 0.4 s (computer overloaded or suspended)"
-TILTED = "57° of tilt, more than limits.max_tilt_deg + safety.tilt_margin_deg = 55"
+TILTED = "the vehicle tilts by 57°, more than limits.max_tilt_deg + safety.tilt_margin_deg = 55"
 BREACHES = [
     ("unheard", control(**SILENT, heard=OLD), LISTEN, 0.0, "no attitude from the vehicle for 0.6"),
     ("silence", control(**SILENT), HAND_BACK, 0.0, "no attitude"),
@@ -119,7 +119,7 @@ BREACHES = [
     ("position rate", health(position_rate=9.0), HAND_BACK, 1.0, "come at 9 Hz, below link.min"),
     ("link loss", health(lost=0.45), WARN, 2.0, "45 % of the vehicle's frames"),
     ("round trip", health(round_trip=0.2), WARN, 5.0, "200 ms"),
-    ("deadlines", health(missed=0.3), HAND_BACK, 1.5, "30 % of the answers"),
+    ("deadlines", health(missed=0.3), HAND_BACK, 1.5, "30 % of the setpoints"),
     ("starvation", health(starved=0.6), HAND_BACK, 1.5, "60 %"),
 ]
 

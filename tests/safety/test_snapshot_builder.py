@@ -45,7 +45,7 @@ class Flight:
             times=[],
             shift=(1.0, 2.0, 3.0),
             turn=3.0,
-            largest_tilt=0.7,
+            largest_tilt_jump=0.7,
             on_counter=lambda *seen: self.counted.append(seen),
         )
         self.record = LoopRecord(thrust=0.45)
@@ -239,7 +239,7 @@ def test_gaps_count_for_five_seconds_and_resets_for_thirty_but_none_from_before(
 def test_resets_are_summed_from_where_control_began(flight):
     assert flight.snapshot().resets == Resets(0, 0.0, 0.0, 0.0)
     flight.resets.shift, flight.resets.turn = (1.0, 5.0, 7.0), -3.0
-    flight.resets.largest_tilt = 0.2
+    flight.resets.largest_tilt_jump = 0.2
     found = flight.snapshot().resets
     assert found.shift == pytest.approx(5.0)
     assert found.turn == pytest.approx(2.0 * 3.141592653589793 - 6.0)

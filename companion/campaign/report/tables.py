@@ -12,7 +12,7 @@ from companion.campaign.report.sensitivity import Influence
 from companion.campaign.report.statistics import levels, share_of, worst
 from companion.config.reference import keys
 from companion.config.units import unit_of
-from companion.flight.flown_config import flat
+from companion.flight.flown_config import flattened
 from companion.report.tables import Table
 from companion.testing.settings import complete_mock
 
@@ -59,10 +59,10 @@ def configuration(campaign: Campaign) -> Table:
         if key.section == "limits" or key.value != key.default
     ]
     mock = complete_mock(campaign.base.mock or {})
-    usual = flat(complete_mock({"autopilot": mock["autopilot"]}))
+    usual = flattened(complete_mock({"autopilot": mock["autopilot"]}))
     rows += [
         (f"mock.{key}", value, usual.get(key, EMPTY), unit_of(key))
-        for key, value in flat(mock).items()
+        for key, value in flattened(mock).items()
         if value != usual.get(key)
     ]
     title = "Configuration of every case: the limits, and what is not the default"

@@ -20,7 +20,7 @@ from companion.mavlink.transport.endpoint import (
     UdpOut,
     parse_endpoint,
 )
-from companion.safety.actions import internal
+from companion.safety.actions import fault_message
 from companion.serve.network.addresses import Address, source_of
 from companion.serve.network.client import Client
 from companion.serve.network.routing import Routing
@@ -147,7 +147,7 @@ class Network:
             try:
                 self.routing.from_client(client, frame)
             except Exception as error:
-                self._tell_once(f"{internal(error)}; a frame of {client.name} was dropped")
+                self._tell_once(f"{fault_message(error)}; a frame of {client.name} was dropped")
         self._flush_later()
 
     def flush(self) -> None:

@@ -1,4 +1,4 @@
-"""Checks the body rates of a planner from another package, and limits them."""
+"""A planner from another package, whose body rates are checked and limited."""
 
 from math import isfinite
 
@@ -16,12 +16,12 @@ class PlannerFaultError(Exception):
     """A planner of another package raised an error; the message is for the user."""
 
 
-class WithinLimits:
-    """Limits another planner's rates to the largest tilt rate and yaw rate.
+class PluginPlanner:
+    """Checks the planner of another package and limits its body rates.
 
     Args:
-        planner: the planner whose rates are limited.
-        limits: limits of the rates.
+        planner: planner of another package.
+        limits: limits of the body rates; its largest tilt is not applied.
     """
 
     def __init__(self, planner: Planner, limits: Limits) -> None:
@@ -36,7 +36,7 @@ class WithinLimits:
         Raises:
             InvalidRatesError: the planner's rates are not finite.
             AttitudeError: the planner cannot use this attitude or target.
-            PlannerFaultError: the planner raises another error, or does not return three numbers.
+            PlannerFaultError: the planner raised another error, or did not return three numbers.
         """
         try:
             roll, pitch, yaw = self._planner.rates(q, target, dt, body_rates)
@@ -50,9 +50,9 @@ class WithinLimits:
         return BodyRates(*limit_rates(roll, pitch, yaw, self._tilt_rate, self._yaw_rate))
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
-        """Pass the attitude target to the planner."""
+        """See `Planner.note_attitude_target`."""
         self._planner.note_attitude_target(q, age)
 
     def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
-        """Reset the planner."""
+        """See `Planner.reset`."""
         self._planner.reset(q, body_rates)
