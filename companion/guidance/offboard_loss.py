@@ -47,14 +47,14 @@ class LossFailsafe(NamedTuple):
     """The vehicle and its offboard-loss failsafe.
 
     Attributes:
-        held: Time for which the autopilot holds the last rates, s.
+        hold_time: Time for which the autopilot holds the last rates, s.
         brakes: True: the failsafe brakes the vehicle. False: it drifts until drag stops it.
         drag: Drag of the vehicle; no drag if it is unknown.
         max_tilt_rate: Largest tilt rate that is sent, rad/s.
         fence: The fence, whose braking formula is used.
     """
 
-    held: float
+    hold_time: float
     brakes: bool
     drag: Drag
     max_tilt_rate: float
@@ -102,10 +102,10 @@ class _HeldResult(NamedTuple):
     tilt: float
 
 
-def reach(flown: MotionAtLoss, loss: LossFailsafe) -> Reach:
-    """How far the vehicle can move if the setpoints end now."""
-    held = _held_motion(flown, loss)
-    size = hypot(*flown.thrust)
+def reach(at_loss: MotionAtLoss, loss: LossFailsafe) -> Reach:
+    """How far the vehicle can move if the setpoints end at this motion."""
+    held = _held_motion(at_loss, loss)
+    size = hypot(*at_loss.thrust)
     speed = hypot(*held.velocity[:2])
     widest = speed + held.extra_speed
     stop, farthest = (_stopping_distance(value, held.tilt, size, loss) for value in (speed, widest))
@@ -118,19 +118,19 @@ def reach(flown: MotionAtLoss, loss: LossFailsafe) -> Reach:
     return Reach((north, east), held.extra_way + farthest - stop, up, _fall_distance(held, size))
 
 
-def _held_motion(flown: MotionAtLoss, loss: LossFailsafe) -> _HeldResult:
+def _held_motion(at_loss: MotionAtLoss, loss: LossFailsafe) -> _HeldResult:
     """Integrate the motion while rates and thrust are held: the thrust axis turns steadily."""
-    duration = loss.held + _FAILSAFE_DELAY
+    duration = loss.hold_time + _FAILSAFE_DELAY
     step = duration / _STEPS
-    size = hypot(*flown.thrust)
-    axis: Vector = _scaled(flown.thrust, 1.0 / size)
-    along = sum(a * b for a, b in zip(axis, flown.turn, strict=True))
-    across: Vector = _plus_scaled(flown.turn, axis, -along)
+    size = hypot(*at_loss.thrust)
+    axis: Vector = _scaled(at_loss.thrust, 1.0 / size)
+    along = sum(a * b for a, b in zip(axis, at_loss.turn, strict=True))
+    across: Vector = _plus_scaled(at_loss.turn, axis, -along)
     rate = hypot(*across) / size
     ahead = _scaled(across, 1.0 / (rate * size)) if rate > 0.0 else (0.0, 0.0, 0.0)
     rate = min(rate, loss.max_tilt_rate)
     feedback = min(_FEEDBACK_RATE, loss.max_tilt_rate)
-    way, velocity, thrust = (0.0, 0.0, 0.0), flown.velocity, axis
+    way, velocity, thrust = (0.0, 0.0, 0.0), at_loss.velocity, axis
     extra_way = extra_speed = highest = 0.0
     for index in range(_STEPS):
         angle = rate * (index + 0.5) * step

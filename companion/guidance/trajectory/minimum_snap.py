@@ -20,7 +20,7 @@ from companion.guidance.trajectory.septic_spline import (
     derivative_rows,
 )
 
-_CONDITION = 1e-13
+_SMALLEST_EIGENVALUE = 1e-13
 """The spline is undetermined if an eigenvalue of the scaled last pivot is smaller than this."""
 
 
@@ -86,7 +86,7 @@ def minimum_snap(
     spans = np.diff(knots) / unit
     equations = _smoothness(spans, stiffness / unit**7, fixed.states.shape[2])
     for observed in observations:
-        _add(equations, knots, spans, unit, observed)
+        _add_observations(equations, knots, spans, unit, observed)
     scale = unit ** np.arange(ORDER)
     states = _solved(equations, fixed.states * scale[:, None], fixed.mask)
     return SepticSpline(knots, states / scale[:, None])
@@ -109,7 +109,7 @@ def _smoothness(spans: Floats, stiffness: float, series: int) -> _Equations:
     )
 
 
-def _add(
+def _add_observations(
     equations: _Equations, knots: Floats, spans: Floats, unit: float, observed: Observations
 ) -> None:
     """Add half the gradient of the weighted squares of the residuals."""
@@ -160,7 +160,7 @@ def _eliminated(diagonal: Floats, upper: Floats, right: Floats) -> Floats:
         reduced[k], right[k] = both[:, :ORDER], both[:, ORDER:]
         pivot = diagonal[k + 1] - upper[k].T @ reduced[k]
         right[k + 1] -= upper[k].T @ right[k]
-    if np.linalg.eigvalsh(pivot)[0] < _CONDITION:
+    if np.linalg.eigvalsh(pivot)[0] < _SMALLEST_EIGENVALUE:
         raise np.linalg.LinAlgError("too little is fixed and observed to determine the spline")
     right[-1] = np.linalg.solve(pivot, right[-1])
     for k in range(len(upper) - 1, -1, -1):

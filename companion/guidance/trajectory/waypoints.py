@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.guidance.trajectory.minimum_snap import Fixed, minimum_snap
-from companion.guidance.trajectory.sample import LEAST_WAY, TrajectoryError, Vector
+from companion.guidance.trajectory.sample import SMALLEST_DISTANCE, TrajectoryError, Vector
 from companion.guidance.trajectory.septic_spline import ORDER, Floats, SepticSpline
 from companion.guidance.trajectory.spline_curve import (
     HEADING_CHECK_STEP,
@@ -61,7 +61,7 @@ def waypoints(
         )
     places = np.array([(0.0, 0.0, 0.0), *points])
     distances = np.linalg.norm(np.diff(places, axis=0), axis=1)
-    if not points or distances.min() < LEAST_WAY:
+    if not points or distances.min() < SMALLEST_DISTANCE:
         raise TrajectoryError(_fault(distances))
     knots = np.concatenate(([0.0], np.cumsum(_trapezoids(distances, speed, acceleration))))
     knots *= _stretch(_through(knots, places), knots, speed, acceleration)
@@ -80,7 +80,7 @@ def waypoints(
 def _fault(distances: Floats) -> str:
     if not distances.size:
         return "there are no waypoints"
-    index = int(np.flatnonzero(distances < LEAST_WAY)[0])
+    index = int(np.flatnonzero(distances < SMALLEST_DISTANCE)[0])
     before = f"waypoint {index}" if index else "the start"
     return f"waypoint {index + 1} is the same as {before}; leave it out"
 
