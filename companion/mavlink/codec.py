@@ -30,7 +30,7 @@ _ATTITUDE_BYTES = _ATTITUDE.size
 _RESET_COUNTER_AT = struct.calcsize("<Q55fBB")
 _SETPOINT = struct.Struct("<BBBBBBBHB I4f3ff BBB")
 _SETPOINT_PAYLOAD_BYTES = 39
-_SETPOINT_EXTRA = CRC_EXTRA[SET_ATTITUDE_TARGET]
+_SETPOINT_CRC_EXTRA = CRC_EXTRA[SET_ATTITUDE_TARGET]
 
 
 def decode_attitude(payload: bytes) -> tuple[int, Quaternion, BodyRates] | None:
@@ -126,7 +126,7 @@ class SetpointEncoder:
             self._target_component,
             IGNORE_ATTITUDE,
         )
-        return body + crc16.mcrf4xx(body[1:] + _SETPOINT_EXTRA).to_bytes(2, "little")
+        return body + crc16.mcrf4xx(body[1:] + _SETPOINT_CRC_EXTRA).to_bytes(2, "little")
 
 
 def _refusal(time_boot_ms: int, rates: BodyRates, thrust: float) -> InvalidSetpoint:

@@ -161,7 +161,7 @@ class CommandClient:
 
     def _send_try(self, command: int, params: tuple[float, ...], confirmation: int) -> None:
         padded = (*params, *(0.0,) * 7)[:7]
-        self._outbox.message(
+        self._outbox.send(
             dialect.MAVLink_command_long_message(
                 self._settings.target_system,
                 self._settings.target_component,

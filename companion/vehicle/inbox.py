@@ -164,7 +164,7 @@ class Inbox:
         self._filter.tell_remarks()
 
     def _admit(self, frame: Frame) -> bool:
-        if self._filter.from_vehicle(frame):
+        if self._filter.admits_source(frame):
             return self._filter.signature_good(frame)
         if self.on_foreign is not None:
             self._router.guard(self.on_foreign, frame)
