@@ -12,13 +12,13 @@ Known = Mapping[str, Sequence[float | None]]
 """Lag (ms), dead time (ms), acceleration limit (°/s²) and damping by axis, as configured."""
 
 _PREFIX = {"roll": "", "pitch": "pitch_", "yaw": "yaw_"}
-_UNLIMITED = 100_000.0
+_NO_SLEW_LIMIT = 100_000.0
 """Slew limit written for an axis that has none while roll has one, °/s²; null would mean roll's."""
 _SAME_MS = 3.0
 """Lags and dead times of roll and pitch that differ by at most this count as the same, ms."""
-_SAME_SLEW = 0.1
+_SAME_SLEW_SHARE = 0.1
 """Slew limits of roll and pitch that differ by at most this share count as the same."""
-_DAMPINGS = 0.3, 10.0
+_ACCEPTED_DAMPINGS = 0.3, 10.0
 """Damping ratios that `vehicle.damping` takes."""
 
 
@@ -94,7 +94,7 @@ def second_order_keys(vehicle: IdentifiedVehicle) -> dict[str, float]:
         fit = response.second_order
         if fit is None or fit.slew is not None or not response.is_good():
             return {}
-        if not _DAMPINGS[0] <= fit.damping <= _DAMPINGS[1]:
+        if not _ACCEPTED_DAMPINGS[0] <= fit.damping <= _ACCEPTED_DAMPINGS[1]:
             return {}
         keys[f"{prefix}lag_ms"] = round(2e3 * fit.damping / fit.frequency, 1)
         keys[f"{prefix}dead_time_ms"] = round(1e3 * fit.dead_time, 1)
@@ -141,7 +141,7 @@ def _tilt_keys(roll: AxisValues, pitch: AxisValues) -> list[str]:
 
 def _nearly_same(one: AxisValues, other: AxisValues) -> bool:
     if one.slew is not None and other.slew is not None:
-        if abs(one.slew - other.slew) > _SAME_SLEW * max(one.slew, other.slew):
+        if abs(one.slew - other.slew) > _SAME_SLEW_SHARE * max(one.slew, other.slew):
             return False
     elif one.slew != other.slew:
         return False
@@ -155,7 +155,7 @@ def _axis_keys(name: str, axis: AxisValues, inherited: float | None = None) -> l
     """Lines of one axis; `inherited` is roll's slew limit, which counts if none is written."""
     prefix = _PREFIX[name]
     lines = [f"  {prefix}lag_ms: {axis.lag:.1f}", f"  {prefix}dead_time_ms: {axis.dead_time:.1f}"]
-    slew = axis.slew if axis.slew is not None or inherited is None else _UNLIMITED
+    slew = axis.slew if axis.slew is not None or inherited is None else _NO_SLEW_LIMIT
     if slew is not None:
         lines.append(f"  {prefix}acceleration_limit_deg_s2: {slew:.0f}")
     if axis.damping is not None:

@@ -58,7 +58,7 @@ class FitNeeds:
 
 
 NEEDS = FitNeeds()
-_EDGE = 1e-6  # s
+_EDGE_TOLERANCE = 1e-6  # s
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +127,7 @@ class RateResponse:
 
 
 def _at_edge(value: float, searched: tuple[float, float]) -> bool:
-    return not searched[0] + _EDGE < value < searched[1] - _EDGE
+    return not searched[0] + _EDGE_TOLERANCE < value < searched[1] - _EDGE_TOLERANCE
 
 
 _NOT_FOUND = RateResponse(

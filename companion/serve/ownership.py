@@ -47,7 +47,7 @@ class Ownership:
         self.owner: Hashable | None = None
         self._streams: dict[Hashable, _Stream] = {}
 
-    def setpoint(self, client: Hashable, now: float) -> str | None:
+    def note_setpoint(self, client: Hashable, now: float) -> str | None:
         """Note a setpoint; return why it is not flown, or None.
 
         A setpoint of another client takes over from a silent owner.
@@ -84,7 +84,7 @@ class Ownership:
         self.owner = client
         return None
 
-    def streams(self, client: Hashable, now: float) -> bool:
+    def has_stream(self, client: Hashable, now: float) -> bool:
         """Whether a client sends a stream: its last two setpoints came in time."""
         stream = self._streams.get(client, _Stream())
         return self._is_live(client, now) and stream.newest - stream.before <= self._timeout

@@ -114,7 +114,7 @@ class ServedFlight:
         return self._assembled.context.loop.offboard_active
 
     @property
-    def ends(self) -> bool:
+    def is_ending(self) -> bool:
         """Whether requests are no longer flown: a monitor holds the vehicle, or an exit runs."""
         begun, flown = (
             self._source.start_pose is not None,
@@ -230,8 +230,8 @@ class ServedFlight:
             if not self.in_control:
                 continue
             if self.tracking_error is not None:
-                self._component.value("trk_err_m", self.tracking_error)
-            self._component.value("answer_ms", 1e-6 * self._assembled.trace.newest_latency_ns)
+                self._component.send_value("trk_err_m", self.tracking_error)
+            self._component.send_value("answer_ms", 1e-6 * self._assembled.trace.newest_latency_ns)
 
     def _answer(self, command: ControlRequest | None, result: int) -> None:
         if command is not None:

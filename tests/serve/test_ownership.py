@@ -17,40 +17,40 @@ def ownership():
 def stream(ownership, client, begin, end, period=0.1):
     refusals, now = [], begin
     while now <= end:
-        refusals.append(ownership.setpoint(client, now))
+        refusals.append(ownership.note_setpoint(client, now))
         now += period
     return refusals
 
 
 def test_control_needs_a_fresh_setpoint_as_px4_does(ownership):
     assert "setpoints first" in ownership.request_control("a", 0.0)
-    ownership.setpoint("a", 0.0)
+    ownership.note_setpoint("a", 0.0)
     assert "setpoints first" in ownership.request_control("a", TIMEOUT + 0.1), "too old"
-    ownership.setpoint("a", 1.0)
+    ownership.note_setpoint("a", 1.0)
     assert ownership.request_control("a", 1.1) is None
     assert ownership.owner == "a"
 
 
 def test_one_setpoint_alone_is_no_stream(ownership):
-    ownership.setpoint("a", 0.0)
-    assert not ownership.streams("a", 0.1)
-    ownership.setpoint("a", 0.4)
-    assert ownership.streams("a", 0.5)
-    assert not ownership.streams("a", 1.0)
-    ownership.setpoint("a", 2.0)
-    assert not ownership.streams("a", 2.1)
+    ownership.note_setpoint("a", 0.0)
+    assert not ownership.has_stream("a", 0.1)
+    ownership.note_setpoint("a", 0.4)
+    assert ownership.has_stream("a", 0.5)
+    assert not ownership.has_stream("a", 1.0)
+    ownership.note_setpoint("a", 2.0)
+    assert not ownership.has_stream("a", 2.1)
 
 
 def test_a_setpoint_that_cannot_be_flown_keeps_nobody_live(ownership):
-    ownership.setpoint("a", 0.0)
+    ownership.note_setpoint("a", 0.0)
     ownership.request_control("a", 0.1)
     for number in range(10):
         now = 0.2 + 0.1 * number
-        assert ownership.setpoint("a", now) is None
+        assert ownership.note_setpoint("a", now) is None
         ownership.withdraw("a", "a")
     assert ownership.control(now) is Control.HOLDING
     before = ownership.owner
-    assert ownership.setpoint("b", now) is None
+    assert ownership.note_setpoint("b", now) is None
     ownership.withdraw("b", before)
     assert ownership.owner == "a"
 
@@ -81,16 +81,16 @@ def test_a_silent_owner_is_held_for_and_then_handed_back(ownership):
 def test_an_owner_that_resumes_is_live_again(ownership):
     stream(ownership, "a", 0.0, 1.0)
     ownership.request_control("a", 1.0)
-    ownership.setpoint("a", 2.0)
+    ownership.note_setpoint("a", 2.0)
     assert ownership.control(2.1) is Control.LIVE
 
 
 def test_another_client_takes_over_from_a_silent_owner(ownership):
     stream(ownership, "a", 0.0, 1.0)
     ownership.request_control("a", 1.0)
-    assert ownership.setpoint("b", 1.6) is None
+    assert ownership.note_setpoint("b", 1.6) is None
     assert ownership.owner == "b"
-    assert ownership.setpoint("a", 1.7) == "b is in control"
+    assert ownership.note_setpoint("a", 1.7) == "b is in control"
 
 
 def test_after_release_nobody_is_in_control(ownership):
@@ -98,12 +98,12 @@ def test_after_release_nobody_is_in_control(ownership):
     ownership.request_control("a", 1.0)
     ownership.release()
     assert ownership.control(1.1) is Control.FREE
-    assert ownership.setpoint("b", 1.1) is None
+    assert ownership.note_setpoint("b", 1.1) is None
 
 
 def test_many_clients_are_not_remembered_for_ever(ownership):
     for number in range(1000):
-        ownership.setpoint(number, float(number))
+        ownership.note_setpoint(number, float(number))
     assert len(ownership._streams) < 100
 
 
@@ -121,7 +121,7 @@ def test_at_any_time_only_a_live_owner_is_flown(ownership):
                 ownership.release()
                 continue
             case _:
-                refusal = ownership.setpoint(client, now)
+                refusal = ownership.note_setpoint(client, now)
                 assert (refusal is None) or client != before
                 if refusal is None:
                     newest[client] = now

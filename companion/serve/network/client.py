@@ -120,7 +120,7 @@ class Client(ABC):
         self._bytes = 0
 
 
-class Flood:
+class FloodDetector:
     """Detects a client that sends faster than any program needs to."""
 
     WINDOW = 0.02
