@@ -39,7 +39,7 @@ class Simulation:
         vehicle: the true vehicle.
         state: what its autopilot estimates and does.
         parameters: parameters of the autopilot.
-        stream: the offboard setpoints that it accepted.
+        stream: the latest offboard setpoint that it accepted, and their number.
         commander: its arming and modes.
         companion: link to the companion.
         gcs: link to the ground station; nothing is sent on it if ``gcs_port`` is 0.

@@ -67,12 +67,7 @@ def dead_time_by_correlation(
         raise ValueError(f"lag must be finite and not negative, not {lag}")
     if slew is not None and not slew > 0.0:
         raise ValueError(f"slew must be positive, not {slew}")
-    products, powers, squares, count = (
-        np.zeros(_DELAYS + 1),
-        np.zeros(_DELAYS + 1),
-        0.0,
-        0,
-    )
+    products, powers, squares, count = np.zeros(_DELAYS + 1), np.zeros(_DELAYS + 1), 0.0, 0
     band = _band_pass(lag, damping)
     for part in stretches(time, commanded, measured_time, measured):
         filtered = _filtered(part, lag, slew, band)

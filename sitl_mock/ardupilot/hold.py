@@ -17,7 +17,7 @@ STOPPING_S = 0.65
 LAND)."""
 _HEIGHT_INTEGRAL = 1.0
 """Acceleration per climb rate error and second; chosen for a steady hover, not measured."""
-_STEEP_CLIMB = 10.0
+_CLIMB_LIMIT = 10.0
 """Largest climb and descent of the height controller, m/s. It is high, because the callers limit
 the climb rate that they ask for."""
 
@@ -102,8 +102,8 @@ class PositionHold:
             (*((0.0, 0.0) if level else (nan, nan)), -climb.acceleration),
             self.yaw,
             0.01 * parameters["WPNAV_SPEED"],
-            _STEEP_CLIMB,
-            _STEEP_CLIMB,
+            _CLIMB_LIMIT,
+            _CLIMB_LIMIT,
         )
         return self.follow(demand, dt)
 

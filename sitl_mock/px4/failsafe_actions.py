@@ -152,7 +152,13 @@ class FailsafeActions:
             self._announce(EventKind.FAILSAFE_UNNAMED, "", values)
 
     def act_on_link(self, cause: Cause, parameter: str, lost_us: int) -> None:
-        """Execute the action of a parameter; before a return or landing hold for COM_FAIL_ACT_T."""
+        """Execute the action of a parameter; before a return or landing hold for COM_FAIL_ACT_T.
+
+        Args:
+            cause: cause of the failsafe.
+            parameter: name of the parameter.
+            lost_us: vehicle time of the loss.
+        """
         action = LINK_ACTIONS.get(int(self._parameters[parameter]))
         if action is None:
             return
