@@ -181,7 +181,6 @@ class Simulation:
 
 
 def _links(settings: MockSettings, personality: Personality, system_id: int) -> tuple[Link, Link]:
-    """Return the links to the companion and to the ground station."""
     signing = settings.signing
 
     def link(name: str) -> Link:

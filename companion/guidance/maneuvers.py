@@ -11,6 +11,8 @@ from companion.guidance.reference import Pose, Reference
 _HOLD_PAUSE = 1.0
 """Pause of the position hold before open-loop steps, s: its corrections would disturb the attitude
 from which a step is measured."""
+_CHECK_STEP = 0.01
+"""Largest time between two checks of a maneuver, s."""
 
 
 class Maneuver(Protocol):
@@ -39,9 +41,9 @@ class Maneuver(Protocol):
         ...
 
 
-def spread(begin: float, end: float, step: float = 0.01) -> list[float]:
-    """Times from `begin` to `end`, both included, about `step` apart, s."""
-    count = max(1, math.ceil((end - begin) / step))
+def spread(begin: float, end: float) -> list[float]:
+    """Times from `begin` to `end`, both included, at most `_CHECK_STEP` apart, s."""
+    count = max(1, math.ceil((end - begin) / _CHECK_STEP))
     return [begin + (end - begin) * k / count for k in range(count + 1)]
 
 

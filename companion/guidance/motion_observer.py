@@ -53,7 +53,7 @@ class ObserverSettings:
     trusted_pull: float = 0.0
 
     def pull(self, dt: float, trust: float) -> float:
-        """Correction of the velocity per position error, 1/s; arguments as in `gains`."""
+        """Correction of the velocity per position error, 1/s; `dt` and `trust` as in `gains`."""
         return min(self.position_pull + trust * self.trusted_pull, _LARGEST_PULL_TIMES_STEP / dt)
 
     def gains(self, dt: float, trust: float = 0.0) -> ObserverGains:

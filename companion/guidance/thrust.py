@@ -37,9 +37,9 @@ def cos_tilt_ahead(q: Quaternion, body_rates: BodyRates, ahead: float) -> float:
 
 
 def largest_tilt(lift: float, largest: float) -> float:
-    """The largest tilt at which the thrust still gives the lift, rad; 0 if it gives no more.
+    """The largest tilt at which the share `TILT_THRUST_SHARE` of the thrust gives the lift, rad.
 
-    Tilt uses at most the share `TILT_THRUST_SHARE` of the largest thrust.
+    It is 0 if the lift needs this share or more.
 
     Args:
         lift: upward component of the specific thrust, m/s².

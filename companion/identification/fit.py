@@ -172,7 +172,6 @@ def _second_order(
 
 
 def _lag_fit(data: DelayedModel, found: Solution) -> LagFit:
-    """The `LagFit` of a solution."""
     lag, dead_time = exp(found.unknown[0]), data.dead_time(found.unknown)
     commands = data.delayed_commands(found.unknown)
     span = float(np.ptp(commands))

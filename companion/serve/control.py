@@ -210,7 +210,6 @@ class ServedControl:
             self._answer(client, frame, ACCEPTED if self.in_control else IN_PROGRESS)
 
     def _begin(self, owner: Program, command: ControlRequest | None, *, from_ground: bool) -> None:
-        """Begin a flight under a client's control."""
         self._flight = flight = ServedFlight(
             str(owner),
             self._config,

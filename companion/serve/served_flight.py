@@ -193,7 +193,6 @@ class ServedFlight:
             self._assembled.flight.note(internal(error))
 
     def _tell_alarm(self, text: str) -> None:
-        """Send the text of a safety monitor to the clients."""
         self._note_alarm(text)
         self._component.tell(text, WARNING)
 

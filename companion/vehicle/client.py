@@ -126,7 +126,8 @@ class VehicleClient:
         Raises:
             NotConnected: No heartbeat has come yet, so the encoding of parameters is unknown.
             UnansweredParameter: No answer came; some autopilots do not answer for unknown names.
-            UnknownParameter: The autopilot answered that it has no such parameter.
+            UnknownParameter: The autopilot answered that it has no such parameter, or the name is
+                not 1 to 16 ASCII characters.
             ParameterRefused: The autopilot answered with another error.
             LinkLost: The connection dropped while waiting.
         """
@@ -139,8 +140,9 @@ class VehicleClient:
 
         Raises:
             NotConnected: No heartbeat has come yet, so the encoding of parameters is unknown.
-            UnknownParameter: The autopilot has no such parameter, or did not answer.
-            ParameterRefused: The value does not fit the type, or the autopilot keeps another value.
+            UnansweredParameter, UnknownParameter: As for `read_parameter`.
+            ParameterRefused: The value does not fit the type, or the autopilot keeps another value
+                or answered with an error.
             LinkLost: The connection dropped while waiting.
         """
         return await self._parameters.write(name, value, timeout_s, retries)

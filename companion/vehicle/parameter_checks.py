@@ -102,7 +102,10 @@ def shortest_rate_hold(silence_limit: float) -> float:
 
 
 def rates_held(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
-    """Check that the last rates are held longer than `silence_limit`, not for too long."""
+    """Check the time for which the last rates are held.
+
+    It must be longer than `silence_limit`, and at most `LONGEST_RATE_HOLD`.
+    """
     set_to = shortest_rate_hold(settings.silence_limit)
     if value <= settings.silence_limit:
         return Problem(

@@ -100,7 +100,6 @@ class MissionProtocol:
 
 
 def _sender(message: Message) -> tuple[int, int]:
-    """System and component of a message's sender."""
     return message.get_srcSystem(), message.get_srcComponent()
 
 

@@ -183,13 +183,17 @@ def _require_steps(times: Floats, lines: Sequence[int], name: str) -> None:
     if wrong.size:
         step, line = float(steps[wrong[0]]), lines[int(wrong[0]) + 1]
         if step <= 0.0:
-            raise TrajectoryError(f"{name}, line {line}: time does not increase")
+            raise TrajectoryError(
+                f"{name}, line {line}: time does not increase; leave this sample out"
+            )
         raise TrajectoryError(
             f"{name}, line {line}: {step:.3g} s after the sample before; from {_SHORTEST_STEP:g} "
             f"to {_LONGEST_STEP:g} s can be used, and time is read in s"
         )
     if times[-1] - times[0] < _SHORTEST_DURATION:
-        raise TrajectoryError(f"{name}: lasts less than {_SHORTEST_DURATION:g} s")
+        raise TrajectoryError(
+            f"{name}: lasts less than {_SHORTEST_DURATION:g} s; time is read in s"
+        )
 
 
 def _require_range(
@@ -213,7 +217,7 @@ def _require_range(
         if bad.size:
             raise TrajectoryError(
                 f"{name}, line {lines[int(bad[0])]}: the quaternion has the length "
-                f"{lengths[bad[0]]:.3g}, not 1"
+                f"{lengths[bad[0]]:.3g}, not 1; give unit quaternions, or leave their columns out"
             )
 
 

@@ -20,7 +20,7 @@ class CurvePoint(NamedTuple):
 
 
 class PhaseSampling(NamedTuple):
-    """Phases at which to check a curve, so that no extreme between two of them is missed.
+    """Phases at which to check a curve, so close that an extreme between two is hardly missed.
 
     Attributes:
         step: phase between two checks; None if `phases` lists the checks.

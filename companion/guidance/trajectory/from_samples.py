@@ -188,7 +188,6 @@ def _root_mean_square(values: Floats) -> float:
 def _heading(
     spline: SepticSpline, table: Table, options: SampleOptions, resting: tuple[bool, bool]
 ) -> Heading:
-    """The heading that the options request."""
     if options.heading is HeadingFrom.ALONG:
         return tangent_heading(spline, resting)
     if options.heading is HeadingFrom.FIXED or table.yaw is None:

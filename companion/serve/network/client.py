@@ -114,7 +114,6 @@ class Client(ABC):
         return b"".join(frames), len(frames)
 
     def _drop_waiting(self) -> None:
-        """Drop all queued frames."""
         self.stats.dropped += len(self._waiting)
         self._waiting.clear()
         self._bytes = 0

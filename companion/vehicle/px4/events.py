@@ -214,7 +214,6 @@ class EventReader:
 
 
 def _filled_in(words: _Text, arguments: bytes) -> str:
-    """The text with the values of an event filled in."""
     values = struct.unpack_from(words.layout, arguments)
     named = (
         value if meaning is None else meaning.get(value, str(value))
