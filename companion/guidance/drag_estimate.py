@@ -18,11 +18,11 @@ _WIND_CHANGE = 0.2
 """Standard deviation of the change of the acceleration by wind in 1 s, m/s²."""
 _CLAMP_DEVIATIONS = 3.0
 """An innovation is clamped to this many standard deviations, because a bump is no sign of drag."""
-_LARGEST_INCREASE = 2.0
+_LARGEST_LINEAR_INCREASE = 2.0
 """Largest estimated linear drag above that of the prior, 1/s."""
 _LARGEST_QUADRATIC = 0.3
 """Largest estimate of the quadratic drag, 1/m."""
-_AXIS_DEVIATION, _LARGEST_AXIS = 0.03, 0.1
+_AXIS_DRAG_DEVIATION, _LARGEST_AXIS_DRAG = 0.03, 0.1
 """Initial standard deviation of `AxisDrag.coefficient`, which begins at 0, and its largest
 estimate, 1/m."""
 _CERTAIN_DEVIATION = 0.1
@@ -75,13 +75,13 @@ class DragEstimate:
             _WIND_DEVIATION,
             _WIND_DEVIATION,
         )
-        self._covariance = np.diag([*(each**2 for each in deviations), _AXIS_DEVIATION**2])
+        self._covariance = np.diag([*(each**2 for each in deviations), _AXIS_DRAG_DEVIATION**2])
         self._forget_window()
 
     @property
     def axis_coefficient(self) -> float:
         """The coefficient of `AxisDrag` estimated so far, 1/m."""
-        return min(max(float(self._state[4]), 0.0), _LARGEST_AXIS)
+        return min(max(float(self._state[4]), 0.0), _LARGEST_AXIS_DRAG)
 
     @property
     def certain(self) -> bool:
@@ -144,7 +144,9 @@ class DragEstimate:
         (linear, quadratic), p = self._state[:2].tolist(), self._covariance
         within = min(max(quadratic, 0.0), _LARGEST_QUADRATIC)
         linear += float(p[0, 1] / p[1, 1]) * (within - quadratic) if p[1, 1] > 0.0 else 0.0
-        return Drag(min(max(linear, 0.0), self.prior_drag.linear + _LARGEST_INCREASE), within)
+        return Drag(
+            min(max(linear, 0.0), self.prior_drag.linear + _LARGEST_LINEAR_INCREASE), within
+        )
 
     def _forget_window(self) -> None:
         self._span = 0.0

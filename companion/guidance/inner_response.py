@@ -88,7 +88,7 @@ class InnerResponse:
         """Target heading (rad) and heading rate (rad/s) with which the heading follows its path.
 
         The planner turns at gain·(ψ_d − ψ) + ψ̇_d, so only lag·ψ̈ remains to be compensated. With
-        a gain of 0 it is not.
+        a gain of 0 nothing is compensated.
         """
         acts = time + self.dead_time
         there = heading(acts)

@@ -102,7 +102,7 @@ class Guidance(Protocol):
     def acts_after(self) -> float:
         """Mean delay from computing a command until its feedback takes effect, s.
 
-        `GuidanceInput.predicted` is predicted for this time.
+        `GuidanceInput.predicted` is the motion after this delay.
         """
         ...
 

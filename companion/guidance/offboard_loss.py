@@ -13,7 +13,7 @@ from companion.drag import Drag
 from companion.guidance.fence import Fence
 from companion.guidance.reference import GRAVITY, Vector
 
-_STEPS = 20
+_INTEGRATION_STEPS = 20
 """Number of integration steps while the rates are held."""
 _FEEDBACK_RATE = 0.15
 """Largest part of the rates that is feedback on a smooth path, rad/s (mock vehicles: 0.1)."""
@@ -125,7 +125,7 @@ def reach(at_loss: MotionAtLoss, loss: LossFailsafe) -> Reach:
 def _held_motion(at_loss: MotionAtLoss, loss: LossFailsafe) -> _HeldResult:
     """Integrate the motion while rates and thrust are held: the thrust axis turns steadily."""
     duration = loss.hold_time + _FAILSAFE_DELAY
-    step = duration / _STEPS
+    step = duration / _INTEGRATION_STEPS
     specific_thrust = hypot(*at_loss.thrust)
     axis: Vector = _scaled(at_loss.thrust, 1.0 / specific_thrust)
     along = sum(a * b for a, b in zip(axis, at_loss.turn, strict=True))
@@ -136,7 +136,7 @@ def _held_motion(at_loss: MotionAtLoss, loss: LossFailsafe) -> _HeldResult:
     feedback = min(_FEEDBACK_RATE, loss.max_tilt_rate)
     way, velocity, thrust = (0.0, 0.0, 0.0), at_loss.velocity, axis
     extra_way = extra_speed = highest = 0.0
-    for index in range(_STEPS):
+    for index in range(_INTEGRATION_STEPS):
         angle = rate * (index + 0.5) * step
         thrust = _plus_scaled(_scaled(axis, cos(angle)), ahead, sin(angle))
         velocity = _plus_scaled(_slowed(velocity, loss.drag, step), thrust, specific_thrust * step)

@@ -11,7 +11,7 @@ _LONGEST_WINDOW = 0.1
 """Longest time constant of each low-pass filter in motion, s; noisy positions need it."""
 _WINDOW_PER_NOISE = 0.1
 """Growth of that time constant with the noise of r (see `PositionCorrection`), s per m/s."""
-_SMOOTH, _NOISY = 0.2, 0.6
+_SMOOTH_BELOW, _NOISY_ABOVE = 0.2, 0.6
 """Noise of r below which positions count as smooth, and above which as noisy, m/s. It is at most
 0.1 m/s on PX4 and ArduPilot; white noise of 3 mm at 50 Hz makes 0.5 m/s."""
 _LARGEST_CHANGE = 0.08
@@ -81,7 +81,9 @@ class PositionCorrection:
 
         0 if they are noisy or rounded, or if the vehicle is at rest.
         """
-        smoothness = min(max(0.0, (_NOISY - sqrt(self._noise)) / (_NOISY - _SMOOTH)), 1.0)
+        smoothness = min(
+            max(0.0, (_NOISY_ABOVE - sqrt(self._noise)) / (_NOISY_ABOVE - _SMOOTH_BELOW)), 1.0
+        )
         return smoothness * self._moving
 
     def corrected(self, time: float, measured: VehicleMotion) -> VehicleMotion:

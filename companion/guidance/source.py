@@ -140,10 +140,10 @@ class CommandedSource:
                 kind and after a jump of the acceleration.
         """
         self._require_fresh(now)
-        self._jerk = self._difference(reference, now) if jerk_ned is None else jerk_ned
+        self._jerk = self._jerk_towards(reference, now) if jerk_ned is None else jerk_ned
         self._newest, self._given_at = reference, now
 
-    def _difference(self, reference: Reference, now: float) -> Vector:
+    def _jerk_towards(self, reference: Reference, now: float) -> Vector:
         """Jerk between an earlier reference and this one, m/s³; 0 if it cannot be computed.
 
         References less than `_SHORTEST_JERK_TIME` apart keep the last jerk.

@@ -13,10 +13,10 @@ from companion.identification.record import LONGEST_DEAD_TIME, Stretch, stretche
 
 Floats = NDArray[np.float64]
 
-_GRID = 0.004
+_GRID_PERIOD = 0.004
 """Sample period of the correlation, s."""
-_DELAYS = int(LONGEST_DEAD_TIME / _GRID)
-"""Number of delays that are compared, besides 0; one `_GRID` apart."""
+_DELAYS = int(LONGEST_DEAD_TIME / _GRID_PERIOD)
+"""Number of delays that are compared, besides 0; one `_GRID_PERIOD` apart."""
 _CENTRE_PHASE = 0.38
 """Phase of the lag at the centre frequency of the filter, rad."""
 _CENTRE_FREQUENCIES = 5.0, 9.0
@@ -89,7 +89,7 @@ def _centre_frequency(lag: float, damping: float) -> float:
     slowest, quickest = _CENTRE_FREQUENCIES
     if damping < np.inf:
         lag *= _FIRST_ORDER_SHARE
-    return min(max(_CENTRE_PHASE / max(lag, _GRID), slowest), quickest)
+    return min(max(_CENTRE_PHASE / max(lag, _GRID_PERIOD), slowest), quickest)
 
 
 def _second_order_delay(lag: float, damping: float) -> float:
@@ -108,8 +108,8 @@ def _band_pass(lag: float, damping: float) -> Floats:
     """
     frequency = _centre_frequency(lag, damping)
     deviation = 3.0**0.5 / frequency
-    half = int(_FILTER_REACH * deviation / _GRID)
-    time = _GRID * np.arange(-half, half + 1)
+    half = int(_FILTER_REACH * deviation / _GRID_PERIOD)
+    time = _GRID_PERIOD * np.arange(-half, half + 1)
     at = time / deviation
     shape = at * (3.0 - at**2) * np.exp(-0.5 * at**2)
     taps: Floats = shape / abs(float(np.sin(frequency * time) @ shape))
@@ -119,15 +119,15 @@ def _band_pass(lag: float, damping: float) -> Floats:
 def _filtered(
     part: Stretch, lag: float, slew: float | None, band: Floats
 ) -> tuple[Floats, Floats] | None:
-    """Filtered commands (n + `_DELAYS`,) and measurements (n,), sampled every `_GRID` seconds.
+    """Filtered commands (n + `_DELAYS`,) and measurements (n,), sampled every `_GRID_PERIOD` s.
 
     Both end at the same time. None: the measurements are shorter than the filter.
     """
     first, last = part.measured_time[0], part.measured_time[-1]
-    count = int((last - first) / _GRID)
+    count = int((last - first) / _GRID_PERIOD)
     if count <= band.size:
         return None
-    at = last - _GRID * np.arange(count + _DELAYS)[::-1]
+    at = last - _GRID_PERIOD * np.arange(count + _DELAYS)[::-1]
     at = np.maximum(at, part.time[0])
     knots = held_commands(part.time, part.commanded)
     if slew is not None:
@@ -147,4 +147,4 @@ def _peak(correlation: Floats) -> float | None:
         return None
     before, here, after = correlation[top - 1 : top + 2].tolist()
     bend = before - 2.0 * here + after
-    return _GRID * (top + (0.5 * (before - after) / bend if bend < 0.0 else 0.0))
+    return _GRID_PERIOD * (top + (0.5 * (before - after) / bend if bend < 0.0 else 0.0))

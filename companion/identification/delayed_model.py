@@ -113,7 +113,7 @@ class SecondOrderFit:
         )
 
 
-DEAD_TIMES = 0.0, LONGEST_DEAD_TIME - 0.01
+DEAD_TIME_RANGE = 0.0, LONGEST_DEAD_TIME - 0.01
 """Range in which the dead time is searched, s."""
 _RAMP_TIMES = 0.01, 0.5
 """Range in which the slew limit is searched, as the time (s) that the record's largest change of
@@ -187,7 +187,7 @@ class DelayedModel:
     def search(self, start: Floats) -> Solution:
         """The best fit near `start`."""
         ramps = [log(self.largest_change / ramp) for ramp in reversed(_RAMP_TIMES)]
-        limits = [*zip(self.model.lowest, self.model.highest, strict=True), DEAD_TIMES, ramps]
+        limits = [*zip(self.model.lowest, self.model.highest, strict=True), DEAD_TIME_RANGE, ramps]
         lowest, highest = np.array(limits[: start.size]).T
         return minimise(self.projection, start, lowest, highest)
 
@@ -204,8 +204,8 @@ class DelayedModel:
     def _offset_columns(self, unknown: Floats) -> Floats:
         """(m, 1 + initial states): ones, and the remainder of the initial state of each stretch.
 
-        The state is that at the first sample of the stretch. That at the first command would have
-        decayed to nearly nothing at the samples, and its weight would be unbounded.
+        The initial state is taken at the first sample of the stretch. A state at the first command
+        would have decayed to nearly nothing there, and its weight would be unbounded.
         """
         shape = unknown[: self._dead_time_index]
         decays = [self.model.free_responses(shape, times - times[0]) for times in self.times]

@@ -24,7 +24,7 @@ from companion.least_squares import Solution
 
 Floats = NDArray[np.float64]
 
-LAGS = exp(FirstOrder.lowest[0]), exp(FirstOrder.highest[0])
+LAG_RANGE = exp(FirstOrder.lowest[0]), exp(FirstOrder.highest[0])
 """Range in which the lag is searched, s."""
 _TRIED_LAGS = np.geomspace(0.005, 1.0, 7)
 _TRIED_DEAD_TIMES = np.linspace(0.0, 0.48, 25)

@@ -11,7 +11,7 @@ from companion.identification.vehicle import IdentifiedVehicle
 Known = Mapping[str, Sequence[float | None]]
 """Lag (ms), dead time (ms), acceleration limit (°/s²) and damping by axis, as configured."""
 
-_PREFIX = {"roll": "", "pitch": "pitch_", "yaw": "yaw_"}
+_KEY_PREFIX = {"roll": "", "pitch": "pitch_", "yaw": "yaw_"}
 _NO_SLEW_LIMIT = 100_000.0
 """Slew limit written for an axis that has none while roll has one, °/s²; null would mean roll's."""
 _SAME_MS = 3.0
@@ -90,7 +90,7 @@ def second_order_keys(vehicle: IdentifiedVehicle) -> dict[str, float]:
     """
     keys: dict[str, float] = {}
     for name in ("roll", "pitch"):
-        response, prefix = vehicle.axes[name], _PREFIX[name]
+        response, prefix = vehicle.axes[name], _KEY_PREFIX[name]
         fit = response.second_order
         if fit is None or fit.slew is not None or not response.is_good():
             return {}
@@ -153,7 +153,7 @@ def _nearly_same(one: AxisValues, other: AxisValues) -> bool:
 
 def _axis_keys(name: str, axis: AxisValues, inherited: float | None = None) -> list[str]:
     """Lines of one axis; `inherited` is roll's slew limit, which counts if none is written."""
-    prefix = _PREFIX[name]
+    prefix = _KEY_PREFIX[name]
     lines = [f"  {prefix}lag_ms: {axis.lag:.1f}", f"  {prefix}dead_time_ms: {axis.dead_time:.1f}"]
     slew = axis.slew if axis.slew is not None or inherited is None else _NO_SLEW_LIMIT
     if slew is not None:

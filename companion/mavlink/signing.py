@@ -16,7 +16,7 @@ from pathlib import Path
 from companion.mavlink.errors import SigningError
 from companion.mavlink.framing import SIGNATURE_LENGTH, Frame
 from companion.mavlink.stamp_file import StampFile
-from companion.mavlink.stamps import MOST_TICKS, TICKS_PER_S, SignatureResult, StampJudge, Stamps
+from companion.mavlink.stamps import LATEST_TICKS, TICKS_PER_S, SignatureResult, StampJudge, Stamps
 
 _STAMP_BYTES = 6
 _HASH_BYTES = 6
@@ -206,7 +206,7 @@ class StampKeeper:
 
 def _with_reserve(stamps: Stamps) -> Stamps:
     streams = {
-        stream: tuple(min(stamp + _STAMP_RESERVE, MOST_TICKS) for stamp in newest)
+        stream: tuple(min(stamp + _STAMP_RESERVE, LATEST_TICKS) for stamp in newest)
         for stream, newest in stamps.streams.items()
     }
-    return replace(stamps, sent=min(stamps.sent + _STAMP_RESERVE, MOST_TICKS), streams=streams)
+    return replace(stamps, sent=min(stamps.sent + _STAMP_RESERVE, LATEST_TICKS), streams=streams)

@@ -82,7 +82,7 @@ class FlightRecords:
                 self._tap = None
 
     async def keep(self, record: FlightFiles, summary: Summary) -> None:
-        """Write the summary of a finished flight, whose log is closed.
+        """Write the summary of a finished flight, whose log is closed; then call `on_recorded`.
 
         The next flight may already have begun, with its own record.
         """

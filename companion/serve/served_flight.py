@@ -23,7 +23,7 @@ from companion.serve.flight_records import FlightRecords
 from companion.serve.motion_settings import change_refusal, commanded_motion
 from companion.serve.network.addresses import Address
 from companion.serve.network.client import Client
-from companion.serve.ownership import Control, Ownership
+from companion.serve.ownership import ControlState, Ownership
 from companion.serve.setpoints.request import Request
 from companion.serve.source import ServedSource
 from companion.vehicle.link import Link
@@ -214,10 +214,10 @@ class ServedFlight:
             await asyncio.sleep(_PROGRESS_PERIOD)
         self._answer(command, ACCEPTED)
         self._component.tell(f"{self._source.name} is in control")
-        reported = Control.LIVE
+        reported = ControlState.LIVE
         while True:
             now = self._ownership.control(self._clock())
-            if now is not reported and now in (Control.LIVE, Control.HOLDING):
+            if now is not reported and now in (ControlState.LIVE, ControlState.HOLDING):
                 self._component.tell(f"{self._source.name}: {now.value}")
                 reported = now
             await asyncio.sleep(_CHECK_PERIOD)

@@ -173,7 +173,7 @@ class VehicleClock:
             self.on_event("the age of telemetry is known by TIMESYNC")
 
     def _judge_misfit(self, time_boot_ms: int, stamp: Stamp, quickest: float) -> Misfit | None:
-        """Why `stamp` does not fit the clock; None if it fits, or a change of the clock does it."""
+        """Why `stamp` does not fit the clock; None if it fits, or a change is accepted."""
         if self._began == inf:
             self._began = self._received = stamp.received
             self._quickest = 0.0 if self._lockstep else stamp.ahead

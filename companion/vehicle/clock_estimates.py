@@ -10,8 +10,8 @@ from math import inf
 from typing import NamedTuple
 
 MOST_DRIFT = 0.02
-"""Largest difference in rate between the two clocks, s per s. Crystals differ by less than 0.0002,
-a simulator that is slower than real time by 0.006 (measured)."""
+"""Largest difference in rate between the two clocks, s per s. It is less than 0.0002 for crystals,
+and was 0.006 for a simulator that ran slower than real time."""
 _RATE_UNCERTAINTY = 0.005
 """Uncertainty of a measured rate, s per s."""
 _LATE_SAMPLES_RISE = 0.005

@@ -1,9 +1,9 @@
 """The effective rate of setpoints or samples, from the intervals between them."""
 
 _MAX_UNEVENNESS = 2.0
-"""Largest ratio of Σg²/Σg to the mean interval with which the effective rate is the mean rate.
+"""Up to this ratio of Σg²/Σg to the mean of the intervals g, the effective rate is the mean rate.
 
-g is an interval. With a larger ratio the effective rate is lower.
+If the intervals are less even, the ratio is larger, and the effective rate is lower.
 """
 
 

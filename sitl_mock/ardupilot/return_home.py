@@ -21,7 +21,7 @@ class Leg(Enum):
     LAND = auto()
 
 
-class Return:
+class ReturnHome:
     """The height and the leg of a return.
 
     Args:

@@ -18,7 +18,7 @@ _DEEPEST_NESTING = 20
 """Largest number of nested levels."""
 _LONGEST_VALUE = 5000  # characters of a value
 
-_PLAIN = {
+_PLAIN_PATTERNS = {
     "bool": r"true|True|TRUE|false|False|FALSE",
     "null": r"~|null|Null|NULL|",
     "int": r"[-+]?[0-9]{1,40}",
@@ -56,7 +56,7 @@ class _Loader(yaml.SafeLoader):
         return int(self.construct_scalar(node))
 
 
-for _name, _pattern in _PLAIN.items():
+for _name, _pattern in _PLAIN_PATTERNS.items():
     _Loader.add_implicit_resolver(
         f"tag:yaml.org,2002:{_name}", re.compile(f"(?:{_pattern})$"), None
     )

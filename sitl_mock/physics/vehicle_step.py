@@ -156,7 +156,7 @@ class Plant(Protocol):
     Args:
         law: constants.
         state: state at the start.
-        trail_length: steps whose motion is kept.
+        trail_length: number of the latest steps whose motion is kept.
 
     Attributes:
         law: the argument `law`.

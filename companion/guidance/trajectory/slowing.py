@@ -119,7 +119,7 @@ def slow_down(trajectory: Trajectory, envelope: Envelope) -> SlowDown:
 def _evenly(
     trajectory: Trajectory, motion: Motion, broken: tuple[Violation, ...], envelope: Envelope
 ) -> SlowedPart:
-    """The whole trajectory with the smallest single factor; TrajectoryError if none is enough."""
+    """The whole trajectory, slowed by the least factor that is enough; an error if none is."""
     for one in broken:
         if not one.slowing_helps:
             raise TrajectoryError(f"{trajectory.name}: {one}; {one.remedy}")

@@ -12,7 +12,7 @@ from companion.guidance.trajectory.curves import (
 )
 from companion.guidance.trajectory.minimum_snap import Fixed, Observations, minimum_snap
 from companion.guidance.trajectory.sample import TrajectoryError
-from companion.guidance.trajectory.septic_spline import ORDER, Floats, SepticSpline
+from companion.guidance.trajectory.septic_spline import STATE_SIZE, Floats, SepticSpline
 
 _HEADING_CUTOFF = 2.0
 """Cutoff frequency of every `heading_spline`, Hz: no vehicle follows a faster heading."""
@@ -109,8 +109,8 @@ def smoothed(
     knots = np.linspace(
         times[0], times[-1], int(np.ceil((times[-1] - times[0]) * 2.0 * cutoff)) + 1
     )
-    states = np.zeros((knots.size, ORDER, values.shape[1]))
-    mask = np.zeros((knots.size, ORDER), dtype=bool)
+    states = np.zeros((knots.size, STATE_SIZE, values.shape[1]))
+    mask = np.zeros((knots.size, STATE_SIZE), dtype=bool)
     for end, rests in zip((0, -1), resting, strict=True):
         states[end, 0] = values[end]
         mask[end] = True, rests, rests, rests

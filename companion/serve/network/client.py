@@ -96,7 +96,7 @@ class Client(ABC):
     def _flush(self) -> None:
         """Send queued frames without blocking; called only if some are queued."""
 
-    def _take(self, most: int) -> tuple[bytes, int]:
+    def _dequeue(self, most: int) -> tuple[bytes, int]:
         """Remove whole frames from the queue, at least one.
 
         Args:

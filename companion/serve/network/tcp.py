@@ -145,7 +145,7 @@ class TcpClient(Client):
         if transport.is_closing() or transport.get_write_buffer_size() > _MAX_UNSENT_BYTES:
             self._drop_waiting()
         else:
-            data, frames = self._take(_MAX_UNSENT_BYTES)
+            data, frames = self._dequeue(_MAX_UNSENT_BYTES)
             transport.write(data)
             self.stats.sent += frames
 

@@ -152,7 +152,7 @@ class UdpClient(Client):
 
     def _flush(self) -> None:
         while self._waiting:
-            datagram, frames = self._take(_MAX_DATAGRAM)
+            datagram, frames = self._dequeue(_MAX_DATAGRAM)
             if self._port.send(datagram, self._address):
                 self.stats.sent += frames
             else:

@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 from companion.mavlink.texts import TextAssembler
 
-_EVENT = struct.Struct("<IIHBBB40s")  # id, time, sequence, destination, log levels, arguments
-_AUTOPILOT = 1 << 24
+_EVENT_LAYOUT = struct.Struct("<IIHBBB40s")
+"""Fields: id, time, sequence, destination (two bytes), log levels, arguments."""
+_AUTOPILOT_COMPONENT = 1 << 24
 _FNV_OFFSET, _FNV_PRIME = 0x811C9DC5, 0x01000193
 _WARNING_SEVERITY, _PROGRAMS_ONLY_SEVERITY = 4, 8
 
@@ -147,7 +148,7 @@ def event_id(name: str) -> int:
     value = _FNV_OFFSET
     for byte in name.encode():
         value = (value ^ byte) * _FNV_PRIME & 0xFFFFFFFF
-    return _AUTOPILOT | value & 0xFFFFFF
+    return _AUTOPILOT_COMPONENT | value & 0xFFFFFF
 
 
 # The names of 17980399 and 30203637 are not known. Their texts come from the STATUSTEXTs that PX4
@@ -185,8 +186,8 @@ class EventReader:
 
     def take(self, payload: bytes) -> None:
         """Take the payload of one EVENT."""
-        number, _, sequence, _, _, levels, arguments = _EVENT.unpack(
-            payload[: _EVENT.size].ljust(_EVENT.size, b"\0")
+        number, _, sequence, _, _, levels, arguments = _EVENT_LAYOUT.unpack(
+            payload[: _EVENT_LAYOUT.size].ljust(_EVENT_LAYOUT.size, b"\0")
         )
         if sequence == self._last_sequence:
             return  # a repetition
