@@ -5,16 +5,16 @@ import time
 from collections.abc import Callable
 
 from sitl_mock.connections import Connections
-from sitl_mock.exchange import Arrived, Exchange, in_burst
+from sitl_mock.exchange import Arrived, Exchange, burst_time
 from sitl_mock.link.endpoint import Endpoint
 from sitl_mock.link.framing import decode
 from sitl_mock.settings import MockSettings
 from sitl_mock.simulation import Simulation
 
-BEACON_FIRST_S = 0.05
-"""The first beacon is sent again after this much wall time without an answer."""
-BEACON_AGAIN_S = 0.2
-"""A later beacon is sent again after this much wall time."""
+FIRST_BEACON_PERIOD_S = 0.05
+"""The first beacon is sent again after this wall time without an answer, s."""
+BEACON_PERIOD_S = 0.2
+"""A later beacon is sent again after this wall time without an answer, s."""
 MAX_LAG_S = 1.0
 """Largest lag that is made up in real time, s. A busy computer delays us by tenths of a second,
 which are made up, because to the companion a lost tenth would look like a slower link.
@@ -106,7 +106,7 @@ class Server:
         self._connections.send_beacon(self._beacon)
         heard_at: float | None = None
         while not self._answered:
-            self._collect(BEACON_FIRST_S)
+            self._collect(FIRST_BEACON_PERIOD_S)
             self._connections.send_beacon(self._beacon)
             now = time.monotonic()
             if heard_at is None and self._companion.heard:
@@ -117,13 +117,13 @@ class Server:
 
     def _await_answer(self) -> None:
         """Wait for the answer; after ``patience_s`` continue in real time."""
-        self._collect(BEACON_AGAIN_S)
+        self._collect(BEACON_PERIOD_S)
         if self._answered:
             return
-        deadline = time.monotonic() + self._settings.lockstep.patience_s - BEACON_AGAIN_S
+        deadline = time.monotonic() + self._settings.lockstep.patience_s - BEACON_PERIOD_S
         while not self._answered and time.monotonic() < deadline:
             self._connections.send_beacon(self._beacon)
-            self._collect(BEACON_AGAIN_S)
+            self._collect(BEACON_PERIOD_S)
         if not self._answered:
             self._lockstep = False
             self._rebase()
@@ -172,7 +172,7 @@ class Server:
     def _await_client(self) -> None:
         """Wait for a client where the endpoint can tell; the vehicle boots after that."""
         while not self._companion.connected:
-            self._connections.ready(BEACON_AGAIN_S)
+            self._connections.ready(BEACON_PERIOD_S)
 
     def _rebase(self) -> None:
         """Count real time from now on."""
@@ -187,7 +187,7 @@ class Server:
         self._base_wall += self._simulation.effects.take_slip()
         speed = self._settings.speed
         elapsed_s = (self._simulation.next_us - self._base_us) / speed / 1e6
-        due = self._base_wall + in_burst(elapsed_s, self._settings.burst_ms * 1e-3 / speed)
+        due = self._base_wall + burst_time(elapsed_s, self._settings.burst_ms * 1e-3 / speed)
         left = due - time.monotonic()
         if left < -MAX_LAG_S:
             self._rebase()

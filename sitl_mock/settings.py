@@ -12,8 +12,8 @@ from sitl_mock.config.settings import VehicleSettings
 from sitl_mock.config.yaml_file import Document, FileRefusedError, explain_yaml, load_yaml
 from sitl_mock.personalities import PERSONALITIES
 
-WITH_FILTER = {"position_noise_m": 0.0, "velocity_noise_m_s": 0.0, "position_delay_ms": 0.0}
-"""Defaults of ``sensors`` with a navigation filter, whose output is smooth, and as recent as the
+SENSORS_WITH_FILTER = {"position_noise_m": 0.0, "velocity_noise_m_s": 0.0, "position_delay_ms": 0.0}
+"""Defaults of ``sensors`` with a navigation filter: its output is smooth, and as recent as the
 attitude."""
 
 
@@ -52,7 +52,7 @@ def _with_ekf(section: dict[str, Any]) -> object:
     if not isinstance(sensors, dict):
         return sensors
     filled = {"ekf": section.get("autopilot", "px4"), **sensors}
-    return filled if filled["ekf"] in (None, "none") else {**WITH_FILTER, **filled}
+    return filled if filled["ekf"] in (None, "none") else {**SENSORS_WITH_FILTER, **filled}
 
 
 def load_settings(path: Path | None, overrides: dict[str, Any]) -> MockSettings:

@@ -39,7 +39,7 @@ class Simulation:
         vehicle: the true vehicle.
         state: what its autopilot estimates and does.
         parameters: parameters of the autopilot.
-        stream: the offboard setpoints that it accepted.
+        stream: the latest offboard setpoint that it accepted, and their number.
         commander: its arming and modes.
         companion: link to the companion.
         gcs: link to the ground station; nothing is sent on it if ``gcs_port`` is 0.
@@ -181,7 +181,6 @@ class Simulation:
 
 
 def _links(settings: MockSettings, personality: Personality, system_id: int) -> tuple[Link, Link]:
-    """Return the links to the companion and to the ground station."""
     signing = settings.signing
 
     def link(name: str) -> Link:

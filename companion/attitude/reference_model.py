@@ -64,8 +64,8 @@ class ReferenceModel:
     The whole vector v is scaled, so a step moves on a straight line. The scale keeps the body rates
     of the motion within the limits. The rates that are sent compensate the lag of the vehicle
     (τ and σ) and stay within the limits too. If the autopilot has a slew limit, v changes no faster
-    than that, and stays so small that it can be slowed down in time. Behind a lag of second order, a
-    large step of v would saturate the motors, and the response would not be linear: there v takes
+    than that, and stays so small that it can be slowed down in time. Behind a lag of second order,
+    a large step of v would saturate the motors, and the response would not be linear: there v takes
     at least τ from rest to the largest rate.
 
     Args:

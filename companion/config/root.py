@@ -26,7 +26,7 @@ from companion.config.serve import ServeConfig
 from companion.config.vehicle import ThrustConfig, VehicleConfig
 from companion.files.yaml_file import Section
 from companion.guidance.fence import Fence
-from companion.guidance.thrust import FOR_TILT, ThrustCurve, largest_tilt
+from companion.guidance.thrust import TILT_THRUST_SHARE, ThrustCurve, largest_tilt
 
 FileName = Annotated[str, Field(max_length=1000)]
 MOST_INCLUDED = 32
@@ -149,7 +149,7 @@ def _thrust_contradictions(config: Config) -> list[tuple[bool, str]]:
     # An autopilot that compensates the tilt may use the full thrust.
     most = 1.0 if thrust.autopilot_compensates_tilt else curve.share(limits.max_thrust)
     tilt = degrees(largest_tilt(hover, most))
-    needed = hover / cos(limits.max_tilt) / FOR_TILT
+    needed = hover / cos(limits.max_tilt) / TILT_THRUST_SHARE
     remedy = f"lower limits.max_tilt_deg to {max(1, floor(tilt))}"
     if needed <= 1.0 and not thrust.autopilot_compensates_tilt:
         remedy += f" or raise limits.max_thrust to {ceil(100.0 * curve.signal(needed)) / 100.0:.2f}"

@@ -204,7 +204,7 @@ class ControlLoop:
         if self._recorder.on:
             self._recorder.answer(command, rates, thrust, latency)
         if self.offboard_active:
-            self._hover_thrust.sent(thrust, sample.q)
+            self._hover_thrust.note_thrust(thrust, sample.q)
             self._trace.add_rates(
                 sample.vehicle_time,
                 sample.received,

@@ -221,7 +221,7 @@ class GuidanceLoop:
                 now,
                 self._q,
                 offboard_active=self._loop.offboard_active,
-                steady=reference.height_is_steady,
+                steady=reference.thrust_is_steady,
             )
         measured_at = self.estimate.vehicle_time(now, position)
         if self._loop.offboard_active:

@@ -33,7 +33,7 @@ class HoverLearning:
     @property
     def thrust_limits(self) -> tuple[float, float]:
         """Smallest and largest available specific thrust, as far as known, m/s²."""
-        return self._hover_thrust.smallest, self._hover_thrust.largest
+        return self._hover_thrust.smallest_specific, self._hover_thrust.largest_specific
 
     @property
     def hover(self) -> float:
@@ -47,7 +47,7 @@ class HoverLearning:
 
     def largest_tilt(self, acceleration_down: float = 0.0) -> float:
         """Largest tilt at which 95 % of full thrust still give `acceleration_down` (m/s²), rad."""
-        return largest_tilt(GRAVITY - acceleration_down, self._hover_thrust.largest_tilted)
+        return largest_tilt(GRAVITY - acceleration_down, self._hover_thrust.largest_specific_tilted)
 
     def limit_tilt(self, target: Target, acceleration_down: float) -> Target:
         """The target with its tilt limited to `largest_tilt`."""
@@ -103,5 +103,5 @@ class HoverLearning:
             return False
         if not self._state.armed or height is None or height < _CLEAR_HEIGHT:
             return False
-        self._hover_thrust.sent(target.thrust, q)
+        self._hover_thrust.note_thrust(target.thrust, q)
         return True

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from math import inf
 
-from companion.vehicle.held_rates import HeldRates
+from companion.vehicle.interval_sums import IntervalSums
 from companion.vehicle.records import AttitudeSample
 
 _KEPT_GAPS = 32
@@ -97,7 +97,7 @@ class LoopRecord:
         gaps: when the first answerable sample after each of the latest gaps arrived. A gap is a
             time longer than `Deadlines.telemetry_stale` without a setpoint, while offboard is
             active or requested.
-        held: time from each setpoint to the next one, without gaps.
+        setpoint_intervals: time from each setpoint to the next one, without gaps.
     """
 
     samples: int = 0
@@ -112,7 +112,7 @@ class LoopRecord:
     last_answer: float = -inf
     gap_from: float = inf
     gaps: deque[float] = field(default_factory=lambda: deque(maxlen=_KEPT_GAPS))
-    held: HeldRates = field(default_factory=HeldRates)
+    setpoint_intervals: IntervalSums = field(default_factory=IntervalSums)
 
     def note_arrival(self, sample: AttitudeSample) -> float:
         """Note an arrived sample; return the vehicle time since the last usable one, s."""
@@ -134,7 +134,7 @@ class LoopRecord:
         self.thrust = thrust
         interval = received - self.last_answer
         if interval <= telemetry_stale:
-            self.held.add(interval)
+            self.setpoint_intervals.add(interval)
         self.last_answer = self.gap_from = received
 
     @property

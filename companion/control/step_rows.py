@@ -190,7 +190,7 @@ def _guidance_row(made: StepOutput) -> tuple[float, ...]:
         inputs.drag.quadratic,
         reference.holds_position,
         reference.holds_height,
-        reference.height_is_steady,
+        reference.thrust_is_steady,
     )
 
 

@@ -10,9 +10,9 @@ _DECELERATION_SHARE = 0.47
 a share of 0.7; the rest is left for wind and feedback."""
 _JERK = 8.0
 """Largest jerk of a smooth stop, m/s³: the vehicle tilts and levels by less than 50°/s."""
-_AT_REST = 0.1
+_REST_SPEED = 0.1
 """A slower vehicle is at rest, m/s."""
-_NOTICED = 0.1
+_NOTICE_TIME = 0.1
 """Time within which the fence's monitor and guidance notice a breach, s."""
 
 
@@ -39,9 +39,9 @@ def braking_time(speed: float, acceleration: float, assumed: AssumedBraking) -> 
         acceleration: largest horizontal acceleration, m/s²; 0 if the thrust allows no tilt.
         assumed: what the monitor of the fence assumes.
     """
-    if speed < _AT_REST:
+    if speed < _REST_SPEED:
         return 0.0
-    reaction = max(0.0, assumed.reaction - _NOTICED)
+    reaction = max(0.0, assumed.reaction - _NOTICE_TIME)
     longest = 2.0 * reaction + speed / assumed.deceleration
     if acceleration <= 0.0:
         return longest

@@ -4,9 +4,9 @@ from companion.attitude.rotation import clamp
 
 _BANDWIDTH = 0.5
 """Both poles of the filter, rad/s: slower than the height hold, quicker than a lap."""
-_LONGEST = 0.5
+_LONGEST_GAP = 0.5
 """Longest time between two heights from which the error is learned, s."""
-_LARGEST = 0.15
+_LARGEST_BIAS = 0.15
 """Largest error that is believed, m/s."""
 
 
@@ -18,7 +18,7 @@ class ClimbBias:
     at 5 to 10 m/s, and a height hold that believes this speed stays 0.02 to 0.03 m off.
 
     Attributes:
-        bias: reported speed minus true one, m/s downwards.
+        bias: reported minus true vertical speed, m/s, positive down.
     """
 
     def __init__(self) -> None:
@@ -32,16 +32,16 @@ class ClimbBias:
 
         Args:
             time: vehicle time of both, s.
-            height: m downwards.
-            speed: m/s downwards.
+            height: m, positive down.
+            speed: m/s, positive down.
         """
         dt, before, mean = time - self._time, self._height, 0.5 * (self._speed + speed)
         self._time, self._speed = time, speed
-        if before is None or not 0.0 < dt < _LONGEST:
+        if before is None or not 0.0 < dt < _LONGEST_GAP:
             self._height = height
             return speed - self.bias
         predicted = before + dt * (mean - self.bias)
         error = height - predicted
         self._height = predicted + min(2.0 * _BANDWIDTH * dt, 1.0) * error
-        self.bias = clamp(self.bias - _BANDWIDTH * _BANDWIDTH * dt * error, _LARGEST)
+        self.bias = clamp(self.bias - _BANDWIDTH * _BANDWIDTH * dt * error, _LARGEST_BIAS)
         return speed - self.bias

@@ -10,19 +10,19 @@ from companion.guidance.reference import Pose, Reference
 _SMALL_SIZE = 0.5
 """Relative size of the first doublet of an axis; a single size cannot tell a slew limit from
 a lag."""
-_REST = 0.5
-"""Time of zero rates after a doublet, in which the slowest axis comes to rest, s."""
-_CLIMBS = 3
+_REST_TIME = 0.5
+"""Time of zero rates after a doublet of body rates, in which the slowest axis comes to rest, s."""
+_CLIMB_COUNT = 3
 """Number of climb doublets."""
 
 
 class _Doublet(NamedTuple):
-    """One doublet: signs +1, −1, +1 for T, 2T, T, times body rates or a vertical acceleration.
+    """One doublet of body rates or of vertical acceleration, times +1, −1, +1 for T, 2T, T.
 
     Attributes:
         step: T, s.
-        body_rates: rad/s; None: a doublet of climb.
-        climb: vertical acceleration, m/s², upwards.
+        body_rates: rad/s; None: a doublet of vertical acceleration.
+        climb: vertical acceleration, m/s², positive up.
     """
 
     step: float
@@ -32,7 +32,7 @@ class _Doublet(NamedTuple):
     @property
     def duration(self) -> float:
         """Duration with the rest that follows a doublet of body rates, s."""
-        return 4.0 * self.step + (0.0 if self.body_rates is None else _REST)
+        return 4.0 * self.step + (0.0 if self.body_rates is None else _REST_TIME)
 
     def at(self, time: float, hold: Reference) -> Reference:
         """The reference `time` s after the beginning; `hold` is the reference of position hold."""
@@ -81,7 +81,7 @@ class Doublets:
         yaw_step: T of yaw, s; yaw responds more slowly.
         climb: vertical acceleration, m/s².
         climb_step: T of the climbs, s.
-        settle: time of position hold, s.
+        settle: time of position hold before each doublet and at the end, s.
     """
 
     tilt_rate: float
@@ -113,7 +113,7 @@ class Doublets:
             )
             for size in (_SMALL_SIZE, 1.0)
         ]
-        return *rates, *(_CLIMBS * [_Doublet(self.climb_step, climb=self.climb)])
+        return *rates, *(_CLIMB_COUNT * [_Doublet(self.climb_step, climb=self.climb)])
 
     def check_times(self) -> list[float]:
         """The beginning, times 0.01 s apart over each doublet and its rest, and the end, s."""

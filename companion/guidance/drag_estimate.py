@@ -9,23 +9,23 @@ from companion.drag import AxisDrag, Drag
 from companion.guidance.reference import Horizontal, Vector
 
 _WINDOW = 0.2
-"""Duration of one measurement, s; a longer one suffers less from velocity noise."""
-_NOISE = 0.2
+"""Shortest duration of one measurement, s; a longer one suffers less from velocity noise."""
+_MEASUREMENT_DEVIATION = 0.2
 """Standard deviation of a measurement, m/s², from velocity noise and the thrust's direction."""
-_WIND = 2.0
+_WIND_DEVIATION = 2.0
 """Initial standard deviation of the acceleration by wind, m/s²."""
 _WIND_CHANGE = 0.2
 """Standard deviation of the change of the acceleration by wind in 1 s, m/s²."""
-_CLAMP = 3.0
-"""An innovation is clamped to this many standard deviations, since a bump is no sign of drag."""
-_LARGEST_INCREASE = 2.0
+_CLAMP_DEVIATIONS = 3.0
+"""An innovation is clamped to this many standard deviations, because a bump is no sign of drag."""
+_LARGEST_LINEAR_INCREASE = 2.0
 """Largest estimated linear drag above that of the prior, 1/s."""
 _LARGEST_QUADRATIC = 0.3
 """Largest estimate of the quadratic drag, 1/m."""
-_AXIS_DEVIATION, _LARGEST_AXIS = 0.03, 0.1
+_AXIS_DRAG_DEVIATION, _LARGEST_AXIS_DRAG = 0.03, 0.1
 """Initial standard deviation of `AxisDrag.coefficient`, which begins at 0, and its largest
 estimate, 1/m."""
-_CERTAIN = 0.1
+_CERTAIN_DEVIATION = 0.1
 """The drag counts as known if its standard deviation at the top speed is below this, 1/s."""
 
 
@@ -57,6 +57,8 @@ class DragEstimate:
 
     Attributes:
         prior_drag: drag of the prior.
+        drag: the drag estimated so far.
+        top_speed: largest mean horizontal speed in one measurement so far, m/s.
     """
 
     def __init__(self, prior: DragPrior) -> None:
@@ -64,44 +66,38 @@ class DragEstimate:
 
     def begin(self, prior: DragPrior) -> None:
         """Start again from `prior`."""
-        self.prior_drag = prior.drag
-        self._top_speed = 0.0
+        self.prior_drag = self.drag = prior.drag
+        self.top_speed = 0.0
         self._state = np.array([prior.drag.linear, prior.drag.quadratic, 0.0, 0.0, 0.0])
-        deviations = prior.linear_deviation, prior.quadratic_deviation, _WIND, _WIND
-        self._covariance = np.diag([*(each**2 for each in deviations), _AXIS_DEVIATION**2])
-        self._drag = prior.drag
+        deviations = (
+            prior.linear_deviation,
+            prior.quadratic_deviation,
+            _WIND_DEVIATION,
+            _WIND_DEVIATION,
+        )
+        self._covariance = np.diag([*(each**2 for each in deviations), _AXIS_DRAG_DEVIATION**2])
         self._forget_window()
-
-    @property
-    def drag(self) -> Drag:
-        """The drag estimated so far."""
-        return self._drag
 
     @property
     def axis_coefficient(self) -> float:
         """The coefficient of `AxisDrag` estimated so far, 1/m."""
-        return min(max(float(self._state[4]), 0.0), _LARGEST_AXIS)
+        return min(max(float(self._state[4]), 0.0), _LARGEST_AXIS_DRAG)
 
     @property
     def certain(self) -> bool:
         """Whether the vehicle has moved enough for a certain estimate."""
-        speed, p = self._top_speed, self._covariance
+        speed, p = self.top_speed, self._covariance
         variance = p[0, 0] + 2.0 * speed * p[0, 1] + speed * speed * p[1, 1]
-        return speed > 0.0 and sqrt(max(variance, 0.0)) < _CERTAIN
-
-    @property
-    def top_speed(self) -> float:
-        """The fastest mean speed of a window so far, m/s."""
-        return self._top_speed
+        return speed > 0.0 and sqrt(max(variance, 0.0)) < _CERTAIN_DEVIATION
 
     def observe(
         self, dt: float, velocity: Vector, residual: Horizontal, heading: float = 0.0
     ) -> None:
-        """Take a measured acceleration; one that is not finite is ignored.
+        """Take a measured acceleration; ignored if a number is not finite or `dt` not positive.
 
         Args:
-            dt: duration of the measurement, s.
-            velocity: mean velocity during the measurement, m/s, NED.
+            dt: duration over which it was measured, s.
+            velocity: mean velocity in this time, m/s, NED.
             residual: measured acceleration less the acceleration by thrust, m/s², NED.
             heading: heading of the vehicle, rad.
         """
@@ -122,7 +118,7 @@ class DragEstimate:
     def _learn(self) -> None:
         """Update the filter with the window: one measurement of north and one of east."""
         span = self._span
-        self._top_speed = max(self._top_speed, hypot(*self._passed) / span)
+        self.top_speed = max(self.top_speed, hypot(*self._passed) / span)
         for wind in (2, 3):
             self._covariance[wind, wind] += span * _WIND_CHANGE**2
         for axis in (0, 1):
@@ -130,15 +126,15 @@ class DragEstimate:
             row[0], row[1] = -self._passed[axis] / span, -self._squared[axis] / span
             row[2 + axis], row[4] = 1.0, -self._along_axes[axis] / span
             spread = self._covariance @ row
-            variance = float(row @ spread) + _NOISE**2
+            variance = float(row @ spread) + _MEASUREMENT_DEVIATION**2
             innovation, most = (
                 self._residual[axis] / span - float(row @ self._state),
-                _CLAMP * sqrt(variance),
+                _CLAMP_DEVIATIONS * sqrt(variance),
             )
             gain = spread / variance
             self._state = self._state + gain * min(max(innovation, -most), most)
             self._covariance = self._covariance - np.outer(gain, spread)
-        self._drag = self._bounded()
+        self.drag = self._bounded()
 
     def _bounded(self) -> Drag:
         """The most likely drag within the bounds.
@@ -148,7 +144,9 @@ class DragEstimate:
         (linear, quadratic), p = self._state[:2].tolist(), self._covariance
         within = min(max(quadratic, 0.0), _LARGEST_QUADRATIC)
         linear += float(p[0, 1] / p[1, 1]) * (within - quadratic) if p[1, 1] > 0.0 else 0.0
-        return Drag(min(max(linear, 0.0), self.prior_drag.linear + _LARGEST_INCREASE), within)
+        return Drag(
+            min(max(linear, 0.0), self.prior_drag.linear + _LARGEST_LINEAR_INCREASE), within
+        )
 
     def _forget_window(self) -> None:
         self._span = 0.0

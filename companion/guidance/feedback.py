@@ -74,8 +74,8 @@ def chain_gains(weights: Weights, lag: float, drag: float = 0.0) -> ChainGains:
     return gains
 
 
-_LARGEST_DOWN, _LARGEST_UP = 0.5 * GRAVITY, 0.5 * GRAVITY
-"""Largest accelerations that are commanded downwards and upwards, m/s²."""
+_LARGEST_VERTICAL = 0.5 * GRAVITY
+"""Largest acceleration that is commanded up or down, m/s²."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,4 +103,4 @@ def acceleration_down(gains: HeightGains, reference: Reference, motion: VehicleM
         speed = reference.velocity_ned[2] + gains.height * error
         speed = min(max(speed, -gains.max_climb), gains.max_descent)
         wanted += gains.climb * (speed - motion.velocity_ned[2])
-    return min(max(wanted, -_LARGEST_UP), _LARGEST_DOWN)
+    return min(max(wanted, -_LARGEST_VERTICAL), _LARGEST_VERTICAL)

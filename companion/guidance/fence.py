@@ -15,7 +15,7 @@ Components = tuple[Any, Any, Any]
 """A `Vector`, or a vector whose components are arrays."""
 
 EARTH_RADIUS = 6_371_000.0
-"""Mean radius, m; over the size of a fence the earth counts as flat."""
+"""Mean radius of the earth, m; over the size of a fence the earth counts as flat."""
 
 
 class Place(NamedTuple):
@@ -30,20 +30,19 @@ class Breach(NamedTuple):
 
     Attributes:
         limit: the configuration key of the limit that is breached.
-        side: on which side of the limit the place lies, such as "beyond" or "below".
+        relation: how the place lies to the limit, such as "beyond"; the key follows it.
         where: the place, in words that end a sentence.
         by: how far the place lies outside, m; negative inside, 0 if it was not computed (polygon
             without a margin, unknown origin).
     """
 
     limit: str
-    side: str
+    relation: str
     where: str
     by: float
 
     def __str__(self) -> str:
-        polygon = self.limit.startswith("safety.")
-        return self.where if polygon else f"{self.where}, {self.side} {self.limit}"
+        return f"{self.where}, {self.relation} {self.limit}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +57,7 @@ class Fence:
         places: corners as (latitude, longitude) in degrees, instead of `polygon`.
         deceleration: deceleration that the vehicle certainly reaches, m/s².
         reaction: assumed delay before the vehicle brakes, s.
-        late: time by which the estimated horizontal motion is behind the vehicle, s.
+        late: delay of the estimated horizontal motion behind the true one, s.
     """
 
     radius: float
@@ -90,13 +89,14 @@ class Fence:
             return Breach("limits.fence_radius_m", "beyond", where, distance - self.radius)
         if self.places and origin is None:
             where = "at a place whose latitude and longitude are not known"
-            return Breach("safety.fence_polygon_deg", "with", where, 0.0)
+            return Breach("safety.fence_polygon_deg", "but needed by", where, 0.0)
         corners = local_polygon(self.places, origin) if origin and self.places else self.polygon
         if corners:
             by = -distance_inside(north, east, corners) if margin else 0.0
             if by > -margin or not inside(north, east, corners):
                 key = "safety.fence_polygon_deg" if self.places else "safety.fence_polygon_m"
-                return Breach(key, "outside", "outside the polygon of the fence", by)
+                where = f"{north:.1f} m north and {east:.1f} m east of where control began"
+                return Breach(key, "outside", where, by)
         if -down > self.ceiling - margin:
             where = f"{0.0 - down:.1f} m above where control began"
             return Breach("limits.fence_ceiling_m", "above", where, -down - self.ceiling)
@@ -110,10 +110,10 @@ class Fence:
     ) -> Components:
         """Where the vehicle stops if it brakes now, m NED from where control began.
 
-        For the horizontal and for the vertical velocity v the way is v·t + v²/(2b), with the
+        From a horizontal or vertical velocity v, the vehicle stops after v·t + v²/(2b), with the
         deceleration b and the reaction time t, to which `late` is added horizontally. A horizontal
-        acceleration a that makes the vehicle faster lasts for t: the way is
-        v·t + a·t²/2 + (v + a·t)²/(2b). One that brakes does not count, since it may end at any
+        acceleration a that makes the vehicle faster lasts for t: then it stops after
+        v·t + a·t²/2 + (v + a·t)²/(2b). One that brakes does not count, because it may end at any
         moment.
 
         Args:
@@ -148,7 +148,7 @@ class Fence:
     ) -> Breach | None:
         """The breach of the fence at the place of `stop`; None: the vehicle stops inside.
 
-        The arguments are those of `breach` and `stop`.
+        The arguments are those of `breach` and `stop`; `height` is the present one.
         """
         stop = self.stop(offset, velocity, acceleration)
         sunk = stop[2] - offset[2]
@@ -181,9 +181,9 @@ def distance_inside(north: float, east: float, polygon: Sequence[Corner]) -> flo
 
 
 @lru_cache(maxsize=4)
-def circle_corners(radius: float, number: int) -> tuple[Corner, ...]:
-    """A circle about the origin as a polygon of `number` corners, m north and east."""
-    angles = [2.0 * pi * corner / number for corner in range(number)]
+def circle_corners(radius: float, count: int) -> tuple[Corner, ...]:
+    """A circle of `radius` metres about the origin, as a polygon of `count` corners."""
+    angles = [2.0 * pi * corner / count for corner in range(count)]
     return tuple((radius * cos(angle), radius * sin(angle)) for angle in angles)
 
 

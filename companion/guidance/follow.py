@@ -19,7 +19,7 @@ def circle(radius: float, speed: float, laps: float) -> "HeldFigure":
         radius: m.
         speed: speed between speeding up and slowing down, m/s.
         laps: number of laps, in which the vehicle also speeds up and slows down. If it is not
-            whole, the circle ends elsewhere.
+            whole, the circle does not end where it began.
     """
     return HeldFigure(steady_circle(radius, speed, laps, longest=inf))
 

@@ -6,12 +6,12 @@ from companion.attitude import BodyRates, Quaternion
 from companion.attitude.kinematics import cos_tilt
 from companion.guidance.reference import GRAVITY
 from companion.guidance.thrust import BatterySag, ThrustCurve, cos_tilt_ahead, specific_thrust
-from companion.guidance.thrust_filter import SHORTEST, ThrustFilter
+from companion.guidance.thrust_filter import SHORTEST_WINDOW, ThrustFilter
 
 _LONGEST_WINDOW = 0.5
-"""Longest time between two velocities that are used, s; the thrust between them is uncertain."""
+"""Longest time between two velocities from which thrust is learned, s."""
 
-_PLAUSIBLE = (0.3 * GRAVITY, 2.5 * GRAVITY)
+_PLAUSIBLE_THRUST = (0.3 * GRAVITY, 2.5 * GRAVITY)
 """Range of measured specific thrust, m/s²; outside it (free fall, a bump) nothing is learned."""
 
 _DRAG_DEVIATION = 0.5
@@ -51,8 +51,8 @@ class ThrustSettings:
 class HoverThrust:
     """Normalised thrust for a wanted vertical acceleration, from a hover thrust that is learned.
 
-    The caller calls `observe` only in the air, and passes to `sent` the thrust that the vehicle
-    follows: the thrust that `companion` sends while it is in control, before that the autopilot's.
+    The caller calls `observe` only in the air, and passes to `note_thrust` the thrust that the
+    vehicle follows: that of `companion` while it is in control, before that the autopilot's.
     """
 
     def __init__(self, settings: ThrustSettings) -> None:
@@ -78,7 +78,7 @@ class HoverThrust:
 
     @property
     def learned(self) -> float:
-        """Learned normalised thrust at hover, at the battery voltage at the start of the flight."""
+        """Learned normalised thrust at hover, at the first battery voltage in the air."""
         return self._curve.signal(GRAVITY / self._filter.gain)
 
     @property
@@ -87,21 +87,21 @@ class HoverThrust:
         return self._normalised(GRAVITY)
 
     @property
-    def largest(self) -> float:
+    def largest_specific(self) -> float:
         """Largest specific thrust that is sent, m/s²."""
         return self._specific(self._settings.highest)
 
     @property
-    def largest_tilted(self) -> float:
+    def largest_specific_tilted(self) -> float:
         """Largest specific thrust of a tilted vehicle along its thrust axis, m/s².
 
-        An autopilot that compensates the tilt itself may raise the thrust beyond `largest`.
+        An autopilot that compensates the tilt itself may raise the thrust above `largest_specific`.
         """
         settings = self._settings
         return self._specific(1.0 if settings.tilt_compensated else settings.highest)
 
     @property
-    def smallest(self) -> float:
+    def smallest_specific(self) -> float:
         """Smallest specific thrust that is sent, m/s²."""
         return self._specific(self._settings.lowest)
 
@@ -122,7 +122,7 @@ class HoverThrust:
         """The normalised thrust, limited to its bounds."""
         return min(max(normalised, self._settings.lowest), self._settings.highest)
 
-    def sent(self, normalised: float, q: Quaternion) -> None:
+    def note_thrust(self, normalised: float, q: Quaternion) -> None:
         """Note a normalised thrust that the vehicle follows, and its attitude at that time."""
         vertical = self._curve.share(normalised) * self._battery.factor
         if not self._settings.tilt_compensated:
@@ -137,19 +137,19 @@ class HoverThrust:
             return
         began, before = self._window_start
         span = time - began
-        if 0.0 <= span < SHORTEST:
+        if 0.0 <= span < SHORTEST_WINDOW:
             return
         if span <= _LONGEST_WINDOW and self._count:
             velocity = 0.5 * (before + velocity_down)
             acceleration = (velocity_down - before) / span
             measured = GRAVITY - acceleration - self._settings.drag * velocity
-            if _PLAUSIBLE[0] <= measured <= _PLAUSIBLE[1]:
+            if _PLAUSIBLE_THRUST[0] <= measured <= _PLAUSIBLE_THRUST[1]:
                 extra_variance = (_DRAG_DEVIATION * velocity) ** 2
                 self._filter.learn(span, self._sum / self._count, measured, extra_variance)
         self._begin_window(time, velocity_down)
 
     def pause(self) -> None:
-        """Drop the current window: nothing is learned across a pause."""
+        """Drop the latest velocity: nothing is learned across a pause."""
         self._window_start = None
 
     def note_voltage(self, time: float, voltage: float | None) -> None:
@@ -157,7 +157,7 @@ class HoverThrust:
         self._battery.note(time, voltage)
 
     def on_ground(self) -> None:
-        """Called on the ground: stop learning; the next voltage in the air is the first one."""
+        """Stop learning, and take the next battery voltage as the first one in the air."""
         self.pause()
         self._battery.reset()
 

@@ -9,15 +9,16 @@ from companion.attitude import Coefficients
 from companion.attitude.reference import first_order_step
 from companion.attitude.representation import wrap_angle
 
-Path = Callable[[float], Coefficients]
-"""Coefficients as a function of time (s)."""
+CoefficientPath = Callable[[float], Coefficients]
+"""Coefficients as a function of event-loop time, s."""
 
-_STEP = 2e-3
+_PATH_STEP = 2e-3
 """Step of the central differences along a path, s; it makes an error of about 1e-7 in flight."""
 _INTEGRATION_STEP = 1e-3
 """Step of the integration in `step_time`, s."""
 _MOST_STEPS = 60_000
-_COVERED = 1.0 - exp(-1.0)
+_COVERED_SHARE = 1.0 - exp(-1.0)
+"""Share of a step that a first-order response covers in its time constant."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +53,7 @@ class InnerResponse:
         """Time that the coefficients need for 63 % of a step of the target, s.
 
         Args:
-            size: size of the step, a coefficient.
+            size: size of the step, without unit.
             max_speed: largest speed of the coefficients, 1/s.
 
         Returns:
@@ -62,7 +63,7 @@ class InnerResponse:
         speeds = deque([0.0] * (1 + round(delay / _INTEGRATION_STEP)))
         c = speed = 0.0
         for k in range(_MOST_STEPS):
-            if c >= _COVERED * size:
+            if c >= _COVERED_SHARE * size:
                 return k * _INTEGRATION_STEP + (self.dead_time if self.follows_model else 0.0)
             # Without a model, the error of now takes effect one dead time later.
             speeds.append(min(self.gain * (size - c), max_speed))
@@ -73,10 +74,10 @@ class InnerResponse:
             c += moved
         return inf
 
-    def target(self, path: Path, time: float) -> Coefficients:
+    def target(self, path: CoefficientPath, time: float) -> Coefficients:
         """The target at `time` with which the coefficients follow `path` without error."""
         acts = time + self.dead_time
-        before, there, after = path(acts - _STEP), path(acts), path(acts + _STEP)
+        before, there, after = path(acts - _PATH_STEP), path(acts), path(acts + _PATH_STEP)
         held = there if self.follows_model or self.dead_time == 0.0 else path(time)
         return Coefficients(
             held.north + self._lead(before.north, there.north, after.north),
@@ -86,23 +87,24 @@ class InnerResponse:
     def heading_target(self, heading: Callable[[float], float], time: float) -> tuple[float, float]:
         """Target heading (rad) and heading rate (rad/s) with which the heading follows its path.
 
-        The planner turns at gain·(ψ_d − ψ) + ψ̇_d, so only lag·ψ̈ remains to be compensated.
+        The planner turns at gain·(ψ_d − ψ) + ψ̇_d, so only lag·ψ̈ remains to be compensated. With
+        a gain of 0 nothing is compensated.
         """
         acts = time + self.dead_time
         there = heading(acts)
-        before = there - wrap_angle(there - heading(acts - _STEP))
-        after = there + wrap_angle(heading(acts + _STEP) - there)
-        rate = 0.5 * (after - before) / _STEP
+        before = there - wrap_angle(there - heading(acts - _PATH_STEP))
+        after = there + wrap_angle(heading(acts + _PATH_STEP) - there)
+        rate = 0.5 * (after - before) / _PATH_STEP
         held = there if self.follows_model else heading(time)
         if self.gain == 0.0:
             return held, rate
-        bend = (after - 2.0 * there + before) / (_STEP * _STEP)
+        bend = (after - 2.0 * there + before) / (_PATH_STEP * _PATH_STEP)
         return held + self.lag * bend / self.gain, rate
 
     def _lead(self, before: float, there: float, after: float) -> float:
         """(ċ + lag·c̈)/gain from central differences of three coefficients."""
-        speed = 0.5 * (after - before) / _STEP
-        bend = (after - 2.0 * there + before) / (_STEP * _STEP)
+        speed = 0.5 * (after - before) / _PATH_STEP
+        bend = (after - 2.0 * there + before) / (_PATH_STEP * _PATH_STEP)
         return (speed + self.lag * bend) / self.gain
 
 

@@ -49,7 +49,7 @@ class GuidanceInput(NamedTuple):
 
     Attributes:
         now: present motion.
-        acts: motion predicted for the time when the present command takes effect.
+        predicted: motion predicted for the time when the present command takes effect.
         thrust: horizontal acceleration due to the present thrust, m/s², NED.
         disturbance: horizontal acceleration due to wind and bias, m/s², NED.
         drag: drag of the vehicle.
@@ -58,7 +58,7 @@ class GuidanceInput(NamedTuple):
     """
 
     now: VehicleMotion
-    acts: VehicleMotion
+    predicted: VehicleMotion
     thrust: Horizontal
     disturbance: Horizontal
     drag: Drag
@@ -102,7 +102,7 @@ class Guidance(Protocol):
     def acts_after(self) -> float:
         """Mean delay from computing a command until its feedback takes effect, s.
 
-        `GuidanceInput.acts` is predicted for this time.
+        `GuidanceInput.predicted` is the motion after this delay.
         """
         ...
 
@@ -114,10 +114,10 @@ class Guidance(Protocol):
 
 
 class RestingCoefficients:
-    """Mean target coefficients of the latest drift, in which only the disturbance is compensated.
+    """Mean target coefficients of the latest drift (`Reference.drifting`).
 
-    Steps that are added to them accelerate the vehicle as asked, in wind and with an estimate that
-    is tilted by a fraction of a degree, too.
+    Open-loop coefficients that are added to this mean accelerate the vehicle as asked, even in wind
+    or if the estimated attitude is off by a fraction of a degree.
     """
 
     def __init__(self) -> None:
@@ -144,7 +144,7 @@ class RestingCoefficients:
 
 
 class LinearGuidance:
-    """Acceleration of the reference, plus feedback of position, velocity and acceleration errors.
+    """Commands the reference's acceleration, plus feedback of errors in position and its rates.
 
     Drag and the observed disturbance are fed forward. The result is a path of coefficients.
     `InnerResponse.target` leads the target, so that the coefficients follow this path. Coefficients
@@ -197,14 +197,14 @@ class LinearGuidance:
         return LinearCommand(target, later, down)
 
     def _feedback(self, now: Reference, acts: Reference, inputs: GuidanceInput) -> Horizontal:
-        """Horizontal acceleration that corrects errors and disturbance, m/s², limited."""
+        """Horizontal acceleration that corrects errors and disturbance, m/s², at most the limit."""
         settings, gains, wind = self._settings, self._settings.gains, inputs.disturbance
         if now.drifting:
             return limited(-wind[0], -wind[1], settings.max_horizontal)
         wanted, slowed = [], inputs.deceleration(inputs.now.velocity_ned)
         for axis in (0, 1):
-            place = inputs.acts.position_ned[axis] - acts.position_ned[axis]
-            speed = inputs.acts.velocity_ned[axis] - acts.velocity_ned[axis]
+            place = inputs.predicted.position_ned[axis] - acts.position_ned[axis]
+            speed = inputs.predicted.velocity_ned[axis] - acts.velocity_ned[axis]
             acceleration = (
                 inputs.thrust[axis] - slowed[axis] + wind[axis] - now.acceleration_ned[axis]
             )

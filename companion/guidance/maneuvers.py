@@ -8,9 +8,11 @@ from typing import Protocol
 from companion.attitude import Coefficients
 from companion.guidance.reference import Pose, Reference
 
-_REST = 1.0
+_HOLD_PAUSE = 1.0
 """Pause of the position hold before open-loop steps, s: its corrections would disturb the attitude
 from which a step is measured."""
+_CHECK_STEP = 0.01
+"""Largest time between two checks of a maneuver, s."""
 
 
 class Maneuver(Protocol):
@@ -39,9 +41,9 @@ class Maneuver(Protocol):
         ...
 
 
-def spread(begin: float, end: float, step: float = 0.01) -> list[float]:
-    """Times from `begin` to `end`, both included, about `step` apart, s."""
-    count = max(1, math.ceil((end - begin) / step))
+def spread(begin: float, end: float) -> list[float]:
+    """Times from `begin` to `end`, both included, at most `_CHECK_STEP` apart, s."""
+    count = max(1, math.ceil((end - begin) / _CHECK_STEP))
     return [begin + (end - begin) * k / count for k in range(count + 1)]
 
 
@@ -73,17 +75,17 @@ class Steps:
 
     @property
     def _period(self) -> float:
-        return _REST + 4.0 * self.step + self.settle
+        return _HOLD_PAUSE + 4.0 * self.step + self.settle
 
     def check_times(self) -> list[float]:
         """Times 0.01 s apart over each doublet, s; pauses and settling are not checked."""
-        begins = [index * self._period + _REST for index in range(len(self.DIRECTIONS))]
+        begins = [index * self._period + _HOLD_PAUSE for index in range(len(self.DIRECTIONS))]
         return [time for begin in begins for time in spread(begin, begin + 4.0 * self.step)]
 
     def at(self, time: float, start: Pose) -> Reference:
         """The reference: a pause, open-loop coefficients in the doublet, then position hold."""
         index = min(max(int(time / self._period), 0), len(self.DIRECTIONS) - 1)
-        within = time - index * self._period - _REST
+        within = time - index * self._period - _HOLD_PAUSE
         rest = Reference(start.position_ned, heading=start.heading)
         if within < 0.0:
             return rest._replace(drifting=True)
@@ -102,9 +104,9 @@ class Corners:
     Such steps show the differences between the planners, as in the paper's figure 2; a step through
     level is straight with every planner. Before the first step the position hold pauses, so that
     the attitude is at rest; the corners are added to the coefficients of this rest. The
-    acceleration goes round the rectangle twice, the second time
-    mirrored. With an ideal response and no drag the vehicle ends where it began, at rest. Position
-    hold corrects the remaining error for `settle` seconds.
+    acceleration goes round the rectangle twice, the second time mirrored. With an ideal response
+    and no drag the vehicle ends where it began, at rest. Position hold corrects the remaining error
+    for `settle` seconds.
 
     Attributes:
         north, east: absolute values of the corners' coefficients; the sine of the tilt is
@@ -133,18 +135,18 @@ class Corners:
     @property
     def duration(self) -> float:
         """The pause before the steps, all corners, and the settling, s."""
-        return _REST + len(self.CORNERS) * self.step + self.settle
+        return _HOLD_PAUSE + len(self.CORNERS) * self.step + self.settle
 
     def check_times(self) -> list[float]:
         """Times 0.01 s apart over the corners, and the end, s."""
-        return [*spread(_REST, _REST + len(self.CORNERS) * self.step), self.duration]
+        return [*spread(_HOLD_PAUSE, _HOLD_PAUSE + len(self.CORNERS) * self.step), self.duration]
 
     def at(self, time: float, start: Pose) -> Reference:
         """The reference: a pause, open-loop coefficients at the corners, then position hold."""
         rest = Reference(start.position_ned, heading=start.heading)
-        if time < _REST:
+        if time < _HOLD_PAUSE:
             return rest._replace(drifting=True)
-        index = int((time - _REST) / self.step)
+        index = int((time - _HOLD_PAUSE) / self.step)
         if index >= len(self.CORNERS):
             return rest
         north, east = self.CORNERS[index]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from companion.attitude.history import locate_time
 from companion.guidance.reference import Horizontal, Vector, VehicleMotion, limited, rotated
 
-_LARGEST_STEP = 0.5
+_LARGEST_PULL_TIMES_STEP = 0.5
 """Largest product of `ObserverSettings.pull` and the time between two measurements: with a larger
 one, the observer is unstable at low position rates, and a gap in the positions makes a false wind.
 """
@@ -37,10 +37,10 @@ class ObserverSettings:
     """How strongly measurements correct the observer.
 
     Attributes:
-        bandwidth: both poles of velocity and disturbance, rad/s.
+        bandwidth: both poles of the error of velocity and disturbance, rad/s.
         position_time: time constant with which the position follows the measured one, s.
         position_pull: correction of the velocity per position error, 1/s.
-        largest: largest disturbance, m/s².
+        largest_disturbance: largest disturbance, m/s².
         sharpening: relative increase of the bandwidth with trusted positions.
         trusted_pull: increase of `position_pull` with trusted positions, 1/s.
     """
@@ -48,13 +48,13 @@ class ObserverSettings:
     bandwidth: float
     position_time: float
     position_pull: float
-    largest: float
+    largest_disturbance: float
     sharpening: float = 0.0
     trusted_pull: float = 0.0
 
     def pull(self, dt: float, trust: float) -> float:
-        """Correction of the velocity per position error, 1/s; arguments as in `gains`."""
-        return min(self.position_pull + trust * self.trusted_pull, _LARGEST_STEP / dt)
+        """Correction of the velocity per position error, 1/s; `dt` and `trust` as in `gains`."""
+        return min(self.position_pull + trust * self.trusted_pull, _LARGEST_PULL_TIMES_STEP / dt)
 
     def gains(self, dt: float, trust: float = 0.0) -> ObserverGains:
         """The gains for measurements `dt` seconds apart.
@@ -99,12 +99,14 @@ class MotionObserver:
     ) -> None:
         """Take a measured position and velocity.
 
-        The first one is taken as it is, and so is one after 1 s or more without a measurement.
+        The first one is taken as it is, and so is one after 1 s or more without a measurement, or
+        one that is not newer than the last.
 
         Args:
             time: vehicle time of the measurement, s.
             measured: measured motion, NED.
-            known: horizontal acceleration by thrust and drag since the last measurement, m/s².
+            known: mean horizontal acceleration by thrust and drag since the last measurement, m/s²,
+                NED.
             trust: trust in the positions, 0 to 1 (`PositionCorrection.trust`).
         """
         motion, dt = self._motion, time - self._time
@@ -128,7 +130,7 @@ class MotionObserver:
             velocity[axis] = v + gains.velocity * error
             found[axis] = disturbance[axis] + gains.disturbance * error
         self._motion = VehicleMotion(_vector(position), _vector(velocity))
-        self.disturbance = limited(found[0], found[1], settings.largest)
+        self.disturbance = limited(found[0], found[1], settings.largest_disturbance)
 
     def turn(self, angle: float) -> None:
         """Rotate the disturbance by `angle` (rad), a jump of the estimated heading.
@@ -142,7 +144,7 @@ class MotionObserver:
 
         Args:
             time: vehicle time, s.
-            known: horizontal acceleration by thrust and drag until then, m/s².
+            known: mean horizontal acceleration by thrust and drag until then, m/s², NED.
         """
         motion, dt = self._motion, time - self._time
         if motion is None:
@@ -164,7 +166,7 @@ def _vector(values: list[float]) -> Vector:
     return north, east, down
 
 
-_LENGTH = 200
+_KEPT_ATTITUDES = 200
 """Number of attitudes kept: 0.8 s at 250 Hz, longer than the delay of any position."""
 
 
@@ -173,11 +175,14 @@ class SlopeHistory:
 
     The observer needs the mean slope between the time stamps of two positions. These come late and
     at other times than the attitudes, so the history keeps the integral of the slope.
+
+    Attributes:
+        newest: slope of the newest attitude (north, east), without unit.
     """
 
     def __init__(self) -> None:
-        self._times: deque[float] = deque(maxlen=_LENGTH)
-        self._sums: deque[Horizontal] = deque(maxlen=_LENGTH)
+        self._times: deque[float] = deque(maxlen=_KEPT_ATTITUDES)
+        self._sums: deque[Horizontal] = deque(maxlen=_KEPT_ATTITUDES)
         self.newest: Horizontal = (0.0, 0.0)
 
     def add(self, time: float, slope: Horizontal) -> None:
@@ -206,14 +211,15 @@ class SlopeHistory:
         self.newest = slope
 
     def forget(self) -> None:
-        """Forget all attitudes, because a heading jump has changed the direction of north."""
+        """Forget all attitudes; called after a jump of the estimated heading, which turns north."""
         self._times.clear()
         self._sums.clear()
 
     def mean(self, start: float, end: float) -> Horizontal:
         """The mean slope between two vehicle times, s.
 
-        Before the first attitude and after the last, the slope is taken as constant.
+        Before the first attitude and after the last, the slope is taken as constant. It is `newest`
+        if `end` is not after `start`, or if no attitude is kept.
         """
         if not start < end or not self._times:
             return self.newest

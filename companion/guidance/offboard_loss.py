@@ -13,7 +13,7 @@ from companion.drag import Drag
 from companion.guidance.fence import Fence
 from companion.guidance.reference import GRAVITY, Vector
 
-_STEPS = 20
+_INTEGRATION_STEPS = 20
 """Number of integration steps while the rates are held."""
 _FEEDBACK_RATE = 0.15
 """Largest part of the rates that is feedback on a smooth path, rad/s (mock vehicles: 0.1)."""
@@ -47,14 +47,14 @@ class LossFailsafe(NamedTuple):
     """The vehicle and its offboard-loss failsafe.
 
     Attributes:
-        held: Time for which the autopilot holds the last rates, s.
+        hold_time: Time for which the autopilot holds the last rates, s.
         brakes: True: the failsafe brakes the vehicle. False: it drifts until drag stops it.
         drag: Drag of the vehicle; no drag if it is unknown.
         max_tilt_rate: Largest tilt rate that is sent, rad/s.
         fence: The fence, whose braking formula is used.
     """
 
-    held: float
+    hold_time: float
     brakes: bool
     drag: Drag
     max_tilt_rate: float
@@ -102,43 +102,47 @@ class _HeldResult(NamedTuple):
     tilt: float
 
 
-def reach(flown: MotionAtLoss, loss: LossFailsafe) -> Reach:
-    """How far the vehicle can move if the setpoints end now."""
-    held = _held_motion(flown, loss)
-    size = hypot(*flown.thrust)
+def reach(at_loss: MotionAtLoss, loss: LossFailsafe) -> Reach:
+    """How far the vehicle can move if the setpoints end at this motion."""
+    held = _held_motion(at_loss, loss)
+    specific_thrust = hypot(*at_loss.thrust)
     speed = hypot(*held.velocity[:2])
     widest = speed + held.extra_speed
-    stop, farthest = (_stopping_distance(value, held.tilt, size, loss) for value in (speed, widest))
+    stop, farthest = (
+        _stopping_distance(value, held.tilt, specific_thrust, loss) for value in (speed, widest)
+    )
     north, east = (
         way + (stop * component / speed if speed > 0.0 else 0.0)
         for way, component in zip(held.way[:2], held.velocity[:2], strict=True)
     )
     up_speed = max(0.0, held.extra_speed - held.velocity[2])
     up = held.highest + held.extra_way + up_speed * _FAILSAFE_DELAY + _braking_distance(up_speed)
-    return Reach((north, east), held.extra_way + farthest - stop, up, _fall_distance(held, size))
+    return Reach(
+        (north, east), held.extra_way + farthest - stop, up, _fall_distance(held, specific_thrust)
+    )
 
 
-def _held_motion(flown: MotionAtLoss, loss: LossFailsafe) -> _HeldResult:
+def _held_motion(at_loss: MotionAtLoss, loss: LossFailsafe) -> _HeldResult:
     """Integrate the motion while rates and thrust are held: the thrust axis turns steadily."""
-    duration = loss.held + _FAILSAFE_DELAY
-    step = duration / _STEPS
-    size = hypot(*flown.thrust)
-    axis: Vector = _scaled(flown.thrust, 1.0 / size)
-    along = sum(a * b for a, b in zip(axis, flown.turn, strict=True))
-    across: Vector = _plus_scaled(flown.turn, axis, -along)
-    rate = hypot(*across) / size
-    ahead = _scaled(across, 1.0 / (rate * size)) if rate > 0.0 else (0.0, 0.0, 0.0)
+    duration = loss.hold_time + _FAILSAFE_DELAY
+    step = duration / _INTEGRATION_STEPS
+    specific_thrust = hypot(*at_loss.thrust)
+    axis: Vector = _scaled(at_loss.thrust, 1.0 / specific_thrust)
+    along = sum(a * b for a, b in zip(axis, at_loss.turn, strict=True))
+    across: Vector = _plus_scaled(at_loss.turn, axis, -along)
+    rate = hypot(*across) / specific_thrust
+    ahead = _scaled(across, 1.0 / (rate * specific_thrust)) if rate > 0.0 else (0.0, 0.0, 0.0)
     rate = min(rate, loss.max_tilt_rate)
     feedback = min(_FEEDBACK_RATE, loss.max_tilt_rate)
-    way, velocity, thrust = (0.0, 0.0, 0.0), flown.velocity, axis
+    way, velocity, thrust = (0.0, 0.0, 0.0), at_loss.velocity, axis
     extra_way = extra_speed = highest = 0.0
-    for index in range(_STEPS):
+    for index in range(_INTEGRATION_STEPS):
         angle = rate * (index + 0.5) * step
         thrust = _plus_scaled(_scaled(axis, cos(angle)), ahead, sin(angle))
-        velocity = _plus_scaled(_slowed(velocity, loss.drag, step), thrust, size * step)
+        velocity = _plus_scaled(_slowed(velocity, loss.drag, step), thrust, specific_thrust * step)
         velocity = (velocity[0], velocity[1], velocity[2] + GRAVITY * step)
         way = _plus_scaled(way, velocity, step)
-        stray = 2.0 * size * sin(0.5 * min(pi, feedback * (index + 0.5) * step))
+        stray = 2.0 * specific_thrust * sin(0.5 * min(pi, feedback * (index + 0.5) * step))
         extra_speed += (stray - loss.drag.linear * extra_speed) * step
         extra_way += extra_speed * step
         highest = max(highest, -way[2])
@@ -146,22 +150,24 @@ def _held_motion(flown: MotionAtLoss, loss: LossFailsafe) -> _HeldResult:
     return _HeldResult(way, velocity, extra_way, extra_speed, highest, min(pi, tilt))
 
 
-def _stopping_distance(speed: float, tilt: float, size: float, loss: LossFailsafe) -> float:
+def _stopping_distance(
+    speed: float, tilt: float, specific_thrust: float, loss: LossFailsafe
+) -> float:
     """Horizontal distance from the end of the held rates to the stop, m."""
     if loss.brakes:
         return float(loss.fence.stop((0.0, 0.0, 0.0), (speed, 0.0, 0.0))[0])
     levelled = _level_time(tilt)
-    speed += size * sin(min(tilt, 0.5 * pi)) * levelled
+    speed += specific_thrust * sin(min(tilt, 0.5 * pi)) * levelled
     return speed * levelled + speed / max(loss.drag.linear, _SMALLEST_DRAG)
 
 
-def _fall_distance(held: _HeldResult, size: float) -> float:
+def _fall_distance(held: _HeldResult, specific_thrust: float) -> float:
     """Largest fall while the rates are held, while the vehicle levels and until it stops, m."""
     duration = _level_time(held.tilt)
     mean_cosine = sin(held.tilt) / held.tilt if held.tilt > 0.0 else 1.0  # while it levels
     speed = held.velocity[2] + held.extra_speed
     fall = held.way[2] + held.extra_way
-    gain = max(0.0, GRAVITY - size * mean_cosine)
+    gain = max(0.0, GRAVITY - specific_thrust * mean_cosine)
     fall += max(0.0, speed) * duration + 0.5 * gain * duration * duration
     return max(0.0, fall + _braking_distance(max(0.0, speed) + gain * duration))
 

@@ -5,13 +5,13 @@ from math import exp, hypot, sqrt
 
 from companion.guidance.reference import Horizontal, VehicleMotion, limited
 
-_LONGEST = 0.5
+_LONGEST_GAP = 0.5
 """Longest time between two positions from which a correction is computed, s."""
 _LONGEST_WINDOW = 0.1
-"""Time constant of each low-pass filter with noisy positions, s."""
+"""Longest time constant of each low-pass filter in motion, s; noisy positions need it."""
 _WINDOW_PER_NOISE = 0.1
 """Growth of that time constant with the noise of r (see `PositionCorrection`), s per m/s."""
-_SMOOTH, _NOISY = 0.2, 0.6
+_SMOOTH_BELOW, _NOISY_ABOVE = 0.2, 0.6
 """Noise of r below which positions count as smooth, and above which as noisy, m/s. It is at most
 0.1 m/s on PX4 and ArduPilot; white noise of 3 mm at 50 Hz makes 0.5 m/s."""
 _LARGEST_CHANGE = 0.08
@@ -20,7 +20,7 @@ position in whole milliseconds: at 5 m/s a stamp that is off by 1 ms changes one
 its estimator corrects changes r by 0.02 m/s, with peaks of 0.1 m/s (measured)."""
 _NOISE_TIME = 1.0
 """Time constant with which the noise of r is estimated, s."""
-_MOVING = 2.0
+_MOVING_SPEED = 2.0
 """Speed from which the positions are trusted fully, m/s. Below it their errors are small and mostly
 noise: a real PX4 then hovers with half the body rates and the same true position error."""
 
@@ -31,15 +31,15 @@ class CorrectionSettings:
 
     Attributes:
         ahead: time constant of the estimator's correction, s: 1/(the estimator's position gain).
-        window: time constant of the two low-pass filters on the correction in motion with smooth
-            positions, s, positive; at rest it is twice that.
-        largest: largest anticipated correction, m.
+        window: time constant of each of the two low-pass filters while the vehicle moves and its
+            positions are smooth, s, positive; at rest it is twice that.
+        largest_correction: largest anticipated correction, m.
         lateness: delay of the estimator's position that remains after its corrections, s.
     """
 
     ahead: float
     window: float
-    largest: float
+    largest_correction: float
     lateness: float
 
 
@@ -81,7 +81,9 @@ class PositionCorrection:
 
         0 if they are noisy or rounded, or if the vehicle is at rest.
         """
-        smoothness = min(max(0.0, (_NOISY - sqrt(self._noise)) / (_NOISY - _SMOOTH)), 1.0)
+        smoothness = min(
+            max(0.0, (_NOISY_ABOVE - sqrt(self._noise)) / (_NOISY_ABOVE - _SMOOTH_BELOW)), 1.0
+        )
         return smoothness * self._moving
 
     def corrected(self, time: float, measured: VehicleMotion) -> VehicleMotion:
@@ -94,8 +96,10 @@ class PositionCorrection:
         settings = self._settings
         before, dt = self._before, time - self._time
         self._time, self._before = time, measured
-        self._moving = min(hypot(measured.velocity_ned[0], measured.velocity_ned[1]) / _MOVING, 1.0)
-        if before is None or not 0.0 < dt < _LONGEST:
+        self._moving = min(
+            hypot(measured.velocity_ned[0], measured.velocity_ned[1]) / _MOVING_SPEED, 1.0
+        )
+        if before is None or not 0.0 < dt < _LONGEST_GAP:
             self._raw = self._filtered = self._correction = (0.0, 0.0)
         else:
             self._take(before, measured, dt)
@@ -124,9 +128,9 @@ class PositionCorrection:
             wanted = settings.ahead * filtered[axis]
             correction[axis] = wanted + kept * (self._correction[axis] - wanted)
         self._raw = raw[0], raw[1]
-        most = settings.largest / settings.ahead if settings.ahead > 0.0 else 0.0
+        most = settings.largest_correction / settings.ahead if settings.ahead > 0.0 else 0.0
         self._filtered = limited(filtered[0], filtered[1], most)
-        self._correction = limited(correction[0], correction[1], settings.largest)
+        self._correction = limited(correction[0], correction[1], settings.largest_correction)
 
     def _window(self, raw: list[float], dt: float) -> float:
         """Time constant of the low-pass filters, s, from the changes of r between two positions."""

@@ -13,7 +13,7 @@ GRAVITY = 9.80665
 """Standard gravity, m/s²."""
 
 LARGEST_JERK = 50.0
-"""A commanded acceleration that changes faster counts as a step, whose jerk is unknown, m/s³."""
+"""Largest jerk of a commanded acceleration, m/s³; a faster change counts as a step."""
 
 
 class Pose(NamedTuple):
@@ -66,10 +66,10 @@ class Reference(NamedTuple):
         return self.closed_loop and not self.drifting
 
     @property
-    def height_is_steady(self) -> bool:
+    def thrust_is_steady(self) -> bool:
         """Whether the thrust changes slowly enough for the rotors.
 
-        False in the doublets of `identify`, and if another program commands body rates or thrust.
+        False in the doublets of `identify`, and where body rates or the thrust are commanded.
         """
         return not self.thrust_steps and self.body_rates is None and self.thrust is None
 

@@ -14,7 +14,7 @@ from companion.guidance.reference import (
 )
 
 _NO_JERK = (0.0, 0.0, 0.0)
-_SHORTEST = 0.01
+_SHORTEST_JERK_TIME = 0.01
 """Shortest time from which the jerk is computed, s: half a period of guidance at 50 Hz."""
 
 
@@ -140,16 +140,16 @@ class CommandedSource:
                 kind and after a jump of the acceleration.
         """
         self._require_fresh(now)
-        self._jerk = self._difference(reference, now) if jerk_ned is None else jerk_ned
+        self._jerk = self._jerk_towards(reference, now) if jerk_ned is None else jerk_ned
         self._newest, self._given_at = reference, now
 
-    def _difference(self, reference: Reference, now: float) -> Vector:
+    def _jerk_towards(self, reference: Reference, now: float) -> Vector:
         """Jerk between an earlier reference and this one, m/s³; 0 if it cannot be computed.
 
-        References less than `_SHORTEST` apart give no usable difference: the last jerk stays.
+        References less than `_SHORTEST_JERK_TIME` apart keep the last jerk.
         """
         before, since = self._base, now - self._base_at
-        if before is not None and since < _SHORTEST:
+        if before is not None and since < _SHORTEST_JERK_TIME:
             return self._jerk if _kind(before) == _kind(reference) else _NO_JERK
         self._base, self._base_at = reference, now
         if before is None or _kind(before) != _kind(reference):

@@ -6,8 +6,8 @@ from companion.attitude import BodyRates, Quaternion
 from companion.attitude.rotation import down_in_body
 from companion.guidance.reference import GRAVITY, Vector
 
-FOR_TILT = 0.95
-"""Share of the largest thrust that is used when tilted; the rest is a reserve for gusts."""
+TILT_THRUST_SHARE = 0.95
+"""Share of the largest thrust that tilt may use; the rest is a reserve for gusts."""
 
 _MIN_COSINE = 0.5
 """Cosine of the largest tilt (60°) up to which the thrust is raised with the tilt."""
@@ -37,26 +37,26 @@ def cos_tilt_ahead(q: Quaternion, body_rates: BodyRates, ahead: float) -> float:
 
 
 def largest_tilt(lift: float, largest: float) -> float:
-    """The largest tilt at which `FOR_TILT` of the largest thrust still gives the lift, rad.
+    """The largest tilt at which the share `TILT_THRUST_SHARE` of the thrust gives the lift, rad.
 
-    It is 0 if the lift needs as much or more.
+    It is 0 if the lift needs this share or more.
 
     Args:
         lift: upward component of the specific thrust, m/s².
         largest: largest specific thrust, m/s².
     """
-    if lift >= FOR_TILT * largest:
+    if lift >= TILT_THRUST_SHARE * largest:
         return 0.0
-    return acos(max(lift, 0.0) / (FOR_TILT * largest))
+    return acos(max(lift, 0.0) / (TILT_THRUST_SHARE * largest))
 
 
 def height_first(wanted: Vector, smallest: float, largest: float) -> Vector:
     """Limit the acceleration to what the thrust gives, with priority for the height.
 
     If the thrust is too small, the horizontal part is shortened in its direction: the tilt shrinks
-    and the height is kept. Tilt uses at most the share `FOR_TILT` of the largest thrust. The
-    vertical part changes if it alone needs more than the largest thrust, or if `wanted` needs less
-    than the smallest one, as in a fast descent.
+    and the height is kept. Tilt uses at most the share `TILT_THRUST_SHARE` of the largest thrust.
+    The vertical part changes if it alone needs more than the largest thrust, or if `wanted` needs
+    less than the smallest one, as in a fast descent.
 
     Args:
         wanted: acceleration NED, m/s².
@@ -68,7 +68,7 @@ def height_first(wanted: Vector, smallest: float, largest: float) -> Vector:
     """
     north, east, down = wanted
     lift = min(max(GRAVITY - down, 0.0), largest)
-    spare = (FOR_TILT * largest) ** 2 - lift * lift
+    spare = (TILT_THRUST_SHARE * largest) ** 2 - lift * lift
     length, most = hypot(north, east), sqrt(max(spare, 0.0))
     if length > most:
         north, east, length = north * most / length, east * most / length, most
@@ -77,10 +77,10 @@ def height_first(wanted: Vector, smallest: float, largest: float) -> Vector:
     return north, east, GRAVITY - lift
 
 
-_SMOOTHING = 0.3
+_VOLTAGE_FILTER_TIME = 0.3
 """Time constant of the voltage filter, s; ArduPilot's (MOT_BAT_V_MAX) has a cutoff of 0.5 Hz."""
 
-_PLAUSIBLE = 0.6, 1.2
+_PLAUSIBLE_RATIO = 0.6, 1.2
 """Plausible range of voltage / first voltage; a reading outside it is ignored."""
 
 
@@ -144,6 +144,6 @@ class BatterySag:
             self._first = voltage
         passed, self._time = time - self._time, time
         ratio = voltage / self._first
-        if passed > 0.0 and _PLAUSIBLE[0] < ratio < _PLAUSIBLE[1]:
-            self._ratio += passed / (passed + _SMOOTHING) * (ratio - self._ratio)
+        if passed > 0.0 and _PLAUSIBLE_RATIO[0] < ratio < _PLAUSIBLE_RATIO[1]:
+            self._ratio += passed / (passed + _VOLTAGE_FILTER_TIME) * (ratio - self._ratio)
             self.factor = self._ratio**self._exponent

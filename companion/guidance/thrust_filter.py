@@ -4,16 +4,16 @@ from math import copysign
 
 from companion.guidance.reference import GRAVITY
 
-SHORTEST = 0.1
-"""Shortest time between two velocities for an acceleration, s; a longer one has less noise."""
+SHORTEST_WINDOW = 0.1
+"""Shortest time between two velocities that give an acceleration, s; a longer one is less noisy."""
 
 _FIRST_DEVIATION = 0.4
 """Relative standard deviation of the configured hover thrust."""
 
-_GATE = 3.0
+_GATE_DEVIATIONS = 3.0
 """An innovation above this number of standard deviations is rejected (PX4: HTE_ACC_GATE)."""
 
-_NOISE = 0.2
+_USUAL_NOISE = 0.2
 """Usual variance of a measured specific thrust, (m/s²)²; `time_constant` holds at this value."""
 
 _FIRST_NOISE, _SMALLEST_NOISE, _LARGEST_NOISE = 1.0, 0.05, 100.0
@@ -28,11 +28,12 @@ _NOISE_TIME = 2.0
 _REJECTION_TIME = 1.0
 """Time constant of the low-pass filter that finds lasting rejections, s."""
 
-_LASTING = 0.2
-"""If, at a rejection, the filtered value is above this, the variance is reset: after about 0.25 s.
+_LASTING_REJECTION = 0.2
+"""If the magnitude of the filtered value is above this at a rejection, the variance is reset.
 
-The filter's input is the squared ratio of the innovation to its gate, at most 1, with the sign of
-the innovation: +1 for a rejected one that is too high, −1 for one that is too low.
+That takes about 0.25 s. The filter's input is the squared ratio of the innovation to its gate, at
+most 1, with the sign of the innovation: +1 for a rejected one that is too high, −1 for one that is
+too low.
 """
 
 
@@ -63,7 +64,7 @@ class ThrustFilter:
         self._bounds = self.gain / (1.0 + limit), self.gain * (1.0 + limit)
         self._first_variance = (_FIRST_DEVIATION * self.gain) ** 2
         # In the steady state of ẋ = noise the filter is a low pass of this time constant.
-        self._drift = _NOISE * SHORTEST / (time_constant * hover) ** 2
+        self._drift = _USUAL_NOISE * SHORTEST_WINDOW / (time_constant * hover) ** 2
         self._variance = self._first_variance
         self._noise = _FIRST_NOISE
         self._rejections = 0.0
@@ -82,11 +83,11 @@ class ThrustFilter:
         self._variance = min(self._variance + self._drift * span, self._first_variance)
         innovation = specific_thrust - self.gain * share
         expected = share * share * self._variance + self._noise + extra_variance
-        ratio = innovation * innovation / (_GATE * _GATE * expected)
+        ratio = innovation * innovation / (_GATE_DEVIATIONS * _GATE_DEVIATIONS * expected)
         passed = min(1.0, span / _REJECTION_TIME)
         self._rejections += passed * (copysign(min(ratio, 1.0), innovation) - self._rejections)
         if ratio > 1.0:
-            if abs(self._rejections) > _LASTING:
+            if abs(self._rejections) > _LASTING_REJECTION:
                 self._variance, self._rejections = self._first_variance, 0.0
             return
         kalman = self._variance * share / expected

@@ -14,19 +14,20 @@ from companion.identification.record import LONGEST_DEAD_TIME, Stretch, stretche
 
 Floats = NDArray[np.float64]
 
-_GRID = 0.004
+_GRID_PERIOD = 0.004
 """Sample period of the correlation, s."""
-_DELAYS = int(LONGEST_DEAD_TIME / _GRID)
-_PHASE = 0.38
+_DELAYS = int(LONGEST_DEAD_TIME / _GRID_PERIOD)
+"""Number of delays that are compared, besides 0; one `_GRID_PERIOD` apart."""
+_CENTRE_PHASE = 0.38
 """Phase of the lag at the centre frequency of the filter, rad."""
-_FREQUENCIES = 5.0, 9.0
+_CENTRE_FREQUENCIES = 5.0, 9.0
 """Range of the centre frequency, rad/s. At 8 rad/s on PX4 and 9 rad/s on ArduPilot, the dead times
 measured in steps, circles, figure-eights and doublets agree within 3 ms."""
-_REACH = 3.5
+_FILTER_REACH = 3.5
 """Half width of the filter, in its standard deviations."""
-_EXPLAINED = 0.985
+_LEAST_EXPLAINED = 0.985
 """Smallest R² of a correlation that is used; below it, gusts or another axis distort the delay."""
-_EXCITED = 0.005
+_LEAST_EXCITATION = 0.005
 """Smallest root mean square of the filtered commands, rad/s."""
 
 
@@ -76,23 +77,23 @@ def dead_time_by_correlation(
         powers += np.correlate(commands**2, np.ones(response.size), "valid")[::-1]
         squares += float(response @ response)
         count += response.size
-    if count == 0 or powers.max() < count * _EXCITED**2 or squares == 0.0:
+    if count == 0 or powers.max() < count * _LEAST_EXCITATION**2 or squares == 0.0:
         return None
-    found = _peak(products / np.sqrt(np.maximum(powers, count * _EXCITED**2) * squares))
+    found = _peak(products / np.sqrt(np.maximum(powers, count * _LEAST_EXCITATION**2) * squares))
     return None if found is None else max(0.0, found - _second_order_delay(lag, damping))
 
 
-def _frequency(lag: float, damping: float) -> float:
+def _centre_frequency(lag: float, damping: float) -> float:
     """Centre frequency of the filter, rad/s."""
-    slowest, quickest = _FREQUENCIES
+    slowest, quickest = _CENTRE_FREQUENCIES
     if damping < np.inf:
         lag *= FIRST_ORDER_SHARE
-    return min(max(_PHASE / max(lag, _GRID), slowest), quickest)
+    return min(max(_CENTRE_PHASE / max(lag, _GRID_PERIOD), slowest), quickest)
 
 
 def _second_order_delay(lag: float, damping: float) -> float:
     """Extra delay of a second-order lag compared with a first-order one, s."""
-    frequency = _frequency(lag, damping)
+    frequency = _centre_frequency(lag, damping)
     turned = frequency * lag
     phase = np.arctan2(turned, 1.0 - (0.5 * turned / damping) ** 2)
     return float(phase - np.arctan(turned)) / frequency
@@ -104,10 +105,10 @@ def _band_pass(lag: float, damping: float) -> Floats:
     Its gain, proportional to ω³·exp(−1.5·(ω/ω₀)²), has a maximum of 1 and nearly suppresses slow
     turns. It delays commands and measurements equally.
     """
-    frequency = _frequency(lag, damping)
+    frequency = _centre_frequency(lag, damping)
     deviation = 3.0**0.5 / frequency
-    half = int(_REACH * deviation / _GRID)
-    time = _GRID * np.arange(-half, half + 1)
+    half = int(_FILTER_REACH * deviation / _GRID_PERIOD)
+    time = _GRID_PERIOD * np.arange(-half, half + 1)
     at = time / deviation
     shape = at * (3.0 - at**2) * np.exp(-0.5 * at**2)
     taps: Floats = shape / abs(float(np.sin(frequency * time) @ shape))
@@ -117,16 +118,15 @@ def _band_pass(lag: float, damping: float) -> Floats:
 def _filtered(
     part: Stretch, lag: float, slew: float | None, band: Floats
 ) -> tuple[Floats, Floats] | None:
-    """Filtered commands (n + `_DELAYS`,) and measurements (n,), sampled every `_GRID` seconds.
+    """Filtered commands (n + `_DELAYS`,) and measurements (n,), sampled every `_GRID_PERIOD` s.
 
-    Before filtering, both end at the last measurement. None: the measurements are shorter than the
-    filter.
+    Both end at the same time. None: the measurements are shorter than the filter.
     """
     first, last = part.measured_time[0], part.measured_time[-1]
-    count = int((last - first) / _GRID)
+    count = int((last - first) / _GRID_PERIOD)
     if count <= band.size:
         return None
-    at = last - _GRID * np.arange(count + _DELAYS)[::-1]
+    at = last - _GRID_PERIOD * np.arange(count + _DELAYS)[::-1]
     at = np.maximum(at, part.time[0])
     knots = held_commands(part.time, part.commanded)
     if slew is not None:
@@ -142,8 +142,8 @@ def _peak(correlation: Floats) -> float | None:
     None if this correlation is too small, or is at the first or last delay.
     """
     top = int(np.argmax(correlation))
-    if correlation[top] < _EXPLAINED**0.5 or top in {0, correlation.size - 1}:
+    if correlation[top] < _LEAST_EXPLAINED**0.5 or top in {0, correlation.size - 1}:
         return None
     before, here, after = correlation[top - 1 : top + 2].tolist()
     bend = before - 2.0 * here + after
-    return _GRID * (top + (0.5 * (before - after) / bend if bend < 0.0 else 0.0))
+    return _GRID_PERIOD * (top + (0.5 * (before - after) / bend if bend < 0.0 else 0.0))

@@ -113,12 +113,12 @@ class SecondOrderFit:
         )
 
 
-DEAD_TIMES = 0.0, LONGEST_DEAD_TIME - 0.01
+DEAD_TIME_RANGE = 0.0, LONGEST_DEAD_TIME - 0.01
 """Range in which the dead time is searched, s."""
-_RAMPS = 0.01, 0.5
+_RAMP_TIMES = 0.01, 0.5
 """Range in which the slew limit is searched, as the time (s) that the record's largest change of
 command takes at that limit."""
-_SAME_COMMAND = 0.005
+_SAME_COMMAND_SHARE = 0.005
 """Commands that differ by less than this share of their range count as the same."""
 
 
@@ -147,7 +147,7 @@ class DelayedModel:
         self._dead_time_index = model.lowest.size
         span = max(float(np.ptp(part.commanded)) for part in record)
         self.commands = [
-            held_commands(part.time, part.commanded, _SAME_COMMAND * span) for part in record
+            held_commands(part.time, part.commanded, _SAME_COMMAND_SHARE * span) for part in record
         ]
         self.times = [part.measured_time[::thinning] for part in record]
         self.measured = np.concatenate([part.measured[::thinning] for part in record])
@@ -186,8 +186,8 @@ class DelayedModel:
 
     def search(self, start: Floats) -> Solution:
         """The best fit near `start`."""
-        ramps = [log(self.largest_change / ramp) for ramp in reversed(_RAMPS)]
-        limits = [*zip(self.model.lowest, self.model.highest, strict=True), DEAD_TIMES, ramps]
+        ramps = [log(self.largest_change / ramp) for ramp in reversed(_RAMP_TIMES)]
+        limits = [*zip(self.model.lowest, self.model.highest, strict=True), DEAD_TIME_RANGE, ramps]
         lowest, highest = np.array(limits[: start.size]).T
         return minimise(self.projection, start, lowest, highest)
 
@@ -204,8 +204,8 @@ class DelayedModel:
     def _offset_columns(self, unknown: Floats) -> Floats:
         """(m, 1 + initial states): ones, and the remainder of the initial state of each stretch.
 
-        The state is that at the first sample of the stretch. That at the first command would have
-        decayed to nearly nothing at the samples, and its weight would be unbounded.
+        The initial state is taken at the first sample of the stretch. A state at the first command
+        would have decayed to nearly nothing there, and its weight would be unbounded.
         """
         shape = unknown[: self._dead_time_index]
         decays = [self.model.free_responses(shape, times - times[0]) for times in self.times]

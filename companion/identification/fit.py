@@ -24,32 +24,32 @@ from companion.least_squares import Solution
 
 Floats = NDArray[np.float64]
 
-LAGS = exp(FirstOrder.lowest[0]), exp(FirstOrder.highest[0])
+LAG_RANGE = exp(FirstOrder.lowest[0]), exp(FirstOrder.highest[0])
 """Range in which the lag is searched, s."""
 _TRIED_LAGS = np.geomspace(0.005, 1.0, 7)
 _TRIED_DEAD_TIMES = np.linspace(0.0, 0.48, 25)
-_TRIED_RAMPS = (0.03, 0.06, 0.12, 0.25)
+_TRIED_RAMP_TIMES = (0.03, 0.06, 0.12, 0.25)
 """Slew limits from which the search starts. Each is given as the time (s) that the largest change
 of command takes at that limit."""
 _LAG_SHARES = (0.15, 0.4, 1.0)
 _DEAD_TIME_SHARES = (0.6, 1.0)
 """Shares of the lag and dead time found without a slew limit; the search with one starts there."""
-_CLEARLY = 0.6
+_CLEARLY_BETTER = 0.6
 """A model with more unknowns is accepted if its sum of squares is below this share of the other."""
 _TRIED_DAMPINGS = (0.4, 0.7, 1.0)
-_TRIED_SHARES = (0.0, 0.3, 0.6)
+_TRIED_DEAD_TIME_SHARES = (0.0, 0.3, 0.6)
 """Starts of the search for the dead time of a second-order model, as shares of the whole delay."""
-_EXCITED = 0.02
+_EXCITED_SHARE = 0.02
 """A sample is excited if the modelled response differs from the command by more than this share of
 the commands' range."""
-_MEMORY = 4.0
+_MEMORY_DELAYS = 4.0
 """Length of the vehicle's response and of its noise correlation, as multiples of the delay."""
-_COARSE = 500
+_COARSE_SAMPLES = 500
 """Approximate number of samples used to find the start of the search."""
-_FINE = 4000
+_MOST_SAMPLES = 4000
 """Largest number of samples used for the fit: more take longer and change nothing."""
-_FEWEST = 10
-_NEIGHBOUR = 0.005
+_FEWEST_SAMPLES = 10
+_NEIGHBOUR_DISTANCE = 0.005
 """Distance in lag and dead time to the neighbouring minima, s."""
 
 
@@ -91,7 +91,7 @@ class LagFit:
 def fit_lag(
     record: list[Stretch], gain: float | None = None, *, may_slew: bool = True
 ) -> LagFit | None:
-    """The best fit, or None if no stretch has a changed command, or for fewer than 10 samples.
+    """The best fit; None if no command changes, or for fewer than 10 samples.
 
     Args:
         record: commands and measurements.
@@ -100,9 +100,9 @@ def fit_lag(
     """
     record = most_excited(record)
     samples = sum(part.measured.size for part in record)
-    if samples < _FEWEST or all(np.ptp(part.commanded) == 0.0 for part in record):
+    if samples < _FEWEST_SAMPLES or all(np.ptp(part.commanded) == 0.0 for part in record):
         return None
-    fine, coarse = 1 + samples // _FINE, 1 + samples // _COARSE
+    fine, coarse = 1 + samples // _MOST_SAMPLES, 1 + samples // _COARSE_SAMPLES
     data = DelayedModel(record, FirstOrder(), gain, fine)
     first_look = DelayedModel(record, FirstOrder(), gain, coarse)
     best = _best_without_slew(data, _grid_start(first_look))
@@ -120,10 +120,10 @@ def fit_lag(
 def _slewed_if_clearly(best: Solution, data: DelayedModel, coarse: DelayedModel) -> Solution:
     """The best fit with a slew limit, if it is clearly better than `best`, else `best`."""
     promising = coarse.search(_slewed_start(best, coarse))
-    if promising.squares > _CLEARLY * coarse.search(best.unknown).squares:
+    if promising.squares > _CLEARLY_BETTER * coarse.search(best.unknown).squares:
         return best
     best_limited = data.search(promising.unknown)
-    return best_limited if best_limited.squares < _CLEARLY * best.squares else best
+    return best_limited if best_limited.squares < _CLEARLY_BETTER * best.squares else best
 
 
 def _slewed_start(best: Solution, coarse: DelayedModel) -> Floats:
@@ -135,7 +135,7 @@ def _slewed_start(best: Solution, coarse: DelayedModel) -> Floats:
     return coarse.best_of(
         [
             np.array([log(share * lag), left * dead_time, log(coarse.largest_change / ramp)])
-            for ramp in _TRIED_RAMPS
+            for ramp in _TRIED_RAMP_TIMES
             for share in _LAG_SHARES
             for left in _DEAD_TIME_SHARES
         ]
@@ -153,12 +153,12 @@ def _second_order(
         [
             np.array([log((1.0 - share) * whole), log(damping), share * whole, *slew])
             for damping in _TRIED_DAMPINGS
-            for share in _TRIED_SHARES
+            for share in _TRIED_DEAD_TIME_SHARES
         ]
     )
     data = DelayedModel(record, model, None, first.thinning)
     best = data.search(start)
-    if best.squares > _CLEARLY * found.squares:
+    if best.squares > _CLEARLY_BETTER * found.squares:
         return None
     frequency, damping = frequency_damping(best.unknown)
     return SecondOrderFit(
@@ -172,11 +172,10 @@ def _second_order(
 
 
 def _lag_fit(data: DelayedModel, found: Solution) -> LagFit:
-    """The `LagFit` of a solution."""
     lag, dead_time = exp(found.unknown[0]), data.dead_time(found.unknown)
     commands = data.delayed_commands(found.unknown)
     span = float(np.ptp(commands))
-    excited = int((np.abs(data.response(found.unknown) - commands) > _EXCITED * span).sum())
+    excited = int((np.abs(data.response(found.unknown) - commands) > _EXCITED_SHARE * span).sum())
     residuals = _residuals(data, found, excited)
     moved = float(np.std(data.measured))
     return LagFit(
@@ -196,7 +195,7 @@ def _lag_fit(data: DelayedModel, found: Solution) -> LagFit:
 
 def _residuals(data: DelayedModel, found: Solution, excited: int) -> Residuals:
     unknown = found.unknown
-    memory = _MEMORY * (exp(unknown[0]) + data.dead_time(unknown))
+    memory = _MEMORY_DELAYS * (exp(unknown[0]) + data.dead_time(unknown))
     step = float(np.median(np.diff(np.concatenate(data.times))))
     correlated = 1 + int(memory / max(step, 1e-4))
     return analyse(
@@ -219,7 +218,7 @@ def _best_without_slew(data: DelayedModel, start: Floats) -> Solution:
     lag, dead_time = exp(found.unknown[0]), float(found.unknown[1])
     neighbours = [
         data.search(np.array([log(lag - shift), dead_time + shift]))
-        for shift in (-_NEIGHBOUR, _NEIGHBOUR)
+        for shift in (-_NEIGHBOUR_DISTANCE, _NEIGHBOUR_DISTANCE)
         if lag > shift
     ]
     return min(found, *neighbours, key=lambda each: each.squares)

@@ -11,17 +11,17 @@ from companion.identification.vehicle import IdentifiedVehicle
 Known = Mapping[str, Sequence[float | None]]
 """Lag (ms), dead time (ms), acceleration limit (°/s²) and damping by axis, as configured."""
 
-_PREFIX = {"roll": "", "pitch": "pitch_", "yaw": "yaw_"}
+_KEY_PREFIX = {"roll": "", "pitch": "pitch_", "yaw": "yaw_"}
 _KEYS = "lag_ms", "dead_time_ms", "acceleration_limit_deg_s2", "damping"
-_UNLIMITED = 100_000.0
+_NO_SLEW_LIMIT = 100_000.0
 """Slew limit written for an axis that has none while roll has one, °/s²; null would mean roll's."""
 _SAME_MS = 3.0
 """Lags and dead times of roll and pitch that differ by at most this count as the same, ms."""
-_SAME_SLEW = 0.1
+_SAME_SLEW_SHARE = 0.1
 """Slew limits of roll and pitch that differ by at most this share count as the same."""
 _SAME_DAMPING = 0.05
 """Damping ratios of roll and pitch that differ by at most this count as the same."""
-_DAMPINGS = 0.3, 10.0
+_ACCEPTED_DAMPINGS = 0.3, 10.0
 """Damping ratios that `vehicle.damping` takes."""
 
 
@@ -100,7 +100,7 @@ def _of_second_order(vehicle: IdentifiedVehicle) -> dict[str, AxisValues]:
         fit = response.second_order
         if fit is None or fit.slew is not None or not response.is_good():
             return {}
-        if not _DAMPINGS[0] <= fit.damping <= _DAMPINGS[1]:
+        if not _ACCEPTED_DAMPINGS[0] <= fit.damping <= _ACCEPTED_DAMPINGS[1]:
             return {}
         lag = 2e3 * fit.damping / fit.frequency
         axes[name] = AxisValues(lag, 1e3 * fit.dead_time, None, fit.damping)
@@ -149,7 +149,7 @@ def _mean(one: float | None, other: float | None) -> float | None:
 def _nearly_same(one: AxisValues, other: AxisValues) -> bool:
     return (
         max(abs(one.lag - other.lag), abs(one.dead_time - other.dead_time)) <= _SAME_MS
-        and _near(one.slew, other.slew, _SAME_SLEW * max(one.slew or 0.0, other.slew or 0.0))
+        and _near(one.slew, other.slew, _SAME_SLEW_SHARE * max(one.slew or 0.0, other.slew or 0.0))
         and _near(one.damping, other.damping, _SAME_DAMPING)
     )
 
@@ -164,7 +164,7 @@ def _axis_keys(name: str, axis: AxisValues, inherited: float | None = None) -> l
 
     Keys without a value are written as null, so that no value of another file remains in force.
     """
-    slew = axis.slew if axis.slew is not None or inherited is None else _UNLIMITED
+    slew = axis.slew if axis.slew is not None or inherited is None else _NO_SLEW_LIMIT
     values = {
         "lag_ms": f"{axis.lag:.1f}",
         "dead_time_ms": f"{axis.dead_time:.1f}",
@@ -172,7 +172,7 @@ def _axis_keys(name: str, axis: AxisValues, inherited: float | None = None) -> l
         "damping": "null" if axis.damping is None else f"{axis.damping:.2f}",
     }
     keys = _KEYS[:-1] if name == "yaw" else _KEYS  # there is no yaw_damping
-    return [f"  {_PREFIX[name]}{key}: {values[key]}" for key in keys]
+    return [f"  {_KEY_PREFIX[name]}{key}: {values[key]}" for key in keys]
 
 
 def _comment(name: str, response: RateResponse, kept: Mapping[str, AxisValues]) -> str:

@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 Numbers = NDArray[Any]
 """An array of real or complex numbers."""
 
-_LONGEST_PART = 500.0
+_LARGEST_EXPONENT = 500.0
 """Largest exponent used, so that `exp` does not overflow."""
 
 
@@ -83,11 +83,11 @@ def lagged(commands: Knots, lag: float, at: Floats) -> Floats:
 
     It starts in the steady state of the first command. No time may be before the first knot.
     """
-    return np.asarray(lagged_by(commands, lag, at), dtype=np.float64)
+    return np.asarray(complex_lagged(commands, lag, at), dtype=np.float64)
 
 
-def lagged_by(commands: Knots, lag: complex, at: Floats) -> Numbers:
-    """`lagged` for a complex lag, one of the conjugate pair of an oscillating second order."""
+def complex_lagged(commands: Knots, lag: complex, at: Floats) -> Numbers:
+    """`lagged` for a complex lag (s): one of the conjugate pair of an oscillating second order."""
     steady = commands.value - commands.slope * lag
     ends = steady[:-1] + commands.slope[:-1] * np.diff(commands.time)
     jumps = np.concatenate(([commands.value[0] - steady[0]], ends - steady[1:]))
@@ -108,7 +108,7 @@ def _decayed_sums(ages: Numbers, jumps: Numbers) -> Numbers:
     real = np.real(ages)
     start, before = 0, 0.0 * jumps[0]
     while start < jumps.size:
-        end = int(np.searchsorted(real, real[start] + _LONGEST_PART, side="right"))
+        end = int(np.searchsorted(real, real[start] + _LARGEST_EXPONENT, side="right"))
         growth = np.exp(ages[start:end] - ages[start])
         sums[start:end] = (before + np.cumsum(jumps[start:end] * growth)) / growth
         if end < jumps.size:
@@ -140,7 +140,7 @@ def second_order(commands: Knots, frequency: float, damping: float, at: Floats) 
     """
     first, second = _lags(frequency, damping)
     if first.imag:
-        oscillating: Floats = np.imag(first * lagged_by(commands, first, at)) / first.imag
+        oscillating: Floats = np.imag(first * complex_lagged(commands, first, at)) / first.imag
         return oscillating
     slow, quick = first.real, second.real
     by_slow, by_quick = lagged(commands, slow, at), lagged(commands, quick, at)
@@ -159,6 +159,7 @@ def second_order_decay(since: Floats, frequency: float, damping: float) -> Float
 
 
 def _lags(frequency: float, damping: float) -> tuple[complex, complex]:
+    """The two first-order lags of which a second-order lag is made, s; the longer one first."""
     apart = damping * damping - 1.0
     apart = copysign(max(abs(apart), _NEARLY_CRITICAL), apart)
     root = complex(0.0, sqrt(-apart)) if apart < 0.0 else complex(sqrt(apart))

@@ -15,10 +15,10 @@ later: by default PX4 after 1 s, ArduPilot after 3 s."""
 
 _MOST_ROWS = 16_000
 """Largest number of commands and samples in a fit: half a minute of both at 250 Hz."""
-_WINDOW = 10.0
+_WINDOW_DURATION = 10.0
 """A long record is cut into windows of this length, s; the fit uses those with the most
 excitation."""
-_LEAD = 1.5
+_WINDOW_LEAD = 1.5
 """Time before a window from which commands are kept, s: more than the longest dead time plus the
 longest duration of a slew-limited change of command that is searched."""
 
@@ -90,9 +90,9 @@ def most_excited(record: list[Stretch]) -> list[Stretch]:
 def _windows(part: Stretch) -> list[Stretch]:
     """A stretch divided into windows; those without a sample are left out."""
     windows = []
-    for start in np.arange(part.measured_time[0], part.measured_time[-1], _WINDOW):
-        first, last = np.searchsorted(part.measured_time, (start, start + _WINDOW))
-        begin, end = np.searchsorted(part.time, (start - _LEAD, start + _WINDOW))
+    for start in np.arange(part.measured_time[0], part.measured_time[-1], _WINDOW_DURATION):
+        first, last = np.searchsorted(part.measured_time, (start, start + _WINDOW_DURATION))
+        begin, end = np.searchsorted(part.time, (start - _WINDOW_LEAD, start + _WINDOW_DURATION))
         begin = max(int(begin) - 1, 0)
         if last > first:
             commands = part.time[begin:end], part.commanded[begin:end]

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
-from companion.identification.delayed_model import DEAD_TIMES, SecondOrderFit
-from companion.identification.fit import LAGS, fit_lag
+from companion.identification.delayed_model import DEAD_TIME_RANGE, SecondOrderFit
+from companion.identification.fit import LAG_RANGE, fit_lag
 from companion.identification.record import stretches
 
 
@@ -57,8 +57,8 @@ class FitNeeds:
     gain: tuple[float, float] = (0.8, 1.2)
 
 
-NEEDS = FitNeeds()
-_EDGE = 1e-6  # s
+DEFAULT_NEEDS = FitNeeds()
+_EDGE_TOLERANCE = 1e-6  # s
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +82,7 @@ class RateResponse:
     fit: FitQuality
     second_order: SecondOrderFit | None = None
 
-    def reason(self, needs: FitNeeds = NEEDS) -> str | None:
+    def reason(self, needs: FitNeeds = DEFAULT_NEEDS) -> str | None:
         """Why this fit must not be used, a sentence without full stop; None if it may be used."""
         fit, uncertain = self.fit, max(self.fit.dead_time_error, self.fit.lag_error)
         low, high = needs.gain
@@ -93,11 +93,11 @@ class RateResponse:
                 f"{needs.span:.2f} are needed",
             ),
             (
-                _at_edge(self.dead_time, DEAD_TIMES),
+                _at_edge(self.dead_time, DEAD_TIME_RANGE),
                 f"dead time is at the edge of the searched range, {1e3 * self.dead_time:.0f} ms",
             ),
             (
-                _at_edge(self.lag, LAGS),
+                _at_edge(self.lag, LAG_RANGE),
                 f"lag is at the edge of the searched range, {1e3 * self.lag:.0f} ms",
             ),
             (
@@ -121,13 +121,13 @@ class RateResponse:
         )
         return next((text for wrong, text in faults if wrong), None)
 
-    def is_good(self, needs: FitNeeds = NEEDS) -> bool:
+    def is_good(self, needs: FitNeeds = DEFAULT_NEEDS) -> bool:
         """Whether the fit may be used: there is no `reason` against it."""
         return self.reason(needs) is None
 
 
 def _at_edge(value: float, searched: tuple[float, float]) -> bool:
-    return not searched[0] + _EDGE < value < searched[1] - _EDGE
+    return not searched[0] + _EDGE_TOLERANCE < value < searched[1] - _EDGE_TOLERANCE
 
 
 _NOT_FOUND = RateResponse(

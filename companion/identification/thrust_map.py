@@ -9,9 +9,9 @@ from companion.identification.fit import fit_lag
 from companion.identification.record import Stretch, stretches
 
 _LEAST_EXPLAINED = 0.8
-_EXCITED = 0.2
+_EXCITED_SHARE = 0.2
 """A command is excited if it differs from the median by more than this share of the range."""
-_HOVER = 0.05, 0.95
+_ACCEPTED_HOVER = 0.05, 0.95
 """Range of the normalised thrust at hover that the configuration accepts."""
 _LARGEST_DELAY = 0.5
 """Largest sum of lag and dead time of the rotors, s."""
@@ -52,7 +52,7 @@ class ThrustMap:
         if not self.lag + self.dead_time < _LARGEST_DELAY:
             return f"the rotors seem {self.lag + self.dead_time:.2f} s late"
         hover = self.normalised(gravity)
-        if not _HOVER[0] < hover < _HOVER[1]:
+        if not _ACCEPTED_HOVER[0] < hover < _ACCEPTED_HOVER[1]:
             return f"it puts hover at a thrust of {hover:.2f}"
         return None
 
@@ -73,7 +73,7 @@ def _excited_samples(record: list[Stretch]) -> list[Stretch]:
     if not record:
         return []
     thrust = np.concatenate([part.commanded for part in record])
-    usual, least_change = float(np.median(thrust)), _EXCITED * float(np.ptp(thrust))
+    usual, least_change = float(np.median(thrust)), _EXCITED_SHARE * float(np.ptp(thrust))
     excited = []
     for part in record:
         changed = part.time[np.abs(part.commanded - usual) > least_change]

@@ -16,7 +16,8 @@ from companion.identification.thrust_map import ThrustMap, fit_thrust_map
 Rows = Sequence[Sequence[float]]
 Floats = NDArray[np.float64]
 
-_PLANNERS_GAIN = 1.0
+_ASSUMED_GAIN = 1.0
+"""Gain of the rate loop that the planners assume."""
 
 AXES = ("roll", "pitch", "yaw")
 
@@ -78,7 +79,7 @@ def _as_array(rows: Rows, columns: int) -> Floats:
 
 def _response(commands: Floats, measured: Floats, axis: int) -> RateResponse:
     record = commands[:, 0], commands[:, axis], measured[:, 0], measured[:, axis]
-    return fit_rate_response(*record, gain=_PLANNERS_GAIN)
+    return fit_rate_response(*record, gain=_ASSUMED_GAIN)
 
 
 def vehicle_table(vehicle: IdentifiedVehicle, gravity: float) -> RenderableType:

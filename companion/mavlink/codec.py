@@ -25,12 +25,12 @@ IGNORE_ATTITUDE = 128
 No other mask is sent: with any other the autopilot chooses a value itself."""
 
 _FLOAT32_MAX = 3.4028234663852886e38
-_ATTITUDE = struct.Struct("<I7f")
-_ATTITUDE_BYTES = _ATTITUDE.size
+_ATTITUDE_LAYOUT = struct.Struct("<I7f")
+_ATTITUDE_BYTES = _ATTITUDE_LAYOUT.size
 _RESET_COUNTER_AT = struct.calcsize("<Q55fBB")
-_SETPOINT = struct.Struct("<BBBBBBBHB I4f3ff BBB")
+_SETPOINT_LAYOUT = struct.Struct("<BBBBBBBHB I4f3ff BBB")
 _SETPOINT_PAYLOAD_BYTES = 39
-_SETPOINT_EXTRA = CRC_EXTRA[SET_ATTITUDE_TARGET]
+_SETPOINT_CRC_EXTRA = CRC_EXTRA[SET_ATTITUDE_TARGET]
 
 
 def decode_attitude(payload: bytes) -> tuple[int, Quaternion, BodyRates] | None:
@@ -42,7 +42,7 @@ def decode_attitude(payload: bytes) -> tuple[int, Quaternion, BodyRates] | None:
     """
     if len(payload) < _ATTITUDE_BYTES:
         payload = payload.ljust(_ATTITUDE_BYTES, b"\0")
-    time_boot_ms, w, x, y, z, roll, pitch, yaw = _ATTITUDE.unpack_from(payload)
+    time_boot_ms, w, x, y, z, roll, pitch, yaw = _ATTITUDE_LAYOUT.unpack_from(payload)
     # One test for all: the sum of seven float32 cannot overflow a double, so it is finite if and
     # only if all of them are.
     if not isfinite(w + x + y + z + roll + pitch + yaw):
@@ -101,7 +101,7 @@ class SetpointEncoder:
             and 0 <= time_boot_ms <= 0xFFFFFFFF
         ):
             raise _refusal(time_boot_ms, rates, thrust)
-        body = _SETPOINT.pack(
+        body = _SETPOINT_LAYOUT.pack(
             # header
             V2,
             _SETPOINT_PAYLOAD_BYTES,
@@ -126,7 +126,7 @@ class SetpointEncoder:
             self._target_component,
             IGNORE_ATTITUDE,
         )
-        return body + crc16.mcrf4xx(body[1:] + _SETPOINT_EXTRA).to_bytes(2, "little")
+        return body + crc16.mcrf4xx(body[1:] + _SETPOINT_CRC_EXTRA).to_bytes(2, "little")
 
 
 def _refusal(time_boot_ms: int, rates: BodyRates, thrust: float) -> InvalidSetpoint:
@@ -139,12 +139,12 @@ def _refusal(time_boot_ms: int, rates: BodyRates, thrust: float) -> InvalidSetpo
     return InvalidSetpoint(f"setpoint not sent: time_boot_ms {time_boot_ms} is outside uint32")
 
 
-_SYSTEM_TIME = struct.Struct("<QI")
+_SYSTEM_TIME_LAYOUT = struct.Struct("<QI")
 
 
 def encode_system_time(time_boot_ms: int) -> bytes:
     """Payload of a SYSTEM_TIME without wall-clock time, which answers a lockstep beacon."""
-    return _SYSTEM_TIME.pack(0, time_boot_ms)
+    return _SYSTEM_TIME_LAYOUT.pack(0, time_boot_ms)
 
 
 def decode_beacon(payload: bytes) -> int | None:
@@ -153,7 +153,7 @@ def decode_beacon(payload: bytes) -> int | None:
     Returns:
         None for a SYSTEM_TIME with wall-clock time, which is no beacon.
     """
-    padded = payload.ljust(_SYSTEM_TIME.size, b"\0")
-    fields: tuple[int, int] = _SYSTEM_TIME.unpack_from(padded)
+    padded = payload.ljust(_SYSTEM_TIME_LAYOUT.size, b"\0")
+    fields: tuple[int, int] = _SYSTEM_TIME_LAYOUT.unpack_from(padded)
     unix_usec, time_boot_ms = fields
     return None if unix_usec else time_boot_ms

@@ -130,11 +130,13 @@ class CommandClient:
         time = asyncio.get_running_loop().time
         for confirmation in range(retries + 1):
             sent, ends = _Try(answers), time() + timeout_s
-            self._expected(command).append(sent)
+            self._expected_tries(command).append(sent)
             self._send_try(command, params, confirmation)
             try:
                 result = await answers.next(timeout_s)
-                return await self._final(command, answers) if result == _IN_PROGRESS else result
+                return (
+                    await self._final_result(command, answers) if result == _IN_PROGRESS else result
+                )
             except TimeoutError:  # lost; but after a stall the ACK may be in the backlog
                 ends = time() + _BACKLOG_S if time() - ends > _STALL_S else -inf
             finally:
@@ -144,7 +146,7 @@ class CommandClient:
             f"is system {self._settings.target_system} still there?"
         )
 
-    async def _final(self, command: int, answers: Pending[int]) -> int:
+    async def _final_result(self, command: int, answers: Pending[int]) -> int:
         """Wait for the final result of a command that is in progress."""
         try:
             async with asyncio.timeout(_IN_PROGRESS_TIMEOUT_S):
@@ -161,7 +163,7 @@ class CommandClient:
 
     def _send_try(self, command: int, params: tuple[float, ...], confirmation: int) -> None:
         padded = (*params, *(0.0,) * 7)[:7]
-        self._outbox.message(
+        self._outbox.send(
             dialect.MAVLink_command_long_message(
                 self._settings.target_system,
                 self._settings.target_component,
@@ -178,14 +180,14 @@ class CommandClient:
             return
         if message.target_component not in (0, self._settings.source_component):
             return
-        expected = self._expected(message.command)
+        expected = self._expected_tries(message.command)
         if not expected:
             return
         expected[0].answers.put(message.result)
         if message.result != _IN_PROGRESS:
             expected.popleft()
 
-    def _expected(self, command: int) -> deque[_Try]:
+    def _expected_tries(self, command: int) -> deque[_Try]:
         """The tries of a command whose ACK may still come, oldest first."""
         now, tries = (
             asyncio.get_running_loop().time(),

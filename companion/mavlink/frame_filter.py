@@ -41,20 +41,19 @@ class FrameFilter:
 
     @property
     def awaits_answer(self) -> bool:
-        """Whether the last frame was refused until the vehicle answers a TIMESYNC request."""
+        """Whether the last frame was refused only until the vehicle answers a TIMESYNC request."""
         return self._signing is not None and self._signing.awaits_answer
 
     def is_vehicle(self, frame: Frame) -> bool:
         """Whether a frame carries the vehicle's system and component."""
         return (frame.system, frame.component) == self._source
 
-    def from_vehicle(self, frame: Frame) -> bool:
-        """Whether a frame carries the vehicle's system and component; counts other frames."""
-        source = (frame.system, frame.component)
-        if source == self._source:
+    def admits_source(self, frame: Frame) -> bool:
+        """`is_vehicle`, which also counts each frame of another source."""
+        if self.is_vehicle(frame):
             return True
         self._stats.ignored_foreign += 1
-        self._stats.foreign_sources.add(source)
+        self._stats.foreign_sources.add((frame.system, frame.component))
         return False
 
     def signature_good(self, frame: Frame) -> bool:

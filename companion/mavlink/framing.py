@@ -14,8 +14,11 @@ from fastcrc import crc16
 from companion.mavlink.stats import LinkStats
 
 V2 = 0xFD
+"""First byte of a frame of version 2."""
 V1 = 0xFE
+"""First byte of a frame of version 1."""
 SIGNED = 0x01
+"""Incompatibility flag of a frame with a signature."""
 SIGNATURE_LENGTH = 13
 
 _V2_HEADER = struct.Struct("<BBBBBBBHB")

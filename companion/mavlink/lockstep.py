@@ -19,7 +19,7 @@ from companion.mavlink.loop import HotSelector, LinkEventLoop, Ready
 T = TypeVar("T")
 Arguments = TypeVarTuple("Arguments")
 
-PATIENCE_S = 2.0
+BEACON_TIMEOUT_S = 2.0
 """Wall time without a new beacon after which the vehicle counts as gone, s; virtual time then
 advances without it.
 """
@@ -46,8 +46,8 @@ class LockstepClock(Protocol):
         ...
 
 
-class _VehicleClock:
-    """Wall time until the first beacon, vehicle time from then on; s."""
+class _BeaconClock:
+    """Wall time in s until the first beacon, vehicle time in s from then on."""
 
     def __init__(self) -> None:
         self._wall_start = time.monotonic()
@@ -78,11 +78,11 @@ class _VehicleClock:
         """Wall time left for the next beacon, s; `None` before the first beacon."""
         if self._vehicle is None:
             return None
-        return max(0.0, self._waiting_since + PATIENCE_S - time.monotonic())
+        return max(0.0, self._waiting_since + BEACON_TIMEOUT_S - time.monotonic())
 
     def advance_alone(self) -> None:
         """Advance time although the vehicle sent no beacon in time, so that timeouts can expire."""
-        self._offset += PATIENCE_S
+        self._offset += BEACON_TIMEOUT_S
         self.start_waiting()
 
 
@@ -122,7 +122,7 @@ class SettlingSelector(HotSelector, ABC):
 class _SteppingSelector(SettlingSelector):
     """Lets no timer wait on the wall clock while the vehicle sends beacons."""
 
-    def __init__(self, clock: _VehicleClock) -> None:
+    def __init__(self, clock: _BeaconClock) -> None:
         super().__init__()
         self._clock = clock
 
@@ -158,8 +158,8 @@ class _SteppingSelector(SettlingSelector):
 class LockstepEventLoop(LinkEventLoop):
     """An event loop in vehicle time: `advance` sets `time()`.
 
-    Before the first beacon it runs on wall time. If no new beacon comes for `PATIENCE_S` of wall
-    time, its time advances by that amount, so that timeouts expire if the vehicle is gone.
+    Before the first beacon it runs on wall time. If no new beacon comes for `BEACON_TIMEOUT_S` of
+    wall time, its time advances by that amount, so that timeouts expire if the vehicle is gone.
 
     Args:
         clock: clock to use instead of the one described above; needs `selector` too.
@@ -170,7 +170,7 @@ class LockstepEventLoop(LinkEventLoop):
         self, clock: LockstepClock | None = None, selector: SettlingSelector | None = None
     ) -> None:
         if clock is None or selector is None:
-            clock = wall_or_vehicle = _VehicleClock()
+            clock = wall_or_vehicle = _BeaconClock()
             selector = _SteppingSelector(wall_or_vehicle)
         self._clock: LockstepClock = clock
         self._stepping = selector
@@ -179,7 +179,7 @@ class LockstepEventLoop(LinkEventLoop):
         super().__init__(self._stepping)
 
     def time(self) -> float:
-        """Vehicle time in s."""
+        """Event-loop time, s: vehicle time from the first beacon on."""
         return self._read_clock()
 
     def call_at(

@@ -17,7 +17,7 @@ class Outbox:
 
     Attributes:
         transport: The open connection; None while there is none.
-        setpoint_at: Event-loop time of the last setpoint, sent or dropped, s; −inf before the
+        last_setpoint_at: Event-loop time of the last setpoint, sent or dropped, s; −inf before the
             first.
     """
 
@@ -35,9 +35,9 @@ class Outbox:
         )
         self._latched: tuple[int, BodyRates, float] | None = None
         self.transport: Transport | None = None
-        self.setpoint_at = -inf
+        self.last_setpoint_at = -inf
 
-    def setpoint(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> bool:
+    def send_setpoint(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> bool:
         """Send SET_ATTITUDE_TARGET now; return False if it could not be sent.
 
         Args:
@@ -48,8 +48,8 @@ class Outbox:
         Raises:
             InvalidSetpoint: A value must not reach the vehicle; nothing was sent.
         """
-        sent = self._send(self._setpoints.frame(self._sequence, time_boot_ms, rates, thrust))
-        self.setpoint_at = self._loop.time()
+        sent = self._send_frame(self._setpoints.frame(self._sequence, time_boot_ms, rates, thrust))
+        self.last_setpoint_at = self._loop.time()
         return sent
 
     def latch(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> None:
@@ -65,17 +65,19 @@ class Outbox:
         """Close a lockstep step: send its setpoint, or a SYSTEM_TIME, which is not recorded."""
         latched, self._latched = self._latched, None
         if latched is not None:
-            self.setpoint(*latched)
+            self.send_setpoint(*latched)
         else:
-            self._send(self._frame(SYSTEM_TIME, encode_system_time(time_boot_ms)), record=False)
+            self._send_frame(
+                self._frame(SYSTEM_TIME, encode_system_time(time_boot_ms)), record=False
+            )
 
-    def message(self, message: Message) -> bool:
+    def send(self, message: Message) -> bool:
         """Send a pymavlink message; return False if it could not be sent."""
-        return self.payload(message.get_msgId(), encode(message))
+        return self.send_payload(message.get_msgId(), encode(message))
 
-    def payload(self, message_id: int, payload: bytes) -> bool:
+    def send_payload(self, message_id: int, payload: bytes) -> bool:
         """Send a message given by its payload; return False if it could not be sent."""
-        return self._send(self._frame(message_id, payload))
+        return self._send_frame(self._frame(message_id, payload))
 
     def forward(self, frame: bytes) -> bool:
         """Send a whole frame of another node unchanged; return False if it could not be sent."""
@@ -97,7 +99,7 @@ class Outbox:
             signed=self._signing is not None,
         )
 
-    def _send(self, frame: bytes, *, record: bool = True) -> bool:
+    def _send_frame(self, frame: bytes, *, record: bool = True) -> bool:
         if self._signing is not None:
             frame = self._signing.sign(frame)
         if record:  # how often a step is closed depends on wall time: it must not be counted

@@ -76,9 +76,9 @@ class ParameterClient:
             ParameterRefused: The autopilot answered with another error.
             LinkLost: The connection dropped while waiting.
         """
-        self._check(name)
+        self._require_valid_name(name)
         async with self._locks.setdefault(name, asyncio.Lock()):
-            return self._number(await self._ask(name, timeout_s, retries))
+            return self._decoded(await self._ask(name, timeout_s, retries))
 
     async def write(self, name: str, value: float, timeout_s: float, retries: int) -> float | int:
         """Write a parameter in the autopilot's own type; return the value that it then has.
@@ -89,17 +89,17 @@ class ParameterClient:
                 or answered with an error.
             LinkLost: The connection dropped while waiting.
         """
-        self._check(name)
+        self._require_valid_name(name)
         async with self._locks.setdefault(name, asyncio.Lock()):
             kind = (await self._ask(name, timeout_s, retries)).kind
-            value_wanted = _Value(self._bytes(name, value, kind), kind)
+            value_wanted = _Value(self._encoded(name, value, kind), kind)
             payload = _SET_LAYOUT.pack(value_wanted.raw, *self._target, name.encode(), kind)
             value_held = await self._exchange("PARAM_SET", payload, name, timeout_s, retries)
             if value_held != value_wanted:
                 raise ParameterRefused(
-                    f"{name}: the autopilot keeps {self._number(value_held)} instead of {value}"
+                    f"{name}: the autopilot keeps {self._decoded(value_held)} instead of {value}"
                 )
-            return self._number(value_held)
+            return self._decoded(value_held)
 
     async def _ask(self, name: str, timeout_s: float, retries: int) -> _Value:
         payload = _READ_LAYOUT.pack(_BY_NAME, *self._target, name.encode())
@@ -112,7 +112,7 @@ class ParameterClient:
             self._waiting[name] = answers
             try:
                 for _ in range(retries + 1):
-                    self._outbox.payload(MESSAGE_IDS[message], payload)
+                    self._outbox.send_payload(MESSAGE_IDS[message], payload)
                     try:
                         answer = await answers.next(timeout_s)
                     except TimeoutError:
@@ -127,11 +127,11 @@ class ParameterClient:
             "probably has no parameter of that name (names change between versions)"
         )
 
-    def _check(self, name: str) -> None:
+    def _require_valid_name(self, name: str) -> None:
         if not (0 < len(name) <= _MAX_NAME and name.isascii()):
             raise UnknownParameter(f"{name!r} is no parameter name: 1 to 16 ASCII characters")
 
-    def _number(self, value: _Value) -> float | int:
+    def _decoded(self, value: _Value) -> float | int:
         if self._bytewise() and value.kind in _INTEGER_LAYOUTS:
             integer: int = struct.unpack(_INTEGER_LAYOUTS[value.kind], value.raw)[0]
             return integer
@@ -139,7 +139,7 @@ class ParameterClient:
         # NaN and infinity cannot become integers; the caller gets them unchanged.
         return int(number) if value.kind in _INTEGER_LAYOUTS and isfinite(number) else number
 
-    def _bytes(self, name: str, value: float, kind: int) -> bytes:
+    def _encoded(self, name: str, value: float, kind: int) -> bytes:
         if not isfinite(value):
             raise ParameterRefused(f"{name} cannot hold {value}")
         try:

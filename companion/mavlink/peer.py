@@ -80,7 +80,8 @@ _CONTROL_LASTS_S = 2.0
 """Time after the last setpoint during which the peer changes only if it is silent, s."""
 
 HEARTBEAT = 0
-_TYPE, _AUTOPILOT, _FIELDS = 4, 5, 6  # of a HEARTBEAT payload, which may lack trailing zeros
+# Of a HEARTBEAT payload, which may lack trailing zeros.
+_TYPE_AT, _AUTOPILOT_AT, _FIELD_BYTES = 4, 5, 6
 _AUTOPILOT_INVALID = 8
 
 
@@ -121,8 +122,8 @@ class PeerRule:
             return True
         if frame.message_id != HEARTBEAT:
             return False
-        fields = frame.payload.ljust(_FIELDS, b"\0")
-        return fields[_AUTOPILOT] != _AUTOPILOT_INVALID and fields[_TYPE] != MAV_TYPE_GCS
+        fields = frame.payload.ljust(_FIELD_BYTES, b"\0")
+        return fields[_AUTOPILOT_AT] != _AUTOPILOT_INVALID and fields[_TYPE_AT] != MAV_TYPE_GCS
 
     def renew(self) -> None:
         """Note that the peer has repeated its claim."""

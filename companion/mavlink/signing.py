@@ -16,7 +16,7 @@ from pathlib import Path
 from companion.mavlink.errors import SigningError
 from companion.mavlink.framing import SIGNATURE_LENGTH, Frame
 from companion.mavlink.stamp_file import StampFile
-from companion.mavlink.stamps import MOST_TICKS, TICKS_PER_S, SignatureResult, StampJudge, Stamps
+from companion.mavlink.stamps import LATEST_TICKS, TICKS_PER_S, SignatureResult, StampJudge, Stamps
 
 _STAMP_BYTES = 6
 _HASH_BYTES = 6
@@ -27,16 +27,16 @@ _TIMESYNC_ID = 111
 _TIMESYNC = _TIMESYNC_ID.to_bytes(3, "little")
 _REQUESTS_KEPT = 16
 
-PERIOD_S = 10.0
+WRITE_PERIOD_S = 10.0
 """Time between two writes of the stamps, s. The guide demands one write a minute."""
-_RESERVE = 15 * TICKS_PER_S
+_STAMP_RESERVE = 15 * TICKS_PER_S
 """How far the stamps in the file are ahead of the newest stamps while the link is open, ticks.
 
 It is longer than a period. If this program is killed, the stamps that it sends later are still
 newer, and no older frame is accepted again. In that case the vehicle's frames are also refused
 until their stamps are newer than those in the file, for 15 s at most.
 """
-_LAST_WRITE_S = 2.0
+_LAST_WRITE_TIMEOUT_S = 2.0
 """Time allowed for the last write, s."""
 
 
@@ -129,7 +129,7 @@ class Signing:
 
     @property
     def awaits_answer(self) -> bool:
-        """Whether the last frame was refused until the vehicle answers a TIMESYNC request."""
+        """Whether the last frame was refused only until the vehicle answers a TIMESYNC request."""
         return self._unproven_stamp != 0
 
     def stamps(self) -> Stamps:
@@ -178,14 +178,14 @@ class StampKeeper:
             return  # not started
         self._ended = True
         self._signing.changed.set()
-        self._thread.join(_LAST_WRITE_S)
+        self._thread.join(_LAST_WRITE_TIMEOUT_S)
 
     def _run(self) -> None:
         while not self._ended:
             self._signing.changed.clear()
             self._write(_with_reserve(self._signing.stamps()))
             if not self._ended:
-                self._signing.changed.wait(PERIOD_S)
+                self._signing.changed.wait(WRITE_PERIOD_S)
         self._write(self._signing.stamps())
 
     def _write(self, stamps: Stamps) -> None:
@@ -206,7 +206,7 @@ class StampKeeper:
 
 def _with_reserve(stamps: Stamps) -> Stamps:
     streams = {
-        stream: tuple(min(stamp + _RESERVE, MOST_TICKS) for stamp in newest)
+        stream: tuple(min(stamp + _STAMP_RESERVE, LATEST_TICKS) for stamp in newest)
         for stream, newest in stamps.streams.items()
     }
-    return replace(stamps, sent=min(stamps.sent + _RESERVE, MOST_TICKS), streams=streams)
+    return replace(stamps, sent=min(stamps.sent + _STAMP_RESERVE, LATEST_TICKS), streams=streams)

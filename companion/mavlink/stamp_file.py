@@ -11,7 +11,7 @@ from typing import Any
 
 from companion.files.write_whole import write_whole
 from companion.mavlink.errors import SigningError
-from companion.mavlink.stamps import MOST_TICKS, Stamps, Stream
+from companion.mavlink.stamps import LATEST_TICKS, Stamps, Stream
 
 _FOLDER = Path("mavlink-companion", "signing")
 _MAX_FILE_BYTES = 4_000_000
@@ -100,6 +100,6 @@ def _stream(name: str) -> Stream:
 
 
 def _ticks(value: Any) -> int:
-    if type(value) is not int or not 0 <= value <= MOST_TICKS:
+    if type(value) is not int or not 0 <= value <= LATEST_TICKS:
         raise ValueError(value)
     return value

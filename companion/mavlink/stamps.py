@@ -22,7 +22,7 @@ _PROGRAM_DATE = (1_788_220_800 - EPOCH_UNIX_S) * TICKS_PER_S
 _MAX_AHEAD = 5 * 365 * _DAY
 """Furthest that an accepted stamp may be ahead of the date, ticks."""
 
-MOST_TICKS = 2**48 - 2 * _MAX_AHEAD
+LATEST_TICKS = 2**48 - 2 * _MAX_AHEAD
 """Latest date that is used (2094), ticks, so that every stamp fits into 48 bits."""
 
 Stream = tuple[int, int, int]
@@ -95,7 +95,7 @@ class StampJudge:
         self._elapsed = elapsed
         start = int((clock() - EPOCH_UNIX_S) * TICKS_PER_S)
         self._check_clock(start, kept.date)
-        self._start = min(max(start, kept.date, _PROGRAM_DATE), MOST_TICKS)
+        self._start = min(max(start, kept.date, _PROGRAM_DATE), LATEST_TICKS)
         self._started = elapsed()
         self._limit = self._start + _DAY
         self._kept = kept.streams

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, field
 
-SOME_LOST = 0.02
-"""Share of messages that may be lost without consequences."""
+TOLERABLE_LOSS = 0.02
+"""Share of frames that may be lost without consequences for a flight."""
 
 
 def share_lost(frames: int, lost: int) -> float:

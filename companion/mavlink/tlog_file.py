@@ -12,7 +12,7 @@ from companion.mavlink.framing import V1, V2, Frame, FrameScanner
 from companion.mavlink.messages import CRC_EXTRA, MESSAGE_IDS, Message, decode
 
 _STAMP_BYTES = 8
-_V1_OVERHEAD, _V2_OVERHEAD, _SIGNATURE = 8, 12, 13
+_V1_OVERHEAD, _V2_OVERHEAD, _SIGNATURE_BYTES = 8, 12, 13
 
 
 def messages(path: Path, names: Set[str]) -> Iterator[tuple[Frame, Message]]:
@@ -41,7 +41,7 @@ def _records(path: Path) -> Iterator[bytes]:
     while at + 3 <= len(data):
         magic, size, flags = data[at : at + 3]
         if magic == V2:
-            end = at + _V2_OVERHEAD + size + (_SIGNATURE if flags & 1 else 0)
+            end = at + _V2_OVERHEAD + size + (_SIGNATURE_BYTES if flags & 1 else 0)
         elif magic == V1:
             end = at + _V1_OVERHEAD + size
         elif at == _STAMP_BYTES:

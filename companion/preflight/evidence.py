@@ -86,7 +86,7 @@ class SampleTimes(NamedTuple):
         age: Median of their ages at arrival, s; `None`: unknown (`VehicleClock`).
         clock_change: Description of a jump or restart of the vehicle's clock; empty: none.
         unusable: Number of samples that are not a unit quaternion or not finite.
-        rate: Effective rate, Hz, lowered by bursts (`HeldRates`); `None` for too few samples.
+        rate: Effective rate, Hz, lowered by bursts (`IntervalSums`); `None` for too few samples.
     """
 
     heard: int = 0

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 
 from companion.config import Config
 from companion.mavlink.peer import PEER_NOTICE
-from companion.mavlink.stats import SOME_LOST
+from companion.mavlink.stats import TOLERABLE_LOSS
 from companion.preflight import clock_checks
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
@@ -104,7 +104,9 @@ def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
     """Check the link for lost messages, damaged messages and reconnects."""
     link = evidence.link
     share = link.loss
-    result = UNSAFE if share > _UNSAFE_LOSS_SHARE else INEFFECTIVE if share > SOME_LOST else SAFE
+    result = (
+        UNSAFE if share > _UNSAFE_LOSS_SHARE else INEFFECTIVE if share > TOLERABLE_LOSS else SAFE
+    )
     bad = result is not SAFE
     yield Finding(
         Key.LOSS,

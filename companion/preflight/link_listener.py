@@ -8,7 +8,7 @@ from companion.attitude.representation import is_unit
 from companion.mavlink.framing import Frame
 from companion.mavlink.messages import Message, dialect
 from companion.preflight.evidence import OtherNodes, SampleTimes
-from companion.vehicle.held_rates import HeldRates
+from companion.vehicle.interval_sums import IntervalSums
 from companion.vehicle.link import Link
 
 _HEARTBEAT_ID = dialect.MAVLINK_MSG_ID_HEARTBEAT
@@ -76,9 +76,9 @@ class LinkListener:
             return SampleTimes(len(self._stamps), unusable=self._unusable)
         (first, first_stamp), (last, last_stamp) = self._stamps[0], self._stamps[-1]
         known = len(self._stamps) >= _MIN_SAMPLES and last > first
-        held, clock = HeldRates(), self._link.clock
+        arrivals, clock = IntervalSums(), self._link.clock
         for earlier, later in pairs:
-            held.add(later[0] - earlier[0])
+            arrivals.add(later[0] - earlier[0])
         return SampleTimes(
             heard=len(self._stamps),
             longest_pause=max(later[0] - earlier[0] for earlier, later in pairs),
@@ -87,7 +87,7 @@ class LinkListener:
             clock_rate=(last_stamp - first_stamp) / (last - first) if known else None,
             age=median(self._ages) if self._ages and clock.age_known else None,
             clock_change=clock.last_change if clock.changes != self._clock_changes else "",
-            rate=held.rate_since(HeldRates()) if known else None,
+            rate=arrivals.rate_since(IntervalSums()) if known else None,
         )
 
     @property

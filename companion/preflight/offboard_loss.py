@@ -23,7 +23,7 @@ from companion.guidance.offboard_loss import (
 from companion.guidance.reference import Vector
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
-from companion.vehicle.parameter_checks import LONGEST_HELD, shortest_rate_hold
+from companion.vehicle.parameter_checks import LONGEST_RATE_HOLD, shortest_rate_hold
 from companion.vehicle.parameter_rules import CheckResult
 
 _POINT_PERIOD = 0.05
@@ -55,7 +55,7 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """How far the vehicle is carried if our setpoints stop at the worst moment of the flight."""
     failsafe, maneuvers = evidence.autopilot.offboard_loss_failsafe, evidence.maneuvers
     hold_time = evidence.survey.values.get(failsafe.parameter)
-    if maneuvers is None or hold_time is None or not 0.0 <= hold_time <= LONGEST_HELD:
+    if maneuvers is None or hold_time is None or not 0.0 <= hold_time <= LONGEST_RATE_HOLD:
         return  # an unknown or longer time is unsafe, whatever is flown
     drag = evidence.known_drag.least
     worst = worst_reach(config, maneuvers, hold_time, drag, brakes=failsafe.brakes)

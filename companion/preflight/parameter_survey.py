@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from companion.mavlink.errors import ParameterRefused, UnansweredParameter, UnknownParameter
-from companion.mavlink.stats import SOME_LOST, share_lost
+from companion.mavlink.stats import TOLERABLE_LOSS, share_lost
 from companion.vehicle.link import Link
 from companion.vehicle.parameter_rules import ParameterRule, Values
 
@@ -117,14 +117,14 @@ class _Requests:
 
     @property
     def lossy(self) -> bool:
-        """Whether more than `SOME_LOST` of the frames were lost, or a request had to be repeated.
+        """Whether more than `TOLERABLE_LOSS` of the frames were lost, or a request was repeated.
 
         Gaps in sequence numbers show lost frames of the vehicle. An answer to a repeated request
         shows that the earlier request or its answer was lost.
         """
         stats = self._link.stats
         lost = share_lost(stats.frames - self._frames, stats.lost - self._lost)
-        return self._repeated or lost > SOME_LOST
+        return self._repeated or lost > TOLERABLE_LOSS
 
     def leave_out(self, names: Iterable[str]) -> None:
         """Do not request these names, because the parameters have others in this autopilot."""

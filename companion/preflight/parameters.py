@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from companion.config import Config
-from companion.mavlink.stats import SOME_LOST
+from companion.mavlink.stats import TOLERABLE_LOSS
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Change, Finding, Key
 from companion.preflight.parameter_survey import Survey
@@ -71,7 +71,7 @@ def _unread(evidence: Evidence) -> Iterator[Finding]:
     missing parameters are only named.
     """
     survey = evidence.survey
-    lossy = survey.lossy or evidence.link.loss > SOME_LOST
+    lossy = survey.lossy or evidence.link.loss > TOLERABLE_LOSS
     rules = [rule for rule in evidence.autopilot.parameters if not rule.vital]
     hidden = [rule for rule in rules if rule.universal and _hidden(rule, survey)]
     unread = [rule.name for rule in hidden]

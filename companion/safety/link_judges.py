@@ -126,7 +126,7 @@ def gaps(most: int) -> Judge:
 
 
 def answer_rate(least: float) -> Judge:
-    """The effective rate of setpoints (`HeldRates`) is below `least` Hz."""
+    """The effective rate of setpoints (`IntervalSums`) is below `least` Hz."""
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
         rate = snapshot.health.answer_rate

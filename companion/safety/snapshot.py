@@ -87,7 +87,7 @@ class Health(NamedTuple):
         round_trip: round trip of TIMESYNC, s.
         missed: share of setpoints that missed their deadline; None in lockstep.
         starved: share of the time by which the program's timer was late.
-        answer_rate: effective rate of setpoints, Hz (`HeldRates`).
+        answer_rate: effective rate of setpoints, Hz (`IntervalSums`).
         gaps: number of gaps in the setpoints within the last 5 s.
         position_rate: rate of positions, Hz.
     """

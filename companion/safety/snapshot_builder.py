@@ -19,7 +19,7 @@ from companion.safety.snapshot import (
     Resets,
     Snapshot,
 )
-from companion.vehicle.held_rates import HeldRates
+from companion.vehicle.interval_sums import IntervalSums
 from companion.vehicle.link import Link
 
 _AVERAGING_TIME = 1.0
@@ -57,7 +57,7 @@ class _Counters(NamedTuple):
     setpoints: int
     missed: int
     late: float
-    held: HeldRates
+    setpoint_intervals: IntervalSums
     positions: int
 
 
@@ -145,7 +145,7 @@ class SnapshotBuilder:
                 record.setpoints,
                 record.missed_deadlines,
                 late,
-                record.held.copy(),
+                record.setpoint_intervals.copy(),
                 self._link.state.positions,
             )
         )
@@ -226,7 +226,7 @@ class SnapshotBuilder:
             if self._real_time
             else None,
             late / span,
-            last.held.rate_since(first.held),
+            last.setpoint_intervals.rate_since(first.setpoint_intervals),
             gaps,
             (last.positions - first.positions) / span,
         )

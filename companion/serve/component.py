@@ -68,7 +68,7 @@ class Component:
             for piece in self._pieces(text, severity):
                 self._network.send_to(client, self._frame(piece))
 
-    def value(self, name: str, value: float) -> None:
+    def send_value(self, name: str, value: float) -> None:
         """Send a NAMED_VALUE_FLOAT; the name has at most 10 characters."""
         boot_ms = round((time.monotonic() - self._began) * 1e3) & 0xFFFFFFFF
         message = dialect.MAVLink_named_value_float_message(boot_ms, name.encode(), value)
@@ -93,8 +93,8 @@ class Component:
         )
         self._network.send_to(client, self._frame(message, sender))
 
-    def on_own(self, client: Channel, frame: Frame) -> None:
-        """Refuse a command addressed only to our component, which carries out no commands."""
+    def on_own_frame(self, client: Channel, frame: Frame) -> None:
+        """Refuse a command to our component, which carries out none; ignore other frames."""
         if frame.message_id in _COMMANDS and isinstance(client, Client):
             self.acknowledge(client, frame, dialect.MAV_RESULT_UNSUPPORTED, self._own_address)
 

@@ -36,7 +36,7 @@ from companion.serve.situation import SituationKeeper
 from companion.vehicle.autopilot import ControlEntry, Role
 from companion.vehicle.link import Link
 
-_ENDS = "control is ending and the vehicle is held; request control again when it has ended"
+_IS_ENDING = "control is ending and the vehicle is held; request control again when it has ended"
 _RETRY_PAUSE = 2.0
 """Time after a failed takeover in which setpoints alone begin no other takeover, s."""
 
@@ -142,7 +142,7 @@ class ServedControl:
             request = understand(
                 frame, situation, self._targets, body_yaw_is_relative=autopilot.body_yaw_is_relative
             )
-            refusal = self.ownership.setpoint(owner, now)
+            refusal = self.ownership.note_setpoint(owner, now)
             if refusal is None:
                 refusal = self._fly_request(owner, request, now)
         except RefusedSetpoint as error:
@@ -160,11 +160,11 @@ class ServedControl:
             UnplannableError: no motion leads to the request; the previous one stays in force.
         """
         flight = self._flight
-        if flight is not None and not flight.ends and self.ownership.owner == owner:
+        if flight is not None and not flight.is_ending and self.ownership.owner == owner:
             flight.give(request)
         self._programs.keep(owner, request)
-        if flight is not None and flight.ends:
-            return _ENDS
+        if flight is not None and flight.is_ending:
+            return _IS_ENDING
         if self._flight is None and self._may_begin(owner, now):
             self._begin(owner, None, from_ground=False)
         return None
@@ -182,7 +182,7 @@ class ServedControl:
         if not state.flying:
             self._component.answer(owner.client, "take off first: only then setpoints are flown")
             return False
-        if not self.ownership.streams(owner, now):
+        if not self.ownership.has_stream(owner, now):
             return False
         refusal = self._fence.refusal() or self.ownership.request_control(owner, now)
         if refusal is not None:
@@ -193,8 +193,8 @@ class ServedControl:
         """Answer a command that requests control: by a takeover or a refusal."""
         now, owner = self._clock(), self._programs.sender_of(client, frame)
         refusal, standing = self.ownership.request_control(owner, now), not self._link.state.flying
-        if refusal is None and self._flight is not None and self._flight.ends:
-            refusal = _ENDS
+        if refusal is None and self._flight is not None and self._flight.is_ending:
+            refusal = _IS_ENDING
         elif refusal is None and self._flight is None:
             refusal = self._fence.refusal()
             if refusal is None and standing:
@@ -210,7 +210,6 @@ class ServedControl:
             self._answer(client, frame, ACCEPTED if self.in_control else IN_PROGRESS)
 
     def _begin(self, owner: Program, command: ControlRequest | None, *, from_ground: bool) -> None:
-        """Begin a flight under a client's control."""
         self._flight = flight = ServedFlight(
             str(owner),
             self._config,

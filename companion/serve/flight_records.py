@@ -49,7 +49,7 @@ class FlightRecords:
         self._tap: Tap | None = None
 
     def __call__(self, time: float, frame: bytes) -> None:
-        """Take a frame of the link, seen at `time` on our clock, s."""
+        """Take a frame of the link at `time`, s of event-loop time."""
         if self._tap is not None:
             self._tap(time, frame)
 
@@ -82,20 +82,20 @@ class FlightRecords:
                 self._tap = None
 
     async def keep(self, record: FlightFiles, summary: Summary) -> None:
-        """Write the summary of a finished flight, whose log is closed.
+        """Write the summary of a finished flight, whose log is closed; then call `on_recorded`.
 
         The next flight may already have begun, with its own record.
         """
-        await self._beside(record.save, summary)
+        await self._in_thread(record.save, summary)
         if record.folder is not None:
             self._note(f"recorded in {record.folder}")
-            text = await self._beside(self.on_recorded, record.folder)
+            text = await self._in_thread(self.on_recorded, record.folder)
             if text is not None:
                 self._note(text)
 
     async def discard(self, record: FlightFiles) -> None:
         """Remove the record of a failed takeover, in which nothing was flown."""
-        await self._beside(_remove, record.folder)
+        await self._in_thread(_remove, record.folder)
 
     def _record(self, config: Config, folder: Path | None) -> FlightFiles:
         loop = asyncio.get_running_loop()
@@ -105,7 +105,7 @@ class FlightRecords:
 
         return FlightFiles(config, folder, self._environment, note, follows=False)
 
-    async def _beside(self, work: Callable[[Argument], Result], argument: Argument) -> Result:
+    async def _in_thread(self, work: Callable[[Argument], Result], argument: Argument) -> Result:
         """Call `work` in a thread, so that a slow disk blocks nothing; return its result."""
         if not self._environment.realtime:  # a virtual clock knows no threads
             return work(argument)

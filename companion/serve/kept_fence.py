@@ -56,7 +56,7 @@ class KeptFence:
     def refusal(self) -> str | None:
         """Why control must not begin; None if it may.
 
-        The vehicle is outside the fence, or the place of the fence is not certain.
+        It must not if the vehicle is outside the fence, or the place of the fence is not certain.
         """
         position, kept = self._state.position, self.centre
         if kept is None or position is None:

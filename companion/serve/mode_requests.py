@@ -21,7 +21,7 @@ _GUIDED_ITEMS = 2, 3
 _SET_MESSAGE_INTERVAL = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
 _STEERING_COMMANDS = dialect.MAV_CMD_DO_REPOSITION, dialect.MAV_CMD_DO_PAUSE_CONTINUE
 _LEAVING_COMMANDS = MAV_CMD_DO_SET_MODE, MAV_CMD_NAV_LAND, MAV_CMD_NAV_RETURN_TO_LAUNCH
-_CUSTOM_MODE = 1
+_CUSTOM_MODE_FLAG = 1
 _MAIN_MODE = 0xFF << 16
 """PX4's main mode within a custom mode. OFFBOARD has no sub mode, and PX4 ignores one."""
 _MODE_MESSAGES = frozenset({_COMMAND_LONG, _COMMAND_INT, _SET_MODE})
@@ -49,7 +49,7 @@ def asks_for_control(frame: Frame, autopilot: Autopilot) -> bool:
     return bool(
         message.command == MAV_CMD_DO_SET_MODE
         and isfinite(message.param1)
-        and int(message.param1) & _CUSTOM_MODE
+        and int(message.param1) & _CUSTOM_MODE_FLAG
         and isfinite(message.param2)
         and int(message.param2) << 16 & _MAIN_MODE == offboard
     )

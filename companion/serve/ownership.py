@@ -9,7 +9,7 @@ _MAX_CLIENTS = 64
 """Number of remembered clients above which the silent ones are forgotten."""
 
 
-class Control(Enum):
+class ControlState(Enum):
     """How the vehicle is controlled for its owner."""
 
     FREE = "no client is in control"
@@ -47,7 +47,7 @@ class Ownership:
         self.owner: Hashable | None = None
         self._streams: dict[Hashable, _Stream] = {}
 
-    def setpoint(self, client: Hashable, now: float) -> str | None:
+    def note_setpoint(self, client: Hashable, now: float) -> str | None:
         """Note a setpoint; return why it is not flown, or None.
 
         A setpoint of another client takes over from a silent owner.
@@ -84,7 +84,7 @@ class Ownership:
         self.owner = client
         return None
 
-    def streams(self, client: Hashable, now: float) -> bool:
+    def has_stream(self, client: Hashable, now: float) -> bool:
         """Whether a client sends a stream: its last two setpoints came in time."""
         stream = self._streams.get(client, _Stream())
         return self._is_live(client, now) and stream.newest - stream.before <= self._timeout
@@ -98,14 +98,14 @@ class Ownership:
         """End the ownership: the owner has released control, or the vehicle has left our mode."""
         self.owner = None
 
-    def control(self, now: float) -> Control:
+    def control(self, now: float) -> ControlState:
         """How the vehicle is controlled for its owner now."""
         if self.owner is None:
-            return Control.FREE
+            return ControlState.FREE
         silent = now - self._streams.get(self.owner, _Stream()).newest - self._timeout
         if silent <= 0.0:
-            return Control.LIVE
-        return Control.HOLDING if silent <= self._hold else Control.EXPIRED
+            return ControlState.LIVE
+        return ControlState.HOLDING if silent <= self._hold else ControlState.EXPIRED
 
     def _is_live(self, client: Hashable, now: float) -> bool:
         return now - self._streams.get(client, _Stream()).newest <= self._timeout

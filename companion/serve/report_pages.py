@@ -62,7 +62,7 @@ class ReportPages:
             text=True,
             start_new_session=True,  # Ctrl-C must reach only this program
         )
-        _give_way(self._process.pid)
+        _lower_priority(self._process.pid)
         out, errors = self._output(self._process)
         if self._process.returncode != 0:
             raise RuntimeError(" ".join(errors.split()) or f"exit {self._process.returncode}")
@@ -87,7 +87,7 @@ class ReportPages:
                 raise RuntimeError(_INTERRUPTED if self._has_left else late_text)
 
 
-def _give_way(pid: int) -> None:
+def _lower_priority(pid: int) -> None:
     """Give a process the normal scheduler and the lowest priority instead of the flight's."""
     schedule_as_usual(pid)
     with suppress(ProcessLookupError):  # it has ended already

@@ -23,7 +23,7 @@ from companion.serve.flight_records import FlightRecords
 from companion.serve.motion_settings import change_refusal, commanded_motion
 from companion.serve.network.addresses import Address
 from companion.serve.network.client import Client
-from companion.serve.ownership import Control, Ownership
+from companion.serve.ownership import ControlState, Ownership
 from companion.serve.setpoints.request import Request
 from companion.serve.source import ServedSource
 from companion.vehicle.link import Link
@@ -114,7 +114,7 @@ class ServedFlight:
         return self._assembled.context.loop.offboard_active
 
     @property
-    def ends(self) -> bool:
+    def is_ending(self) -> bool:
         """Whether requests are no longer flown: a monitor holds the vehicle, or an exit runs."""
         begun, flown = (
             self._source.start_pose is not None,
@@ -193,7 +193,6 @@ class ServedFlight:
             self._assembled.flight.note(fault_message(error))
 
     def _tell_alarm(self, text: str) -> None:
-        """Send the text of a safety monitor to the clients."""
         self._note_alarm(text)
         self._component.tell(text, WARNING)
 
@@ -215,10 +214,10 @@ class ServedFlight:
             await asyncio.sleep(_PROGRESS_PERIOD)
         self._answer(command, ACCEPTED)
         self._component.tell(f"{self._source.name} is in control")
-        reported = Control.LIVE
+        reported = ControlState.LIVE
         while True:
             now = self._ownership.control(self._clock())
-            if now is not reported and now in (Control.LIVE, Control.HOLDING):
+            if now is not reported and now in (ControlState.LIVE, ControlState.HOLDING):
                 self._component.tell(f"{self._source.name}: {now.value}")
                 reported = now
             await asyncio.sleep(_CHECK_PERIOD)
@@ -230,8 +229,8 @@ class ServedFlight:
             if not self.in_control:
                 continue
             if self.tracking_error is not None:
-                self._component.value("trk_err_m", self.tracking_error)
-            self._component.value("answer_ms", 1e-6 * self._assembled.trace.newest_latency_ns)
+                self._component.send_value("trk_err_m", self.tracking_error)
+            self._component.send_value("answer_ms", 1e-6 * self._assembled.trace.newest_latency_ns)
 
     def _answer(self, command: ControlRequest | None, result: int) -> None:
         if command is not None:

@@ -51,7 +51,7 @@ class ServeSession:
     Attributes:
         changes: changes of values in flight; they stay in force for the next flight.
         network: network of the clients, once it is open.
-        control: control by clients' setpoints, once it is open, if `serve.control` is true.
+        control: control by clients' setpoints, once the link is open, if `serve.control` is true.
         records: records of the flights under a client's control.
     """
 
@@ -141,7 +141,7 @@ class ServeSession:
         gate = _Gate(
             permission, component, self.control, network.routing, link.settings.target_system
         )
-        network.routing.on_own = gate.on_own
+        network.routing.on_own_frame = gate.on_own_frame
         network.routing.intercept = gate.intercept
         for endpoint in self._config.serve.clients:
             self._note(f"clients at {endpoint}")
@@ -196,10 +196,10 @@ class _Gate:
             return False
         return self._control.intercept(client, frame)
 
-    def on_own(self, client: Channel, frame: Frame) -> None:
+    def on_own_frame(self, client: Channel, frame: Frame) -> None:
         """Take a frame addressed only to our component: fly a setpoint, refuse a command."""
         if frame.message_id not in SETPOINTS or not self.intercept(client, frame):
-            self._component.on_own(client, frame)
+            self._component.on_own_frame(client, frame)
 
 
 def _counters(link: Link, network: Network) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from contextlib import suppress
 from companion.attitude import coefficients, heading
 from companion.control.estimator_resets import EstimatorResets
 from companion.guidance.reference import Pose, Reference, ReferenceAt, VehicleMotion
-from companion.serve.ownership import Control, Ownership
+from companion.serve.ownership import ControlState, Ownership
 from companion.serve.setpoints.approach import UnplannableError
 from companion.serve.setpoints.motion import CommandedMotion
 from companion.serve.setpoints.request import (
@@ -17,7 +17,7 @@ from companion.serve.setpoints.request import (
     Request,
 )
 
-_FLOWN_STATES = frozenset({Control.LIVE, Control.HOLDING})
+_FLOWN_STATES = frozenset({ControlState.LIVE, ControlState.HOLDING})
 
 
 class ServedSource:
@@ -59,7 +59,7 @@ class ServedSource:
     def begin(self, now: float, pose: Pose) -> None:
         """Start from the pose that was held so far, with the newest request if it is fresh."""
         self.start_pose = pose
-        live = self._ownership.control(now) is Control.LIVE
+        live = self._ownership.control(now) is ControlState.LIVE
         self._ownership.begin(now)
         self._vehicle = VehicleMotion(pose.position_ned, (0.0, 0.0, 0.0))
         self._motion.begin(pose.position_ned, (0.0, 0.0, 0.0), pose.heading, now)
@@ -91,7 +91,7 @@ class ServedSource:
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
         """The reference over time; if the client is silent, the reference comes to rest."""
         self._vehicle = motion
-        if self._ownership.control(now) is not Control.LIVE and not self._stopped:
+        if self._ownership.control(now) is not ControlState.LIVE and not self._stopped:
             self._leave_direct(now)
             self._motion.stop(now, motion)
             self._stopped = True

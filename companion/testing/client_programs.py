@@ -124,5 +124,5 @@ class Program(Client):
 
     def _flush(self) -> None:
         while self._waiting:
-            data, _ = self._take(100_000)
+            data, _ = self._dequeue(100_000)
             self.heard += self._parser.parse_buffer(data) or ()

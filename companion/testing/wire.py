@@ -14,7 +14,7 @@ from companion.mavlink.transport.base import Receiver
 from companion.mavlink.transport.udp import PEER_SILENCE_S
 from companion.testing.vehicle import MockVehicle
 from companion.testing.virtual_loop import VirtualClock, VirtualEventLoop
-from sitl_mock.exchange import in_burst
+from sitl_mock.exchange import burst_time
 
 _NAME = "the mock vehicle"
 
@@ -145,7 +145,7 @@ class FreeWire(Wire):
                 return
 
     def _next_step_at(self) -> float:
-        return in_burst(self._vehicle.next_step_at, self._burst) + self._slipped
+        return burst_time(self._vehicle.next_step_at, self._burst) + self._slipped
 
     def _deliver_due(self) -> bool:
         """Deliver what is due; return whether the program received something."""

@@ -138,7 +138,7 @@ class Autopilot(Protocol):
         """What is missing before the vehicle can be armed and flown, in words; `None`: nothing."""
 
     def arm(self) -> tuple[Command, ...]:
-        """Commands that enter the mode for take-off and arm with all checks, in order."""
+        """Commands that enter a mode in which it can arm, and arm it with all checks, in order."""
 
     def disarm(self) -> Command:
         """Command that disarms on the ground."""

@@ -16,7 +16,7 @@ from companion.vehicle.autopilot import Autopilot
 from companion.vehicle.clock import VehicleClock
 from companion.vehicle.registry import read_events
 from companion.vehicle.state import VehicleState
-from companion.vehicle.streams import StreamRate, measure, set_rates
+from companion.vehicle.streams import StreamRate, measured_rates, set_rates
 
 
 class VehicleClient:
@@ -28,7 +28,7 @@ class VehicleClient:
         router: Delivers the messages received.
         stats: Counters of the link.
         clock: Returns the event-loop time, s.
-        vehicle_clock: Computes how old a position is.
+        vehicle_clock: Dates the positions.
 
     Attributes:
         settings: The endpoint, and the ids of the vehicle and of this program.
@@ -77,7 +77,7 @@ class VehicleClient:
 
     def send(self, message: Message) -> bool:
         """Send a pymavlink message now; return False if it could not be sent."""
-        return self._outbox.message(message)
+        return self._outbox.send(message)
 
     async def command(
         self,
@@ -126,7 +126,8 @@ class VehicleClient:
         Raises:
             NotConnected: No heartbeat has come yet, so the encoding of parameters is unknown.
             UnansweredParameter: No answer came; some autopilots do not answer for unknown names.
-            UnknownParameter: The autopilot answered that it has no such parameter.
+            UnknownParameter: The autopilot answered that it has no such parameter, or the name is
+                not 1 to 16 ASCII characters.
             ParameterRefused: The autopilot answered with another error.
             LinkLost: The connection dropped while waiting.
         """
@@ -139,8 +140,9 @@ class VehicleClient:
 
         Raises:
             NotConnected: No heartbeat has come yet, so the encoding of parameters is unknown.
-            UnknownParameter: The autopilot has no such parameter, or did not answer.
-            ParameterRefused: The value does not fit the type, or the autopilot keeps another value.
+            UnansweredParameter, UnknownParameter: As for `read_parameter`.
+            ParameterRefused: The value does not fit the type, or the autopilot keeps another value
+                or answered with an error.
             LinkLost: The connection dropped while waiting.
         """
         return await self._parameters.write(name, value, timeout_s, retries)
@@ -160,5 +162,9 @@ class VehicleClient:
         return await set_rates(self._commands, self.stats, rates, window_s, step_us)
 
     async def measure_rates(self, names: Iterable[str], window_s: float) -> dict[str, float]:
-        """Rates in Hz at which messages arrive, counted over `window_s`."""
-        return await measure(self.stats, names, window_s)
+        """Rates in Hz at which messages arrive, counted over `window_s`.
+
+        Raises:
+            UnknownMessage: A name is not in the dialect.
+        """
+        return await measured_rates(self.stats, names, window_s)

@@ -10,9 +10,9 @@ from math import inf, nan
 
 from companion.vehicle.clock_estimates import ClockRate, DelayUnknown, TelemetryDelay
 from companion.vehicle.clock_jumps import (
-    JUMP,
-    REBOOTED,
-    TOGETHER,
+    RESTART_SETBACK,
+    SAME_CLOCK_SPREAD,
+    SMALLEST_JUMP,
     Misfit,
     MisfitRun,
     Reading,
@@ -92,7 +92,7 @@ class VehicleClock:
         if self._began == inf:
             return False
         spread = self.rate.spread(max(0.0, now - self._received))
-        return vehicle_time - now > self._quickest + self.delay.seconds + JUMP + spread
+        return vehicle_time - now > self._quickest + self.delay.seconds + SMALLEST_JUMP + spread
 
     def take(self, time_boot_ms: int, received: float) -> Reading:
         """Take the times of an attitude sample; return its vehicle time and age.
@@ -104,7 +104,7 @@ class VehicleClock:
         time = time_boot_ms / 1000.0 + self._shift
         ahead = time - received
         quickest = self._quickest + self.rate.slowest * (received - self._received)
-        if time <= self._newest or ahead > quickest + JUMP:
+        if time <= self._newest or ahead > quickest + SMALLEST_JUMP:
             misfit = self._judge_misfit(time_boot_ms, Stamp(time, ahead, received), quickest)
             if misfit is not None:
                 return Reading(time, nan, misfit)
@@ -139,12 +139,12 @@ class VehicleClock:
         time = vehicle_ns * 1e-9 + self._shift
         middle_time, half_round_trip = 0.5 * (sent + received), 0.5 * (received - sent)
         quickest = self._quickest + self.rate.rate * (middle_time - self._received)
-        attitude_fits = received - self._received < 1.0 and self._late < JUMP
+        attitude_fits = received - self._received < 1.0 and self._late < SMALLEST_JUMP
         error = half_round_trip + self.rate.spread(max(0.0, received - self._received))
         delay = time - middle_time - quickest
         setback = self.delay.compare(received, error, delay)
         if setback is None:
-            if -delay < JUMP:
+            if -delay < SMALLEST_JUMP:
                 self._quickest -= max(0.0, -delay - error - _TIMESYNC_LAG)
             return
         if attitude_fits:  # the samples are as before: only TIMESYNC's clock has changed
@@ -167,20 +167,20 @@ class VehicleClock:
         if self._reported_unknown:
             self.on_event(
                 f"the age of telemetry is not known, because {self.delay.unknown.value}; "
-                "a delay of all samples is not noticed, only of some against the quickest one"
+                "a sample that is later than the quickest one is noticed, a delay of all is not"
             )
         else:
             self.on_event("the age of telemetry is known by TIMESYNC")
 
     def _judge_misfit(self, time_boot_ms: int, stamp: Stamp, quickest: float) -> Misfit | None:
-        """Why `stamp` does not fit the clock; None if it fits, also after an accepted change."""
+        """Why `stamp` does not fit the clock; None if it fits, or a change is accepted."""
         if self._began == inf:
             self._began = self._received = stamp.received
             self._quickest = 0.0 if self._lockstep else stamp.ahead
             return None
         is_ahead = stamp.time > self._newest
         drift = self.rate.spread(stamp.received - self._received)
-        if is_ahead and stamp.ahead <= quickest + JUMP + drift:
+        if is_ahead and stamp.ahead <= quickest + SMALLEST_JUMP + drift:
             self._quickest = quickest
             self._drop_misfits()
             return None
@@ -206,7 +206,7 @@ class VehicleClock:
         before them.
         """
         lead = stamp.ahead - quickest
-        if lead > self.delay.largest_possible(before=self._received - TOGETHER):
+        if lead > self.delay.largest_possible(before=self._received - SAME_CLOCK_SPREAD):
             return False
         self._quickest = quickest
         self.delay.shorten(lead, stamp.received)
@@ -221,7 +221,7 @@ class VehicleClock:
         stood_still = self._misfits.stood_still(self._newest)
         lasted = self._misfits.stamps[-1].received - self._received
         self._drop_misfits()
-        if stood_still and min(lasted, late) >= JUMP:
+        if stood_still and min(lasted, late) >= SMALLEST_JUMP:
             self._accept_jump(-late, time_boot_ms, restarted=False)
 
     def _drop_misfits(self) -> None:
@@ -241,10 +241,10 @@ class VehicleClock:
         """Accept that the vehicle's clock jumped by `jump` s; vehicle times stay continuous."""
         before = self._received + self._quickest - self._shift
         self._shift -= jump
-        self.delay.forget_after(self._received - self.delay.seconds - TOGETHER)
-        if self._received - self._began < _SETTLING_TIME and jump > -REBOOTED:
+        self.delay.forget_after(self._received - self.delay.seconds - SAME_CLOCK_SPREAD)
+        if self._received - self._began < _SETTLING_TIME and jump > -RESTART_SETBACK:
             return
         self.changes += 1
-        self.restarts += restarted and not has_wrapped(jump, before) and jump < -REBOOTED
+        self.restarts += restarted and not has_wrapped(jump, before) and jump < -RESTART_SETBACK
         self.last_change = describe_change(jump, before, time_boot_ms / 1000.0, restarted=restarted)
         self.on_event(self.last_change)

@@ -10,8 +10,8 @@ from math import inf
 from typing import NamedTuple
 
 MOST_DRIFT = 0.02
-"""Largest difference in rate between the two clocks, s per s. Crystals differ by less than 0.0002,
-a simulator that is slower than real time by 0.006 (measured)."""
+"""Largest difference in rate between the two clocks, s per s. It is less than 0.0002 for crystals,
+and was 0.006 for a simulator that ran slower than real time."""
 _RATE_UNCERTAINTY = 0.005
 """Uncertainty of a measured rate, s per s."""
 _LATE_SAMPLES_RISE = 0.005
@@ -19,11 +19,12 @@ _LATE_SAMPLES_RISE = 0.005
 measurement of the rate restarts. Without a restart, a backlog of 68 ms at the start (measured on
 PX4) would give a rate of 1.4 %, and samples would seem up to 79 ms old for 40 s.
 """
-_PERIOD = 1.0
+_NOTE_PERIOD = 1.0
+"""Time between two offsets that are noted, s."""
 _MIN_WINDOW, _MAX_WINDOW = 5, 20
 """Shortest and longest time over which a rate is measured, s."""
 
-LIFETIME = 20.0
+EXCHANGE_LIFETIME = 20.0
 """Time for which a TIMESYNC exchange is used, s; there is one each second."""
 _MAX_DELAY = 10.0
 """Largest plausible delay of a sample, s; a greater difference means another clock."""
@@ -69,10 +70,10 @@ class ClockRate:
                 self._noted.clear()  # the noted offsets are of late samples
                 self.rate, self._unsure = 0.0, MOST_DRIFT
                 self.slowest = -MOST_DRIFT
-        self.due = now + _PERIOD
+        self.due = now + _NOTE_PERIOD
         self._noted.append((now, offset))
         then, before = self._noted[0]
-        if now - then < _MIN_WINDOW * _PERIOD:
+        if now - then < _MIN_WINDOW * _NOTE_PERIOD:
             return
         self._unsure = _RATE_UNCERTAINTY
         slope = (offset - before) / (now - then)
@@ -115,7 +116,7 @@ class TelemetryDelay:
         self.known = False
         self.seconds = 0.0
         self.unknown = DelayUnknown.UNANSWERED
-        self._exchanges: deque[_Exchange] = deque(maxlen=round(LIFETIME) + 10)
+        self._exchanges: deque[_Exchange] = deque(maxlen=round(EXCHANGE_LIFETIME) + 10)
         self._odd: _Exchange | None = None
 
     def compare(self, now: float, half: float, delay: float) -> float | None:
@@ -189,7 +190,7 @@ class TelemetryDelay:
     def expire(self, now: float) -> None:
         """Forget exchanges too old at event-loop time `now` (s); use the best of the others."""
         exchanges = self._exchanges
-        while exchanges and now - exchanges[0].at > LIFETIME:
+        while exchanges and now - exchanges[0].at > EXCHANGE_LIFETIME:
             exchanges.popleft()
         if not exchanges:
             self.forget(self.unknown)

@@ -3,15 +3,15 @@
 from enum import Enum
 from typing import NamedTuple
 
-JUMP = 0.05
+SMALLEST_JUMP = 0.05
 """A stamp further ahead of the clock than this, s, is no drift; simulators slip by up to 0.016."""
-TOGETHER = 0.1
+SAME_CLOCK_SPREAD = 0.1
 """Largest difference of offsets of samples that may belong to one clock, s."""
 _MIN_JUMP_SAMPLES = 3
 """Number of misfits in a row that shows a jump of the clock; fewer are outliers."""
 _MIN_JUMP_SPAN = 0.04
 """Time that the misfits in a row must span to show a jump of the clock, s."""
-REBOOTED = 2.0
+RESTART_SETBACK = 2.0
 """The autopilot restarted if its clock went back by more than this, s; otherwise it jumped."""
 _WRAP_PERIOD = 2**32 / 1000.0
 """Time after which time_boot_ms, a uint32, wraps: 49.7 days in s."""
@@ -70,7 +70,7 @@ class MisfitRun:
         if not self.stamps:
             return True
         last = self.stamps[-1]
-        return stamp.time >= last.time and abs(stamp.ahead - last.ahead) < TOGETHER
+        return stamp.time >= last.time and abs(stamp.ahead - last.ahead) < SAME_CLOCK_SPREAD
 
     def confirmed(self, quickest: float) -> bool:
         """Whether the misfits show a jump of the clock away from `quickest`, the old offset, s."""
@@ -79,7 +79,7 @@ class MisfitRun:
             len(self.stamps) >= _MIN_JUMP_SAMPLES
             and last.time > first.time
             and last.received - first.received >= _MIN_JUMP_SPAN
-            and abs(self.most_ahead() - quickest) >= JUMP
+            and abs(self.most_ahead() - quickest) >= SMALLEST_JUMP
         )
 
     def most_ahead(self) -> float:
@@ -120,7 +120,7 @@ def describe_change(jump: float, before: float, now: float, *, restarted: bool) 
         return f"the vehicle's clock jumped ahead by {jump:.2f} s"
     if not restarted:
         return f"the vehicle's clock stood still for {-jump:.2f} s"
-    if jump < -REBOOTED:
+    if jump < -RESTART_SETBACK:
         return (
             f"the vehicle's time since boot went back from {before:.1f} s to {now:.1f} s: the "
             "autopilot restarted"

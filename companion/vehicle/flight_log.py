@@ -13,7 +13,7 @@ from companion.vehicle.registry import AUTOPILOT_NAMES, BY_NUMBER
 
 Row = tuple[float, ...]
 
-_ARMED = 128
+_ARMED_FLAG = 128
 _RELEVANT_BITS = IGNORE_ATTITUDE | 0b1100111
 """Bits of a type mask that are compared: quaternion, three rates, throttle, body thrust."""
 _STANDARD_GRAVITY = 9.80665
@@ -114,7 +114,7 @@ class _Reader:
         if source != self.vehicle or self._autopilot is None:
             return
         mode = self._autopilot.mode_name(heartbeat.base_mode, heartbeat.custom_mode)
-        armed = bool(heartbeat.base_mode & _ARMED)
+        armed = bool(heartbeat.base_mode & _ARMED_FLAG)
         obeying = armed and Role.OFFBOARD in self._autopilot.roles(mode)
         if obeying and self._obeying:
             self.obeyed.extend(self._unconfirmed)

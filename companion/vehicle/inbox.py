@@ -107,7 +107,7 @@ class Inbox:
         try:
             for frame in self._scanner.feed(data):
                 if frame.message_id not in CRC_EXTRA:
-                    self._show(frame)
+                    self._call_on_frame(frame)
                 elif self._admit(frame):
                     accepted = True
                     if self._candidate is not None:
@@ -115,7 +115,7 @@ class Inbox:
                         self._candidate = None
                     self._accept(frame, received_ns)
                 elif not self._filter.is_vehicle(frame):
-                    self._show(frame)
+                    self._call_on_frame(frame)
         except Exception as error:  # from the tap; subscribers are guarded one by one
             self._router.report(error)
             return False
@@ -164,7 +164,7 @@ class Inbox:
         self._filter.tell_remarks()
 
     def _admit(self, frame: Frame) -> bool:
-        if self._filter.from_vehicle(frame):
+        if self._filter.admits_source(frame):
             return self._filter.signature_good(frame)
         if self.on_foreign is not None:
             self._router.guard(self.on_foreign, frame)
@@ -197,10 +197,9 @@ class Inbox:
                 self._router.report(error)
         self._counter.count(frame.message_id, frame.sequence)
         self._router.route(frame.message_id, frame.payload)
-        self._show(frame)
+        self._call_on_frame(frame)
 
-    def _show(self, frame: Frame) -> None:
-        """Pass a frame to `on_frame`."""
+    def _call_on_frame(self, frame: Frame) -> None:
         if self.on_frame is not None:
             self._router.guard(self.on_frame, frame)
 

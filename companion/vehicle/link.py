@@ -76,7 +76,7 @@ class Link(VehicleClient):
         self.clock = VehicleClock(lockstep=settings.lockstep)
         super().__init__(settings, outbox, router, stats, self._loop.time, self.clock)
         self._inbox = Inbox(
-            settings, stats, router, tap, notice, self.clock, lambda: outbox.setpoint_at
+            settings, stats, router, tap, notice, self.clock, lambda: outbox.last_setpoint_at
         )
         self.timesync = TimeSync(outbox, router, self._loop.time, self.clock)
         self._connection = Connection(
@@ -218,7 +218,7 @@ class Link(VehicleClient):
         if self._lockstep is not None and self._lockstep.step_ms == time_boot_ms:
             self._outbox.latch(time_boot_ms, rates, thrust)
             return True
-        return self._outbox.setpoint(time_boot_ms, rates, thrust)
+        return self._outbox.send_setpoint(time_boot_ms, rates, thrust)
 
     # --- inside
 

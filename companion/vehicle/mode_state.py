@@ -10,7 +10,7 @@ from companion.vehicle.autopilot import Autopilot
 from companion.vehicle.records import CurrentMode, Heartbeat
 from companion.vehicle.registry import MULTIROTORS, autopilot_for
 
-_ARMED = 128
+_ARMED_FLAG = 128
 _AUTOPILOT_INVALID = 8
 _FAILSAFE_STATES = frozenset({5, 6, 8})
 """MAV_STATE of an autopilot in a failsafe: critical, emergency, flight termination."""
@@ -90,7 +90,7 @@ class ModeState:
                 self.unsupported = None
             except UnsupportedAutopilot as error:
                 self.unsupported = error
-        armed = bool(message.base_mode & _ARMED)
+        armed = bool(message.base_mode & _ARMED_FLAG)
         self.armings += armed and not self.armed
         mode = str(message.custom_mode)
         if self.autopilot is not None:

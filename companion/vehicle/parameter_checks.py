@@ -7,7 +7,7 @@ from companion.vehicle.parameter_rules import Check, CheckResult, CompanionSetti
 
 UNSAFE, INEFFECTIVE = CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 
-LONGEST_HELD = 2.0
+LONGEST_RATE_HOLD = 2.0
 """Longest time for which the last rates may be held, s. 0.4 rad/s held for 1 s became 24° of tilt
 (measured on PX4); twice that tilt is not recoverable."""
 
@@ -56,7 +56,7 @@ def required(result: CheckResult, good: float, because: str) -> Check:
 
 
 def positive(result: CheckResult, because: str, set_to: float) -> Check:
-    """A check that requires a value above zero: zero or less switches a protection off."""
+    """A check that requires a value above zero, because zero or less turns a protection off."""
 
     def check(value: float, _: Values, __: CompanionSettings) -> Problem | None:
         return None if value > 0.0 else Problem(result, because, set_to)
@@ -102,7 +102,10 @@ def shortest_rate_hold(silence_limit: float) -> float:
 
 
 def rates_held(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
-    """Check that the last rates are held longer than `silence_limit`, at most `LONGEST_HELD`."""
+    """Check the time for which the last rates are held.
+
+    It must be longer than `silence_limit`, and at most `LONGEST_RATE_HOLD`.
+    """
     set_to = shortest_rate_hold(settings.silence_limit)
     if value <= settings.silence_limit:
         return Problem(
@@ -112,7 +115,7 @@ def rates_held(value: float, _: Values, settings: CompanionSettings) -> Problem 
             "setpoints triggers it",
             set_to,
         )
-    if value > LONGEST_HELD:
+    if value > LONGEST_RATE_HOLD:
         return Problem(
             UNSAFE,
             f"when setpoints stop, the last rates are held for {value:g} s: 0.4 rad/s become "

@@ -13,20 +13,21 @@ from companion.mavlink.router import Router
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.stats import LinkStats
 from companion.vehicle.clock import VehicleClock
-from companion.vehicle.clock_estimates import LIFETIME
+from companion.vehicle.clock_estimates import EXCHANGE_LIFETIME
 
 _MAV_AUTOPILOT_INVALID = 8
 _MAV_STATE_ACTIVE = 4
 _MAVLINK_VERSION = 3
-_QUICK_REQUESTS, _QUICK_PERIOD_S = 10, 0.1  # for a good clock offset within the first second
-_PERIOD_S = 1.0
-_WINDOW = 16
+# For a good clock offset within the first second.
+_QUICK_REQUESTS, _QUICK_REQUEST_PERIOD_S = 10, 0.1
+_REQUEST_PERIOD_S = 1.0
+_KEPT_REQUESTS = 16
 _S_PER_NS = 1e-9
 
 
 def send_heartbeat(settings: LinkSettings, outbox: Outbox) -> None:
     """Send one HEARTBEAT of the configured type, with the state active."""
-    outbox.message(
+    outbox.send(
         dialect.MAVLink_heartbeat_message(
             type=settings.heartbeat_type,
             autopilot=_MAV_AUTOPILOT_INVALID,
@@ -63,8 +64,9 @@ class TimeSync:
         vehicle_clock: VehicleClock,
     ) -> None:
         self._outbox, self._clock, self._vehicle_clock = outbox, clock, vehicle_clock
-        self._requests: deque[int] = deque(maxlen=_WINDOW)
-        self._round_trips: deque[tuple[float, float]] = deque(maxlen=_WINDOW)  # received, took; s
+        self._requests: deque[int] = deque(maxlen=_KEPT_REQUESTS)
+        # (event-loop time of the answer, round trip), s
+        self._round_trips: deque[tuple[float, float]] = deque(maxlen=_KEPT_REQUESTS)
         router.subscribe("TIMESYNC", self._on_timesync)
 
     @property
@@ -79,10 +81,10 @@ class TimeSync:
         return max(trips) - min(trips) if trips else None
 
     def ask(self) -> None:
-        """Send one request."""
+        """Send one TIMESYNC request."""
         stamp = self._now_ns()
         self._requests.append(stamp)
-        self._outbox.message(dialect.MAVLink_timesync_message(tc1=0, ts1=stamp))
+        self._outbox.send(dialect.MAVLink_timesync_message(tc1=0, ts1=stamp))
 
     def reset(self) -> None:
         """Forget all requests and answers, after a reconnect: the vehicle may have restarted."""
@@ -92,14 +94,14 @@ class TimeSync:
     def _on_timesync(self, message: Message) -> None:
         now = self._now_ns()
         if message.tc1 == 0:
-            self._outbox.message(dialect.MAVLink_timesync_message(tc1=now, ts1=message.ts1))
+            self._outbox.send(dialect.MAVLink_timesync_message(tc1=now, ts1=message.ts1))
         elif message.ts1 in self._requests:  # otherwise it answers another station
             self._requests.remove(message.ts1)
             self._round_trips.append((now * _S_PER_NS, (now - message.ts1) * _S_PER_NS))
             self._vehicle_clock.exchange(message.ts1 * _S_PER_NS, now * _S_PER_NS, message.tc1)
 
     def _recent(self) -> list[float]:
-        oldest = self._clock() - LIFETIME
+        oldest = self._clock() - EXCHANGE_LIFETIME
         return [round_trip for received, round_trip in self._round_trips if received >= oldest]
 
     def _now_ns(self) -> int:
@@ -112,10 +114,10 @@ async def synchronise(timesync: TimeSync, clock: VehicleClock) -> None:
     now = asyncio.get_running_loop().time
     for _ in range(_QUICK_REQUESTS):
         timesync.ask()
-        await asyncio.sleep(_QUICK_PERIOD_S)
+        await asyncio.sleep(_QUICK_REQUEST_PERIOD_S)
     while True:
         timesync.ask()
-        await asyncio.sleep(_PERIOD_S)
+        await asyncio.sleep(_REQUEST_PERIOD_S)
         clock.update(now())
 
 
@@ -126,7 +128,10 @@ def no_heartbeat(settings: LinkSettings, stats: LinkStats, timeout_s: float) -> 
     if refused is not None:
         return refused
     if stats.bad_crc:
-        return f"{opening}, but {stats.bad_crc} damaged frames; is the baud rate right?"
+        return (
+            f"{opening}, but {stats.bad_crc} damaged frames; is the baud rate right? "
+            "(link.endpoint)"
+        )
     return f"{opening} on {settings.endpoint}; is the vehicle running and sending to this address?"
 
 

@@ -141,9 +141,10 @@ class Battery(NamedTuple):
     remaining: float | None
 
     def replaced_by(self, newer: "Battery") -> "Battery":
-        """`newer`, or this battery with its voltage if only this one knows the charge.
+        """`newer`; but if only this battery knows the charge, it stays, with the newer voltage.
 
-        Some vehicles send the charge in one of the two messages only.
+        Some vehicles send the charge in one of the two messages only. It is kept for
+        `_MAX_CHARGE_AGE`.
         """
         age = newer.received - self.received
         if newer.remaining is not None or self.remaining is None or age > _MAX_CHARGE_AGE:

@@ -33,7 +33,7 @@ GROUND_HEIGHT = 1.5
 """Largest height above home that counts as on the ground, m: the estimate drifts."""
 _UNKNOWN_U16 = 65535
 _PREARM_CHECK = 0x10000000
-_UNDEFINED, LANDED_ON_GROUND, LANDED_TAKEOFF = 0, 1, 3
+_LANDED_UNDEFINED, LANDED_ON_GROUND, LANDED_TAKEOFF = 0, 1, 3
 
 
 @dataclass
@@ -115,7 +115,7 @@ class VehicleState(ModeState, _Values):
     @property
     def flying(self) -> bool:
         """Whether the autopilot reports that it is in the air; False if unknown."""
-        return self._landed_state() not in (None, _UNDEFINED, LANDED_ON_GROUND)
+        return self._landed_state() not in (None, _LANDED_UNDEFINED, LANDED_ON_GROUND)
 
     @property
     def taking_off(self) -> bool:

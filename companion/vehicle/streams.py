@@ -65,7 +65,7 @@ async def set_rates(
         name: await _request(commands, numbers[name], rate, interval_step_us)
         for name, rate in rates.items()
     }
-    achieved = await measure(stats, rates, window_s)
+    achieved = await measured_rates(stats, rates, window_s)
     return {
         name: StreamRate(rate, answers[name][0], achieved[name], answers[name][1])
         for name, rate in rates.items()
@@ -95,7 +95,9 @@ async def _request(
     return 0.0, refusal
 
 
-async def measure(stats: LinkStats, names: Iterable[str], window_s: float) -> dict[str, float]:
+async def measured_rates(
+    stats: LinkStats, names: Iterable[str], window_s: float
+) -> dict[str, float]:
     """Rates in Hz at which messages arrive, by name, counted over `window_s` seconds.
 
     Raises:

@@ -13,7 +13,7 @@ from sitl_mock.autopilot.state import Mode, State
 from sitl_mock.physics.quaternion import Quaternion, Vector
 from sitl_mock.physics.vehicle import ActuatorCommand
 
-LEARNING_S = 10.0
+HOVER_LEARNING_TIME_S = 10.0
 """MOT_THST_HOVER follows the thrust of a quiet hover with this time constant."""
 # The mock shapes rates, where ArduPilot shapes the attitudes of its own modes. The yaw response is
 # slow, and a higher yaw gain would oscillate.
@@ -69,7 +69,7 @@ class ActuatorOutput:
         quiet = self._hold.climb.rate == 0.0 and abs(state.estimate.velocity_ned[2]) < 0.6
         if parameters["MOT_HOVER_LEARN"] and quiet and self.cos_tilt > cos(radians(5.0)):
             hover = float(parameters["MOT_THST_HOVER"])
-            change = dt / LEARNING_S * (output.thrust - hover)
+            change = dt / HOVER_LEARNING_TIME_S * (output.thrust - hover)
             parameters.set("MOT_THST_HOVER", hover + change)
 
     def attitude(self, target: Quaternion, thrust: float) -> ActuatorCommand:

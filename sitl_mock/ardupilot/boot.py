@@ -41,7 +41,7 @@ _TEXTS = (
     (RECORDED_READY_S, "EKF3 IMU0 is using GPS"),
     (RECORDED_READY_S, "EKF3 IMU1 is using GPS"),
 )
-_SAVED = (
+_SAVED_PARAMETERS = (
     (0.16, "COMPASS_DEV_ID"),
     (1.87, "BARO1_GND_PRESS"),
     (INITIALISED_S, "INS_GYR_ID"),
@@ -76,7 +76,7 @@ class Boot:
         self._scale = ready_us / (RECORDED_READY_S * 1e6)
         self._elevation = elevation
         self._texts = list(_TEXTS)
-        self._saved = list(_SAVED)
+        self._saved = list(_SAVED_PARAMETERS)
         self._home_sent = False
         self._next_runtime_us = RUNTIME_PERIOD_US
 

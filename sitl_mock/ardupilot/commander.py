@@ -76,7 +76,7 @@ class ArduPilotCommander:
         state = self._state
         if state.armed:
             return ACCEPTED
-        problem = self._check()
+        problem = self._find_problem()
         if problem is not None and not (force and self._boot.initialised and not self._crashed):
             self._announce(EventKind.ARMING_DENIED, problem)
             return FAILED
@@ -92,7 +92,7 @@ class ArduPilotCommander:
 
     def announce_problem(self) -> None:
         """Announce what forbids arming now, if anything does."""
-        problem = self._check()
+        problem = self._find_problem()
         if problem is not None:
             self._announce(EventKind.PREFLIGHT_FAIL, problem)
 
@@ -137,7 +137,7 @@ class ArduPilotCommander:
         """Record a heartbeat, for the ground station failsafe."""
         self.failsafe.receive_heartbeat(heartbeat)
 
-    def setpoint(self, message: Message) -> None:
+    def take_setpoint(self, message: Message) -> None:
         """Accept a setpoint in GUIDED; ignore one with the autopilot's own ids."""
         state = self._state
         own = (self._parameters["MAV_SYSID"], _OWN_COMPONENT)
@@ -181,7 +181,7 @@ class ArduPilotCommander:
         if state.armed and crashed:
             self._stop_motors(EventKind.DISARMED_AFTER_CRASH)
         self.failsafe.step()
-        self._check()
+        self._find_problem()
         if state.armed:
             self._align_yaw()
             self._disarm_on_ground()
@@ -196,7 +196,7 @@ class ArduPilotCommander:
         for unit in (0, 1):
             self._announce.say(f"EKF3 IMU{unit} MAG0 in-flight yaw alignment complete", INFO)
 
-    def _check(self) -> str | None:
+    def _find_problem(self) -> str | None:
         """Return why arming is refused now, None if it is not, and note it in the state."""
         state = self._state
         state.prearm_problem = arming_problem(

@@ -14,7 +14,7 @@ from sitl_mock.autopilot.state import Mode, State
 from sitl_mock.link.framing import Message
 from sitl_mock.link.link import Link
 
-_GROUPS: dict[int, tuple[int, ...]] = {
+_STREAM_GROUPS: dict[int, tuple[int, ...]] = {
     dialect.MAV_DATA_STREAM_RAW_SENSORS: (
         dialect.MAVLINK_MSG_ID_RAW_IMU,
         dialect.MAVLINK_MSG_ID_SCALED_PRESSURE,
@@ -77,7 +77,7 @@ class ArduPilotCommands(Commands):
     def data_stream(self, message: Message, link: Link) -> None:
         """REQUEST_DATA_STREAM: start or stop a group of messages on this link; 0 means all."""
         requested = message.req_stream_id
-        groups = _GROUPS.values() if requested == 0 else [_GROUPS.get(requested, ())]
+        groups = _STREAM_GROUPS.values() if requested == 0 else [_STREAM_GROUPS.get(requested, ())]
         rate = message.req_message_rate
         interval = 1e6 / rate if message.start_stop and rate else -1.0
         for group in groups:

@@ -97,7 +97,7 @@ class Guided:
             self._begin(Task.POSITION)
 
     def silent(self, now_us: int, timeout_s: float) -> bool:
-        """Whether the latest setpoint is older than GUID_TIMEOUT."""
+        """Whether the latest setpoint is older than GUID_TIMEOUT (``timeout_s``)."""
         return now_us - self.setpoint_us > timeout_s * 1e6
 
     def _begin(self, task: Task) -> None:

@@ -13,13 +13,13 @@ from sitl_mock.autopilot.state import State
 from sitl_mock.physics.quaternion import from_yaw
 from sitl_mock.physics.vehicle import ActuatorCommand
 
-THRUST_IS_THRUST = 8
+THRUST_AS_THRUST = 8
 """Bit of GUID_OPTIONS: a setpoint's thrust is thrust, not a climb rate."""
 SPOOL_UP_US = 2_000_000
 """Spool-up of the rotors after NAV_TAKEOFF (recorded: it lifts off after 2.3 s)."""
-ARRIVAL_ACCELERATION = 0.55
+ARRIVAL_DECELERATION = 0.55
 """Deceleration at the end of a take-off, m/s^2 (recorded)."""
-ARRIVED_M = 0.1
+ARRIVAL_TOLERANCE_M = 0.1
 """A take-off ends this far below its height, m."""
 _SLOWEST_ARRIVAL = 0.1
 """Smallest climb rate of a take-off, m/s, so that it reaches its height."""
@@ -74,8 +74,8 @@ class GuidedFlight:
             return self._output.rates((0.0, 0.0, 0.0), 0.0)
         left = guided.takeoff_height - state.home_ned[2] - self._hold.climb.height
         fastest = 0.01 * self._parameters["WPNAV_SPEED_UP"]
-        speed = max(_SLOWEST_ARRIVAL, approach_speed(left, ARRIVAL_ACCELERATION, fastest))
-        if left < ARRIVED_M:
+        speed = max(_SLOWEST_ARRIVAL, approach_speed(left, ARRIVAL_DECELERATION, fastest))
+        if left < ARRIVAL_TOLERANCE_M:
             guided.arrive()
         return self._output.follow(self._hold.step(speed, dt), dt)
 
@@ -87,7 +87,7 @@ class GuidedFlight:
         state.position_controlled = False
         was_silent = self._silent and not began
         self._silent = self._guided.silent(state.time_us, parameters["GUID_TIMEOUT"])
-        as_thrust = bool(int(parameters["GUID_OPTIONS"]) & THRUST_IS_THRUST)
+        as_thrust = bool(int(parameters["GUID_OPTIONS"]) & THRUST_AS_THRUST)
         climbs = self._silent or not as_thrust
         state.height_controlled = climbs
         if self._silent and not was_silent:

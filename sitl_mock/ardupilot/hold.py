@@ -16,8 +16,8 @@ STOPPING_S = 0.65
 """The held point lies ahead of the position by the velocity times this, s (recorded on entering
 LAND)."""
 _HEIGHT_INTEGRAL = 1.0
-"""Acceleration per climb rate error and second; chosen for a steady hover, not measured."""
-_STEEP_CLIMB = 10.0
+"""Acceleration per climb rate error and second, 1/s^2; chosen for a steady hover, not measured."""
+_CLIMB_LIMIT = 10.0
 """Largest climb and descent of the height controller, m/s. It is high, because the callers limit
 the climb rate that they ask for."""
 
@@ -102,8 +102,8 @@ class PositionHold:
             (*((0.0, 0.0) if level else (nan, nan)), -climb.acceleration),
             self.yaw,
             0.01 * parameters["WPNAV_SPEED"],
-            _STEEP_CLIMB,
-            _STEEP_CLIMB,
+            _CLIMB_LIMIT,
+            _CLIMB_LIMIT,
         )
         return self.follow(demand, dt)
 

@@ -6,7 +6,7 @@ from sitl_mock.ardupilot.actuator_output import ActuatorOutput
 from sitl_mock.ardupilot.guided import Guided
 from sitl_mock.ardupilot.guided_flight import GuidedFlight
 from sitl_mock.ardupilot.hold import PositionHold, approach_speed
-from sitl_mock.ardupilot.return_home import Leg, Return
+from sitl_mock.ardupilot.return_home import Leg, ReturnHome
 from sitl_mock.ardupilot.thrust import angle_boosted, specific_thrust
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.state import Mode, State
@@ -43,7 +43,7 @@ class ArduPilotModeControl:
         self._hold = PositionHold(state, parameters)
         self._output = ActuatorOutput(state, parameters, guided, self._hold, throttle)
         self._guided_flight = GuidedFlight(state, parameters, guided, self._hold, self._output)
-        self._return = Return(state, parameters)
+        self._return = ReturnHome(state, parameters)
 
     def enter(self, mode: Mode) -> None:
         """Begin a mode at the present estimate."""

@@ -18,6 +18,7 @@ MODES_BY_NUMBER = {number: mode for mode, number in MODE_NUMBERS.items()}
 NEEDS_POSITION = frozenset({Mode.GUIDED, Mode.LOITER, Mode.RTL, Mode.BRAKE})
 """Modes that need a horizontal position."""
 NOT_ARMABLE = frozenset({Mode.RTL, Mode.LAND, Mode.BRAKE})
+"""Modes in which ArduCopter cannot be armed."""
 
 PILOT_MODES = {
     Mode.POSCTL: Mode.LOITER,

@@ -158,7 +158,6 @@ class ArduPilot:
 
 
 def _send_once(commands: Commands, messages: Iterable[int], links: Iterable[Link]) -> None:
-    """Send messages once on every link."""
     for link in links:
         for message_id in messages:
             commands.send(message_id, link)

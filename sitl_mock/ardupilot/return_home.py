@@ -6,9 +6,9 @@ from math import hypot
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.state import State
 
-_NEAR_M = 2.0
+_HOME_RADIUS_M = 2.0
 """Distance at which the vehicle has reached home (WPNAV_RADIUS)."""
-_REACHED_M = 0.3
+_CLIMB_TOLERANCE_M = 0.3
 """The climb ends this far below the height of the flight home, m."""
 
 
@@ -21,7 +21,7 @@ class Leg(Enum):
     LAND = auto()
 
 
-class Return:
+class ReturnHome:
     """The height and the leg of a return.
 
     Args:
@@ -38,7 +38,10 @@ class Return:
         self._waiting_since_us = 0
 
     def begin(self) -> None:
-        """Choose the height: RTL_ALT, less near home (RTL_CONE_SLOPE), at least the present one."""
+        """Choose the height of the flight home: RTL_ALT, less near home (RTL_CONE_SLOPE).
+
+        It is at least the present height.
+        """
         state, parameters = self._state, self._parameters
         height = -state.estimate.position_ned[2]
         cone = parameters["RTL_CONE_SLOPE"] * self._distance()
@@ -50,10 +53,10 @@ class Return:
         """Start the next leg when this one is complete."""
         state = self._state
         if self.leg is Leg.CLIMB:
-            if self.height + state.estimate.position_ned[2] < _REACHED_M:
+            if self.height + state.estimate.position_ned[2] < _CLIMB_TOLERANCE_M:
                 self.leg = Leg.HOME
         elif self.leg is Leg.HOME:
-            if self._distance() < _NEAR_M:
+            if self._distance() < _HOME_RADIUS_M:
                 self.leg = Leg.WAIT
                 self._waiting_since_us = state.time_us
         elif self.leg is Leg.WAIT:

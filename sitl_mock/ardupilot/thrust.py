@@ -8,17 +8,17 @@ from math import isnan
 
 from sitl_mock.physics.rigid_body import GRAVITY
 
-HOVER = 0.364
+HOVER_THRUST = 0.364
 """Thrust that hovers."""
 
 _CURVE = (
     (0.0, 0.045),
     (0.1, 0.29),
-    (HOVER, 1.0),
+    (HOVER_THRUST, 1.0),
     (1.0, 2.745),
 )
-"""Points of the curve: (normalised thrust, specific thrust in g). Above HOVER they lie on a line
-through the origin, and almost so from 0.1 on. Between 0.3 and 0.6 this line agrees with the
+"""Points of the curve: (normalised thrust, specific thrust in g). Above `HOVER_THRUST` they lie on
+a line through the origin, and almost so from 0.1 on. Between 0.3 and 0.6 this line agrees with the
 simulator's truth of circles, figure-eights and steps within 0.03 m/s^2. Climbs at a constant thrust
 accelerate less, because their drag grows quickly.
 """

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from sitl_mock.physics.quaternion import Quaternion, Vector, multiply, normalise
 
-_OPPOSITE = 1e-5
+_OPPOSITE_MARGIN = 1e-5
 """Two axes with a cosine below -1 plus this count as opposite: no arc between them is shortest."""
 
 
@@ -78,7 +78,7 @@ def _shortest_arc(q: Quaternion, target: Quaternion) -> Quaternion:
     ax, ay, az = body_z(q)
     bx, by, bz = body_z(target)
     dot = ax * bx + ay * by + az * bz
-    if dot < -1.0 + _OPPOSITE:
+    if dot < -1.0 + _OPPOSITE_MARGIN:
         return multiply(target, conjugate(q))
     w = sqrt(2.0 * (1.0 + dot))
     return normalise(

@@ -12,7 +12,7 @@ from sitl_mock.link.framing import Message
 from sitl_mock.link.link import Link
 
 _ACCEPTED = dialect.MAV_MISSION_ACCEPTED
-_TYPES = range(3)
+_PLAN_TYPES = range(3)
 """Mission, fence and rally points."""
 _MOST_ITEMS = 1000
 """Largest number of items in a plan."""
@@ -31,7 +31,7 @@ class MissionProtocol:
     """Keeps one plan of each type, and returns it unchanged."""
 
     def __init__(self) -> None:
-        self.plans: dict[int, list[Message]] = {kind: [] for kind in _TYPES}
+        self.plans: dict[int, list[Message]] = {kind: [] for kind in _PLAN_TYPES}
         self._upload: _Upload | None = None
         self.handlers: dict[str, Callable[[Message, Link], None]] = {
             "MISSION_REQUEST_LIST": self._send_count,
@@ -92,7 +92,7 @@ class MissionProtocol:
 
     def _clear(self, message: Message, link: Link) -> None:
         everything = message.mission_type == dialect.MAV_MISSION_TYPE_ALL
-        cleared = _TYPES if everything else self.plans.keys() & {message.mission_type}
+        cleared = _PLAN_TYPES if everything else self.plans.keys() & {message.mission_type}
         for kind in cleared:
             self.plans[kind] = []
         result = _ACCEPTED if cleared else dialect.MAV_MISSION_UNSUPPORTED
@@ -100,7 +100,6 @@ class MissionProtocol:
 
 
 def _sender(message: Message) -> tuple[int, int]:
-    """System and component of a message's sender."""
     return message.get_srcSystem(), message.get_srcComponent()
 
 

@@ -10,7 +10,7 @@ from sitl_mock.autopilot.state import NAN_VECTOR
 from sitl_mock.physics.quaternion import Quaternion, Vector, along_heading, normalise
 from sitl_mock.physics.rigid_body import GRAVITY
 
-_STEEPEST = radians(80.0)
+_LARGEST_TILT = radians(80.0)
 """Upper bound of the tilt limit."""
 
 
@@ -156,7 +156,7 @@ def _thrust_vector(
     """Return attitude and thrust that give an acceleration (NED, m/s^2) at a yaw, within limits."""
     north, east, down = acceleration
     lift = max(GRAVITY - down, 0.1 * GRAVITY)
-    limit = lift * tan(min(gains.max_tilt, _STEEPEST))
+    limit = lift * tan(min(gains.max_tilt, _LARGEST_TILT))
     side = hypot(north, east)
     if side > limit:
         north, east = north * limit / side, east * limit / side

@@ -45,8 +45,8 @@ class Receiver:
         self._personality = personality
         self._system_id = system_id
         self._handlers: dict[str, Callable[[Message, Link], None]] = {
-            "SET_ATTITUDE_TARGET": lambda message, _: commander.setpoint(message),
-            "SET_POSITION_TARGET_LOCAL_NED": lambda message, _: commander.setpoint(message),
+            "SET_ATTITUDE_TARGET": lambda message, _: commander.take_setpoint(message),
+            "SET_POSITION_TARGET_LOCAL_NED": lambda message, _: commander.take_setpoint(message),
             "HEARTBEAT": self._heartbeat,
             "COMMAND_LONG": self._command_long,
             "COMMAND_INT": self._command_int,

@@ -22,8 +22,9 @@ FORCE = 512
 YAW_IGNORED = 1024
 POSITION_YAW_RATE_IGNORED = 2048
 _BODY_FRAMES = (dialect.MAV_FRAME_BODY_NED, dialect.MAV_FRAME_BODY_FRD)
-DETECTION_US = 60_000
-"""Delay beyond COM_OF_LOSS_T after which the loss is noticed, us (measured: 60 to 110 ms)."""
+LOSS_DETECTION_US = 60_000
+"""Delay beyond COM_OF_LOSS_T after which the loss of setpoints is noticed, us (measured: 60 to 110
+ms)."""
 
 
 class AttitudeSetpoint(NamedTuple):
@@ -93,7 +94,14 @@ def _masked(mask: int, bits: tuple[int, int, int], values: Vector) -> Vector:
 
 
 class OffboardStream:
-    """The latest accepted setpoint, its vehicle time (us), and the number accepted so far."""
+    """The latest accepted setpoint.
+
+    Attributes:
+        setpoint: the setpoint; None before the first.
+        received: number of setpoints accepted so far.
+        last_us: vehicle time at which the latest was received, us; None before the first.
+        fresh: whether it arrived since the last call of `take_fresh`.
+    """
 
     def __init__(self) -> None:
         self.setpoint: Setpoint | None = None
@@ -114,10 +122,10 @@ class OffboardStream:
         return fresh
 
     def alive(self, now_us: int, loss_s: float) -> bool:
-        """Whether the latest setpoint is at most ``loss_s`` + `DETECTION_US` old.
+        """Whether the latest setpoint is at most ``loss_s`` + `LOSS_DETECTION_US` old.
 
         ``loss_s`` is COM_OF_LOSS_T.
         """
         if self.last_us is None:
             return False
-        return now_us - self.last_us <= round(loss_s * 1e6) + DETECTION_US
+        return now_us - self.last_us <= round(loss_s * 1e6) + LOSS_DETECTION_US

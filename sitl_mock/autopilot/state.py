@@ -72,11 +72,11 @@ class State:
 
     Times are vehicle time in us since boot. ``shown_us`` is the time in telemetry; it differs from
     ``time_us`` only while a fault freezes the clock. ``prearm_problem``: why arming is refused,
-    None if it is not. ``contact``: the vehicle touches the ground; ``landed``: the land
-    detector's result; ``flown``: it took off since arming. ``status_us``: when
-    the status (mode and arming) was last published. ``after_disarming``: the mode that PX4 enters
-    when it disarms. ``height_controlled`` and ``position_controlled``: these controllers of
-    ArduPilot run. ``aborted``: ArduPilot's process has ended, so it sends nothing more.
+    None if it is not. ``contact``: the vehicle touches the ground; ``landed``: the land detector's
+    result; ``flown``: it took off since arming. ``status_us``: when the status (mode and arming)
+    was last published. ``after_disarming``: the mode that PX4 enters when it disarms.
+    ``height_controlled`` and ``position_controlled``: these controllers of ArduPilot run.
+    ``aborted``: ArduPilot's process has ended, so it sends nothing more.
     """
 
     estimate: Estimate

@@ -55,9 +55,9 @@ class SystemTelemetry:
         return dialect.MAVLink_extended_sys_state_message(0, int(self._state.landed_state))
 
     def _sys_status(self, present: int, enabled: int, healthy: int, load: int) -> Message:
-        """Return SYS_STATUS, without the health of what fails now; ``load`` in 0.1 %.
+        """Return SYS_STATUS; the health bits of what fails now are cleared. ``load`` is in 0.1 %.
 
-        Clients read its prearm bit as armable.
+        Clients take the pre-arm bit for whether the vehicle can be armed.
         """
         if self._state.prearm_problem is not None:
             healthy &= ~_PREARM_CHECK

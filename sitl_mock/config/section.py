@@ -12,7 +12,7 @@ Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
-_LISTED = 20
+_MOST_LISTED = 20
 """Largest number of known words that a message lists."""
 _NUMBER_AND_UNIT = re.compile(r"([-+]?[0-9]+(?:[.,][0-9]+)?)\s*(\D*)")
 
@@ -54,7 +54,7 @@ def suggestion(word: str, known: Iterable[str]) -> str:
     near = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
     if near:
         return f"; did you mean {near[0]}?"
-    return f"; known are {', '.join(sorted(names))}" if len(names) <= _LISTED else ""
+    return f"; known are {', '.join(sorted(names))}" if len(names) <= _MOST_LISTED else ""
 
 
 def explain(error: ValidationError, model: type[BaseModel]) -> str:

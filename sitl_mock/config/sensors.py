@@ -127,7 +127,7 @@ class SensorConfig(Section):
     """Errors of the autopilot's estimate: white noise (standard deviations) and delays.
 
     With a navigation filter the defaults of ``position_noise_m``, ``velocity_noise_m_s`` and
-    ``position_delay_ms`` are 0 (`settings.WITH_FILTER`).
+    ``position_delay_ms`` are 0 (`settings.SENSORS_WITH_FILTER`).
     """
 
     ekf: EkfConfig | None = None

@@ -14,11 +14,11 @@ import yaml
 
 _MOST_BYTES = 250_000
 _MOST_NODES = 6000
-_DEEPEST = 20
+_DEEPEST_NESTING = 20
 """Largest number of nested levels."""
-_LONGEST = 5000  # characters of a value
+_LONGEST_VALUE = 5000  # characters of a value
 
-_PLAIN = {
+_PLAIN_PATTERNS = {
     "bool": r"true|True|TRUE|false|False|FALSE",
     "null": r"~|null|Null|NULL|",
     "int": r"[-+]?[0-9]{1,40}",
@@ -43,9 +43,9 @@ class _Loader(yaml.SafeLoader):
         self._depth += 1
         if isinstance(event, yaml.AliasEvent) or getattr(event, "tag", None) is not None:
             raise yaml.YAMLError("aliases and tags are not supported")
-        if self._nodes > _MOST_NODES or self._depth > _DEEPEST:
+        if self._nodes > _MOST_NODES or self._depth > _DEEPEST_NESTING:
             raise yaml.YAMLError("too many values, or nested too deeply")
-        if isinstance(event, yaml.ScalarEvent) and len(event.value) > _LONGEST:
+        if isinstance(event, yaml.ScalarEvent) and len(event.value) > _LONGEST_VALUE:
             raise yaml.YAMLError("a value is too long")
         node = super().compose_node(parent, index)
         self._depth -= 1
@@ -56,7 +56,7 @@ class _Loader(yaml.SafeLoader):
         return int(self.construct_scalar(node))
 
 
-for _name, _pattern in _PLAIN.items():
+for _name, _pattern in _PLAIN_PATTERNS.items():
     _Loader.add_implicit_resolver(
         f"tag:yaml.org,2002:{_name}", re.compile(f"(?:{_pattern})$"), None
     )

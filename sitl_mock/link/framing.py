@@ -26,7 +26,7 @@ _FLAGS_AT = 2
 _PAYLOAD_AT = 10
 _UNKNOWN_LENGTH = -1
 
-_HEADER = struct.Struct("<BBBBBBHB")
+_HEADER_LAYOUT = struct.Struct("<BBBBBBHB")
 _CRC_LAYOUT = struct.Struct("<H")
 
 _decoder = dialect.MAVLink(None)
@@ -138,7 +138,7 @@ class Framer:
     def frame_raw(self, message_id: int, crc_extra: int, payload: bytes) -> bytes:
         """Return the frame of a message given as payload; trailing zeros are truncated."""
         payload = payload.rstrip(b"\0") or b"\0"
-        body = _HEADER.pack(
+        body = _HEADER_LAYOUT.pack(
             len(payload),
             self._flags,
             0,

@@ -17,8 +17,8 @@ Trail = list[TrailRow]
 """The rows of the latest steps in a ring buffer; an array if the steps are compiled."""
 
 
-class NavigationError(NamedTuple):
-    """Estimate minus truth: m, m/s, and a small rotation of the attitude, rad, NED."""
+class ErrorVectors(NamedTuple):
+    """Estimate minus truth, NED: m, m/s, and a small rotation of the attitude, rad."""
 
     position: Vector
     velocity: Vector
@@ -110,7 +110,7 @@ def propagated_vertical(
     )
 
 
-def error_at(law: ErrorLaw, state: FilterState, truth: TrailRow, now: float) -> NavigationError:
+def error_at(law: ErrorLaw, state: FilterState, truth: TrailRow, now: float) -> ErrorVectors:
     """Return the error at time ``now`` (s), when the true motion is ``truth`` (pure)."""
     elapsed = now - state.fused_at
     unsettled = pending_share(law.predictor_ms, state, now)
@@ -122,7 +122,7 @@ def error_at(law: ErrorLaw, state: FilterState, truth: TrailRow, now: float) -> 
     down, sink, _ = propagated_vertical(law, state, truth, elapsed)
     pending = state.vertical.pending
     down += law.height_offset + state.sag - unsettled * pending[0]
-    return NavigationError(
+    return ErrorVectors(
         (place.real, place.imag, down.real),
         (speed.real, speed.imag, (sink - unsettled * pending[1]).real + state.sink),
         # A wrong attitude rotates the thrust, which makes the acceleration wrong.

@@ -21,14 +21,14 @@ from sitl_mock.physics.navigation_error import (
 )
 from sitl_mock.physics.rigid_body import GRAVITY
 
-_SAG_S = 2.0
+_SAG_TIME_S = 2.0
 """Time constant with which errors of height and climb follow the acceleration, s."""
 _MIN_COURSE_SPEED = 0.5
 """Smallest speed for which the turn rate of the course is computed, m/s; the course of a slower
 vehicle would seem to turn infinitely fast."""
-_COMPASS_S = 20.0
+_COMPASS_TIME_S = 20.0
 """Time constant with which the heading follows the compass without acceleration, s."""
-_UNCERTAINTY = 0.1
+_LARGEST_UNCERTAINTY = 0.1
 """Uncertainty of the heading after a long time without acceleration, s^3/m^2. Times the squared
 acceleration it is the rate, 1/s, at which fixes correct the heading. Fixes reduce it as in a Kalman
 filter."""
@@ -63,7 +63,7 @@ class NavigationFilter:
             config.predictor_ms,
             config.heading_predictor_ms,
         )
-        self._uncertainty = _UNCERTAINTY
+        self._uncertainty = _LARGEST_UNCERTAINTY
         self._random = Random(f"{seed}/navigation")
         self._height_random = Random(f"{seed}/height")
         self._slipped = Random(f"{seed}/slip").random()
@@ -167,11 +167,10 @@ class NavigationFilter:
     def _next_alignment(self, velocity: complex, acceleration: complex, elapsed: float) -> float:
         """Return the next heading error without its noise, rad.
 
-        Without acceleration the heading rests on the compass. A horizontal acceleration shows it
-        better, because the fixes measure the direction of the acceleration; in a turn late fixes
-        are behind this direction.
+        Without acceleration the heading follows the compass. In a horizontal acceleration it
+        follows the fixes, because they measure its direction. In a turn, late fixes lag behind it.
         """
-        config, slow = self._config, 1.0 / _COMPASS_S
+        config, slow = self._config, 1.0 / _COMPASS_TIME_S
         across = (velocity.conjugate() * acceleration).imag
         turn_rate = across / max(abs(velocity) ** 2, _MIN_COURSE_SPEED**2)
         shown = self._uncertainty * abs(acceleration) ** 2
@@ -180,7 +179,7 @@ class NavigationFilter:
         wrong -= shown * turn_rate * config.turn_yaw_ms * 1e-3
         rest = wrong / rate
         left = self._uncertainty / (1.0 + shown * elapsed)
-        self._uncertainty = min(left + _UNCERTAINTY_GROWTH * elapsed, _UNCERTAINTY)
+        self._uncertainty = min(left + _UNCERTAINTY_GROWTH * elapsed, _LARGEST_UNCERTAINTY)
         return rest + (self.state.noiseless_yaw - rest) * exp(-rate * elapsed)
 
     def _next_sag(
@@ -190,7 +189,7 @@ class NavigationFilter:
         config, state = self._config, self.state
         sag = config.height_sag_s4_per_m * acceleration**2 + height_noise
         sink = config.sink_per_acceleration_ms * 1e-3 * acceleration
-        share = 1.0 - exp(-elapsed / _SAG_S)
+        share = 1.0 - exp(-elapsed / _SAG_TIME_S)
         return state.sag + share * (sag - state.sag), state.sink + share * (sink - state.sink)
 
     def _next_height_noise(self, elapsed: float) -> float:

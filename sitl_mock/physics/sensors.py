@@ -8,8 +8,8 @@ from typing import NamedTuple
 from sitl_mock.config.sensors import SensorConfig
 from sitl_mock.physics.navigation_error import (
     ErrorLaw,
+    ErrorVectors,
     FilterState,
-    NavigationError,
     TrackState,
     Trail,
     TrailRow,
@@ -26,10 +26,10 @@ from sitl_mock.physics.quaternion import (
     to_body,
 )
 
-NO_ERROR = NavigationError((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+NO_ERRORS = ErrorVectors((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 _NO_TRACK = TrackState((0j, 0j, 0j), (0j, 0j), (0j, 0j))
 _NO_FILTER = FilterState(_NO_TRACK, _NO_TRACK, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0j, 0j)
-_DRAWN_TOGETHER = 16
+_ESTIMATES_PER_DRAW = 16
 """Number of estimates for which noise is drawn at a time; even, as normal numbers come in pairs."""
 
 
@@ -103,7 +103,7 @@ def estimate(
     if law.filtered:
         error = error_at(law.errors, state.filter, place, time - law.position_delay * law.dt)
     else:
-        error = NO_ERROR
+        error = NO_ERRORS
     q = (attitude[3], attitude[4], attitude[5], attitude[6])
     fx, fy, fz = to_body(q, (attitude[13], attitude[14], attitude[15] - law.gravity))
     tilted = multiply(state.yaw, rotated_slightly(error.rotation, q))
@@ -224,7 +224,7 @@ class Estimator:
         count, begin = len(self._deviations), self._drawn
         if begin == len(self._numbers):
             random = self._random.random
-            uniform = [random() for _ in range(count * _DRAWN_TOGETHER)]
+            uniform = [random() for _ in range(count * _ESTIMATES_PER_DRAW)]
             self._numbers = self._make_noise(uniform, self._deviations)
             begin = 0
         self._drawn = begin + count

@@ -117,7 +117,11 @@ def _settled(
     touchdown_speed: float,
     load: Load,
 ) -> tuple[Kinematics, Vector, bool, bool, float]:
-    """Return motion, position and contact with the ground after one step under this load."""
+    """Return the state after one step under this load.
+
+    It is the motion, the position (m, NED), whether the vehicle is on the ground and has crashed,
+    and the sink speed of the latest touchdown, m/s.
+    """
     multirotor, ground = law
     _, _, _, w, x, y, z, _, _, _ = body[0]
     if crashed:
@@ -152,7 +156,7 @@ class Plant(Protocol):
     Args:
         law: constants.
         state: state at the start.
-        trail_length: steps whose motion is kept.
+        trail_length: number of the latest steps whose motion is kept.
 
     Attributes:
         law: the argument `law`.

@@ -23,6 +23,9 @@ class ArmingChecks:
         stream: the offboard setpoints.
         health: sends the failing checks as events.
         ready_us: vehicle time at which the estimator is ready.
+
+    Attributes:
+        crashed: whether the vehicle has crashed.
     """
 
     def __init__(
@@ -45,7 +48,7 @@ class ArmingChecks:
         """Whether offboard setpoints arrive, as `OffboardStream.alive` judges."""
         return self._stream.alive(self._state.time_us, self._parameters["COM_OF_LOSS_T"])
 
-    def problem(self, *, gcs_alive: bool, pilot: bool, refusal: str | None) -> str | None:
+    def find_problem(self, *, gcs_alive: bool, pilot: bool, refusal: str | None) -> str | None:
         """Return why arming is refused now, None if it is not, and note it in the state.
 
         Args:

@@ -64,7 +64,7 @@ class Px4Commander:
         state = self._state
         if state.armed:
             return ACCEPTED
-        problem = self._problem()
+        problem = self._find_problem()
         if problem is not None and (not force or self._checks.crashed):
             self._announce(EventKind.ARMING_DENIED, "")
             self._announce(EventKind.PREFLIGHT_FAIL, problem)
@@ -136,7 +136,7 @@ class Px4Commander:
         """Handle MANUAL_CONTROL, a pilot's sticks."""
         self._sticks.receive(message, self._state.time_us)
 
-    def setpoint(self, message: Message) -> None:
+    def take_setpoint(self, message: Message) -> None:
         """Accept a setpoint in any mode, if MAV_FWDEXTSP is set and PX4 would not ignore it."""
         setpoint = decode_setpoint(message)
         if setpoint is not None and self._parameters["MAV_FWDEXTSP"]:
@@ -149,7 +149,7 @@ class Px4Commander:
 
     def announce_problem(self) -> None:
         """Announce what forbids arming now, if anything does."""
-        problem = self._problem()
+        problem = self._find_problem()
         if problem is not None:
             self._announce(EventKind.PREFLIGHT_FAIL, problem)
 
@@ -159,7 +159,7 @@ class Px4Commander:
         self._checks.crashed = crashed
         if state.armed and crashed:
             self._stop_motors(EventKind.DISARMED_AFTER_CRASH)
-        self._problem()
+        self._find_problem()
         self._checks.report(gcs_alive=self.failsafe.gcs_alive, pilot=self._pilot_present)
         self._watch_sticks()
         self.failsafe.step(pilot=self._pilot_present)
@@ -178,8 +178,8 @@ class Px4Commander:
         """Whether a pilot holds the sticks, by fault injection or by MANUAL_CONTROL."""
         return self.pilot or self._sticks.present(self._state.time_us)
 
-    def _problem(self) -> str | None:
-        return self._checks.problem(
+    def _find_problem(self) -> str | None:
+        return self._checks.find_problem(
             gcs_alive=self.failsafe.gcs_alive, pilot=self._pilot_present, refusal=self.refusal
         )
 

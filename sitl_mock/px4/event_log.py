@@ -19,7 +19,7 @@ from sitl_mock.link.framing import Message
 from sitl_mock.link.link import Link
 from sitl_mock.px4.events import PX4_EVENTS
 
-_MOST_EVENTS = 20
+_KEPT_EVENTS = 20
 """Number of events that can be requested again."""
 _SEQUENCE_PERIOD_US = 3_000_000
 """Period of CURRENT_EVENT_SEQUENCE."""
@@ -45,7 +45,7 @@ class EventLog:
     def __init__(self, state: State, links: list[Link]) -> None:
         self._state = state
         self._links = links
-        self._sent: deque[_Sent] = deque(maxlen=_MOST_EVENTS)
+        self._sent: deque[_Sent] = deque(maxlen=_KEPT_EVENTS)
         self._latest = 0
         self._sequence_sent_us = 0
 
@@ -84,11 +84,11 @@ class EventLog:
         """
         first, last = request.first_sequence, request.last_sequence
         wanted = (last - first & 0xFFFF) + 1
-        if wanted > _MOST_EVENTS:
+        if wanted > _KEPT_EVENTS:
             self._refuse(first, request, link)
-            first = last - _MOST_EVENTS + 1
+            first = last - _KEPT_EVENTS + 1
         kept = {sent.sequence: sent.payload for sent in self._sent}
-        for number in range(first, first + min(wanted, _MOST_EVENTS)):
+        for number in range(first, first + min(wanted, _KEPT_EVENTS)):
             sequence = number & 0xFFFF
             if sequence in kept:
                 _send(link, EVENT, kept[sequence])

@@ -13,7 +13,7 @@ _WARNING = dialect.MAV_SEVERITY_WARNING
 _CRITICAL = dialect.MAV_SEVERITY_CRITICAL
 _EMERGENCY = dialect.MAV_SEVERITY_EMERGENCY
 
-_AUTOPILOT = 1 << 24
+_AUTOPILOT_COMPONENT = 1 << 24
 _FNV_OFFSET, _FNV_PRIME = 0x811C9DC5, 0x01000193
 
 
@@ -22,7 +22,7 @@ def event_id(name: str) -> int:
     value = _FNV_OFFSET
     for byte in name.encode():
         value = (value ^ byte) * _FNV_PRIME & 0xFFFFFFFF
-    return _AUTOPILOT | value & 0xFFFFFF
+    return _AUTOPILOT_COMPONENT | value & 0xFFFFFF
 
 
 def _event(

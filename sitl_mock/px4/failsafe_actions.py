@@ -10,8 +10,8 @@ from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.state import Mode, State
 from sitl_mock.px4.modes import NEEDS_POSITION, custom_mode
 
-_ENTER_HOLD = struct.Struct("<IBHB")
-_ENTER = struct.Struct("<IBB")
+_ENTER_HOLD_LAYOUT = struct.Struct("<IBHB")
+_ENTER_LAYOUT = struct.Struct("<IBB")
 
 
 class Action(NamedTuple):
@@ -142,17 +142,23 @@ class FailsafeActions:
         intended = custom_mode(self._state.intended_mode)
         if then is not None:
             delay = round(self._parameters["COM_FAIL_ACT_T"])
-            values = _ENTER_HOLD.pack(intended, then.number, delay, cause.number)
+            values = _ENTER_HOLD_LAYOUT.pack(intended, then.number, delay, cause.number)
             self._announce(EventKind.FAILSAFE_HOLD, str(delay), values)
         elif cause.number:
-            values = _ENTER.pack(intended, action.number, cause.number)
+            values = _ENTER_LAYOUT.pack(intended, action.number, cause.number)
             self._announce(EventKind.FAILSAFE, "", values)
         else:
-            values = _ENTER.pack(intended, action.number, 0)
+            values = _ENTER_LAYOUT.pack(intended, action.number, 0)
             self._announce(EventKind.FAILSAFE_UNNAMED, "", values)
 
     def act_on_link(self, cause: Cause, parameter: str, lost_us: int) -> None:
-        """Execute the action of a parameter; before a return or landing hold for COM_FAIL_ACT_T."""
+        """Execute the action of a parameter; before a return or landing hold for COM_FAIL_ACT_T.
+
+        Args:
+            cause: cause of the failsafe.
+            parameter: name of the parameter.
+            lost_us: vehicle time of the loss.
+        """
         action = LINK_ACTIONS.get(int(self._parameters[parameter]))
         if action is None:
             return

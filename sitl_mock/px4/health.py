@@ -22,11 +22,11 @@ _GCS_PRESENT = 1 << 12
 _PERIOD_US = 2_000_000
 """Minimum time between two reports."""
 
-_SUMMARY = struct.Struct("<BIIII")
+_SUMMARY_LAYOUT = struct.Struct("<BIIII")
 """Fields: chunk; components with errors, with warnings; modes that can be armed, that can run."""
-_FAILURE = struct.Struct("<IB")
+_FAILURE_LAYOUT = struct.Struct("<IB")
 """Fields: affected modes, component."""
-_HEALTH = struct.Struct("<BIII")
+_HEALTH_LAYOUT = struct.Struct("<BIII")
 """Fields: chunk; components present, with errors, with warnings."""
 
 
@@ -111,16 +111,16 @@ class HealthReport:
         modes = _ARMABLE_MODES
         for check in errors:
             modes &= ~check.modes
-        summary = _SUMMARY.pack(0, _components(errors), _components(warnings), modes, modes)
+        summary = _SUMMARY_LAYOUT.pack(0, _components(errors), _components(warnings), modes, modes)
         send = self._events.send
         send(event_id("commander_arming_check_summary"), _PROTOCOL, arguments=summary)
         for check in failing:
             send(
                 check.event_id,
                 check.severity,
-                arguments=_FAILURE.pack(check.modes, check.component),
+                arguments=_FAILURE_LAYOUT.pack(check.modes, check.component),
             )
-        health = _HEALTH.pack(0, present, 0, 0)
+        health = _HEALTH_LAYOUT.pack(0, present, 0, 0)
         send(event_id("commander_health_summary"), _PROTOCOL, arguments=health)
 
 

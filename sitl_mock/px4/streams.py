@@ -15,11 +15,11 @@ SLOT_US = {100: 10_000, 250: 4000, 800: 2500}
 
 HEARTBEAT, LOCAL_POSITION_NED, CURRENT_MODE = 0, 32, 436
 
-BUSY_SHARE = 0.22
+MISS_PROBABILITY = 0.22
 """Probability that a stream sent in one slot misses the next (250 Hz loop only; measured: 0.17 in
 one flight, 0.23 in another)."""
 
-NEW_EVERY_US = {LOCAL_POSITION_NED: 8000}
+VALUE_PERIOD_US = {LOCAL_POSITION_NED: 8000}
 """Message id -> period of new values, us; unless rates are exact, a value is not sent twice."""
 
 
@@ -102,7 +102,7 @@ class Px4Streams:
         """Whether a due message misses this slot."""
         if self._random is None:
             return False
-        if slot_us % NEW_EVERY_US.get(stream.message_id, 1):
+        if slot_us % VALUE_PERIOD_US.get(stream.message_id, 1):
             return True
         in_slot_before = stream.sent_us is not None and stream.sent_us == self._slot_before_us
-        return in_slot_before and self._random.random() < BUSY_SHARE
+        return in_slot_before and self._random.random() < MISS_PROBABILITY

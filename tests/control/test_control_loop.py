@@ -286,27 +286,27 @@ def refuse_setpoint(*_):
 def test_the_rate_of_answers_counts_bursts_as_what_they_are(intervals, rate):
     bench = Bench()
     bench.run(10)
-    before, stamp = bench.loop.record.held.copy(), bench.time - 7.0
+    before, stamp = bench.loop.record.setpoint_intervals.copy(), bench.time - 7.0
     for interval in intervals:
         bench.time += interval
         stamp += sum(intervals) / len(intervals)
         bench.refresh()
         bench.sample(vehicle_time=min(stamp, bench.time - 7.0))
-    assert bench.loop.record.held.rate_since(before) == pytest.approx(rate, rel=0.01)
+    assert bench.loop.record.setpoint_intervals.rate_since(before) == pytest.approx(rate, rel=0.01)
 
 
 def test_gaps_are_counted_and_are_no_part_of_the_rate():
     bench = Bench()
     bench.loop.offboard_active = True
     bench.run(50)
-    before = bench.loop.record.held.copy()
+    before = bench.loop.record.setpoint_intervals.copy()
     for _ in range(3):
         bench.time += 0.2
         bench.run(1)
         bench.loop.resume()
         bench.run(10)
     assert len(bench.loop.record.gaps) == 3
-    assert bench.loop.record.held.rate_since(before) == pytest.approx(250.0)
+    assert bench.loop.record.setpoint_intervals.rate_since(before) == pytest.approx(250.0)
 
 
 ASKED = BodyRates(0.3, -0.4, 0.5)

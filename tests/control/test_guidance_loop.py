@@ -28,7 +28,7 @@ HERE = (3.0, 4.0, -5.0)
 class HoverSpy:
     """Counts its calls."""
 
-    smallest, largest, largest_tilted = 2.0, 18.0, 18.0
+    smallest_specific, largest_specific, largest_specific_tilted = 2.0, 18.0, 18.0
 
     def __init__(self):
         self.observed = self.paused = 0

@@ -8,7 +8,7 @@ import pytest
 from companion.config import Config
 from companion.files.yaml_file import ConfigError, parse
 from companion.guidance import GRAVITY
-from companion.guidance.thrust import FOR_TILT, largest_tilt
+from companion.guidance.thrust import TILT_THRUST_SHARE, largest_tilt
 from tests.flight.fly import fly, merged, mock_vehicle
 
 HEAVY = {"thrust_slope_m_s2": 12.95, "thrust_offset_m_s2": 0.22}
@@ -29,7 +29,7 @@ def loaded(text):
 @pytest.mark.parametrize("share", [0.3, 0.7, 0.9])
 def test_at_the_largest_tilt_the_thrust_for_it_gives_the_lift(share):
     tilt = largest_tilt(GRAVITY, GRAVITY / share)
-    assert FOR_TILT * GRAVITY / share * cos(tilt) == pytest.approx(GRAVITY)
+    assert TILT_THRUST_SHARE * GRAVITY / share * cos(tilt) == pytest.approx(GRAVITY)
 
 
 def test_without_thrust_to_spare_there_is_no_tilt():

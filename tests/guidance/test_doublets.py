@@ -71,7 +71,7 @@ def test_position_is_held_before_each_doublet_and_at_the_end(rates, references):
     held = DOUBLETS.at(DOUBLETS.duration + 5.0, START)
     assert (held.position_ned, held.heading) == (START.position_ned, START.heading)
     assert held.closed_loop
-    assert held.height_is_steady
+    assert held.thrust_is_steady
 
 
 def test_climbs_are_one_motion_and_come_back(references):
@@ -90,5 +90,5 @@ def test_climbs_are_one_motion_and_come_back(references):
 def test_the_hover_thrust_is_learned_only_where_the_height_is_steady(references):
     for reference in references:
         moving = reference.body_rates is not None or reference.acceleration_ned[2] != 0.0
-        assert reference.height_is_steady is not moving
+        assert reference.thrust_is_steady is not moving
         assert reference.closed_loop is (reference.body_rates is None)

@@ -66,8 +66,9 @@ def test_a_margin_counts_inwards_from_every_side():
         assert breach(**place, margin=4.01) is not None
     assert breach(6.0, fence=polygon, margin=4.0) is None
     found = breach(6.5, fence=polygon, margin=4.0)
-    assert (found.limit, found.side, found.by) == ("safety.fence_polygon_m", "outside", -3.5)
-    assert str(found) == "outside the polygon of the fence"
+    assert (found.limit, found.relation, found.by) == ("safety.fence_polygon_m", "outside", -3.5)
+    where = "6.5 m north and 0.0 m east of where control began"
+    assert str(found) == f"{where}, outside safety.fence_polygon_m"
     assert breach(12.0, fence=polygon).by == 0.0
     assert breach(12.0, fence=polygon, margin=1.0).by == pytest.approx(2.0)
 
@@ -82,10 +83,13 @@ def test_a_fence_on_the_map_needs_to_know_where_it_is():
     assert breach(9.9, -9.9, fence=fence) is None
     assert breach(9.9, -10.1, fence=fence).limit == "safety.fence_polygon_deg"
     unknown = breach(fence=fence, origin=None)
-    assert (unknown.limit, unknown.side, unknown.by) == ("safety.fence_polygon_deg", "with", 0.0)
+    assert (unknown.limit, unknown.by) == ("safety.fence_polygon_deg", 0.0)
     still = (0.0, 0.0, -5.0), (0.0, 0.0, 0.0)
     assert fence.stop_breach(*still, 10.0, HOME) is None
-    assert str(unknown) == "at a place whose latitude and longitude are not known"
+    assert str(unknown) == (
+        "at a place whose latitude and longitude are not known, but needed by "
+        "safety.fence_polygon_deg"
+    )
     flat = [value for corner in local_polygon(corners, HOME) for value in corner]
     assert flat == pytest.approx([value for corner in SQUARE for value in corner], abs=1e-5)
 

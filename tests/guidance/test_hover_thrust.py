@@ -42,7 +42,7 @@ class Vehicle:
             if k % 5 == 0:
                 self.thrust.observe(self.time, self.velocity + self.random.gauss(0.0, self.noise))
             signal = self.thrust.normalised(command(self), self.q, STILL)
-            self.thrust.sent(signal, self.q)
+            self.thrust.note_thrust(signal, self.q)
             self.felt += STEP / self.lag * (self.specific(signal) - self.felt)
             lift = self.felt * self.cosine() + self.drag * self.velocity
             self.velocity += STEP * (GRAVITY - lift + push)
@@ -106,10 +106,10 @@ def test_neither_free_fall_nor_garbage_is_ever_learned_from():
     vehicle = Vehicle(thrust).fly(8.0)
     before = thrust.learned
     for k in range(100):
-        thrust.sent(0.5, LEVEL)
+        thrust.note_thrust(0.5, LEVEL)
         thrust.observe(vehicle.time + 0.05 * k, 0.49 * k)
     for k, velocity in enumerate([math.nan, math.inf, 1e30, -1e30] * 50):
-        thrust.sent(0.5, LEVEL)
+        thrust.note_thrust(0.5, LEVEL)
         thrust.observe(vehicle.time + 6.0 + 0.05 * k, velocity)
     assert thrust.learned == before
 
@@ -118,7 +118,7 @@ def test_neither_free_fall_nor_garbage_is_ever_learned_from():
 def test_a_thrust_that_was_never_flown_by_leads_no_further_than_the_limit(sent, bound):
     thrust = HoverThrust(replace(SETTINGS, highest=1.0))
     for k in range(500):
-        thrust.sent(sent, LEVEL)
+        thrust.note_thrust(sent, LEVEL)
         thrust.observe(0.02 * k, 0.0)
     assert thrust.learned == pytest.approx(bound)
 
@@ -127,7 +127,7 @@ def test_after_a_lie_the_truth_is_learned():
     """An autopilot that tells its thrust in other units costs half a second, no more."""
     thrust = HoverThrust(SETTINGS)
     for k in range(500):
-        thrust.sent(0.8, LEVEL)
+        thrust.note_thrust(0.8, LEVEL)
         thrust.observe(0.02 * k, 0.0)
     assert thrust.learned == pytest.approx(0.8, rel=0.02)
     vehicle = Vehicle(thrust)
@@ -140,15 +140,15 @@ def test_nothing_is_learned_across_a_pause_a_gap_or_the_ground():
     thrust = HoverThrust(SETTINGS)
     for interruption in (thrust.pause, thrust.on_ground):
         thrust.observe(0.0, 0.0)
-        thrust.sent(0.9, LEVEL)
+        thrust.note_thrust(0.9, LEVEL)
         interruption()
         thrust.observe(0.2, 0.0)
         interruption()
     thrust.observe(1.0, 0.0)
-    thrust.sent(0.9, LEVEL)
+    thrust.note_thrust(0.9, LEVEL)
     thrust.observe(9.0, 0.0)
     assert thrust.learned == 0.5
-    thrust.sent(0.9, LEVEL)
+    thrust.note_thrust(0.9, LEVEL)
     thrust.observe(9.2, 0.0)  # the same without any of them
     assert thrust.learned > 0.6
 
@@ -214,7 +214,7 @@ def test_the_battery_is_made_up_for_at_once():
         thrust.note_voltage(2.0 + k, 14.4)
     assert thrust.normalised(0.0, LEVEL, STILL) == pytest.approx(0.5 / 0.81, rel=1e-3)
     assert thrust.learned == 0.5
-    assert thrust.largest == pytest.approx(0.9 / 0.5 * GRAVITY * 0.81, rel=1e-3)
+    assert thrust.largest_specific == pytest.approx(0.9 / 0.5 * GRAVITY * 0.81, rel=1e-3)
     thrust.on_ground()
     assert thrust.normalised(0.0, LEVEL, STILL) == 0.5
 
@@ -223,7 +223,7 @@ def test_a_sag_that_the_voltage_tells_is_not_learned_a_second_time():
     thrust = HoverThrust(replace(SETTINGS, battery_exponent=2.0))
     for k in range(60):
         thrust.note_voltage(0.1 * k, 16.0 - 0.02 * k)
-        thrust.sent(0.5 * (16.0 / (16.0 - 0.02 * k)) ** 2, LEVEL)
+        thrust.note_thrust(0.5 * (16.0 / (16.0 - 0.02 * k)) ** 2, LEVEL)
         thrust.observe(0.1 * k, 0.0)
     assert thrust.learned == pytest.approx(0.5, rel=0.01)
 
@@ -232,5 +232,5 @@ def test_what_is_given_out_stays_in_its_bounds():
     thrust = HoverThrust(SETTINGS)
     assert thrust.normalised(-1e9, LEVEL, STILL) == 0.9
     assert thrust.normalised(1e9, LEVEL, STILL) == 0.1
-    assert thrust.smallest == pytest.approx(0.2 * GRAVITY)
-    assert thrust.largest == pytest.approx(1.8 * GRAVITY)
+    assert thrust.smallest_specific == pytest.approx(0.2 * GRAVITY)
+    assert thrust.largest_specific == pytest.approx(1.8 * GRAVITY)

@@ -20,7 +20,7 @@ def flown(velocity=NOTHING, thrust=LEVEL, turn=NOTHING):
 
 
 def test_a_vehicle_that_hovers_is_carried_no_farther_than_feedback_had_turned_it():
-    there = reach(flown(), PX4._replace(held=0.0))
+    there = reach(flown(), PX4._replace(hold_time=0.0))
     assert there.away < 0.1
     assert max(there.up, there.down) < 0.1
     assert hypot(*there.place) == 0.0
@@ -60,10 +60,10 @@ def test_an_autopilot_that_does_not_hold_lets_it_drift_until_drag_has_stopped_it
 
 def test_rates_that_are_held_turn_the_thrust_and_the_longer_the_worse():
     rolling = flown(turn=(0.5 * GRAVITY, 0.0, 0.0))  # 0.5 rad/s northwards from level
-    short, long = (reach(rolling, PX4._replace(held=held)) for held in (0.5, 1.5))
+    short, long = (reach(rolling, PX4._replace(hold_time=held)) for held in (0.5, 1.5))
     assert 0.0 < short.place[0] < long.place[0] / 5.0
     assert short.down < long.down
-    slower = reach(rolling, PX4._replace(held=1.5, max_tilt_rate=0.2))
+    slower = reach(rolling, PX4._replace(hold_time=1.5, max_tilt_rate=0.2))
     assert slower.place[0] < 0.5 * long.place[0]
     assert slower.down < long.down
 

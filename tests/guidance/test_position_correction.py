@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from companion.guidance.position_correction import CorrectionSettings, PositionCorrection
 from companion.guidance.reference import VehicleMotion
 
-SETTINGS = CorrectionSettings(ahead=0.7, window=0.1, largest=0.2, lateness=0.0)
+SETTINGS = CorrectionSettings(ahead=0.7, window=0.1, largest_correction=0.2, lateness=0.0)
 DT = 0.02
 RATE = 0.4
 """Of how the estimator's velocity wanders, rad/s."""
@@ -94,7 +94,7 @@ def test_a_gap_and_a_reset_begin_anew():
 
 def noisy(metres, speed, seconds=20.0, seed=3):
     """The correction at a speed (m/s), and the errors it adds (m), with white position noise."""
-    quick = CorrectionSettings(ahead=0.65, window=0.04, largest=0.2, lateness=0.0)
+    quick = CorrectionSettings(ahead=0.65, window=0.04, largest_correction=0.2, lateness=0.0)
     correction, random, added = PositionCorrection(quick), Random(seed), []
     for n in range(round(seconds / DT)):
         north = speed * n * DT + random.gauss(0.0, metres)
@@ -115,7 +115,7 @@ def test_noise_of_the_positions_lengthens_the_filters():
 @pytest.mark.parametrize("slip", [-0.001, 0.001])
 def test_a_stamp_that_slips_by_a_millisecond_hardly_moves_the_position(slip):
     """As on ArduPilot. Unlimited, these 5 mm become a correction of 28 mm."""
-    quick = CorrectionSettings(ahead=0.65, window=0.04, largest=0.2, lateness=0.0)
+    quick = CorrectionSettings(ahead=0.65, window=0.04, largest_correction=0.2, lateness=0.0)
     correction, added = PositionCorrection(quick), []
     for n in range(200):
         time = n * DT + (slip if n >= 100 else 0.0)

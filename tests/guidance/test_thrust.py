@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from companion.attitude import BodyRates
 from companion.guidance import GRAVITY, height_first, specific_thrust
-from companion.guidance.thrust import FOR_TILT, cos_tilt_ahead
+from companion.guidance.thrust import TILT_THRUST_SHARE, cos_tilt_ahead
 
 SMALLEST, LARGEST = 2.0, 18.0
 accelerations = st.floats(-30.0, 30.0)
@@ -84,14 +84,16 @@ def test_what_thrust_cannot_give_is_taken_from_the_horizontal_part(north, east, 
         assert found[2] == pytest.approx(down)
     if math.hypot(north, east) > length + 1e-6:
         # The last of the thrust is not spent on tilt.
-        assert math.hypot(lift, length) == pytest.approx(max(FOR_TILT * LARGEST, lift))
+        assert math.hypot(lift, length) == pytest.approx(max(TILT_THRUST_SHARE * LARGEST, lift))
 
 
 def test_the_height_comes_first():
     assert height_first((3.0, -1.0, 0.5), SMALLEST, LARGEST) == pytest.approx((3.0, -1.0, 0.5))
     north, east, down = height_first((20.0, 0.0, -5.0), SMALLEST, LARGEST)
     assert down == pytest.approx(-5.0)
-    assert north == pytest.approx(math.sqrt((FOR_TILT * LARGEST) ** 2 - (GRAVITY + 5.0) ** 2))
+    assert north == pytest.approx(
+        math.sqrt((TILT_THRUST_SHARE * LARGEST) ** 2 - (GRAVITY + 5.0) ** 2)
+    )
     assert east == 0.0
     # More lift than there is: all of it goes upwards.
     assert height_first((5.0, 5.0, -30.0), SMALLEST, LARGEST) == pytest.approx(

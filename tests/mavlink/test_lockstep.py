@@ -191,7 +191,7 @@ def test_no_beacon_is_said_clearly():
 
 
 def test_when_the_vehicle_is_gone_timeouts_still_end(monkeypatch):
-    monkeypatch.setattr(lockstep, "PATIENCE_S", 0.05)
+    monkeypatch.setattr(lockstep, "BEACON_TIMEOUT_S", 0.05)
     port = free_port()
     vehicle = LockstepVehicle(port, 10, telemetry)
 
@@ -209,7 +209,7 @@ def test_when_the_vehicle_is_gone_timeouts_still_end(monkeypatch):
 
 
 def test_a_vehicle_that_starts_anew_does_not_turn_our_time_back(monkeypatch):
-    monkeypatch.setattr(lockstep, "PATIENCE_S", 0.05)
+    monkeypatch.setattr(lockstep, "BEACON_TIMEOUT_S", 0.05)
     monkeypatch.setattr(udp, "PEER_SILENCE_S", 0.2)
     port = free_port()
     first, second = LockstepVehicle(port, 500, telemetry), LockstepVehicle(port, 200, telemetry)

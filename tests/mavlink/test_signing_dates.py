@@ -318,7 +318,7 @@ def wait_for(condition):
 
 def test_the_loop_never_waits_for_the_disk(run, monkeypatch):
     """A disk that hangs: the link opens, hears, and closes after the 2 s it is given."""
-    monkeypatch.setattr("companion.mavlink.signing._LAST_WRITE_S", 0.05)
+    monkeypatch.setattr("companion.mavlink.signing._LAST_WRITE_TIMEOUT_S", 0.05)
     monkeypatch.setattr(StampFile, "save", lambda *_: time.sleep(1.0))
 
     async def scene():

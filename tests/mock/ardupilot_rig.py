@@ -10,7 +10,7 @@ from sitl_mock.link.framing import decode
 STABILIZE, ALT_HOLD, GUIDED, LOITER, RTL, LAND, BRAKE = 0, 2, 4, 5, 6, 9, 17
 FAILED = 4
 HOVER = 0.364
-THRUST_IS_THRUST = {"GUID_OPTIONS": 8}
+THRUST_AS_THRUST = {"GUID_OPTIONS": 8}
 READY_S = 0.5
 QUICK = {"WPNAV_SPEED_UP": 400.0, "WPNAV_ACCEL_Z": 400.0}
 """A quicker take-off than ArduCopter's."""

@@ -1,7 +1,7 @@
 """ArduCopter's failsafes: ground station by system id, battery, position; and the pilot."""
 
 import pytest
-from ardupilot_rig import FAILED, GUIDED, HOVER, LAND, LOITER, RTL, THRUST_IS_THRUST, ArduRig
+from ardupilot_rig import FAILED, GUIDED, HOVER, LAND, LOITER, RTL, THRUST_AS_THRUST, ArduRig
 from mock_rig import ACCEPTED
 from pymavlink.dialects.v20 import development as dialect
 
@@ -23,7 +23,7 @@ def heartbeat_from(rig, system):
 
 
 def test_a_lost_ground_station_returns_after_5_s_though_setpoints_go_on():
-    rig = ArduRig(parameters=THRUST_IS_THRUST)
+    rig = ArduRig(parameters=THRUST_AS_THRUST)
     rig.lift(3.0)
     rig.simulation.parameters.set("FS_GCS_ENABLE", 1)
     rig.heartbeat()

@@ -4,7 +4,7 @@ from math import cos, degrees, hypot, inf, nan, radians, sin
 
 import numpy as np
 import pytest
-from ardupilot_rig import BRAKE, FAILED, GUIDED, HOVER, LAND, RTL, THRUST_IS_THRUST, ArduRig
+from ardupilot_rig import BRAKE, FAILED, GUIDED, HOVER, LAND, RTL, THRUST_AS_THRUST, ArduRig
 from mock_rig import ACCEPTED
 from pymavlink.dialects.v20 import development as dialect
 
@@ -14,7 +14,7 @@ from sitl_mock.physics.quaternion import yaw
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 DRAG = 0.37
-NO_BOOST = {**THRUST_IS_THRUST, "ATC_ANGLE_BOOST": 0}
+NO_BOOST = {**THRUST_AS_THRUST, "ATC_ANGLE_BOOST": 0}
 
 
 def tilt_deg(rig):
@@ -31,7 +31,7 @@ def tilted(angle_deg):
 
 
 def test_a_flight_from_the_ground_to_the_ground_with_its_times_and_flags():
-    rig = ArduRig(true_speed=True, parameters=THRUST_IS_THRUST)
+    rig = ArduRig(true_speed=True, parameters=THRUST_AS_THRUST)
     assert rig.switch(GUIDED) == ACCEPTED
     assert rig.start(10.0) == FAILED  # disarmed
     assert rig.arm() == ACCEPTED
@@ -108,7 +108,7 @@ def test_silence_keeps_the_rates_for_3_s_then_level_without_climbing_or_a_word()
 @pytest.fixture(scope="module")
 def aloft():
     """One vehicle for the setpoints that it survives; each test leaves it flying."""
-    rig = ArduRig(parameters={**THRUST_IS_THRUST, "WPNAV_SPEED_UP": 250.0})
+    rig = ArduRig(parameters={**THRUST_AS_THRUST, "WPNAV_SPEED_UP": 250.0})
     rig.lift(8.0)
     return rig
 
@@ -219,7 +219,7 @@ def test_position_and_velocity_setpoints(aloft):
 
 
 def test_a_setpoint_ends_a_take_off_at_once():
-    rig = ArduRig(parameters=THRUST_IS_THRUST)
+    rig = ArduRig(parameters=THRUST_AS_THRUST)
     rig.switch(GUIDED)
     rig.arm()
     rig.start(10.0)
@@ -231,7 +231,7 @@ def test_a_setpoint_ends_a_take_off_at_once():
 
 
 def test_no_number_as_thrust_falls_infinity_is_all_and_an_infinite_rate_runs_away():
-    rig = ArduRig(parameters=THRUST_IS_THRUST)
+    rig = ArduRig(parameters=THRUST_AS_THRUST)
     rig.fly(5.0, thrust=nan)
     rig.run(0.4)
     assert climb(rig) < -3.0
@@ -244,7 +244,7 @@ def test_no_number_as_thrust_falls_infinity_is_all_and_an_infinite_rate_runs_awa
 
 
 def test_a_quaternion_of_nan_in_use_ends_the_process():
-    rig = ArduRig(parameters=THRUST_IS_THRUST)
+    rig = ArduRig(parameters=THRUST_AS_THRUST)
     rig.fly(2.0)
     rig.each_tick = None
     rig.rates(q=(nan,) * 4, thrust=HOVER)  # not in use: ignored

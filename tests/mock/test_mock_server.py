@@ -21,7 +21,7 @@ from mock_process import (
 from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.config.settings import GCS_PORT_OFFSET, PORT_OFFSET
-from sitl_mock.exchange import in_burst
+from sitl_mock.exchange import burst_time
 from sitl_mock.link.endpoint import bundles
 from sitl_mock.link.framing import Framer, decode
 from sitl_mock.settings import MockSettings
@@ -317,9 +317,9 @@ def test_bursts_come_as_often_as_recorded():
     slots = [n * 0.0025 for n in range(1, 4001)]
     # 250 Hz of the 400 Hz loop, five slots of eight.
     samples = [slot for number, slot in enumerate(slots) if number % 8 in (1, 3, 4, 6, 7)]
-    times = [in_burst(each, burst_s) for each in samples]
+    times = [burst_time(each, burst_s) for each in samples]
     waited = [burst - slot for burst, slot in zip(times, samples, strict=True)]
     assert -1e-9 < min(waited) < max(waited) < burst_s
     paired = sum(after - before < 1e-6 for before, after in pairwise(times)) / len(times)
     assert 0.18 < paired < 0.42
-    assert in_burst(0.0123, 0.0) == 0.0123
+    assert burst_time(0.0123, 0.0) == 0.0123

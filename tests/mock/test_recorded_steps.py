@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ardupilot_rig import THRUST_IS_THRUST, ArduRig
+from ardupilot_rig import THRUST_AS_THRUST, ArduRig
 from mock_rig import Rig
 from pymavlink import mavutil
 
@@ -43,7 +43,7 @@ def flown(rig, samples, setpoints):
 
 
 def ardupilot():
-    rig = ArduRig(parameters={**THRUST_IS_THRUST, "ATC_ANGLE_BOOST": 0})
+    rig = ArduRig(parameters={**THRUST_AS_THRUST, "ATC_ANGLE_BOOST": 0})
     rig.fly(HEIGHT_M)
     return rig
 

@@ -285,7 +285,9 @@ def test_a_polygon_has_an_inside(north, east, within):
 def test_the_polygon_is_judged_about_where_control_began_or_on_the_map():
     local = Config.model_validate({"safety": {"fence_polygon_m": L_SHAPE}})
     verdict, _ = Climb(local).see(motion(offset=(5.0, -5.0, 0.0)), 0.0)
-    assert (verdict.action, verdict.reason) == (LAND, "outside the polygon of the fence")
+    where = "5.0 m north and -5.0 m east of where control began"
+    assert verdict.action == LAND
+    assert verdict.reason == f"{where}, outside safety.fence_polygon_m"
     degree = 111_194.9  # m of latitude
     map_corners = [(47.0 + n / degree, 8.0 + e / degree / cos(radians(47.0))) for n, e in L_SHAPE]
     flat = [

@@ -174,7 +174,7 @@ def run_for(flight, seconds):
     for step in range(1, round(50 * seconds) + 1):
         flight.stats.frames, flight.stats.lost = 6 * step, 4 * step
         flight.record.setpoints, flight.record.missed_deadlines = 4 * step, step
-        flight.record.held.add(0.005)
+        flight.record.setpoint_intervals.add(0.005)
         flight.state.positions = step // 5
         flight.listen(10.0 + 0.02 * step)
     return flight.snapshot(10.0 + seconds)

@@ -294,7 +294,7 @@ def test_our_component_speaks_and_refuses_commands_to_itself(run):
     async def scene():
         async with network() as (net, link, vehicle):
             component = Component(link.settings, net, link.send)
-            net.routing.on_own = component.on_own
+            net.routing.on_own_frame = component.on_own_frame
             client = await udp_client(net.ports[0].local[1])
             client.send(dialect.MAVLink_command_long_message(1, 191, 400, 0, 1, 0, 0, 0, 0, 0, 0))
             await until(lambda: client.of("COMMAND_ACK"))
@@ -305,7 +305,7 @@ def test_our_component_speaks_and_refuses_commands_to_itself(run):
             component.tell("The pilot has taken over.")
             component.answer(net.clients[0], "w" * 120)
             component.answer(net.clients[0], "a tilt of 35°")
-            component.value("trk_err", 0.25)
+            component.send_value("trk_err", 0.25)
             await until(lambda: client.of("NAMED_VALUE_FLOAT") and client.of("HEARTBEAT"))
             whole, *pieces, tilt = client.of("STATUSTEXT")
             assert tilt.text == "a tilt of 35 deg"

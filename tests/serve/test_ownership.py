@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from companion.serve.ownership import Control, Ownership
+from companion.serve.ownership import ControlState, Ownership
 
 TIMEOUT, HOLD = 0.5, 2.0
 
@@ -17,47 +17,47 @@ def ownership():
 def stream(ownership, client, begin, end, period=0.1):
     refusals, now = [], begin
     while now <= end:
-        refusals.append(ownership.setpoint(client, now))
+        refusals.append(ownership.note_setpoint(client, now))
         now += period
     return refusals
 
 
 def test_control_needs_a_fresh_setpoint_as_px4_does(ownership):
     assert "setpoints first" in ownership.request_control("a", 0.0)
-    ownership.setpoint("a", 0.0)
+    ownership.note_setpoint("a", 0.0)
     assert "setpoints first" in ownership.request_control("a", TIMEOUT + 0.1), "too old"
-    ownership.setpoint("a", 1.0)
+    ownership.note_setpoint("a", 1.0)
     assert ownership.request_control("a", 1.1) is None
     assert ownership.owner == "a"
 
 
 def test_one_setpoint_alone_is_no_stream(ownership):
-    ownership.setpoint("a", 0.0)
-    assert not ownership.streams("a", 0.1)
-    ownership.setpoint("a", 0.4)
-    assert ownership.streams("a", 0.5)
-    assert not ownership.streams("a", 1.0)
-    ownership.setpoint("a", 2.0)
-    assert not ownership.streams("a", 2.1)
+    ownership.note_setpoint("a", 0.0)
+    assert not ownership.has_stream("a", 0.1)
+    ownership.note_setpoint("a", 0.4)
+    assert ownership.has_stream("a", 0.5)
+    assert not ownership.has_stream("a", 1.0)
+    ownership.note_setpoint("a", 2.0)
+    assert not ownership.has_stream("a", 2.1)
 
 
 def test_a_setpoint_that_cannot_be_flown_keeps_nobody_live(ownership):
-    ownership.setpoint("a", 0.0)
+    ownership.note_setpoint("a", 0.0)
     ownership.request_control("a", 0.1)
     for number in range(10):
         now = 0.2 + 0.1 * number
-        assert ownership.setpoint("a", now) is None
+        assert ownership.note_setpoint("a", now) is None
         ownership.withdraw("a", "a")
-    assert ownership.control(now) is Control.HOLDING
+    assert ownership.control(now) is ControlState.HOLDING
     before = ownership.owner
-    assert ownership.setpoint("b", now) is None
+    assert ownership.note_setpoint("b", now) is None
     ownership.withdraw("b", before)
     assert ownership.owner == "a"
 
 
 def test_setpoints_without_asking_give_no_control(ownership):
     stream(ownership, "a", 0.0, 1.0)
-    assert ownership.control(1.0) is Control.FREE
+    assert ownership.control(1.0) is ControlState.FREE
 
 
 def test_another_clients_setpoints_are_refused_by_name_while_the_owner_is_live(ownership):
@@ -72,38 +72,38 @@ def test_a_silent_owner_is_held_for_and_then_handed_back(ownership):
     stream(ownership, "a", 0.0, 1.0)
     ownership.request_control("a", 1.0)
     now = 1.0
-    assert ownership.control(now + TIMEOUT - 0.01) is Control.LIVE
-    assert ownership.control(now + TIMEOUT + 0.01) is Control.HOLDING
-    assert ownership.control(now + TIMEOUT + HOLD - 0.01) is Control.HOLDING
-    assert ownership.control(now + TIMEOUT + HOLD + 0.01) is Control.EXPIRED
+    assert ownership.control(now + TIMEOUT - 0.01) is ControlState.LIVE
+    assert ownership.control(now + TIMEOUT + 0.01) is ControlState.HOLDING
+    assert ownership.control(now + TIMEOUT + HOLD - 0.01) is ControlState.HOLDING
+    assert ownership.control(now + TIMEOUT + HOLD + 0.01) is ControlState.EXPIRED
 
 
 def test_an_owner_that_resumes_is_live_again(ownership):
     stream(ownership, "a", 0.0, 1.0)
     ownership.request_control("a", 1.0)
-    ownership.setpoint("a", 2.0)
-    assert ownership.control(2.1) is Control.LIVE
+    ownership.note_setpoint("a", 2.0)
+    assert ownership.control(2.1) is ControlState.LIVE
 
 
 def test_another_client_takes_over_from_a_silent_owner(ownership):
     stream(ownership, "a", 0.0, 1.0)
     ownership.request_control("a", 1.0)
-    assert ownership.setpoint("b", 1.6) is None
+    assert ownership.note_setpoint("b", 1.6) is None
     assert ownership.owner == "b"
-    assert ownership.setpoint("a", 1.7) == "b is in control"
+    assert ownership.note_setpoint("a", 1.7) == "b is in control"
 
 
 def test_after_release_nobody_is_in_control(ownership):
     stream(ownership, "a", 0.0, 1.0)
     ownership.request_control("a", 1.0)
     ownership.release()
-    assert ownership.control(1.1) is Control.FREE
-    assert ownership.setpoint("b", 1.1) is None
+    assert ownership.control(1.1) is ControlState.FREE
+    assert ownership.note_setpoint("b", 1.1) is None
 
 
 def test_many_clients_are_not_remembered_for_ever(ownership):
     for number in range(1000):
-        ownership.setpoint(number, float(number))
+        ownership.note_setpoint(number, float(number))
     assert len(ownership._streams) < 100
 
 
@@ -121,11 +121,11 @@ def test_at_any_time_only_a_live_owner_is_flown(ownership):
                 ownership.release()
                 continue
             case _:
-                refusal = ownership.setpoint(client, now)
+                refusal = ownership.note_setpoint(client, now)
                 assert (refusal is None) or client != before
                 if refusal is None:
                     newest[client] = now
         if before is not None and ownership.owner != before:
             assert now - newest.get(before, -9.0) > TIMEOUT
-        if ownership.control(now) is Control.LIVE:
+        if ownership.control(now) is ControlState.LIVE:
             assert now - newest[ownership.owner] <= TIMEOUT

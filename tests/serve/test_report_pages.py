@@ -7,7 +7,9 @@ from companion.serve.report_pages import ReportPages
 
 
 def test_a_page_that_cannot_be_written_is_told_in_one_sentence(tmp_path, monkeypatch):
-    monkeypatch.setattr(report_pages, "_give_way", lambda pid: None)  # the computer may be busy
+    monkeypatch.setattr(
+        report_pages, "_lower_priority", lambda pid: None
+    )  # the computer may be busy
     pages = ReportPages()
     failed = pages.write(tmp_path)
     pages.leave()
@@ -37,7 +39,7 @@ class Hung:
 def test_a_process_that_cannot_be_killed_is_not_waited_for(tmp_path, monkeypatch):
     told = []
     pages = ReportPages()
-    monkeypatch.setattr(report_pages, "_give_way", lambda pid: None)
+    monkeypatch.setattr(report_pages, "_lower_priority", lambda pid: None)
     monkeypatch.setattr(report_pages, "_PAGE_TIMEOUT", 0.0)
     hung, left = Hung(lambda: None), Hung(pages.leave)
     monkeypatch.setattr(subprocess, "Popen", lambda *_, **__: [hung, left][len(told)])

@@ -173,7 +173,7 @@ def test_a_station_behind_the_autopilot_is_heard_and_answered(net):
 
 def test_a_command_to_us_is_handed_over_and_not_forwarded(net):
     taken = []
-    net.routing.on_own = lambda client, got: taken.append((client, got.message_id))
+    net.routing.on_own_frame = lambda client, got: taken.append((client, got.message_id))
     net.routing.from_client(net.ground, command(OWN, GROUND))
     assert (net.heard(), taken) == (set(), [(net.ground, 76)])
 

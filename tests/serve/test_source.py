@@ -22,7 +22,7 @@ def source():
     """A source whose owner sends setpoints at 0 s and 0.1 s."""
     ownership = Ownership(0.5, 2.0)
     for now in (0.0, 0.1):
-        ownership.setpoint("script", now)
+        ownership.note_setpoint("script", now)
     assert ownership.request_control("script", 0.1) is None
     return ServedSource("script", CommandedMotion(LIMITS), ownership, lambda: 0.5), ownership
 
@@ -52,7 +52,7 @@ def test_after_rates_a_request_without_a_motion_is_refused_and_the_rates_still_c
     assert served.reference(0.7, STILL)(0.7).body_rates is None, "nobody commands"
     with pytest.raises(UnplannableError):
         served.give(wild, 0.8)
-    ownership.setpoint("script", 0.9)
+    ownership.note_setpoint("script", 0.9)
     assert served.reference(0.9, STILL)(0.9).velocity_ned == pytest.approx((0.0, 0.0, 0.0))
 
 

@@ -48,7 +48,7 @@ class MemoryClient(testing.Program):
 
     def _flush(self):
         while self._waiting:
-            data, _ = self._take(100_000)
+            data, _ = self._dequeue(100_000)
             self.heard += self._parser.parse_buffer(read(data)) or ()
 
     def texts(self):

@@ -8,24 +8,24 @@ from scipy.linalg import null_space
 from companion.guidance.trajectory.minimum_snap import Fixed, Observations, minimum_snap
 from companion.guidance.trajectory.septic_spline import (
     FROM_ENDS,
-    ORDER,
+    STATE_SIZE,
     SepticSpline,
     derivative_rows,
 )
 
 
 def test_rest_to_rest_is_the_septic_of_the_literature():
-    states = np.zeros((2, ORDER, 1))
+    states = np.zeros((2, STATE_SIZE, 1))
     states[1, 0] = 1.0
-    spline = minimum_snap(np.array([0.0, 1.0]), Fixed(states, np.ones((2, ORDER), dtype=bool)))
+    spline = minimum_snap(np.array([0.0, 1.0]), Fixed(states, np.ones((2, STATE_SIZE), dtype=bool)))
     septic = Polynomial([0, 0, 0, 0, 35, -84, 70, -20])
     for u in np.linspace(0.0, 1.0, 21):
-        expected = [septic.deriv(k)(u) if k else septic(u) for k in range(ORDER)]
+        expected = [septic.deriv(k)(u) if k else septic(u) for k in range(STATE_SIZE)]
         assert spline.at(u)[0] == pytest.approx(expected, abs=1e-12)
 
 
 def test_the_coefficients_of_a_piece_are_exact():
-    ends = [derivative_rows(np.array([u]), k)[0] for u in (0.0, 1.0) for k in range(ORDER)]
+    ends = [derivative_rows(np.array([u]), k)[0] for u in (0.0, 1.0) for k in range(STATE_SIZE)]
     np.testing.assert_allclose(np.array(ends) @ FROM_ENDS, np.eye(8), atol=1e-12)
     assert (np.rint(6.0 * FROM_ENDS) / 6.0 == FROM_ENDS).all()
 
@@ -34,9 +34,9 @@ def _problem(seed, count=6):
     """Knots, and what is fixed: places at all, all at the ends, a velocity on the way."""
     rng = np.random.default_rng(seed)
     knots = np.cumsum(rng.uniform(0.3, 3.0, count))
-    states = np.zeros((count, ORDER, 3))
+    states = np.zeros((count, STATE_SIZE, 3))
     states[:] = rng.normal(size=states.shape)
-    mask = np.zeros((count, ORDER), dtype=bool)
+    mask = np.zeros((count, STATE_SIZE), dtype=bool)
     mask[:, 0] = True
     mask[[0, -1]] = True
     mask[2, 1] = True
@@ -72,7 +72,7 @@ def _dense(knots, fixed, axis):
                 rows.append(row(i, end, order))
                 values.append(fixed.states[knot, order, axis])
     for i in range(count - 1):
-        for order in range(1, ORDER):
+        for order in range(1, STATE_SIZE):
             rows.append(row(i, 1.0, order) - row(i + 1, 0.0, order))
             values.append(0.0)
     a, b = np.array(rows), np.array(values)
@@ -115,7 +115,7 @@ def test_many_waypoints_are_met_and_derivatives_up_to_the_sixth_are_continuous()
 def test_observations_are_met_where_nothing_is_stiff_and_smoothed_where_it_is():
     times = np.linspace(0.0, 4.0, 41)
     knots = np.linspace(0.0, 4.0, 9)
-    nothing = Fixed(np.zeros((9, ORDER, 1)), np.zeros((9, ORDER), dtype=bool))
+    nothing = Fixed(np.zeros((9, STATE_SIZE, 1)), np.zeros((9, STATE_SIZE), dtype=bool))
     smooth, rough = np.sin(times), 0.1 * (-1.0) ** np.arange(41)
     seen = Observations(times, (smooth + rough)[:, None], np.ones(41))
     spline = minimum_snap(knots, nothing, (seen,), stiffness=1e-3)
@@ -130,7 +130,7 @@ def test_observations_are_met_where_nothing_is_stiff_and_smoothed_where_it_is():
 
 def test_observed_velocities_make_up_for_missing_places():
     knots = np.linspace(0.0, 2.0, 5)
-    states, mask = np.zeros((5, ORDER, 1)), np.zeros((5, ORDER), dtype=bool)
+    states, mask = np.zeros((5, STATE_SIZE, 1)), np.zeros((5, STATE_SIZE), dtype=bool)
     mask[0, 0] = True
     times = np.linspace(0.0, 2.0, 50)
     slopes = Observations(times, np.cos(times)[:, None], np.ones(50), derivative=1)
@@ -139,14 +139,14 @@ def test_observed_velocities_make_up_for_missing_places():
 
 
 def test_too_little_to_go_by_is_an_error():
-    states, mask = np.zeros((4, ORDER, 1)), np.zeros((4, ORDER), dtype=bool)
+    states, mask = np.zeros((4, STATE_SIZE, 1)), np.zeros((4, STATE_SIZE), dtype=bool)
     mask[:3, 0] = True
     with pytest.raises(np.linalg.LinAlgError, match="too little"):
         minimum_snap(np.arange(4.0), Fixed(states, mask))
 
 
 def test_a_spline_goes_on_past_its_ends_as_its_last_pieces_do():
-    states = np.zeros((3, ORDER, 1))
+    states = np.zeros((3, STATE_SIZE, 1))
     states[:, 0, 0] = 0.0, 1.0, 4.0
     states[:, 1, 0] = 0.0, 2.0, 4.0
     states[:, 2, 0] = 2.0

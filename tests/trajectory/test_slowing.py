@@ -232,7 +232,7 @@ def test_a_slower_time_has_right_derivatives_and_is_found_again():
         assert here.second == pytest.approx((after.first - before.first) / (2 * h), abs=1e-6)
         assert here.third == pytest.approx((after.second - before.second) / (2 * h), abs=2e-4)
         assert 1 / 2.5 <= here.first <= 1.0
-        times, _ = law.of(np.array([here.phase]))
+        times, _ = law.stretched(np.array([here.phase]))
         assert times[0] == pytest.approx(time, abs=1e-12)
     assert law.at(-1.0).phase == 0.0
     assert law.at(law.duration + 1.0).phase == pytest.approx(6.0)

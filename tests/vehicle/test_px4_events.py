@@ -62,7 +62,7 @@ def test_an_unknown_value_is_shown_as_a_number_and_an_unknown_event_as_its_numbe
     scene.event(123, 0x44)
     (_, failsafe), (severity, unknown) = scene.said
     assert "238" in failsafe
-    assert (severity, unknown) == (4, "event 123")
+    assert (severity, unknown) == (4, "unknown PX4 event 123")
 
 
 def test_failsafes_say_why_and_what():
@@ -102,7 +102,7 @@ def test_an_unknown_event_is_named_by_its_number_once():
         scene.now = at
         scene.event(16777217, 0x44)
     scene.event(16777218, 0x88)  # for programs only
-    assert scene.said == [(4, "event 16777217")]
+    assert scene.said == [(4, "unknown PX4 event 16777217")]
 
 
 def test_an_event_sent_again_is_taken_once():

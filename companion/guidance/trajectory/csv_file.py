@@ -22,7 +22,7 @@ from companion.guidance.trajectory.csv_header import columns_of, rows_of, shown,
 from companion.guidance.trajectory.sample import FARTHEST, FASTEST, TrajectoryError
 from companion.guidance.trajectory.septic_spline import Floats
 
-_FEWEST = 4
+_FEWEST_SAMPLES = 4
 """Smallest number of samples of a table. Fewer do not determine a smooth curve."""
 
 _MOST_SAMPLES = 50_000
@@ -31,10 +31,10 @@ _MOST_SAMPLES = 50_000
 _MOST_BYTES = 20_000_000
 """Largest size of a file, bytes: `_MOST_SAMPLES` samples of twenty columns with all digits."""
 
-_LEAST_STEP, _LONGEST_STEP = 1e-4, 10.0
+_SHORTEST_STEP, _LONGEST_STEP = 1e-4, 10.0
 """Shortest and longest time between two samples, s."""
 
-_SHORTEST = 0.1
+_SHORTEST_DURATION = 0.1
 """Shortest duration of a table, s."""
 
 _RANGES = {
@@ -104,8 +104,8 @@ def table(lines: Iterable[str], name: str) -> Table:
     """
     frames: list[str] = []
     rows = list(itertools.islice(rows_of(csv.reader(lines), frames), _MOST_SAMPLES + 2))
-    if len(rows) <= _FEWEST:
-        raise TrajectoryError(f"{name}: needs a header and at least {_FEWEST} samples")
+    if len(rows) <= _FEWEST_SAMPLES:
+        raise TrajectoryError(f"{name}: needs a header and at least {_FEWEST_SAMPLES} samples")
     if len(rows) > _MOST_SAMPLES + 1:
         raise TrajectoryError(f"{name}: has more than {_MOST_SAMPLES} samples; leave some out")
     named = [column.strip().lower() for column in rows[0][1]]
@@ -134,7 +134,8 @@ def table(lines: Iterable[str], name: str) -> Table:
 def _require_no_more_values(rows: Sequence[tuple[int, Sequence[str]]], name: str) -> None:
     """Check that no value lacks a column because a comma stands where a point should.
 
-    Published files do have values without a name in the header: as many in each row, with points.
+    Some published files do have more values than names. Then each row has equally many values, and
+    decimals have points.
     """
     columns = len(rows[0][1])
     more = next(((line, len(row)) for line, row in rows[1:] if any(row[columns:])), None)
@@ -176,19 +177,23 @@ def _numbers(
 
 
 def _require_steps(times: Floats, lines: Sequence[int], name: str) -> None:
-    """Check each step in time (`_LEAST_STEP` to `_LONGEST_STEP`) and the duration."""
+    """Check each step in time (`_SHORTEST_STEP` to `_LONGEST_STEP`) and the duration."""
     steps = np.diff(times)
-    wrong = np.flatnonzero(~((steps >= 0.999 * _LEAST_STEP) & (steps <= _LONGEST_STEP)))
+    wrong = np.flatnonzero(~((steps >= 0.999 * _SHORTEST_STEP) & (steps <= _LONGEST_STEP)))
     if wrong.size:
         step, line = float(steps[wrong[0]]), lines[int(wrong[0]) + 1]
         if step <= 0.0:
-            raise TrajectoryError(f"{name}, line {line}: time does not increase")
+            raise TrajectoryError(
+                f"{name}, line {line}: time does not increase; leave this sample out"
+            )
         raise TrajectoryError(
-            f"{name}, line {line}: {step:.3g} s after the sample before; from {_LEAST_STEP:g} to "
-            f"{_LONGEST_STEP:g} s can be used, and time is read in s"
+            f"{name}, line {line}: {step:.3g} s after the sample before; from {_SHORTEST_STEP:g} "
+            f"to {_LONGEST_STEP:g} s can be used, and time is read in s"
         )
-    if times[-1] - times[0] < _SHORTEST:
-        raise TrajectoryError(f"{name}: lasts less than {_SHORTEST:g} s")
+    if times[-1] - times[0] < _SHORTEST_DURATION:
+        raise TrajectoryError(
+            f"{name}: lasts less than {_SHORTEST_DURATION:g} s; time is read in s"
+        )
 
 
 def _require_range(
@@ -212,7 +217,7 @@ def _require_range(
         if bad.size:
             raise TrajectoryError(
                 f"{name}, line {lines[int(bad[0])]}: the quaternion has the length "
-                f"{lengths[bad[0]]:.3g}, not 1"
+                f"{lengths[bad[0]]:.3g}, not 1; give unit quaternions, or leave their columns out"
             )
 
 

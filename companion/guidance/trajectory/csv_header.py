@@ -30,7 +30,7 @@ _OTHER_UNIT = re.compile(r"(.*?)(?:_| ?[\[(])(deg|°|ms|us|ns|cm|mm|ft)[\])]?")
 """A column name followed by a unit that is refused."""
 _FRAME = re.compile(r"#\s*frame\s*[:=]\s*(\S+)\s*")
 
-_SHOWN = 60
+_MOST_SHOWN = 60
 """Largest number of characters that a message quotes from the file."""
 
 
@@ -116,7 +116,7 @@ def _is_number(text: str) -> bool:
 
 
 def _missing(group: str, header: list[str]) -> str:
-    """A message with the missing and the present columns of a quantity."""
+    """The message that columns of a quantity are missing, with those that were found."""
     spellings = _SPELLINGS[group]
     known = " or ".join(",".join(names) for names in spellings)
     nearest = max(spellings, key=lambda names: sum(column in header for column in names))
@@ -130,4 +130,4 @@ def _missing(group: str, header: list[str]) -> str:
 
 def shown(text: str) -> str:
     """Text of the file, shortened for a message."""
-    return text if len(text) <= _SHOWN else text[:_SHOWN] + "…"
+    return text if len(text) <= _MOST_SHOWN else text[:_MOST_SHOWN] + "…"

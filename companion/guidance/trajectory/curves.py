@@ -20,7 +20,7 @@ class CurvePoint(NamedTuple):
 
 
 class PhaseSampling(NamedTuple):
-    """Phases at which to check a curve, so that no extreme between two of them is missed.
+    """Phases at which to check a curve, so close that an extreme between two is hardly missed.
 
     Attributes:
         step: phase between two checks; None if `phases` lists the checks.
@@ -57,7 +57,7 @@ def require_checkable(needed: float) -> None:
 
 
 def _sampling_of(figure: "Figure") -> PhaseSampling:
-    return PhaseSampling(min(tau / _CHECKS_PER_LAP, PATH_STEP / figure.steepest), tau)
+    return PhaseSampling(min(tau / _CHECKS_PER_LAP, PATH_STEP / figure.path_per_phase), tau)
 
 
 class Curve(Protocol):
@@ -77,11 +77,11 @@ class Curve(Protocol):
 
 
 class Figure(Curve, Protocol):
-    """A curve whose largest path length per unit of phase is known."""
+    """A curve whose largest path length per unit of phase is known; its phase is an angle."""
 
     @property
-    def steepest(self) -> float:
-        """Largest length of the first derivative, m per unit of phase."""
+    def path_per_phase(self) -> float:
+        """Largest length of the first derivative, m per rad."""
         ...
 
 
@@ -119,7 +119,7 @@ class Helix:
     rise: float = 0.0
 
     @property
-    def steepest(self) -> float:
+    def path_per_phase(self) -> float:
         """Length of the first derivative, m per rad; constant."""
         return hypot(self.radius, self.rise / tau)
 
@@ -145,7 +145,7 @@ class GeronoEight:
     half_width: float
 
     @property
-    def steepest(self) -> float:
+    def path_per_phase(self) -> float:
         """Largest length of the first derivative, m per rad: in the middle."""
         return sqrt(2.0) * self.half_width
 
@@ -174,7 +174,7 @@ class BernoulliEight:
     half_width: float
 
     @property
-    def steepest(self) -> float:
+    def path_per_phase(self) -> float:
         """Largest length of the first derivative, m per rad: at the tips."""
         return self.half_width
 
@@ -205,9 +205,9 @@ class Turned:
     angle: float
 
     @property
-    def steepest(self) -> float:
-        """`steepest` of the figure."""
-        return self.figure.steepest
+    def path_per_phase(self) -> float:
+        """`path_per_phase` of the figure."""
+        return self.figure.path_per_phase
 
     def sampling(self) -> PhaseSampling:
         """`sampling` of the figure."""

@@ -47,7 +47,7 @@ class Slowed:
         Raises:
             TrajectoryError: it is too long to be checked.
         """
-        times, _ = self.law.of(np.array(self.moments or self.trajectory.check_times()))
+        times, _ = self.law.stretched(np.array(self.moments or self.trajectory.check_times()))
         require_duration(float(times[-1]))
         return [float(time) for time in times]
 

@@ -16,7 +16,7 @@ _ROUNDING = 1e-9
 
 _DEGREES = 180.0 / pi
 
-SLOWER = "fly it more slowly (--slow-down finds how much), or change the limit"
+SLOWER_REMEDY = "fly it more slowly (--slow-down finds how much), or change the limit"
 """The remedy if a slower motion would keep the limit."""
 
 
@@ -36,7 +36,7 @@ class Violation(NamedTuple):
     begins: float
     time: float
     text: str
-    remedy: str = SLOWER
+    remedy: str = SLOWER_REMEDY
     slowing_helps: bool = True
 
     def __str__(self) -> str:

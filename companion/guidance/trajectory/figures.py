@@ -11,14 +11,19 @@ from companion.guidance.trajectory.curves import (
     Straight,
     Turned,
 )
-from companion.guidance.trajectory.sample import LEAST_WAY, Sample, TrajectoryError, Vector
-from companion.guidance.trajectory.time_laws import STEEPEST, Cruise, LimitedJerk, cosine_ramp
+from companion.guidance.trajectory.sample import SMALLEST_DISTANCE, Sample, TrajectoryError, Vector
+from companion.guidance.trajectory.time_laws import (
+    SEPTIC_SLOPE,
+    Cruise,
+    LimitedJerk,
+    cosine_ramp,
+)
 from companion.guidance.trajectory.timed_curve import HeldHeading, TangentHeading, TimedCurve
 
-_LARGEST_RAMP = 0.5
+_LONGEST_RAMP_SHARE = 0.5
 """Longest ramp (time in which the rate rises or falls), as a share of the time for all laps at the
-steady rate. With it, a ramp covers at most a quarter of the path, and the fastest place of each
-figure lies between the ramps.
+steady rate. So a ramp covers at most a quarter of the path, and the fastest place of each figure
+lies between the ramps.
 """
 
 _RAMP_ACCELERATION = 1.0
@@ -69,7 +74,7 @@ def line(
             and `along` is set.
     """
     length = sqrt(sum(x * x for x in to))
-    if length < LEAST_WAY:
+    if length < SMALLEST_DISTANCE:
         raise TrajectoryError("a line must lead somewhere else than where it begins")
     if along and hypot(to[0], to[1]) == 0.0:
         raise TrajectoryError("a vertical line has no heading to face along")
@@ -104,7 +109,7 @@ def circle(radius: float, laps: Laps) -> TimedCurve:
     Raises:
         TrajectoryError: the radius, the speed, the laps or the acceleration is not positive.
     """
-    return _rounds("circle", radius, Helix(radius), laps, TangentHeading(pi / 2.0, -1.0))
+    return _flown_laps("circle", radius, Helix(radius), laps, TangentHeading(pi / 2.0, -1.0))
 
 
 def steady_circle(radius: float, speed: float, laps: float, longest: float) -> TimedCurve:
@@ -131,7 +136,7 @@ def helix(radius: float, rise: float, laps: Laps) -> TimedCurve:
     Raises:
         TrajectoryError: see `circle`.
     """
-    return _rounds("helix", radius, Helix(radius, rise), laps, TangentHeading(pi / 2.0, -1.0))
+    return _flown_laps("helix", radius, Helix(radius, rise), laps, TangentHeading(pi / 2.0, -1.0))
 
 
 def gerono_eight(half_width: float, laps: Laps) -> TimedCurve:
@@ -158,16 +163,16 @@ def bernoulli_eight(half_width: float, laps: Laps) -> TimedCurve:
 def _eight(name: str, half_width: float, curve: Figure, laps: Laps) -> TimedCurve:
     if laps.laps % 1.0:
         raise TrajectoryError("the laps of a figure-eight must be whole")
-    return _rounds(name, half_width, curve, laps, TangentHeading(-pi / 2.0))
+    return _flown_laps(name, half_width, curve, laps, TangentHeading(-pi / 2.0))
 
 
-def _rounds(
+def _flown_laps(
     name: str, size: float, curve: Figure, laps: Laps, tangent: TangentHeading
 ) -> TimedCurve:
     if min(size, laps.speed, laps.laps, laps.acceleration) <= 0.0:
         raise TrajectoryError(f"size, speed, laps and acceleration of a {name} must be positive")
-    length, rate = tau * laps.laps, laps.speed / curve.steepest
-    ramp = min(STEEPEST * laps.speed / laps.acceleration, _LARGEST_RAMP * length / rate)
+    length, rate = tau * laps.laps, laps.speed / curve.path_per_phase
+    ramp = min(SEPTIC_SLOPE * laps.speed / laps.acceleration, _LONGEST_RAMP_SHARE * length / rate)
     if laps.direction:
         curve = Turned(curve, laps.direction)
         tangent = replace(tangent, middle=tangent.middle + laps.direction)

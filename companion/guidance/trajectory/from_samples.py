@@ -16,7 +16,7 @@ from companion.guidance.trajectory.spline_curve import (
     smoothed,
     tangent_heading,
 )
-from companion.guidance.trajectory.time_laws import STEEPEST, Cruise
+from companion.guidance.trajectory.time_laws import SEPTIC_SLOPE, Cruise
 from companion.guidance.trajectory.timed_curve import (
     Heading,
     HeldHeading,
@@ -24,7 +24,7 @@ from companion.guidance.trajectory.timed_curve import (
     require_duration,
 )
 
-_AT_REST = 0.1
+_REST_SPEED = 0.1
 """Samples slower than this at their beginning or end count as at rest there, m/s."""
 
 _CHECKS_PER_PIECE = 16
@@ -33,7 +33,7 @@ _CHECKS_PER_PIECE = 16
 _MOST_PIECES = 4500
 """Largest number of pieces of the spline. Fitting so many takes a second."""
 
-_LARGEST_RAMP = 0.5
+_LONGEST_RAMP_SHARE = 0.5
 """Longest ramp, as a share of the duration."""
 
 
@@ -131,12 +131,14 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
     position = (table.position - table.position[0]) @ to_ned.rotation.T
     derivatives = tuple(known @ to_ned.rotation.T for known in table.derivatives)
     spline = smoothed(table.times, position, options.cutoff, derivatives)
-    _check(spline, table.times, derivatives)
+    _require_derivatives(spline, table.times, derivatives)
     speeds = [_speed(spline, end) for end in (spline.begin, spline.end)]
-    resting = speeds[0] < _AT_REST, speeds[1] < _AT_REST
+    resting = speeds[0] < _REST_SPEED, speeds[1] < _REST_SPEED
     spline = smoothed(table.times, position, options.cutoff, derivatives, resting)
     rise_time, fall_time = [
-        0.0 if rests else min(STEEPEST * speed / options.acceleration, _LARGEST_RAMP * spline.end)
+        0.0
+        if rests
+        else min(SEPTIC_SLOPE * speed / options.acceleration, _LONGEST_RAMP_SHARE * spline.end)
         for rests, speed in zip(resting, speeds, strict=True)
     ]
     law = Cruise(spline.end, 1.0, rise_time, fall_time)
@@ -161,7 +163,9 @@ def _speed(spline: SepticSpline, time: float) -> float:
     return float(np.linalg.norm([axis[1] for axis in spline.at(time)]))
 
 
-def _check(spline: SepticSpline, times: Floats, derivatives: tuple[Floats, ...]) -> None:
+def _require_derivatives(
+    spline: SepticSpline, times: Floats, derivatives: tuple[Floats, ...]
+) -> None:
     """Check that velocity and acceleration are the derivatives of the position."""
     motion = spline.along(times)
     for order, (known, quantity) in enumerate(zip(derivatives, _DERIVATIVES, strict=False), 1):
@@ -172,7 +176,8 @@ def _check(spline: SepticSpline, times: Floats, derivatives: tuple[Floats, ...])
             raise TrajectoryError(
                 f"the {quantity.name} is not the derivative of the positions: at "
                 f"{times[worst]:.2f} s it is off by {missed[worst]:.1f} {quantity.unit}. Is it in "
-                "another frame, or with gravity? Without these columns it is computed"
+                f"another frame, or with gravity? Leave out the columns of the {quantity.name}, "
+                "and it is computed"
             )
 
 
@@ -183,7 +188,6 @@ def _root_mean_square(values: Floats) -> float:
 def _heading(
     spline: SepticSpline, table: Table, options: SampleOptions, resting: tuple[bool, bool]
 ) -> Heading:
-    """The heading that the options request."""
     if options.heading is HeadingFrom.ALONG:
         return tangent_heading(spline, resting)
     if options.heading is HeadingFrom.FIXED or table.yaw is None:

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from companion.guidance.trajectory.septic_spline import (
     FROM_ENDS,
-    ORDER,
+    STATE_SIZE,
     Floats,
     SepticSpline,
     derivative_rows,
 )
 
-_CONDITION = 1e-13
+_SMALLEST_EIGENVALUE = 1e-13
 """The spline is undetermined if an eigenvalue of the scaled last pivot is smaller than this."""
 
 
@@ -86,47 +86,49 @@ def minimum_snap(
     spans = np.diff(knots) / unit
     equations = _smoothness(spans, stiffness / unit**7, fixed.states.shape[2])
     for observed in observations:
-        _add(equations, knots, spans, unit, observed)
-    scale = unit ** np.arange(ORDER)
+        _add_observations(equations, knots, spans, unit, observed)
+    scale = unit ** np.arange(STATE_SIZE)
     states = _solved(equations, fixed.states * scale[:, None], fixed.mask)
     return SepticSpline(knots, states / scale[:, None])
 
 
 def _smoothness(spans: Floats, stiffness: float, series: int) -> _Equations:
     """Half the gradient of the integral of squared snap."""
-    powers = np.arange(ORDER)
+    powers = np.arange(STATE_SIZE)
     # Snap of uᵏ is k!/(k−4)!·uᵏ⁻⁴, and ∫ uᵐ over a piece is 1/(m + 1).
     snap = np.array([24.0, 120.0, 360.0, 840.0])
     energy = np.outer(snap, snap) / (powers[:, None] + powers + 1.0)
-    unit = FROM_ENDS[ORDER:].T @ energy @ FROM_ENDS[ORDER:]
+    unit = FROM_ENDS[STATE_SIZE:].T @ energy @ FROM_ENDS[STATE_SIZE:]
     ends = spans[:, None] ** np.tile(powers, 2)
     blocks = stiffness * unit * ends[:, :, None] * ends[:, None, :] / spans[:, None, None] ** 7
-    diagonal = np.zeros((spans.size + 1, ORDER, ORDER))
-    diagonal[:-1] += blocks[:, :ORDER, :ORDER]
-    diagonal[1:] += blocks[:, ORDER:, ORDER:]
+    diagonal = np.zeros((spans.size + 1, STATE_SIZE, STATE_SIZE))
+    diagonal[:-1] += blocks[:, :STATE_SIZE, :STATE_SIZE]
+    diagonal[1:] += blocks[:, STATE_SIZE:, STATE_SIZE:]
     return _Equations(
-        diagonal, blocks[:, :ORDER, ORDER:].copy(), np.zeros((spans.size + 1, ORDER, series))
+        diagonal,
+        blocks[:, :STATE_SIZE, STATE_SIZE:].copy(),
+        np.zeros((spans.size + 1, STATE_SIZE, series)),
     )
 
 
-def _add(
+def _add_observations(
     equations: _Equations, knots: Floats, spans: Floats, unit: float, observed: Observations
 ) -> None:
     """Add half the gradient of the weighted squares of the residuals."""
     piece = np.clip(np.searchsorted(knots, observed.times, side="right") - 1, 0, spans.size - 1)
     span = spans[piece]
     fractions = (observed.times - knots[piece]) / (span * unit)
-    ends = span[:, None] ** np.tile(np.arange(ORDER), 2)
+    ends = span[:, None] ** np.tile(np.arange(STATE_SIZE), 2)
     rows = derivative_rows(fractions, observed.derivative) @ FROM_ENDS * ends
     rows /= (span[:, None] * unit) ** observed.derivative
     weighted = rows * observed.weights[:, None]
     squares = weighted[:, :, None] * rows[:, None, :]
     moments = weighted[:, :, None] * observed.values[:, None, :]
-    np.add.at(equations.diagonal, piece, squares[:, :ORDER, :ORDER])
-    np.add.at(equations.diagonal, piece + 1, squares[:, ORDER:, ORDER:])
-    np.add.at(equations.upper, piece, squares[:, :ORDER, ORDER:])
-    np.add.at(equations.right, piece, moments[:, :ORDER])
-    np.add.at(equations.right, piece + 1, moments[:, ORDER:])
+    np.add.at(equations.diagonal, piece, squares[:, :STATE_SIZE, :STATE_SIZE])
+    np.add.at(equations.diagonal, piece + 1, squares[:, STATE_SIZE:, STATE_SIZE:])
+    np.add.at(equations.upper, piece, squares[:, :STATE_SIZE, STATE_SIZE:])
+    np.add.at(equations.right, piece, moments[:, :STATE_SIZE])
+    np.add.at(equations.right, piece + 1, moments[:, STATE_SIZE:])
 
 
 def _solved(equations: _Equations, states: Floats, mask: NDArray[np.bool_]) -> Floats:
@@ -138,7 +140,9 @@ def _solved(equations: _Equations, states: Floats, mask: NDArray[np.bool_]) -> F
     right[1:] -= upper.transpose(0, 2, 1) @ met[:-1]
     right[mask] = met[mask]
     free = ~mask
-    diagonal = diagonal * (free[:, :, None] & free[:, None, :]) + mask[:, :, None] * np.eye(ORDER)
+    diagonal = diagonal * (free[:, :, None] & free[:, None, :]) + mask[:, :, None] * np.eye(
+        STATE_SIZE
+    )
     upper = upper * (free[:-1, :, None] & free[1:, None, :])
     return _eliminated(diagonal, upper, right)
 
@@ -157,10 +161,10 @@ def _eliminated(diagonal: Floats, upper: Floats, right: Floats) -> Floats:
     pivot = diagonal[0]
     for k in range(len(upper)):
         both = np.linalg.solve(pivot, np.concatenate((upper[k], right[k]), axis=1))
-        reduced[k], right[k] = both[:, :ORDER], both[:, ORDER:]
+        reduced[k], right[k] = both[:, :STATE_SIZE], both[:, STATE_SIZE:]
         pivot = diagonal[k + 1] - upper[k].T @ reduced[k]
         right[k + 1] -= upper[k].T @ right[k]
-    if np.linalg.eigvalsh(pivot)[0] < _CONDITION:
+    if np.linalg.eigvalsh(pivot)[0] < _SMALLEST_EIGENVALUE:
         raise np.linalg.LinAlgError("too little is fixed and observed to determine the spline")
     right[-1] = np.linalg.solve(pivot, right[-1])
     for k in range(len(upper) - 1, -1, -1):

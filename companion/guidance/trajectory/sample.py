@@ -19,7 +19,7 @@ FARTHEST = 10_000.0
 FASTEST = 100.0
 """Largest speed or velocity component that a file may hold, m/s."""
 
-LEAST_WAY = 1e-3
+SMALLEST_DISTANCE = 1e-3
 """Points closer together than this are the same point, m."""
 
 

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-ORDER = 4
+STATE_SIZE = 4
 """Size of the state at a knot: the value and its first three derivatives."""
 
-_DEGREE = 2 * ORDER - 1
+_DEGREE = 2 * STATE_SIZE - 1
 
 
 def derivative_rows(fractions: Floats, derivative: int) -> Floats:
@@ -25,7 +25,7 @@ def derivative_rows(fractions: Floats, derivative: int) -> Floats:
 
 def _coefficients_from_ends() -> Floats:
     """Matrix (8, 8) from the states at u = 0 and u = 1 to the coefficients of 1, u, … u⁷."""
-    ends = [derivative_rows(np.array([u]), k)[0] for u in (0.0, 1.0) for k in range(ORDER)]
+    ends = [derivative_rows(np.array([u]), k)[0] for u in (0.0, 1.0) for k in range(STATE_SIZE)]
     return np.round(np.linalg.inv(np.array(ends)) * 6.0) / 6.0
 
 
@@ -44,7 +44,7 @@ class SepticSpline:
             states: (k, 4, n): value, first, second and third derivative of n series at each knot.
         """
         spans = np.diff(knots)
-        scale = spans[:, None] ** np.arange(ORDER)
+        scale = spans[:, None] ** np.arange(STATE_SIZE)
         ends = np.concatenate(
             (states[:-1] * scale[:, :, None], states[1:] * scale[:, :, None]), axis=1
         )

@@ -9,8 +9,8 @@ import numpy as np
 from companion.guidance.trajectory.septic_spline import Floats
 from companion.guidance.trajectory.time_laws import Progress
 
-_NEWTON_STEPS = 20
-_TOLERANCE = 1e-14
+_MOST_NEWTON_STEPS = 20
+_NEWTON_TOLERANCE = 1e-14
 """Tolerance of Newton's method, as a share of a piece."""
 
 Number = Any
@@ -42,7 +42,7 @@ class _Piece(NamedTuple):
         return u * (self.a + u * (self.b / 2.0 + u * (self.c / 3.0 + u * self.d / 4.0)))
 
 
-def _piece(p: Number, q: Number, r: Number, s: Number) -> _Piece:
+def _spline_piece(p: Number, q: Number, r: Number, s: Number) -> _Piece:
     """The piece between four coefficients of a uniform cubic B-spline."""
     return _Piece(
         (p + 4.0 * q + r) / 6.0,
@@ -77,7 +77,7 @@ class SlowerTime:
 
     def _pieces(self) -> list[_Piece]:
         c = self.coefficients
-        return [_piece(*four) for four in zip(c, c[1:], c[2:], c[3:], strict=False)]
+        return [_spline_piece(*four) for four in zip(c, c[1:], c[2:], c[3:], strict=False)]
 
     @property
     def _width(self) -> float:
@@ -92,27 +92,27 @@ class SlowerTime:
     def at(self, time: float) -> Progress:
         """Original time at the stretched `time`, and its derivatives; limited to the duration."""
         if time <= 0.0:
-            return self._progress(_piece(*self.coefficients[:4]), 0.0, 0.0)
+            return self._progress(_spline_piece(*self.coefficients[:4]), 0.0, 0.0)
         last = len(self.coefficients) - 4
         if time >= self.duration:
-            return self._progress(_piece(*self.coefficients[last:]), 1.0, last)
+            return self._progress(_spline_piece(*self.coefficients[last:]), 1.0, last)
         index = min(bisect_right(self._ends, time) - 1, last)
-        piece = _piece(*self.coefficients[index : index + 4])
+        piece = _spline_piece(*self.coefficients[index : index + 4])
         area = (time - self._ends[index]) / self._width
         u = area / float(piece.area(1.0))
-        for _ in range(_NEWTON_STEPS):
+        for _ in range(_MOST_NEWTON_STEPS):
             step = (float(piece.area(u)) - area) / float(piece.factor(u))
             u = min(max(u - step, 0.0), 1.0)
-            if abs(step) < _TOLERANCE:
+            if abs(step) < _NEWTON_TOLERANCE:
                 break
         return self._progress(piece, u, index)
 
-    def of(self, moments: Floats) -> tuple[Floats, Progress]:
+    def stretched(self, moments: Floats) -> tuple[Floats, Progress]:
         """Stretched times and progress (m,) at the original times `moments` (m,), s."""
         count = len(self.coefficients) - 3
         index = np.clip((moments / self._width).astype(int), 0, count - 1)
         c = np.array(self.coefficients)
-        piece = _piece(c[index], c[index + 1], c[index + 2], c[index + 3])
+        piece = _spline_piece(c[index], c[index + 1], c[index + 2], c[index + 3])
         u = moments / self._width - index
         times = np.array(self._ends)[index] + self._width * np.asarray(piece.area(u))
         return times, self._progress(piece, u, index)

@@ -24,15 +24,15 @@ from companion.guidance.trajectory.feasibility import Envelope, Violation, broke
 from companion.guidance.trajectory.sample import LONGEST, Trajectory, TrajectoryError, computable
 from companion.guidance.trajectory.slower_time import SlowerTime
 
-_SLOWEST = 64.0
+_LARGEST_FACTOR = 64.0
 """Largest slowing factor that is tried."""
-_PRECISION = 1e-3
+_FACTOR_PRECISION = 1e-3
 """Relative precision of a factor."""
-_HALVINGS = 16
+_BISECTIONS = 16
 """Number of bisection steps in the search for the factor of one moment."""
 _WIDTHS, _FEWEST_PIECES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2), 4
 """Widths of the slowness' pieces to try, s, and the fewest pieces: a ramp takes at least these."""
-_ROUNDS = 60
+_MOST_ROUNDS = 60
 """Largest number of times that the slowness is raised before the search gives up."""
 _LEAST_RAISE, _LARGEST_RAISE = 0.004, 0.1
 """Bounds of the relative increase of the slowness in one round."""
@@ -44,16 +44,16 @@ _SHORTEST_STEP = 0.006
 """Shortest step between evenly spaced moments, s."""
 _MOMENTS_A_PIECE = 8.0
 """Fewest moments in each piece of the slowness; fewer could miss the extreme of a ramp."""
-_GAP = 3.0
-"""A gap between check times is filled in if it is this many times as long as the usual gap."""
-_WORTH = 0.98
+_LONG_GAP_FACTOR = 3.0
+"""A gap between check times is filled if it is this many times as long as the median gap."""
+_WORTHWHILE_SHARE = 0.98
 """Slowing down in parts is used if it takes less than this share of the time of slowing evenly."""
-_NOTICEABLE = 1.02
+_NOTICEABLE_FACTOR = 1.02
 """Smallest factor that counts as slowing down."""
 _NEAR_SLOWEST = 0.9
 """A moment is near the slowest if its factor minus 1 is at least this share of the largest."""
-_FILLED = 2.0
-"""Time between filled-in moments, in usual gaps."""
+_FILL_STEP_GAPS = 2.0
+"""Time between the moments that fill a gap, in median gaps."""
 
 
 class SlowedPart(NamedTuple):
@@ -102,19 +102,16 @@ def slow_down(trajectory: Trajectory, envelope: Envelope) -> SlowDown:
         if not broken:
             return SlowDown(trajectory)
         whole = _evenly(trajectory, motion, broken, envelope)
-        even = evenly_slowed(trajectory, whole.factor)
+        even = SlowDown(evenly_slowed(trajectory, whole.factor), (whole,), even=True)
         moments = _moments(motion.times)
         if moments.size > _MOST_MOMENTS:
-            reason = "it is too long to be slowed down in parts"
-            return SlowDown(even, (whole,), True, reason)
+            return even._replace(reason="it is too long to be slowed down in parts")
         fine = sampled(trajectory, moments.tolist())
         if broken_limits(fine.slowed(whole.factor), envelope):  # a finer look found more
-            reason = "a finer check found more limits exceeded"
-            return SlowDown(even, (whole,), True, reason)
+            return even._replace(reason="a finer check found more limits exceeded")
         best = _best_law(fine, trajectory.duration, envelope)
-        if best is None or best.duration > _WORTH * even.duration:
-            reason = "slowing down in parts would not be quicker"
-            return SlowDown(even, (whole,), True, reason)
+        if best is None or best.duration > _WORTHWHILE_SHARE * even.trajectory.duration:
+            return even._replace(reason="slowing down in parts would not be quicker")
         slower = Slowed(trajectory, best, tuple(moments.tolist()))
         return SlowDown(slower, tuple(_parts(fine, best, envelope)))
 
@@ -122,18 +119,18 @@ def slow_down(trajectory: Trajectory, envelope: Envelope) -> SlowDown:
 def _evenly(
     trajectory: Trajectory, motion: Motion, broken: tuple[Violation, ...], envelope: Envelope
 ) -> SlowedPart:
-    """The whole trajectory, with the smallest single factor that keeps the limits."""
+    """The whole trajectory, slowed by the least factor that is enough; an error if none is."""
     for one in broken:
         if not one.slowing_helps:
             raise TrajectoryError(f"{trajectory.name}: {one}; {one.remedy}")
     too_fast, slow, last = 1.0, 2.0, broken[0]
     while found := broken_limits(motion.slowed(slow), envelope):
         too_fast, slow, last = slow, 2.0 * slow, found[0]
-        if slow > _SLOWEST:
+        if slow > _LARGEST_FACTOR:
             raise TrajectoryError(
                 f"{trajectory.name}: however slowly it is flown, {found[0]}; {found[0].remedy}"
             )
-    while slow - too_fast > _PRECISION * too_fast:
+    while slow - too_fast > _FACTOR_PRECISION * too_fast:
         middle = 0.5 * (too_fast + slow)
         if found := broken_limits(motion.slowed(middle), envelope):
             too_fast, last = middle, found[0]
@@ -144,18 +141,18 @@ def _evenly(
 
 
 def _moments(times: Floats) -> Floats:
-    """The check times, evenly spaced ones, and more in the laps without check times."""
+    """The check times, evenly spaced ones, and more in laps and other gaps without check times."""
     gaps = np.diff(times)
     usual = float(np.median(gaps[gaps > 0.0])) if gaps.size else 1.0
     length = float(times[-1])
-    parts = [times, np.linspace(0.0, length, int(length / _step(length)) + 2)]
-    for k in np.flatnonzero(gaps > _GAP * usual):
-        count = min(int(gaps[k] / (_FILLED * usual)), _MOST_MOMENTS)
+    parts = [times, np.linspace(0.0, length, int(length / _moment_step(length)) + 2)]
+    for k in np.flatnonzero(gaps > _LONG_GAP_FACTOR * usual):
+        count = min(int(gaps[k] / (_FILL_STEP_GAPS * usual)), _MOST_MOMENTS)
         parts.append(np.linspace(times[k], times[k + 1], count + 1))
     return np.unique(np.concatenate(parts))
 
 
-def _step(length: float) -> float:
+def _moment_step(length: float) -> float:
     """Largest step between the times at which a trajectory of `length` seconds is checked, s."""
     return max(_SHORTEST_STEP, length / _EVEN_MOMENTS)
 
@@ -163,45 +160,48 @@ def _step(length: float) -> float:
 def _best_law(motion: Motion, length: float, envelope: Envelope) -> SlowerTime | None:
     """The quickest slowness among the widths to try; None if none keeps the limits."""
     needed = _needed_factors(motion, envelope)
-    least = _MOMENTS_A_PIECE * _step(length)
+    least = _MOMENTS_A_PIECE * _moment_step(length)
     widths = [w for w in _WIDTHS if w >= least and length / w >= _FEWEST_PIECES]
-    laws = [_law(motion, needed, length, width, envelope) for width in widths]
+    laws = [_law_of_width(motion, needed, length, width, envelope) for width in widths]
     return min((law for law in laws if law), key=lambda law: law.duration, default=None)
 
 
 def _needed_factors(motion: Motion, envelope: Envelope) -> Floats:
     """Factor of slowing the whole trajectory with which each moment keeps the limits, (m,)."""
-    low, high = np.zeros_like(motion.times), np.full_like(motion.times, np.log(_SLOWEST))
-    high[_over(motion, envelope) <= 0.0] = 0.0
-    for _ in range(_HALVINGS):
+    low, high = np.zeros_like(motion.times), np.full_like(motion.times, np.log(_LARGEST_FACTOR))
+    high[_largest_excess(motion, envelope) <= 0.0] = 0.0
+    for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        over = _over(motion.slowed(np.exp(middle)), envelope) > 0.0
+        over = _largest_excess(motion.slowed(np.exp(middle)), envelope) > 0.0
         low, high = np.where(over, middle, low), np.where(over, high, middle)
     return np.exp(high)
 
 
-def _over(motion: Motion, envelope: Envelope) -> Floats:
+def _largest_excess(motion: Motion, envelope: Envelope) -> Floats:
     """The largest excess of a limit at each moment, (m,)."""
     nothing = np.full_like(motion.times, -1.0)
     over: Floats = np.max([nothing, *excess(motion, envelope).values()], axis=0)
     return over
 
 
-def _law(
+def _law_of_width(
     motion: Motion, needed: Floats, length: float, width: float, envelope: Envelope
 ) -> SlowerTime | None:
-    """The slowness of this width, raised until all limits are kept; None if that fails."""
+    """The slowness with pieces of `width` s, raised until all limits are kept; None if that fails.
+
+    `needed` is the factor of each moment, (m,); `length` is the duration of the trajectory, s.
+    """
     count = int(np.ceil(length / width))
     piece = np.clip((motion.times * (count / length)).astype(int), 0, count - 1)
     most = np.ones(count)
     np.maximum.at(most, piece, needed)
-    coefficients = _over_four(most, 1.0)
-    for _ in range(_ROUNDS):
+    coefficients = _largest_of_four(most, 1.0)
+    for _ in range(_MOST_ROUNDS):
         law = SlowerTime(length, tuple(coefficients.tolist()))
-        if law.duration > LONGEST or coefficients.max() > _SLOWEST:
+        if law.duration > LONGEST or coefficients.max() > _LARGEST_FACTOR:
             return None
-        slower = motion.retimed(*law.of(motion.times))
-        over = _over(slower, envelope)
+        slower = motion.retimed(*law.stretched(motion.times))
+        over = _largest_excess(slower, envelope)
         if envelope.fence is not None and (found := envelope.fence(slower)) is not None:
             outside = (slower.times >= found.begins) & (slower.times <= found.time)
             over = np.where(outside, np.maximum(over, _LARGEST_RAISE), over)
@@ -210,11 +210,11 @@ def _law(
         raised = np.zeros(count)
         np.maximum.at(raised, piece, np.where(over > 0.0, over, 0.0))
         raised = np.where(raised > 0.0, np.clip(0.5 * raised, _LEAST_RAISE, _LARGEST_RAISE), 0.0)
-        coefficients *= 1.0 + _over_four(raised, 0.0)
+        coefficients *= 1.0 + _largest_of_four(raised, 0.0)
     return None
 
 
-def _over_four(values: Floats, beyond: float) -> Floats:
+def _largest_of_four(values: Floats, beyond: float) -> Floats:
     """Largest value among the four pieces (n,) that each coefficient (n + 3,) affects."""
     padded = np.concatenate(([beyond] * 3, values, [beyond] * 3))
     largest: Floats = np.max([padded[k : k + values.size + 3] for k in range(4)], axis=0)
@@ -223,9 +223,9 @@ def _over_four(values: Floats, beyond: float) -> Floats:
 
 def _parts(motion: Motion, law: SlowerTime, envelope: Envelope) -> Iterator[SlowedPart]:
     """The parts that a slowness slows down, each with the limit that requires it."""
-    times, progress = law.of(motion.times)
+    times, progress = law.stretched(motion.times)
     factors = 1.0 / np.asarray(progress.first)
-    slow = np.concatenate(([False], factors > _NOTICEABLE, [False]))
+    slow = np.concatenate(([False], factors > _NOTICEABLE_FACTOR, [False]))
     edges = np.flatnonzero(np.diff(slow.astype(int)))
     for begin, end in zip(edges[::2], edges[1::2], strict=True):
         slowest = begin + int(factors[begin:end].argmax())

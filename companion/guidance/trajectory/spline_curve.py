@@ -12,7 +12,7 @@ from companion.guidance.trajectory.curves import (
 )
 from companion.guidance.trajectory.minimum_snap import Fixed, Observations, minimum_snap
 from companion.guidance.trajectory.sample import TrajectoryError
-from companion.guidance.trajectory.septic_spline import ORDER, Floats, SepticSpline
+from companion.guidance.trajectory.septic_spline import STATE_SIZE, Floats, SepticSpline
 
 _HEADING_CUTOFF = 2.0
 """Cutoff frequency of every `heading_spline`, Hz: no vehicle follows a faster heading."""
@@ -23,10 +23,10 @@ HEADING_CHECK_STEP = 1.0 / (32.0 * _HEADING_CUTOFF)
 _HEADING_STEP = 0.01
 """Sample period of the direction of flight, s."""
 
-_SLOW = 0.1
+_SLOW_SHARE = 0.1
 """Share of the largest horizontal speed below which the direction of flight is not used."""
 
-_STANDING = 0.01
+_STANDING_SPEED = 0.01
 """Speed below which the direction of flight is not used, m/s."""
 
 
@@ -109,8 +109,8 @@ def smoothed(
     knots = np.linspace(
         times[0], times[-1], int(np.ceil((times[-1] - times[0]) * 2.0 * cutoff)) + 1
     )
-    states = np.zeros((knots.size, ORDER, values.shape[1]))
-    mask = np.zeros((knots.size, ORDER), dtype=bool)
+    states = np.zeros((knots.size, STATE_SIZE, values.shape[1]))
+    mask = np.zeros((knots.size, STATE_SIZE), dtype=bool)
     for end, rests in zip((0, -1), resting, strict=True):
         states[end, 0] = values[end]
         mask[end] = True, rests, rests, rests
@@ -128,7 +128,7 @@ def heading_spline(times: Floats, headings: Floats, resting: tuple[bool, bool]) 
 
 
 def tangent_heading(spline: SepticSpline, resting: tuple[bool, bool]) -> SplineHeading:
-    """Heading along a spline of north, east and down, interpolated where the spline is slow.
+    """Heading along a spline of north, east and down, interpolated where it hardly moves.
 
     Args:
         spline: spline of the positions, m.
@@ -141,7 +141,7 @@ def tangent_heading(spline: SepticSpline, resting: tuple[bool, bool]) -> SplineH
     times = np.linspace(spline.begin, spline.end, count)
     velocity = spline.along(times)[:, :2, 1]
     speed = np.hypot(velocity[:, 0], velocity[:, 1])
-    moving = speed > max(_SLOW * speed.max(), _STANDING)
+    moving = speed > max(_SLOW_SHARE * speed.max(), _STANDING_SPEED)
     if not moving.any():
         raise TrajectoryError("it never moves horizontally, so there is no heading along it")
     headings = np.unwrap(np.arctan2(velocity[moving, 1], velocity[moving, 0]))

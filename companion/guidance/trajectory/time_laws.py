@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, Protocol
 
 from companion.guidance.trajectory.sample import TrajectoryError
 
-STEEPEST = 2.1875
+SEPTIC_SLOPE = 2.1875
 """Largest slope of the septic blend, 140·(1/2)⁶."""
 
 
@@ -15,8 +15,8 @@ class Progress(NamedTuple):
     """The phase of a curve at one time, and its derivatives by time.
 
     Attributes:
-        phase: phase in the curve's unit.
-        first, second, third: per s, s², s³.
+        phase: phase in the curve's unit (rad, m or s).
+        first, second, third: derivatives, in that unit per s, s², s³.
     """
 
     phase: float
@@ -166,7 +166,7 @@ class Cruise:
         return Progress(self.rate * (time - 0.5 * self.rise_time), self.rate)
 
 
-_CRUISING = 3
+_CRUISING_PIECE = 3
 """Index of the piece at constant speed among the seven pieces of constant jerk."""
 
 
@@ -205,13 +205,12 @@ class LimitedJerk:
         self._pieces = _joined((*faster, (cruising, 0.0), *slower))
         self._ends = [start for start, _, _ in self._pieces[1:]]
         self.duration = 2.0 * ramp + cruising
-        """Duration, s."""
 
     def pieces(self) -> list[Piece]:
         """The seven pieces of constant jerk."""
         begins = [start for start, _, _ in self._pieces]
         spans = zip(begins, [*begins[1:], self.duration], strict=True)
-        return [Piece(begin, end, k == _CRUISING) for k, (begin, end) in enumerate(spans)]
+        return [Piece(begin, end, k == _CRUISING_PIECE) for k, (begin, end) in enumerate(spans)]
 
     def at(self, time: float) -> Progress:
         """Progress at `time`."""
@@ -224,11 +223,11 @@ class LimitedJerk:
         return _after_constant_jerk(state, jerk, time - start)
 
 
-_Piece = tuple[float, Progress, float]
+_JerkPiece = tuple[float, Progress, float]
 """(beginning in s, progress there, jerk)."""
 
 
-def _joined(jerks: Sequence[tuple[float, float]]) -> list[_Piece]:
+def _joined(jerks: Sequence[tuple[float, float]]) -> list[_JerkPiece]:
     """Join pieces (duration s, constant jerk) into one motion that begins at rest."""
     pieces = []
     start, state = 0.0, Progress(0.0)

@@ -20,10 +20,10 @@ from companion.guidance.trajectory.septic_spline import Floats
 from companion.guidance.trajectory.time_laws import Piece, TimeLaw, derivatives
 
 _CHECKS_PER_PIECE = 256
-"""Fewest checks in each smooth part of a time law whose rate changes."""
+"""Fewest checks in each piece of a time law whose rate changes."""
 
-_TABLE = 2048
-"""Rows of the table that maps a phase to a time. It need not be exact."""
+_TABLE_ROWS = 2048
+"""Rows of the table from which the time at a phase is interpolated; it need not be exact."""
 
 
 def check_times(sampling: PhaseSampling, law: TimeLaw, longest: float = LONGEST) -> list[float]:
@@ -54,7 +54,9 @@ def require_duration(seconds: float, longest: float = LONGEST) -> None:
         TrajectoryError: the trajectory lasts longer.
     """
     if not seconds <= longest:
-        raise TrajectoryError(f"it lasts {seconds:.4g} s, and {longest:.0f} s is the longest")
+        raise TrajectoryError(
+            f"it lasts {seconds:.4g} s, and {longest:.0f} s is the longest; make it shorter"
+        )
 
 
 def _checked_parts(piece: Piece, sampling: PhaseSampling, law: TimeLaw) -> Iterator[Piece]:
@@ -88,7 +90,7 @@ def _times(
         rate = law.at(piece.begin).first
         ends = np.array([piece.begin, piece.end])
         return np.concatenate((ends, piece.begin + (phases - begin) / rate))
-    table = np.linspace(piece.begin, piece.end, _TABLE)
+    table = np.linspace(piece.begin, piece.end, _TABLE_ROWS)
     reached = np.array([law.at(time).phase for time in table.tolist()])
     evenly = np.linspace(piece.begin, piece.end, _CHECKS_PER_PIECE + 1)
     # The jerk may jump at the end, and belongs to the next part there.

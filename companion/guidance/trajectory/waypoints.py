@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.guidance.trajectory.minimum_snap import Fixed, minimum_snap
-from companion.guidance.trajectory.sample import LEAST_WAY, TrajectoryError, Vector
-from companion.guidance.trajectory.septic_spline import ORDER, Floats, SepticSpline
+from companion.guidance.trajectory.sample import SMALLEST_DISTANCE, TrajectoryError, Vector
+from companion.guidance.trajectory.septic_spline import STATE_SIZE, Floats, SepticSpline
 from companion.guidance.trajectory.spline_curve import (
     HEADING_CHECK_STEP,
     SplineCurve,
@@ -61,7 +61,7 @@ def waypoints(
         )
     places = np.array([(0.0, 0.0, 0.0), *points])
     distances = np.linalg.norm(np.diff(places, axis=0), axis=1)
-    if not points or distances.min() < LEAST_WAY:
+    if not points or distances.min() < SMALLEST_DISTANCE:
         raise TrajectoryError(_fault(distances))
     knots = np.concatenate(([0.0], np.cumsum(_trapezoids(distances, speed, acceleration))))
     knots *= _stretch(_through(knots, places), knots, speed, acceleration)
@@ -80,7 +80,7 @@ def waypoints(
 def _fault(distances: Floats) -> str:
     if not distances.size:
         return "there are no waypoints"
-    index = int(np.flatnonzero(distances < LEAST_WAY)[0])
+    index = int(np.flatnonzero(distances < SMALLEST_DISTANCE)[0])
     before = f"waypoint {index}" if index else "the start"
     return f"waypoint {index + 1} is the same as {before}; leave it out"
 
@@ -94,14 +94,14 @@ def _trapezoids(distances: Floats, speed: float, acceleration: float) -> Floats:
 
 def _through(knots: Floats, places: Floats) -> SepticSpline:
     """A spline through the places (k, n) at the knots, from rest to rest."""
-    states = np.zeros((knots.size, ORDER, places.shape[1]))
+    states = np.zeros((knots.size, STATE_SIZE, places.shape[1]))
     states[:, 0] = places
     return minimum_snap(knots, Fixed(states, _rest_to_rest_mask(np.ones(knots.size, dtype=bool))))
 
 
 def _rest_to_rest_mask(values: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Mask (k, 4) of a spline at rest at both ends, with the knots of known value (k,) fixed."""
-    mask = np.zeros((values.size, ORDER), dtype=bool)
+    mask = np.zeros((values.size, STATE_SIZE), dtype=bool)
     mask[:, 0] = values
     mask[[0, -1], 1:] = True
     return mask
@@ -122,6 +122,6 @@ def _stretch(spline: SepticSpline, knots: Floats, speed: float, acceleration: fl
 def _given_headings(knots: Floats, headings: Sequence[float | None]) -> SplineHeading:
     """A spline through the given headings, turning the short way from one to the next."""
     given = np.array([angle is not None for angle in (None, *headings)])
-    states = np.zeros((knots.size, ORDER, 1))
+    states = np.zeros((knots.size, STATE_SIZE, 1))
     states[given, 0, 0] = np.unwrap([angle for angle in headings if angle is not None])
     return SplineHeading(minimum_snap(knots, Fixed(states, _rest_to_rest_mask(given))))

@@ -16,7 +16,11 @@ class Receiver(Protocol):
     """Takes the bytes that a transport receives. `PeerRule` explains claims."""
 
     def connect(self, *, streaming: bool) -> None:
-        """Forget an incomplete frame: the next bytes come over another connection."""
+        """Forget an incomplete frame: the next bytes come over another connection.
+
+        Args:
+            streaming: Whether a frame may continue in the bytes received next.
+        """
 
     def receive(self, data: bytes, received_ns: int) -> bool:
         """Take bytes of the peer (`Receive`)."""

@@ -6,7 +6,7 @@ import socket
 
 from companion.mavlink.errors import LinkError
 
-_FIRST, _COUNT = 20_000, 12_000
+_FIRST_PORT, _PORT_COUNT = 20_000, 12_000
 """Below 32768, where Linux begins to give ports to sockets that ask for any."""
 
 _PORTS_PER_PROCESS = 50
@@ -27,11 +27,11 @@ def free_port(*offsets: int) -> int:
     Raises:
         LinkError: all ports are in use.
     """
-    for number in itertools.islice(_counter, _COUNT):
-        port = _FIRST + (os.getpid() * _PORTS_PER_PROCESS + number) % _COUNT
+    for number in itertools.islice(_counter, _PORT_COUNT):
+        port = _FIRST_PORT + (os.getpid() * _PORTS_PER_PROCESS + number) % _PORT_COUNT
         if all(_is_free(port + offset) for offset in (0, *offsets)):
             return port
-    raise LinkError(f"all ports from {_FIRST} to {_FIRST + _COUNT - 1} are in use")
+    raise LinkError(f"all ports from {_FIRST_PORT} to {_FIRST_PORT + _PORT_COUNT - 1} are in use")
 
 
 def _is_free(port: int) -> bool:

@@ -18,8 +18,8 @@ _LOG = logging.getLogger(__name__)
 
 _MAX_DATAGRAM = 4096  # far above the largest MAVLink frame (280); routers pack several into one
 _SO_TIMESTAMPNS = getattr(socket, "SO_TIMESTAMPNS", 35)  # Linux; the module names it from 3.13 on
-_STAMP = struct.Struct("@qq")  # s and ns since 1970
-_STAMP_SPACE = socket.CMSG_SPACE(_STAMP.size)
+_STAMP_LAYOUT = struct.Struct("@qq")  # s and ns since 1970
+_STAMP_SPACE = socket.CMSG_SPACE(_STAMP_LAYOUT.size)
 _MAX_STAMP_AGE_NS = 1_000_000_000  # an older stamp means that the computer's clock was changed
 _MAX_READS_AT_ONCE = 32  # datagrams read before the loop does other work
 
@@ -207,6 +207,6 @@ def _arrival_ns(stamps: list[tuple[int, int, bytes]]) -> int:
     now = time.perf_counter_ns()
     if not stamps:
         return now
-    seconds, nanoseconds = _STAMP.unpack(stamps[0][2])
+    seconds, nanoseconds = _STAMP_LAYOUT.unpack(stamps[0][2])
     age = time.time_ns() - (seconds * 1_000_000_000 + nanoseconds)
     return now - age if 0 <= age < _MAX_STAMP_AGE_NS else now

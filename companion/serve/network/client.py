@@ -96,7 +96,7 @@ class Client(ABC):
     def _flush(self) -> None:
         """Send queued frames without blocking; called only if some are queued."""
 
-    def _take(self, most: int) -> tuple[bytes, int]:
+    def _dequeue(self, most: int) -> tuple[bytes, int]:
         """Remove whole frames from the queue, at least one.
 
         Args:
@@ -114,13 +114,12 @@ class Client(ABC):
         return b"".join(frames), len(frames)
 
     def _drop_waiting(self) -> None:
-        """Drop all queued frames."""
         self.stats.dropped += len(self._waiting)
         self._waiting.clear()
         self._bytes = 0
 
 
-class Flood:
+class FloodDetector:
     """Detects a client that sends faster than any program needs to."""
 
     WINDOW = 0.02

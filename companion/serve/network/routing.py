@@ -61,8 +61,8 @@ class Routing:
     """Forwards each frame, byte for byte, to the channels that should hear it.
 
     - A frame without a target, or for everybody, goes to all channels but its own.
-    - A targeted frame goes to the channels on which its target was heard. If a component of the
-      vehicle's system was never heard, its frames go to the vehicle.
+    - A targeted frame goes to the channels on which its target was heard. A frame for a component
+      of the vehicle's system that was never heard goes to the vehicle.
     - Frames for our own component end here.
     - Messages of unknown kinds go to everybody, as their target is not known.
 
@@ -76,7 +76,7 @@ class Routing:
         stats: counters of frames.
         intercept: called with a client's frame before it is forwarded; returns whether it must not
             be. Until it is set, nothing of a client is forwarded.
-        on_own: called with each client's frame that only our component should receive, or None.
+        on_own_frame: called with each client's frame for our component; None: it is dropped.
     """
 
     def __init__(
@@ -84,7 +84,7 @@ class Routing:
     ) -> None:
         self.stats = RoutingStats()
         self.intercept: Intercept = lambda *_: True
-        self.on_own: Callable[[Channel, Frame], None] | None = None
+        self.on_own_frame: Callable[[Channel, Frame], None] | None = None
         self._vehicle, self._autopilot, self._own = vehicle, autopilot, own
         self._heard: dict[Channel | VehicleChannel, set[Address]] = {vehicle: {autopilot}}
         self._clients: tuple[Channel, ...] = ()
@@ -127,7 +127,7 @@ class Routing:
     def from_client(self, client: Channel, frame: Frame) -> None:
         """Forward a client's frame, unless it is looped, for our component, or intercepted.
 
-        A looped frame (`RoutingStats`) is dropped; a frame for our component goes to `on_own`.
+        A looped frame (`RoutingStats`) is dropped. One for our component goes to `on_own_frame`.
         """
         source = source_of(frame)
         if (
@@ -141,8 +141,8 @@ class Routing:
             self._heard[client].add(source)
         target = target_of(frame)
         if target == self._own:
-            if self.on_own is not None:
-                self.on_own(client, frame)
+            if self.on_own_frame is not None:
+                self.on_own_frame(client, frame)
             return
         if self.intercept(client, frame):
             return

@@ -71,5 +71,5 @@ class SerialClient(Client):
         while self._waiting and self.transport is not None:
             if not self.transport.send(self._waiting[0]):
                 return  # the line is busy; what does not fit into the queue meanwhile is dropped
-            self._take(0)
+            self._dequeue(0)
             self.stats.sent += 1

@@ -8,7 +8,7 @@ from companion.mavlink.peer import NamedPeers, host_and_port, plain_host, resolv
 from companion.mavlink.transport.base import why_not_opened
 from companion.mavlink.transport.endpoint import TcpClient as TcpOut
 from companion.mavlink.transport.endpoint import TcpServer
-from companion.serve.network.client import Client, Clients, Flood
+from companion.serve.network.client import Client, Clients, FloodDetector
 
 _MAX_CLIENTS = 16
 _MAX_UNSENT_BYTES = 65_536
@@ -145,7 +145,7 @@ class TcpClient(Client):
         if transport.is_closing() or transport.get_write_buffer_size() > _MAX_UNSENT_BYTES:
             self._drop_waiting()
         else:
-            data, frames = self._take(_MAX_UNSENT_BYTES)
+            data, frames = self._dequeue(_MAX_UNSENT_BYTES)
             transport.write(data)
             self.stats.sent += frames
 
@@ -156,7 +156,7 @@ class _Connection(asyncio.Protocol):
         self._loop = asyncio.get_running_loop()
         self._client: TcpClient | None = None
         self._transport: asyncio.Transport | None = None
-        self._flood = Flood()
+        self._flood = FloodDetector()
         self.lost = asyncio.Event()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -172,7 +172,7 @@ class _Connection(asyncio.Protocol):
         number = self._port.received(self._client, data)
         if self._flood.count(number, self._loop.time()) and not self._transport.is_closing():
             self._transport.pause_reading()
-            self._loop.call_later(Flood.WINDOW, self._resume)
+            self._loop.call_later(FloodDetector.WINDOW, self._resume)
 
     def _resume(self) -> None:
         if self._transport is not None and not self._transport.is_closing():

@@ -9,7 +9,7 @@ from companion.mavlink.peer import NamedPeers, host_and_port, plain_host
 from companion.mavlink.transport.base import why_not_opened
 from companion.mavlink.transport.endpoint import UdpIn, UdpOut
 from companion.mavlink.transport.udp import udp_address
-from companion.serve.network.client import Client, Clients, Flood
+from companion.serve.network.client import Client, Clients, FloodDetector
 
 _READ_BYTES = 4_096
 _MAX_DATAGRAM = 1_400
@@ -59,7 +59,7 @@ class UdpPort:
         self._loop = asyncio.get_running_loop()
         self._by_address: dict[Any, UdpClient] = {}
         self._only_address: Any = None
-        self._flood = Flood()
+        self._flood = FloodDetector()
         self._pause: asyncio.TimerHandle | None = None
         self._timer = self._loop.call_later(_SILENCE_TIMEOUT, self._expire)
         self._loop.add_reader(sock.fileno(), self._read)
@@ -102,7 +102,7 @@ class UdpPort:
             self._take(data, address)
             if self._flood.count(1, self._loop.time()):
                 self._loop.remove_reader(self._socket.fileno())
-                self._pause = self._loop.call_later(Flood.WINDOW, self._resume)
+                self._pause = self._loop.call_later(FloodDetector.WINDOW, self._resume)
                 return
 
     def _resume(self) -> None:
@@ -152,7 +152,7 @@ class UdpClient(Client):
 
     def _flush(self) -> None:
         while self._waiting:
-            datagram, frames = self._take(_MAX_DATAGRAM)
+            datagram, frames = self._dequeue(_MAX_DATAGRAM)
             if self._port.send(datagram, self._address):
                 self.stats.sent += frames
             else:

@@ -17,7 +17,7 @@ class State(NamedTuple):
 
 
 class AxisLimits(NamedTuple):
-    """Limits of a motion along one axis.
+    """Limits of a motion along one axis, in SI units or radians.
 
     Attributes:
         velocity: largest velocity along the axis.

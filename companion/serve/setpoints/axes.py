@@ -1,8 +1,8 @@
 """Axes that follow commands: a stream directly, a jump by a motion within limits.
 
-The commanded state is extrapolated between setpoints (`Carrier`). When it jumps, the difference
-between the present and the commanded state becomes an error, which a jerk-limited motion reduces to
-zero (`Approach`). The state is the sum of both.
+The commanded state is extrapolated between setpoints (`CommandedState`). When it jumps, the
+difference between the present and the commanded state becomes an error, which a jerk-limited motion
+reduces to zero (`Approach`). The state is the sum of both.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,12 @@ from typing import NamedTuple
 from companion.attitude.rotation import clamp
 from companion.guidance.reference import LARGEST_JERK, change_rate
 from companion.serve.setpoints.approach import Approach, AxisLimits, State, Values
-from companion.serve.setpoints.carrier import AxisMotion, Carrier, are_far_apart, plus
+from companion.serve.setpoints.commanded_state import (
+    AxisMotion,
+    CommandedState,
+    are_far_apart,
+    plus,
+)
 from companion.serve.setpoints.request import AxisDemand
 
 _MAX_STREAM_PERIOD = 0.25
@@ -64,24 +69,24 @@ class Axes:
         self._demand: AxisDemand | None = None
         self._given_at = 0.0
         self._approach: Approach | None = None
-        self._carrier = Carrier(self._zero, self._zero, self._zero, self._zero, 0.0)
+        self._commanded = CommandedState(self._zero, self._zero, self._zero, self._zero, 0.0)
 
     def begin(self, state: State, now: float) -> None:
         """Start from a state, and come to rest until a command comes."""
         self._demand, self._approach = None, None
-        self._carrier = Carrier(*state, self._zero, now)
+        self._commanded = CommandedState(*state, self._zero, now)
         self.stop(now)
 
     def at(self, time: float) -> State:
         """The state at a time, s."""
-        carried = self._carrier.at(time)
+        commanded = self._commanded.at(time)
         if self._approach is None:
-            return carried
+            return commanded
         error = self._approach.at(time)
         return State(
-            plus(carried.position, error.position),
-            plus(carried.velocity, error.velocity),
-            plus(carried.acceleration, error.acceleration),
+            plus(commanded.position, error.position),
+            plus(commanded.velocity, error.velocity),
+            plus(commanded.acceleration, error.acceleration),
         )
 
     def stop(self, now: float, actual: AxisMotion | None = None) -> None:
@@ -98,7 +103,7 @@ class Axes:
                 current.position, actual.position, _MAX_LEAD_DISTANCE
             ) or are_far_apart(current.velocity, actual.velocity, _MAX_LEAD_SPEED):
                 self._demand, self._approach = None, None
-                self._carrier = Carrier(*actual, self._zero, self._zero, now)
+                self._commanded = CommandedState(*actual, self._zero, self._zero, now)
         self.command(AxisDemand(None, self._zero, None), now)
 
     def command(self, demand: AxisDemand, now: float, actual: AxisMotion | None = None) -> None:
@@ -118,9 +123,9 @@ class Axes:
             return
         current = self.at(now)
         if demand.position is not None:
-            self._carry_position(demand, current, now)
+            self._follow_position(demand, current, now)
         else:
-            self._carry_motion(demand, _near_vehicle(current, actual, demand), now)
+            self._follow_motion(demand, _near_vehicle(current, actual, demand), now)
         self._demand, self._given_at = demand, now
 
     def _repeat(self, demand: AxisDemand, now: float, actual: AxisMotion | None) -> None:
@@ -130,7 +135,7 @@ class Axes:
             return
         moving = any(demand.velocity or ()) or any(demand.acceleration or ())
         if moving and now - self._given_at > self._timeout:
-            self._carry_position(AxisDemand(demand.position, None, None), self.at(now), now)
+            self._follow_position(AxisDemand(demand.position, None, None), self.at(now), now)
             self._given_at = inf
 
     def _repeat_motion(self, demand: AxisDemand, now: float, actual: AxisMotion | None) -> None:
@@ -144,31 +149,31 @@ class Axes:
         strayed = actual is not None and are_far_apart(
             current.position, actual.position, _MAX_LEAD_DISTANCE
         )
-        accelerates_on = demand.acceleration is None and any(self._carrier.acceleration)
+        accelerates_on = demand.acceleration is None and any(self._commanded.acceleration)
         if demand.velocity is None or strayed or accelerates_on:
-            self._carry_motion(demand, _near_vehicle(current, actual, demand), now)
+            self._follow_motion(demand, _near_vehicle(current, actual, demand), now)
 
-    def _carry_position(self, demand: AxisDemand, current: State, now: float) -> None:
+    def _follow_position(self, demand: AxisDemand, current: State, now: float) -> None:
         assert demand.position is not None
         velocity = demand.velocity or self._zero
         acceleration, jerk = self._derivatives(demand, now)
-        carrier = Carrier(demand.position, velocity, acceleration, jerk, now)
-        error = carrier.error_of(current)
+        target = CommandedState(demand.position, velocity, acceleration, jerk, now)
+        error = target.error_of(current)
         if demand.velocity is not None and self._is_continued(error):
             approach = None
         else:
             approach = self._plan(error, error.position, now, by_velocity=False)
-        self._carrier, self._approach = carrier, approach
+        self._commanded, self._approach = target, approach
 
-    def _carry_motion(self, demand: AxisDemand, current: State, now: float) -> None:
+    def _follow_motion(self, demand: AxisDemand, current: State, now: float) -> None:
         velocity = current.velocity if demand.velocity is None else demand.velocity
         acceleration = demand.acceleration or self._zero
-        carrier = Carrier(current.position, velocity, acceleration, self._zero, now)
+        target = CommandedState(current.position, velocity, acceleration, self._zero, now)
         approach = None
         if demand.velocity is not None:
-            error = carrier.error_of(current)
+            error = target.error_of(current)
             approach = self._plan(error, error.velocity, now, by_velocity=True)
-        self._carrier, self._approach = carrier, approach
+        self._commanded, self._approach = target, approach
 
     def _plan(self, error: State, direction: Values, now: float, *, by_velocity: bool) -> Approach:
         """A motion of the error to zero; the limits hold along its direction, not for each axis."""
@@ -197,11 +202,11 @@ class Axes:
             rate = change_rate(before.velocity, demand.velocity, since, _LARGEST_ACCELERATION)
             if rate is None:
                 return self._zero, self._zero
-            return _blend(self._carrier.acceleration, rate), self._zero
+            return _blend(self._commanded.acceleration, rate), self._zero
         if before.acceleration is None:
             return commanded, self._zero
         jerk = change_rate(before.acceleration, commanded, since, LARGEST_JERK)
-        return commanded, self._zero if jerk is None else _blend(self._carrier.jerk, jerk)
+        return commanded, self._zero if jerk is None else _blend(self._commanded.jerk, jerk)
 
     def _is_continued(self, error: State) -> bool:
         return (

@@ -7,7 +7,7 @@ from companion.attitude.representation import wrap_angle
 from companion.guidance.reference import Reference, Vector, VehicleMotion
 from companion.serve.setpoints.approach import AxisLimits, State, UnplannableError
 from companion.serve.setpoints.axes import Axes, Continuity
-from companion.serve.setpoints.carrier import AxisMotion
+from companion.serve.setpoints.commanded_state import AxisMotion
 from companion.serve.setpoints.request import AxisDemand, MotionRequest
 
 _HORIZONTAL_CONTINUITY = Continuity(0.3, 0.6)

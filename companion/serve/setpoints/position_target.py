@@ -20,11 +20,11 @@ from companion.serve.setpoints.request import (
     Situation,
 )
 
-_POSITION, _VELOCITY, _ACCELERATION = (1, 2, 4), (8, 16, 32), (64, 128, 256)
+_POSITION_BITS, _VELOCITY_BITS, _ACCELERATION_BITS = (1, 2, 4), (8, 16, 32), (64, 128, 256)
 _FORCE, _NO_YAW, _NO_YAW_RATE = 512, 1024, 2048
 _NO_ACCELERATION = 64 | 128 | 256
 _KNOWN_BITS = 4095
-_HORIZONTAL, _VERTICAL = (0, 1), (2,)
+_HORIZONTAL_AXES, _VERTICAL_AXES = (0, 1), (2,)
 
 _MAX_POSITION, _MAX_SPEED, _MAX_ACCELERATION, _MAX_YAW_RATE = 10_000.0, 100.0, 100.0, 20.0
 """Larger numbers count as errors; m, m/s, m/s², rad/s."""
@@ -51,9 +51,12 @@ _LOCAL_FRAMES = {
     dialect.MAV_FRAME_BODY_OFFSET_NED: _Frame(offset=True, body=True),
     dialect.MAV_FRAME_BODY_FRD: _Frame(offset=True, body=True),
 }
-_AMSL = dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_INT
-_ABOVE_HOME = dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
-_TERRAIN = dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT, dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT
+_AMSL_FRAMES = dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_INT
+_ABOVE_HOME_FRAMES = (
+    dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+    dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+)
+_TERRAIN_FRAMES = dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT, dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT
 
 
 def local_target(
@@ -95,15 +98,15 @@ def global_target(message: Message, situation: Situation) -> MotionRequest:
             kind that is not flown; or the origin of the local frame is unknown.
     """
     frame = message.coordinate_frame
-    if frame in _TERRAIN:
+    if frame in _TERRAIN_FRAMES:
         raise RefusedSetpoint("heights above terrain are not known here: use AMSL or above home")
-    if frame not in (*_AMSL, *_ABOVE_HOME):
+    if frame not in (*_AMSL_FRAMES, *_ABOVE_HOME_FRAMES):
         raise RefusedSetpoint(f"coordinate_frame {frame} is not supported")
     position, velocity, acceleration = _groups(message, (0.0, 0.0, message.alt))
     if any(value is not None for value in position):
         if situation.origin is None:
             raise RefusedSetpoint("the vehicle's global position is not known yet")
-        place = _to_local(message, situation.origin, above_home=frame in _ABOVE_HOME)
+        place = _to_local(message, situation.origin, above_home=frame in _ABOVE_HOME_FRAMES)
         position = tuple(
             None if value is None else here for value, here in zip(position, place, strict=True)
         )
@@ -122,11 +125,11 @@ def _groups(message: Message, position: Vector) -> tuple[_Values, _Values, _Valu
     if mask & ~_KNOWN_BITS:
         raise RefusedSetpoint(f"type_mask {mask} has bits that mean nothing to a multirotor")
     return (
-        _masked(mask, _POSITION, position, _MAX_POSITION, "position"),
-        _masked(mask, _VELOCITY, (message.vx, message.vy, message.vz), _MAX_SPEED, "velocity"),
+        _masked(mask, _POSITION_BITS, position, _MAX_POSITION, "position"),
+        _masked(mask, _VELOCITY_BITS, (message.vx, message.vy, message.vz), _MAX_SPEED, "velocity"),
         _masked(
             mask,
-            _ACCELERATION,
+            _ACCELERATION_BITS,
             (message.afx, message.afy, message.afz),
             _MAX_ACCELERATION,
             "acceleration",
@@ -177,8 +180,8 @@ def _request(
     yaw_rate: float | None,
 ) -> MotionRequest:
     return MotionRequest(
-        _demand(groups, _HORIZONTAL, "horizontal"),
-        _demand(groups, _VERTICAL, "vertical"),
+        _demand(groups, _HORIZONTAL_AXES, "horizontal"),
+        _demand(groups, _VERTICAL_AXES, "vertical"),
         yaw,
         yaw_rate,
     )

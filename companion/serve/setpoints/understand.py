@@ -7,10 +7,10 @@ from companion.serve.setpoints.attitude_target import attitude_target
 from companion.serve.setpoints.position_target import global_target, local_target
 from companion.serve.setpoints.request import RefusedSetpoint, Request, Situation
 
-_ATTITUDE = dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET
-_LOCAL = dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED
-_GLOBAL = dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT
-SETPOINTS = frozenset({_ATTITUDE, _LOCAL, _GLOBAL})
+_ATTITUDE_TARGET_ID = dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET
+_LOCAL_TARGET_ID = dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED
+_GLOBAL_TARGET_ID = dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT
+SETPOINTS = frozenset({_ATTITUDE_TARGET_ID, _LOCAL_TARGET_ID, _GLOBAL_TARGET_ID})
 """Numbers of the messages that command a motion, an attitude or body rates."""
 
 
@@ -36,9 +36,9 @@ def understand(
     """
     _check_target(target_of(frame), *targets)
     message = decode(frame.message_id, frame.payload)
-    if frame.message_id == _ATTITUDE:
+    if frame.message_id == _ATTITUDE_TARGET_ID:
         return attitude_target(message)
-    if frame.message_id == _GLOBAL:
+    if frame.message_id == _GLOBAL_TARGET_ID:
         return global_target(message, situation)
     return local_target(message, situation, body_yaw_is_relative=body_yaw_is_relative)
 

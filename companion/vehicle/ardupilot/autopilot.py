@@ -23,7 +23,7 @@ from companion.vehicle.autopilot import (
     Role,
 )
 
-_ARMED, _GUIDED = 128, 8  # MAV_MODE_FLAG
+_ARMED_FLAG, _GUIDED_FLAG = 128, 8  # MAV_MODE_FLAG
 _CUSTOM_MODE_ENABLED = 1.0
 _ESTIMATOR_NEEDED = 0x1 | 0x2 | 0x4 | 0x10  # attitude, both velocities, absolute position
 _NO_POSITION = 0x80  # constant position mode: the estimator has no position measurement
@@ -88,7 +88,7 @@ class ArduPilot:
     def mode_name(self, base_mode: int, custom_mode: int) -> str:
         """Name of the mode in a heartbeat; GUIDED has another name while it obeys body rates."""
         name = _NAMES.get(custom_mode, f"mode {custom_mode}")
-        by_rates = name == "GUIDED" and base_mode & _ARMED and not base_mode & _GUIDED
+        by_rates = name == "GUIDED" and base_mode & _ARMED_FLAG and not base_mode & _GUIDED_FLAG
         return _BY_RATES if by_rates else name
 
     def roles(self, mode: str) -> frozenset[Role]:

@@ -96,7 +96,7 @@ def _battery_failsafe(value: float, values: Values, _: CompanionSettings) -> Pro
     )
 
 
-def _acceleration(axis: str, name: str) -> tuple[ParameterRule, ParameterRule]:
+def _acceleration_rules(axis: str, name: str) -> tuple[ParameterRule, ParameterRule]:
     meaning = f"how quickly the {name} rate may change"
     return (
         ParameterRule((f"ATC_ACC_{axis}_MAX",), meaning, acceleration_limit(1.0, name), _MEASURED),
@@ -143,9 +143,9 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         at_most(INEFFECTIVE, 0.3, "levelling takes long when setpoints stop", 0.15),
         _REFERENCE,
     ),
-    *_acceleration("R", "roll"),
-    *_acceleration("P", "pitch"),
-    *_acceleration("Y", "yaw"),
+    *_acceleration_rules("R", "roll"),
+    *_acceleration_rules("P", "pitch"),
+    *_acceleration_rules("Y", "yaw"),
     ParameterRule(
         ("FS_GCS_ENABLE",),
         "what ArduPilot does when the ground station's heartbeat stops",

@@ -11,12 +11,13 @@ from typing import NamedTuple
 
 from companion.mavlink.texts import TextAssembler
 
-_EVENT = struct.Struct("<IIHBBB40s")  # id, time, sequence, destination, log levels, arguments
-_AUTOPILOT = 1 << 24
+_EVENT_LAYOUT = struct.Struct("<IIHBBB40s")
+"""Fields: id, time, sequence, destination (two bytes), log levels, arguments."""
+_AUTOPILOT_COMPONENT = 1 << 24
 _FNV_OFFSET, _FNV_PRIME = 0x811C9DC5, 0x01000193
 _WARNING_SEVERITY, _PROGRAMS_ONLY_SEVERITY = 4, 8
 
-_REASONS = {
+_ARMING_REASONS = {
     1: "stick gesture",
     2: "RC switch",
     3: "internal command",
@@ -31,7 +32,7 @@ _REASONS = {
     13: "RC button",
     14: "failsafe",
 }
-_ACTIONS = {
+_FAILSAFE_ACTIONS = {
     1: "warning",
     2: "fallback to position control",
     3: "fallback to altitude control",
@@ -43,7 +44,7 @@ _ACTIONS = {
     9: "disarm",
     10: "terminate",
 }
-_CAUSES = {
+_FAILSAFE_CAUSES = {
     1: "manual control loss",
     2: "GCS connection loss",
     3: "low battery level",
@@ -68,8 +69,8 @@ class _Text(NamedTuple):
 
 
 _EVENTS = {
-    "commander_armed_by": _Text("Armed by {}", "<B", (_REASONS,)),
-    "commander_disarmed_by": _Text("Disarmed by {}", "<B", (_REASONS,)),
+    "commander_armed_by": _Text("Armed by {}", "<B", (_ARMING_REASONS,)),
+    "commander_disarmed_by": _Text("Disarmed by {}", "<B", (_ARMING_REASONS,)),
     "commander_arm_denied_resolve_failures": _Text(
         "Arming denied: Resolve system health failures first"
     ),
@@ -83,24 +84,26 @@ _EVENTS = {
         "Using default takeoff altitude: {:.1f} m", "<f", (None,)
     ),
     "commander_failsafe_enter": _Text(
-        "Failsafe activated due to {1}, triggering {0}", "<4xBB", (_ACTIONS, _CAUSES)
+        "Failsafe activated due to {1}, triggering {0}",
+        "<4xBB",
+        (_FAILSAFE_ACTIONS, _FAILSAFE_CAUSES),
     ),
     "commander_failsafe_enter_generic": _Text(
-        "Failsafe activated, triggering {}", "<4xB", (_ACTIONS,)
+        "Failsafe activated, triggering {}", "<4xB", (_FAILSAFE_ACTIONS,)
     ),
     "commander_failsafe_enter_autopilot_disengaged": _Text(
-        "Failsafe activated, triggering {}", "<4xB", (_ACTIONS,)
+        "Failsafe activated, triggering {}", "<4xB", (_FAILSAFE_ACTIONS,)
     ),
     "commander_failsafe_enter_hold": _Text(
         "Failsafe activated due to {2}, triggering {0} in {1} seconds",
         "<4xBHB",
-        (_ACTIONS, None, _CAUSES),
+        (_FAILSAFE_ACTIONS, None, _FAILSAFE_CAUSES),
     ),
     "commander_failsafe_enter_generic_hold": _Text(
-        "Failsafe activated, triggering {} in {} seconds", "<4xBH", (_ACTIONS, None)
+        "Failsafe activated, triggering {} in {} seconds", "<4xBH", (_FAILSAFE_ACTIONS, None)
     ),
     "commander_failsafe_enter_warn": _Text(
-        "Failsafe warning triggered due to {}", "<4xB", (_CAUSES,)
+        "Failsafe warning triggered due to {}", "<4xB", (_FAILSAFE_CAUSES,)
     ),
     "commander_failsafe_enter_generic_warn": _Text("Failsafe warning triggered"),
     "commander_failsafe_enter_low_bat": _Text("Low battery level, return advised"),
@@ -118,7 +121,7 @@ _EVENTS = {
     "commander_onboard_ctrl_regained": _Text("Onboard controller regained"),
 }
 
-_CHECKS = {
+_CHECK_TEXTS = {
     "check_modes_attitude": "No valid attitude estimate",
     "check_modes_angular_velocity": "Angular velocity not valid",
     "check_modes_local_pos": "Navigation error: No valid position estimate",
@@ -132,12 +135,12 @@ _CHECKS = {
 }
 """Texts of the checks that a health report names as failing."""
 
-_OUR_STREAM = (
+_SETPOINT_CHECKS = (
     "check_modes_offboard_signal",
     "check_modes_offboard_no_signal",
     "check_modes_offboard_signal_lost",
 )
-"""Checks that fail while no setpoints are sent; they are not reported."""
+"""Checks that fail while no setpoints are sent; their failures are not reported."""
 
 
 def event_id(name: str) -> int:
@@ -145,7 +148,7 @@ def event_id(name: str) -> int:
     value = _FNV_OFFSET
     for byte in name.encode():
         value = (value ^ byte) * _FNV_PRIME & 0xFFFFFFFF
-    return _AUTOPILOT | value & 0xFFFFFF
+    return _AUTOPILOT_COMPONENT | value & 0xFFFFFF
 
 
 # The names of 17980399 and 30203637 are not known. Their texts come from the STATUSTEXTs that PX4
@@ -153,10 +156,10 @@ def event_id(name: str) -> int:
 _WORDS_BY_ID = {event_id(name): words for name, words in _EVENTS.items()} | {
     17980399: _Text("Logging to {}-{:02}-{:02}/{:02}_{:02}_{:02}.ulg", "<H5B", (None,) * 6),
 }
-_CHECKS_BY_ID = {event_id(name): words for name, words in _CHECKS.items()} | {
+_CHECKS_BY_ID = {event_id(name): words for name, words in _CHECK_TEXTS.items()} | {
     30203637: "No heading reference",
 }
-_OUR_STREAM_IDS = {event_id(name) for name in _OUR_STREAM}
+_SETPOINT_CHECK_IDS = {event_id(name) for name in _SETPOINT_CHECKS}
 _REPORT_BEGINS = event_id("commander_arming_check_summary")
 _REPORT_ENDS = event_id("commander_health_summary")
 
@@ -183,8 +186,8 @@ class EventReader:
 
     def take(self, payload: bytes) -> None:
         """Take the payload of one EVENT."""
-        number, _, sequence, _, _, levels, arguments = _EVENT.unpack(
-            payload[: _EVENT.size].ljust(_EVENT.size, b"\0")
+        number, _, sequence, _, _, levels, arguments = _EVENT_LAYOUT.unpack(
+            payload[: _EVENT_LAYOUT.size].ljust(_EVENT_LAYOUT.size, b"\0")
         )
         if sequence == self._last_sequence:
             return  # a repetition
@@ -196,7 +199,7 @@ class EventReader:
             self._failed_before, self._in_report = self._failing, False
         elif self._in_report:
             self._failing.add(number)
-            known = self._failed_before | _OUR_STREAM_IDS
+            known = self._failed_before | _SETPOINT_CHECK_IDS
             if number not in known and severity <= _WARNING_SEVERITY:
                 self._report(severity, number, _CHECKS_BY_ID.get(number))
         elif severity < _PROGRAMS_ONLY_SEVERITY:
@@ -208,11 +211,10 @@ class EventReader:
             self._texts.take_event(severity, words, self._clock())
         elif number not in self._unknown:
             self._unknown.add(number)
-            self._texts.take_event(severity, f"event {number}", self._clock())
+            self._texts.take_event(severity, f"unknown PX4 event {number}", self._clock())
 
 
 def _filled_in(words: _Text, arguments: bytes) -> str:
-    """The text with the values of an event filled in."""
     values = struct.unpack_from(words.layout, arguments)
     named = (
         value if meaning is None else meaning.get(value, str(value))

@@ -57,7 +57,8 @@ def _termination(value: float, values: Values, settings: CompanionSettings) -> P
     if not all(name in values for name in _FAILURE_ANGLES):
         return Problem(
             UNSAFE,
-            f"the tilt at which the motors stop ({_NAMED_ANGLES}) is not known; fix the link",
+            f"the tilt at which the motors stop ({_NAMED_ANGLES}) is not known, because these "
+            "parameters were not received; check again on a link that loses less",
         )
     angles = [values[name] for name in _FAILURE_ANGLES if values[name] > 0.0]
     if not angles or min(angles) > degrees(settings.max_tilt) + _TILT_OVERSHOOT:

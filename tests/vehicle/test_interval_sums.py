@@ -2,11 +2,11 @@
 
 import pytest
 
-from companion.vehicle.held_rates import HeldRates
+from companion.vehicle.interval_sums import IntervalSums
 
 
 def held(*intervals):
-    rates = HeldRates()
+    rates = IntervalSums()
     for interval in intervals:
         rates.add(interval)
     return rates
@@ -22,7 +22,7 @@ def held(*intervals):
     ],
 )
 def test_the_rate_is_the_mean_one_unless_pauses_dominate(intervals, rate):
-    assert held(*intervals).rate_since(HeldRates()) == pytest.approx(rate)
+    assert held(*intervals).rate_since(IntervalSums()) == pytest.approx(rate)
 
 
 def test_only_what_came_since_then_counts():
@@ -36,5 +36,5 @@ def test_only_what_came_since_then_counts():
 
 
 def test_setpoints_without_any_time_between_them_have_no_rate():
-    assert held(0.0, 0.0).rate_since(HeldRates()) is None
-    assert held(1e-170).rate_since(HeldRates()) is None  # its square is too small for a float
+    assert held(0.0, 0.0).rate_since(IntervalSums()) is None
+    assert held(1e-170).rate_since(IntervalSums()) is None  # its square is too small for a float

@@ -1,12 +1,13 @@
-"""The effective rate of setpoints or samples, from the time until each is replaced by the next."""
+"""The effective rate of setpoints or samples, from the intervals between them."""
 
 _MAX_UNEVENNESS = 2.0
-"""Largest ratio of the time-weighted mean interval Σg²/Σg to the mean interval for which the
-effective rate equals the mean rate. With a larger ratio it is lower.
+"""Up to this ratio of Σg²/Σg to the mean of the intervals g, the effective rate is the mean rate.
+
+If the intervals are less even, the ratio is larger, and the effective rate is lower.
 """
 
 
-class HeldRates:
+class IntervalSums:
     """Sums over the intervals between consecutive setpoints or samples.
 
     Attributes:
@@ -21,16 +22,16 @@ class HeldRates:
         self.intervals, self.seconds, self.squares = intervals, seconds, squares
 
     def add(self, interval: float) -> None:
-        """Add the time between one and the next, s."""
+        """Add the interval between one and the next, s."""
         self.intervals += 1
         self.seconds += interval
         self.squares += interval * interval
 
-    def copy(self) -> "HeldRates":
+    def copy(self) -> "IntervalSums":
         """A copy of the present sums."""
-        return HeldRates(self.intervals, self.seconds, self.squares)
+        return IntervalSums(self.intervals, self.seconds, self.squares)
 
-    def rate_since(self, before: "HeldRates") -> float | None:
+    def rate_since(self, before: "IntervalSums") -> float | None:
         """Effective rate since `before`, Hz; None if there was no interval since then.
 
         It is the number of intervals per second, but at most 2·Σg/Σg², summed over the intervals g.

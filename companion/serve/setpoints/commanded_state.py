@@ -1,4 +1,4 @@
-"""A commanded state along some axes, extrapolated between two setpoints."""
+"""The commanded state along some axes, extrapolated between two setpoints."""
 
 from math import hypot
 from typing import NamedTuple
@@ -18,8 +18,11 @@ class AxisMotion(NamedTuple):
     velocity: Values
 
 
-class Carrier(NamedTuple):
-    """The commanded state, extrapolated at a constant jerk from the time `begins`, s."""
+class CommandedState(NamedTuple):
+    """The commanded state at the time `begins`, s; from then on the jerk is constant.
+
+    Position, velocity, acceleration and jerk are in SI units or radians.
+    """
 
     position: Values
     velocity: Values
