@@ -136,9 +136,7 @@ class VehicleClock:
         """
         if self._lockstep or self._began == inf:
             return
-        time = (
-            vehicle_ns % WRAP_PERIOD_NS * 1e-9 + self._shift
-        )  # wrapped as the samples' stamps are
+        time = vehicle_ns % WRAP_PERIOD_NS * 1e-9 + self._shift  # wraps as the samples' stamps do
         middle_time, half_round_trip = 0.5 * (sent + received), 0.5 * (received - sent)
         quickest = self._quickest + self.rate.rate * (middle_time - self._received)
         attitude_fits = received - self._received < 1.0 and self._late < JUMP
