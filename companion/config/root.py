@@ -127,6 +127,10 @@ def _contradictions(config: Config) -> list[tuple[bool, str]]:
             "deadman.target_stale_ms must be at least two periods of guidance.rate_hz",
         ),
         (
+            config.deadman.telemetry_stale_ms <= 1000.0 / config.link.attitude_rate_hz,
+            "deadman.telemetry_stale_ms must be longer than a period of link.attitude_rate_hz",
+        ),
+        (
             "steps" in flown and config.steps.coefficient > sin(tilt),
             "steps.coefficient must not exceed the sine of limits.max_tilt_deg",
         ),

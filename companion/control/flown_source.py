@@ -12,7 +12,7 @@ from companion.guidance.source import ManeuverSource, Source
 _REJOINED_DISTANCE = 1.0
 """Distance from the reference at which the vehicle counts as returned after open loop, m."""
 _RETURN_TIME = 10.0
-"""Closed-loop time after which the vehicle counts as returned in any case, s; 10 m take 4 s."""
+"""After this time the vehicle must have returned, s; 10 m take 4 s."""
 
 
 class FlownSource:
@@ -102,14 +102,19 @@ class FlownSource:
     ) -> float | None:
         """Distance from the reference, m; `now` in s of event-loop time.
 
-        It is None without a pose, in open loop, and while the reference drifts. After open loop or
-        drifting it stays None until the vehicle is back at the reference, or for `_RETURN_TIME`.
+        It is None without a pose, in open loop, while the reference drifts, and until the vehicle
+        has returned from either. It has `_RETURN_TIME` for that, from the first closed loop on;
+        open loop that begins before it has returned gives it no more time.
         """
         distance = dist(reference.position_ned, motion.position_ned)
+        since = self._returning_since
         if not reference.holds_position:
-            self._returning_since = inf
-        elif self._returning_since is not None:
-            self._returning_since = since = min(now, self._returning_since)
-            if distance <= _REJOINED_DISTANCE or now - since > _RETURN_TIME:
+            self._returning_since = inf if since is None else since
+            return None
+        if since is not None:
+            self._returning_since = since = min(now, since)
+            if distance <= _REJOINED_DISTANCE:
                 self._returning_since = None
-        return None if self.pose is None or self._returning_since is not None else distance
+            elif now - since <= _RETURN_TIME:
+                return None
+        return None if self.pose is None else distance

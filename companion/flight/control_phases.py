@@ -1,6 +1,7 @@
 """The phases under our control and the endings, one coroutine each."""
 
 import asyncio
+from collections import deque
 from collections.abc import Callable
 from math import degrees
 
@@ -28,6 +29,9 @@ _SELF_DISARM_TIMEOUT = 8.0
 
 _MIN_HOLDING_TILT = 5.0
 """Smallest tilt that the thrust must allow to hold against a breeze, °."""
+
+_MARGIN_WINDOW = 1.0
+"""Time within which the largest tilt counts, s."""
 
 _ROLES_BEFORE_LANDING = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
 
@@ -92,11 +96,16 @@ async def _fly(context: FlightContext, source: Source, progress: Callable[[], st
 
 
 class _TiltMargin:
-    """Checks that the learned hover thrust leaves thrust for the configured tilt."""
+    """Checks that the learned hover thrust leaves thrust for the configured tilt.
+
+    The largest tilt within a second counts: a vehicle that does not receive our setpoints for some
+    tenths of a second falls, and seems heavy.
+    """
 
     def __init__(self, context: FlightContext) -> None:
         self._context = context
         self._reported = False
+        self._tilts: deque[tuple[float, float]] = deque()  # s on our clock, °
 
     def check(self) -> None:
         """Report a smaller tilt limit once.
@@ -105,7 +114,11 @@ class _TiltMargin:
             FlightEnded: the thrust allows less than 5° of tilt.
         """
         limits, learning = self._context.config.limits, self._context.guidance_loop.learning
-        tilt, hover = degrees(learning.largest_tilt()), learning.present_hover
+        now, tilts = asyncio.get_running_loop().time(), self._tilts
+        tilts.append((now, degrees(learning.largest_tilt())))
+        while now - tilts[0][0] > _MARGIN_WINDOW:
+            tilts.popleft()
+        tilt, hover = max(each for _, each in tilts), learning.present_hover
         if tilt < _MIN_HOLDING_TILT:
             raise FlightEnded(
                 f"the vehicle hovers at a thrust of {hover:.2f}: limits.max_thrust "

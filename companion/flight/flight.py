@@ -54,7 +54,8 @@ class Flight:
         self._observer, self._ask_landing = observer, ask_landing
         self._clock = asyncio.get_running_loop().time
         self.began = self._entered = self._clock()
-        self._interrupted = self._asking = False
+        self._interruption: FlightEnded | None = None
+        self._asking = False
         self._end = self._new_end()
 
     async def run(self) -> str:
@@ -100,12 +101,10 @@ class Flight:
         An exit that is under way continues. While the user is asked whether to land, an interrupt
         answers no.
         """
-        self._interrupted = True
-        if self.failed_in is None:
-            usual = self._usual_exit()
-            self.end(FlightEnded(reason, Exit.HOLD if usual is Exit.LAND else usual))
-        elif self._asking:
-            self.end(FlightEnded(reason))
+        usual = self._usual_exit()
+        self._interruption = FlightEnded(reason, Exit.HOLD if usual is Exit.LAND else usual)
+        if self.failed_in is None or self._asking:
+            self.end(self._interruption)
 
     def on_heartbeat(self) -> None:
         """Judge a new HEARTBEAT at once."""
@@ -138,6 +137,8 @@ class Flight:
                 self._context.link.state.forget()
                 self._context.same_vehicle.begin()
                 self._end = self._new_end()
+                if self._interruption is not None:  # it came after the checks became void
+                    raise self._interruption from void
             except FlightEnded:
                 raise
             except Exception as error:  # of the plan: the vehicle must not be left to nobody
@@ -190,7 +191,7 @@ class Flight:
         """Fly the exit, then land if the user wants it; a failure is noted, not raised."""
         try:
             await self._exit(exit_)
-            if exit_ is Exit.HOLD and self._interrupted and await self._user_wants_landing():
+            if exit_ is Exit.HOLD and self._interruption and await self._user_wants_landing():
                 await self._exit(Exit.LAND)
         except FlightEnded as ended:
             self.note(ended.reason)

@@ -1,6 +1,6 @@
 """The values of a flight at one time for the live page, named as in `flight.mcap`."""
 
-from math import isfinite, sqrt
+from math import hypot, isfinite
 from typing import Any
 
 from companion.attitude import coefficients
@@ -71,8 +71,9 @@ def _motion(context: FlightContext, now: float) -> dict[str, float | None]:
     if reference is not None:
         shown.update(_named("reference", reference.position_ned, "m"))
         north, east, down = reference.acceleration_ned
-        thrust = sqrt(north * north + east * east + (GRAVITY - down) ** 2)
-        shown.update(reference_north=north / thrust, reference_east=east / thrust)
+        thrust = hypot(north, east, GRAVITY - down)
+        if thrust > 0.0:  # in free fall no direction of the thrust is wanted
+            shown.update(reference_north=north / thrust, reference_east=east / thrust)
         if height is not None:
             above = motion.position_ned[2] - reference.position_ned[2]
             shown.update(reference_height_m=height + above)

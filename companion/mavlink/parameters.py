@@ -96,6 +96,9 @@ class ParameterClient:
             payload = _SET_LAYOUT.pack(value_wanted.raw, *self._target, name.encode(), kind)
             value_held = await self._exchange("PARAM_SET", payload, name, timeout_s, retries)
             if value_held != value_wanted:
+                # It may be a late or second answer to an earlier read.
+                value_held = await self._ask(name, timeout_s, retries)
+            if value_held != value_wanted:
                 raise ParameterRefused(
                     f"{name}: the autopilot keeps {self._decoded(value_held)} instead of {value}"
                 )

@@ -27,7 +27,10 @@ def failsafe(snapshot: Snapshot, _: bool) -> str | None:
 
 
 def battery(least: float) -> Judge:
-    """The battery's remaining charge is below `least` (0..1), or is no longer reported."""
+    """The battery's remaining charge is below `least` (0..1), or is no longer reported.
+
+    A vehicle that never reported a charge is flown without this monitor.
+    """
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
         newest = snapshot.autopilot.battery
@@ -35,7 +38,12 @@ def battery(least: float) -> Judge:
             return None
         if outdated(newest.received, snapshot.now):  # the battery may have become empty meanwhile
             return "the battery's state is not reported any more"
-        if newest.remaining is None or newest.remaining >= least:
+        if newest.remaining is None:
+            known_at = newest.charge_received
+            if known_at is None or not outdated(known_at, snapshot.now):
+                return None
+            return "the battery's charge is not reported any more"
+        if newest.remaining >= least:
             return None
         return (
             f"battery at {100 * newest.remaining:.0f} %, below "

@@ -13,6 +13,7 @@ from companion.vehicle.clock_jumps import (
     RESTART_SETBACK,
     SAME_CLOCK_SPREAD,
     SMALLEST_JUMP,
+    WRAP_PERIOD_NS,
     Misfit,
     MisfitRun,
     Reading,
@@ -117,8 +118,7 @@ class VehicleClock:
         late = quickest - ahead
         if late < 0.0:
             quickest, late = ahead, 0.0
-        self._quickest, self._received, self._newest = quickest, received, time
-        self._late = late
+        self._quickest, self._received, self._newest, self._late = quickest, received, time, late
         if received >= self.rate.due:
             self.rate.note(received, quickest)
         return Reading(time, late + self.delay.seconds)
@@ -136,7 +136,7 @@ class VehicleClock:
         """
         if self._lockstep or self._began == inf:
             return
-        time = vehicle_ns * 1e-9 + self._shift
+        time = vehicle_ns % WRAP_PERIOD_NS * 1e-9 + self._shift  # wraps as the samples' stamps do
         middle_time, half_round_trip = 0.5 * (sent + received), 0.5 * (received - sent)
         quickest = self._quickest + self.rate.rate * (middle_time - self._received)
         attitude_fits = received - self._received < 1.0 and self._late < SMALLEST_JUMP

@@ -13,8 +13,9 @@ _MIN_JUMP_SPAN = 0.04
 """Time that the misfits in a row must span to show a jump of the clock, s."""
 RESTART_SETBACK = 2.0
 """The autopilot restarted if its clock went back by more than this, s; otherwise it jumped."""
-_WRAP_PERIOD = 2**32 / 1000.0
-"""Time after which time_boot_ms, a uint32, wraps: 49.7 days in s."""
+WRAP_PERIOD_NS = 2**32 * 1_000_000
+"""Time after which time_boot_ms, a uint32, wraps: 49.7 days in ns."""
+_WRAP_PERIOD = 1e-9 * WRAP_PERIOD_NS
 _WRAP_TOLERANCE = 600.0
 """Tolerance for recognising a wrap, s."""
 

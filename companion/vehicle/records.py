@@ -134,11 +134,13 @@ class Battery(NamedTuple):
         received: Event-loop time, s.
         voltage_v: Voltage of the whole battery, V.
         remaining: Remaining charge, 0..1.
+        charge_received: Event-loop time at which a charge was last received, s.
     """
 
     received: float
     voltage_v: float | None
     remaining: float | None
+    charge_received: float | None = None
 
     def replaced_by(self, newer: "Battery") -> "Battery":
         """`newer`; but if only this battery knows the charge, it stays, with the newer voltage.
@@ -146,9 +148,10 @@ class Battery(NamedTuple):
         Some vehicles send the charge in one of the two messages only. It is kept for
         `_MAX_CHARGE_AGE`.
         """
-        age = newer.received - self.received
-        if newer.remaining is not None or self.remaining is None or age > _MAX_CHARGE_AGE:
+        if newer.remaining is not None:
             return newer
+        if self.remaining is None or newer.received - self.received > _MAX_CHARGE_AGE:
+            return newer._replace(charge_received=self.charge_received)
         return self if newer.voltage_v is None else self._replace(voltage_v=newer.voltage_v)
 
 

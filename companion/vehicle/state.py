@@ -124,8 +124,10 @@ class VehicleState(ModeState, _Values):
 
     @property
     def battery_silent(self) -> bool:
-        """Whether the battery was reported before and is no longer reported."""
-        return self.battery is not None and outdated(self.battery.received, self._clock())
+        """Whether the battery, or its charge, was reported before and is no longer reported."""
+        battery, now = self.battery, self._clock()
+        times = () if battery is None else (battery.received, battery.charge_received)
+        return any(time is not None and outdated(time, now) for time in times)
 
     @property
     def height(self) -> float | None:
@@ -198,7 +200,8 @@ class VehicleState(ModeState, _Values):
 
     def _take_battery(self, voltage_v: float | None, percent: int) -> None:
         remaining = None if percent < 0 else percent / 100.0
-        newest = Battery(self._clock(), voltage_v, remaining)
+        now = self._clock()
+        newest = Battery(now, voltage_v, remaining, None if remaining is None else now)
         self.battery = newest if self.battery is None else self.battery.replaced_by(newest)
 
     def _on_attitude_target(self, message: Message) -> None:

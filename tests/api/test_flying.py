@@ -12,7 +12,7 @@ import companion
 from companion.config import trajectory_file
 from companion.config.files import changed, load
 from companion.files.yaml_file import ConfigError
-from companion.guidance import Pose, Reference, VehicleMotion
+from companion.guidance import GRAVITY, Pose, Reference, VehicleMotion
 from companion.guidance.follow import HeldFigure
 from companion.guidance.source import CommandedSource
 from companion.guidance.trajectory import line
@@ -384,6 +384,19 @@ def test_an_observer_that_raises_costs_nothing():
     mock = QuickVehicle()
     assert run(mock, main()).result == "ok"
     assert not mock.state()["armed"]
+
+
+def test_free_fall_may_be_commanded():
+    async def program(vehicle):
+        await vehicle.take_off()
+        async with vehicle.control() as control:
+            async for state in control.states(seconds=0.3):
+                control.follow(Reference(state.position_ned, (0.0, 0.0, 0.0), (0.0, 0.0, GRAVITY)))
+        await vehicle.land()
+
+    summary, events = flown(program, QuickVehicle())
+    assert summary.result == "ok"
+    assert not any("internal error" in event for event in events)
 
 
 def test_no_acceleration_keeps_the_velocity_against_drag():

@@ -46,6 +46,10 @@ def config(tmp_path, text):
         ("deadman: {silence_limit_ms: 10000}", "`deadman.silence_limit_ms`"),
         ("deadman: {silence_limit_ms: 90}", "at least as long as the stale limits"),
         ("deadman: {target_stale_ms: 30}", "two periods of guidance.rate_hz"),
+        (
+            "link: {attitude_rate_hz: 100}\ndeadman: {telemetry_stale_ms: 10}",
+            "telemetry_stale_ms must be longer than a period of link.attitude_rate_hz",
+        ),
         ("link: {attitude_rate_hz: 40}", "min_attitude_rate_hz must not exceed"),
         ("link: {source_component: 1}", "must not both equal"),
         ("thrust: {hover_thrust: 0.92}", "between limits.min_thrust and limits.max_thrust"),

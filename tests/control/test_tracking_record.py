@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from companion.attitude import BodyRates
+from companion.attitude import BodyRates, Coefficients
 from companion.control.flown_source import FlownSource
 from companion.control.tracking_record import FlownPart, TrackingRecord, flown_part
 from companion.guidance import Doublets, ManeuverSequence, Pose, Reference, VehicleMotion
@@ -74,3 +74,22 @@ def test_what_is_no_reference_is_nan(reference, known):
     trace = FlightTrace()
     TrackingRecord(trace, FlownSource()).add(9.0, 3.0, reference, HERE)
     assert [not isnan(value) for value in trace.tracking_rows()[0, 1:4]] == known
+
+
+def test_open_loop_before_a_vehicle_has_returned_gives_it_no_more_time_to_return():
+    """Steps with settling times of 3 s, in a wind that the vehicle cannot hold."""
+    flown, away = FlownSource(), VehicleMotion((30.0, 2.0, -3.0), (0.0, 0.0, 0.0))
+    flown.begin(program(), POSE, 0.0)
+    hold = Reference(POSE.position_ned)
+    step = hold._replace(coefficients=Coefficients(0.2, 0.0))
+    for began in (0.0, 5.0, 10.0):
+        for second in range(5):
+            reference = step if second < 2 else hold
+            error = flown.tracking_error(began + second, reference, away)
+            assert error is None or began + second > 12.0, began + second
+    assert error == pytest.approx(29.0)
+    assert flown.tracking_error(15.0, step, away) is None
+    here = VehicleMotion(POSE.position_ned, (0.0, 0.0, 0.0))
+    assert flown.tracking_error(16.0, hold, here) == 0.0
+    assert flown.tracking_error(17.0, step, away) is None
+    assert flown.tracking_error(18.0, hold, away) is None

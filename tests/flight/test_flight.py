@@ -7,17 +7,18 @@ import pytest
 
 from companion.flight.context import cancel
 from companion.flight.flight import Flight
-from companion.flight.observer import SilentObserver
+from companion.flight.observer import SilentObserver, decline_landing
 from companion.flight.phases import Phase
 from companion.flight.vehicle_identity import ChecksVoid
 from companion.safety.actions import Exit
 
 
 class Bench:
-    """A flight of made-up phases; `judge` is the watch's."""
+    """A flight of made-up phases, each of which lasts `lasts` s; `judge` is the watch's."""
 
-    def __init__(self, monkeypatch, judge):
-        self.done, self.begun = [], 0
+    def __init__(self, monkeypatch, judge, lasts=0.0):
+        self.done, self.begun, self.lasts = [], 0, lasts
+        self.running = None
         first, second = self.phase("checks"), self.phase("maneuvers", Exit.LAND)
 
         async def phases(_):
@@ -46,6 +47,8 @@ class Bench:
 
     def phase(self, name, on_failure=Exit.LEAVE):
         async def work(_):
+            self.running = name
+            await asyncio.sleep(self.lasts)
             self.done.append(name)
 
         return Phase(name, "nothing", work, 5.0, on_failure)
@@ -60,8 +63,10 @@ class Bench:
 
     def fly(self):
         async def run():
-            flight = Flight(self.context, self.plan, self.watch, SilentObserver(), None)
-            return await flight.run(), [text for _, text in flight.events]
+            self.flight = Flight(
+                self.context, self.plan, self.watch, SilentObserver(), decline_landing
+            )
+            return await self.flight.run(), [text for _, text in self.flight.events]
 
         return asyncio.run(run())
 
@@ -75,6 +80,17 @@ def test_another_vehicle_before_arming_is_checked_from_the_beginning(monkeypatch
     result, events = bench.fly()
     assert (result, bench.done) == ("ok", ["checks", "checks", "maneuvers", "stop"])
     assert events == ["another vehicle answers; the checks are repeated"]
+
+
+def test_an_interrupt_just_as_the_checks_become_void_ends_the_flight(monkeypatch):
+    def judge(bench, phase):
+        if phase.name == bench.running == "maneuvers" and bench.begun == 0:
+            asyncio.get_running_loop().call_soon(bench.flight.interrupt, "Ctrl-C")
+            raise ChecksVoid("another vehicle answers")
+
+    bench = Bench(monkeypatch, judge, lasts=0.1)
+    result, _ = bench.fly()
+    assert (result, bench.done) == ("Ctrl-C", ["checks", "stop"])
 
 
 def test_vehicles_that_change_all_the_time_are_given_up(monkeypatch):

@@ -108,3 +108,21 @@ def test_a_vehicle_that_only_just_hovers_is_not_flown():
     assert "limits.max_thrust 0.75 leaves nothing to steer with" in summary.result
     assert "disarmed" in [text for _, text in summary.events]
     assert (state["on_ground"], state["crashed"]) == (True, False)
+
+
+def test_setpoints_that_are_lost_for_a_moment_make_no_vehicle_too_heavy():
+    """It holds the last rates and thrust and falls, so more thrust is sent than it gives."""
+    steps = {"coefficient": 0.5, "duration_s": 0.4, "settle_s": 3.0}
+    with mock_vehicle() as mock:
+        mock.inject(
+            {
+                "kind": "drop",
+                "direction": "from_companion",
+                "after_offboard_s": 2.2,
+                "duration_s": 0.6,
+            }
+        )
+        flight = {"maneuvers": ["steps"], "takeoff_height_m": 8.0}
+        summary = fly(mock, flight=flight, steps=steps)
+    assert summary.result == "ok", summary.events
+    assert not [text for _, text in summary.events if "hovers at a thrust" in text]

@@ -113,6 +113,11 @@ SAID = [
         "the battery's state is not reported any more",
     ),
     (
+        lambda: autopilot_judges.battery(0.2),
+        autopilot(battery=Battery(inf, 16.0, None, OLD)),
+        "the battery's charge is not reported any more",
+    ),
+    (
         lambda: autopilot_judges.battery(0.7),
         autopilot(battery=Battery(inf, 14.0, 0.6)),
         "battery at 60 %, below limits.min_battery_percent = 70",

@@ -93,6 +93,7 @@ BREACHES = [
     ("failsafe", autopilot(failsafe=True), HAND_BACK, 0.0, "failsafe"),
     ("battery", autopilot(battery=Battery(inf, 14.0, 0.15)), LAND, 0.2, "battery at 15 %"),
     ("battery", autopilot(battery=Battery(NOW - 6.0, 16.0, 0.9)), LAND, 0.2, "not reported"),
+    ("battery", autopilot(battery=Battery(NOW, 16.0, None, NOW - 6.0)), LAND, 0.2, "charge is not"),
     ("gps", autopilot(gps=Gps(NOW, 1, 3, 500.0)), LAND, 0.2, "GPS position lost"),
     ("gps", autopilot(gps=Gps(NOW - 6.0, 3, 12, 500.0)), LAND, 0.2, "GPS is not reported"),
     ("estimator", autopilot(estimator=Estimator(NOW - 6.0, GOOD)), LAND, 0.5, "not reported"),

@@ -299,6 +299,21 @@ def test_a_lost_parameter_request_is_repeated(run):
     run(scene())
 
 
+def test_a_second_answer_to_a_read_is_no_answer_to_the_write_after_it(run):
+    async def scene():
+        async with linked() as (link, vehicle):
+            parameters = ParameterVehicle(vehicle)
+
+            def write(message):
+                old = parameters.value(message.param_id)
+                return [*old, *parameters.write(message)]
+
+            vehicle.answers["PARAM_SET"] = write
+            assert await link.write_parameter("COM_OF_LOSS_T", 0.5) == 0.5
+
+    run(scene())
+
+
 def test_unknown_parameters_by_silence_and_by_error(run):
     async def scene():
         async with linked() as (link, vehicle):

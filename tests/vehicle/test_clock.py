@@ -192,6 +192,15 @@ def test_boot_time_wraps_after_49_days():
     assert link.ages[-1] < 0.02
 
 
+def test_timesync_which_does_not_wrap_tells_ages_after_49_days():
+    wrap = 2**32 / 1000.0
+    link = Link(boot=100.0, delay=0.05)
+    link.other = wrap
+    link.run(10.0)
+    assert link.clock.age_known
+    assert link.clock.delay.seconds == pytest.approx(0.05, abs=0.01)
+
+
 def test_timesync_tells_of_a_restart_before_attitude_is_asked_for_again():
     """After a restart ArduPilot does not send attitude by itself."""
     link = Link(boot=500.0).run(10.0)
