@@ -130,11 +130,11 @@ class Vehicle:
         north, east, down = (
             goal - begin for goal, begin in zip(position_ned, here.position_ned, strict=True)
         )
-        displacement = line((north, east, down), speed, acceleration, jerk)
+        way = line((north, east, down), speed, acceleration, jerk)
         if heading is None:
-            await self._fly(HeldFigure(displacement))
+            await self._fly(HeldFigure(way))
         else:
-            await self.follow(replace(displacement, heading=FixedHeading(heading)))
+            await self.follow(replace(way, heading=FixedHeading(heading)))
 
     async def follow(self, trajectory: Trajectory | Path | str) -> None:
         """Follow a trajectory from the present position.
@@ -163,8 +163,9 @@ class Vehicle:
             name: name of the commanding program in the list of events.
 
         Raises:
-            FlightEnded: control has ended before the block did.
+            FlightEnded: the vehicle is not under our control, or control ended before the block.
         """
+        self._pose()  # raises if the vehicle is not under our control
         source = CommandedSource(name, self._context.config.deadman.target_stale, _START_TIMEOUT)
         work = partial(fly_commanded, source=source)
         phase = program_phase("control", f"{name} to end its control", work)
@@ -218,20 +219,19 @@ class Vehicle:
         )
 
     def _require_followable(self, maneuver: Maneuver) -> None:
-        origin = self._context.snapshot_builder.origin_ned or (0.0, 0.0, 0.0)
-        north, east, down = (
-            here - begin for here, begin in zip(self._pose().position_ned, origin, strict=True)
-        )
-        require_followable(
-            self._context.config, maneuver, (north, east, down), self._context.known_drag
-        )
+        context, here = self._context, self._pose().position_ned
+        origin = context.snapshot_builder.origin_ned or (0.0, 0.0, 0.0)
+        north, east, down = (place - begin for place, begin in zip(here, origin, strict=True))
+        require_followable(context.config, maneuver, (north, east, down), context.known_drag)
 
     def _pose(self) -> Pose:
         """The held pose.
 
         Raises:
-            FlightEnded: the vehicle is not under our control, which may end at any moment.
+            FlightEnded: the flight has ended, or the vehicle is not under our control.
         """
+        if self._program.ended is not None:
+            raise self._program.ended
         pose = self._context.guidance_loop.flown.pose
         if pose is None or not self._context.loop.offboard_active:
             raise FlightEnded("the vehicle is not under our control: take off first", Exit.LEAVE)

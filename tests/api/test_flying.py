@@ -2,7 +2,7 @@
 
 import asyncio
 from contextlib import suppress
-from functools import cache
+from functools import cache, partial
 from math import dist, hypot, pi
 
 import numpy as np
@@ -313,11 +313,32 @@ def test_before_take_off_nothing_flies(tmp_path):
     async def program(vehicle):
         with pytest.raises(companion.FlightEnded, match="take off first"):
             await vehicle.hold(1.0)
+        with pytest.raises(companion.FlightEnded, match="take off first"):
+            async with vehicle.control():
+                pass
 
     mock = QuickVehicle()
     summary, _ = flown(program, mock)
     assert mock.state()["armed"] is False
     assert summary.result == "ok"
+
+
+def test_after_the_flight_each_call_says_why_it_ended():
+    told = []
+
+    async def program(vehicle):
+        await vehicle.take_off()
+        mock.inject({"kind": "pilot_takeover", "mode": "POSCTL"})
+        for call in (partial(vehicle.hold, 5.0), partial(vehicle.go_to, (5.0, 0.0, -2.0))):
+            with pytest.raises(companion.FlightEnded) as ended:
+                await call()
+            told.append(str(ended.value))
+
+    mock = QuickVehicle()
+    with suppress(companion.FlightEnded):
+        flown(program, mock)
+    assert len(told) == 2
+    assert all(text.startswith("the pilot or another station took over") for text in told), told
 
 
 @BOTH
