@@ -1,5 +1,6 @@
 """Atomic writing of a file: at any time a reader finds either the old or the new content."""
 
+import errno
 import os
 import tempfile
 import threading
@@ -68,6 +69,8 @@ def write_whole(path: Path, text: str, mode: int = 0o666) -> None:
     Raises:
         OSError: the file cannot be written; the error names it. No temporary file is left.
     """
+    if not path.name:  # `.` and `/`
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, mode)
