@@ -63,7 +63,8 @@ def write_whole(path: Path, text: str, mode: int = 0o666) -> None:
 
     Args:
         path: path of the file; its folder exists.
-        text: the complete text; it is written in UTF-8.
+        text: the complete text; it is written in UTF-8, with `?` for what UTF-8 cannot encode, such
+            as bytes of a file name in another encoding.
         mode: permissions of the file, less the process's umask.
 
     Raises:
@@ -74,7 +75,7 @@ def write_whole(path: Path, text: str, mode: int = 0o666) -> None:
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, mode)
-        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+        with os.fdopen(descriptor, "w", encoding="utf-8", errors="replace") as file:
             file.write(text)
             file.flush()
             os.fsync(file.fileno())
