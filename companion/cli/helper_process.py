@@ -49,9 +49,10 @@ def helper_process(
         require("nicegui", "live", "--live")
     if options.foxglove is not None:
         require("foxglove", "foxglove", "--foxglove")
-        stream = stream_address(options.foxglove)
     if options.live is not None:
         page = open_page_socket(options.live)
+    if options.foxglove is not None:  # after the page, which may have the same port
+        stream = stream_address(options.foxglove)
     for each in (page, stream):
         if each is not None:
             console.print(each.words(), highlight=False, soft_wrap=True)

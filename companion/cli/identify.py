@@ -119,9 +119,10 @@ def _configured_axes(log: Path) -> dict[str, AxisKeys]:
 
 
 def _flight_name(log: Path) -> str:
-    """The name of a flight's folder, or of another program's log."""
+    """The name of a flight's folder, or of another program's log; `?` for what is not UTF-8."""
     path = log.resolve()
-    return (path.parent.name if path.name == _LOG else path.name)[:_LONGEST_NAME]
+    name = path.parent.name if path.name == _LOG else path.name
+    return name.encode("utf-8", "replace").decode("utf-8")[:_LONGEST_NAME]
 
 
 def _write_fit(out: Path, text: str) -> None:

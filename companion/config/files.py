@@ -64,7 +64,7 @@ def _read(path: Path) -> Contents:
             values = values.get(section) if isinstance(values, dict) else None
         name = values.get(key) if isinstance(values, dict) else None
         if isinstance(name, str) and yaml_file.is_path(name):
-            values[key] = str(path.parent / name)
+            values[key] = str(path.parent / yaml_file.expanded(name))
     return contents
 
 
@@ -134,7 +134,7 @@ def _included(path: Path, own: dict[str, Any]) -> list[Path]:
     ):
         shown = shortened(names)
         raise ConfigError(f"{path}: `{_INCLUDE}` must be a file or a list of files, not {shown}")
-    return [path.parent / name for name in names]
+    return [path.parent / yaml_file.expanded(name) for name in names]
 
 
 def _check_part(included: Path, part: dict[str, Any]) -> None:

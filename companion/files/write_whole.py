@@ -1,5 +1,6 @@
 """Atomic writing of a file: at any time a reader finds either the old or the new content."""
 
+import errno
 import os
 import tempfile
 import threading
@@ -62,16 +63,19 @@ def write_whole(path: Path, text: str, mode: int = 0o666) -> None:
 
     Args:
         path: path of the file; its folder exists.
-        text: the complete text; it is written in UTF-8.
+        text: the complete text; it is written in UTF-8, with `?` for what UTF-8 cannot encode, such
+            as bytes of a file name in another encoding.
         mode: permissions of the file, less the process's umask.
 
     Raises:
         OSError: the file cannot be written; the error names it. No temporary file is left.
     """
+    if not path.name:  # `.` and `/`
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, mode)
-        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+        with os.fdopen(descriptor, "w", encoding="utf-8", errors="replace") as file:
             file.write(text)
             file.flush()
             os.fsync(file.fileno())

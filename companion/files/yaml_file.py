@@ -1,6 +1,7 @@
 """Reads YAML into a typed model; an error says what is wrong, where, and how to mend it."""
 
 from collections.abc import Mapping
+from os.path import expanduser
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar, get_args, get_origin
 
@@ -23,6 +24,11 @@ PathKey = Annotated[Path, Field(json_schema_extra={"maxLength": _LONGEST_PATH})]
 def is_path(text: str) -> bool:
     """Whether a text can name a file or a folder."""
     return text.strip() != "" and "\0" not in text and len(text) <= _LONGEST_PATH
+
+
+def expanded(path: str) -> str:
+    """A path with the home folder for `~`, which no shell expands in a file or after `--set`."""
+    return expanduser(path)  # noqa: PTH111  Path.expanduser raises for an unknown user
 
 
 class Section(BaseModel):
@@ -61,12 +67,14 @@ class Section(BaseModel):
 
     @field_validator("*", mode="before")
     @classmethod
-    def _no_impossible_path(cls, value: Any, field: ValidationInfo) -> Any:
+    def _path(cls, value: Any, field: ValidationInfo) -> Any:
         """Refuse paths that are empty (the folder itself), too long, or hold a null character."""
         kinds = kinds_in(cls.model_fields[str(field.field_name)].annotation)
-        if isinstance(value, str) and Path in kinds and not is_path(value):
+        if not isinstance(value, str) or Path not in kinds:
+            return value
+        if not is_path(value):
             raise ValueError("must name a file or a folder")
-        return value
+        return expanded(value)
 
 
 class ConfigError(Exception):

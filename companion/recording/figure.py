@@ -38,7 +38,9 @@ class FigureError(Exception):
 
 
 def draw_flight(folder: Path, out: Path) -> None:
-    """Draw the flight recorded in `folder` into the file `out`, whose suffix selects the format.
+    """Draw the flight recorded in `folder` into the file `out`.
+
+    The suffix of `out` selects the format; without one it is PNG.
 
     Raises:
         MissingExtraError: matplotlib is missing.
@@ -70,7 +72,8 @@ def draw_flight(folder: Path, out: Path) -> None:
         if motion is not None:
             grid = next(parts).subplots(len(HEIGHTS), 1, sharex=True, height_ratios=HEIGHTS)
             draw_history(grid, motion, marks)
-        figure.savefig(out, dpi=120)
+        # Without a format matplotlib would add a suffix to a name that has none.
+        figure.savefig(out, dpi=120, format=out.suffix[1:] or "png")
     except ValueError as error:  # a suffix that matplotlib does not know
         raise FigureError(f"{out}: {error}") from error
     finally:

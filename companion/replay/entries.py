@@ -44,7 +44,10 @@ def _in_order(messages: "_Messages") -> Iterator[Entry]:
     while (topic := messages.next()) is not None:
         if topic == SAMPLE.topic:
             row = messages.take(SAMPLE)
-            yield recorded_sample(row, messages.take(SETPOINT) if row["unanswered"] == 0 else None)
+            answered = row["unanswered"] == 0
+            if answered and messages.next() is None:
+                return  # the record was cut off between the sample and its setpoint
+            yield recorded_sample(row, messages.take(SETPOINT) if answered else None)
         elif topic == INPUT.topic:
             read = messages.take(INPUT)
             target = messages.take(TARGET) if messages.next() == TARGET.topic else None

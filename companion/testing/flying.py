@@ -38,6 +38,7 @@ def run(vehicle: MockVehicle, main: Coroutine[Any, Any, T]) -> T:
     match the vehicle.
 
     Raises:
+        KeyboardInterrupt: Ctrl-C came, also where a flight ended by it and returned.
         UnseenError: a task or callback failed, and the error was not handled.
     """
     unseen: list[dict[str, Any]] = []
@@ -48,9 +49,22 @@ def run(vehicle: MockVehicle, main: Coroutine[Any, Any, T]) -> T:
 
     with _without_collections(), asyncio.Runner(loop_factory=make_loop) as runner:
         runner.get_loop().set_exception_handler(lambda _, context: unseen.append(context))
-        result = runner.run(main)
+        result = runner.run(_cancelled_by_ctrl_c(main))
     if unseen:
         raise UnseenError(unseen[0]["message"]) from unseen[0].get("exception")
+    return result
+
+
+async def _cancelled_by_ctrl_c(main: Coroutine[Any, Any, T]) -> T:
+    """Return what `main` returns, unless Ctrl-C has cancelled it: a flight ends and returns then.
+
+    Otherwise a campaign or a test would go on with the next flight. `asyncio.Runner` turns the
+    CancelledError into KeyboardInterrupt.
+    """
+    result = await main
+    task = asyncio.current_task()
+    if task is not None and task.cancelling():
+        raise asyncio.CancelledError
     return result
 
 

@@ -131,6 +131,13 @@ def test_a_folder_that_holds_other_files_or_is_none_is_refused(begun, tmp_path):
         pass
 
 
+def test_a_page_that_cannot_be_written_is_wrong_usage(begun, tmp_path, capsys):
+    _campaign, out = begun
+    page = tmp_path / "missing" / "page.html"
+    assert main(["campaign", "report", str(out), "--out", str(page)]) == 2
+    assert f"{page}: cannot write there: No such file" in capsys.readouterr().err
+
+
 def test_results_that_cannot_be_read_are_named(begun, capsys):
     campaign, out = begun
     path = store.unit_path(out, 1)

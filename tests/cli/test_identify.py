@@ -210,6 +210,13 @@ def test_fitting_is_announced_and_the_include_is_found_from_anywhere(capsys, fit
     assert err.startswith("fitting…")
 
 
+def test_a_folder_named_in_another_encoding_gives_a_file_that_can_be_read(capsys, fitted):
+    log = fitted / os.fsdecode(b"caf\xe9.tlog")
+    log.write_bytes((fitted / "flight.tlog").read_bytes())
+    assert run(capsys, "--log", log, "--force")[0] == 0
+    assert load(fitted / "vehicle.yaml").vehicle.identified == "caf?.tlog"
+
+
 def test_an_axis_that_is_not_good_is_kept_from_the_flights_configuration(capsys, tmp_path):
     shutil.copy(RECORDINGS / "px4-rate-steps.tlog", tmp_path / "flight.tlog")
     known = {"lag_ms": 18.0, "dead_time_ms": 19.0, "yaw_lag_ms": 370.0, "yaw_dead_time_ms": 102.0}

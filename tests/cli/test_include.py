@@ -7,7 +7,7 @@ import yaml
 
 from companion.cli.main import main
 from companion.config import Config
-from companion.config.files import changed, json_schema, load
+from companion.config.files import assigned, changed, json_schema, load
 from companion.files.yaml_file import ConfigError
 
 
@@ -50,6 +50,20 @@ def test_it_is_relative_to_the_including_file(files, tmp_path, monkeypatch):
     main_file = files(main="include: flights/vehicle.yaml\n")
     monkeypatch.chdir("/")
     assert load(main_file).vehicle.lag_ms == 5.0
+
+
+def test_a_tilde_is_the_home_folder(files, tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    main_file = files(
+        main="include: ~/home.yaml\nrecording: {directory: ~/flights}\n",
+        home="flight: {trajectory: ~/eight.yaml}\nlink: {signing_key_file: ~/key}\n",
+    )
+    config = load(main_file)
+    assert config.recording.directory == tmp_path / "flights"
+    assert config.flight.trajectory == tmp_path / "eight.yaml"
+    assert config.link.signing_key_file == tmp_path / "key"
+    set_by_hand = changed(config, assigned(["recording.directory=~/other"]), "--set")
+    assert set_by_hand.recording.directory == tmp_path / "other"
 
 
 def test_an_empty_included_file_or_section_changes_nothing(files):

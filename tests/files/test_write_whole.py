@@ -100,6 +100,18 @@ def test_an_error_names_the_file_and_not_the_temporary_one(tmp_path, monkeypatch
     assert unwritten.value.filename == str(tmp_path / "page.html")
 
 
+def test_a_file_name_in_another_encoding_is_written_with_question_marks(tmp_path):
+    write_whole(tmp_path / "page.html", "<title>" + os.fsdecode(b"caf\xe9") + "</title>")
+    assert (tmp_path / "page.html").read_text(encoding="utf-8") == "<title>caf?</title>"
+
+
+@pytest.mark.parametrize("path", [".", "/"])
+def test_a_folder_without_a_name_is_refused_as_any_folder(path):
+    with pytest.raises(IsADirectoryError, match="Is a directory") as refused:
+        write_whole(Path(path), "")
+    assert refused.value.filename == path
+
+
 def reserved(folder):
     """Bytes on the disk that open files without a name hold in a folder."""
     held = 0

@@ -337,6 +337,8 @@ def test_a_port_in_use_and_a_missing_extra_are_usage_errors(monkeypatch, capsys)
         port = other.getsockname()[1]
         assert main(["demo", "--foxglove", str(port)]) == 2
     assert f"--foxglove: cannot listen at port {port}" in capsys.readouterr().err
+    assert main(["demo", "--live", str(port), "--foxglove", str(port)]) == 2
+    assert f"--foxglove: cannot listen at port {port}" in capsys.readouterr().err
     monkeypatch.setitem(sys.modules, "foxglove", None)
     assert main(["demo", "--foxglove", "0"]) == 2
     assert "[foxglove]'" in capsys.readouterr().err

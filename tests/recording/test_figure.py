@@ -123,6 +123,15 @@ def test_a_flight_is_drawn_with_what_it_recorded(tmp_path, kept):
     assert (tmp_path / "out.png").read_bytes()[:4] == b"\x89PNG"
 
 
+def test_the_drawing_has_the_name_it_is_given_also_without_a_suffix(tmp_path, capsys):
+    record(tmp_path, motion=True, summary=WHOLE)
+    out = tmp_path / "drawing"
+    assert main(["plot", str(tmp_path), "--out", str(out)]) == 0
+    assert out.read_bytes()[:4] == b"\x89PNG"
+    assert main(["plot", str(tmp_path), "--out", str(tmp_path)]) == 2  # it was `FOLDER.png`
+    assert f"{tmp_path}: cannot write it: Is a directory" in capsys.readouterr().err
+
+
 def test_a_missing_folder_for_the_drawing_is_one_sentence(tmp_path, capsys):
     record(tmp_path, motion=True, summary=WHOLE)
     out = tmp_path / "missing" / "out.png"

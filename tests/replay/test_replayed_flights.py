@@ -96,6 +96,17 @@ def test_so_does_a_replay_of_steps(steps):
     replays_to_the_bit(*steps("ardupilot"))
 
 
+def test_so_does_a_replay_of_a_record_that_ends_between_a_sample_and_its_setpoint(steps):
+    folder, _ = steps("ardupilot")
+    record = read_flight(folder)
+    order = record.content.order
+    del order[len(order) - 1 - order[::-1].index("/setpoint") :]
+    assert order[-1] == "/sample"
+    samples = Replay(record, load(folder / "config.yaml")).run()
+    assert [each for each in samples if not each.same] == []
+    assert len(samples) == order.count("/sample") - 1
+
+
 def replays_to_the_bit(folder, summary):
     assert summary.result == "ok", summary.events
     samples = replayed(folder)

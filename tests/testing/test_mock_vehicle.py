@@ -2,6 +2,7 @@
 
 import asyncio
 import gc
+import signal
 import threading
 from pathlib import Path
 
@@ -204,6 +205,14 @@ def test_a_session_can_be_interrupted():
     observer.session = session(config(mock, hover={"duration_s": 9.0}), mock, observer=observer)
     assert run(mock, observer.session.fly()).result == "enough"
     assert (mock.state()["mode"], mock.state()["armed"]) == ("LOITER", True)
+
+
+def test_ctrl_c_ends_more_than_the_flight_in_which_it_comes():
+    mock = vehicle()
+    mock.at(3.0, lambda: signal.raise_signal(signal.SIGINT))
+    with pytest.raises(KeyboardInterrupt):
+        fly(config(mock), mock)
+    assert 3.0 <= mock.time < 4.0
 
 
 def test_many_flights_leave_nothing_behind():

@@ -7,7 +7,6 @@ import pytest
 
 from companion.batch import can_compile
 from companion.config.files import changed, load, shipped
-from companion.flight.session import LEFT_BY_USER
 from companion.testing import MockVehicle
 from companion.tuning import flights, propose
 from companion.tuning.flights import (
@@ -74,15 +73,6 @@ def test_a_pilots_small_limits_are_kept_and_slow_the_course_down():
     assert 1.0 < flight.speed < 4.5
     assert flight.rate < radians(45.0)
     assert flight.rate_limited < 0.05  # without knowledge of the drag
-
-
-def test_ctrl_c_ends_more_than_the_flight_in_which_it_comes(monkeypatch):
-    class Left:
-        result = LEFT_BY_USER
-
-    monkeypatch.setattr(flights, "fly", lambda *_: Left())
-    with pytest.raises(KeyboardInterrupt):
-        fly_course(load(shipped("mock-px4.yaml")), EIGHT, "px4")
 
 
 def test_the_mock_vehicle_is_like_the_identified_one():

@@ -22,6 +22,7 @@ from companion.campaign.report.sensitivity import FEWEST, Influence, influences
 from companion.campaign.report.statistics import levels, share_of
 from companion.extras import require
 from companion.files.write_whole import write_whole
+from companion.files.yaml_file import ConfigError
 from companion.report import PAGE
 from companion.report.html_page import rendered, require_extra
 
@@ -44,16 +45,21 @@ def run(options: argparse.Namespace) -> int:
             folder.
 
     Raises:
-        ConfigError: the folder holds no campaign or no results yet, or a file in it is damaged.
+        ConfigError: the folder holds no campaign or no results yet, or a file in it is damaged, or
+            the page cannot be written.
         MissingExtraError: an extra is missing.
-        OSError: a file cannot be written.
+        OSError: the tables cannot be written.
     """
     require_packages()
     require("SALib", "campaign", "`companion campaign report`")
     require_extra()
     results = Results.read(options.folder)
     page = options.out or options.folder / PAGE
-    write_whole(page, page_text(results, load(options.folder / FILE)))
+    text = page_text(results, load(options.folder / FILE))
+    try:
+        write_whole(page, text)
+    except OSError as error:
+        raise ConfigError(f"{page}: cannot write there: {error.strerror}") from error
     write_tables(results.table, options.folder)
     console = Console(highlight=False, soft_wrap=True, markup=False)
     console.print(headline(results))
