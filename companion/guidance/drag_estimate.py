@@ -27,6 +27,9 @@ _AXIS_DRAG_DEVIATION, _LARGEST_AXIS_DRAG = 0.03, 0.1
 estimate, 1/m."""
 _CERTAIN_DEVIATION = 0.1
 """The drag counts as known if its standard deviation at the top speed is below this, 1/s."""
+_GUSTY_SURPRISE = 2.0
+"""Above this mean surprise (squared innovation by its variance) the drag does not count as known:
+gusts change quicker than the filter assumes, and move the vehicle, so they are taken for drag."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +79,7 @@ class DragEstimate:
             _WIND_DEVIATION,
         )
         self._covariance = np.diag([*(each**2 for each in deviations), _AXIS_DRAG_DEVIATION**2])
+        self._surprise_sum, self._measurements = 0.0, 0
         self._forget_window()
 
     @property
@@ -85,7 +89,9 @@ class DragEstimate:
 
     @property
     def certain(self) -> bool:
-        """Whether the vehicle has moved enough for a certain estimate."""
+        """Whether the vehicle has moved enough for a certain estimate, in calm enough air."""
+        if self._surprise_sum > _GUSTY_SURPRISE * self._measurements:
+            return False
         speed, p = self.top_speed, self._covariance
         variance = p[0, 0] + 2.0 * speed * p[0, 1] + speed * speed * p[1, 1]
         return speed > 0.0 and sqrt(max(variance, 0.0)) < _CERTAIN_DEVIATION
@@ -131,8 +137,10 @@ class DragEstimate:
                 self._residual[axis] / span - float(row @ self._state),
                 _CLAMP_DEVIATIONS * sqrt(variance),
             )
-            gain = spread / variance
-            self._state = self._state + gain * min(max(innovation, -most), most)
+            gain, innovation = spread / variance, min(max(innovation, -most), most)
+            self._surprise_sum += innovation * innovation / variance
+            self._measurements += 1
+            self._state = self._state + gain * innovation
             self._covariance = self._covariance - np.outer(gain, spread)
         self.drag = self._bounded()
 

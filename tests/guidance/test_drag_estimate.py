@@ -65,6 +65,14 @@ def test_in_wind_and_gusts_it_takes_ten(seed):
     assert estimate.drag.per_velocity(5.0) == pytest.approx(0.5, abs=0.08)
 
 
+@pytest.mark.parametrize(("gust", "certain"), [(0.0, True), (0.5, True), (2.5, False)])
+def test_in_strong_gusts_the_drag_is_not_certain(gust, certain):
+    """There it would be advised, and kept for the next flight, though it is wrong by half."""
+    estimate = DragEstimate(ANY_VEHICLE)
+    circled(estimate, Drag(1.0), 20.0, speed=2.0, wind=(3.0, 0.0), gust=gust)
+    assert estimate.certain == certain
+
+
 def test_two_speeds_tell_quadratic_drag_from_linear():
     estimate = DragEstimate(ANY_VEHICLE)
     for speed in (2.0, 5.0, 8.0):
