@@ -1,6 +1,6 @@
 """How `model-following` plans the tilt: smooth, on straight lines, within the limits."""
 
-from math import ceil, hypot, inf, sin, sqrt
+from math import ceil, hypot, inf, radians, sin, sqrt
 
 from companion.attitude.kinematics import speed_to_rates
 from companion.attitude.limits import Constants
@@ -10,6 +10,9 @@ from companion.attitude.types import Coefficients, Target
 _LONGEST_REFERENCE = sin(1.4)
 """Longest vector of coefficients at which the reference starts. Towards length 1 (90° of tilt) the
 body rates grow without bound."""
+_LARGEST_RISE = radians(400.0)
+"""Largest change of v within τ behind a lag of second order, rad/s. PX4's motors, measured in its
+simulation, saturate in a jump of v by 270 °/s."""
 _FOUR_ZETA_SQUARED = 2.7
 """Smallest 4·ζ² of the model, where ζ is its damping ratio."""
 _LARGEST_GAIN_TIMES_STEP = 0.1
@@ -65,8 +68,8 @@ class ReferenceModel:
     of the motion within the limits. The rates that are sent compensate the lag of the vehicle
     (τ and σ) and stay within the limits too. If the autopilot has a slew limit, v changes no faster
     than that, and stays so small that it can be slowed down in time. Behind a lag of second order,
-    a large step of v would saturate the motors, and the response would not be linear: there v takes
-    at least τ from rest to the largest rate.
+    a large step of v would saturate the motors, and the response would not be linear: there v
+    changes by at most `_LARGEST_RISE` within τ, if the body rates are limited at all.
 
     Args:
         constants: gains and limits.
@@ -113,8 +116,9 @@ class ReferenceModel:
         self._constants = constants
         self._braking = braking_lead(constants.gain, lag)
         self._lag = Lag(lag, self._sigma)
-        gentle = constants.max_tilt_rate / lag if self._sigma > 0.0 else inf
-        self._acceleration = min(self._slew_limit, gentle)
+        self._acceleration = self._slew_limit
+        if self._sigma > 0.0 and constants.max_tilt_rate < inf:
+            self._acceleration = min(self._slew_limit, _LARGEST_RISE / lag)
         # Near the target v falls by p·v a second.
         slowed_in_time = self._acceleration / constants.gain
         self._tilt_rate_weight = max(constants.tilt_rate_weight, slowed_in_time**-2)
