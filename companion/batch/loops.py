@@ -29,7 +29,7 @@ _Turn = Callable[[Array, Array, Array, float], None]
 
 
 class Loops(NamedTuple):
-    """One law over many vehicles."""
+    """Functions that apply one law to n vehicles, compiled or in Python."""
 
     apply: _Apply
     """(q, targets, rates, dt, constants): fills rates (3, n)."""

@@ -77,7 +77,13 @@ def fly_steps(
 
 
 def _rate_loop(axes: Sequence[AxisResponse]) -> tuple[Array, NDArray[np.int64]]:
-    """(3, 7) lag, σ (s²), slew per step and transition of each axis; (3,) dead times in steps."""
+    """The rate loop of a vehicle as arrays.
+
+    Returns:
+        (3, 7), for each axis: lag (s), σ (s²), largest change of the acting command per step
+        (rad/s), and the 2x2 transition matrix of `Lag.transition`, row by row;
+        (3,), dead times in steps.
+    """
     rows = []
     for axis in (each.with_least_lag() for each in axes):
         slew = axis.acceleration / STEP_HZ if isfinite(axis.acceleration) else _UNLIMITED

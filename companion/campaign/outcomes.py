@@ -45,8 +45,9 @@ or its thrust is at most the lower limit divided by this share.
 def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
     """Tracking errors by the true and the estimated position, m, and the largest true tilt, rad.
 
-    Errors are those of maneuvers in closed loop, each without the time left out at its beginning.
-    Without such a maneuver the result is empty.
+    Errors are those of maneuvers in closed loop, each after its settling time. The tilt is that
+    from the first such maneuver, after its settling time, to the end of the last. Without such a
+    maneuver or without rows in `truth` the result is empty.
 
     Args:
         summary: summary of the flight.

@@ -173,8 +173,11 @@ class _DoctorRun:
         link, config = vehicle.link, self._config
         proposed = [finding for finding in findings if finding.change is not None]
         if not proposed:
-            self.say("No parameter is to be set.")
-            return EXIT_OK if self.result["result"] == "ok" else EXIT_FLIGHT
+            if self.result["result"] == "ok":
+                self.say("`--fix` has no parameter to set.")
+                return EXIT_OK
+            self.say("`--fix` has no parameter to set: the findings need other remedies.")
+            return EXIT_FLIGHT
         require_disarmed(link)
         undo = UndoFile(config.recording.directory, link, evidence.identity)
         try:

@@ -3,6 +3,7 @@
 import argparse
 import json
 import os
+import shlex
 from contextlib import suppress
 from math import isfinite
 from pathlib import Path
@@ -95,7 +96,7 @@ def _fit(log: Path, out: Path, options: argparse.Namespace, console: FlightConso
                 console.print(f"  {axis}: {reason}", soft_wrap=True)
         _print_json(options, {"result": str(error), "log": str(log), **_figures(vehicle)})
         return EXIT_FLIGHT
-    _write_fit(out, text)
+    _write_fit(out, text, flown=None if options.log is not None else log.parent)
     kept = {
         axis: f"kept from the configuration ({keys.described()}): {vehicle.axes[axis].reason()}"
         for axis, keys in kept_axes(vehicle, known).items()
@@ -125,8 +126,13 @@ def _flight_name(log: Path) -> str:
     return name.encode("utf-8", "replace").decode("utf-8")[:_LONGEST_NAME]
 
 
-def _write_fit(out: Path, text: str) -> None:
+def _write_fit(out: Path, text: str, flown: Path | None) -> None:
     """Write a file completely or not at all, because a flight may read it.
+
+    Args:
+        out: the file.
+        text: its text.
+        flown: folder of the flight that was just flown; None: no flight was flown.
 
     Raises:
         OSError: the file cannot be written; its text is a complete sentence.
@@ -134,7 +140,13 @@ def _write_fit(out: Path, text: str) -> None:
     try:
         write_whole(out, text)
     except OSError as error:
-        raise OSError(f"{out}: cannot write what was identified: {error.strerror}") from error
+        reason = f"{out}: cannot write the identified response: {error.strerror}"
+        if flown is not None:
+            folder = shlex.quote(str(flown))
+            reason += (
+                f"; the flight is recorded: run `companion identify --log {folder} --out FILE`"
+            )
+        raise OSError(reason) from error
 
 
 def _how_to_include(out: Path, config: Path | None) -> str:

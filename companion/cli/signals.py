@@ -12,8 +12,8 @@ SECOND_CTRL_C_AFTER = 1.0
 """Shortest time between two Ctrl-C for the second one to leave, s; a key may bounce."""
 
 HOW_TO_LEAVE = (
-    f"Ctrl-C again, {SECOND_CTRL_C_AFTER:g} s later or more, stops the setpoints and ends the "
-    "flight"
+    f"Ctrl-C again, {SECOND_CTRL_C_AFTER:g} s later or more, stops the setpoints at once: then the "
+    "pilot or the autopilot's offboard-loss failsafe flies the vehicle"
 )
 
 

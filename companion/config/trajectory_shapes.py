@@ -113,7 +113,7 @@ class FigureEightShape(_LapShape):
     """Speed at the fastest point: the middle for gerono, the tips for bernoulli."""
     shape: Literal["gerono", "bernoulli"] = "gerono"
     """gerono: (A sin φ, A sin φ cos φ). bernoulli: the same over 1 + cos² φ, with rounder loops.
-    φ increases at a constant rate."""
+    Between acceleration and braking, φ increases at a constant rate."""
 
     def trajectory(self) -> Trajectory:
         """The trajectory of this shape."""

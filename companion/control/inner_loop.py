@@ -109,10 +109,15 @@ def hover_thrust(config: Config) -> HoverThrust:
     )
 
 
+def full_thrust(config: Config) -> float:
+    """Specific thrust at a normalised thrust of 1 by the configured hover thrust, m/s²."""
+    return GRAVITY / config.thrust.hover_thrust
+
+
 def thrust_limits(config: Config) -> tuple[float, float]:
     """Smallest and largest specific thrust by the configured hover thrust, m/s²."""
-    per_thrust = GRAVITY / config.thrust.hover_thrust
-    return config.limits.min_thrust * per_thrust, config.limits.max_thrust * per_thrust
+    full = full_thrust(config)
+    return config.limits.min_thrust * full, config.limits.max_thrust * full
 
 
 def tilt_response(config: Config) -> InnerResponse:

@@ -16,7 +16,7 @@ from companion.safety.actions import fault_message
 _MEASURING_PERIOD = 2.0
 """Time between two measurements, s; the axes take turns."""
 _WINDOW_PERIODS = 4
-"""Length of a measurement in these periods; the first measurement is a period shorter."""
+"""Length of a measurement, in units of `_MEASURING_PERIOD`; the first one is a period shorter."""
 _MIN_ROW_AGE = 1.5
 """Rows newer than this are not used, s: the autopilot may already have left offboard."""
 _MAX_ROWS = 75_000

@@ -11,7 +11,7 @@ import numpy as np
 
 from companion.config import Config
 from companion.config.known_drag import KnownDrag
-from companion.control.inner_loop import thrust_limits
+from companion.control.inner_loop import full_thrust, thrust_limits
 from companion.drag import Drag
 from companion.files.yaml_file import ConfigError
 from companion.flight.fence_check import FenceCheck
@@ -188,6 +188,7 @@ def envelope_of(config: Config, drag: KnownDrag) -> Envelope:
         max_yaw_rate=limits.max_yaw_rate,
         min_thrust=min_thrust,
         max_thrust=max_thrust,
+        full_thrust=full_thrust(config),
         max_climb=limits.max_climb_m_s,
         max_descent=limits.max_descent_m_s,
         max_speed=config.safety.max_speed_m_s,

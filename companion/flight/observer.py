@@ -13,7 +13,7 @@ class Observer(Protocol):
     """Receives the events of a flight in order; every method must return at once."""
 
     def phase(self, name: str, waits_for: str) -> None:
-        """A phase began."""
+        """A phase began; `waits_for` names the condition that ends it, as shown to the user."""
         ...
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:

@@ -12,7 +12,7 @@ from companion.safety.actions import Exit
 from companion.vehicle.autopilot import Autopilot, ControlEntry, Role
 
 _TAKEOFF_ROLES = frozenset({Role.TAKEOFF, Role.READY})
-_STANDING_ROLES = frozenset({Role.READY})
+_ARMED_ON_GROUND_ROLES = frozenset({Role.READY})
 _AIRBORNE_ROLES = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD})
 _OFFBOARD_ROLES = frozenset({Role.OFFBOARD})
 _MANEUVER_GRACE = 10.0
@@ -125,7 +125,9 @@ def takeover_phases(config: FlightConfig) -> tuple[Phase, ...]:
 
 def takeoff_for_client_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, ...]:
     """The phases that take off a vehicle which somebody else armed, and take it over."""
-    checks = _checks_phase(config, "to take off", takeover.check_standing, _STANDING_ROLES)
+    checks = _checks_phase(
+        config, "to take off", takeover.check_armed_on_ground, _ARMED_ON_GROUND_ROLES
+    )
     (takeoff_phase,) = (
         phase for phase in takeoff_phases(config, autopilot) if phase.name == "takeoff"
     )

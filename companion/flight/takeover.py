@@ -1,4 +1,4 @@
-"""The phases before a takeover: somebody else armed the vehicle, which flies or stands."""
+"""The phases before a takeover: somebody else armed the vehicle; it flies or is on the ground."""
 
 import asyncio
 from collections.abc import Callable
@@ -23,18 +23,18 @@ async def check_airborne(context: FlightContext) -> None:
     context.ground.note_flying()
 
 
-async def check_standing(context: FlightContext) -> None:
+async def check_armed_on_ground(context: FlightContext) -> None:
     """Check a vehicle that somebody else armed on the ground; only request telemetry.
 
     The newest heartbeat may be older than the arming.
 
     Raises:
-        FlightEnded: the vehicle does not stand armed, or a finding blocks the take-off.
+        FlightEnded: the vehicle is not armed on the ground, or a finding blocks the take-off.
     """
     with suppress(TimeoutError):
         async with asyncio.timeout(_ARMED_REPORT_TIMEOUT):
             await context.until(context.armed, "the vehicle to show that it is armed")
-    await _check(context, Stage.ARMED, _require_standing)
+    await _check(context, Stage.ARMED, _require_armed_on_ground)
     await context.until(lambda: context.link.state.home is not None, "the home position")
 
 
@@ -65,8 +65,8 @@ def _require_flying(context: FlightContext) -> None:
         raise FlightEnded("the vehicle does not fly: take off first", Exit.LEAVE)
 
 
-def _require_standing(context: FlightContext) -> None:
-    if not context.armed() or not context.link.state.landed:
-        raise FlightEnded(
-            "the vehicle does not stand armed on the ground: arm it first", Exit.LEAVE
-        )
+def _require_armed_on_ground(context: FlightContext) -> None:
+    if not context.armed():
+        raise FlightEnded("the vehicle is not armed: arm it first", Exit.LEAVE)
+    if not context.link.state.landed:
+        raise FlightEnded("the vehicle has left the ground: request control again", Exit.LEAVE)

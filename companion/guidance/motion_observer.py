@@ -211,7 +211,10 @@ class SlopeHistory:
         self.newest = slope
 
     def forget(self) -> None:
-        """Forget all attitudes; called after a jump of the estimated heading, which turns north."""
+        """Forget all attitudes.
+
+        Called after the estimated heading jumped: older attitudes refer to another north.
+        """
         self._times.clear()
         self._sums.clear()
 

@@ -88,16 +88,16 @@ class _HeldResult(NamedTuple):
     Attributes:
         way: Displacement without feedback, m NED.
         velocity: Velocity without feedback, m/s NED.
-        extra_way: Displacement that feedback adds in the worst direction, m.
-        extra_speed: Speed that feedback adds in the worst direction, m/s.
+        feedback_displacement: Displacement that feedback adds in the worst direction, m.
+        feedback_speed: Speed that feedback adds in the worst direction, m/s.
         highest: Greatest height above the start, without feedback, m.
         tilt: Largest possible tilt, rad.
     """
 
     way: Vector
     velocity: Vector
-    extra_way: float
-    extra_speed: float
+    feedback_displacement: float
+    feedback_speed: float
     highest: float
     tilt: float
 
@@ -107,7 +107,7 @@ def reach(at_loss: MotionAtLoss, loss: LossFailsafe) -> Reach:
     held = _held_motion(at_loss, loss)
     specific_thrust = hypot(*at_loss.thrust)
     speed = hypot(*held.velocity[:2])
-    widest = speed + held.extra_speed
+    widest = speed + held.feedback_speed
     stop, farthest = (
         _stopping_distance(value, held.tilt, specific_thrust, loss) for value in (speed, widest)
     )
@@ -115,10 +115,18 @@ def reach(at_loss: MotionAtLoss, loss: LossFailsafe) -> Reach:
         way + (stop * component / speed if speed > 0.0 else 0.0)
         for way, component in zip(held.way[:2], held.velocity[:2], strict=True)
     )
-    up_speed = max(0.0, held.extra_speed - held.velocity[2])
-    up = held.highest + held.extra_way + up_speed * _FAILSAFE_DELAY + _braking_distance(up_speed)
+    up_speed = max(0.0, held.feedback_speed - held.velocity[2])
+    up = (
+        held.highest
+        + held.feedback_displacement
+        + up_speed * _FAILSAFE_DELAY
+        + _braking_distance(up_speed)
+    )
     return Reach(
-        (north, east), held.extra_way + farthest - stop, up, _fall_distance(held, specific_thrust)
+        (north, east),
+        held.feedback_displacement + farthest - stop,
+        up,
+        _fall_distance(held, specific_thrust),
     )
 
 
@@ -135,7 +143,7 @@ def _held_motion(at_loss: MotionAtLoss, loss: LossFailsafe) -> _HeldResult:
     rate = min(rate, loss.max_tilt_rate)
     feedback = min(_FEEDBACK_RATE, loss.max_tilt_rate)
     way, velocity, thrust = (0.0, 0.0, 0.0), at_loss.velocity, axis
-    extra_way = extra_speed = highest = 0.0
+    feedback_displacement = feedback_speed = highest = 0.0
     for index in range(_INTEGRATION_STEPS):
         angle = rate * (index + 0.5) * step
         thrust = _plus_scaled(_scaled(axis, cos(angle)), ahead, sin(angle))
@@ -143,11 +151,11 @@ def _held_motion(at_loss: MotionAtLoss, loss: LossFailsafe) -> _HeldResult:
         velocity = (velocity[0], velocity[1], velocity[2] + GRAVITY * step)
         way = _plus_scaled(way, velocity, step)
         stray = 2.0 * specific_thrust * sin(0.5 * min(pi, feedback * (index + 0.5) * step))
-        extra_speed += (stray - loss.drag.linear * extra_speed) * step
-        extra_way += extra_speed * step
+        feedback_speed += (stray - loss.drag.linear * feedback_speed) * step
+        feedback_displacement += feedback_speed * step
         highest = max(highest, -way[2])
     tilt = acos(max(-1.0, min(1.0, -thrust[2]))) + feedback * duration
-    return _HeldResult(way, velocity, extra_way, extra_speed, highest, min(pi, tilt))
+    return _HeldResult(way, velocity, feedback_displacement, feedback_speed, highest, min(pi, tilt))
 
 
 def _stopping_distance(
@@ -165,8 +173,8 @@ def _fall_distance(held: _HeldResult, specific_thrust: float) -> float:
     """Largest fall while the rates are held, while the vehicle levels and until it stops, m."""
     duration = _level_time(held.tilt)
     mean_cosine = sin(held.tilt) / held.tilt if held.tilt > 0.0 else 1.0  # while it levels
-    speed = held.velocity[2] + held.extra_speed
-    fall = held.way[2] + held.extra_way
+    speed = held.velocity[2] + held.feedback_speed
+    fall = held.way[2] + held.feedback_displacement
     gain = max(0.0, GRAVITY - specific_thrust * mean_cosine)
     fall += max(0.0, speed) * duration + 0.5 * gain * duration * duration
     return max(0.0, fall + _braking_distance(max(0.0, speed) + gain * duration))

@@ -1,4 +1,7 @@
-"""The inputs of the loops of a recorded flight, in order: samples, guidance steps, actions."""
+"""The inputs of the loops of a recorded flight, in order.
+
+They are samples, guidance steps, actions, changes of values and the autopilot's attitude targets.
+"""
 
 from collections.abc import Iterator
 

@@ -105,7 +105,7 @@ def comparison_tables(flights: Sequence[FlightData]) -> list[Table]:
 
 
 def _compared(key: ConfigKey) -> tuple[str, str]:
-    """Value and default of a key; for an endpoint without its port, which `demo` varies."""
+    """Value and default of a key; endpoints without the port, because `demo` varies it."""
     value, default = _value(key.value), _value(key.default)
     if key.name != "endpoint":
         return value, default

@@ -59,7 +59,7 @@ def loss(most: float) -> Judge:
             return None
         return (
             f"{100 * lost:.0f} % of the vehicle's frames are lost, more than "
-            f"safety.max_loss = {most:g}"
+            f"safety.max_loss = {most:g} ({100 * most:g} %)"
         )
 
     return judge
@@ -89,7 +89,7 @@ def deadlines(most: float) -> Judge:
             return None
         return (
             f"{100 * missed:.0f} % of the setpoints miss deadman.deadline_ms, more than "
-            f"safety.max_missed = {most:g}"
+            f"safety.max_missed = {most:g} ({100 * most:g} %)"
         )
 
     return judge
@@ -104,7 +104,7 @@ def starvation(most: float) -> Judge:
             return None
         return (
             f"CPU starvation: the program's timer lost {100 * starved:.0f} % of the last second, "
-            f"more than safety.max_starved = {most:g}"
+            f"more than safety.max_starved = {most:g} ({100 * most:g} %)"
         )
 
     return judge

@@ -165,14 +165,14 @@ class ServedControl:
         self._programs.keep(owner, request)
         if flight is not None and flight.is_ending:
             return _IS_ENDING
-        if self._flight is None and self._may_begin(owner, now):
+        if self._flight is None and self._give_control(owner, now):
             self._begin(owner, None, from_ground=False)
         return None
 
-    def _may_begin(self, owner: Program, now: float) -> bool:
-        """Whether setpoints alone begin a flight now: in ArduPilot's GUIDED, in the air.
+    def _give_control(self, program: Program, now: float) -> bool:
+        """Give control to a program whose setpoints alone begin a flight; return whether it has it.
 
-        If the owner must do something first, this tells the owner.
+        They do in ArduPilot's GUIDED, in the air. This tells the program why control is refused.
         """
         autopilot, state = self._link.autopilot, self._link.state
         if autopilot.control_entry is not ControlEntry.BY_FIRST_SETPOINT or now < self._not_before:
@@ -180,13 +180,13 @@ class ServedControl:
         if state.mode is None or Role.READY not in autopilot.roles(state.mode):
             return False
         if not state.flying:
-            self._component.answer(owner.client, "take off first: only then setpoints are flown")
+            self._component.answer(program.client, "take off first: only then setpoints are flown")
             return False
-        if not self.ownership.has_stream(owner, now):
+        if not self.ownership.has_stream(program, now):
             return False
-        refusal = self._fence.refusal() or self.ownership.request_control(owner, now)
+        refusal = self._fence.refusal() or self.ownership.request_control(program, now)
         if refusal is not None:
-            self._component.answer(owner.client, f"control refused: {refusal}")
+            self._component.answer(program.client, f"control refused: {refusal}")
         return refusal is None
 
     def _take_control_request(self, client: Client, frame: Frame) -> None:

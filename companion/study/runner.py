@@ -77,9 +77,12 @@ def run(
 
 
 def _run_named(out: Path, name: str, tick: Tick) -> Outcome:
-    """Run a study without a case in a worker process, and write its files."""
+    """In a worker process, run a study that takes no case, and write its files.
+
+    The figure of the returned outcome is empty: the file has it, and it is large to pass on.
+    """
     outcome = _run(_job(registry.STUDIES[name], None), out, tick)
-    return replace(outcome, figure=Figure())  # the files are written; the figure is large
+    return replace(outcome, figure=Figure())
 
 
 def _run(job: Job, out: Path, tick: Tick) -> Outcome:

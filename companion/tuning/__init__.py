@@ -16,7 +16,7 @@ A proposal
     propose        a `Proposal` for a configuration
     Proposal       the values, `changes` for `companion.config.files.changed`, what to expect
     Aims           the margins to keep
-    Design         the values that are search
+    Design         the values that are searched
 
 The analysis
     expectation    margins, errors, rates and settling of a configuration: an `Expectation`

@@ -27,12 +27,13 @@ def frequencies() -> Complex:
 
 
 class Margins(NamedTuple):
-    """Margins of one loop; infinite where its gain never crosses the limit.
+    """Margins of one loop.
 
     Attributes:
-        gain_db: gain margin, the smaller of rise and fall, dB.
-        phase_deg: phase margin, degrees.
-        delay: delay margin, s.
+        gain_db: gain margin, the smaller of rise and fall, dB; infinite if the phase never crosses
+            -180°.
+        phase_deg: phase margin, degrees; infinite if the gain never crosses 1.
+        delay: delay margin, s; infinite if the gain never crosses 1.
         stable: whether the closed loop is stable; if not, the other values are no margins, but say
             how far it is from stability.
     """

@@ -22,7 +22,7 @@ class IntervalSums:
         self.intervals, self.seconds, self.squares = intervals, seconds, squares
 
     def add(self, interval: float) -> None:
-        """Add the interval between one and the next, s."""
+        """Add the interval between two consecutive setpoints or samples, s."""
         self.intervals += 1
         self.seconds += interval
         self.squares += interval * interval

@@ -37,7 +37,12 @@ class _Loader(yaml.SafeLoader):
         self._depth = 0
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        """Compose one node; raise an error beyond the limits."""
+        """Compose one node.
+
+        Raises:
+            yaml.YAMLError: an alias or a tag, too many or too deeply nested values, or a value
+                that is too long.
+        """
         event: Any = self.peek_event()  # type: ignore[no-untyped-call]
         self._nodes += 1
         self._depth += 1

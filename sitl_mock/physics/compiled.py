@@ -17,7 +17,7 @@ import numpy as np
 from numba.extending import intrinsic, register_jitable
 
 from sitl_mock.physics.multirotor_step import Conditions, Rings, empty_rings
-from sitl_mock.physics.navigation_error import TrailRow
+from sitl_mock.physics.navigation_error import TruthRow
 from sitl_mock.physics.quaternion import Vector
 from sitl_mock.physics.sensors import Estimate, SensorLaw, SensorState, estimate, white_noise
 from sitl_mock.physics.vehicle import Vehicle
@@ -28,7 +28,7 @@ from sitl_mock.physics.vehicle_step import (
     VehicleState,
     advance,
     outcome,
-    trail_row,
+    truth_row,
 )
 
 T = TypeVar("T")
@@ -119,7 +119,7 @@ def _advance(
     state_memory: Any,
     arrived: Any,
     shaped: Any,
-    trail: Any,
+    history: Any,
     armed: bool,
     roll: float,
     pitch: float,
@@ -133,7 +133,7 @@ def _advance(
     state = advance(
         _load_law(law_memory),
         Rings(arrived, shaped),
-        trail,
+        history,
         _load_state(state_memory),
         ActuatorCommand(armed, roll, pitch, yaw, thrust),
         Conditions(thrust_factor, wind, attitude_error),
@@ -149,9 +149,9 @@ def _keep_sensors(memory: Any, sensors: tuple[SensorLaw, SensorState]) -> None:
 
 
 @_compiled
-def _estimate(memory: Any, trail: Any, steps: int, time: float, noise: Any) -> Any:
+def _estimate(memory: Any, history: Any, steps: int, time: float, noise: Any) -> Any:
     law, state = _load_sensors(memory)
-    return estimate(law, state, trail, steps, time, noise)
+    return estimate(law, state, history, steps, time, noise)
 
 
 _white_noise = _compiled(white_noise)
@@ -160,11 +160,11 @@ _white_noise = _compiled(white_noise)
 class CompiledPlant:
     """A vehicle whose steps and estimates are compiled; its arguments: see `Plant`."""
 
-    def __init__(self, law: VehicleLaw, state: VehicleState, trail_length: int) -> None:
+    def __init__(self, law: VehicleLaw, state: VehicleState, history_length: int) -> None:
         self.law, self._law, self._memory = law, _memory_for(law), _memory_for(state)
         _start(self._law, law, self._memory, state)
         self._arrived, self._shaped = (np.array(ring) for ring in empty_rings(law.multirotor))
-        self._trail = np.array([trail_row(state.body, state.position)] * trail_length)
+        self._history = np.array([truth_row(state.body, state.position)] * history_length)
         self._state: VehicleState | None = state
         self._steps = state.steps
         self._sensors = _memory_for(_SENSORS)
@@ -186,15 +186,15 @@ class CompiledPlant:
             self._memory,
             self._arrived,
             self._shaped,
-            self._trail,
+            self._history,
             *command,
             *conditions,
             count,
         )
 
-    def before(self, steps: int) -> TrailRow:
-        """Row of the trail `steps` steps ago."""
-        row: TrailRow = tuple(self._trail[(self._steps - steps) % len(self._trail)].tolist())
+    def before(self, steps: int) -> TruthRow:
+        """Row of the history `steps` steps ago."""
+        row: TruthRow = tuple(self._history[(self._steps - steps) % len(self._history)].tolist())
         return row
 
     def estimate(
@@ -205,7 +205,7 @@ class CompiledPlant:
             self._sensor_state = state
             _keep_sensors(self._sensors, (law, state))
         estimated: tuple[Estimate, Vector] = _estimate(
-            self._sensors, self._trail, self._steps, time, noise
+            self._sensors, self._history, self._steps, time, noise
         )
         return estimated
 

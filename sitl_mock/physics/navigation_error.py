@@ -11,9 +11,9 @@ from sitl_mock.physics.rigid_body import GRAVITY, Motion
 
 Errors = tuple[complex, complex, complex]
 """Errors of position (m), velocity (m/s), acceleration (m/s^2, from errors of roll and pitch)."""
-TrailRow = tuple[*Motion, *Vector, *Vector]
+TruthRow = tuple[*Motion, *Vector, *Vector]
 """The true motion after a step: motion, position (NED, m), mean acceleration (NED, m/s^2)."""
-Trail = list[TrailRow]
+TruthHistory = list[TruthRow]
 """The rows of the latest steps in a ring buffer; an array if the steps are compiled."""
 
 
@@ -75,7 +75,7 @@ def pending_share(predictor_ms: float, state: FilterState, now: float) -> float:
 
 
 def propagated_horizontal(
-    law: ErrorLaw, state: FilterState, truth: TrailRow, elapsed: float
+    law: ErrorLaw, state: FilterState, truth: TruthRow, elapsed: float
 ) -> Errors:
     """Return the horizontal errors ``elapsed`` s after the fix.
 
@@ -93,7 +93,7 @@ def propagated_horizontal(
 
 
 def propagated_vertical(
-    law: ErrorLaw, state: FilterState, truth: TrailRow, elapsed: float
+    law: ErrorLaw, state: FilterState, truth: TruthRow, elapsed: float
 ) -> Errors:
     """Return the vertical errors (down) ``elapsed`` s after the fix; only the real parts count.
 
@@ -110,7 +110,7 @@ def propagated_vertical(
     )
 
 
-def error_at(law: ErrorLaw, state: FilterState, truth: TrailRow, now: float) -> ErrorVectors:
+def error_at(law: ErrorLaw, state: FilterState, truth: TruthRow, now: float) -> ErrorVectors:
     """Return the error at time ``now`` (s), when the true motion is ``truth`` (pure)."""
     elapsed = now - state.fused_at
     unsettled = pending_share(law.predictor_ms, state, now)

@@ -14,7 +14,7 @@ from sitl_mock.physics.navigation_error import (
     Errors,
     FilterState,
     TrackState,
-    TrailRow,
+    TruthRow,
     pending_share,
     propagated_horizontal,
     propagated_vertical,
@@ -49,7 +49,7 @@ class NavigationFilter:
         state: errors after the latest fix.
     """
 
-    def __init__(self, config: EkfConfig, start: TrailRow, seed: int) -> None:
+    def __init__(self, config: EkfConfig, start: TruthRow, seed: int) -> None:
         self._config = config
         self._period = config.fix_period_ms * 1e-3
         self._gains = (config.position_gains, config.velocity_gains, config.acceleration_gains)
@@ -89,7 +89,7 @@ class NavigationFilter:
         """Whether a fix is due at a fusion time, s."""
         return at - self.state.fused_at >= self._period - 1e-9
 
-    def advance(self, delayed: TrailRow, at: float, present: TrailRow, now: float) -> None:
+    def advance(self, delayed: TruthRow, at: float, present: TruthRow, now: float) -> None:
         """Correct the errors by a fix; the output follows gradually, without a jump.
 
         Args:
@@ -137,7 +137,7 @@ class NavigationFilter:
         )
         self.state = self._without_jump(corrected, present)
 
-    def _without_jump(self, corrected: FilterState, present: TrailRow) -> FilterState:
+    def _without_jump(self, corrected: FilterState, present: TruthRow) -> FilterState:
         """Return the corrected state with pending corrections that keep the output as it was."""
         law, state, now = self.law, self.state, corrected.corrected_at
         since, ago = now - state.fused_at, now - corrected.fused_at

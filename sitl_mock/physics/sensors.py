@@ -11,8 +11,8 @@ from sitl_mock.physics.navigation_error import (
     ErrorVectors,
     FilterState,
     TrackState,
-    Trail,
-    TrailRow,
+    TruthHistory,
+    TruthRow,
     error_at,
 )
 from sitl_mock.physics.navigation_filter import NavigationFilter
@@ -83,7 +83,7 @@ def white_noise(numbers: list[float], deviations: tuple[float, ...]) -> None:
 def estimate(
     law: SensorLaw,
     state: SensorState,
-    trail: Trail,
+    history: TruthHistory,
     steps: int,
     time: float,
     noise: Sequence[float],
@@ -93,13 +93,13 @@ def estimate(
     Args:
         law: constants.
         state: errors after the latest fix, and all resets.
-        trail: the true motion of the latest steps.
+        history: the true motion of the latest steps.
         steps: steps since boot.
         time: now, s.
         noise: 15 numbers, three each for attitude, rates, position, velocity and force.
     """
-    attitude = trail[(steps - law.attitude_delay) % len(trail)]
-    place = trail[(steps - law.position_delay) % len(trail)]
+    attitude = history[(steps - law.attitude_delay) % len(history)]
+    place = history[(steps - law.position_delay) % len(history)]
     if law.filtered:
         error = error_at(law.errors, state.filter, place, time - law.position_delay * law.dt)
     else:
@@ -107,7 +107,7 @@ def estimate(
     q = (attitude[3], attitude[4], attitude[5], attitude[6])
     fx, fy, fz = to_body(q, (attitude[13], attitude[14], attitude[15] - law.gravity))
     tilted = multiply(state.yaw, rotated_slightly(error.rotation, q))
-    rates = trail[(steps - law.rate_delay) % len(trail)]
+    rates = history[(steps - law.rate_delay) % len(history)]
     yaw_rate = rates[9] + law.yaw_rate_bias + noise[5]
     gyro = (rates[7] + noise[3], rates[8] + noise[4], yaw_rate)
     position, velocity, offset = error.position, error.velocity, state.offset
@@ -150,13 +150,13 @@ class Estimator:
         rotation: small rotation of the attitude by the filter's error at the latest estimate, rad,
             NED.
         reset_counter: estimator resets since boot.
-        trail_length: steps whose motion an estimate needs, the present one included.
+        history_length: steps whose motion an estimate needs, the present one included.
     """
 
     def __init__(
         self,
         config: SensorConfig,
-        start: TrailRow,
+        start: TruthRow,
         *,
         gravity: float,
         dt: float,
@@ -187,7 +187,7 @@ class Estimator:
         )
         horizon = 0 if config.ekf is None else round(config.ekf.fix_delay_ms * 1e-3 / dt)
         self._behind = max(horizon, self.law.position_delay)
-        self.trail_length = 1 + max(self.law.rate_delay, self._behind)
+        self.history_length = 1 + max(self.law.rate_delay, self._behind)
         self._filter = filter_
         first = _NO_FILTER if filter_ is None else filter_.state
         self.state = SensorState(first, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -207,12 +207,12 @@ class Estimator:
         )
         self.reset_counter += 1
 
-    def correct(self, time: float, row_before: Callable[[int], TrailRow]) -> None:
+    def correct(self, time: float, row_before: Callable[[int], TruthRow]) -> None:
         """Correct the errors if a fix of the navigation filter is due.
 
         Args:
             time: now, s.
-            row_before: returns the true motion k steps ago, for k below `trail_length`.
+            row_before: returns the true motion k steps ago, for k below `history_length`.
         """
         fused = time - self._behind * self.law.dt
         if self._filter is not None and self._filter.is_due(fused):

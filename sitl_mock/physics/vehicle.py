@@ -26,7 +26,7 @@ from sitl_mock.physics.vehicle_step import (
     PythonPlant,
     VehicleLaw,
     VehicleState,
-    trail_row,
+    truth_row,
 )
 
 __all__ = ["ActuatorCommand", "BatteryState", "Estimate", "TruthState", "Vehicle"]
@@ -99,7 +99,7 @@ class Vehicle:
         body, stopped = at_rest(from_yaw(heading)), initial_actuation(self._multirotor, 0.0)
         self.estimator = Estimator(
             sensors or SensorConfig(),
-            trail_row(body, ZERO),
+            truth_row(body, ZERO),
             gravity=airframe.gravity_m_s2,
             dt=dt,
             seed=seed,
@@ -108,7 +108,7 @@ class Vehicle:
         self.plant = plant(
             VehicleLaw(self._multirotor, ground_law(airframe, dt)),
             VehicleState(0, body, stopped, ZERO, True, False, nan),
-            self.estimator.trail_length,
+            self.estimator.history_length,
         )
 
     @property

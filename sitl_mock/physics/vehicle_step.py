@@ -19,7 +19,7 @@ from sitl_mock.physics.multirotor_step import (
     move,
     sinks,
 )
-from sitl_mock.physics.navigation_error import Trail, TrailRow
+from sitl_mock.physics.navigation_error import TruthHistory, TruthRow
 from sitl_mock.physics.quaternion import Vector
 from sitl_mock.physics.rigid_body import Load
 from sitl_mock.physics.sensors import Estimate, SensorLaw, SensorState, estimate, white_noise
@@ -59,7 +59,7 @@ class VehicleLaw(NamedTuple):
     ground: GroundLaw
 
 
-def trail_row(body: Kinematics, position: Vector) -> TrailRow:
+def truth_row(body: Kinematics, position: Vector) -> TruthRow:
     """Return the data of a step that the estimator needs."""
     motion, acceleration, _ = body
     return motion + position + acceleration
@@ -68,7 +68,7 @@ def trail_row(body: Kinematics, position: Vector) -> TrailRow:
 def advance(
     law: VehicleLaw,
     rings: Rings,
-    trail: Trail,
+    history: TruthHistory,
     state: VehicleState,
     command: ActuatorCommand,
     conditions: Conditions,
@@ -79,7 +79,7 @@ def advance(
     Args:
         law: constants.
         rings: the latest setpoints; they are changed.
-        trail: the latest rows of `trail_row`, one for each step. It is changed.
+        history: the latest rows of `truth_row`, one for each step. It is changed.
         state: state before the steps.
         command: command for all steps.
         conditions: conditions for all steps.
@@ -87,7 +87,7 @@ def advance(
     """
     steps, body, actuation, position, on_ground, crashed, touchdown_speed = state
     armed, roll, pitch, yaw, thrust = command
-    length = len(trail)
+    length = len(history)
     for _ in range(count):
         load, actuation = drive(
             law.multirotor,
@@ -104,7 +104,7 @@ def advance(
         body, position, on_ground, crashed, touchdown_speed = _settled(
             law, body, position, on_ground, crashed, touchdown_speed, load
         )
-        trail[steps % length] = trail_row(body, position)
+        history[steps % length] = truth_row(body, position)
     return VehicleState(steps, body, actuation, position, on_ground, crashed, touchdown_speed)
 
 
@@ -156,7 +156,7 @@ class Plant(Protocol):
     Args:
         law: constants.
         state: state at the start.
-        trail_length: number of the latest steps whose motion is kept.
+        history_length: number of the latest steps whose motion is kept.
 
     Attributes:
         law: the argument `law`.
@@ -164,7 +164,7 @@ class Plant(Protocol):
 
     law: VehicleLaw
 
-    def __init__(self, law: VehicleLaw, state: VehicleState, trail_length: int) -> None: ...
+    def __init__(self, law: VehicleLaw, state: VehicleState, history_length: int) -> None: ...
 
     @property
     def state(self) -> VehicleState:
@@ -175,8 +175,8 @@ class Plant(Protocol):
         """Advance by `count` steps under one command."""
         ...
 
-    def before(self, steps: int) -> TrailRow:
-        """Row of the trail `steps` steps ago."""
+    def before(self, steps: int) -> TruthRow:
+        """Row of the history `steps` steps ago."""
         ...
 
     def estimate(
@@ -194,28 +194,28 @@ class Plant(Protocol):
 class PythonPlant:
     """A vehicle whose steps and estimates are computed in Python; its arguments: see `Plant`."""
 
-    def __init__(self, law: VehicleLaw, state: VehicleState, trail_length: int) -> None:
+    def __init__(self, law: VehicleLaw, state: VehicleState, history_length: int) -> None:
         self.state = state
         self.law = law
         self._rings = empty_rings(law.multirotor)
-        self._trail = [trail_row(state.body, state.position)] * trail_length
+        self._history = [truth_row(state.body, state.position)] * history_length
 
     def advance(self, command: ActuatorCommand, conditions: Conditions, count: int) -> Outcome:
         """Advance by `count` steps under one command."""
         self.state = advance(
-            self.law, self._rings, self._trail, self.state, command, conditions, count
+            self.law, self._rings, self._history, self.state, command, conditions, count
         )
         return outcome(self.state)
 
-    def before(self, steps: int) -> TrailRow:
-        """Row of the trail `steps` steps ago."""
-        return self._trail[(self.state.steps - steps) % len(self._trail)]
+    def before(self, steps: int) -> TruthRow:
+        """Row of the history `steps` steps ago."""
+        return self._history[(self.state.steps - steps) % len(self._history)]
 
     def estimate(
         self, law: SensorLaw, state: SensorState, time: float, noise: Sequence[float]
     ) -> tuple[Estimate, Vector]:
         """The autopilot's estimate now: see `sensors.estimate`."""
-        return estimate(law, state, self._trail, self.state.steps, time, noise)
+        return estimate(law, state, self._history, self.state.steps, time, noise)
 
     @staticmethod
     def make_noise(uniform: list[float], deviations: tuple[float, ...]) -> Sequence[float]:

@@ -288,13 +288,19 @@ def run_of(config=None):
     return doctor_command._DoctorRun(config or Config(), console), shown
 
 
-@pytest.mark.parametrize(("result", "code"), [("ok", 0), ("unsafe", 1)])
-def test_without_a_change_to_propose_nothing_is_set(result, code):
+@pytest.mark.parametrize(
+    ("result", "code", "told"),
+    [
+        ("ok", 0, "`--fix` has no parameter to set."),
+        ("unsafe", 1, "`--fix` has no parameter to set: the findings need other remedies."),
+    ],
+)
+def test_without_a_change_to_propose_nothing_is_set(result, code, told):
     run, shown = run_of()
     run.result = {"result": result}
     vehicle = SimpleNamespace(link=None)
     assert asyncio.run(run._fix(vehicle, None, [FINDING], unasked=True)) == code
-    assert shown.getvalue() == "No parameter is to be set.\n"
+    assert shown.getvalue() == f"{told}\n"
 
 
 @pytest.mark.parametrize(

@@ -99,9 +99,7 @@ def test_a_benchmark_prints_its_figures_as_one_line_of_json(
     assert capsys.readouterr().out == ""
 
 
-def test_a_study_that_is_interrupted_says_that_its_files_are_complete(
-    monkeypatch, capsys, tmp_path
-):
+def test_a_study_that_is_interrupted_says_which_files_are_complete(monkeypatch, capsys, tmp_path):
     def interrupted(*_):
         raise KeyboardInterrupt
 
@@ -109,8 +107,8 @@ def test_a_study_that_is_interrupted_says_that_its_files_are_complete(
     out = tmp_path / "a [b]"
     assert main(["study", "track", "--out", str(out)]) == 1
     told = " ".join(capsys.readouterr().out.split())
-    assert "Interrupted; the files in" in told
-    assert "a [b] are complete." in told
+    assert "Interrupted: in " in told
+    assert "a [b] only the files of finished studies are complete. Run the command again." in told
     monkeypatch.setattr(runner, "run", lambda *_: (out / "index.html", [{"rms": 0.1}]))
     assert main(["study", "track", "--out", str(out), "--json"]) == 0
     told = capsys.readouterr()

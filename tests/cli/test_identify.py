@@ -248,10 +248,25 @@ def test_a_disk_that_is_full_leaves_the_old_file_whole(capsys, fitted, monkeypat
     code, _, err = run(capsys, "--log", fitted, "--force")
     assert code == 1
     assert err == (
-        f"companion: {written}: cannot write what was identified: No space left on device"
+        f"companion: {written}: cannot write the identified response: No space left on device"
     )
     assert written.read_text() == "old"
     assert set(fitted.iterdir()) == before
+
+
+def test_after_a_flight_a_full_disk_leaves_the_fit_for_another_place(capsys, fitted, monkeypatch):
+    def full(_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    flown = SimpleNamespace(result="ok", log=fitted)
+    monkeypatch.setattr(identify, "_fly_doublets", lambda *_: flown)
+    monkeypatch.setattr(os, "fsync", full)
+    code, _, err = run(capsys, "--config", fitted / "my.yaml")
+    assert code == 1
+    assert err.endswith(
+        "cannot write the identified response: No space left on device; the flight is recorded: "
+        f"run `companion identify --log {fitted} --out FILE`"
+    )
 
 
 def test_an_interrupted_fit_says_where_the_flight_is(capsys, fitted, monkeypatch):

@@ -125,7 +125,7 @@ SAID = [
     (
         lambda: link_judges.loss(0.2),
         at(health=Health(lost=0.6)),
-        "60 % of the vehicle's frames are lost, more than safety.max_loss = 0.2",
+        "60 % of the vehicle's frames are lost, more than safety.max_loss = 0.2 (20 %)",
     ),
     (
         lambda: link_judges.round_trip(0.2),
@@ -135,13 +135,13 @@ SAID = [
     (
         lambda: link_judges.deadlines(0.2),
         at(health=Health(missed=0.6)),
-        "60 % of the setpoints miss deadman.deadline_ms, more than safety.max_missed = 0.2",
+        "60 % of the setpoints miss deadman.deadline_ms, more than safety.max_missed = 0.2 (20 %)",
     ),
     (
         lambda: link_judges.starvation(0.2),
         at(health=Health(starved=0.6)),
         "CPU starvation: the program's timer lost 60 % of the last second, "
-        "more than safety.max_starved = 0.2",
+        "more than safety.max_starved = 0.2 (20 %)",
     ),
     (
         lambda: link_judges.gaps(2),

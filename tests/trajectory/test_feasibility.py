@@ -99,6 +99,15 @@ def test_each_limit_is_broken_where_the_need_exceeds_it_and_only_there(
     assert f"limits.{key} allows {'no less than ' if least else ''}" in broken.text
 
 
+@pytest.mark.parametrize(
+    ("field", "share", "allowed"),
+    [("min_thrust", 0.45, "0.45 allows no less than 9"), ("max_thrust", 0.55, "0.55 allows 11")],
+)
+def test_a_thrust_limit_is_told_as_its_key_has_it(field, share, allowed):
+    (broken,) = violations(CLIMB, Envelope(**{field: 20.0 * share}, full_thrust=20.0))
+    assert f" m/s² of thrust, limits.{field} = {allowed} m/s²" in broken.text
+
+
 def test_a_limit_that_is_just_met_is_kept():
     assert violations(EIGHT, Envelope(max_speed=5.0)) == ()
     assert violations(circle(5.0, Laps(5.0, 2)), Envelope(max_tilt=atan(5.0 / G))) == ()

@@ -140,7 +140,14 @@ def _progress(console: Console, trials: int) -> Iterator[Callable[[Found], None]
 def _concluded(
     campaign: Campaign, tune: Tune, place: Path, fly: Fly, found: Found, console: Console
 ) -> int:
-    """Check the best candidate on unseen cases, write it, and report the outcome."""
+    """Check the best candidate on unseen cases, write it, and report the outcome.
+
+    Returns:
+        the exit code: `FAILED` if no candidate met the constraint (`inside_share`), else `DONE`.
+
+    Raises:
+        OSError: the result cannot be written; it was printed instead.
+    """
     if found.best is None:
         console.print(
             f"None of the {found.tried} candidates kept {tune.inside_share:.1%} of the flights "

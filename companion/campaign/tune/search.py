@@ -44,7 +44,7 @@ _HOPELESS = 1.3
 """A candidate is abandoned when its error on the first cases is more than this factor times that of
 the best candidate on the same cases.
 """
-_UNFLOWN = 10.0
+_LARGEST_ERROR = 10.0
 """Largest error of a flight as Optuna sees it, m; the error of a flight that ended early."""
 _VALUES, _SCORE, _MISSED, _WHOLE = "values", "score", "missed", "whole"
 
@@ -190,7 +190,7 @@ class Search:
         try:
             flown = cases(self._campaign, values)
         except ConfigError:  # keys that do not fit together, such as a minimum above a maximum
-            self._stop(trial, _UNFLOWN, 1.0)
+            self._stop(trial, _LARGEST_ERROR, 1.0)
             return
         count = min(len(flown), max(_FEWEST, len(flown) // _FIRST_DIVISOR))
         score = scored(self._fly(flown[:count]), self._tune.envelope_m)
@@ -244,5 +244,5 @@ class Search:
 
 
 def _finite(score: Score) -> float:
-    """The RMS error for Optuna, m; no flight counts more than `_UNFLOWN`."""
-    return pooled(np.minimum(score.true, _UNFLOWN))
+    """The RMS error for Optuna, m; no flight counts more than `_LARGEST_ERROR`."""
+    return pooled(np.minimum(score.true, _LARGEST_ERROR))

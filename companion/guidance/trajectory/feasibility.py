@@ -53,6 +53,8 @@ class Envelope:
         max_yaw_rate: largest heading rate, rad/s.
         min_thrust: smallest specific thrust, m/s².
         max_thrust: largest specific thrust, m/s².
+        full_thrust: specific thrust at a normalised thrust of 1, m/s². With it messages also give
+            the thrust limits as normalised thrust, like their keys.
         max_climb: largest upward speed, m/s.
         max_descent: largest downward speed, m/s.
         max_speed: largest speed, m/s.
@@ -66,6 +68,7 @@ class Envelope:
     max_yaw_rate: float | None = None
     min_thrust: float | None = None
     max_thrust: float | None = None
+    full_thrust: float | None = None
     max_climb: float | None = None
     max_descent: float | None = None
     max_speed: float | None = None
@@ -84,6 +87,7 @@ class _Need(NamedTuple):
         what: unit and quantity as messages show them after the number, such as "° of tilt".
         shown_in: factor from the unit of `allowed` to the unit in messages.
         least: whether the limit is a lower limit.
+        key_scale: `allowed` divided by the value of the key; None: messages do not give that value.
     """
 
     limit: str
@@ -92,6 +96,7 @@ class _Need(NamedTuple):
     what: str
     shown_in: float = 1.0
     least: bool = False
+    key_scale: float | None = None
 
 
 def violations(trajectory: Trajectory, envelope: Envelope) -> tuple[Violation, ...]:
@@ -145,8 +150,10 @@ def _needs(motion: Motion, envelope: Envelope) -> Iterator[_Need]:
     spin = "°/s of roll and pitch"
     yield _Need("limits.max_tilt_rate_deg_s", e.max_tilt_rate, turning, spin, _DEGREES)
     yield _Need("limits.max_yaw_rate_deg_s", e.max_yaw_rate, turn, "°/s of yaw", _DEGREES)
-    yield _Need("limits.min_thrust", e.min_thrust, rotors.thrust, " m/s² of thrust", least=True)
-    yield _Need("limits.max_thrust", e.max_thrust, rotors.thrust, " m/s² of thrust")
+    force, full = " m/s² of thrust", e.full_thrust
+    lowest, highest = e.min_thrust, e.max_thrust
+    yield _Need("limits.min_thrust", lowest, rotors.thrust, force, least=True, key_scale=full)
+    yield _Need("limits.max_thrust", highest, rotors.thrust, force, key_scale=full)
     yield _Need("limits.max_climb_m_s", e.max_climb, climb, " m/s of climb")
     yield _Need("limits.max_descent_m_s", e.max_descent, -climb, " m/s of descent")
     yield _Need("safety.max_speed_m_s", e.max_speed, speed, " m/s of speed")
@@ -167,9 +174,12 @@ def _violation(times: Floats, need: _Need) -> Violation | None:
         return None
     begins, time = float(times[np.argmax(broken)]), float(times[np.argmax(over)])
     needed = float(need.needed[np.argmax(over)]) * need.shown_in
+    limit, unit = need.limit, ""
+    if need.key_scale is not None:
+        limit, unit = f"{limit} = {need.allowed / need.key_scale:.4g}", " m/s²"
     text = (
-        f"at {time:.2f} s it needs {needed:.4g}{need.what}, {need.limit} allows "
-        f"{'no less than ' if need.least else ''}{need.allowed * need.shown_in:.4g}"
+        f"at {time:.2f} s it needs {needed:.4g}{need.what}, {limit} allows "
+        f"{'no less than ' if need.least else ''}{need.allowed * need.shown_in:.4g}{unit}"
     )
     if begins < time:
         text += f" (broken from {begins:.2f} s on)"

@@ -57,10 +57,10 @@ def derived_summary(record: FlightRecord) -> dict[str, Any]:
         RecordError: the record is not valid.
     """
     with as_recorded(record.folder):
-        return _derived(record).as_dict()
+        return _summary_from_record(record).as_dict()
 
 
-def _derived(record: FlightRecord) -> Summary:
+def _summary_from_record(record: FlightRecord) -> Summary:
     flight = record.metadata["flight"]
     reason = f"the record ends {record.duration:.1f} s after the flight began, before it was over"
     phase = record.phases[-1].name if record.phases else "connect"
