@@ -52,7 +52,8 @@ class RateResponse:
             takes the rates along the axes of that target. None: `lead_time` derives it.
 
     Raises:
-        ValueError: a time is negative, longer than 1 s or NaN, or a slew limit is not positive.
+        ValueError: a time is negative, longer than 1 s or NaN, or a slew limit or damping is not
+            positive.
     """
 
     roll: AxisResponse = AxisResponse()
@@ -69,6 +70,8 @@ class RateResponse:
             _check_time(f"{prefix}dead_time", axis.dead_time)
             if not axis.acceleration > 0.0:
                 raise ValueError(f"{prefix}acceleration must be positive, not {axis.acceleration}")
+            if not axis.damping > 0.0:
+                raise ValueError(f"{prefix}damping must be positive, not {axis.damping}")
 
     @property
     def lead_time(self) -> float:

@@ -102,6 +102,8 @@ def test_the_body_turns_as_limit_and_lag_make_it(most):
         ({"yaw": AxisResponse(dead_time=1.5)}, "yaw_dead_time must"),
         ({"roll": AxisResponse(acceleration=0.0)}, "acceleration must be positive, not 0.0"),
         ({"yaw": AxisResponse(acceleration=np.nan)}, "yaw_acceleration must be positive"),
+        ({"roll": AxisResponse(damping=0.0)}, "damping must be positive, not 0.0"),
+        ({"pitch": AxisResponse(damping=np.nan)}, "pitch_damping must be positive"),
         ({"frame_lead": -0.1}, "frame_lead must"),
     ],
 )
