@@ -163,10 +163,7 @@ def test_model_following_leads_unlike_axes_each_by_its_own():
 
 @pytest.mark.slow
 def test_the_order_is_the_same_in_real_time(tmp_path):
-    """Two vehicles flown at once, without lockstep.
-
-    How much straighter, the flights in memory judge: on a busy computer samples come late.
-    """
+    """Two vehicles flown at once, without lockstep."""
     names = ("model-following", "first-order")
     with ExitStack() as stack:
         sessions = []
@@ -185,7 +182,7 @@ def test_the_order_is_the_same_in_real_time(tmp_path):
         followed, first_order = loop.run(fly_all())
     for summary in (followed, first_order):
         assert summary.result == "ok", summary.events
-    assert followed.response().cross_axis_max < first_order.response().cross_axis_max
+    assert followed.response().cross_axis_max < 0.3 * first_order.response().cross_axis_max
 
 
 def test_the_yaml_gives_model_following_the_vehicles_response(tmp_path):
