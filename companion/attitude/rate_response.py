@@ -68,10 +68,8 @@ class RateResponse:
         for prefix, axis in axes.items():
             _check_time(f"{prefix}lag", axis.lag)
             _check_time(f"{prefix}dead_time", axis.dead_time)
-            if not axis.acceleration > 0.0:
-                raise ValueError(f"{prefix}acceleration must be positive, not {axis.acceleration}")
-            if not axis.damping > 0.0:
-                raise ValueError(f"{prefix}damping must be positive, not {axis.damping}")
+            _check_positive(f"{prefix}acceleration", axis.acceleration)
+            _check_positive(f"{prefix}damping", axis.damping)
 
     @property
     def lead_time(self) -> float:
@@ -101,6 +99,11 @@ class RateResponse:
 def _check_time(name: str, value: float) -> None:
     if not 0.0 <= value <= _LONGEST_TIME:
         raise ValueError(f"{name} must be from 0 to {_LONGEST_TIME:g} s, not {value}")
+
+
+def _check_positive(name: str, value: float) -> None:
+    if not value > 0.0:
+        raise ValueError(f"{name} must be positive, not {value}")
 
 
 def largest_gain(lag: float, dead_time: float, sigma: float = 0.0) -> float:

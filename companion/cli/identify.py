@@ -62,7 +62,7 @@ def identify(options: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         reason = (
             f"interrupted while fitting; the flight is kept in {summary.log}; "
-            f"fit it with companion identify --log {summary.log}"
+            f"fit it with {_fit_command(summary.log)}"
         )
         with suppress(OSError):
             console.print(reason, soft_wrap=True)
@@ -142,11 +142,13 @@ def _write_fit(out: Path, text: str, flown: Path | None) -> None:
     except OSError as error:
         reason = f"{out}: cannot write the identified response: {error.strerror}"
         if flown is not None:
-            folder = shlex.quote(str(flown))
-            reason += (
-                f"; the flight is recorded: run `companion identify --log {folder} --out FILE`"
-            )
+            reason += f"; the flight is recorded: run `{_fit_command(flown)} --out FILE`"
         raise OSError(reason) from error
+
+
+def _fit_command(folder: Path) -> str:
+    """The command that fits the flight recorded in a folder."""
+    return f"companion identify --log {shlex.quote(str(folder))}"
 
 
 def _how_to_include(out: Path, config: Path | None) -> str:
