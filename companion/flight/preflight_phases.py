@@ -88,9 +88,12 @@ async def arm(context: FlightContext) -> None:
 
 
 async def undo_arming(context: FlightContext) -> None:
-    """Disarm if we armed; a vehicle that the pilot armed is left alone."""
+    """Disarm if we armed or commanded the take-off; else a vehicle that is armed is left alone.
+
+    A vehicle that the pilot armed would carry out the take-off after the end of this flight.
+    """
     context.release()
-    if not context.arm_sent:
+    if not (context.arm_sent or context.takeoff_sent):
         return
     context.detail = "the autopilot to accept disarming"
     # Sent even if the newest heartbeat says disarmed: it may be older than our arming.

@@ -36,10 +36,13 @@ async def takeoff(context: FlightContext) -> None:
     context.ground.command_takeoff()
     context.loop.drop_command()  # the idle command must not be sent from here on
     context.guidance_loop.step()
-    # Checked again before each try: a disarmed PX4 stores the command and takes off once armed.
-    await command_if_ours(
-        context, command, lambda: _require_ground(context), lambda: not state.landed
-    )
+
+    def ready() -> None:
+        # Before each try: a disarmed PX4 stores the command and takes off once armed.
+        _require_ground(context)
+        context.takeoff_sent = True
+
+    await command_if_ours(context, command, ready, lambda: not state.landed)
     climb = _Climb(context, height)
     await context.until(climb.is_over)
 
