@@ -130,8 +130,8 @@ async def _arm(context: FlightContext) -> None:
     def ready() -> None:
         _refuse_unsafe(vehicle_checks.armed(state))
         require_role(context.link, {Role.READY})
+        context.arm_sent = True  # only now: a vehicle that somebody else armed is not disarmed
 
-    context.arm_sent = True
     context.same_vehicle.commit()
     await command_if_ours(context, command, ready, armed)
     await context.until(armed, "the vehicle to be armed")

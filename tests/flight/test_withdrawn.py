@@ -4,8 +4,9 @@ from collections import deque
 
 import pytest
 
+from companion.flight.preflight_checks import PreflightChecks
 from sitl_mock.link.framing import decode
-from tests.flight.fly import mock_vehicle, run, session_for
+from tests.flight.fly import fly, mock_vehicle, run, session_for
 from tests.flight.others import When
 
 ARM, TAKE_OFF, SET_MODE = 400, 22, 176
@@ -46,3 +47,24 @@ def test_interrupted_before_it_lifts_off_a_vehicle_that_the_pilot_armed_stays_do
     assert (summary.result, summary.phase) == ("interrupted by the user", "takeoff")
     assert [command for command, _ in sent] == [TAKE_OFF, ARM]
     assert (state["armed"], state["on_ground"]) == (False, True), summary.events
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_who_arms_just_before_we_would_is_not_disarmed(monkeypatch, autopilot):
+    require, stages = PreflightChecks.require, []
+
+    with mock_vehicle(autopilot=autopilot) as mock:
+
+        async def then_somebody_arms(self, stage):
+            evidence = await require(self, stage)
+            stages.append(stage)
+            if len(stages) == 2:  # the checks before arming
+                mock.command(ARM, 1)
+            return evidence
+
+        monkeypatch.setattr(PreflightChecks, "require", then_somebody_arms)
+        sent = commands_from(mock)
+        summary = fly(mock)
+        state = mock.state()
+    assert summary.result == "the vehicle is already armed; land and disarm it first"
+    assert (list(sent), state["armed"]) == ([], True), summary.events
