@@ -66,7 +66,7 @@ class Campaign:
             ConfigError: the program or the mock vehicle refuses its configuration; the message
                 names the case and the key.
         """
-        factors = {name: _shown(name, value) for name, value in sample.values.items()}
+        factors = {name: _factor(name, value) for name, value in sample.values.items()}
         changes: dict[str, Any] = {}
         for name, value in sample.values.items():
             if name not in FAULT_FACTORS:
@@ -147,6 +147,9 @@ def _check_flyable(config: Config) -> None:
         )
 
 
-def _shown(name: str, value: Any) -> Value:
-    """A value as written in the results; a trajectory file by its name without the ending."""
-    return Path(value).stem if name == TRAJECTORY and value is not None else column_value(value)
+def _factor(name: str, value: Any) -> Value:
+    """A value as written in the results; of a trajectory's path only the folder of its copy.
+
+    The folder is called like the file. Files of the same name have folders such as `circle-2`.
+    """
+    return Path(value).parent.name if name == TRAJECTORY else column_value(value)

@@ -128,14 +128,11 @@ class _CampaignReader:
         """The swept key, with the paths of its trajectory files replaced by their copies."""
         if TRAJECTORY not in (swept.keys or (key,)):
             return swept
-        known = {}
-        for kind in ("values", "choice"):
-            values = getattr(swept, kind)
-            if values is not None:
-                if not all(isinstance(value, str) for value in values):
-                    raise ConfigError(f"{self._path}: sweep.{key}: each value must be a file")
-                known[kind] = tuple(str(self._collect(self._folder / value)) for value in values)
-        return swept.model_copy(update=known)
+        listed = swept.values or swept.choice or ()
+        if not (listed and all(isinstance(value, str) for value in listed)):
+            raise ConfigError(f"{self._path}: sweep.{key}: each value must be a file")
+        copies = tuple(str(self._collect(self._folder / value)) for value in listed)
+        return swept.model_copy(update={swept.kind: copies})
 
     def _collect(self, path: Path) -> Path:
         """Copy a trajectory's file and its table into the campaign; return its name there.

@@ -96,6 +96,10 @@ def test_a_fault_cannot_be_called_none_nor_be_in_a_batch(tmp_path):
         ({"set": {"mock.airframe.no.such": 1}}, "unknown key mock.airframe.no"),
         ({"set": {"limits.max_tilt_deg": 120}}, "max_tilt_deg"),
         ({"sweep": {"flight.trajectory": [5, 6]}}, "flight.trajectory: each value must be a file"),
+        (
+            {"sweep": {"flight.trajectory": {"uniform": [0, 1]}}},
+            "flight.trajectory: each value must be a file",
+        ),
     ],
 )
 def test_a_key_that_cannot_take_its_value(tmp_path, told, words):
@@ -129,6 +133,15 @@ def test_a_trajectory_that_is_named_twice_is_copied_once(tmp_path):
     config = {"flight": {"maneuvers": ["trajectory"], "trajectory": "t.csv"}}
     told = load(tmp_path, config=config, sweep={"flight.trajectory": ["t.csv", "other/t.csv"]})
     assert len(told.files) == 2
+
+
+def test_trajectories_of_the_same_name_are_different_factors(tmp_path):
+    (tmp_path / "other").mkdir()
+    for name in ("t.csv", "other/t.csv"):
+        rows = (f"{k},{k},0,0" for k in range(9))
+        (tmp_path / name).write_text("\n".join(["t,x,y,z", *rows]))
+    told = load(tmp_path, sweep={"flight.trajectory": ["t.csv", "other/t.csv"]})
+    assert [case.factors["flight.trajectory"] for case in told.cases()] == ["t", "t-2"]
 
 
 @pytest.mark.parametrize(
