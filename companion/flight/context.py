@@ -46,8 +46,7 @@ class FlightContext:
         setpoint_rate_hz: rate of setpoints over the maneuvers, Hz.
         heartbeat_limit: largest age of a known mode, s; the checks set it from the heartbeat rate.
         mode_at_checks: the mode when the checks ended; another one before arming is a takeover.
-        arm_sent: whether we commanded arming.
-        takeoff_sent: whether we commanded the take-off.
+        must_disarm: whether an end on the ground disarms: we commanded arming or the take-off.
         fence_centre: centre of the fence in an earlier flight, if the vehicle has not been disarmed
             since; None: the fence is centred where control begins.
         note: records and shows an event.
@@ -67,8 +66,7 @@ class FlightContext:
     setpoint_rate_hz: float = 0.0
     heartbeat_limit: float = INITIAL_HEARTBEAT_LIMIT
     mode_at_checks: str | None = None
-    arm_sent: bool = False
-    takeoff_sent: bool = False
+    must_disarm: bool = False
     fence_centre: FenceCentre | None = None
     note: Callable[[str], None] = lambda _: None
 

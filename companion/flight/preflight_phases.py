@@ -93,7 +93,7 @@ async def undo_arming(context: FlightContext) -> None:
     A vehicle that the pilot armed would carry out the take-off after the end of this flight.
     """
     context.release()
-    if not (context.arm_sent or context.takeoff_sent):
+    if not context.must_disarm:
         return
     context.detail = "the autopilot to accept disarming"
     # Sent even if the newest heartbeat says disarmed: it may be older than our arming.
@@ -130,7 +130,7 @@ async def _arm(context: FlightContext) -> None:
     def ready() -> None:
         _refuse_unsafe(vehicle_checks.armed(state))
         require_role(context.link, {Role.READY})
-        context.arm_sent = True  # only now: a vehicle that somebody else armed is not disarmed
+        context.must_disarm = True  # only now: a vehicle that somebody else armed is not disarmed
 
     context.same_vehicle.commit()
     await command_if_ours(context, command, ready, armed)

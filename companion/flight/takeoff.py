@@ -40,7 +40,7 @@ async def takeoff(context: FlightContext) -> None:
     def ready() -> None:
         # Before each try: a disarmed PX4 stores the command and takes off once armed.
         _require_ground(context)
-        context.takeoff_sent = True
+        context.must_disarm = True
 
     await command_if_ours(context, command, ready, lambda: not state.landed)
     climb = _Climb(context, height)

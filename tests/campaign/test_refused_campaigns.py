@@ -121,13 +121,17 @@ def test_a_case_is_described_with_its_values(tmp_path):
     )
 
 
+def write_trajectory(path):
+    path.parent.mkdir(exist_ok=True)
+    path.write_text("\n".join(["t,x,y,z", *(f"{k},{k},0,0" for k in range(9))]))
+
+
 def test_a_trajectory_that_is_named_twice_is_copied_once(tmp_path):
-    (tmp_path / "t.csv").write_text("\n".join(["t,x,y,z", *(f"{k},{k},0,0" for k in range(9))]))
+    write_trajectory(tmp_path / "t.csv")
     path = {"flight.trajectory": "t.csv"}
     told = load(tmp_path, set=path)
     assert list(told.files) == ["trajectories/t/t.csv"]
-    (tmp_path / "other").mkdir()
-    (tmp_path / "other" / "t.csv").write_text((tmp_path / "t.csv").read_text())
+    write_trajectory(tmp_path / "other" / "t.csv")
     told = load(tmp_path, sweep={"flight.trajectory": ["t.csv", "other/t.csv"]})
     assert sorted(told.files) == ["trajectories/t-2/t.csv", "trajectories/t/t.csv"]
     config = {"flight": {"maneuvers": ["trajectory"], "trajectory": "t.csv"}}
@@ -136,10 +140,8 @@ def test_a_trajectory_that_is_named_twice_is_copied_once(tmp_path):
 
 
 def test_trajectories_of_the_same_name_are_different_factors(tmp_path):
-    (tmp_path / "other").mkdir()
-    for name in ("t.csv", "other/t.csv"):
-        rows = (f"{k},{k},0,0" for k in range(9))
-        (tmp_path / name).write_text("\n".join(["t,x,y,z", *rows]))
+    write_trajectory(tmp_path / "t.csv")
+    write_trajectory(tmp_path / "other" / "t.csv")
     told = load(tmp_path, sweep={"flight.trajectory": ["t.csv", "other/t.csv"]})
     assert [case.factors["flight.trajectory"] for case in told.cases()] == ["t", "t-2"]
 

@@ -1,7 +1,5 @@
 """A flight that ends on the ground takes back what it commanded, and nothing else."""
 
-from collections import deque
-
 import pytest
 
 from companion.flight.preflight_checks import PreflightChecks
@@ -16,7 +14,7 @@ HANDING_OVER = {"px4": (1, 4, 3), "ardupilot": (1, 4)}
 
 def commands_from(mock):
     """Those of these commands that the program sends, with the first parameter, as they come."""
-    found = deque()
+    found = []
 
     def note(datagram):
         for message in decode(datagram):
@@ -67,4 +65,4 @@ def test_who_arms_just_before_we_would_is_not_disarmed(monkeypatch, autopilot):
         summary = fly(mock)
         state = mock.state()
     assert summary.result == "the vehicle is already armed; land and disarm it first"
-    assert (list(sent), state["armed"]) == ([], True), summary.events
+    assert (sent, state["armed"]) == ([], True), summary.events
