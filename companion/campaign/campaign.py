@@ -70,7 +70,7 @@ class Campaign:
         changes: dict[str, Any] = {}
         for name, value in sample.values.items():
             if name not in FAULT_FACTORS:
-                for key in self.file.sweep[name].keys or (name,):
+                for key in self.file.sweep[name].changed_keys(name):
                     changes[key] = self._value(name, key, value)
         try:
             config, mock = with_keys(self.base, self._mock, changes)

@@ -1,4 +1,4 @@
-"""The YAML file of a campaign: the flight, the swept keys, and the limits."""
+"""The YAML file of a campaign: base configuration, swept keys, faults, limits and search."""
 
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -6,7 +6,6 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from companion.campaign.swept import Swept
-from companion.campaign.tune.section import Tune
 from companion.files.yaml_file import PathKey, Section
 
 Name = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
@@ -31,6 +30,8 @@ _DEFAULT_AFTER_S = {
 }
 """Time from the beginning of a phase to a fault where the scenario does not set one, s."""
 TRAJECTORY, MANEUVERS = "flight.trajectory", "flight.maneuvers"
+NOUNS = {"flights": "flights", "batch": "vehicles"}
+"""Plural noun for the cases of each kind of campaign."""
 
 
 class FaultScenario(Section):
@@ -80,6 +81,39 @@ class CampaignLimits(Section):
     cases."""
     flight_s: Annotated[float, Field(ge=1.0, le=36_000.0)] = 600.0
     """Longest flight, s of vehicle time from boot. A longer one is ended, and is not good."""
+
+
+class Tune(Section):
+    """The search of `companion campaign tune`. Running the campaign ignores this section."""
+
+    search: Annotated[dict[str, Swept], Field(min_length=1, max_length=30)]
+    """Searched keys of the program: dotted, each with uniform, loguniform or choice."""
+    trials: Annotated[int, Field(ge=1, le=100_000)] = 100
+    """Number of candidates that are tried; `--trials` replaces it."""
+    envelope_m: Annotated[float, Field(gt=0.0, le=1000.0)] | None = 1.0
+    """Largest true distance from the reference (`position_max_m` of the results) for a flight that
+    reaches its end to count as inside the envelope. null: every flight that reaches its end counts
+    as inside.
+    """
+    inside_share: Annotated[float, Field(gt=0.0, le=1.0)] = 0.999
+    """Share of the flights that must stay inside the envelope."""
+    check_samples: Annotated[int, Field(ge=2, le=10_000)] = 8
+    """Number of samples that the search does not see; on them the result is compared with the
+    unchanged configuration."""
+
+    @field_validator("search")
+    @classmethod
+    def _searchable(cls, search: dict[str, Swept]) -> dict[str, Swept]:
+        for key, swept in search.items():
+            if not (swept.uniform or swept.loguniform or swept.choice):
+                raise ValueError(f"{key}: give uniform, loguniform or choice")
+            if swept.times_base or swept.keys:
+                raise ValueError(f"{key}: times_base and keys belong to `sweep`")
+            if key.startswith("mock."):
+                raise ValueError(
+                    f"{key}: keys of the mock vehicle cannot be searched; name keys of the program"
+                )
+        return search
 
 
 class CampaignFile(Section):
@@ -136,7 +170,7 @@ class CampaignFile(Section):
             raise ValueError(f"faults: {NO_FAULT} is the name of a flight without a fault")
         factors: dict[str, str] = {}
         for name, swept in self.sweep.items():
-            for key in swept.keys or (name,):
+            for key in swept.changed_keys(name):
                 if key in self.set:
                     raise ValueError(f"`{key}` stands in set and in sweep; remove one of them")
                 if factors.setdefault(key, name) != name:
@@ -147,3 +181,10 @@ class CampaignFile(Section):
         if self.kind == "batch" and (self.faults or FAULT in self.sweep):
             raise ValueError("faults need kind: flights")
         return self
+
+    @property
+    def swept_keys(self) -> frozenset[str]:
+        """All keys that a factor changes, and the fault factors."""
+        return frozenset(
+            key for name, each in self.sweep.items() for key in each.changed_keys(name)
+        )

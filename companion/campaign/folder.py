@@ -79,7 +79,11 @@ def make(folder: Path, campaign: Campaign, description: Description) -> None:
                 f"{folder}: holds files, but no campaign that was begun; name another folder with "
                 "--out, or empty this one"
             )
-        store.write_campaign(folder, campaign, bounded_yaml.dump(as_written(campaign)))
+        (folder / store.RESULTS).mkdir(parents=True, exist_ok=True)
+        for name, text in campaign.files.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            write_whole(folder / name, text)
+        write_whole(folder / FILE, bounded_yaml.dump(as_written(campaign)))
         write_whole(folder / _DESCRIPTION, json.dumps(asdict(description), indent=2) + "\n")
     except OSError as error:
         raise ConfigError(f"{folder}: cannot be written: {error.strerror}") from error

@@ -10,6 +10,7 @@ import hashlib
 from collections.abc import Sequence
 from functools import lru_cache
 from math import inf, isfinite, radians
+from statistics import fmean
 from typing import NamedTuple
 
 import numpy as np
@@ -52,12 +53,12 @@ def check_case(case: Case) -> None:
         ConfigError: its planner keeps state, it has no open-loop maneuver, its sample rate does not
             divide 1000 Hz, or it has a fault.
     """
-    if fault := _unflyable(case):
-        raise ConfigError(f"{case.described()}: {fault}")
+    if reason := _unflyable(case):
+        raise ConfigError(f"{case.described()}: {reason}")
 
 
 def _unflyable(case: Case) -> str | None:
-    """Why a case cannot be flown in a batch, or None."""
+    """Why a case cannot be flown in a batch; None: it can."""
     config = case.config
     if config.planner_name not in LAW_NAMES:
         return (
@@ -92,21 +93,19 @@ def _run_case(case: Case) -> dict[str, Value]:
         "case": case.index,
         "seed": case.seed,
         **case.factors,
-        **_outcomes(flight, figures, size, len(targets) / rate_hz),
+        **_outcomes(flight, figures, size),
     }
 
 
-def _outcomes(
-    flight: StepFlight, figures: StepFigures, size: float, seconds: float
-) -> dict[str, Value]:
-    constants = [each for each in figures[-2:] if isfinite(each)]
+def _outcomes(flight: StepFlight, figures: StepFigures, size: float) -> dict[str, Value]:
+    """The outcomes of a case; `size` is the largest length of a target's coefficients."""
+    constants = [each for each in figures[-2:] if isfinite(each)]  # north and east
     values = {
         "cross_axis_max": figures.cross_axis_max,
         "model_deviation_max": figures.model_deviation_max,
-        "time_constant_s": sum(constants) / len(constants) if constants else inf,
+        "time_constant_s": fmean(constants) if constants else inf,
         "rate_rms_rad_s": figures.rate_rms,
         "rate_max_rad_s": figures.rate_max,
-        "flight_s": seconds,
     }
     finite = bool(np.isfinite(flight.commanded).all() and np.isfinite(flight.q).all())
     straight = finite and figures.cross_axis_max <= STRAIGHTNESS * size
@@ -115,7 +114,6 @@ def _outcomes(
         "ok": straight,
         "result": result,
         **{name: value if isfinite(value) else None for name, value in values.items()},
-        "setpoints": len(flight.commanded),
         "digest": _digest(flight),
     }
 

@@ -62,36 +62,29 @@ class _CampaignReader:
         Raises:
             ConfigError: a file cannot be read or is wrong; see `load`.
         """
-        file, name = self._file, str(self._path)
-        base = self._base()
-        swept = [
-            key
-            for key, each in file.sweep.items()
-            if key not in FAULT_FACTORS
-            for key in each.keys or (key,)
-        ]
+        file, base = self._file, self._base()
         for key in file.set:
             check_key(key, base, self._at("set", key))
-        for key, each in file.sweep.items():
-            for changed in () if key in FAULT_FACTORS else each.keys or (key,):
-                check_key(changed, base, self._at("sweep", key))
+        for name, swept in file.sweep.items():
+            for key in () if name in FAULT_FACTORS else swept.changed_keys(name):
+                check_key(key, base, self._at("sweep", name))
         for key in () if file.tune is None else file.tune.search:
             check_key(key, base, self._at("tune", "search", key))
         self._check_faults()
         changes = dict(file.set)
-        if TRAJECTORY in {*swept, *changes} and MANEUVERS not in {*swept, *changes}:
+        named = file.swept_keys | changes.keys()
+        if TRAJECTORY in named and MANEUVERS not in named:
             changes[MANEUVERS] = ("trajectory",)
         if isinstance(changes.get(TRAJECTORY), str):
             changes[TRAJECTORY] = self._folder / changes[TRAJECTORY]
         try:
             base, mock = with_keys(base, base.mock or {}, changes)
         except ConfigError as error:
-            raise ConfigError(f"{name}: {error}") from error
-        base = base.model_copy(update={"mock": mock})
-        base = self._flyable(base)
-        sweep = {key: self._with_files(key, each) for key, each in file.sweep.items()}
+            raise ConfigError(f"{self._path}: {error}") from error
+        base = self._flyable(base.model_copy(update={"mock": mock}))
+        sweep = {name: self._with_files(name, swept) for name, swept in file.sweep.items()}
         file = file.model_copy(update={"sweep": sweep, "set": {}})
-        return Campaign(file, base, self._files, name)
+        return Campaign(file, base, self._files, str(self._path))
 
     def _at(self, *where: str) -> str:
         """Line number and section of a key, for messages."""
@@ -124,13 +117,17 @@ class _CampaignReader:
         path = base.flight.trajectory
         return base if path is None else _with_trajectory(base, self._collect(path))
 
-    def _with_files(self, key: str, swept: Swept) -> Swept:
-        """The swept key, with the paths of its trajectory files replaced by their copies."""
-        if TRAJECTORY not in (swept.keys or (key,)):
+    def _with_files(self, name: str, swept: Swept) -> Swept:
+        """A factor with the paths of the copies of its trajectory files.
+
+        Raises:
+            ConfigError: a value names no trajectory that can be read.
+        """
+        if TRAJECTORY not in swept.changed_keys(name):
             return swept
         listed = swept.values or swept.choice or ()
         if not (listed and all(isinstance(value, str) for value in listed)):
-            raise ConfigError(f"{self._path}: sweep.{key}: each value must be a file")
+            raise ConfigError(f"{self._path}: sweep.{name}: each value must be a file")
         copies = tuple(str(self._collect(self._folder / value)) for value in listed)
         return swept.model_copy(update={swept.kind: copies})
 

@@ -117,6 +117,10 @@ class Swept(Section):
         listed = self.values or self.choice
         return listed is not None and all(isinstance(value, bool) for value in listed)
 
+    def changed_keys(self, name: str) -> tuple[str, ...]:
+        """The keys that receive the value of the factor `name`."""
+        return self.keys or (name,)
+
     def grid(self) -> tuple[Any, ...]:
         """The values of a grid."""
         if self.range is None:

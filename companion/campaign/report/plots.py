@@ -7,7 +7,13 @@ import numpy as np
 
 from companion.campaign.report.results import RATES, THRUST, Floats, Results, label
 from companion.campaign.report.sensitivity import Influence
-from companion.campaign.report.statistics import choices, levels, pareto_front, share_of
+from companion.campaign.report.statistics import (
+    choices,
+    levels,
+    median,
+    pareto_front,
+    share_of,
+)
 from companion.report.plots import IDEAL, MEASURED, NEAREST, REFERENCE, Plot, axes, numbers
 
 _MOST_FACTORS = 6
@@ -91,7 +97,7 @@ def pareto(results: Results) -> Iterator[Plot]:
     points, titles = [], []
     for choice in choices(results):
         part = choice.cases
-        values = np.array([_median(columns[name][part]) for name in names])
+        values = np.array([median(columns[name][part]) for name in names])
         if np.isfinite(values).all():
             points.append(values)
             good = share_of(results.good[part]).share
@@ -119,11 +125,6 @@ def pareto(results: Results) -> Iterator[Plot]:
     )
     layout = axes(x=label(RATES), y=label(results.error))
     yield Plot("Pareto front", note, [t for t in traces if t["x"]], layout, 420)
-
-
-def _median(values: Floats) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.median(known)) if len(known) else float("nan")
 
 
 def _points(name: str, goals: Floats, titles: list[str], size: int) -> dict[str, Any]:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from companion.campaign.campaign import Campaign
+from companion.campaign.campaign_file import Tune
 from companion.campaign.case import Case
 from companion.campaign.keys import with_keys
 from companion.campaign.swept import Swept
-from companion.campaign.tune.section import Tune
 from companion.config import Config
 from companion.config.flight import OPEN_LOOP
 from companion.config.known_drag import drag_prior
@@ -55,8 +55,7 @@ def section_of(campaign: Campaign) -> Tune:
         raise ConfigError(f"{campaign.name}: there is no section `tune` that says what to search")
     if campaign.file.kind != "flights":
         raise ConfigError(f"{campaign.name}: tune needs kind: flights")
-    swept = {key for name, each in campaign.file.sweep.items() for key in each.keys or (name,)}
-    for key in tune.search.keys() & swept:
+    for key in tune.search.keys() & campaign.file.swept_keys:
         raise ConfigError(f"{campaign.name}: `{key}` stands in sweep and in tune.search")
     flown = (case.config.flight.maneuvers for case in campaign.cases())
     if all(set(OPEN_LOOP).issuperset(maneuvers) for maneuvers in flown):

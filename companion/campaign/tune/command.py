@@ -12,6 +12,7 @@ from rich.progress import TextColumn
 
 from companion.campaign import engine, estimate, folder
 from companion.campaign.campaign import Campaign
+from companion.campaign.campaign_file import Tune
 from companion.campaign.case import Case
 from companion.campaign.cluster import ClusterError, connected, require_packages, wait_for_workers
 from companion.campaign.loading import load
@@ -20,7 +21,6 @@ from companion.campaign.tune.candidates import cases, section_of, set_values, st
 from companion.campaign.tune.certainty import compared
 from companion.campaign.tune.scores import Row, scored
 from companion.campaign.tune.search import Fly, Found, Search
-from companion.campaign.tune.section import Tune
 from companion.campaign.tune.storage import StorageError
 from companion.campaign.tune.writing import (
     Result,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from companion.campaign.campaign import Campaign
+from companion.campaign.campaign_file import Tune
 from companion.campaign.case import Case
 from companion.campaign.tune.candidates import (
     Start,
@@ -20,7 +21,6 @@ from companion.campaign.tune.candidates import (
 )
 from companion.campaign.tune.first_flight import learned
 from companion.campaign.tune.scores import Row, Score, pooled, scored
-from companion.campaign.tune.section import Tune
 from companion.campaign.tune.storage import storage_errors
 from companion.config import Config
 from companion.files.yaml_file import ConfigError
