@@ -73,26 +73,21 @@ class Campaign:
                 for key in self.file.sweep[name].changed_keys(name):
                     changes[key] = self._value(name, key, value)
         try:
-            config, mock = with_keys(self.base, self._mock, changes)
+            config = with_keys(self.base, changes)
             _check_flyable(config)
             fault = self._fault(sample.values)
         except ConfigError as error:
-            case = Case(sample.index, sample.seed, factors, self.base, {}, None, {}, 0.0)
+            case = Case(sample.index, sample.seed, factors, self.base, None, {}, 0.0)
             raise ConfigError(f"{self.name}: {case.described()}: {error}") from error
         return Case(
             sample.index,
             sample.seed,
             factors,
-            config,
-            {**mock, "seed": sample.seed},
+            config.model_copy(update={"mock": {**(config.mock or {}), "seed": sample.seed}}),
             fault,
             self._files_of(config),
             self.file.limits.flight_s,
         )
-
-    @cached_property
-    def _mock(self) -> dict[str, Any]:
-        return dict(self.base.mock or {})
 
     def _value(self, name: str, key: str, value: Any) -> Any:
         """The value of a key; a factor with `times_base` is multiplied by the base's value."""
@@ -115,7 +110,7 @@ class Campaign:
 
     @cached_property
     def _complete_mock(self) -> dict[str, Any]:
-        return complete_mock(self._mock)
+        return complete_mock(self.base.mock or {})
 
     def _fault(self, values: Mapping[str, Any]) -> Fault | None:
         name = values.get(FAULT, NO_FAULT)

@@ -1,4 +1,4 @@
-"""One case of a campaign: its factors, and the resulting configuration and mock vehicle."""
+"""One case of a campaign: its factors, the resulting configuration, and its fault."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -35,9 +35,8 @@ class Case:
         index: number in the campaign, from 0.
         seed: seed of noise and gusts.
         factors: value of each swept key, as the results hold it.
-        config: configuration of the program. If a trajectory is flown, `flight.trajectory` is a
-            key of `files`.
-        mock: the complete section `mock`, the seed included.
+        config: configuration of the program, and in its section `mock` that of the mock vehicle. If
+            a trajectory is flown, `flight.trajectory` is a key of `files`.
         fault: fault scenario; None: no fault.
         files: the text of each file that the flight reads, by its path in the campaign's folder.
         flight_s: longest flight, s of vehicle time.
@@ -47,10 +46,14 @@ class Case:
     seed: int
     factors: Mapping[str, Value]
     config: Config
-    mock: Mapping[str, Any]
     fault: Fault | None
     files: Mapping[str, str]
     flight_s: float
+
+    @property
+    def mock(self) -> Mapping[str, Any]:
+        """The complete section `mock`, the seed of this case included."""
+        return self.config.mock or {}
 
     def described(self) -> str:
         """The case in a message: its number and its factors."""

@@ -78,10 +78,10 @@ class _CampaignReader:
         if isinstance(changes.get(TRAJECTORY), str):
             changes[TRAJECTORY] = self._folder / changes[TRAJECTORY]
         try:
-            base, mock = with_keys(base, base.mock or {}, changes)
+            base = with_keys(base, changes)
         except ConfigError as error:
             raise ConfigError(f"{self._path}: {error}") from error
-        base = self._flyable(base.model_copy(update={"mock": mock}))
+        base = self._flyable(base)
         sweep = {name: self._with_files(name, swept) for name, swept in file.sweep.items()}
         file = file.model_copy(update={"sweep": sweep, "set": {}})
         return Campaign(file, base, self._files, str(self._path))

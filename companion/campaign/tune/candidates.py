@@ -73,9 +73,7 @@ def cases(campaign: Campaign, values: Values) -> list[Case]:
     Raises:
         ConfigError: a value is refused.
     """
-    config, _ = with_keys(campaign.base, campaign.base.mock or {}, values)
-    base = config.model_copy(update={"mock": campaign.base.mock})
-    return list(replace(campaign, base=base).cases())
+    return list(replace(campaign, base=with_keys(campaign.base, values)).cases())
 
 
 def unseen(campaign: Campaign, samples: int) -> Campaign:
