@@ -90,7 +90,11 @@ class Campaign:
         )
 
     def _value(self, name: str, key: str, value: Any) -> Any:
-        """The value of a key; a factor with `times_base` is multiplied by the base's value."""
+        """The new value of a key: `value`, times that of the base for a factor with `times_base`.
+
+        Raises:
+            ConfigError: the base holds no number to multiply.
+        """
         if not self.file.sweep[name].times_base or value is None:
             return value
         base = self._base_value(key)
@@ -127,6 +131,7 @@ class Campaign:
         )
 
     def _files_of(self, config: Config) -> dict[str, str]:
+        """The files that a flight with this configuration reads."""
         path = config.flight.trajectory
         if path is None or "trajectory" not in config.flight.maneuvers:
             return {}

@@ -28,7 +28,7 @@ _DEFAULT_AFTER_S = {
     "hand back": 0.02,
     "land": 0.3,
 }
-"""Time from the beginning of a phase to a fault where the scenario does not set one, s."""
+"""Value of `FaultScenario.after_s` by phase where the scenario does not set one, s."""
 TRAJECTORY, MANEUVERS = "flight.trajectory", "flight.maneuvers"
 NOUNS = {"flights": "flights", "batch": "vehicles"}
 """Plural noun for the cases of each kind of campaign."""
@@ -38,23 +38,23 @@ class FaultScenario(Section):
     """A fault of the mock vehicle that begins in a phase, and how the flight may end then."""
 
     inject: Annotated[tuple[dict[str, Any], ...], Field(min_length=1, max_length=10)]
-    """Entries as in `mock.faults`, without `at_s` and `after_offboard_s`. They begin together."""
+    """Entries as in `mock.faults`, without `at_s` and `after_offboard_s`. All begin together."""
     phase: FaultPhase = "maneuvers"
-    """Phase of the flight in which they begin; for stream the phase arm if a flight has no stream.
-    The factor fault.phase replaces it."""
+    """Phase of the flight in which the faults begin. A flight without the phase stream takes arm
+    for it. The factor fault.phase replaces this key."""
     after_s: Annotated[float, Field(ge=0.0, le=3600.0)] | None = None
-    """Time from the beginning of the phase. The factor fault.after_s replaces it. null: 0 s in
-    stream and arm, 0.8 s in takeoff, 1.3 s in offboard, 0.3 s in maneuvers and land, 0.02 s in
-    hand back.
+    """Time from the beginning of the phase to the faults. The factor fault.after_s replaces this
+    key. null: 0 s in stream and arm, 0.8 s in takeoff, 1.3 s in offboard, 0.3 s in maneuvers and
+    land, 0.02 s in hand back.
     """
     ends: (
         Annotated[tuple[Ending, ...], Field(min_length=1)]
         | dict[FaultPhase, Annotated[tuple[Ending, ...], Field(min_length=1)]]
     ) = ("ok",)
     """Permitted endings of the flight (docs/safety.md): a list for all phases, or a list for each
-    phase. ground: it never left the ground. ok: as without the fault. landed: our program landed
-    it and says why. held: the autopilot flies it, by our command or its own failsafe. pilot: the
-    pilot has it.
+    phase. ground: the vehicle never left the ground. ok: as without the fault. landed: our program
+    landed the vehicle and says why. held: the autopilot flies on, by our command or its own
+    failsafe. pilot: the pilot has taken over.
     """
 
     def after(self, phase: str) -> float:
@@ -77,8 +77,8 @@ class CampaignLimits(Section):
     max_cases: Annotated[int, Field(ge=1, le=100_000_000)] | None = None
     """Largest number of cases. null: 2000 flights, or 100000 vehicles of batch kinematics."""
     max_hours: Annotated[float, Field(gt=0.0, le=10_000.0)] = 4.0
-    """Longest estimated duration of the campaign. It is not checked if each worker has at most two
-    cases."""
+    """Longest estimated duration of the campaign. A campaign with at most two cases for each worker
+    is not checked against it."""
     flight_s: Annotated[float, Field(ge=1.0, le=36_000.0)] = 600.0
     """Longest flight, s of vehicle time from boot. A longer one is ended, and is not good."""
 
@@ -156,7 +156,7 @@ class CampaignFile(Section):
     @field_validator("config", mode="before")
     @classmethod
     def _file_or_keys(cls, value: Any) -> Any:
-        """Refuse other values in words: pydantic would tell the fault of each kind."""
+        """Refuse other values in one sentence; pydantic would write one for each permitted type."""
         if not isinstance(value, str | Path | dict):
             raise ValueError("must name a file, or hold the keys of a configuration")
         return value

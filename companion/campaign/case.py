@@ -15,9 +15,9 @@ class Fault:
     Attributes:
         name: name of the scenario.
         inject: entries as in `mock.faults`.
-        phase: phase of the flight in which they begin.
-        after: time from the beginning of the phase, s.
-        ends: documented endings; see `FaultScenario.ends`.
+        phase: phase of the flight in which the faults begin.
+        after: time from the beginning of the phase to the faults, s.
+        ends: permitted endings; see `FaultScenario.ends`.
     """
 
     name: str
@@ -56,7 +56,7 @@ class Case:
         return self.config.mock or {}
 
     def described(self) -> str:
-        """The case in a message: its number and its factors."""
+        """Number and factors of the case, for messages."""
         factors = ", ".join(f"{key} = {_shown(value)}" for key, value in self.factors.items())
         return f"case {self.index}" + (f" ({factors})" if factors else "")
 

@@ -3,7 +3,7 @@
 There is no position, no estimator and no link. The planner's law and the functions of the attitude
 are those of a flight, compiled. The section `vehicle` gives the dead time, slew limit, lag and
 damping of the simulated rate loop. In a flight it only gives what the program assumes. The vehicle
-begins level and at rest, at the heading `mock.home.heading_deg`.
+begins level and without rotation, at the heading `mock.home.heading_deg`.
 """
 
 import hashlib
@@ -35,7 +35,7 @@ from companion.recording.measurements.verdict import STRAIGHTNESS
 
 
 def run_cases(cases: Sequence[Case]) -> list[dict[str, Value]]:
-    """Fly cases one after the other; returns a row for each, in order.
+    """Fly cases one after the other; return a row for each, in order.
 
     `ok` is true if every step stayed as close to its line as a good flight must.
 
@@ -86,7 +86,7 @@ def _run_case(case: Case) -> dict[str, Value]:
     targets = _targets(config, law.constants.longest_target, heading)
     start = attitude(Coefficients(0.0, 0.0), heading)
     rate_hz = config.link.attitude_rate_hz
-    flight = fly_steps(law, rate_loop(config), start, targets, round(STEP_HZ / rate_hz))
+    flight = fly_steps(law, _rate_loop(config), start, targets, round(STEP_HZ / rate_hz))
     figures = step_figures(flight, config.planner.gain_per_s, 1.0 / rate_hz)
     size = float(np.hypot(*targets[:, :2].T).max())
     return {
@@ -125,8 +125,8 @@ def _digest(flight: StepFlight) -> str:
     return found.hexdigest()
 
 
-def rate_loop(config: Config) -> list[AxisResponse]:
-    """Response of roll, pitch and yaw to commanded rates; immediate without identification."""
+def _rate_loop(config: Config) -> list[AxisResponse]:
+    """Response of roll, pitch and yaw to commanded rates; a key that is null delays nothing."""
     return [
         AxisResponse(
             axis.lag or 0.0,
@@ -139,7 +139,11 @@ def rate_loop(config: Config) -> list[AxisResponse]:
 
 
 def _targets(config: Config, longest: float, heading: float) -> Array:
-    """(samples, 4) targets of the open-loop steps, each limited as the planner limits it."""
+    """Targets of the open-loop steps, limited as the planner limits them.
+
+    Returns:
+        (samples, 4): coefficients north and east, heading (rad), heading rate (rad/s).
+    """
     name = next(each for each in config.flight.maneuvers if each in ACCELERATION_STEPS)
     scale: tuple[float, float]
     if name == "corners":

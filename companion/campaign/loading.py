@@ -2,6 +2,7 @@
 
 import tempfile
 from collections.abc import Mapping
+from itertools import chain, count
 from pathlib import Path
 from typing import Any, get_args
 
@@ -99,7 +100,7 @@ class _CampaignReader:
         return load_config(self._folder / given_config)
 
     def _flyable(self, base: Config) -> Config:
-        """Adapt the base to a flight in memory: the program arms, its trajectory is copied.
+        """Adapt the base to a flight in memory: the program arms; the trajectory is a copy.
 
         Raises:
             ConfigError: the configuration needs the MAVSDK link or signing, or its trajectory
@@ -132,7 +133,7 @@ class _CampaignReader:
         return swept.model_copy(update={swept.kind: copies})
 
     def _collect(self, path: Path) -> Path:
-        """Copy a trajectory's file and its table into the campaign; return its name there.
+        """Copy a trajectory's file and its table into the campaign; return the path of the copy.
 
         Raises:
             ConfigError: the file cannot be read, or holds no trajectory.
@@ -141,11 +142,8 @@ class _CampaignReader:
             return self._collected[path]
         trajectory_file.read(path)
         taken = {name.parts[1] for name in self._collected.values()}
-        stem = next(
-            stem
-            for stem in (path.stem, *(f"{path.stem}-{number}" for number in range(2, 10_000)))
-            if stem not in taken
-        )
+        numbered = (f"{path.stem}-{number}" for number in count(2))
+        stem = next(stem for stem in chain([path.stem], numbered) if stem not in taken)
         with tempfile.TemporaryDirectory(prefix="companion-campaign-") as folder:
             copies = Path(folder) / stem
             name = copy_trajectory(path, copies)
@@ -168,8 +166,8 @@ class _CampaignReader:
                 complete_mock({"faults": fault_case.inject})
             except ConfigError as error:
                 raise ConfigError(f"{name}: faults.{scenario}: {error}") from error
-        self._check_words(FAULT, (NO_FAULT, *file.faults))
-        self._check_words(FAULT_PHASE, get_args(FaultPhase))
+        self._check_names(FAULT, (NO_FAULT, *file.faults))
+        self._check_names(FAULT_PHASE, get_args(FaultPhase))
         for key in (FAULT_PHASE, FAULT_AFTER):
             if key in file.sweep and FAULT not in file.sweep:
                 raise ConfigError(f"{name}: sweep.{key} needs sweep.{FAULT}")
@@ -177,17 +175,22 @@ class _CampaignReader:
         if after is not None and not after.is_number:
             raise ConfigError(f"{name}: sweep.{FAULT_AFTER}: each value must be a number")
 
-    def _check_words(self, key: str, known: tuple[str, ...]) -> None:
+    def _check_names(self, key: str, known: tuple[str, ...]) -> None:
+        """Check that a factor, if it is swept, takes only known names.
+
+        Raises:
+            ConfigError: the factor has no list of names, or an unknown name.
+        """
         swept = self._file.sweep.get(key)
         if swept is None:
             return
         if not (listed := swept.values or swept.choice):
             raise ConfigError(f"{self._path}: sweep.{key}: give a list of names")
-        for word in listed:
-            if word not in known:
-                names = ", ".join(known)
+        for name in listed:
+            if name not in known:
                 raise ConfigError(
-                    f"{self._path}: sweep.{key}: there is no {word!r:.60}; known: {names}"
+                    f"{self._path}: sweep.{key}: there is no {name!r:.60}; known: "
+                    f"{', '.join(known)}"
                 )
 
 

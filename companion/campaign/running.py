@@ -43,8 +43,8 @@ if TYPE_CHECKING:
     from distributed import Client
 
 DONE, FAILED = 0, 1
-_FEW = 2
-"""The time of a case is measured only with more than this number of cases for each worker."""
+_UNMEASURED = 2
+"""Up to this number of cases for each worker, the time that a case takes is not measured."""
 _MOST_SHOWN = 3
 """Largest number of lost units, and of internal errors, that are printed."""
 
@@ -130,7 +130,7 @@ class _Run:
             estimate.check_size(campaign, estimate.case_time(kind, first), workers)
         cases = list(campaign.cases())
         check_cases(kind, cases)
-        if len(cases) <= _FEW * workers:
+        if len(cases) <= _UNMEASURED * workers:
             return None
         case_s = estimate.case_time(kind, cases)
         if not self._options.yes:
@@ -175,7 +175,8 @@ class _Run:
         for sentence in progress.lost[:_MOST_SHOWN]:
             say(f"not flown: {sentence}")
         if progress.flown < description.cases:
-            return self._stopped(f"{len(progress.lost)} units were given up")
+            lost = len(progress.lost)
+            return self._stopped(f"{lost} unit{'s were' if lost > 1 else ' was'} given up")
         errors = engine.internal_errors(self._place, self._campaign.file)
         for error, times in errors.most_common(_MOST_SHOWN):
             say(f"{times} of the {self._noun} ended by an {error}")

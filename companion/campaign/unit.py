@@ -15,7 +15,7 @@ Row = dict[str, Value]
 SECONDS = 2.5
 """Longest planned time of a unit with several cases, s.
 
-It is long compared with the time to send a unit, and so short that a lost unit costs little.
+Long compared with the time to send a unit, and short enough that a lost unit costs little.
 """
 _UNITS_PER_WORKER = 4
 """Number of units planned for each worker, so that all workers end at about the same time.

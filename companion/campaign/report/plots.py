@@ -106,17 +106,19 @@ def pareto(results: Results) -> Iterator[Plot]:
         return
     goals = np.array(points)
     front = pareto_front(goals)
-    traces = [
-        _points(name, goals[part], [titles[k] for k in np.flatnonzero(part)], size)
-        for name, part, size in (("on the front", front, 11), ("others", ~front, 6))
-    ]
-    traces[0]["marker"] |= {"line": {"color": REFERENCE, "width": 2}}
     thrust = len(names) > 2
-    for trace, part in zip(traces, (front, ~front), strict=True):
+    traces = []
+    for name, part in (("on the front", front), ("others", ~front)):
+        marker: dict[str, Any] = {"size": 11 if part is front else 6}
+        if part is front:
+            marker["line"] = {"color": REFERENCE, "width": 2}
         if thrust:
-            trace["marker"] |= _scale(goals[part, 2], goals[:, 2], shown=trace is traces[0])
+            marker |= _scale(goals[part, 2], goals[:, 2], shown=part is front)
         else:
-            trace["marker"]["color"] = MEASURED if trace is traces[0] else IDEAL
+            marker["color"] = MEASURED if part is front else IDEAL
+        if part.any():
+            shown = [titles[k] for k in np.flatnonzero(part)]
+            traces.append(_points(name, goals[part], shown, marker))
     of = "error, rate use and thrust use" if thrust else "error and rate use"
     note = (
         f"A point for each choice of the program's own keys: the medians over everything else; or "
@@ -124,10 +126,10 @@ def pareto(results: Results) -> Iterator[Plot]:
         f"front no other point is better in {of} at once. Each point shows its success rate."
     )
     layout = axes(x=label(RATES), y=label(results.error))
-    yield Plot("Pareto front", note, [t for t in traces if t["x"]], layout, 420)
+    yield Plot("Pareto front", note, traces, layout, 420)
 
 
-def _points(name: str, goals: Floats, titles: list[str], size: int) -> dict[str, Any]:
+def _points(name: str, goals: Floats, titles: list[str], marker: dict[str, Any]) -> dict[str, Any]:
     return {
         "type": "scatter",
         "mode": "markers",
@@ -136,7 +138,7 @@ def _points(name: str, goals: Floats, titles: list[str], size: int) -> dict[str,
         "y": numbers(goals[:, 0]),
         "text": titles,
         "hovertemplate": "%{text}<br>%{y:.3g}, %{x:.3g}<extra></extra>",
-        "marker": {"size": size},
+        "marker": marker,
     }
 
 

@@ -19,10 +19,12 @@ _NOT_CHOSEN = ("mock.", "fault", "flight.", "vehicle.")
 
 
 class Share(NamedTuple):
-    """A share of cases with its Wilson interval, which covers the true share in 95 % of campaigns.
+    """The share of cases that have a property, with its Wilson interval.
+
+    The interval covers the true share in 95 % of campaigns.
 
     Attributes:
-        chosen: number of cases that count.
+        chosen: number of cases that have the property.
         of: number of all cases.
         share: chosen / of; NaN for no case.
         low: lower end of the interval.

@@ -23,10 +23,8 @@ if TYPE_CHECKING:
 
 Values = Mapping[str, Any]
 """Value of each searched key."""
-_UNSEEN = 1_000_003
+_UNSEEN_SEED_OFFSET = 1_000_003
 """Offset of the campaign's seed for the cases that the search does not see."""
-
-
 _SPREAD = 0.15
 """Standard deviation of the candidates near a start, as a share of the (logarithmic) range."""
 
@@ -78,7 +76,7 @@ def cases(campaign: Campaign, values: Values) -> list[Case]:
 
 def unseen(campaign: Campaign, samples: int) -> Campaign:
     """The campaign with other samples, noise and gusts than those of the search."""
-    update = {"seed": campaign.file.seed + _UNSEEN, "samples": samples}
+    update = {"seed": campaign.file.seed + _UNSEEN_SEED_OFFSET, "samples": samples}
     return replace(campaign, file=campaign.file.model_copy(update=update))
 
 
