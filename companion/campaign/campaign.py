@@ -70,32 +70,31 @@ class Campaign:
         changes: dict[str, Any] = {}
         for name, value in sample.values.items():
             if name not in FAULT_FACTORS:
-                for key in self.file.sweep[name].keys or (name,):
+                for key in self.file.sweep[name].changed_keys(name):
                     changes[key] = self._value(name, key, value)
         try:
-            config, mock = with_keys(self.base, self._mock, changes)
+            config = with_keys(self.base, changes)
             _check_flyable(config)
             fault = self._fault(sample.values)
         except ConfigError as error:
-            case = Case(sample.index, sample.seed, factors, self.base, {}, None, {}, 0.0)
+            case = Case(sample.index, sample.seed, factors, self.base, None, {}, 0.0)
             raise ConfigError(f"{self.name}: {case.described()}: {error}") from error
         return Case(
             sample.index,
             sample.seed,
             factors,
-            config,
-            {**mock, "seed": sample.seed},
+            config.model_copy(update={"mock": {**(config.mock or {}), "seed": sample.seed}}),
             fault,
             self._files_of(config),
             self.file.limits.flight_s,
         )
 
-    @cached_property
-    def _mock(self) -> dict[str, Any]:
-        return dict(self.base.mock or {})
-
     def _value(self, name: str, key: str, value: Any) -> Any:
-        """The value of a key; a factor with `times_base` is multiplied by the base's value."""
+        """The new value of a key: `value`, times that of the base for a factor with `times_base`.
+
+        Raises:
+            ConfigError: the base holds no number to multiply.
+        """
         if not self.file.sweep[name].times_base or value is None:
             return value
         base = self._base_value(key)
@@ -115,7 +114,7 @@ class Campaign:
 
     @cached_property
     def _complete_mock(self) -> dict[str, Any]:
-        return complete_mock(self._mock)
+        return complete_mock(self.base.mock or {})
 
     def _fault(self, values: Mapping[str, Any]) -> Fault | None:
         name = values.get(FAULT, NO_FAULT)
@@ -132,6 +131,7 @@ class Campaign:
         )
 
     def _files_of(self, config: Config) -> dict[str, str]:
+        """The files that a flight with this configuration reads."""
         path = config.flight.trajectory
         if path is None or "trajectory" not in config.flight.maneuvers:
             return {}

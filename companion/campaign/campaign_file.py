@@ -1,4 +1,4 @@
-"""The YAML file of a campaign: the flight, the swept keys, and the limits."""
+"""The YAML file of a campaign: base configuration, swept keys, faults, limits and search."""
 
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -6,7 +6,6 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from companion.campaign.swept import Swept
-from companion.campaign.tune.section import Tune
 from companion.files.yaml_file import PathKey, Section
 
 Name = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
@@ -29,31 +28,33 @@ _DEFAULT_AFTER_S = {
     "hand back": 0.02,
     "land": 0.3,
 }
-"""Time from the beginning of a phase to a fault where the scenario does not set one, s."""
+"""Value of `FaultScenario.after_s` by phase where the scenario does not set one, s."""
 TRAJECTORY, MANEUVERS = "flight.trajectory", "flight.maneuvers"
+NOUNS = {"flights": "flights", "batch": "vehicles"}
+"""Plural noun for the cases of each kind of campaign."""
 
 
 class FaultScenario(Section):
     """A fault of the mock vehicle that begins in a phase, and how the flight may end then."""
 
     inject: Annotated[tuple[dict[str, Any], ...], Field(min_length=1, max_length=10)]
-    """Entries as in `mock.faults`, without `at_s` and `after_offboard_s`. They begin together."""
+    """Entries as in `mock.faults`, without `at_s` and `after_offboard_s`. All begin together."""
     phase: FaultPhase = "maneuvers"
-    """Phase of the flight in which they begin; for stream the phase arm if a flight has no stream.
-    The factor fault.phase replaces it."""
+    """Phase of the flight in which the faults begin. A flight without the phase stream takes arm
+    for it. The factor fault.phase replaces this key."""
     after_s: Annotated[float, Field(ge=0.0, le=3600.0)] | None = None
-    """Time from the beginning of the phase. The factor fault.after_s replaces it. null: 0 s in
-    stream and arm, 0.8 s in takeoff, 1.3 s in offboard, 0.3 s in maneuvers and land, 0.02 s in
-    hand back.
+    """Time from the beginning of the phase to the faults. The factor fault.after_s replaces this
+    key. null: 0 s in stream and arm, 0.8 s in takeoff, 1.3 s in offboard, 0.3 s in maneuvers and
+    land, 0.02 s in hand back.
     """
     ends: (
         Annotated[tuple[Ending, ...], Field(min_length=1)]
         | dict[FaultPhase, Annotated[tuple[Ending, ...], Field(min_length=1)]]
     ) = ("ok",)
     """Permitted endings of the flight (docs/safety.md): a list for all phases, or a list for each
-    phase. ground: it never left the ground. ok: as without the fault. landed: our program landed
-    it and says why. held: the autopilot flies it, by our command or its own failsafe. pilot: the
-    pilot has it.
+    phase. ground: the vehicle never left the ground. ok: as without the fault. landed: our program
+    landed the vehicle and says why. held: the autopilot flies on, by our command or its own
+    failsafe. pilot: the pilot has taken over.
     """
 
     def after(self, phase: str) -> float:
@@ -76,10 +77,43 @@ class CampaignLimits(Section):
     max_cases: Annotated[int, Field(ge=1, le=100_000_000)] | None = None
     """Largest number of cases. null: 2000 flights, or 100000 vehicles of batch kinematics."""
     max_hours: Annotated[float, Field(gt=0.0, le=10_000.0)] = 4.0
-    """Longest estimated duration of the campaign. It is not checked if each worker has at most two
-    cases."""
+    """Longest estimated duration of the campaign. A campaign with at most two cases for each worker
+    is not checked against it."""
     flight_s: Annotated[float, Field(ge=1.0, le=36_000.0)] = 600.0
     """Longest flight, s of vehicle time from boot. A longer one is ended, and is not good."""
+
+
+class Tune(Section):
+    """The search of `companion campaign tune`. Running the campaign ignores this section."""
+
+    search: Annotated[dict[str, Swept], Field(min_length=1, max_length=30)]
+    """Searched keys of the program: dotted, each with uniform, loguniform or choice."""
+    trials: Annotated[int, Field(ge=1, le=100_000)] = 100
+    """Number of candidates that are tried; `--trials` replaces it."""
+    envelope_m: Annotated[float, Field(gt=0.0, le=1000.0)] | None = 1.0
+    """Largest true distance from the reference (`position_max_m` of the results) for a flight that
+    reaches its end to count as inside the envelope. null: every flight that reaches its end counts
+    as inside.
+    """
+    inside_share: Annotated[float, Field(gt=0.0, le=1.0)] = 0.999
+    """Share of the flights that must stay inside the envelope."""
+    check_samples: Annotated[int, Field(ge=2, le=10_000)] = 8
+    """Number of samples that the search does not see; on them the result is compared with the
+    unchanged configuration."""
+
+    @field_validator("search")
+    @classmethod
+    def _searchable(cls, search: dict[str, Swept]) -> dict[str, Swept]:
+        for key, swept in search.items():
+            if not (swept.uniform or swept.loguniform or swept.choice):
+                raise ValueError(f"{key}: give uniform, loguniform or choice")
+            if swept.times_base or swept.keys:
+                raise ValueError(f"{key}: times_base and keys belong to `sweep`")
+            if key.startswith("mock."):
+                raise ValueError(
+                    f"{key}: keys of the mock vehicle cannot be searched; name keys of the program"
+                )
+        return search
 
 
 class CampaignFile(Section):
@@ -122,7 +156,7 @@ class CampaignFile(Section):
     @field_validator("config", mode="before")
     @classmethod
     def _file_or_keys(cls, value: Any) -> Any:
-        """Refuse other values in words: pydantic would tell the fault of each kind."""
+        """Refuse other values in one sentence; pydantic would write one for each permitted type."""
         if not isinstance(value, str | Path | dict):
             raise ValueError("must name a file, or hold the keys of a configuration")
         return value
@@ -136,7 +170,7 @@ class CampaignFile(Section):
             raise ValueError(f"faults: {NO_FAULT} is the name of a flight without a fault")
         factors: dict[str, str] = {}
         for name, swept in self.sweep.items():
-            for key in swept.keys or (name,):
+            for key in swept.changed_keys(name):
                 if key in self.set:
                     raise ValueError(f"`{key}` stands in set and in sweep; remove one of them")
                 if factors.setdefault(key, name) != name:
@@ -147,3 +181,10 @@ class CampaignFile(Section):
         if self.kind == "batch" and (self.faults or FAULT in self.sweep):
             raise ValueError("faults need kind: flights")
         return self
+
+    @property
+    def swept_keys(self) -> frozenset[str]:
+        """All keys that a factor changes, and the fault factors."""
+        return frozenset(
+            key for name, each in self.sweep.items() for key in each.changed_keys(name)
+        )

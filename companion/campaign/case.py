@@ -1,4 +1,4 @@
-"""One case of a campaign: its factors, and the resulting configuration and mock vehicle."""
+"""One case of a campaign: its factors, the resulting configuration, and its fault."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,9 +15,9 @@ class Fault:
     Attributes:
         name: name of the scenario.
         inject: entries as in `mock.faults`.
-        phase: phase of the flight in which they begin.
-        after: time from the beginning of the phase, s.
-        ends: documented endings; see `FaultScenario.ends`.
+        phase: phase of the flight in which the faults begin.
+        after: time from the beginning of the phase to the faults, s.
+        ends: permitted endings; see `FaultScenario.ends`.
     """
 
     name: str
@@ -35,9 +35,8 @@ class Case:
         index: number in the campaign, from 0.
         seed: seed of noise and gusts.
         factors: value of each swept key, as the results hold it.
-        config: configuration of the program. If a trajectory is flown, `flight.trajectory` is a
-            key of `files`.
-        mock: the complete section `mock`, the seed included.
+        config: configuration of the program, and in its section `mock` that of the mock vehicle. If
+            a trajectory is flown, `flight.trajectory` is a key of `files`.
         fault: fault scenario; None: no fault.
         files: the text of each file that the flight reads, by its path in the campaign's folder.
         flight_s: longest flight, s of vehicle time.
@@ -47,13 +46,17 @@ class Case:
     seed: int
     factors: Mapping[str, Value]
     config: Config
-    mock: Mapping[str, Any]
     fault: Fault | None
     files: Mapping[str, str]
     flight_s: float
 
+    @property
+    def mock(self) -> Mapping[str, Any]:
+        """The complete section `mock`, the seed of this case included."""
+        return self.config.mock or {}
+
     def described(self) -> str:
-        """The case in a message: its number and its factors."""
+        """Number and factors of the case, for messages."""
         factors = ", ".join(f"{key} = {_shown(value)}" for key, value in self.factors.items())
         return f"case {self.index}" + (f" ({factors})" if factors else "")
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from distributed import Client, Future
 
 DEATHS = 3
-"""A unit is given up when it was on a dying worker, running or waiting, for the third time.
+"""A unit is given up when its worker dies for the third time, even if the unit only waited there.
 
 An existing cluster follows its own setting, `distributed.scheduler.allowed-failures`.
 """
@@ -126,7 +126,7 @@ def _interrupts_blocked() -> Iterator[None]:
 
     Ctrl-C in a terminal reaches all processes. Only the client may act on it: it ends the workers.
     """
-    resource_tracker.ensure_running()  # it would unblock the signal
+    resource_tracker.ensure_running()  # its start inside of the block would unblock the signal
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -177,7 +177,7 @@ def _compare_versions(client: "Client") -> None:
         VersionError: says who has which.
     """
     dask_versions = client.get_versions()
-    ours, scheduler = (_of_dask(dask_versions[who]) for who in ("client", "scheduler"))
+    ours, scheduler = (_dask_and_python(dask_versions[who]) for who in ("client", "scheduler"))
     require_equal(ours, scheduler, "the Dask scheduler")
     for address, found in client.run(versions, on_error="return").items():
         if isinstance(found, BaseException):
@@ -188,7 +188,7 @@ def _compare_versions(client: "Client") -> None:
         require_equal(versions(), as_versions(found), f"the worker {address}")
 
 
-def _of_dask(versions: Mapping[str, Any]) -> dict[str, str]:
+def _dask_and_python(versions: Mapping[str, Any]) -> dict[str, str]:
     python = ".".join(str(versions["host"]["python"]).split(".")[:2])
     return {"python": python, "distributed": str(versions["packages"]["distributed"])}
 

@@ -15,7 +15,6 @@ from companion.campaign.flight import INTERNAL_ERROR
 from companion.campaign.folder import Description
 from companion.campaign.unit import (
     Row,
-    first_and_last,
     fly_cases,
     fly_samples,
     ranges,
@@ -84,12 +83,13 @@ def run(
 def _keep(
     ended: EndedUnit, unit: range, campaign: Campaign, folder: Path, progress: Progress
 ) -> None:
+    first, last = unit[0], unit[-1]
     if ended.result is None:
-        cases = f"cases {unit.start} to {unit.stop - 1}"
-        progress.lost.append(f"unit {ended.number} ({cases}): {ended.reason}")
+        progress.lost.append(f"unit {ended.number} (cases {first} to {last}): {ended.reason}")
         return
-    timing = {**first_and_last(unit), "wall_s": ended.result.wall_s, "worker": ended.result.worker}
-    store.write_unit(folder, campaign.file, ended.number, ended.result.rows, timing)
+    rows, wall_s, worker = ended.result
+    timing = {"first": first, "last": last, "wall_s": wall_s, "worker": worker}
+    store.write_unit(folder, campaign.file, ended.number, rows, timing)
     progress.flown += len(unit)
 
 

@@ -5,14 +5,13 @@ from dataclasses import replace
 from time import perf_counter
 
 from companion.campaign.campaign import Campaign
+from companion.campaign.campaign_file import NOUNS
 from companion.campaign.case import Case
 from companion.campaign.unit import run_cases
 from companion.files.yaml_file import ConfigError
 
 MOST_CASES = {"flights": 2000, "batch": 100_000}
 """Largest number of cases by kind, where `limits.max_cases` is null."""
-NOUNS = {"flights": "flights", "batch": "vehicles"}
-"""Plural noun for the cases of each kind."""
 _MEASURED = 3
 """Largest number of flights whose time is measured."""
 _BATCH = 64

@@ -21,10 +21,18 @@ WIRE_S = 0.0005
 INTERNAL_ERROR = "internal error: "
 """Prefix of the result of a case in which the program itself failed."""
 _TRUTH_EVERY = 5
-"""Steps of the mock vehicle between two true positions."""
+"""Steps of the mock vehicle between two rows of its true motion."""
 _AFTERWARDS_S = 10.0
 """Time for which a vehicle that is still armed is watched after the flight, s."""
-_PILOT_MODES = ("POSCTL", "ALTCTL", "STABILIZED", "MANUAL", "LOITER", "ALT_HOLD", "STABILIZE")
+_PILOT_MODES = (  # of PX4 and ArduPilot
+    "POSCTL",
+    "ALTCTL",
+    "STABILIZED",
+    "MANUAL",
+    "LOITER",
+    "ALT_HOLD",
+    "STABILIZE",
+)
 
 
 def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
@@ -74,7 +82,7 @@ class CaseFlight:
         self._too_long = False
 
     def fly(self, folder: Path | None) -> dict[str, Value]:
-        """Fly the case; return its outcomes."""
+        """Fly the case; return its outcomes. For `folder` see `fly_case`."""
         vehicle, case = self._vehicle, self._case
         vehicle.after_step.append(self._note_truth)
         fault = _FaultInjector(vehicle, case.fault)
@@ -86,17 +94,26 @@ class CaseFlight:
 
         vehicle.at(case.flight_s, end)
         summary = run(vehicle, flight.fly())
-        after = vehicle.state()
+        at_end = vehicle.state()
         flight_s = vehicle.time
         vehicle.after_step.clear()
         while vehicle.state()["armed"] and vehicle.time < flight_s + _AFTERWARDS_S:
             vehicle.step()
         final = vehicle.state()
-        return self._outcomes(summary, after, final, flight_s, begun=fault.begun)
+        return self._outcomes(summary, at_end, final, flight_s, begun=fault.begun)
 
     def _outcomes(
-        self, summary: Summary, after: Truth, final: Truth, flight_s: float, *, begun: bool
+        self, summary: Summary, at_end: Truth, final: Truth, flight_s: float, *, begun: bool
     ) -> dict[str, Value]:
+        """The outcomes of the flight.
+
+        Args:
+            summary: the program's summary.
+            at_end: true state of the vehicle when the program ended.
+            final: its true state after it disarmed, or `_AFTERWARDS_S` later.
+            flight_s: time from boot to the end of the program, s.
+            begun: whether the phase of the fault was reached.
+        """
         figures, setpoints = summary.as_dict(), self._vehicle.setpoints
         crashed, fault = final["crashed"], self._case.fault
         measured = {
@@ -107,7 +124,7 @@ class CaseFlight:
         }
         documented = None
         if fault is not None and begun and fault.ends:
-            documented = not crashed and _ending(after, summary.result) in fault.ends
+            documented = not crashed and _ending(at_end, summary.result) in fault.ends
         result = summary.result
         if self._too_long:
             result = f"not over after {self._case.flight_s:g} s of vehicle time"

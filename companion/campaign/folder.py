@@ -26,7 +26,7 @@ FILE = "campaign.yaml"
 """Name of the campaign's resolved file in its folder."""
 _DESCRIPTION, _LOCK = "campaign.json", ".lock"
 _MOST_BYTES = 1_000_000
-_SIZE = ("max_cases", "max_hours")
+_SIZE_LIMITS = ("max_cases", "max_hours")
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,11 @@ def make(folder: Path, campaign: Campaign, description: Description) -> None:
                 f"{folder}: holds files, but no campaign that was begun; name another folder with "
                 "--out, or empty this one"
             )
-        store.write_campaign(folder, campaign, bounded_yaml.dump(as_written(campaign)))
+        (folder / store.RESULTS).mkdir(parents=True, exist_ok=True)
+        for name, text in campaign.files.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            write_whole(folder / name, text)
+        write_whole(folder / FILE, bounded_yaml.dump(as_written(campaign)))
         write_whole(folder / _DESCRIPTION, json.dumps(asdict(description), indent=2) + "\n")
     except OSError as error:
         raise ConfigError(f"{folder}: cannot be written: {error.strerror}") from error
@@ -100,7 +104,7 @@ def read_description(folder: Path) -> Description:
     try:
         values = json.loads(read_text(path, _MOST_BYTES))
         description = Description(**{**values, "versions": as_versions(values["versions"])})
-        # `range` refuses all that is no whole number.
+        # `range` refuses everything but whole numbers.
         if not (range(description.cases) and range(description.unit)):
             raise ValueError("cases and unit must be positive")
     except FileRefusedError as error:
@@ -119,23 +123,13 @@ def resume(folder: Path, campaign: Campaign) -> Description:
     """
     description = read_description(folder)
     _compare(folder, campaign)
-    require_version(folder, description)
-    return description
-
-
-def require_version(folder: Path, description: Description) -> None:
-    """Refuse a folder that was started by another version of the program.
-
-    Raises:
-        VersionError: says what differs.
-    """
-    found = difference(description.versions, versions())
-    if found:
+    if found := difference(description.versions, versions()):
         raise VersionError(
             f"{folder} was begun by another version: this one has {found}. Results of two versions "
             "must not be mixed: continue with the version that began it, or start again with "
             "another --out"
         )
+    return description
 
 
 def _compare(folder: Path, campaign: Campaign) -> None:
@@ -147,7 +141,7 @@ def _compare(folder: Path, campaign: Campaign) -> None:
     path = folder / FILE
     try:
         before = bounded_yaml.parse(read_text(path, _MOST_BYTES))
-        # Read as the file was: a tuple becomes a list.
+        # Written and parsed like the file, so that tuples are lists here, too.
         now = bounded_yaml.parse(bounded_yaml.dump(as_written(campaign)))
     except (FileRefusedError, YamlError) as error:
         raise ConfigError(f"{path}: {error}") from error
@@ -166,7 +160,7 @@ def _without_size(data: Mapping[str, Any], key: str) -> Any:
     """A key of a campaign file without the limits on the campaign's size."""
     value = data.get(key)
     if key == "limits" and isinstance(value, Mapping):
-        return {name: each for name, each in value.items() if name not in _SIZE}
+        return {name: each for name, each in value.items() if name not in _SIZE_LIMITS}
     return value
 
 

@@ -7,7 +7,6 @@ from companion.config import Config
 from companion.files.yaml_file import ConfigError, validated
 from companion.testing.settings import complete_mock, mock_with
 
-_MOCK = "mock."
 _WITHOUT_EFFECT = (
     "flight.arm",
     "link.backend",
@@ -38,8 +37,9 @@ def check_key(key: str, base: Config, where: str) -> None:
         where: place of the key in its file, for messages.
 
     Raises:
-        ConfigError: it is not SECTION.KEY, does not exist, has no effect in a campaign, or concerns
-            signing. The message names the key; for an unknown key also the nearest one, if any.
+        ConfigError: the key is not SECTION.KEY, does not exist, has no effect in a campaign, or
+            concerns signing. The message names the key; for an unknown key also the nearest one, if
+            any.
     """
     section, dot, name = key.partition(".")
     if not (dot and section and name):
@@ -50,28 +50,20 @@ def check_key(key: str, base: Config, where: str) -> None:
         )
     if any(f"{key}.".startswith(f"{other}.") for other in _SIGNING):
         raise ConfigError(f"{where}: `{key}`: campaigns fly without signing")
-    _check_exists(key, base, where)
-
-
-def _check_exists(key: str, base: Config, where: str) -> None:
-    section, _, name = key.partition(".")
     if section == "mock":
-        # Only the complaint about the name counts: a value comes later.
-        _check_mock_key(name, dict(base.mock or {}), where)
-        return
-    model = Config.model_fields.get(section)
-    known = None if model is None else getattr(base, section)
-    if known is None or name not in type(known).model_fields:
+        _check_mock_key(name, base.mock or {}, where)
+    elif name not in getattr(type(getattr(base, section, None)), "model_fields", ()):
         validated({section: {name: 0.0}}, where, Config)
         raise ConfigError(f"{where}: there is no key `{key}`")
 
 
-def _check_mock_key(name: str, section: dict[str, Any], where: str) -> None:
+def _check_mock_key(name: str, section: Mapping[str, Any], where: str) -> None:
+    """Check that a key of the mock vehicle exists; its value is checked later, with each case."""
+    *path, last = name.split(".")
     complete: Any = complete_mock(section)
-    *path, _ = name.split(".")
     for part in path:
         complete = complete.get(part) if isinstance(complete, dict) else None
-    if isinstance(complete, dict) and name.rpartition(".")[2] in complete:
+    if isinstance(complete, dict) and last in complete:
         return
     try:
         mock_with(section, {name: 0.0})
@@ -80,31 +72,22 @@ def _check_mock_key(name: str, section: dict[str, Any], where: str) -> None:
             raise ConfigError(f"{where}: {error}") from error
 
 
-def with_keys(
-    base: Config, mock: Mapping[str, Any], changes: Mapping[str, Any]
-) -> tuple[Config, dict[str, Any]]:
-    """Change dotted keys; return the configuration and the complete section `mock`.
-
-    Args:
-        base: configuration before the changes.
-        mock: its section `mock`.
-        changes: new values by dotted key.
+def with_keys(base: Config, changes: Mapping[str, Any]) -> Config:
+    """The configuration with new values by dotted key, and with its complete section `mock`.
 
     Raises:
         ConfigError: a value is refused; the message names the key.
     """
-    of_mock = {key.removeprefix(_MOCK): value for key, value in changes.items() if _of_mock(key)}
+    mock: dict[str, Any] = {}
     # Sections without a change are not checked again, which would take most of the time.
     data = {name: getattr(base, name) for name in Config.model_fields if name != "include"}
     for key, value in changes.items():
-        if not _of_mock(key):
-            section, _, name = key.partition(".")
-            if not isinstance(data[section], dict):
-                data[section] = data[section].model_dump()
-            data[section][name] = value
+        section, _, name = key.partition(".")
+        if section == "mock":
+            mock[name] = value
+            continue
+        if not isinstance(data[section], dict):
+            data[section] = data[section].model_dump()
+        data[section][name] = value
     config = validated(data, "the configuration", Config)
-    return config, mock_with(mock, of_mock)
-
-
-def _of_mock(key: str) -> bool:
-    return key.startswith(_MOCK)
+    return config.model_copy(update={"mock": mock_with(base.mock or {}, mock)})

@@ -3,13 +3,14 @@
 There is no position, no estimator and no link. The planner's law and the functions of the attitude
 are those of a flight, compiled. The section `vehicle` gives the dead time, slew limit, lag and
 damping of the simulated rate loop. In a flight it only gives what the program assumes. The vehicle
-begins level and at rest, at the heading `mock.home.heading_deg`.
+begins level and without rotation, at the heading `mock.home.heading_deg`.
 """
 
 import hashlib
 from collections.abc import Sequence
 from functools import lru_cache
 from math import inf, isfinite, radians
+from statistics import fmean
 from typing import NamedTuple
 
 import numpy as np
@@ -34,7 +35,7 @@ from companion.recording.measurements.verdict import STRAIGHTNESS
 
 
 def run_cases(cases: Sequence[Case]) -> list[dict[str, Value]]:
-    """Fly cases one after the other; returns a row for each, in order.
+    """Fly cases one after the other; return a row for each, in order.
 
     `ok` is true if every step stayed as close to its line as a good flight must.
 
@@ -52,12 +53,12 @@ def check_case(case: Case) -> None:
         ConfigError: its planner keeps state, it has no open-loop maneuver, its sample rate does not
             divide 1000 Hz, or it has a fault.
     """
-    if fault := _unflyable(case):
-        raise ConfigError(f"{case.described()}: {fault}")
+    if reason := _unflyable(case):
+        raise ConfigError(f"{case.described()}: {reason}")
 
 
 def _unflyable(case: Case) -> str | None:
-    """Why a case cannot be flown in a batch, or None."""
+    """Why a case cannot be flown in a batch; None: it can."""
     config = case.config
     if config.planner_name not in LAW_NAMES:
         return (
@@ -85,28 +86,26 @@ def _run_case(case: Case) -> dict[str, Value]:
     targets = _targets(config, law.constants.longest_target, heading)
     start = attitude(Coefficients(0.0, 0.0), heading)
     rate_hz = config.link.attitude_rate_hz
-    flight = fly_steps(law, rate_loop(config), start, targets, round(STEP_HZ / rate_hz))
+    flight = fly_steps(law, _rate_loop(config), start, targets, round(STEP_HZ / rate_hz))
     figures = step_figures(flight, config.planner.gain_per_s, 1.0 / rate_hz)
     size = float(np.hypot(*targets[:, :2].T).max())
     return {
         "case": case.index,
         "seed": case.seed,
         **case.factors,
-        **_outcomes(flight, figures, size, len(targets) / rate_hz),
+        **_outcomes(flight, figures, size),
     }
 
 
-def _outcomes(
-    flight: StepFlight, figures: StepFigures, size: float, seconds: float
-) -> dict[str, Value]:
-    constants = [each for each in figures[-2:] if isfinite(each)]
+def _outcomes(flight: StepFlight, figures: StepFigures, size: float) -> dict[str, Value]:
+    """The outcomes of a case; `size` is the largest length of a target's coefficients."""
+    constants = [each for each in figures[-2:] if isfinite(each)]  # north and east
     values = {
         "cross_axis_max": figures.cross_axis_max,
         "model_deviation_max": figures.model_deviation_max,
-        "time_constant_s": sum(constants) / len(constants) if constants else inf,
+        "time_constant_s": fmean(constants) if constants else inf,
         "rate_rms_rad_s": figures.rate_rms,
         "rate_max_rad_s": figures.rate_max,
-        "flight_s": seconds,
     }
     finite = bool(np.isfinite(flight.commanded).all() and np.isfinite(flight.q).all())
     straight = finite and figures.cross_axis_max <= STRAIGHTNESS * size
@@ -115,7 +114,6 @@ def _outcomes(
         "ok": straight,
         "result": result,
         **{name: value if isfinite(value) else None for name, value in values.items()},
-        "setpoints": len(flight.commanded),
         "digest": _digest(flight),
     }
 
@@ -127,8 +125,8 @@ def _digest(flight: StepFlight) -> str:
     return found.hexdigest()
 
 
-def rate_loop(config: Config) -> list[AxisResponse]:
-    """Response of roll, pitch and yaw to commanded rates; immediate without identification."""
+def _rate_loop(config: Config) -> list[AxisResponse]:
+    """Response of roll, pitch and yaw to commanded rates; a key that is null delays nothing."""
     return [
         AxisResponse(
             axis.lag or 0.0,
@@ -141,7 +139,11 @@ def rate_loop(config: Config) -> list[AxisResponse]:
 
 
 def _targets(config: Config, longest: float, heading: float) -> Array:
-    """(samples, 4) targets of the open-loop steps, each limited as the planner limits it."""
+    """Targets of the open-loop steps, limited as the planner limits them.
+
+    Returns:
+        (samples, 4): coefficients north and east, heading (rad), heading rate (rad/s).
+    """
     name = next(each for each in config.flight.maneuvers if each in ACCELERATION_STEPS)
     scale: tuple[float, float]
     if name == "corners":

@@ -2,6 +2,7 @@
 
 import tempfile
 from collections.abc import Mapping
+from itertools import chain, count
 from pathlib import Path
 from typing import Any, get_args
 
@@ -62,36 +63,29 @@ class _CampaignReader:
         Raises:
             ConfigError: a file cannot be read or is wrong; see `load`.
         """
-        file, name = self._file, str(self._path)
-        base = self._base()
-        swept = [
-            key
-            for key, each in file.sweep.items()
-            if key not in FAULT_FACTORS
-            for key in each.keys or (key,)
-        ]
+        file, base = self._file, self._base()
         for key in file.set:
             check_key(key, base, self._at("set", key))
-        for key, each in file.sweep.items():
-            for changed in () if key in FAULT_FACTORS else each.keys or (key,):
-                check_key(changed, base, self._at("sweep", key))
+        for name, swept in file.sweep.items():
+            for key in () if name in FAULT_FACTORS else swept.changed_keys(name):
+                check_key(key, base, self._at("sweep", name))
         for key in () if file.tune is None else file.tune.search:
             check_key(key, base, self._at("tune", "search", key))
         self._check_faults()
         changes = dict(file.set)
-        if TRAJECTORY in {*swept, *changes} and MANEUVERS not in {*swept, *changes}:
+        named = file.swept_keys | changes.keys()
+        if TRAJECTORY in named and MANEUVERS not in named:
             changes[MANEUVERS] = ("trajectory",)
         if isinstance(changes.get(TRAJECTORY), str):
             changes[TRAJECTORY] = self._folder / changes[TRAJECTORY]
         try:
-            base, mock = with_keys(base, base.mock or {}, changes)
+            base = with_keys(base, changes)
         except ConfigError as error:
-            raise ConfigError(f"{name}: {error}") from error
-        base = base.model_copy(update={"mock": mock})
+            raise ConfigError(f"{self._path}: {error}") from error
         base = self._flyable(base)
-        sweep = {key: self._with_files(key, each) for key, each in file.sweep.items()}
+        sweep = {name: self._with_files(name, swept) for name, swept in file.sweep.items()}
         file = file.model_copy(update={"sweep": sweep, "set": {}})
-        return Campaign(file, base, self._files, name)
+        return Campaign(file, base, self._files, str(self._path))
 
     def _at(self, *where: str) -> str:
         """Line number and section of a key, for messages."""
@@ -106,7 +100,7 @@ class _CampaignReader:
         return load_config(self._folder / given_config)
 
     def _flyable(self, base: Config) -> Config:
-        """Adapt the base to a flight in memory: the program arms, its trajectory is copied.
+        """Adapt the base to a flight in memory: the program arms; the trajectory is a copy.
 
         Raises:
             ConfigError: the configuration needs the MAVSDK link or signing, or its trajectory
@@ -124,18 +118,22 @@ class _CampaignReader:
         path = base.flight.trajectory
         return base if path is None else _with_trajectory(base, self._collect(path))
 
-    def _with_files(self, key: str, swept: Swept) -> Swept:
-        """The swept key, with the paths of its trajectory files replaced by their copies."""
-        if TRAJECTORY not in (swept.keys or (key,)):
+    def _with_files(self, name: str, swept: Swept) -> Swept:
+        """A factor with the paths of the copies of its trajectory files.
+
+        Raises:
+            ConfigError: a value names no trajectory that can be read.
+        """
+        if TRAJECTORY not in swept.changed_keys(name):
             return swept
         listed = swept.values or swept.choice or ()
         if not (listed and all(isinstance(value, str) for value in listed)):
-            raise ConfigError(f"{self._path}: sweep.{key}: each value must be a file")
+            raise ConfigError(f"{self._path}: sweep.{name}: each value must be a file")
         copies = tuple(str(self._collect(self._folder / value)) for value in listed)
         return swept.model_copy(update={swept.kind: copies})
 
     def _collect(self, path: Path) -> Path:
-        """Copy a trajectory's file and its table into the campaign; return its name there.
+        """Copy a trajectory's file and its table into the campaign; return the path of the copy.
 
         Raises:
             ConfigError: the file cannot be read, or holds no trajectory.
@@ -144,11 +142,8 @@ class _CampaignReader:
             return self._collected[path]
         trajectory_file.read(path)
         taken = {name.parts[1] for name in self._collected.values()}
-        stem = next(
-            stem
-            for stem in (path.stem, *(f"{path.stem}-{number}" for number in range(2, 10_000)))
-            if stem not in taken
-        )
+        numbered = (f"{path.stem}-{number}" for number in count(2))
+        stem = next(stem for stem in chain([path.stem], numbered) if stem not in taken)
         with tempfile.TemporaryDirectory(prefix="companion-campaign-") as folder:
             copies = Path(folder) / stem
             name = copy_trajectory(path, copies)
@@ -171,8 +166,8 @@ class _CampaignReader:
                 complete_mock({"faults": fault_case.inject})
             except ConfigError as error:
                 raise ConfigError(f"{name}: faults.{scenario}: {error}") from error
-        self._check_words(FAULT, (NO_FAULT, *file.faults))
-        self._check_words(FAULT_PHASE, get_args(FaultPhase))
+        self._check_names(FAULT, (NO_FAULT, *file.faults))
+        self._check_names(FAULT_PHASE, get_args(FaultPhase))
         for key in (FAULT_PHASE, FAULT_AFTER):
             if key in file.sweep and FAULT not in file.sweep:
                 raise ConfigError(f"{name}: sweep.{key} needs sweep.{FAULT}")
@@ -180,17 +175,22 @@ class _CampaignReader:
         if after is not None and not after.is_number:
             raise ConfigError(f"{name}: sweep.{FAULT_AFTER}: each value must be a number")
 
-    def _check_words(self, key: str, known: tuple[str, ...]) -> None:
+    def _check_names(self, key: str, known: tuple[str, ...]) -> None:
+        """Check that a factor, if it is swept, takes only known names.
+
+        Raises:
+            ConfigError: the factor has no list of names, or an unknown name.
+        """
         swept = self._file.sweep.get(key)
         if swept is None:
             return
         if not (listed := swept.values or swept.choice):
             raise ConfigError(f"{self._path}: sweep.{key}: give a list of names")
-        for word in listed:
-            if word not in known:
-                names = ", ".join(known)
+        for name in listed:
+            if name not in known:
                 raise ConfigError(
-                    f"{self._path}: sweep.{key}: there is no {word!r:.60}; known: {names}"
+                    f"{self._path}: sweep.{key}: there is no {name!r:.60}; known: "
+                    f"{', '.join(known)}"
                 )
 
 

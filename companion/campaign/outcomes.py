@@ -69,7 +69,7 @@ def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
 
 
 def _horizontal_errors(estimated: Floats, true: Floats) -> dict[str, float]:
-    """RMS of three horizontal distances, m: estimate-reference, true-reference, estimate-true.
+    """RMS of the horizontal distances between true position, estimated position and reference, m.
 
     Args:
         estimated: (N, 7), as `FlightTrace.tracking`.

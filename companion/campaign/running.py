@@ -22,6 +22,7 @@ from rich.progress import (
 
 from companion.campaign import engine, estimate, folder, store
 from companion.campaign.campaign import Campaign
+from companion.campaign.campaign_file import NOUNS
 from companion.campaign.cluster import (
     ClusterError,
     connected,
@@ -42,8 +43,8 @@ if TYPE_CHECKING:
     from distributed import Client
 
 DONE, FAILED = 0, 1
-_FEW = 2
-"""The time of a case is measured only with more than this number of cases for each worker."""
+_UNMEASURED = 2
+"""Up to this number of cases for each worker, the time that a case takes is not measured."""
 _MOST_SHOWN = 3
 """Largest number of lost units, and of internal errors, that are printed."""
 
@@ -89,14 +90,14 @@ class _Run:
     ) -> None:
         self._campaign, self._place, self._console = campaign, place, console
         self._options = options
-        self._noun = estimate.NOUNS[campaign.file.kind]
+        self._noun = NOUNS[campaign.file.kind]
 
     def run(self) -> int:
         """Run the campaign; return the exit code."""
         begun = folder.begun(self._place)
         if begun:
             folder.resume(self._place, self._campaign)
-        number, case_s = (0, None) if begun else self._check_all_cases()
+        case_s = None if begun else self._check_all_cases()
         try:
             with (
                 interruptible(),
@@ -107,7 +108,7 @@ class _Run:
                     wait_for_workers(client)
                 workers = number_of_workers(client)
                 with folder.locked(self._place):
-                    description = self._open_folder(number, case_s, workers)
+                    description = self._open_folder(case_s, workers)
                     self._console.print(f"Dask's dashboard: {client.dashboard_link}")
                     return self._run_with_progress(client, description)
         except KeyboardInterrupt:
@@ -115,8 +116,8 @@ class _Run:
         except ClusterError as error:
             return self._stopped(str(error))
 
-    def _check_all_cases(self) -> tuple[int, float | None]:
-        """Check every case; return their number and the time for one, s (None: unknown).
+    def _check_all_cases(self) -> float | None:
+        """Check every case; return the time that a case takes, s; None: it was not measured.
 
         Raises:
             ConfigError: a case is refused, or the campaign is larger than its limits.
@@ -124,22 +125,28 @@ class _Run:
         campaign, kind = self._campaign, self._campaign.file.kind
         workers = self._options.workers or local_workers()
         if campaign.number_of_cases > estimate.most_cases(campaign) and not self._options.yes:
-            # Only one case: to check all would take long, and they are not flown.
+            # The time of one case is enough to refuse; checking all cases would take long.
             first = [campaign.case(next(campaign.samples()))]
             estimate.check_size(campaign, estimate.case_time(kind, first), workers)
         cases = list(campaign.cases())
         check_cases(kind, cases)
-        if len(cases) <= _FEW * workers:
-            return len(cases), None
+        if len(cases) <= _UNMEASURED * workers:
+            return None
         case_s = estimate.case_time(kind, cases)
         if not self._options.yes:
             estimate.check_size(campaign, case_s, workers)
-        return len(cases), case_s
+        return case_s
 
-    def _open_folder(self, cases: int, case_s: float | None, workers: int) -> Description:
-        """Continue the campaign in its folder, or write the folder of a new one."""
+    def _open_folder(self, case_s: float | None, workers: int) -> Description:
+        """Continue the campaign in its folder, or write the folder of a new one.
+
+        Args:
+            case_s: time that a case takes, s; None: it was not measured.
+            workers: number of workers.
+        """
         if folder.begun(self._place):
             return folder.resume(self._place, self._campaign)
+        cases = self._campaign.number_of_cases
         unit = 1 if case_s is None else size_of_units(cases, case_s, workers)
         description = folder.describe(self._campaign, unit, case_s)
         folder.make(self._place, self._campaign, description)
@@ -168,7 +175,8 @@ class _Run:
         for sentence in progress.lost[:_MOST_SHOWN]:
             say(f"not flown: {sentence}")
         if progress.flown < description.cases:
-            return self._stopped(f"{len(progress.lost)} units were given up")
+            lost = len(progress.lost)
+            return self._stopped(f"{lost} unit{'s were' if lost > 1 else ' was'} given up")
         errors = engine.internal_errors(self._place, self._campaign.file)
         for error, times in errors.most_common(_MOST_SHOWN):
             say(f"{times} of the {self._noun} ended by an {error}")

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from companion.campaign.campaign import Campaign
 from companion.campaign.campaign_file import CampaignFile
 from companion.campaign.outcomes import FLOAT_OUTCOMES
 from companion.campaign.swept import Value
@@ -176,17 +175,3 @@ def metadata(results: "pa.Table") -> dict[str, Any]:
     """Name, kind and factors of the campaign that a table of results belongs to."""
     contents: dict[str, Any] = json.loads((results.schema.metadata or {})[METADATA])
     return contents
-
-
-def write_campaign(folder: Path, campaign: Campaign, text: str) -> None:
-    """Write `campaign.yaml` and the trajectories of a campaign to its new folder.
-
-    Raises:
-        OSError: a file cannot be written.
-    """
-    (folder / RESULTS).mkdir(parents=True, exist_ok=True)
-    for name, content in campaign.files.items():
-        path = folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, content)
-    write_whole(folder / "campaign.yaml", text)

@@ -1,6 +1,6 @@
 """The values of a swept key in a campaign file: a list, a range, or a distribution."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from math import exp, isfinite, log
 from statistics import NormalDist
 from typing import Annotated, Any
@@ -24,7 +24,7 @@ class Swept(Section):
 
     Exactly one of `values`, `range`, `uniform`, `loguniform`, `normal` and `choice` is given.
     `values` and `range` form a grid: each value is flown with every value of the other grids. The
-    other four are sampled.
+    other four are distributions, of which samples are flown.
     """
 
     values: Annotated[tuple[Any, ...], Field(min_length=1, max_length=_MOST_VALUES)] | None = None
@@ -104,7 +104,7 @@ class Swept(Section):
 
     @property
     def is_number(self) -> bool:
-        """Whether its values are numbers; a null among them is a missing number."""
+        """Whether the values are numbers or null."""
         listed = self.values or self.choice
         return listed is None or all(
             value is None or (isinstance(value, float | int) and not isinstance(value, bool))
@@ -113,9 +113,13 @@ class Swept(Section):
 
     @property
     def is_bool(self) -> bool:
-        """Whether its values are true and false."""
+        """Whether all values are true or false."""
         listed = self.values or self.choice
         return listed is not None and all(isinstance(value, bool) for value in listed)
+
+    def changed_keys(self, name: str) -> tuple[str, ...]:
+        """The keys that receive the value of the factor `name`."""
+        return self.keys or (name,)
 
     def grid(self) -> tuple[Any, ...]:
         """The values of a grid."""
@@ -129,7 +133,7 @@ class Swept(Section):
         if self.choice is not None:
             return self.choice[min(int(share * len(self.choice)), len(self.choice) - 1)]
         if self.normal is not None:
-            return _normal(self.normal, self.within, share)
+            return _normal_quantile(self.normal, self.within, share)
         if self.loguniform is not None:
             low, high = map(log, self.loguniform)
             return exp(low + (high - low) * share)
@@ -139,19 +143,16 @@ class Swept(Section):
     def described(self) -> dict[str, Any]:
         """Kind and values, for the metadata of the results."""
         details = {"count": self.count, "within": self.within}
-        shown: Mapping[str, Any] = {
-            key: value for key, value in details.items() if value is not None
-        }
         return {
             "kind": self.kind,
             "sampled": self.sampled,
             self.kind: [column_value(value) for value in getattr(self, self.kind)],
-            **shown,
+            **{key: value for key, value in details.items() if value is not None},
             "times_base": self.times_base,
         }
 
 
-def _normal(normal: TwoNumbers, within: TwoNumbers | None, share: float) -> float:
+def _normal_quantile(normal: TwoNumbers, within: TwoNumbers | None, share: float) -> float:
     distribution = NormalDist(*normal)
     low, high = (0.0, 1.0) if within is None else map(distribution.cdf, within)
     share = min(max(low + (high - low) * share, 1e-12), 1.0 - 1e-12)

@@ -1,8 +1,8 @@
 """A unit of work: cases that one worker flies one after the other."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from companion.campaign.campaign import Campaign
 from companion.campaign.case import Case
@@ -15,7 +15,7 @@ Row = dict[str, Value]
 SECONDS = 2.5
 """Longest planned time of a unit with several cases, s.
 
-It is long compared with the time to send a unit, and so short that a lost unit costs little.
+Long compared with the time to send a unit, and short enough that a lost unit costs little.
 """
 _UNITS_PER_WORKER = 4
 """Number of units planned for each worker, so that all workers end at about the same time.
@@ -46,13 +46,13 @@ def fly_samples(campaign: Campaign, samples: Sequence[Sample], expected: Version
         VersionError: this process has other versions than the client.
     """
     require_equal(expected, versions(), f"the worker {_worker()}")
-    return _run(campaign.file.kind, [campaign.case(sample) for sample in samples])
+    return _timed(campaign.file.kind, [campaign.case(sample) for sample in samples])
 
 
 def fly_cases(kind: str, cases: Sequence[Case], expected: Versions) -> UnitResult:
     """Fly cases that the client has built; otherwise like `fly_samples`."""
     require_equal(expected, versions(), f"the worker {_worker()}")
-    return _run(kind, cases)
+    return _timed(kind, cases)
 
 
 def run_cases(kind: str, cases: Sequence[Case]) -> list[Row]:
@@ -62,15 +62,19 @@ def run_cases(kind: str, cases: Sequence[Case]) -> list[Row]:
         kind: "flights" or "batch".
         cases: cases to be flown.
     """
-    return _run(kind, cases).rows
+    if kind == "flights":
+        return [fly_case(case) for case in cases]
+    from companion.campaign import kinematics  # noqa: PLC0415  imports much
+
+    return kinematics.run_cases(cases)
 
 
-def _run(kind: str, cases: Sequence[Case]) -> UnitResult:
+def _timed(kind: str, cases: Sequence[Case]) -> UnitResult:
     rows: list[Row] = []
     wall_s: list[float] = []
     for part in [cases] if kind == "batch" else [[case] for case in cases]:
         began = perf_counter()
-        rows += _runner(kind)(part)
+        rows += run_cases(kind, part)
         wall_s.append(round(perf_counter() - began, 4))
     return UnitResult(rows, wall_s, _worker())
 
@@ -82,18 +86,10 @@ def check_cases(kind: str, cases: Sequence[Case]) -> None:
         ConfigError: a case cannot be run; the message names it.
     """
     if kind == "batch":
-        from companion.campaign.kinematics import check_case  # noqa: PLC0415  imports much
+        from companion.campaign import kinematics  # noqa: PLC0415  imports much
 
         for case in cases:
-            check_case(case)
-
-
-def _runner(kind: str) -> Callable[[Sequence[Case]], list[Row]]:
-    if kind == "flights":
-        return lambda cases: [fly_case(case) for case in cases]
-    from companion.campaign.kinematics import run_cases as fly_batch  # noqa: PLC0415  as above
-
-    return fly_batch
+            kinematics.check_case(case)
 
 
 def _worker() -> str:
@@ -122,8 +118,3 @@ def size_of_units(cases: int, case_s: float, workers: int) -> int:
 def ranges(cases: int, size: int) -> list[range]:
     """The numbers of the cases of each unit, in order."""
     return [range(first, min(first + size, cases)) for first in range(0, cases, size)]
-
-
-def first_and_last(numbers: range) -> dict[str, Any]:
-    """The cases of a unit for its timing file."""
-    return {"first": numbers.start, "last": numbers.stop - 1}

@@ -147,7 +147,7 @@ def test_a_flight_that_ended_early_is_no_error_but_is_told(tmp_path):
     assert comparison.samples == 3
     assert comparison.ratio.value == pytest.approx(1.0)
     # The estimated errors are those of the same three samples.
-    assert comparison.known == pytest.approx([0.5 * comparison.before.value] * 2)
+    assert comparison.estimated == pytest.approx([0.5 * comparison.before.value] * 2)
     assert comparison.estimate == pytest.approx([0.1] * 2)
 
 

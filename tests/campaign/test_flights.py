@@ -14,6 +14,7 @@ from companion.campaign.unit import ranges, size_of_units
 from companion.campaign.versions import VersionError, difference, require_equal, versions
 from companion.cli import campaign as commands
 from companion.cli.main import main
+from companion.config.files import load as load_config
 from companion.files.yaml_file import ConfigError
 from tests.campaign.test_campaign_file import CONFIGS, load
 from tests.flight.fly import QUICK_PARAMETERS
@@ -40,6 +41,10 @@ def test_equal_cases_are_equal_flights_to_the_bit(campaign, tmp_path):
     row, again = flight.fly_case(calm), flight.fly_case(calm, tmp_path / "recorded")
     assert row == again
     assert (tmp_path / "recorded" / "flight.mcap").exists()
+    # Its record says which vehicle flew.
+    recorded = load_config(tmp_path / "recorded" / "config.yaml")
+    assert recorded.mock["seed"] == calm.seed == row["seed"]
+    assert windy.config.mock["wind"]["speed_m_s"] == 5.0
     assert row["result"] == "ok"
     assert row["ok"]
     assert row["failed_checks"] == ""

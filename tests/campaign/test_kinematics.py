@@ -141,7 +141,6 @@ def test_each_case_of_a_batch_is_flown_with_its_own_vehicle_and_target(tmp_path)
         assert quick["corners.north_coefficient"] == slow["corners.north_coefficient"]
         assert quick["time_constant_s"] < slow["time_constant_s"] - 0.02
         assert quick["cross_axis_max"] < slow["cross_axis_max"]
-        assert quick["flight_s"] == pytest.approx(8 * 0.4)
     assert {row["result"] for row in rows} <= {"ok", "not straight"}
     assert all(row["ok"] == (row["result"] == "ok") for row in rows)
     stored = store.table(told.file, rows).to_pylist()

@@ -52,7 +52,7 @@ def test_a_unit_that_is_given_up_is_told_and_can_be_gone_on_with(
     assert f"3 flights; results in {out}\n" in told
     assert "not flown: unit 1 (cases 1 to 1): RuntimeError: [oops]\n" in told
     assert (
-        "1 units were given up; the results of 2 of 3 flights are kept. Continue with\n"
+        "1 unit was given up; the results of 2 of 3 flights are kept. Continue with\n"
         f"  companion campaign '{out}' --scheduler tcp://192.0.2.1:8786\n"
     ) in told
     monkeypatch.setattr(unit, "fly_case", row_of)

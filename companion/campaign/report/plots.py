@@ -7,7 +7,13 @@ import numpy as np
 
 from companion.campaign.report.results import RATES, THRUST, Floats, Results, label
 from companion.campaign.report.sensitivity import Influence
-from companion.campaign.report.statistics import choices, levels, pareto_front, share_of
+from companion.campaign.report.statistics import (
+    choices,
+    levels,
+    median,
+    pareto_front,
+    share_of,
+)
 from companion.report.plots import IDEAL, MEASURED, NEAREST, REFERENCE, Plot, axes, numbers
 
 _MOST_FACTORS = 6
@@ -91,7 +97,7 @@ def pareto(results: Results) -> Iterator[Plot]:
     points, titles = [], []
     for choice in choices(results):
         part = choice.cases
-        values = np.array([_median(columns[name][part]) for name in names])
+        values = np.array([median(columns[name][part]) for name in names])
         if np.isfinite(values).all():
             points.append(values)
             good = share_of(results.good[part]).share
@@ -100,17 +106,19 @@ def pareto(results: Results) -> Iterator[Plot]:
         return
     goals = np.array(points)
     front = pareto_front(goals)
-    traces = [
-        _points(name, goals[part], [titles[k] for k in np.flatnonzero(part)], size)
-        for name, part, size in (("on the front", front, 11), ("others", ~front, 6))
-    ]
-    traces[0]["marker"] |= {"line": {"color": REFERENCE, "width": 2}}
     thrust = len(names) > 2
-    for trace, part in zip(traces, (front, ~front), strict=True):
+    traces = []
+    for name, part in (("on the front", front), ("others", ~front)):
+        marker: dict[str, Any] = {"size": 11 if part is front else 6}
+        if part is front:
+            marker["line"] = {"color": REFERENCE, "width": 2}
         if thrust:
-            trace["marker"] |= _scale(goals[part, 2], goals[:, 2], shown=trace is traces[0])
+            marker |= _scale(goals[part, 2], goals[:, 2], shown=part is front)
         else:
-            trace["marker"]["color"] = MEASURED if trace is traces[0] else IDEAL
+            marker["color"] = MEASURED if part is front else IDEAL
+        if part.any():
+            shown = [titles[k] for k in np.flatnonzero(part)]
+            traces.append(_points(name, goals[part], shown, marker))
     of = "error, rate use and thrust use" if thrust else "error and rate use"
     note = (
         f"A point for each choice of the program's own keys: the medians over everything else; or "
@@ -118,15 +126,10 @@ def pareto(results: Results) -> Iterator[Plot]:
         f"front no other point is better in {of} at once. Each point shows its success rate."
     )
     layout = axes(x=label(RATES), y=label(results.error))
-    yield Plot("Pareto front", note, [t for t in traces if t["x"]], layout, 420)
+    yield Plot("Pareto front", note, traces, layout, 420)
 
 
-def _median(values: Floats) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.median(known)) if len(known) else float("nan")
-
-
-def _points(name: str, goals: Floats, titles: list[str], size: int) -> dict[str, Any]:
+def _points(name: str, goals: Floats, titles: list[str], marker: dict[str, Any]) -> dict[str, Any]:
     return {
         "type": "scatter",
         "mode": "markers",
@@ -135,7 +138,7 @@ def _points(name: str, goals: Floats, titles: list[str], size: int) -> dict[str,
         "y": numbers(goals[:, 0]),
         "text": titles,
         "hovertemplate": "%{text}<br>%{y:.3g}, %{x:.3g}<extra></extra>",
-        "marker": {"size": size},
+        "marker": marker,
     }
 
 

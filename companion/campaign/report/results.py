@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.campaign import store
+from companion.campaign.campaign_file import NOUNS
 from companion.campaign.folder import read_description
 from companion.config.units import unit_of
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Column = NDArray[Any]
 
-NOUNS = {"flights": "flights", "batch": "vehicles"}
 TRUE_ERROR = "position_rms_m"
 ERRORS = (TRUE_ERROR, "model_deviation_max")
 """Outcomes that may serve as the campaign's error; the first one that was measured is used."""
@@ -90,9 +90,7 @@ class Results:
         for field in self.table.schema:
             column = self.table.column(field.name)
             if str(field.type) == "double":
-                found[field.name] = np.array(
-                    [np.nan if value is None else value for value in column.to_pylist()]
-                )
+                found[field.name] = column.to_numpy()  # null becomes NaN
             else:
                 found[field.name] = np.array(column.to_pylist(), dtype=object)
         return found

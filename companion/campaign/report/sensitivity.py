@@ -36,8 +36,8 @@ class Influence(NamedTuple):
 def influences(results: Results, outcome: str) -> list[Influence]:
     """The factors by their influence on an outcome, the largest first.
 
-    Factors with a single value are left out. The list is empty if fewer than `FEWEST` cases were
-    measured, or if the outcome is always the same.
+    Factors with a single value are left out. The list is empty if no factor is left, if fewer than
+    `FEWEST` cases were measured, or if the outcome is always the same.
 
     Args:
         results: results of the campaign.
@@ -47,7 +47,7 @@ def influences(results: Results, outcome: str) -> list[Influence]:
     rows = np.flatnonzero(np.isfinite(values))
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _MOST_CASES)).astype(int))]
     values = values[rows]
-    columns = {name: as_numbers(results.columns[name][rows], values) for name in results.factors}
+    columns = {name: _as_numbers(results.columns[name][rows], values) for name in results.factors}
     columns = {name: column for name, column in columns.items() if np.ptp(column) > 0.0}
     if len(rows) < FEWEST or not columns or not np.ptp(values) > 1e-12:
         return []
@@ -68,10 +68,11 @@ def influences(results: Results, outcome: str) -> list[Influence]:
     )
 
 
-def as_numbers(column: Column, values: Floats) -> Floats:
+def _as_numbers(column: Column, values: Floats) -> Floats:
     """A factor as numbers; words and booleans are numbered in the order of their mean outcome.
 
-    Without this order neighbouring words could share a class, and their difference would be lost.
+    In another order, words with different outcomes could share a class, and their difference would
+    be lost. A null among numbers becomes a number below all others.
 
     Args:
         column: (cases,) values of the factor.

@@ -1,6 +1,5 @@
 """Success rates with their intervals, levels of a factor, worst cases, and the Pareto front."""
 
-from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from math import inf, isfinite
 from typing import NamedTuple
@@ -14,13 +13,18 @@ CONFIDENCE = 0.95
 _MOST_LEVELS = 12
 """A factor with more different values is shown in ranges."""
 _RANGES = 5
+_MOST_CHOICES = 300
+_NOT_CHOSEN = ("mock.", "fault", "flight.", "vehicle.")
+"""Beginnings of the factors that a user does not choose."""
 
 
 class Share(NamedTuple):
-    """A share of cases with its Wilson interval, which covers the true share in 95 % of campaigns.
+    """The share of cases that have a property, with its Wilson interval.
+
+    The interval covers the true share in 95 % of campaigns.
 
     Attributes:
-        chosen: number of cases that count.
+        chosen: number of cases that have the property.
         of: number of all cases.
         share: chosen / of; NaN for no case.
         low: lower end of the interval.
@@ -55,47 +59,48 @@ def share_of(chosen: NDArray[np.bool_]) -> Share:
     return Share(count, of, count / of, float(interval.low), float(interval.high))
 
 
-class Level(NamedTuple):
-    """The cases in which a factor has one value, or lies in one range.
+class Group(NamedTuple):
+    """Cases that belong together, because some of their factors have the same or similar values.
 
     Attributes:
-        name: the value, or the range.
-        cases: (cases,), whether each case belongs to it.
+        name: these values.
+        cases: (cases,), whether each case belongs to the group.
     """
 
     name: str
     cases: NDArray[np.bool_]
 
 
-def levels(column: Column) -> list[Level]:
-    """The levels of a factor.
+def levels(column: Column) -> list[Group]:
+    """The cases grouped by the levels of a factor: its values, or ranges of them.
 
-    Up to `_MOST_LEVELS` different values give one level each. More numbers give ranges with about
-    equally many cases; null is a level of its own. Of more words, the last level joins the
-    remaining ones.
+    Up to `_MOST_LEVELS` different values give one level each. More numbers give `_RANGES` ranges
+    with about equally many cases each; null is then a level of its own. More words give
+    `_MOST_LEVELS` levels, the last of which holds all remaining words.
     """
     known = sorted({_key(value) for value in column})
     if column.dtype != float or len(known) <= _MOST_LEVELS:
         own = known if len(known) <= _MOST_LEVELS else known[: _MOST_LEVELS - 1]
         keys = [_key(value) for value in column]
-        found = [Level(key[1], np.array([key == each for each in keys])) for key in own]
+        found = [Group(key[1], np.array([key == each for each in keys])) for key in own]
         others = len(known) - len(own)
         if others:
-            found.append(Level(f"{others} others", np.array([key not in own for key in keys])))
+            found.append(Group(f"{others} others", np.array([key not in own for key in keys])))
         return found
     edges = np.nanquantile(column, np.linspace(0.0, 1.0, _RANGES + 1))
     found = []
     for number, (low, high) in enumerate(pairwise(edges)):
         last = number == _RANGES - 1
         inside = (column >= low) & ((column <= high) if last else (column < high))
-        found.append(Level(f"{low:.3g} to {high:.3g}", inside))
+        found.append(Group(f"{low:.3g} to {high:.3g}", inside))
     unknown = np.isnan(column)
     if unknown.any():
-        found.append(Level("null", unknown))
+        found.append(Group("null", unknown))
     return found
 
 
 def _key(value: object) -> tuple[float, str]:
+    """A sort key, which puts null first, and the value as text."""
     if isinstance(value, bool):
         return float(value), str(value).lower()
     if isinstance(value, int | float) and isfinite(value):
@@ -108,7 +113,7 @@ def _key(value: object) -> tuple[float, str]:
 def worst(results: Results, count: int) -> list[int]:
     """Rows of the worst cases: crashed, not as documented, not good, then the largest error.
 
-    A missing error counts as infinite.
+    An error that was not measured counts as infinite.
     """
     columns = results.columns
     error = columns[results.error]
@@ -137,47 +142,34 @@ def pareto_front(goals: Floats) -> NDArray[np.bool_]:
     return front
 
 
-class Choice(NamedTuple):
-    """The cases with equal values of the keys that a user can choose; all other factors vary.
+def choices(results: Results) -> list[Group]:
+    """The cases grouped by equal values of the swept keys that a user chooses.
 
-    Attributes:
-        name: the equal values.
-        cases: (cases,), whether each case belongs to it.
+    A user chooses neither keys of `mock`, `flight` and `vehicle` nor faults. If no two cases have
+    equal values, or there are more than `_MOST_CHOICES` groups, each group is a single case: every
+    k-th case, with k such that there are fewer than 2·`_MOST_CHOICES`.
     """
-
-    name: str
-    cases: NDArray[np.bool_]
-
-
-def choices(results: Results, most: int = 300) -> list[Choice]:
-    """The choices that a campaign compares, by the values of its swept keys.
-
-    Keys of `mock`, `flight` and `vehicle`, and faults, are not chosen by a user and do not count.
-    If no two cases have equal values, or there are more than `most` choices, each choice is one
-    case: every k-th, with k such that there are fewer than 2·`most`.
-    """
-    chosen = [name for name in results.factors if _is_choice(name)]
-    keys = [tuple(_key(results.columns[name][row]) for name in chosen) for row in _rows(results)]
+    chosen = [name for name in results.factors if not name.startswith(_NOT_CHOSEN)]
+    rows = range(results.count)
+    keys = [tuple(_key(results.columns[name][row]) for name in chosen) for row in rows]
     known = sorted(set(keys))
-    if len(known) > most or len(known) == len(keys):
-        step = max(1, len(keys) // most)
+    if len(known) > _MOST_CHOICES or len(known) == len(keys):
+        step = max(1, len(keys) // _MOST_CHOICES)
         return [
-            Choice(f"case {results.columns['case'][row]}", np.arange(results.count) == row)
-            for row in range(0, len(keys), step)
+            Group(f"case {results.columns['case'][row]}", np.arange(results.count) == row)
+            for row in rows[::step]
         ]
-    return [Choice(_named(chosen, key), np.array([key == each for each in keys])) for key in known]
+    return [
+        Group(
+            ", ".join(f"{name} = {text}" for name, (_, text) in zip(chosen, key, strict=True))
+            or "all cases",
+            np.array([key == each for each in keys]),
+        )
+        for key in known
+    ]
 
 
-def _is_choice(name: str) -> bool:
-    return not name.startswith(("mock.", "fault", "flight.", "vehicle."))
-
-
-def _rows(results: Results) -> Iterator[int]:
-    yield from range(results.count)
-
-
-def _named(names: Sequence[str], key: Sequence[tuple[float, str]]) -> str:
-    return (
-        ", ".join(f"{name} = {text}" for name, (_, text) in zip(names, key, strict=True))
-        or "all cases"
-    )
+def median(values: Floats) -> float:
+    """The median of the finite values; NaN if there are none."""
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if len(known) else np.nan

@@ -3,13 +3,14 @@
 import json
 import shlex
 from collections.abc import Iterator, Sequence
+from math import isfinite
 
 import numpy as np
 
 from companion.campaign.campaign import Campaign
-from companion.campaign.report.results import LABELS, RATES, Results, label
+from companion.campaign.report.results import LABELS, RATES, Floats, Results, label
 from companion.campaign.report.sensitivity import Influence
-from companion.campaign.report.statistics import levels, share_of, worst
+from companion.campaign.report.statistics import levels, median, share_of, worst
 from companion.config.reference import keys
 from companion.config.units import unit_of
 from companion.flight.flown_config import flattened
@@ -52,7 +53,7 @@ def _values(results: Results, row: int) -> str:
 
 def configuration(campaign: Campaign) -> Table:
     """What all cases share: limits, and keys that are not the default; without swept keys."""
-    swept = {key for name, each in campaign.file.sweep.items() for key in each.keys or (name,)}
+    swept = campaign.file.swept_keys
     rows = [
         (f"{key.section}.{key.name}", json.dumps(key.value), json.dumps(key.default), key.unit)
         for key in keys(campaign.base)
@@ -92,9 +93,9 @@ def _by_level(results: Results, name: str) -> Iterator[tuple[str, ...]]:
         yield tuple(row)
 
 
-def _median(values: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]") -> str:
-    known = values[np.isfinite(values)]
-    return f"{np.median(known):.3g}" if len(known) else EMPTY
+def _median(values: Floats) -> str:
+    middle = median(values)
+    return f"{middle:.3g}" if isfinite(middle) else EMPTY
 
 
 def sensitivity(influences: dict[str, list[Influence]]) -> Table:
@@ -132,8 +133,8 @@ def crossed(results: Results) -> Table | None:
         cells = []
         for other in across:
             both = level.cases & other.cases
-            median = _median(columns[results.error][both])
-            cells.append(f"{median} ({share_of(results.good[both]).share:.0%})")
+            good = share_of(results.good[both]).share
+            cells.append(f"{_median(columns[results.error][both])} ({good:.0%})")
         rows.append((level.name, *cells))
     title = f"Median {label(results.error)} and share of good {results.noun}: {first} × {second}"
     return Table(title, (first, *(each.name for each in across)), rows)

@@ -1,6 +1,5 @@
 """Search of limits, gains and weights over the cases of a campaign.
 
-section     `tune:` of a campaign's file
 first_flight  what flights of the vehicle teach before the search
 candidates  the values that are searched, and where the search starts
 scores      how good a candidate is on some cases

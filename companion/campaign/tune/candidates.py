@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from companion.campaign.campaign import Campaign
+from companion.campaign.campaign_file import Tune
 from companion.campaign.case import Case
 from companion.campaign.keys import with_keys
 from companion.campaign.swept import Swept
-from companion.campaign.tune.section import Tune
 from companion.config import Config
 from companion.config.flight import OPEN_LOOP
 from companion.config.known_drag import drag_prior
@@ -23,10 +23,8 @@ if TYPE_CHECKING:
 
 Values = Mapping[str, Any]
 """Value of each searched key."""
-_UNSEEN = 1_000_003
+_UNSEEN_SEED_OFFSET = 1_000_003
 """Offset of the campaign's seed for the cases that the search does not see."""
-
-
 _SPREAD = 0.15
 """Standard deviation of the candidates near a start, as a share of the (logarithmic) range."""
 
@@ -55,8 +53,7 @@ def section_of(campaign: Campaign) -> Tune:
         raise ConfigError(f"{campaign.name}: there is no section `tune` that says what to search")
     if campaign.file.kind != "flights":
         raise ConfigError(f"{campaign.name}: tune needs kind: flights")
-    swept = {key for name, each in campaign.file.sweep.items() for key in each.keys or (name,)}
-    for key in tune.search.keys() & swept:
+    for key in tune.search.keys() & campaign.file.swept_keys:
         raise ConfigError(f"{campaign.name}: `{key}` stands in sweep and in tune.search")
     flown = (case.config.flight.maneuvers for case in campaign.cases())
     if all(set(OPEN_LOOP).issuperset(maneuvers) for maneuvers in flown):
@@ -74,14 +71,12 @@ def cases(campaign: Campaign, values: Values) -> list[Case]:
     Raises:
         ConfigError: a value is refused.
     """
-    config, _ = with_keys(campaign.base, campaign.base.mock or {}, values)
-    base = config.model_copy(update={"mock": campaign.base.mock})
-    return list(replace(campaign, base=base).cases())
+    return list(replace(campaign, base=with_keys(campaign.base, values)).cases())
 
 
 def unseen(campaign: Campaign, samples: int) -> Campaign:
     """The campaign with other samples, noise and gusts than those of the search."""
-    update = {"seed": campaign.file.seed + _UNSEEN, "samples": samples}
+    update = {"seed": campaign.file.seed + _UNSEEN_SEED_OFFSET, "samples": samples}
     return replace(campaign, file=campaign.file.model_copy(update=update))
 
 

@@ -29,7 +29,8 @@ class Comparison(NamedTuple):
         before: RMS of the true horizontal error with the configuration before the search, m.
         after: the same with the result, m.
         ratio: after / before.
-        known: RMS of the estimated horizontal error, before and after, on the same flights, m.
+        estimated: RMS of the horizontal distance of the estimated position from the reference,
+            before and after, m.
         estimate: RMS of the horizontal error of the position estimate itself, before and after, m.
         better: number of samples in which the result is better.
         samples: number of samples that were compared.
@@ -38,7 +39,7 @@ class Comparison(NamedTuple):
     before: Interval
     after: Interval
     ratio: Interval
-    known: tuple[float, float]
+    estimated: tuple[float, float]
     estimate: tuple[float, float]
     better: int
     samples: int

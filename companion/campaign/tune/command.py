@@ -2,8 +2,7 @@
 
 import argparse
 import shlex
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +11,7 @@ from rich.progress import TextColumn
 
 from companion.campaign import engine, estimate, folder
 from companion.campaign.campaign import Campaign
+from companion.campaign.campaign_file import Tune
 from companion.campaign.case import Case
 from companion.campaign.cluster import ClusterError, connected, require_packages, wait_for_workers
 from companion.campaign.loading import load
@@ -20,7 +20,6 @@ from companion.campaign.tune.candidates import cases, section_of, set_values, st
 from companion.campaign.tune.certainty import compared
 from companion.campaign.tune.scores import Row, scored
 from companion.campaign.tune.search import Fly, Found, Search
-from companion.campaign.tune.section import Tune
 from companion.campaign.tune.storage import StorageError
 from companion.campaign.tune.writing import (
     Result,
@@ -64,7 +63,10 @@ def run(options: argparse.Namespace) -> int:
                 wait_for_workers(client)
                 console.print(f"Dask's dashboard: {client.dashboard_link}")
                 fly = _fly_on(client, campaign)
-                search = _search(campaign, tune, place, fly)
+                try:
+                    search = Search(campaign, tune, place, fly)
+                except StorageError as error:  # there are no candidates to continue with
+                    raise ConfigError(str(error)) from error
                 found = _searched(search, options.trials or tune.trials, console)
                 return _concluded(campaign, tune, place, fly, found, console)
         except VersionError as error:
@@ -96,45 +98,26 @@ def _fly_on(client: "Client", campaign: Campaign) -> Fly:
     return fly
 
 
-def _search(campaign: Campaign, tune: Tune, place: Path, fly: Fly) -> Search:
-    """Begin or continue the search; raises `ConfigError` if its storage cannot be used."""
-    try:
-        return Search(campaign, tune, place, fly)
-    except StorageError as error:
-        raise ConfigError(str(error)) from error
-
-
 def _searched(search: Search, trials: int, console: Console) -> Found:
     """Search; if the storage fails meanwhile, show the best candidate so far and raise."""
     newest = Found()
+    best_so_far = TextColumn("{task.description}")
     try:
-        with _progress(console, trials) as show:
+        with progress_bar(console, TextColumn("candidates"), best_so_far) as bar:
+            task = bar.add_task("", total=trials)
 
-            def keep(found: Found) -> None:
+            def show(found: Found) -> None:
                 nonlocal newest
                 newest = found
-                show(found)
+                best = "" if found.best is None else f"best {found.best.score.rms:.3f} m"
+                bar.update(task, completed=found.tried, description=best)
 
-            found = search.run(trials, keep)
-            show(found)
+            show(search.run(trials, show))
     except (StorageError, OSError):
         if newest.best is not None:
             console.print(best_so_far_text(newest.best), end="")
         raise
-    return found
-
-
-@contextmanager
-def _progress(console: Console, trials: int) -> Iterator[Callable[[Found], None]]:
-    best_so_far = TextColumn("{task.description}")
-    with progress_bar(console, TextColumn("candidates"), best_so_far) as bar:
-        task = bar.add_task("", total=trials)
-
-        def show(found: Found) -> None:
-            best = "" if found.best is None else f"best {found.best.score.rms:.3f} m"
-            bar.update(task, completed=found.tried, description=best)
-
-        yield show
+    return newest
 
 
 def _concluded(

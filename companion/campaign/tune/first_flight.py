@@ -41,7 +41,10 @@ def learned(campaign: Campaign) -> Config:
 
 
 def _identified(config: Config, case: Case, *, damped: bool) -> Config:
-    """The configuration with the rate-loop times measured by `companion identify`."""
+    """The configuration with the response of the rate loop measured by `companion identify`.
+
+    It is unchanged if the response cannot be identified.
+    """
     planner = case.config.planner.model_copy(update={"name": FIRST_ORDER})
     flight = case.config.flight.model_copy(update={"maneuvers": ("identify",), "trajectory": None})
     doublets = case.config.model_copy(update={"planner": planner, "flight": flight})
@@ -60,7 +63,7 @@ def _identified(config: Config, case: Case, *, damped: bool) -> Config:
 
 
 def _with_drag(config: Config, case: Case) -> Config:
-    """The configuration with the drag measured in a flight of the case."""
+    """The configuration with the drag measured in a flight of the case, if it was measured."""
     with tempfile.TemporaryDirectory(prefix="companion-drag-") as place:
         # A recorded flight keeps what it learned beside its folder.
         CaseFlight(replace(case, fault=None), Path(place)).fly(Path(place) / "flight")

@@ -21,10 +21,10 @@ class Score(NamedTuple):
     Attributes:
         true: RMS of the true horizontal distance from the reference in each case, m; infinite where
             a case was not flown to its end, or had no maneuver in closed loop.
-        estimated: the same distance by the estimated position, which is all that the program knows
-            in flight.
-        estimate: RMS of the horizontal distance between true and estimated position, m; infinite as
-            well.
+        estimated: the same for the estimated position, which is all that the program knows in
+            flight.
+        estimate: RMS of the horizontal distance between true and estimated position, m.
+            `estimated` and `estimate` are infinite where `true` is.
         inside: whether each case was flown to its end and stayed inside the envelope.
     """
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from companion.campaign.campaign import Campaign
+from companion.campaign.campaign_file import Tune
 from companion.campaign.case import Case
 from companion.campaign.tune.candidates import (
-    Start,
     Values,
     cases,
     near,
@@ -20,7 +20,6 @@ from companion.campaign.tune.candidates import (
 )
 from companion.campaign.tune.first_flight import learned
 from companion.campaign.tune.scores import Row, Score, pooled, scored
-from companion.campaign.tune.section import Tune
 from companion.campaign.tune.storage import storage_errors
 from companion.config import Config
 from companion.files.yaml_file import ConfigError
@@ -73,8 +72,8 @@ class Found:
         stopped_early: number of candidates that were abandoned, or whose keys were refused.
         best: of the candidates that met the constraint (`inside_share`) the one with the smallest
             error; None: none met it.
-        near: the best tenth of the candidates that met the constraint, at least three if there are
-            so many; the best one first.
+        near: the best tenth of the candidates that met the constraint, at least three if as many
+            met it; the best one first.
     """
 
     tried: int = 0
@@ -168,10 +167,7 @@ class Search:
             begin = list(starts(self._campaign, self._tune, learning_flight(self._campaign)))
             seed, search = self._campaign.file.seed, self._tune.search
             for start in (*begin, *near(begin[-1], search, self._neighbour_count, seed)):
-                self._enqueue(start)
-
-    def _enqueue(self, start: Start) -> None:
-        self._study.enqueue_trial(dict(start.values), user_attrs={"start": start.name})
+                self._study.enqueue_trial(dict(start.values), user_attrs={"start": start.name})
 
     def _interrupted(self) -> "Trial | None":
         """The candidate whose flights were interrupted; it is tried again."""

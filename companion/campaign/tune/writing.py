@@ -76,10 +76,10 @@ def _certainty(result: Result) -> Iterator[str]:
         f"{comparison.ratio.low:.2f} to {comparison.ratio.high:.2f}; better in "
         f"{comparison.better} of {comparison.samples} samples."
     )
-    (known, known_after), (floor, floor_after) = comparison.known, comparison.estimate
+    (before, after), (own_before, own_after) = comparison.estimated, comparison.estimate
     yield (
-        f"On the same flights the estimated position was {known:.3f} -> {known_after:.3f} m from "
-        f"the reference, and {floor:.3f} -> {floor_after:.3f} m from the true one."
+        f"On the same flights the estimated position was {before:.3f} -> {after:.3f} m from the "
+        f"reference, and {own_before:.3f} -> {own_after:.3f} m from the true one."
     )
     yield (
         "The last is the error of the position estimate, which gains and weights hardly change; "
