@@ -11,7 +11,7 @@ class GuidanceCommand(NamedTuple):
 
     Attributes:
         target: target of the planner; its heading is in the frame without estimator resets.
-        acceleration_down: wanted acceleration downwards, m/s².
+        acceleration_down: acceleration downwards that thrust and gravity shall give, m/s².
         made_at: when guidance made the command, s of event-loop time.
         idle: whether zero rates and zero thrust are sent, on the ground.
         is_step: whether this is an open-loop step whose response is measured.

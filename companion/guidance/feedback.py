@@ -5,6 +5,7 @@ from math import isfinite
 
 import numpy as np
 
+from companion.drag import Drag
 from companion.guidance.reference import GRAVITY, Reference, VehicleMotion
 
 
@@ -95,12 +96,24 @@ class HeightGains:
     max_descent: float
 
 
-def acceleration_down(gains: HeightGains, reference: Reference, motion: VehicleMotion) -> float:
-    """The wanted acceleration downwards, m/s², at most half of gravity up or down."""
-    wanted = reference.acceleration_ned[2]
+def acceleration_down(
+    gains: HeightGains, reference: Reference, motion: VehicleMotion, ahead: Reference, drag: Drag
+) -> float:
+    """The acceleration downwards that thrust and gravity shall give, m/s², at most g/2 up or down.
+
+    Args:
+        gains: gains and limits of the height cascade.
+        reference: the reference now.
+        motion: the present motion.
+        ahead: the reference when the rotors will have followed; for feedforward.
+        drag: drag of the vehicle. Where the height is held, thrust balances it in climb and
+            descent; else the vertical acceleration of the reference is commanded as it is.
+    """
+    wanted = ahead.acceleration_ned[2]
     if reference.holds_height:
         error = reference.position_ned[2] - motion.position_ned[2]
         speed = reference.velocity_ned[2] + gains.height * error
         speed = min(max(speed, -gains.max_climb), gains.max_descent)
         wanted += gains.climb * (speed - motion.velocity_ned[2])
+        wanted += drag.deceleration(ahead.velocity_ned)[2]
     return min(max(wanted, -_LARGEST_VERTICAL), _LARGEST_VERTICAL)

@@ -109,7 +109,7 @@ class HoverThrust:
         """Normalised thrust within its bounds for a wanted vertical acceleration.
 
         Args:
-            acceleration_down: wanted acceleration, m/s², positive down.
+            acceleration_down: acceleration that thrust and gravity shall give, m/s², positive down.
             q: attitude.
             body_rates: rad/s.
         """

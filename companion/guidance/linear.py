@@ -87,7 +87,7 @@ class LinearCommand(NamedTuple):
     Attributes:
         target: the planner's target now.
         later: the target one period later; between the two the target moves on a straight line.
-        down: wanted acceleration downwards, m/s².
+        down: acceleration downwards that thrust and gravity shall give, m/s².
     """
 
     target: Target
@@ -175,10 +175,8 @@ class LinearGuidance:
             inputs: motion, thrust and disturbance of the vehicle.
         """
         reference = reference_at(time)
-        lifted = reference_at(time + self._settings.thrust_lag).acceleration_ned
-        down = acceleration_down(
-            self._settings.height, reference._replace(acceleration_ned=lifted), inputs.now
-        )
+        ahead = reference_at(time + self._settings.thrust_lag)
+        down = acceleration_down(self._settings.height, reference, inputs.now, ahead, inputs.drag)
         ends = time, time + self._settings.period
         if reference.coefficients is not None:
             north, east = self._rest.added_to(reference.coefficients, reference)

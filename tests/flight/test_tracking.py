@@ -65,6 +65,17 @@ def test_so_are_others(name, wind, most):
     assert within(tracking, most), tracking
 
 
+@pytest.mark.parametrize("drag", [1.0, None])
+def test_climbs_and_descents_hold_their_height_against_drag(tmp_path, drag):
+    path = tmp_path / "climbs.yaml"
+    points = [[4.0, 0.0, 0.0], [4.0, 3.0, -3.0], [0.0, 0.0, 0.0]]
+    path.write_text(yaml.safe_dump({"waypoints": {"points_m": points, "speed_m_s": 3.0}}))
+    limits = {"max_climb_m_s": 3.0, "max_descent_m_s": 3.0}
+    tracking = flown(path, guidance={"drag_per_s": drag}, limits=limits).tracking()
+    # Without feedforward of the drag it is 0.15 m.
+    assert tracking["height_rms_m"] <= (0.03 if drag else 0.08), tracking
+
+
 def test_without_the_lead_it_is_more_than_three_times_worse(eight):
     late = flown("figure8.yaml", guidance={"lead": False}).tracking()
     assert late["position_rms_m"] >= 3.0 * eight["position_rms_m"]

@@ -158,6 +158,19 @@ def test_open_loop_coefficients_pass_unchanged_while_height_is_held():
     assert down < 0.0
 
 
+@pytest.mark.parametrize("climb", [-1.5, 0.5])
+def test_thrust_balances_the_drag_of_climb_and_descent_where_the_height_is_held(climb):
+    reference = Reference((0.0, 0.0, -5.0), (3.0, 0.0, climb))
+    motion, drag = VehicleMotion(*reference[:2]), Drag(0.8, 0.1)
+    situation = GuidanceInput(motion, motion, (0.0, 0.0), (0.0, 0.0), drag, THRUST)
+
+    def down(reference):
+        return LinearGuidance(SETTINGS).command(lambda _: reference, 0.0, situation).down
+
+    assert down(reference) == pytest.approx((0.8 + 0.1 * math.hypot(3.0, climb)) * climb)
+    assert down(reference._replace(holds_height=False)) == 0.0
+
+
 def test_drifting_it_asks_for_what_holds_against_the_wind_wherever_it_is():
     motion = VehicleMotion((7.0, 7.0, -5.0), (3.0, 3.0, 0.0))
     situation = GuidanceInput(motion, motion, (0.5, 0.5), (1.0, -0.5), DRAG, THRUST)

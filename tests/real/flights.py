@@ -2,7 +2,7 @@
 
 A flight is named by what it flies, joined by `+`; behind `@` stands a variant, behind `:` the
 planner where it is another than the one that ships: `circle5+eight5`, `circle5@nmpc`,
-`corners400:first-order`. At most one circle and one eight fly in a flight, for the configuration
+`corners400:first-order`. At most one circle and one other path fly in a flight: the configuration
 has one place for each.
 """
 
@@ -45,6 +45,10 @@ _SPINNING = {"limits": {"max_tilt_rate_deg_s": 400.0}, "safety": {"max_body_rate
 _TILTED = {"limits": {"max_tilt_deg": 52.0, "max_tilt_rate_deg_s": 200.0}}
 _FAST = {"limits": {"max_tilt_deg": 58.0, "max_tilt_rate_deg_s": 200.0, "max_thrust": 1.0}}
 _PAUSE_S = 4.0
+_CLIMB = {
+    "waypoints": {"points_m": [[6, 0, 0], [6, 4, -2], [0, 4, -2], [0, 0, 0]], "speed_m_s": 3.0}
+}
+"""A path that climbs and descends by up to 1.2 m/s."""
 
 
 class Part(NamedTuple):
@@ -93,6 +97,7 @@ PARTS = {
     "circle10": _circle(12.0, 10.0, 4.0, _FAST),
     "eight5": _eight(3.0, 5.0, _TILTED),
     "eight8": _eight(6.0, 8.0, _FAST),
+    "climb": Part("trajectory", {"limits": {"max_descent_m_s": 2.0}}, _CLIMB),
 }
 MOVING = ("circle", "trajectory")
 VARIANTS: dict[str, dict] = {

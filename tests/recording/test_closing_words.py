@@ -22,6 +22,7 @@ HOVER = {
     "level_rms_m": 0.03,
     "level_max_m": 0.06,
     "height_rms_m": 0.02,
+    "height_mean_m": 0.13,
     "reference_speed_max_m_s": 0.0,
     "open_loop": False,
 }
@@ -98,7 +99,7 @@ def test_a_good_flight_is_called_good_with_its_figures_and_limits():
 BEYOND = {
     "circle": (["maneuvers", 2, "level_rms_m"], 0.26, "fly it slower"),
     "hover": (["maneuvers", 0, "level_rms_m"], 0.16, "fly it slower"),
-    "steps": (["maneuvers", 1, "height_rms_m"], 0.16, "thrust.hover_thrust"),
+    "steps": (["maneuvers", 1, "height_rms_m"], 0.16, "set thrust.hover_thrust"),
     "straightness of the steps": (["response", "cross_axis_max"], 0.01, "model-following"),
     "linearity of the steps": (
         ["response", "second_order", "deviation_max"],
@@ -129,6 +130,16 @@ def test_a_figure_that_was_not_measured_is_no_fault(what):
     nothing = 0 if what in ("attitude samples", "link") else None
     figures = changed(path, nothing)
     assert is_good(figures)
+
+
+def test_a_height_error_that_changes_in_flight_does_not_come_from_the_hover_thrust():
+    climbing = {**CIRCLE, "height_rms_m": 0.16}
+    told, _ = words(changed(["maneuvers", 2], {**climbing, "height_mean_m": -0.12}))
+    assert "set thrust.hover_thrust" in told.lines[0]
+    for mean in (0.1, -0.1, None):
+        told, _ = words(changed(["maneuvers", 2], {**climbing, "height_mean_m": mean}))
+        assert "thrust.hover_thrust" not in told.lines[0]
+        assert "guidance.drag_per_s" in told.lines[0]
 
 
 SWING = {"swing_rms_deg": 11.9, "swing_period_s": 0.43, "swing_regularity": 0.92}

@@ -47,6 +47,7 @@ def test_each_maneuver_is_measured_by_itself():
     assert hover.duration == pytest.approx(10.0, abs=0.03)
     assert (line.level_rms, line.level_max) == pytest.approx((0.2, 0.2))
     assert (line.height_rms, line.speed) == pytest.approx((0.2, 2.0))
+    assert line.height_mean == pytest.approx(-0.2)  # at -4.8 it is below -5.0
 
 
 def test_the_swing_is_measured_but_in_open_loop():
@@ -89,7 +90,7 @@ def test_what_was_not_recorded_is_not_measured():
 def test_a_thrust_that_another_program_commands_has_no_height_error():
     thrust = np.array(rows(0.0, 4.0, lambda _: (nan, nan, nan), lambda _: (0.0, 0.0, -5.0)))
     (one,) = measure_maneuvers(thrust, RATES, [ManeuverMark(0.0, 0.0, "mine")], 0.0)
-    assert np.isnan([one.height_rms, one.height_max]).all()
+    assert np.isnan([one.height_rms, one.height_max, one.height_mean]).all()
     assert one.as_dict()["height_rms_m"] is None
 
 

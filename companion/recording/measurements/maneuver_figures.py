@@ -38,6 +38,7 @@ class ManeuverFigures:
         level_max: largest horizontal error, m.
         height_rms: RMS of the height error, m.
         height_max: largest height error, m.
+        height_mean: mean height error, m, positive above the reference.
         beginning_max: largest distance in the part left out, m.
         drift: largest horizontal distance from its starting point, m.
         speed: largest speed of the reference (95th percentile), m/s; NaN without a reference.
@@ -53,6 +54,7 @@ class ManeuverFigures:
     level_max: float
     height_rms: float
     height_max: float
+    height_mean: float
     beginning_max: float
     drift: float
     speed: float
@@ -68,6 +70,7 @@ class ManeuverFigures:
             "level_max_m": self.level_max,
             "height_rms_m": self.height_rms,
             "height_max_m": self.height_max,
+            "height_mean_m": self.height_mean,
             "beginning_max_m": self.beginning_max,
             "drift_max_m": self.drift,
             "reference_speed_max_m_s": self.speed,
@@ -147,8 +150,9 @@ def _measured(name: str, begin: float, rows: Floats) -> ManeuverFigures:
     open_loop, beginning = _is_open_loop(rows), _beginning(rows)
     early = time < time[0] + beginning
     error = position - reference
-    level, height = np.hypot(error[:, 0], error[:, 1]), np.abs(error[:, 2])
+    level, height = np.hypot(error[:, 0], error[:, 1]), -error[:, 2]
     held = ~np.isnan(height)  # another program may command the thrust
+    held_late = height[~early & held]
     away = position[:, :2] - position[0, :2]
     return ManeuverFigures(
         name,
@@ -158,8 +162,9 @@ def _measured(name: str, begin: float, rows: Floats) -> ManeuverFigures:
         beginning,
         level_rms=nan if open_loop else rms(level[~early]),
         level_max=nan if open_loop else _largest(level[~early]),
-        height_rms=rms(height[~early & held]),
-        height_max=_largest(height[~early & held]),
+        height_rms=rms(held_late),
+        height_max=_largest(np.abs(held_late)),
+        height_mean=float(held_late.mean()) if len(held_late) else nan,
         beginning_max=_largest(np.hypot(level, height)[early & held]),
         drift=float(np.hypot(away[:, 0], away[:, 1]).max()),
         speed=_speed(time, reference),

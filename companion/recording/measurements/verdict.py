@@ -11,6 +11,8 @@ LEVEL_RMS, LEVEL_RMS_PER_SPEED = 0.15, 0.02
 increase for each m/s of its speed, m."""
 HEIGHT_RMS = 0.15
 """Largest RMS error of the height, m."""
+CONSTANT_HEIGHT_ERROR = 0.7
+"""Above this |mean| / RMS, a height error is mostly constant."""
 SWING_RMS = 3.0
 """Largest RMS of a swing of roll and pitch, °."""
 SWING_REGULARITY = 0.7
@@ -84,9 +86,18 @@ def _maneuvers(figures: Figures) -> Iterator[Check]:
                 maneuver["name"],
                 f"{height:.2f} m RMS in height (limit {HEIGHT_RMS:.2f} m)",
                 height <= HEIGHT_RMS,
-                "set thrust.hover_thrust to the thrust at which the vehicle hovers",
+                _height_remedy(height, maneuver.get("height_mean_m")),
             )
         yield from _swing(maneuver)
+
+
+def _height_remedy(rms: float, mean: float | None) -> str:
+    if mean is not None and abs(mean) > CONSTANT_HEIGHT_ERROR * rms:
+        return "set thrust.hover_thrust to the thrust at which the vehicle hovers"
+    return (
+        "the error changes in flight: climb and descend more slowly, set guidance.drag_per_s to "
+        "the vehicle's drag, or raise guidance.height_gain_per_s"
+    )
 
 
 def _swing(maneuver: Mapping[str, Any]) -> Iterator[Check]:
