@@ -26,8 +26,13 @@ from companion.guidance.trajectory import (
     from_samples,
     read_csv,
 )
+from companion.guidance.trajectory.spline_curve import SplineCurve
+from companion.guidance.trajectory.timed_curve import TimedCurve
+from companion.guidance.trajectory.waypoints import largest_detour
 
 _MOST_COLUMNS_SHOWN = 10
+_SMALLEST_DETOUR = 0.05
+"""Smallest distance of a curve from the lines between its waypoints that is told, m."""
 
 
 class _Shape(Protocol):
@@ -95,7 +100,8 @@ class LoadedTrajectory(NamedTuple):
 
     Attributes:
         trajectory: trajectory to be flown.
-        notes: how a table was read; one sentence each.
+        notes: how a table was read, or how far a curve leaves the lines between its waypoints; one
+            sentence each.
     """
 
     trajectory: Trajectory
@@ -119,6 +125,19 @@ def _table_notes(path: Path, frame: Frame | None, unused: tuple[str, ...]) -> tu
         )
     unread = f"{path.name}: these columns are not used: {', '.join(unused[:_MOST_COLUMNS_SHOWN])}"
     return (axes, unread) if unused else (axes,)
+
+
+def _detour_notes(trajectory: Trajectory) -> tuple[str, ...]:
+    """By how much a curve through waypoints leaves the straight lines between them."""
+    if not (isinstance(trajectory, TimedCurve) and isinstance(trajectory.curve, SplineCurve)):
+        return ()
+    detour = largest_detour(trajectory.curve.spline)
+    if detour < _SMALLEST_DETOUR:
+        return ()
+    return (
+        f"{trajectory.name}: the curve leaves the straight lines between its points by up to "
+        f"{detour:.1f} m; to fly along the lines, set waypoints.stops: true",
+    )
 
 
 class TrajectoryFile(Section):
@@ -149,7 +168,8 @@ class TrajectoryFile(Section):
             return self.csv.read(folder)
         (name,) = self.model_fields_set
         shape: _Shape = getattr(self, name)
-        return LoadedTrajectory(shape.trajectory())
+        trajectory = shape.trajectory()
+        return LoadedTrajectory(trajectory, _detour_notes(trajectory))
 
 
 def is_table(path: Path) -> bool:

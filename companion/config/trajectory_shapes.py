@@ -18,12 +18,14 @@ from companion.guidance.trajectory import (
     gerono_eight,
     helix,
     line,
+    straight_legs,
     waypoints,
 )
 
 Metres = Annotated[float, Field(ge=0.01, le=1000.0)]
 Speed = Annotated[float, Field(ge=0.01, le=FASTEST)]
 Acceleration = Annotated[float, Field(ge=0.01, le=100.0)]
+Jerk = Annotated[float, Field(ge=0.01, le=1000.0)]
 Degrees = Annotated[float, Field(ge=-360.0, le=360.0)]
 Offset = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
 Place = tuple[Offset, Offset, Offset]
@@ -50,7 +52,7 @@ class LineShape(Section):
     """Largest speed."""
     acceleration_m_s2: Acceleration = 3.0
     """Largest acceleration."""
-    jerk_m_s3: Annotated[float, Field(ge=0.01, le=1000.0)] = 10.0
+    jerk_m_s3: Jerk = 10.0
     """Largest jerk."""
     heading: FixedOrAlong = "fixed"
     """fixed: the heading at the start. along: facing along the path."""
@@ -122,7 +124,7 @@ class FigureEightShape(_LapShape):
 
 
 class WaypointsShape(Section):
-    """A minimum-snap trajectory through waypoints, without stops."""
+    """A path through waypoints: minimum snap without stops, or straight legs with stops."""
 
     points_m: Annotated[tuple[Place, ...], Field(min_length=1, max_length=1000)]
     """Waypoints: north, east, down from the start; without the start itself."""
@@ -130,8 +132,13 @@ class WaypointsShape(Section):
     """Largest speed."""
     acceleration_m_s2: Acceleration = 3.0
     """Largest acceleration. The path is flown as fast as this and speed_m_s allow."""
+    stops: bool = False
+    """true: straight lines between the points, with a stop at each. false: one smooth curve through
+    all points, which leaves these lines; a flight says by how much."""
+    jerk_m_s3: Jerk = 10.0
+    """Largest jerk on straight lines; the smooth curve does not use it."""
     heading: FixedOrAlong = "fixed"
-    """fixed: the heading at the start. along: facing along the path."""
+    """fixed: the heading at the start. along: facing along the path; only without stops."""
     headings_deg: tuple[Degrees | None, ...] | None = None
     """Instead of `heading`: heading at each point, clockwise from north; null: any heading."""
 
@@ -139,10 +146,14 @@ class WaypointsShape(Section):
     def _one_heading(self) -> "WaypointsShape":
         if self.headings_deg is not None and "heading" in self.model_fields_set:
             raise ValueError("give either heading or headings_deg")
+        if self.stops and self.heading == "along":
+            raise ValueError("heading: along would turn on the spot at each stop; use headings_deg")
         return self
 
     def trajectory(self) -> Trajectory:
         """The trajectory of this shape."""
         headings = [None if h is None else radians(h) for h in self.headings_deg or ()]
-        along = self.heading == "along"
-        return waypoints(self.points_m, self.speed_m_s, self.acceleration_m_s2, along, headings)
+        limits = self.speed_m_s, self.acceleration_m_s2
+        if self.stops:
+            return straight_legs(self.points_m, *limits, self.jerk_m_s3, headings)
+        return waypoints(self.points_m, *limits, self.heading == "along", headings)

@@ -60,4 +60,5 @@ def _fastest(trajectory: Trajectory) -> float:
 
 
 def _range(low: float, high: float) -> str:
-    return f"{low + 0.0:.1f} to {high + 0.0:.1f}"
+    low, high = round(low, 1) + 0.0, round(high, 1) + 0.0  # no "-0.0"
+    return f"{low:.1f} to {high:.1f}"

@@ -45,10 +45,8 @@ _SPINNING = {"limits": {"max_tilt_rate_deg_s": 400.0}, "safety": {"max_body_rate
 _TILTED = {"limits": {"max_tilt_deg": 52.0, "max_tilt_rate_deg_s": 200.0}}
 _FAST = {"limits": {"max_tilt_deg": 58.0, "max_tilt_rate_deg_s": 200.0, "max_thrust": 1.0}}
 _PAUSE_S = 4.0
-_CLIMB = {
-    "waypoints": {"points_m": [[6, 0, 0], [6, 4, -2], [0, 4, -2], [0, 0, 0]], "speed_m_s": 3.0}
-}
-"""A path that climbs and descends by up to 1.2 m/s."""
+_CLIMB = {"helix": {"radius_m": 4.0, "rise_m": 8.0, "speed_m_s": 3.0, "laps": 2.0}}
+"""It climbs by 0.9 m/s."""
 
 
 class Part(NamedTuple):
@@ -97,7 +95,7 @@ PARTS = {
     "circle10": _circle(12.0, 10.0, 4.0, _FAST),
     "eight5": _eight(3.0, 5.0, _TILTED),
     "eight8": _eight(6.0, 8.0, _FAST),
-    "climb": Part("trajectory", {"limits": {"max_descent_m_s": 2.0}}, _CLIMB),
+    "climb": Part("trajectory", {}, _CLIMB),
 }
 MOVING = ("circle", "trajectory")
 VARIANTS: dict[str, dict] = {

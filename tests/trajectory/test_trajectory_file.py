@@ -13,6 +13,7 @@ from pydantic import BaseModel
 from companion.config.trajectory_file import TrajectoryFile, load, read
 from companion.drag import Drag
 from companion.files.yaml_file import ConfigError
+from companion.guidance.trajectory import line
 from companion.guidance.trajectory.demand import demand, sampled
 from tests.trajectory.finite_differences import (
     assert_derivatives_agree,
@@ -110,6 +111,24 @@ def test_the_heading_can_be_along_the_path(tmp_path, text):
     assert _load(tmp_path, text.replace("along", "fixed")).holds_heading
 
 
+def test_waypoints_say_how_far_they_leave_the_straight_lines_or_fly_along_them(tmp_path):
+    keys = "points_m: [[4, 0, 0], [4, 4, 0]], speed_m_s: 2, jerk_m_s3: 4"
+    path = tmp_path / "path.yaml"
+    path.write_text(f"waypoints: {{{keys}}}")
+    (note,) = read(path).notes
+    assert re.search(
+        r"leaves the straight lines .* by up to 0\.\d m; .* waypoints.stops: true", note
+    )
+    path.write_text(f"waypoints: {{{keys}, stops: true}}")
+    stopping = read(path)
+    assert stopping.notes == ()
+    leg = line((4.0, 0.0, 0.0), 2.0, 3.0, 4.0)
+    assert stopping.trajectory.at(0.4 * leg.duration) == leg.at(0.4 * leg.duration)
+    assert stopping.trajectory.duration == pytest.approx(2.0 * leg.duration)
+    path.write_text("waypoints: {points_m: [[4, 0, 0], [9, 0, 0]], speed_m_s: 2}")
+    assert read(path).notes == ()  # they lie on one line
+
+
 def test_angles_are_degrees_and_keys_reach_what_they_name(tmp_path):
     round_ = _load(
         tmp_path,
@@ -171,6 +190,10 @@ def test_a_csv_file_lies_beside_its_yaml_or_stands_alone(tmp_path):
         (
             "waypoints: {points_m: [[1, 0, 0]], speed_m_s: 1, headings_deg: [0, 0]}",
             "there are 2 headings for 1 waypoints",
+        ),
+        (
+            "waypoints: {points_m: [[1, 0, 0]], speed_m_s: 1, stops: true, heading: along}",
+            "`waypoints`: heading: along would turn on the spot at each stop; use headings_deg",
         ),
         ("csv: {file: none.csv}", "none.csv: cannot read it: No such file"),
         (

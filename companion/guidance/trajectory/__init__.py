@@ -26,7 +26,8 @@ Made from a shape
     Laps             speed, number, acceleration and direction of laps
     steady_circle    the circle of `flight.maneuvers`
     gerono_eight, bernoulli_eight  figures-eight
-    waypoints        through points without a stop
+    waypoints        through points without a stop, on a smooth curve
+    straight_legs    through points on straight lines, with a stop at each
 
 Made from a table
     read_csv         samples of a CSV file: a `Table`
@@ -87,4 +88,5 @@ from companion.guidance.trajectory.slower_time import SlowerTime as SlowerTime
 from companion.guidance.trajectory.slowing import SlowDown as SlowDown
 from companion.guidance.trajectory.slowing import SlowedPart as SlowedPart
 from companion.guidance.trajectory.slowing import slow_down as slow_down
+from companion.guidance.trajectory.straight_legs import straight_legs as straight_legs
 from companion.guidance.trajectory.waypoints import waypoints as waypoints

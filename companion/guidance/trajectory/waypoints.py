@@ -1,6 +1,7 @@
 """Waypoints joined by minimum snap, as fast as a speed and an acceleration allow."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,14 +56,7 @@ def waypoints(
         raise TrajectoryError("speed and acceleration of waypoints must be positive")
     if along and headings:
         raise TrajectoryError("waypoints have either their own headings or one along the path")
-    if headings and len(headings) != len(points):
-        raise TrajectoryError(
-            f"there are {len(headings)} headings for {len(points)} waypoints; give one for each"
-        )
-    places = np.array([(0.0, 0.0, 0.0), *points])
-    distances = np.linalg.norm(np.diff(places, axis=0), axis=1)
-    if not points or distances.min() < SMALLEST_DISTANCE:
-        raise TrajectoryError(_fault(distances))
+    places, distances = places_of(points, headings)
     knots = np.concatenate(([0.0], np.cumsum(_trapezoids(distances, speed, acceleration))))
     knots *= _stretch(_through(knots, places), knots, speed, acceleration)
     require_duration(float(knots[-1]))
@@ -73,8 +67,26 @@ def waypoints(
         curve = SplineCurve(spline, longest_step=HEADING_CHECK_STEP)
         heading = tangent_heading(spline, (True, True))
     elif any(angle is not None for angle in headings):
-        heading = _given_headings(knots, headings)
+        heading = given_headings(knots, headings)
     return TimedCurve("waypoints", curve, Cruise(spline.end, 1.0), heading)
+
+
+def places_of(points: Sequence[Vector], headings: Sequence[float | None]) -> tuple[Floats, Floats]:
+    """The start and the points, (k + 1, 3), and the distances between them, (k,), m.
+
+    Raises:
+        TrajectoryError: there are no points, two consecutive points are equal, or there are
+            headings, but not one for each point.
+    """
+    if headings and len(headings) != len(points):
+        raise TrajectoryError(
+            f"there are {len(headings)} headings for {len(points)} waypoints; give one for each"
+        )
+    places = np.array([(0.0, 0.0, 0.0), *points])
+    distances = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    if not points or distances.min() < SMALLEST_DISTANCE:
+        raise TrajectoryError(_fault(distances))
+    return places, distances
 
 
 def _fault(distances: Floats) -> str:
@@ -119,9 +131,25 @@ def _stretch(spline: SepticSpline, knots: Floats, speed: float, acceleration: fl
     return max(float(fastest) / speed, float(np.sqrt(strongest / acceleration)))
 
 
-def _given_headings(knots: Floats, headings: Sequence[float | None]) -> SplineHeading:
-    """A spline through the given headings, turning the short way from one to the next."""
+def given_headings(knots: Floats, headings: Sequence[float | None]) -> SplineHeading:
+    """A spline through the given headings, turning the short way from one to the next.
+
+    Args:
+        knots: phases of the start and of the points, (k + 1,).
+        headings: heading at each point, rad, or None for any, (k,); at least one is given.
+    """
     given = np.array([angle is not None for angle in (None, *headings)])
     states = np.zeros((knots.size, STATE_SIZE, 1))
     states[given, 0, 0] = np.unwrap([angle for angle in headings if angle is not None])
     return SplineHeading(minimum_snap(knots, Fixed(states, _rest_to_rest_mask(given))))
+
+
+def largest_detour(spline: SepticSpline) -> float:
+    """Largest distance of a spline from the straight lines between its knots, m."""
+    largest = 0.0
+    for begin, end in pairwise(spline.knots.tolist()):
+        path = spline.along(np.linspace(begin, end, _SAMPLES_PER_SEGMENT + 1))[:, :, 0]
+        way, line = path - path[0], path[-1] - path[0]
+        share = np.clip(way @ line / (line @ line), 0.0, 1.0)
+        largest = max(largest, float(np.linalg.norm(way - share[:, None] * line, axis=1).max()))
+    return largest
