@@ -35,6 +35,9 @@ class FlightConfig(Section):
     folder."""
     slow_down: bool = False
     """Slow down a trajectory that exceeds the limits, instead of refusing it."""
+    slow_down_reserve_m_s2: Annotated[float, Field(ge=0.0, le=10.0)] = 0.5
+    """Horizontal acceleration that a trajectory slowed down leaves, below what limits.max_tilt_deg
+    gives: feedback and wind need it."""
     arm: StrictBool = False
     """The program arms the vehicle; so does `fly --arm`. Otherwise it waits for the pilot to
     arm."""

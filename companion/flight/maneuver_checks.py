@@ -4,7 +4,7 @@ from collections.abc import Hashable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import lru_cache
-from math import tau
+from math import atan, tan, tau
 from pathlib import Path
 
 import numpy as np
@@ -196,6 +196,12 @@ def envelope_of(config: Config, drag: KnownDrag) -> Envelope:
         drag=drag.most,
         gravity=GRAVITY,
     )
+
+
+def with_reserve(config: Config, envelope: Envelope) -> Envelope:
+    """The limits with less tilt, so that `flight.slow_down_reserve_m_s2` is left."""
+    most = GRAVITY * tan(config.limits.max_tilt) - config.flight.slow_down_reserve_m_s2
+    return replace(envelope, max_tilt=atan(max(most, 0.0) / GRAVITY))
 
 
 def _fence_check(config: Config, origin: Place | None) -> FenceCheck:

@@ -6,7 +6,12 @@ from companion.config import Config, trajectory_file
 from companion.config.flight import IdentifyConfig
 from companion.config.known_drag import KnownDrag, before_connecting
 from companion.files.yaml_file import ConfigError
-from companion.flight.maneuver_checks import envelope_of, named_if_impossible, require_flyable
+from companion.flight.maneuver_checks import (
+    envelope_of,
+    named_if_impossible,
+    require_flyable,
+    with_reserve,
+)
 from companion.flight.trajectory_notes import overview, slowing
 from companion.guidance import Corners, Doublets, Maneuver, ManeuverSequence, Steps
 from companion.guidance.follow import Follow, circle, hover
@@ -90,7 +95,7 @@ def _follow(config: Config, drag: KnownDrag) -> Follow:
     notes = loaded.notes
     with named_if_impossible(path):
         if config.flight.slow_down:
-            slower = slow_down(trajectory, envelope)
+            slower = slow_down(trajectory, with_reserve(config, envelope))
             notes = (*notes, *slowing(trajectory, slower))
             trajectory = slower.trajectory
         elif broken := violations(trajectory, envelope):

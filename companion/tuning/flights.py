@@ -3,19 +3,25 @@
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from math import hypot, nan
+from math import hypot, nan, tan
 from typing import Any
 
 import numpy as np
 
 from companion.config import Config
 from companion.config.files import changed, load, shipped
+from companion.drag import NO_DRAG
+from companion.guidance import GRAVITY
 from companion.testing import MockVehicle, fly
 
 _Rows = np.ndarray[Any, np.dtype[np.float64]]
 
 GUSTS: Mapping[str, float] = {"speed_m_s": 3.0, "gust_m_s": 1.0}
 """Wind of the flights in gusts, m/s: mean and standard deviation."""
+_STRONG_GUST = 2.0
+"""A strong gust, in standard deviations."""
+_LARGEST_RESERVE = 0.8
+"""Largest reserve for feedback and wind, as a share of what the tilt limit gives."""
 _MAX_THRUST = 0.95
 _FENCE = 50.0  # m
 _WIRE_S = 0.0005
@@ -88,8 +94,8 @@ def autopilot_like(config: Config) -> str:
 def fly_course(config: Config, course: Course, autopilot: str, seed: int = 3) -> CourseResult:
     """Fly a course on the mock vehicle, with this configuration's gains and vehicle times.
 
-    Limits of tilt and tilt rate are the configured ones: a course that needs more is slowed down.
-    Thrust, take-off and fence are those of the mock vehicle and the course, and nothing is signed.
+    Limits of tilt and tilt rate are the configured ones: a course that needs more, with what
+    feedback and wind need, is slowed down. Thrust, take-off and fence are those of the mock vehicle and the course, and nothing is signed.
 
     Args:
         config: the configuration.
@@ -192,8 +198,17 @@ def _flight_config(config: Config, course: Course, mock: Config) -> Config:
                 "maneuvers": ("trajectory",),
                 "trajectory": shipped(f"trajectories/{course.trajectory}"),
                 "slow_down": True,
+                "slow_down_reserve_m_s2": _reserve(config, course, mock),
                 "takeoff_height_m": 5.0,
             },
         },
         "the flight on the mock vehicle",
     )
+
+
+def _reserve(config: Config, course: Course, mock: Config) -> float:
+    """Horizontal acceleration to leave for feedback, and for holding against the wind, m/s²."""
+    strongest = course.wind.get("speed_m_s", 0.0) + _STRONG_GUST * course.wind.get("gust_m_s", 0.0)
+    against, _, _ = (mock.guidance.drag or NO_DRAG).deceleration((strongest, 0.0, 0.0))
+    most = _LARGEST_RESERVE * GRAVITY * tan(config.limits.max_tilt)
+    return min(config.flight.slow_down_reserve_m_s2 + against, most)
