@@ -95,7 +95,8 @@ def fly_course(config: Config, course: Course, autopilot: str, seed: int = 3) ->
     """Fly a course on the mock vehicle, with this configuration's gains and vehicle times.
 
     Limits of tilt and tilt rate are the configured ones: a course that needs more, with what
-    feedback and wind need, is slowed down. Thrust, take-off and fence are those of the mock vehicle and the course, and nothing is signed.
+    feedback and wind need, is slowed down. Thrust, take-off and fence are those of the mock vehicle
+    and the course, and nothing is signed.
 
     Args:
         config: the configuration.
