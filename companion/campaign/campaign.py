@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,6 @@ from companion.campaign.keys import with_keys
 from companion.campaign.swept import Value, column_value
 from companion.config import Config
 from companion.files.yaml_file import ConfigError
-from companion.testing.settings import complete_mock
 
 
 @dataclass(frozen=True)
@@ -106,15 +104,10 @@ class Campaign:
         return value * base
 
     def _base_value(self, key: str) -> Any:
-        section, *path = key.split(".")
-        found: Any = self._complete_mock if section == "mock" else getattr(self.base, section, None)
-        for name in path:
+        found: Any = self.base  # its section `mock` is complete: `with_keys` made it
+        for name in key.split("."):
             found = found.get(name) if isinstance(found, dict) else getattr(found, name, None)
         return found
-
-    @cached_property
-    def _complete_mock(self) -> dict[str, Any]:
-        return complete_mock(self.base.mock or {})
 
     def _fault(self, values: Mapping[str, Any]) -> Fault | None:
         name = values.get(FAULT, NO_FAULT)

@@ -1,7 +1,6 @@
 """Builds the outer loop from the configuration: guidance, motion estimate, predictive control."""
 
 from collections.abc import Callable
-from math import tan
 
 from companion import plugins
 from companion.attitude.reference_model import model_lag
@@ -11,6 +10,7 @@ from companion.config.known_drag import drag_prior
 from companion.control.hold_settings import correction_settings, hold_gains, observer_settings
 from companion.control.inner_loop import (
     heading_response,
+    largest_horizontal,
     plugin,
     slower_tilt,
     thrust_limits,
@@ -20,7 +20,6 @@ from companion.control.motion_estimate import MotionEstimate
 from companion.control.predictive import Predictive
 from companion.files.yaml_file import ConfigError
 from companion.guidance import (
-    GRAVITY,
     IMMEDIATE,
     DragEstimate,
     HeightGains,
@@ -82,7 +81,7 @@ def linear_settings(config: Config) -> LinearSettings:
         ),
         tilt=tilt,
         heading=heading,
-        max_horizontal=GRAVITY * tan(limits.max_tilt),
+        max_horizontal=largest_horizontal(config),
         thrust_lag=config.thrust.lag,
         period=period,
     )

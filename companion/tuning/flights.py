@@ -3,15 +3,15 @@
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from math import hypot, nan, tan
+from math import hypot, nan
 from typing import Any
 
 import numpy as np
 
 from companion.config import Config
 from companion.config.files import changed, load, shipped
+from companion.control.inner_loop import largest_horizontal
 from companion.drag import NO_DRAG
-from companion.guidance import GRAVITY
 from companion.testing import MockVehicle, fly
 
 _Rows = np.ndarray[Any, np.dtype[np.float64]]
@@ -211,5 +211,5 @@ def _reserve(config: Config, course: Course, mock: Config) -> float:
     """Horizontal acceleration to leave for feedback, and for holding against the wind, m/s²."""
     strongest = course.wind.get("speed_m_s", 0.0) + _STRONG_GUST * course.wind.get("gust_m_s", 0.0)
     against, _, _ = (mock.guidance.drag or NO_DRAG).deceleration((strongest, 0.0, 0.0))
-    most = _LARGEST_RESERVE * GRAVITY * tan(config.limits.max_tilt)
+    most = _LARGEST_RESERVE * largest_horizontal(config)
     return min(config.flight.slow_down_reserve_m_s2 + against, most)

@@ -59,7 +59,7 @@ def configuration(campaign: Campaign) -> Table:
         for key in keys(campaign.base)
         if key.section == "limits" or key.value != key.default
     ]
-    mock = complete_mock(campaign.base.mock or {})
+    mock = campaign.base.mock or {}
     usual = flattened(complete_mock({"autopilot": mock["autopilot"]}))
     rows += [
         (f"mock.{key}", value, usual.get(key, EMPTY), unit_of(key))

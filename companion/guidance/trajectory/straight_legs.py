@@ -3,16 +3,16 @@
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 
-from companion.guidance.trajectory.curves import PATH_STEP, CurvePoint, PhaseSampling
+from companion.guidance.trajectory.curves import PATH_STEP, CurvePoint, PhaseSampling, Straight
 from companion.guidance.trajectory.sample import Vector
+from companion.guidance.trajectory.septic_spline import Floats
 from companion.guidance.trajectory.time_laws import LimitedJerk, Piece, Progress
 from companion.guidance.trajectory.timed_curve import Heading, HeldHeading, TimedCurve
 from companion.guidance.trajectory.waypoints import given_headings, places_of
-
-_NONE = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,14 +22,14 @@ class Polyline:
     The direction jumps at the points, so the time law must be at rest there.
 
     Attributes:
-        ends: phase at the end of each leg, ascending, m.
+        begins: phase where each leg begins, ascending from 0, m.
         starts: the point where each leg begins, NED, m.
-        directions: unit vector of each leg, NED.
+        legs: the legs, each as if it began at (0, 0, 0).
     """
 
-    ends: tuple[float, ...]
+    begins: tuple[float, ...]
     starts: tuple[Vector, ...]
-    directions: tuple[Vector, ...]
+    legs: tuple[Straight, ...]
 
     def sampling(self) -> PhaseSampling:
         """The phases at which to check it: at equal distances."""
@@ -37,41 +37,37 @@ class Polyline:
 
     def at(self, phase: float) -> CurvePoint:
         """The point `phase` metres along."""
-        leg = min(bisect_right(self.ends, phase), len(self.ends) - 1)
-        along = phase - (self.ends[leg - 1] if leg else 0.0)
-        (n, e, d), (north, east, down) = self.starts[leg], self.directions[leg]
-        place = n + along * north, e + along * east, d + along * down
-        return CurvePoint(place, self.directions[leg], _NONE, _NONE)
+        leg = _leg_at(phase, self.begins)
+        point = self.legs[leg].at(phase - self.begins[leg])
+        (n, e, d), (north, east, down) = self.starts[leg], point.position
+        return point._replace(position=(n + north, e + east, d + down))
 
 
 class Legs:
     """One leg after another, each from rest to rest in pieces of constant jerk."""
 
-    def __init__(self, legs: Sequence[LimitedJerk], lengths: Sequence[float]) -> None:
+    def __init__(self, legs: Sequence[LimitedJerk], phases: Sequence[float]) -> None:
         """Join the legs.
 
         Args:
             legs: the time law of each leg.
-            lengths: their lengths, m.
+            phases: phase where each leg begins, m.
         """
-        self._legs = legs
-        self._ends = np.cumsum([leg.duration for leg in legs]).tolist()
-        self._phases = np.cumsum([0.0, *lengths]).tolist()
-        self.duration: float = self._ends[-1]
+        self._legs, self._phases = legs, phases
+        *self._begins, self.duration = accumulate((leg.duration for leg in legs), initial=0.0)
 
     def pieces(self) -> list[Piece]:
         """The pieces of all legs."""
-        begins = [0.0, *self._ends]
         return [
             Piece(begin + piece.begin, begin + piece.end, piece.steady)
-            for begin, leg in zip(begins, self._legs, strict=False)
+            for begin, leg in zip(self._begins, self._legs, strict=True)
             for piece in leg.pieces()
         ]
 
     def at(self, time: float) -> Progress:
         """Progress at `time`: the distance along all legs, m."""
-        leg = min(bisect_right(self._ends, time), len(self._legs) - 1)
-        progress = self._legs[leg].at(time - (self._ends[leg - 1] if leg else 0.0))
+        leg = _leg_at(time, self._begins)
+        progress = self._legs[leg].at(time - self._begins[leg])
         return progress._replace(phase=self._phases[leg] + progress.phase)
 
 
@@ -99,13 +95,19 @@ def straight_legs(
     places, lengths = places_of(points, headings)
     phases = np.concatenate(([0.0], np.cumsum(lengths)))
     legs = [LimitedJerk(length, speed, acceleration, jerk) for length in lengths.tolist()]
-    directions = np.diff(places, axis=0) / lengths[:, None]
-    curve = Polyline(tuple(phases[1:].tolist()), _vectors(places[:-1]), _vectors(directions))
+    begins = tuple(phases[:-1].tolist())
+    directions = _vectors(np.diff(places, axis=0) / lengths[:, None])
+    curve = Polyline(begins, _vectors(places[:-1]), tuple(map(Straight, directions)))
     heading: Heading = HeldHeading()
     if any(angle is not None for angle in headings):
         heading = given_headings(phases, headings)
-    return TimedCurve("straight legs", curve, Legs(legs, lengths.tolist()), heading)
+    return TimedCurve("straight legs", curve, Legs(legs, begins), heading)
 
 
-def _vectors(rows: np.ndarray) -> tuple[Vector, ...]:
+def _leg_at(value: float, begins: Sequence[float]) -> int:
+    """Index of the leg at a phase or time; the first one before 0, the last one past the end."""
+    return max(bisect_right(begins, value) - 1, 0)
+
+
+def _vectors(rows: Floats) -> tuple[Vector, ...]:
     return tuple((north, east, down) for north, east, down in rows.tolist())

@@ -1,7 +1,6 @@
 """Waypoints joined by minimum snap, as fast as a speed and an acceleration allow."""
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,11 +123,15 @@ def _stretch(spline: SepticSpline, knots: Floats, speed: float, acceleration: fl
 
     A minimum-snap spline over stretched knots has the same path.
     """
-    fine = np.linspace(0.0, knots.size - 1.0, _SAMPLES_PER_SEGMENT * (knots.size - 1) + 1)
-    times = np.interp(fine, np.arange(knots.size), knots)
-    motion = spline.along(times)
+    motion = _sampled(spline, knots)
     fastest, strongest = np.linalg.norm(motion[:, :, 1:3], axis=1).max(axis=0)
     return max(float(fastest) / speed, float(np.sqrt(strongest / acceleration)))
+
+
+def _sampled(spline: SepticSpline, knots: Floats) -> Floats:
+    """The spline along evenly spaced times of each segment, and at the end."""
+    fine = np.linspace(0.0, knots.size - 1.0, _SAMPLES_PER_SEGMENT * (knots.size - 1) + 1)
+    return spline.along(np.interp(fine, np.arange(knots.size), knots))
 
 
 def given_headings(knots: Floats, headings: Sequence[float | None]) -> SplineHeading:
@@ -146,10 +149,9 @@ def given_headings(knots: Floats, headings: Sequence[float | None]) -> SplineHea
 
 def largest_detour(spline: SepticSpline) -> float:
     """Largest distance of a spline from the straight lines between its knots, m."""
-    largest = 0.0
-    for begin, end in pairwise(spline.knots.tolist()):
-        path = spline.along(np.linspace(begin, end, _SAMPLES_PER_SEGMENT + 1))[:, :, 0]
-        way, line = path - path[0], path[-1] - path[0]
-        share = np.clip(way @ line / (line @ line), 0.0, 1.0)
-        largest = max(largest, float(np.linalg.norm(way - share[:, None] * line, axis=1).max()))
-    return largest
+    path = _sampled(spline, spline.knots)[:, :, 0]
+    lines = np.diff(path[::_SAMPLES_PER_SEGMENT], axis=0)[:, None]  # (k, 1, 3)
+    ways = path[:-1].reshape(len(lines), _SAMPLES_PER_SEGMENT, 3)
+    ways = ways - ways[:, :1]
+    shares = np.clip((ways * lines).sum(axis=2) / (lines * lines).sum(axis=2), 0.0, 1.0)
+    return float(np.linalg.norm(ways - shares[..., None] * lines, axis=2).max())
