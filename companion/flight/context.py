@@ -14,9 +14,10 @@ from companion.control.guidance_loop import GuidanceLoop
 from companion.flight.preflight_checks import PreflightChecks
 from companion.flight.vehicle_identity import SameVehicle
 from companion.guidance import ManeuverSequence
+from companion.guidance.fence import FenceCentre
 from companion.mavlink.commands import MAV_CMD_REQUEST_MESSAGE
 from companion.mavlink.errors import LinkError
-from companion.safety.snapshot_builder import FenceCentre, SnapshotBuilder
+from companion.safety.snapshot_builder import SnapshotBuilder
 from companion.vehicle.link import Link
 from companion.vehicle.records import LocalPosition
 

@@ -25,6 +25,18 @@ class Place(NamedTuple):
     longitude: float
 
 
+class FenceCentre(NamedTuple):
+    """Centre of the fence.
+
+    Attributes:
+        position_ned: position in the autopilot's frame, m NED.
+        place: latitude and longitude; None: unknown.
+    """
+
+    position_ned: Vector
+    place: Place | None
+
+
 class Breach(NamedTuple):
     """How a place breaches the fence.
 

@@ -26,6 +26,7 @@ class LinkStats:
         ignored_foreign: Frames of other systems or components than the vehicle's.
         unclaimed: Frames with the vehicle's ids, from a sender that is not the peer (`PeerRule`).
         non_finite: Messages refused for a NaN or infinity.
+        non_finite_at: When the newest of them came, s of event-loop time, by message.
         outdated: Positions refused because one with the same or a later time stamp had come.
         stamped_ahead: Positions refused because they were stamped ahead of the vehicle's clock.
         malformed: Messages that could not be decoded or whose values are impossible.
@@ -51,6 +52,7 @@ class LinkStats:
     ignored_foreign: int = 0
     unclaimed: int = 0
     non_finite: int = 0
+    non_finite_at: dict[str, float] = field(default_factory=dict)
     outdated: int = 0
     stamped_ahead: int = 0
     malformed: int = 0
@@ -61,6 +63,11 @@ class LinkStats:
     peers: int = 0
     by_message: dict[int, int] = field(default_factory=dict)
     foreign_sources: set[tuple[int, int]] = field(default_factory=set)
+
+    def refuse_non_finite(self, message: str, now: float) -> None:
+        """Count a message of that name as refused at `now`, s of event-loop time."""
+        self.non_finite += 1
+        self.non_finite_at[message] = now
 
 
 class FrameCounter:

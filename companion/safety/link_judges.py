@@ -30,6 +30,8 @@ def _silence_cause(now: float, control: Control, limit: float) -> str:
         still = control.stood_still
         return f"this program did not run for {still:.1f} s (computer overloaded or suspended)"
     if now - control.sampled > limit:
+        if control.attitude_not_finite:
+            return "the vehicle's attitude is not finite (NaN or infinity)"
         return f"no attitude from the vehicle for {now - control.sampled:.1f} s"
     reason = control.reason
     if reason in (Unanswered.NO_TARGET, Unanswered.OLD_TARGET):
@@ -39,6 +41,8 @@ def _silence_cause(now: float, control: Control, limit: float) -> str:
 
 def _missing_command_cause(now: float, control: Control, limit: float) -> str:
     if now - control.placed > limit:
+        if control.position_not_finite:
+            return "the vehicle's position is not finite (NaN or infinity)"
         return "no position from the vehicle"
     if not control.position_fresh:
         return "positions arrive, but older than deadman.position_stale_ms"

@@ -59,9 +59,11 @@ class Control(NamedTuple):
 
     Attributes:
         answered: arrival of the last answered sample.
-        sampled: arrival of the last attitude sample.
+        sampled: arrival of the last usable attitude sample.
+        attitude_not_finite: whether the newest attitude was refused for a NaN or infinity.
         reason: why the newest sample is unanswered, or None.
         placed: arrival of the last position that was newer than all before.
+        position_not_finite: whether the newest position was refused for a NaN or infinity.
         heard: when the arrival of a frame of any kind from the vehicle was last noticed.
         position_fresh: whether the newest position is fresh.
         clock_change: latest jump, stop or restart of the vehicle's clock since control began, in
@@ -71,8 +73,10 @@ class Control(NamedTuple):
 
     answered: float = inf
     sampled: float = inf
+    attitude_not_finite: bool = False
     reason: Unanswered | None = None
     placed: float = inf
+    position_not_finite: bool = False
     heard: float = inf
     position_fresh: bool = True
     clock_change: str | None = None

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from companion.attitude.representation import wrap_angle
 from companion.control.control_loop import ControlLoop
 from companion.control.guidance_loop import GuidanceLoop
-from companion.guidance.fence import Place
+from companion.guidance.fence import FenceCentre, Place
 from companion.guidance.reference import Vector, minus
 from companion.mavlink.stats import share_lost
 from companion.safety.snapshot import (
@@ -34,18 +34,6 @@ _GAP_COUNTING_TIME = 5.0
 """Time over which gaps in the setpoints are counted, s."""
 _RESET_COUNTING_TIME = 30.0
 """Time over which estimator resets are counted, s."""
-
-
-class FenceCentre(NamedTuple):
-    """Centre of the fence.
-
-    Attributes:
-        position_ned: position in the autopilot's frame, m NED.
-        place: latitude and longitude; None: unknown.
-    """
-
-    position_ned: Vector
-    place: Place | None
 
 
 class _Counters(NamedTuple):
@@ -156,6 +144,8 @@ class SnapshotBuilder:
         """The snapshot at `now`, s of event-loop time; call `listen` before."""
         state, loop, clock = self._link.state, self._loop, self._link.clock
         record = loop.record
+        refused = self._link.stats.non_finite_at
+        placed = -inf if state.position is None else state.position.received
         return Snapshot(
             now,
             Autopilot(
@@ -170,8 +160,10 @@ class SnapshotBuilder:
             Control(
                 record.last_answer,
                 record.last_sample,
+                refused.get("ATTITUDE_QUATERNION", -inf) > record.last_sample,
                 record.reason,
-                -inf if state.position is None else state.position.received,
+                placed,
+                refused.get("LOCAL_POSITION_NED", -inf) > placed,
                 self._heard_at,
                 self._guidance_loop.fresh_position() is not None,
                 None if clock.changes == self._clock_changes else clock.last_change,

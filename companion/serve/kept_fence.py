@@ -4,8 +4,8 @@ from math import dist
 
 from companion.config import Config
 from companion.control.estimator_resets import EstimatorResets
+from companion.guidance.fence import FenceCentre
 from companion.guidance.reference import Vector, minus
-from companion.safety.snapshot_builder import FenceCentre
 from companion.safety.table import fence_of
 from companion.vehicle.link import Link
 

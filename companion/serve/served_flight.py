@@ -13,11 +13,11 @@ from companion.flight.environment import Environment
 from companion.flight.observer import Observer, decline_landing
 from companion.flight.plan import TakeoverPlan
 from companion.flight.wiring import connected
+from companion.guidance.fence import FenceCentre
 from companion.mavlink.framing import Frame
 from companion.mavlink.messages import dialect
 from companion.recording.measurements.summary import Summary
 from companion.safety.actions import fault_message
-from companion.safety.snapshot_builder import FenceCentre
 from companion.serve.component import WARNING, Component
 from companion.serve.flight_records import FlightRecords
 from companion.serve.motion_settings import change_refusal, commanded_motion

@@ -206,7 +206,7 @@ class Inbox:
     def _take_sample(self, payload: bytes, now: float, received_ns: int) -> None:
         decoded = decode_attitude(payload)
         if decoded is None:
-            self._stats.non_finite += 1
+            self._stats.refuse_non_finite("ATTITUDE_QUATERNION", now)
             return
         time_boot_ms, q, rates = decoded
         time, age, misfit = self._clock.take(time_boot_ms, now)

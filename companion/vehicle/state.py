@@ -163,7 +163,7 @@ class VehicleState(ModeState, _Values):
     def _on_local_position(self, message: Message) -> None:
         values = (message.x, message.y, message.z, message.vx, message.vy, message.vz)
         if not all(map(isfinite, values)):
-            self._stats.non_finite += 1
+            self._stats.refuse_non_finite("LOCAL_POSITION_NED", self._clock())
             return
         clock, now, last = self._vehicle_clock, self._clock(), self.position
         stamp = clock.vehicle_time(message.time_boot_ms)
@@ -208,7 +208,7 @@ class VehicleState(ModeState, _Values):
         if 0.0 <= message.thrust <= 1.0:
             self.attitude_target_thrust = AttitudeTargetThrust(self._clock(), message.thrust)
         elif not isfinite(message.thrust):
-            self._stats.non_finite += 1
+            self._stats.refuse_non_finite("ATTITUDE_TARGET", self._clock())
         autopilot = self.autopilot
         if autopilot is not None and autopilot.rates_along_target:
             self._take_attitude_target(message.time_boot_ms, tuple(message.q))
@@ -217,7 +217,7 @@ class VehicleState(ModeState, _Values):
         if is_unit(q):
             self.attitude_target = AttitudeTarget(time_boot_ms, q)
         elif not all(map(isfinite, q)):
-            self._stats.non_finite += 1
+            self._stats.refuse_non_finite("ATTITUDE_TARGET", self._clock())
 
     def _on_global_position(self, message: Message) -> None:
         if message.lat == message.lon == 0:
@@ -232,7 +232,7 @@ class VehicleState(ModeState, _Values):
 
     def _on_home(self, message: Message) -> None:
         if not isfinite(message.z):
-            self._stats.non_finite += 1
+            self._stats.refuse_non_finite("HOME_POSITION", self._clock())
             return
         self.home = Home(
             self._clock(),

@@ -177,7 +177,15 @@ def silent(reason=None, **changes):
         (silent(Unanswered.LATE), Unanswered.LATE.words),
         (silent(Unanswered.LATE, stood_still=0.375), Unanswered.LATE.words),
         (silent(Unanswered.OLD_TARGET), Unanswered.OLD_TARGET.words),
+        (
+            silent(sampled=NOW - 0.6, attitude_not_finite=True),
+            "the vehicle's attitude is not finite (NaN or infinity)",
+        ),
         (silent(Unanswered.NO_TARGET, placed=NOW - 0.6), "no position from the vehicle"),
+        (
+            silent(Unanswered.NO_TARGET, placed=NOW - 0.6, position_not_finite=True),
+            "the vehicle's position is not finite (NaN or infinity)",
+        ),
         (
             silent(Unanswered.OLD_TARGET, position_fresh=False),
             "positions arrive, but older than deadman.position_stale_ms",

@@ -33,7 +33,7 @@ class Flight:
             gps_was_good=True,
         )
         self.clock = SimpleNamespace(changes=2, last_change="it jumped")
-        self.stats = SimpleNamespace(frames=0, lost=0)
+        self.stats = SimpleNamespace(frames=0, lost=0, non_finite_at={})
         link = SimpleNamespace(
             state=self.state,
             clock=self.clock,
@@ -153,6 +153,18 @@ def test_before_control_begins_everything_counts_from_the_start_of_the_clock():
     assert told.resets[:3] == (1, pytest.approx(14.0**0.5), 3.0)
 
 
+def test_the_newest_attitude_or_position_with_a_nan_is_known(flight):
+    flight.record.last_sample = 9.5
+    assert not flight.snapshot().control.attitude_not_finite
+    flight.stats.non_finite_at = {"ATTITUDE_QUATERNION": 9.6, "LOCAL_POSITION_NED": 9.7}
+    told = flight.snapshot().control
+    assert (told.attitude_not_finite, told.position_not_finite) == (True, False)  # one at 9.75
+    flight.stats.non_finite_at["LOCAL_POSITION_NED"] = 9.8
+    flight.record.last_sample = 9.65
+    told = flight.snapshot().control
+    assert (told.attitude_not_finite, told.position_not_finite) == (False, True)
+
+
 def test_every_stage_of_a_samples_way_has_its_time(flight):
     flight.record.last_answer, flight.record.last_sample = 9.9, 9.95
     flight.record.reason = Unanswered.LATE
@@ -161,7 +173,8 @@ def test_every_stage_of_a_samples_way_has_its_time(flight):
     flight.listen(10.04)
     flight.listen(10.24)  # late by 0.17 s
     told = flight.snapshot(10.3).control
-    assert told[:5] == (9.9, 9.95, Unanswered.LATE, 9.75, 10.02)
+    assert (told.answered, told.sampled, told.reason) == (9.9, 9.95, Unanswered.LATE)
+    assert (told.placed, told.heard) == (9.75, 10.02)
     assert (told.position_fresh, told.clock_change) == (True, None)
     assert told.stood_still == pytest.approx(0.17)
     flight.clock.changes = 3

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from companion import testing
 from companion.config import Config
 from companion.config.files import changed
-from companion.safety.snapshot_builder import FenceCentre
+from companion.guidance.fence import FenceCentre
 from companion.serve.kept_fence import KeptFence
 from companion.vehicle.records import LocalPosition
 from tests.serve.test_control import REJECTED
