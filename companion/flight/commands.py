@@ -10,7 +10,7 @@ from collections.abc import Callable, Set
 from companion.flight.context import FlightContext
 from companion.mavlink.commands import Command, command_name
 from companion.mavlink.errors import CommandRefused, CommandTimeout, CommandUnfinished
-from companion.safety.actions import Exit, FlightEnded
+from companion.safety.actions import ControlReleased, Exit, FlightEnded
 from companion.vehicle.autopilot import Role
 from companion.vehicle.link import Link
 
@@ -38,14 +38,22 @@ def in_role(link: Link, role: Role) -> bool:
     return role in roles_of(link)
 
 
-def require_role(link: Link, allowed: Set[Role]) -> None:
+def require_role(link: Link, allowed: Set[Role], released_by: str = "") -> None:
     """Release control if the present mode has none of the allowed roles.
 
+    Args:
+        link: link to the vehicle.
+        allowed: roles, of which the present mode needs one.
+        released_by: client in control that has just commanded another mode; "": none.
+
     Raises:
+        ControlReleased: the client in control commanded that mode.
         FlightEnded: names who took over, as far as known.
     """
     if roles_of(link) & allowed:
         return
+    if released_by and not link.state.mode_by_failsafe:
+        raise ControlReleased(f"{released_by} commanded mode {link.state.mode}", Exit.RELEASE)
     who = (
         "the autopilot's failsafe took over"
         if link.state.mode_by_failsafe

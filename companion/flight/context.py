@@ -50,6 +50,8 @@ class FlightContext:
         must_disarm: whether an end on the ground disarms: we commanded arming or the take-off.
         fence_centre: centre of the fence in an earlier flight, if the vehicle has not been disarmed
             since; None: the fence is centred where control begins.
+        released_by: returns the name of a client in control that has just commanded another mode;
+            else "".
         note: records and shows an event.
     """
 
@@ -69,6 +71,7 @@ class FlightContext:
     mode_at_checks: str | None = None
     must_disarm: bool = False
     fence_centre: FenceCentre | None = None
+    released_by: Callable[[], str] = lambda: ""
     note: Callable[[str], None] = lambda _: None
 
     def release(self) -> None:

@@ -56,7 +56,7 @@ def course_of(
     end = None if state.battery is None else state.battery.remaining
     takeoff = None if reporter.takeoff is None else reporter.takeoff - began
     early_end = None
-    if flight.failed_in is not None:
+    if flight.failed_in is not None and result != "ok":
         # There is no such event if the user left the flight.
         time = next((at for at, text in flight.events if text == result), now - began)
         early_end = _early_end(

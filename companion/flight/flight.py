@@ -70,7 +70,7 @@ class Flight:
             self.failed_in = self.phase
             self.note(ended.reason)
             await self._leave(ended.exit or self._usual_exit())
-            return ended.reason
+            return ended.result
         finally:
             await self._context.stop(helpers)
         return "ok"

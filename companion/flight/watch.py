@@ -103,7 +103,7 @@ class Watch:
         self._context.same_vehicle.update()
         self._context.same_vehicle.require()
         if phase.modes:
-            require_role(self._context.link, phase.modes)
+            require_role(self._context.link, phase.modes, self._context.released_by())
         if phase.monitored and self._context.loop.offboard_active:
             self._judge_snapshot(now)
         if phase.modes:

@@ -74,6 +74,20 @@ class FlightEnded(Exception):  # noqa: N818 - it is how every flight that stops 
         self.reason = reason
         self.exit = exit
 
+    @property
+    def result(self) -> str:
+        """The result of the flight in its summary."""
+        return self.reason
+
+
+class ControlReleased(FlightEnded):
+    """The client in control commanded another mode: the usual end of a served flight."""
+
+    @property
+    def result(self) -> str:
+        """The result of the flight in its summary: it ended as it should."""
+        return "ok"
+
 
 def fault_message(error: Exception) -> str:
     """The message for an unexpected exception: a fault of this program or of a planner."""

@@ -110,8 +110,8 @@ class ServedControl:
         elif starves_control(frame, wanted_rates(self._config, self._link)):
             self._answer(client, frame, ACCEPTED)
         else:
-            if isinstance(owner, Program) and owner.client is client:
-                flight.released = flight.released or leaves_control(frame)
+            if isinstance(owner, Program) and owner.client is client and leaves_control(frame):
+                flight.expect_release()
             return False
         return True
 

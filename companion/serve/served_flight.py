@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Coroutine
+from math import inf
 from typing import Any, NamedTuple
 
 from companion.attitude.representation import heading
@@ -35,6 +36,9 @@ REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
 _PROGRESS_PERIOD = 0.4
 """Period of progress messages to a client that requested control, s."""
 _CHECK_PERIOD = 0.05
+_RELEASE_TIME = 2.0
+"""Longest time from the owner's command of another mode to that mode, s; a later change of mode is
+somebody else's."""
 _VALUES_PERIOD = 0.5
 
 
@@ -61,9 +65,6 @@ class ServedFlight:
         fence_centre: centre of the fence of an earlier flight; None: the fence is centred where
             control begins.
         from_ground: whether the vehicle stands armed, and takes off first.
-
-    Attributes:
-        released: whether the owner has commanded another mode and so released control.
     """
 
     def __init__(
@@ -81,7 +82,6 @@ class ServedFlight:
         *,
         from_ground: bool = False,
     ) -> None:
-        self.released = False
         self._records, self._record = records, records.new(changes.begin_flight())
         self._recorder = self._record.recorder(observer)
         self._summary: Summary | None = None
@@ -89,6 +89,7 @@ class ServedFlight:
         self._changes = changes
         self._environment = environment
         self._clock = asyncio.get_running_loop().time
+        self._release_commanded_at = -inf
         settings = link.settings
         self._autopilot = Address(settings.target_system, settings.target_component)
         motion = commanded_motion(changes.wanted)
@@ -105,6 +106,7 @@ class ServedFlight:
         )
         self._source.resets = self._assembled.context.loop.resets
         self._assembled.context.fence_centre = fence_centre
+        self._assembled.context.released_by = self._released_by
         ladder = self._assembled.ladder
         self._note_alarm, ladder.note = ladder.note, self._tell_alarm
 
@@ -116,10 +118,8 @@ class ServedFlight:
     @property
     def is_ending(self) -> bool:
         """Whether requests are no longer flown: a monitor holds the vehicle, or an exit runs."""
-        begun, flown = (
-            self._source.start_pose is not None,
-            self._assembled.context.guidance_loop.flown,
-        )
+        begun = self._source.start_pose is not None
+        flown = self._assembled.context.guidance_loop.flown
         given_up = begun and flown.source is not self._source
         return given_up or self._assembled.flight.failed_in is not None
 
@@ -142,6 +142,10 @@ class ServedFlight:
         """
         self._source.give(request, self._clock())
         self._assembled.context.guidance_loop.step_soon()
+
+    def expect_release(self) -> None:
+        """Note that the owner has just commanded another mode, with which it releases control."""
+        self._release_commanded_at = self._clock()
 
     def interrupt(self, reason: str) -> None:
         """Hand the vehicle back."""
@@ -192,6 +196,10 @@ class ServedFlight:
         except Exception as error:
             self._assembled.flight.note(fault_message(error))
 
+    def _released_by(self) -> str:
+        lately = self._clock() - self._release_commanded_at <= _RELEASE_TIME
+        return self._source.name if lately else ""
+
     def _tell_alarm(self, text: str) -> None:
         self._note_alarm(text)
         self._component.tell(text, WARNING)
@@ -199,9 +207,9 @@ class ServedFlight:
     def _tell_end(self, command: ControlRequest | None, result: str) -> None:
         name = self._source.name
         if self._source.start_pose is not None:
-            ended = "handed back" if result == "ok" else result
-            if self.released:
-                ended = "released by the client"
+            released = self._assembled.flight.failed_in is not None
+            usual = "released by the client" if released else "handed back"
+            ended = usual if result == "ok" else result
             self._component.tell(f"control by {name} has ended: {ended}")
             return
         self._component.tell(f"control was not given to {name}: {result}")
