@@ -2,13 +2,20 @@
 
 import asyncio
 from collections.abc import Sequence
+from math import asin, degrees, radians, sin
+
+import numpy as np
 
 from companion.control.expected_response import gain_warning
 from companion.flight.assembled import Assembled
 from companion.flight.context import FlightContext
 from companion.recording.measurements.course import Course, EarlyEnd
 from companion.recording.measurements.dead_time import DeadTimes
+from companion.recording.measurements.verdict import CUT_STEP
 from companion.recording.trace import ManeuverMark
+
+_NUMERIC_TOLERANCE = 1e-6
+"""Difference of two coefficients that is rounding."""
 
 
 def advice(assembled: Assembled, dead_times: DeadTimes) -> tuple[str, ...]:
@@ -19,8 +26,23 @@ def advice(assembled: Assembled, dead_times: DeadTimes) -> tuple[str, ...]:
         guidance_loop.estimate.mismatch_warning(),
         dead_times.warning(),
         assembled.trace.lost_rows_warning(),
+        _cut_steps_warning(assembled),
     )
     return tuple(warning for warning in warnings if warning is not None)
+
+
+def _cut_steps_warning(assembled: Assembled) -> str | None:
+    """A warning if limits.max_tilt_deg cut a step, for example because wind needs some tilt."""
+    targets = assembled.trace.response_rows()[:, 5:7]
+    largest = float(np.hypot(*targets.T).max(initial=0.0))
+    most = assembled.context.config.limits.max_tilt_deg
+    if largest <= sin(radians(most)) + _NUMERIC_TOLERANCE:
+        return None
+    asked = f"{degrees(asin(largest)):.0f}°" if largest < 1.0 else "more than 90°"
+    return (
+        f"limits.max_tilt_deg = {most:g} {CUT_STEP} {asked}, with the tilt against the wind: "
+        "make the steps smaller, or raise the limit"
+    )
 
 
 def _settings(context: FlightContext) -> dict[str, str]:

@@ -158,19 +158,12 @@ def _draw_plane(axes: "Axes", runs: list[StepRun]) -> None:
     for number, run in enumerate(runs):
         style = _STYLES[number % len(_STYLES)]
         north, east = run.measured.T
-        axes.plot(east, north, style, color=_MEASURED, label=_direction(run))
+        axes.plot(east, north, style, color=_MEASURED, label=run.compass)
         axes.plot(run.target[:, 1], run.target[:, 0], "o", color=_TARGET, markersize=4)
     axes.set(title="Straightness of all steps", xlabel="east: $a_E$", ylabel="north: $a_N$")
     axes.set_aspect("equal", adjustable="datalim")
     axes.legend(loc="upper right", fontsize="small")
     axes.grid(alpha=0.3)
-
-
-def _direction(run: StepRun) -> str:
-    """Direction of the first step of a doublet, in words."""
-    north, east = np.sign(np.round(run.target[0], 6))
-    words = {-1.0: "south", 1.0: "north"}.get(north), {-1.0: "west", 1.0: "east"}.get(east)
-    return "-".join(word for word in words if word)
 
 
 def _draw_ground(axes: "Axes", tracking: Floats) -> None:

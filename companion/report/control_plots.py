@@ -77,7 +77,8 @@ def _plane(flight: FlightData) -> Plot:
     traces = []
     for number, run in enumerate(flight.runs[:_STEPS_SHOWN]):
         colour = FLIGHTS[number % len(FLIGHTS)]
-        traces.append(line(f"doublet {number + 1}", run.measured[:, 1], run.measured[:, 0], colour))
+        north, east = run.measured.T
+        traces.append(line(f"{number + 1}, {run.compass}", east, north, colour))
     layout = axes(x="a_E, east", y="a_N, north")
     layout["yaxis"]["scaleanchor"] = "x"
     note = "Horizontal acceleration per specific thrust. A linear response moves on straight lines."

@@ -57,6 +57,22 @@ def test_one_seed_gives_one_log_to_the_bit(twice):
     assert rows == pytest.approx(again, nan_ok=True)
 
 
+def test_a_step_that_the_tilt_limit_cuts_is_named_and_take_off_is_no_speed_of_ours():
+    """The tilt against the wind leaves too little of the limit for a whole step."""
+    with mock_vehicle(wind={"speed_m_s": 4.0}) as mock:
+        summary = fly(mock, flight={"maneuvers": ["steps"]}, steps={"duration_s": 0.5})
+    figures = summary.as_dict()
+    (told,) = (text for text in figures["advice"] if "cut a step that asked for a tilt" in text)
+    assert told.startswith("limits.max_tilt_deg = 35 cut")
+    assert not figures["verdict"]["good"]
+    assert figures["response"]["step_size"] == pytest.approx(0.25, abs=0.02)
+    (straight,) = (c for c in figures["verdict"]["checks"] if c["what"].startswith("straight"))
+    assert "the tilt limit cut a step" in straight["remedy"]
+    motion, tracked = summary.trace.motion.rows(), summary.trace.tracking_rows()
+    ours = (motion[:, 1] >= tracked[0, 0]) & (motion[:, 1] <= tracked[-1, 0])
+    assert summary.extent()["speed_max_m_s"] == motion[ours, 3].max()
+
+
 @pytest.mark.slow
 def test_another_seed_gives_another_log(tmp_path):
     logs = []

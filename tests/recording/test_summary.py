@@ -10,24 +10,30 @@ import pytest
 from companion.attitude import Coefficients, Target, attitude
 from companion.recording.measurements.dead_time import AxisDeadTime, DeadTimes, SampleAge
 from companion.recording.measurements.response import measure_response
+from companion.recording.measurements.second_order import step_runs
 from companion.recording.measurements.summary import LoopCounts, Summary
 from companion.recording.trace import FlightTrace
 
+NORTH, EAST = (1.0, 0.0), (0.0, 1.0)
 
-def trace_of(tau, bend=0.0):
-    """Two doublets answered exactly with the time constant `tau`; `bend` moves across the step."""
+
+def trace_of(tau, bend=0.0, directions=(NORTH, EAST), wind=(0.0, 0.0)):
+    """Doublets answered exactly with the time constant `tau`; `bend` moves across the step.
+
+    `wind` are the coefficients at which the vehicle is at rest.
+    """
     trace = FlightTrace()
-    for number, direction in enumerate(((1.0, 0.0), (0.0, 1.0))):
+    for number, direction in enumerate(directions):
         along = 0.0
         for k in range(800):
             target = 0.2 if k < 200 or k >= 600 else -0.2
             across = bend * math.sin(k / 100.0)
-            north = along * direction[0] - across * direction[1]
-            east = along * direction[1] + across * direction[0]
+            north = wind[0] + along * direction[0] - across * direction[1]
+            east = wind[1] + along * direction[1] + across * direction[0]
             trace.add_response(
                 number * 10.0 + k * 0.005,
                 attitude(Coefficients(north, east), 0.4),
-                Target(target * direction[0], target * direction[1], 0.4),
+                Target(wind[0] + target * direction[0], wind[1] + target * direction[1], 0.4),
             )
             along = target + (along - target) * math.exp(-0.005 / tau)
     return trace
@@ -48,6 +54,30 @@ def test_deviation_and_cross_axis_are_seen():
     response = measure_response(trace_of(0.3, bend=0.02).response_rows(), gain=5.0)
     assert response.cross_axis_max == pytest.approx(0.02, rel=0.05)
     assert 0.03 < response.model_deviation_max < 0.1
+
+
+@pytest.mark.parametrize("wind", [(0.0, 0.0), (-0.4, 0.02), (0.3, 0.3)])
+def test_wind_changes_neither_the_size_of_the_steps_nor_the_axes_that_were_flown(wind):
+    response = measure_response(trace_of(0.3, directions=[NORTH], wind=wind).response_rows(), 5.0)
+    assert response.step_size == pytest.approx(0.2)
+    assert response.time_constant_north_s == pytest.approx(0.3, rel=1e-3)
+    assert math.isnan(response.time_constant_east_s)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "words"),
+    [
+        *((0.7, "north"), (-0.7, "north"), (44.0, "north-east"), (91.0, "east")),
+        *((135.0, "south-east"), (-179.0, "south"), (179.0, "south"), (-135.0, "south-west")),
+        *((-90.7, "west"), (-67.0, "north-west"), (-68.0, "west")),
+    ],
+)
+def test_a_doublet_is_named_by_the_nearest_point_of_the_compass(degrees, words):
+    angle = math.radians(degrees)
+    way, wind = (math.cos(angle), math.sin(angle)), (0.1, -0.3)
+    (run,) = step_runs(trace_of(0.3, directions=[way], wind=wind).response_rows())
+    assert run.compass == words
+    assert run.direction == pytest.approx(way)
 
 
 def test_without_steps_there_is_no_response():

@@ -15,8 +15,8 @@ from companion.recording.measurements.second_order import (
 
 _TIME_CONSTANT = (0.02, 2.0)
 """Range in which the time constant is searched, s."""
-_MIN_STEP = 1e-3
-"""Smallest target coefficient along an axis that counts as a step along it."""
+_MIN_SHARE = 0.1
+"""Smallest share of a step along an axis that counts as a step along it; less is noise or wind."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,8 @@ class StepResponse:
         time_constant_north_s: time constant of the first-order model that fits a_N best (least
             squares), s; NaN: no step goes north or south.
         time_constant_east_s: the same for a_E, east or west.
-        step_size: largest target coefficient, which is the sine of the tilt.
+        step_size: largest change of the coefficients that steps commanded, from the beginning of
+            their run; from level, it is the sine of the tilt.
         cross_axis_max: straightness: largest distance from the line of a step.
         model_deviation_max: largest distance from the ideal model ċ = p·(c_d − c).
         second_order: the second-order model with a dead time that fits best.
@@ -57,7 +58,7 @@ def measure_response(rows: Floats, gain: float) -> StepResponse | None:
     return StepResponse(
         time_constant_north_s=_time_constant(runs, 0, 1.0 / gain),
         time_constant_east_s=_time_constant(runs, 1, 1.0 / gain),
-        step_size=max(float(np.hypot(*run.target.T).max()) for run in runs),
+        step_size=max(run.size for run in runs),
         cross_axis_max=max(_largest_deviation(step) for run in runs for step in run.steps()),
         model_deviation_max=max(_distance(run, first_order(run, 1.0 / gain)) for run in runs),
         second_order=second_order,
@@ -102,7 +103,7 @@ def _time_constant(runs: list[StepRun], axis: int, start: float) -> float:
     stepped = [
         StepRun(run.time, run.measured[:, [axis]], run.target[:, [axis]])
         for run in runs
-        if np.abs(run.target[:, axis]).max() > _MIN_STEP
+        if np.abs(run.changes[:, axis]).max() > _MIN_SHARE * run.size
     ]
     if not stepped:
         return float("nan")

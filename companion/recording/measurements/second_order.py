@@ -18,6 +18,12 @@ _FEWEST = 10
 """A run has more rows than this."""
 
 
+_COMPASS = (
+    *("north", "north-east", "east", "south-east"),
+    *("south", "south-west", "west", "north-west"),
+)
+
+
 class StepRun(NamedTuple):
     """Steps flown without a pause between them, such as a doublet.
 
@@ -32,10 +38,26 @@ class StepRun(NamedTuple):
     target: Floats
 
     @property
+    def changes(self) -> Floats:
+        """(n, 2), targets relative to the coefficients at the beginning; in wind not the same."""
+        return self.target - self.measured[0]
+
+    @property
+    def size(self) -> float:
+        """Length of the largest of the `changes`."""
+        return float(np.hypot(*self.changes.T).max())
+
+    @property
     def direction(self) -> Floats:
-        """(2,), direction of the first target in the plane of the coefficients."""
-        first: Floats = self.target[0]
+        """(2,), direction of the first of the `changes` in the plane of the coefficients."""
+        first: Floats = self.changes[0]
         return first / max(float(np.hypot(*first)), 1e-9)
+
+    @property
+    def compass(self) -> str:
+        """The nearest of the eight points of the compass to `direction`, such as "north-west"."""
+        north, east = self.direction
+        return _COMPASS[round(4.0 * float(np.arctan2(east, north)) / np.pi) % 8]
 
     def steps(self) -> list["StepRun"]:
         """The single steps: each from one change of the target to the next."""

@@ -136,9 +136,11 @@ class Summary:
         return measure_maneuvers(trace.tracking_rows(), rates, trace.maneuvers, self.course.began)
 
     def extent(self) -> dict[str, float]:
-        """The largest height (m), speed (m/s) and tilt (°), and the time under control (s)."""
+        """The largest height (m), speed (m/s) and tilt (°) under control, and its time (s)."""
         rows, tracked = self.trace.motion.rows(), self.trace.tracking_rows()
-        largest = [column[~np.isnan(column)].max(initial=-math.inf) for column in rows[:, 2:5].T]
+        begin, end = (tracked[0, 0], tracked[-1, 0]) if len(tracked) else (math.inf, -math.inf)
+        controlled = rows[(begin <= rows[:, 1]) & (rows[:, 1] <= end), 2:5]
+        largest = [column[~np.isnan(column)].max(initial=-math.inf) for column in controlled.T]
         return {
             **{
                 key: float(value) if math.isfinite(value) else math.nan

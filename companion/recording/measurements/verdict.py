@@ -3,6 +3,8 @@
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
+from companion.attitude.planner import MODEL_FOLLOWING
+
 Figures = Mapping[str, Any]
 """The figures; the result of `Summary.as_dict`."""
 
@@ -31,6 +33,8 @@ BATTERY_MARGIN = 0.10
 
 LOST_ROWS = "rows of the flight's figures were lost"
 """Words that mark the advice about lost rows; their cause is the disk, not the configuration."""
+CUT_STEP = "cut a step that asked for a tilt of"
+"""Words that mark the advice about a step beyond the tilt limit."""
 
 
 class Check(NamedTuple):
@@ -121,13 +125,13 @@ def _steps(figures: Figures) -> Iterator[Check]:
     size, across = response["step_size"], response["cross_axis_max"]
     if not size or across is None:
         return
+    is_cut = any(CUT_STEP in text for text in figures["advice"])
     limit, deviation_limit = STRAIGHTNESS * size, MODEL_DEVIATION * size
     yield Check(
         "straightness of the steps",
         f"{across:.4f} from their lines (limit {limit:.4f})",
         across <= limit,
-        "run `companion identify` and fly planner.name: model-following with the "
-        "lag and dead time that it finds",
+        _IN_A_CUT_STEP if is_cut else _straightness_remedy(figures["planner"]),
     )
     deviation = response["second_order"]["deviation_max"]
     if deviation is None:
@@ -136,8 +140,25 @@ def _steps(figures: Figures) -> Iterator[Check]:
         "linearity of the steps",
         f"{deviation:.3f} from the nearest second-order model (limit {deviation_limit:.3f})",
         deviation <= deviation_limit,
-        "a rate limit distorts large steps: lower steps.coefficient or raise "
+        _IN_A_CUT_STEP
+        if is_cut
+        else "a rate limit distorts large steps: lower steps.coefficient or raise "
         "limits.max_tilt_rate_deg_s",
+    )
+
+
+_IN_A_CUT_STEP = "the tilt limit cut a step, see below"
+
+
+def _straightness_remedy(planner: str) -> str:
+    if planner != MODEL_FOLLOWING:
+        return (
+            f"run `companion identify` and fly planner.name: {MODEL_FOLLOWING} with the "
+            "lag and dead time that it finds"
+        )
+    return (
+        "run `companion identify`, if vehicle.* does not hold this vehicle's own lag and dead time;"
+        " otherwise fly in calmer air, or lower steps.coefficient"
     )
 
 
