@@ -169,7 +169,9 @@ def _draw_plane(axes: "Axes", runs: list[StepRun]) -> None:
 def _draw_ground(axes: "Axes", tracking: Floats) -> None:
     """The ground track, and its reference, which has gaps in open-loop steps."""
     if not np.isnan(tracking[:, 1]).all():
-        axes.plot(tracking[:, 2], tracking[:, 1], "--", color=_IDEAL, label="reference")
+        north, east = tracking[:, 1], tracking[:, 2]
+        # On top, and thin: a good flight would hide it.
+        axes.plot(east, north, "--", color=_IDEAL, linewidth=1.0, zorder=3, label="reference")
     axes.plot(tracking[:, 5], tracking[:, 4], color=_MEASURED, label="flown")
     axes.set(title="Ground track", xlabel="east, m", ylabel="north, m")
     axes.set_aspect("equal", adjustable="datalim")

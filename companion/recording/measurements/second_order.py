@@ -40,7 +40,8 @@ class StepRun(NamedTuple):
     @property
     def changes(self) -> Floats:
         """(n, 2), targets relative to the coefficients at the beginning; in wind not the same."""
-        return self.target - self.measured[0]
+        since: Floats = self.target - self.measured[0]
+        return since
 
     @property
     def size(self) -> float:
