@@ -17,9 +17,11 @@ import pytest
 
 from companion.cli import command_line
 from companion.config import Config
+from companion.config.files import load
 from companion.mavlink.stats import LinkStats
 from companion.preflight.finding import Key
 from companion.safety import monitors
+from sitl_mock.settings import load_settings
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
@@ -131,6 +133,25 @@ def test_make_targets_exist() -> None:
         if page.name == "real-autopilots.md":  # names targets of PX4's own Makefile, too
             continue
         assert named_here <= targets, f"{named(page)}: {named_here - targets}"
+
+
+def test_every_extra_of_users_is_in_the_table_of_extras() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    page = (ROOT / "docs/getting-started.md").read_text("utf-8")
+    listed = re.findall(r"^\| `(\w+)` \| ", page.split("| extra | for |")[1].split("\n\n")[0], re.M)
+    assert set(listed) == set(project["optional-dependencies"]) - {"test", "mutants"}
+
+
+def test_whole_configurations_on_pages_can_be_flown(tmp_path: Path) -> None:
+    """A block that begins with `include:` is a file beside the shipped ones."""
+    shutil.copytree(ROOT / "configs", tmp_path, dirs_exist_ok=True)
+    texts = [text for page in PAGES for _, text in BLOCK.findall(page.read_text("utf-8"))]
+    whole = [text for text in texts if text.startswith("include:") and "\nmock:" in text]
+    assert whole
+    for text in whole:
+        (tmp_path / "page.yaml").write_text(text, encoding="utf-8")
+        assert load(tmp_path / "page.yaml").flight.arm
+        assert load_settings(tmp_path / "page.yaml", {}).faults
 
 
 def test_every_page_is_in_the_index() -> None:

@@ -167,6 +167,15 @@ def test_a_pymavlink_script_flies_a_square_through_us(folder: Path) -> None:
 
 
 @pytest.mark.slow
+def test_a_pymavlink_script_without_us_ends_with_what_to_start(folder: Path) -> None:
+    address = f"udpout:127.0.0.1:{free_ports(1)[0]}"
+    run = [sys.executable, str(EXAMPLES / "pymavlink_offboard.py"), address]
+    ended = subprocess.run(run, cwd=folder, capture_output=True, text=True, timeout=60)
+    assert (ended.returncode, ended.stdout) == (1, "")
+    assert ended.stderr == "no COMMAND_ACK within 10 s: does `companion serve` run?\n"
+
+
+@pytest.mark.slow
 def test_a_mavsdk_script_flies_through_us(folder: Path) -> None:
     vehicle, program = free_ports(2)
     with mock(vehicle), serving(vehicle, f"udpin://127.0.0.1:{program}"):

@@ -76,7 +76,9 @@ def test_every_key_is_described():
 
 def test_the_page_of_the_mock_vehicle_shows_every_key_with_its_default():
     page = (DOCS / "mock-vehicle.md").read_text()
-    shown = yaml.safe_load(page.split("```yaml\n")[1].split("```")[0])["mock"]
+    shown = yaml.safe_load(
+        page.split("## The section `mock`")[1].split("```yaml\n")[1].split("```")[0]
+    )["mock"]
     assert list(shown) == list(MockSettings.model_fields)
     safer = MockSettings(parameters={"COM_LOW_BAT_ACT": 3, "COM_OF_LOSS_T": 0.75})
     assert load_settings(CONFIGS / "mock-px4.yaml", {}) == safer
