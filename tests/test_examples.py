@@ -170,7 +170,7 @@ def test_a_pymavlink_script_flies_a_square_through_us(folder: Path) -> None:
 def test_a_pymavlink_script_without_us_ends_with_what_to_start(folder: Path) -> None:
     address = f"udpout:127.0.0.1:{free_ports(1)[0]}"
     run = [sys.executable, str(EXAMPLES / "pymavlink_offboard.py"), address]
-    ended = subprocess.run(run, cwd=folder, capture_output=True, text=True, timeout=60)
+    ended = subprocess.run(run, check=False, cwd=folder, capture_output=True, text=True)
     assert (ended.returncode, ended.stdout) == (1, "")
     assert ended.stderr == "no COMMAND_ACK within 10 s: does `companion serve` run?\n"
 
