@@ -21,7 +21,7 @@ from companion.recording.learned_file import newest
 from companion.tuning import Disturbances, Proposal, propose
 from companion.tuning.flights import COURSES, CourseResult, autopilot_like, fly_course
 from companion.tuning.noise import measured_disturbances
-from companion.tuning.writing import proposal_text, summary_lines
+from companion.tuning.writing import proposal_text, summary_lines, worse_sentence
 
 _VEHICLE, _CONFIG, _LOG = "vehicle.yaml", "config.yaml", "flight.tlog"
 _OUTPUT = "tuned.yaml"
@@ -53,10 +53,9 @@ def tune(options: argparse.Namespace) -> int:
         f"Written to {output}. Let your configuration include it, and remove {', '.join(keys)} "
         "from your own file: keys there override those of an included file."
     )
-    good = all(after.ok for _, after in flights.values())
     if options.json:
         print(json.dumps(_figures(proposal, flights, output), allow_nan=False))
-    return EXIT_OK if good else EXIT_FLIGHT
+    return EXIT_OK if worse_sentence(flights) is None else EXIT_FLIGHT
 
 
 def _configuration(source: Path, vehicle: Path, base: Path | None) -> tuple[Config, bool]:

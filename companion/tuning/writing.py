@@ -18,6 +18,10 @@ Flights = Mapping[str, tuple[CourseResult, CourseResult]]
 """Flights before and with the proposal, by the name of the course."""
 
 
+_WORSE_SHARE, _WORSE_BY = 1.25, 0.01
+"""A course is flown worse if its true error grows beyond this factor and by more than this, m."""
+
+
 def proposal_text(
     proposal: Proposal, vehicle: Path | Mapping[str, Any], flights: Flights, where: str
 ) -> str:
@@ -48,7 +52,9 @@ def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
     """Expectation before and after, and the cost of the proposal, for the user."""
     before, after, aims = proposal.before, proposal.after, proposal.aims
     limit = degrees(proposal.tuned.limits.max_tilt_rate)
-    lines = [
+    warning = worse_sentence(flights)
+    lines = [] if warning is None else [warning]
+    lines += [
         "Expected by linear analysis, before -> after:",
         *_compared(before, after),
         f"disturbances: gusts of {proposal.disturbances.gust:g} m/s, noise: "
@@ -72,6 +78,20 @@ def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
         ]
         lines += [_flight_line(name, *pair) for name, pair in flights.items()]
     return lines
+
+
+def worse_sentence(flights: Flights) -> str | None:
+    """A warning if a course failed or was flown worse with the proposal; None: none was."""
+    worse = [
+        f"{name} {after.result}"
+        if not after.ok
+        else f"{name} {before.true:.3f} -> {after.true:.3f} m"
+        for name, (before, after) in flights.items()
+        if not after.ok or after.true > max(_WORSE_SHARE * before.true, before.true + _WORSE_BY)
+    ]
+    if not worse:
+        return None
+    return f"DO NOT USE IT: with the proposal the mock vehicle flew worse: {'; '.join(worse)}"
 
 
 def _compared(before: Expectation, after: Expectation) -> list[str]:

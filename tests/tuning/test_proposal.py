@@ -124,3 +124,24 @@ def test_each_error_of_the_model_has_its_words():
     assert _error(ModelError(delay=0.02)).startswith("with 20 ms of added delay, as while ")
     assert _error(ModelError(time_factor=1.3)) == "with lag and dead time 30 % larger"
     assert _error(ModelError(time_factor=0.7)) == "with lag and dead time 30 % smaller"
+
+
+FLOWN = CourseResult("ok", true=0.134, reported=0.1, speed=5.0)
+
+
+@pytest.mark.parametrize(
+    ("after", "said"),
+    [
+        (replace(FLOWN, true=0.910), "the circle 0.134 -> 0.910 m"),
+        (CourseResult("no attitude"), "the circle no attitude"),
+        (replace(FLOWN, true=0.140), None),  # flights differ by that
+    ],
+)
+def test_a_proposal_that_flies_worse_says_so_first(after, said):
+    proposal = propose(VEHICLES["px4"])
+    pair = {"the circle": (FLOWN, after), "the eight": (FLOWN, FLOWN)}
+    first = summary_lines(proposal, pair)[0]
+    if said is None:
+        assert first.startswith("Expected by linear analysis")
+    else:
+        assert first == f"DO NOT USE IT: with the proposal the mock vehicle flew worse: {said}"
