@@ -202,6 +202,7 @@ def add_config(commands: Commands) -> None:
         "`companion config` shows the range of each key.",
     )
     check.add_argument("file", type=Path, metavar="FILE")
+    add_set(check, "planner.gain_per_s=4")
     check.set_defaults(run="config.check")
 
 

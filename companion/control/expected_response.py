@@ -28,6 +28,7 @@ class ExpectedResponse:
             with twice the gain, or without the rate limit, the lag or the dead time.
         gain: gain p of the planner, 1/s.
         largest_gain: the largest sensible gain, 1/s; None if lag and dead time are not known.
+        shortest: time constant with that gain and without the rate limit, s; None if not known.
     """
 
     coefficient: float
@@ -35,6 +36,7 @@ class ExpectedResponse:
     time_constants_without: dict[str, float]
     gain: float
     largest_gain: float | None
+    shortest: float | None = None
 
     @property
     def limited_by(self) -> str:
@@ -54,10 +56,15 @@ class ExpectedResponse:
             if time < _NOTICEABLE_SHARE * self.time_constant
         )
         tilt = degrees(asin(self.coefficient))
+        floor = ""
+        if self.shortest is not None:
+            floor = (
+                f"; the largest sensible gain without rate limit would give {self.shortest:.2f} s"
+            )
         return (
             f"a step from -{self.coefficient:g} to {self.coefficient:g} (±{tilt:.0f}° of tilt) is "
             f"expected to have a time constant of {self.time_constant:.2f} s; "
-            f"{self.limited_by} limits it most ({changes})"
+            f"{self.limited_by} limits it most ({changes}){floor}"
         )
 
     def gain_sentence(self) -> str:
@@ -87,21 +94,25 @@ def expected_response(config: Config) -> ExpectedResponse:
     """Predict the response with the linear model of planner and rate loop, and the rate limit."""
     step, response = 2.0 * config.steps.coefficient, tilt_response(config)
     speed = _largest_speed(config)
-    twice = config.planner.model_copy(update={"gain_per_s": 2.0 * config.planner.gain_per_s})
-    quicker = tilt_response(config.model_copy(update={"planner": twice}))
+    gain, largest = config.planner.gain_per_s, sensible_gain(config)
     time_constants_without = {
-        _GAIN_KEY: quicker.step_time(step, speed),
+        _GAIN_KEY: _with_gain(config, 2.0 * gain).step_time(step, speed),
         _RATE_LIMIT_KEY: response.step_time(step),
         **_without_the_vehicle(config, response, speed),
     }
-    largest = sensible_gain(config)
     return ExpectedResponse(
         config.steps.coefficient,
         response.step_time(step, speed),
         time_constants_without,
-        config.planner.gain_per_s,
+        gain,
         None if largest == inf else largest,
+        None if largest == inf else _with_gain(config, largest).step_time(step),
     )
+
+
+def _with_gain(config: Config, gain: float) -> InnerResponse:
+    planner = config.planner.model_copy(update={"gain_per_s": gain})
+    return tilt_response(config.model_copy(update={"planner": planner}))
 
 
 def _without_the_vehicle(config: Config, response: InnerResponse, speed: float) -> dict[str, float]:

@@ -28,6 +28,7 @@ FILES = [CONFIGS / f"{name}.yaml" for name in ("mock-px4", "px4", "mock-ardupilo
 @pytest.mark.parametrize("path", FILES, ids=[p.name for p in FILES])
 def test_a_shipped_configuration_is_right_and_short(path, capsys):
     assert main(["check-config", str(path)]) == 0
+    assert main(["check-config", str(path), "--set", "limits.max_tilt_deg=99"]) == 2
     *told, end = capsys.readouterr().out.splitlines()
     assert end == f"{path}: ok"
     doubts = [line for line in told if line.startswith("warning: ")]
