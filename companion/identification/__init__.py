@@ -47,8 +47,8 @@ from companion.identification.response import FitNeeds as FitNeeds
 from companion.identification.response import FitQuality as FitQuality
 from companion.identification.response import RateResponse as RateResponse
 from companion.identification.response import fit_rate_response as fit_rate_response
+from companion.identification.table import vehicle_table as vehicle_table
 from companion.identification.thrust_map import ThrustMap as ThrustMap
 from companion.identification.thrust_map import fit_thrust_map as fit_thrust_map
 from companion.identification.vehicle import IdentifiedVehicle as IdentifiedVehicle
 from companion.identification.vehicle import identify_vehicle as identify_vehicle
-from companion.identification.vehicle import vehicle_table as vehicle_table

@@ -94,6 +94,10 @@ class SecondOrderFit:
         gain: measured per commanded rate.
         slew: slew limit of the command, per second; None: no sign of a limit.
         explained: R².
+        misfit: root mean square of the part of the residual that the commands explain, as a share
+            of the measurements' standard deviation.
+        dead_time_error: standard error of the dead time by noise, s.
+        lag_error: standard error of the lag by noise, s.
     """
 
     frequency: float
@@ -102,6 +106,14 @@ class SecondOrderFit:
     gain: float
     slew: float | None
     explained: float
+    misfit: float
+    dead_time_error: float
+    lag_error: float
+
+    @property
+    def lag(self) -> float:
+        """2ζ/ω, s: the lag of the first order that begins like it."""
+        return 2.0 * self.damping / self.frequency
 
     @property
     def described(self) -> str:

@@ -6,6 +6,7 @@ second-order lag is tried too, and reported if it fits clearly better.
 
 from dataclasses import dataclass, replace
 from math import exp, log
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from companion.identification.delayed_model import (
     frequency_damping,
 )
 from companion.identification.record import Stretch, most_excited
-from companion.identification.residual_analysis import Residuals, analyse
+from companion.identification.residual_analysis import analyse
 from companion.least_squares import Solution
 
 Floats = NDArray[np.float64]
@@ -161,6 +162,7 @@ def _second_order(
     if best.squares > _CLEARLY_BETTER * found.squares:
         return None
     frequency, damping = frequency_damping(best.unknown)
+    quality = _quality(data, best)
     return SecondOrderFit(
         frequency=frequency,
         damping=damping,
@@ -168,43 +170,61 @@ def _second_order(
         gain=float(best.weights[0]),
         slew=data.slew(best.unknown),
         explained=data.explained(best),
+        misfit=quality.misfit,
+        dead_time_error=quality.dead_time_error,
+        lag_error=quality.lag_error,
     )
 
 
 def _lag_fit(data: DelayedModel, found: Solution) -> LagFit:
-    lag, dead_time = exp(found.unknown[0]), data.dead_time(found.unknown)
-    commands = data.delayed_commands(found.unknown)
-    span = float(np.ptp(commands))
-    excited = int((np.abs(data.response(found.unknown) - commands) > _EXCITED_SHARE * span).sum())
-    residuals = _residuals(data, found, excited)
-    moved = float(np.std(data.measured))
+    quality = _quality(data, found)
     return LagFit(
-        dead_time=dead_time,
-        lag=lag,
+        dead_time=data.dead_time(found.unknown),
+        lag=exp(found.unknown[0]),
         gain=float(found.weights[0]),
         offset=float(found.weights[1]),
         slew=data.slew(found.unknown),
         explained=data.explained(found),
-        misfit=residuals.misfit / moved if moved > 0.0 else 0.0,
-        dead_time_error=float(residuals.errors[1]),
-        lag_error=lag * float(residuals.errors[0]),
-        span=span,
-        excited=excited,
+        misfit=quality.misfit,
+        dead_time_error=quality.dead_time_error,
+        lag_error=quality.lag_error,
+        span=quality.span,
+        excited=quality.excited,
     )
 
 
-def _residuals(data: DelayedModel, found: Solution, excited: int) -> Residuals:
-    unknown = found.unknown
-    memory = _MEMORY_DELAYS * (exp(unknown[0]) + data.dead_time(unknown))
+class _Quality(NamedTuple):
+    """Quality of a fit of either order; see `LagFit`."""
+
+    span: float
+    excited: int
+    misfit: float
+    lag_error: float
+    dead_time_error: float
+
+
+def _quality(data: DelayedModel, found: Solution) -> _Quality:
+    unknown, lag = found.unknown, exp(found.unknown[0])
+    commands = data.delayed_commands(unknown)
+    span = float(np.ptp(commands))
+    excited = int((np.abs(data.response(unknown) - commands) > _EXCITED_SHARE * span).sum())
+    memory = _MEMORY_DELAYS * (lag + data.dead_time(unknown))
     step = float(np.median(np.diff(np.concatenate(data.times))))
-    correlated = 1 + int(memory / max(step, 1e-4))
-    return analyse(
+    residuals = analyse(
         found.residual,
         found.slopes,
         lambda later: data.delayed_commands(unknown, later),
         memory,
         excited,
-        correlated,
+        correlated=1 + int(memory / max(step, 1e-4)),
+    )
+    moved = float(np.std(data.measured))
+    return _Quality(
+        span,
+        excited,
+        residuals.misfit / moved if moved > 0.0 else 0.0,
+        lag * float(residuals.errors[0]),
+        float(data.dead_time(residuals.errors)),
     )
 
 

@@ -81,15 +81,15 @@ def vehicle_fragment(
         lines += ["thrust:", f"  hover_thrust: {thrust.normalised(gravity):.3f}"]
     axes = {name: kept.get(name) or _fitted_values(each) for name, each in vehicle.axes.items()}
     if second_order:
-        axes |= _of_second_order(vehicle)
+        axes |= second_order_axes(vehicle)
     mark = [f"  identified: {bounded_yaml.dump_value(flight)}"] if flight else []
     lines += ["vehicle:", *mark, *_tilt_keys(axes["roll"], axes["pitch"])]
     lines += _axis_keys("yaw", axes["yaw"], axes["roll"].slew)
     return "\n".join(lines) + "\n"
 
 
-def _of_second_order(vehicle: IdentifiedVehicle) -> dict[str, AxisValues]:
-    """Roll and pitch as lags of second order.
+def second_order_axes(vehicle: IdentifiedVehicle) -> dict[str, AxisValues]:
+    """Roll and pitch as lags of second order, as the fragment holds them.
 
     Empty unless both have a good fit, and second order without a slew limit is clearly better on
     both, with a damping ratio that the configuration accepts.
@@ -102,8 +102,7 @@ def _of_second_order(vehicle: IdentifiedVehicle) -> dict[str, AxisValues]:
             return {}
         if not _ACCEPTED_DAMPINGS[0] <= fit.damping <= _ACCEPTED_DAMPINGS[1]:
             return {}
-        lag = 2e3 * fit.damping / fit.frequency
-        axes[name] = AxisValues(lag, 1e3 * fit.dead_time, None, fit.damping)
+        axes[name] = AxisValues(1e3 * fit.lag, 1e3 * fit.dead_time, None, fit.damping)
     return axes
 
 
@@ -186,8 +185,8 @@ def _comment(name: str, response: RateResponse, kept: Mapping[str, AxisValues]) 
     second = response.second_order
     better = "" if second is None else f"; clearly better: {second.described}"
     return (
-        f"# {name}: lag {1e3 * response.lag:.1f} ± {1e3 * fit.lag_error:.1f} ms, dead time "
-        f"{1e3 * response.dead_time:.1f} ± {1e3 * fit.dead_time_error:.1f} ms, gain "
+        f"# {name}, first order: lag {1e3 * response.lag:.1f} ± {1e3 * fit.lag_error:.1f} ms, dead "
+        f"time {1e3 * response.dead_time:.1f} ± {1e3 * fit.dead_time_error:.1f} ms, gain "
         f"{response.gain:.2f}{slew}, explains {fit.explained:.1%}, misfit {fit.misfit:.0%}, "
         f"{fit.excited} samples{better}"
     )

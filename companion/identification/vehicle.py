@@ -2,13 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import degrees, isnan
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Group, RenderableType
-from rich.table import Table
-from rich.text import Text
 
 from companion.identification.response import RateResponse, fit_rate_response
 from companion.identification.thrust_map import ThrustMap, fit_thrust_map
@@ -80,48 +76,3 @@ def _as_array(rows: Rows, columns: int) -> Floats:
 def _response(commands: Floats, measured: Floats, axis: int) -> RateResponse:
     record = commands[:, 0], commands[:, axis], measured[:, 0], measured[:, axis]
     return fit_rate_response(*record, gain=_ASSUMED_GAIN)
-
-
-def vehicle_table(vehicle: IdentifiedVehicle, gravity: float) -> RenderableType:
-    """Table of the fits with one row per axis, and a line on the thrust; at most 80 columns wide.
-
-    Args:
-        vehicle: the identified vehicle.
-        gravity: gravity, m/s², which gives the hover thrust.
-    """
-    table = Table(title="Response to body rates", title_justify="left", title_style="bold")
-    table.add_column("")
-    for column in ("lag, ms", "dead time, ms", "gain", "slew, °/s²", "misfit", ""):
-        table.add_column(column, justify="right")
-    for name, response in vehicle.axes.items():
-        table.add_row(name, *_cells(response))
-    second_order = [
-        Text(f"{name}: clearly better: {response.second_order.described}")
-        for name, response in vehicle.axes.items()
-        if response.second_order is not None
-    ]
-    return Group(table, *second_order, Text(_thrust_line(vehicle.thrust, gravity)))
-
-
-def _cells(response: RateResponse) -> tuple[str, ...]:
-    verdict = "good" if response.is_good() else "bad"
-    if isnan(response.lag):
-        return "–", "–", "–", "–", "–", verdict
-    fit = response.fit
-    return (
-        f"{1e3 * response.lag:.1f} ± {1e3 * fit.lag_error:.1f}",
-        f"{1e3 * response.dead_time:.1f} ± {1e3 * fit.dead_time_error:.1f}",
-        f"{response.gain:.2f}",
-        "–" if response.slew is None else f"{degrees(response.slew):.0f}",
-        f"{fit.misfit:.0%}",
-        verdict,
-    )
-
-
-def _thrust_line(thrust: ThrustMap | None, gravity: float) -> str:
-    if thrust is None:
-        return "thrust: not measured, or never changed"
-    flaw = thrust.flaw(gravity)
-    if flaw is not None:
-        return f"thrust: the fit is bad: {flaw}"
-    return f"thrust: {thrust.described()}; hovers at {thrust.normalised(gravity):.3f}"

@@ -333,7 +333,7 @@ def test_first_flights_teach_the_drag(tmp_path, monkeypatch):
 @pytest.mark.parametrize("damped", [False, True])
 def test_first_flights_teach_the_response(tmp_path, monkeypatch, damped):
     """A second order is learned only where the search may set its damping."""
-    nearer = SecondOrderFit(20.0, 0.75, 0.0084, 1.05, None, 0.998)
+    nearer = SecondOrderFit(20.0, 0.75, 0.0084, 1.05, None, 0.998, 0.02, 0.0003, 0.0004)
     seen = replace(
         VEHICLE, roll=replace(ROLL, second_order=nearer), pitch=replace(PITCH, second_order=nearer)
     )

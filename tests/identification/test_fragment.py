@@ -101,7 +101,9 @@ def test_pitch_is_written_where_it_differs_from_roll():
     assert axes["pitch"].acceleration_limit_deg_s2 == pytest.approx(np.degrees(16.0), abs=0.5)
 
 
-NEARER = SecondOrderFit(20.0, 0.75, 0.0084, 1.05, None, 0.998)
+QUALITY = 0.02, 0.0003, 0.0004
+"""Misfit, and standard errors of dead time and lag, s."""
+NEARER = SecondOrderFit(20.0, 0.75, 0.0084, 1.05, None, 0.998, *QUALITY)
 SECOND_ORDER = replace(
     VEHICLE, roll=replace(ROLL, second_order=NEARER), pitch=replace(PITCH, second_order=NEARER)
 )
@@ -190,12 +192,13 @@ def test_an_axis_of_which_nothing_is_known_is_not_left_to_roll(known):
 
 
 def test_each_axis_says_how_good_it_is():
-    nearer = SecondOrderFit(19.4, 0.72, 0.008, 1.02, None, 0.998)
+    nearer = SecondOrderFit(19.4, 0.72, 0.008, 1.02, None, 0.998, *QUALITY)
     text = vehicle_fragment(
         replace(VEHICLE, pitch=replace(PITCH, slew=19.2, second_order=nearer)), GRAVITY, {}
     )
     assert (
-        "# roll: lag 46.0 ± 2.0 ms, dead time 40.0 ± 1.0 ms, gain 1.05, explains 99.0%, misfit 8%"
+        "# roll, first order: lag 46.0 ± 2.0 ms, dead time 40.0 ± 1.0 ms, gain 1.05, "
+        "explains 99.0%, misfit 8%"
     ) in text
     assert "slew 19.2 rad/s²" in text
     assert (
@@ -224,7 +227,7 @@ def shown(vehicle):
 
 
 def test_the_table_tells_every_axis_within_80_columns():
-    nearer = SecondOrderFit(5.6, 0.94, 0.045, 0.92, 4.8, 0.9991)
+    nearer = SecondOrderFit(5.6, 0.94, 0.045, 0.92, 4.8, 0.9991, *QUALITY)
     text = shown(replace(VEHICLE, yaw=replace(YAW, slew=4.71239, second_order=nearer)))
     rows = {line.split("│")[1].strip(): line for line in text.splitlines() if "│" in line}
     assert [cell.strip() for cell in rows["roll"].split("│")[2:8]] == [
@@ -236,9 +239,26 @@ def test_the_table_tells_every_axis_within_80_columns():
         "good",
     ]
     assert " 270 " in rows["yaw"]
-    assert "yaw: clearly better: second order, natural frequency 5.6 rad/s" in text
+    flat = " ".join(text.split())
+    assert "roll: a lag of first order explains 99.0%; second order is not clearly better" in flat
+    assert "yaw: written as first order" in flat
+    assert "though nearer: second order, natural frequency 5.6 rad/s" in flat
     assert "T/m = 19.55·u +0.22" in text
     assert "hovers at 0.490" in " ".join(text.split())
+    assert max(map(len, text.splitlines())) <= 80
+
+
+def test_the_table_shows_what_the_file_holds():
+    text = shown(SECOND_ORDER)
+    rows = {line.split("│")[1].strip(): line for line in text.splitlines() if "│" in line}
+    assert [cell.strip() for cell in rows["roll"].split("│")[2:8]] == [
+        *("75.0 ± 0.4", "8.4 ± 0.3", "0.75", "1.05", "2%", "good"),
+    ]
+    assert rows["yaw"].split("│")[4].strip() == "–"
+    assert "roll: second order, which explains 99.8%; first order explains 99.0%" in text
+    assert "slew" not in text  # no axis has one
+    axes = configured(SECOND_ORDER).vehicle.axes
+    assert axes["roll"][:2] == (75.0, 8.4)
     assert max(map(len, text.splitlines())) <= 80
 
 

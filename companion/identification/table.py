@@ -1,0 +1,82 @@
+"""The table of an identified vehicle for the terminal: the values that its file holds."""
+
+from math import degrees, isnan
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from companion.identification.fragment import second_order_axes
+from companion.identification.response import RateResponse
+from companion.identification.thrust_map import ThrustMap
+from companion.identification.vehicle import IdentifiedVehicle
+
+_NONE = "–"
+
+
+def vehicle_table(vehicle: IdentifiedVehicle, gravity: float) -> RenderableType:
+    """Table of the fits with one row per axis, and lines on the models; at most 80 columns wide.
+
+    An axis that is written as a lag of second order shows that fit. A column without values is left
+    out.
+
+    Args:
+        vehicle: the identified vehicle.
+        gravity: gravity, m/s², which gives the hover thrust.
+    """
+    written = second_order_axes(vehicle)
+    rows = {name: _cells(each, name in written) for name, each in vehicle.axes.items()}
+    names = ("lag, ms", "dead time, ms", "damping", "gain", "slew, °/s²", "misfit", "")
+    filled = [
+        any(cells[number] != _NONE for cells in rows.values()) for number in range(len(names))
+    ]
+    table = Table(title="Response to body rates", title_justify="left", title_style="bold")
+    table.add_column("")
+    for column, has_values in zip(names, filled, strict=True):
+        if has_values:
+            table.add_column(column, justify="right")
+    for name, cells in rows.items():
+        shown = (cell for cell, has_values in zip(cells, filled, strict=True) if has_values)
+        table.add_row(name, *shown)
+    models = [Text(_model_line(name, each, name in written)) for name, each in vehicle.axes.items()]
+    noise = Text("± is the standard error by the noise of this flight.")
+    return Group(table, noise, *models, Text(_thrust_line(vehicle.thrust, gravity)))
+
+
+def _cells(response: RateResponse, second_order: bool) -> tuple[str, ...]:
+    verdict = "good" if response.is_good() else "bad"
+    if isnan(response.lag):
+        return *(_NONE,) * 6, verdict
+    fit, found, damping = response.fit, response.second_order, _NONE
+    times = (response.lag, fit.lag_error), (response.dead_time, fit.dead_time_error)
+    slew, misfit = response.slew, fit.misfit
+    if second_order and found is not None:
+        times = (found.lag, found.lag_error), (found.dead_time, found.dead_time_error)
+        slew, misfit, damping = found.slew, found.misfit, f"{found.damping:.2f}"
+    return (
+        *(f"{1e3 * time:.1f} ± {1e3 * error:.1f}" for time, error in times),
+        damping,
+        f"{response.gain:.2f}",
+        _NONE if slew is None else f"{degrees(slew):.0f}",
+        f"{misfit:.0%}",
+        verdict,
+    )
+
+
+def _model_line(name: str, response: RateResponse, second_order: bool) -> str:
+    """Which model the row of an axis shows, and why."""
+    found, first = response.second_order, f"explains {response.fit.explained:.1%}"
+    if found is None:
+        return f"{name}: a lag of first order {first}; second order is not clearly better"
+    if second_order:
+        return f"{name}: second order, which explains {found.explained:.1%}; first order {first}"
+    return f"{name}: written as first order, which {first}, though nearer: {found.described}"
+
+
+def _thrust_line(thrust: ThrustMap | None, gravity: float) -> str:
+    if thrust is None:
+        return "thrust: not measured, or never changed"
+    flaw = thrust.flaw(gravity)
+    if flaw is not None:
+        return f"thrust: the fit is bad: {flaw}"
+    return f"thrust: {thrust.described()}; hovers at {thrust.normalised(gravity):.3f}"
