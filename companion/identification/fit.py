@@ -70,8 +70,7 @@ class LagFit:
         dead_time_error: standard error of the dead time by noise, s.
         lag_error: standard error of the lag by noise, s.
         span: largest command minus smallest command, after the slew limit.
-        excited: number of samples at which the model differs from the command by more than 2 % of
-            the span.
+        excited: number of samples where model and command differ by more than 2 % of the span.
         second_order: second-order fit, if it is clearly better; else None.
     """
 
