@@ -40,7 +40,7 @@ from companion.preflight.parameter_fixes import (
     restore,
 )
 from companion.preflight.parameter_survey import survey
-from companion.preflight.report import as_dict, outcome_as_dict, outcome_line, tables
+from companion.preflight.report import as_dict, lists, outcome_as_dict, outcome_line
 from companion.preflight.session import PreflightSession, identify, open_session
 from companion.vehicle.link import Link
 from companion.vehicle.parameter_rules import CheckResult
@@ -107,10 +107,9 @@ def _response(config: Config) -> list[Finding]:
         return []
     response = expected_response(config)
     result = CheckResult.INEFFECTIVE if response.gain_is_too_high else CheckResult.SAFE
-    source = f"planner, rate loop and limits; {hold_sentence(config)}"
-    return [
-        Finding(Key.RESPONSE, result, response.gain_sentence(), response.sentence(), source=source)
-    ]
+    source = "planner, rate loop and limits"
+    because = f"{response.sentence()}; {hold_sentence(config)}"
+    return [Finding(Key.RESPONSE, result, response.gain_sentence(), because, source=source)]
 
 
 class _DoctorRun:
@@ -210,7 +209,7 @@ class _DoctorRun:
                 return answer
 
     def _report(self, findings: list[Finding]) -> int:
-        self._console.print(tables(self._config, findings))
+        self._console.print(lists(self._config, findings))
         self.result = as_dict(self._config, findings)
         return EXIT_OK if self.result["result"] == "ok" else EXIT_FLIGHT
 

@@ -1,4 +1,4 @@
-"""The findings of `companion doctor`: tables for the terminal, JSON for programs."""
+"""The findings of `companion doctor`: lists for the terminal, JSON for programs."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -29,28 +29,35 @@ _RESULT_WORDS = {
 }
 
 
-def tables(config: Config, findings: Sequence[Finding]) -> RenderableType:
-    """A table for each result that occurred, the worst first, and a summary line."""
+def lists(config: Config, findings: Sequence[Finding]) -> RenderableType:
+    """A list for each result that occurred, the safe ones first, and a summary line.
+
+    The worst findings stand last, beside the summary line, where a terminal shows them.
+    """
     parts: list[RenderableType] = []
-    for result, (title, style) in _TITLES.items():
+    for result, (title, style) in reversed(_TITLES.items()):
         matching = [finding for finding in findings if finding.result is result]
         if matching:
-            parts.append(_table(title, style, matching, config.flight.accept))
+            parts += [Text(title, style=style), _list(matching, config.flight.accept), Text()]
     return Group(*parts, _last_line(config, findings))
 
 
-def _table(
-    title: str, style: str, findings: Iterable[Finding], accepted: Sequence[str]
-) -> RenderableType:
-    table = Table(title=title, title_justify="left", title_style=style, expand=True)
-    table.add_column("found", ratio=3)
-    table.add_column("consequence, and what to do", ratio=5)
-    table.add_column("source", ratio=2, style="dim")
+def _list(findings: Iterable[Finding], accepted: Sequence[str]) -> RenderableType:
+    """One entry for each finding; what is wrong has its remedy and its source on own lines."""
+    entries = Table.grid(padding=(0, 1))
+    entries.add_column()
+    entries.add_column()
     for finding in findings:
-        excepted = "excepted by flight.accept" if finding.key in accepted else ""
-        advice = "; ".join(filter(None, (finding.because, finding.fix, excepted)))
-        table.add_row(*map(Text, (finding.found, advice, finding.source)))
-    return table
+        because = f": {finding.because}" if finding.because else ""
+        entry = Text(f"{finding.found}{because}")
+        if finding.result is not CheckResult.SAFE:
+            if finding.fix:
+                entry.append(f"\nWhat to do: {finding.fix}", style="bold")
+            if finding.key in accepted:
+                entry.append("\nExcepted by flight.accept")
+            entry.append(f"\nSource: {finding.source}", style="dim")
+        entries.add_row("-", entry)
+    return entries
 
 
 def _last_line(config: Config, findings: Sequence[Finding]) -> Text:
@@ -69,7 +76,11 @@ def _last_line(config: Config, findings: Sequence[Finding]) -> Text:
         )
     if unsafe_count:
         return Text(f"{unsafe_count} unsafe, each excepted by flight.accept", style="bold yellow")
-    return Text("nothing unsafe was found", style="bold green")
+    ineffective = sum(finding.result is CheckResult.INEFFECTIVE for finding in findings)
+    though = f"; {ineffective} ineffective, see above" if ineffective else ""
+    return Text(
+        f"nothing unsafe was found: `companion fly` takes this vehicle{though}", style="bold green"
+    )
 
 
 def outcome_line(outcome: Outcome) -> str:

@@ -102,7 +102,7 @@ def test_the_doctor_is_told_on_any_terminal(tmp_path):
         "flight: {connect_timeout_s: 0.2}\n"
     )
     done = companion(tmp_path, ASCII, "doctor", "--config", "nobody.yaml", "--wait", "0.1")
-    assert_said(done, 1, b"no heartbeat", b"+---")
+    assert_said(done, 1, b"no heartbeat", b"Source: HEARTBEAT")
 
 
 FULL = "companion: standard output cannot be written: No space left on device\n"
