@@ -77,10 +77,10 @@ def _last_line(config: Config, findings: Sequence[Finding]) -> Text:
     if unsafe_count:
         return Text(f"{unsafe_count} unsafe, each excepted by flight.accept", style="bold yellow")
     ineffective = sum(finding.result is CheckResult.INEFFECTIVE for finding in findings)
-    though = f"; {ineffective} ineffective, see above" if ineffective else ""
-    return Text(
-        f"nothing unsafe was found: `companion fly` takes this vehicle{though}", style="bold green"
+    then = (
+        f"; {ineffective} ineffective, see above" if ineffective else ": `companion fly` flies it"
     )
+    return Text(f"nothing unsafe was found{then}", style="bold green")
 
 
 def outcome_line(outcome: Outcome) -> str:

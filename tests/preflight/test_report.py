@@ -34,9 +34,8 @@ def test_the_worst_stands_last_with_its_remedy_beside_the_summary() -> None:
 
 
 def test_without_anything_unsafe_the_summary_says_that_it_may_be_flown() -> None:
-    fine = "nothing unsafe was found: `companion fly` takes this vehicle"
-    assert shown([FINE])[-1] == fine
-    assert shown([FINE, WEAK])[-1] == f"{fine}; 1 ineffective, see above"
+    assert shown([FINE])[-1] == "nothing unsafe was found: `companion fly` flies it"
+    assert shown([FINE, WEAK])[-1] == "nothing unsafe was found; 1 ineffective, see above"
 
 
 def test_an_excepted_finding_says_so() -> None:
