@@ -79,6 +79,7 @@ def course_of(
         unheard=_unheard(context, now),
         battery=(reporter.battery_at_takeoff, end),
         min_battery=config.limits.min_battery,
+        max_tilt=config.limits.max_tilt,
         deadline=config.deadman.deadline,
         lockstep=not reporter.real_time,
         advice=advised,

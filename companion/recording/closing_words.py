@@ -98,10 +98,10 @@ def _extent(figures: Figures) -> str:
     parts = [f"{extent['under_control_s']:.0f} s under our control"]
     for key, words in (
         ("height_max_m", "up to {:.1f} m high"),
-        ("speed_max_m_s", "{:.1f} m/s fast"),
-        ("tilt_max_deg", "{:.0f}° tilted"),
+        ("maneuver_speed_max_m_s", "{:.1f} m/s fast"),
+        ("maneuver_tilt_max_deg", "{:.0f}° tilted"),
     ):
-        if extent[key] is not None:
+        if extent.get(key) is not None:  # an older summary has no figures of the maneuvers
             parts.append(words.format(extent[key]))
     return f"  {', '.join(parts)}"
 

@@ -86,6 +86,7 @@ def _summary_from_record(record: FlightRecord) -> Summary:
             early_end=_early_end(record, phase, takeoff),
             battery=(None, _last(thrust["battery_remaining"])),
             min_battery=float(flight.get("min_battery", "0")),
+            max_tilt=float(flight["max_tilt_rad"]) if "max_tilt_rad" in flight else None,
             deadline=float(flight.get("deadline_s", "0.004")),
             lockstep=flight.get("real_time") == "no",
         ),

@@ -1,6 +1,8 @@
 """The measured response to acceleration steps, compared with linear models."""
 
 from dataclasses import dataclass
+from math import asin, degrees, isnan, nan
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +18,10 @@ from companion.recording.measurements.second_order import (
 _TIME_CONSTANT = (0.02, 2.0)
 """Range in which the time constant is searched, s."""
 _MIN_STEP = 1e-3
-"""Smallest target coefficient along an axis that counts as a step along it."""
+"""Smallest change of a target coefficient along an axis that counts as a step along it."""
+_MIN_SHARE = 0.1
+"""Smallest change along an axis that counts, as a share of the largest change of the run: a gust
+moves the attitude from which the first step begins."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +32,9 @@ class StepResponse:
         time_constant_north_s: time constant of the first-order model that fits a_N best (least
             squares), s; NaN: no step goes north or south.
         time_constant_east_s: the same for a_E, east or west.
-        step_size: largest target coefficient, which is the sine of the tilt.
+        step_size: largest distance of a target from the coefficients at which its run began. In
+            wind these are not level.
+        asked_tilt: largest tilt of a target, rad, before the tilt limit of the planner.
         cross_axis_max: straightness: largest distance from the line of a step.
         model_deviation_max: largest distance from the ideal model ċ = p·(c_d − c).
         second_order: the second-order model with a dead time that fits best.
@@ -37,6 +44,7 @@ class StepResponse:
     time_constant_north_s: float
     time_constant_east_s: float
     step_size: float
+    asked_tilt: float
     cross_axis_max: float
     model_deviation_max: float
     second_order: SecondOrderFit
@@ -57,12 +65,40 @@ def measure_response(rows: Floats, gain: float) -> StepResponse | None:
     return StepResponse(
         time_constant_north_s=_time_constant(runs, 0, 1.0 / gain),
         time_constant_east_s=_time_constant(runs, 1, 1.0 / gain),
-        step_size=max(float(np.hypot(*run.target.T).max()) for run in runs),
+        step_size=max(_longest(run.target - run.measured[0]) for run in runs),
+        asked_tilt=asin(min(1.0, max(_longest(run.target) for run in runs))),
         cross_axis_max=max(_largest_deviation(step) for run in runs for step in run.steps()),
         model_deviation_max=max(_distance(run, first_order(run, 1.0 / gain)) for run in runs),
         second_order=second_order,
         second_order_deviation_max=max(_distance(run, second_order.path(run)) for run in runs),
     )
+
+
+def response_as_dict(response: StepResponse | None) -> dict[str, Any]:
+    """The response as JSON; null for what was not measured, such as an axis without a step."""
+    if response is None:
+        model = dict.fromkeys(("frequency_rad_s", "damping", "dead_time_s", "deviation_max"))
+        names = "step_size", "asked_tilt_deg", "cross_axis_max", "model_deviation_max"
+        constants = dict.fromkeys(("north", "east"))
+        return {"time_constant_s": constants, **dict.fromkeys(names), "second_order": model}
+    north, east = response.time_constant_north_s, response.time_constant_east_s
+    fit = response.second_order
+    return {
+        "time_constant_s": {
+            "north": None if isnan(north) else north,
+            "east": None if isnan(east) else east,
+        },
+        "step_size": response.step_size,
+        "asked_tilt_deg": degrees(response.asked_tilt),
+        "cross_axis_max": response.cross_axis_max,
+        "model_deviation_max": response.model_deviation_max,
+        "second_order": {
+            "frequency_rad_s": fit.frequency,
+            "damping": fit.damping,
+            "dead_time_s": fit.dead_time,
+            "deviation_max": response.second_order_deviation_max,
+        },
+    }
 
 
 def first_order(run: StepRun, time_constant: float) -> Floats:
@@ -83,7 +119,12 @@ def _first_order(steps: list[StepRun], time_constant: float) -> Floats:
 
 
 def _distance(run: StepRun, model: Floats) -> float:
-    return float(np.hypot(*(run.measured - model).T).max())
+    return _longest(run.measured - model)
+
+
+def _longest(coefficients: Floats) -> float:
+    """The largest length of coefficients (n, 2)."""
+    return float(np.hypot(*coefficients.T).max())
 
 
 def _largest_deviation(step: StepRun) -> float:
@@ -97,15 +138,22 @@ def _largest_deviation(step: StepRun) -> float:
     return float(np.abs(across).max())
 
 
+def _moves(run: StepRun, axis: int) -> bool:
+    """Whether a step of the run moves the target along an axis (0: north, 1: east)."""
+    changes = np.vstack([run.target[0] - run.measured[0], np.diff(run.target, axis=0)])
+    along = float(np.abs(changes[:, axis]).max())
+    return along > max(_MIN_STEP, _MIN_SHARE * _longest(changes))
+
+
 def _time_constant(runs: list[StepRun], axis: int, start: float) -> float:
     """The time constant in s that fits one axis best, searched from `start`; NaN without a step."""
     stepped = [
         StepRun(run.time, run.measured[:, [axis]], run.target[:, [axis]])
         for run in runs
-        if np.abs(run.target[:, axis]).max() > _MIN_STEP
+        if _moves(run, axis)
     ]
     if not stepped:
-        return float("nan")
+        return nan
 
     steps = [run.steps() for run in stepped]
     measured = np.concatenate([run.measured for run in stepped])

@@ -1,6 +1,7 @@
 """Whether a flight was good: compares the figures of `--json` with their limits."""
 
 from collections.abc import Iterator, Mapping
+from math import radians, sin
 from typing import Any, NamedTuple
 
 Figures = Mapping[str, Any]
@@ -122,12 +123,13 @@ def _steps(figures: Figures) -> Iterator[Check]:
     if not size or across is None:
         return
     limit, deviation_limit = STRAIGHTNESS * size, MODEL_DEVIATION * size
+    cut = _cut_step(response.get("asked_tilt_deg"), figures.get("max_tilt_deg"), limit)
+    yield from cut
     yield Check(
         "straightness of the steps",
         f"{across:.4f} from their lines (limit {limit:.4f})",
         across <= limit,
-        "run `companion identify` and fly planner.name: model-following with the "
-        "lag and dead time that it finds",
+        _straightness_remedy(figures["planner"], cut=bool(cut)),
     )
     deviation = response["second_order"]["deviation_max"]
     if deviation is None:
@@ -136,8 +138,46 @@ def _steps(figures: Figures) -> Iterator[Check]:
         "linearity of the steps",
         f"{deviation:.3f} from the nearest second-order model (limit {deviation_limit:.3f})",
         deviation <= deviation_limit,
-        "a rate limit distorts large steps: lower steps.coefficient or raise "
+        "the cut step distorts it"
+        if cut
+        else "a rate limit distorts large steps: lower steps.coefficient or raise "
         "limits.max_tilt_rate_deg_s",
+    )
+
+
+def _cut_step(asked: float | None, limit: float | None, tolerated: float) -> list[Check]:
+    """A failed check if the tilt limit cut a step by more than `tolerated`, else nothing.
+
+    Args:
+        asked: largest tilt that a step asked for, °; None: not measured.
+        limit: `limits.max_tilt_deg`; None: unknown.
+        tolerated: tolerated difference of the coefficients, which are sines of tilts.
+    """
+    if asked is None or limit is None or sin(radians(asked)) - sin(radians(limit)) <= tolerated:
+        return []
+    return [
+        Check(
+            "tilt of the steps",
+            f"the tilt limit cut a step, which asked for {asked:.1f}° (limits.max_tilt_deg: "
+            f"{limit:g})",
+            good=False,
+            remedy="lower steps.coefficient or the corners' coefficients, fly in less wind, or "
+            "raise limits.max_tilt_deg",
+        )
+    ]
+
+
+def _straightness_remedy(planner: str, *, cut: bool) -> str:
+    if cut:
+        return "the cut step bends it"
+    if planner == "model-following":
+        return (
+            "measure vehicle.lag_ms and vehicle.dead_time_ms anew with `companion identify`, lower "
+            "planner.gain_per_s, or fly in less wind"
+        )
+    return (
+        "run `companion identify` and fly planner.name: model-following with the lag and dead time "
+        "that it finds"
     )
 
 
