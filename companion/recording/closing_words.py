@@ -4,7 +4,14 @@ import shlex
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from companion.recording.measurements.verdict import LOST_ROWS, Check, Figures, checks, is_good
+from companion.recording.measurements.verdict import (
+    LOST_ROWS,
+    Check,
+    Figures,
+    checks,
+    cut_steps,
+    is_good,
+)
 from companion.recording.what_to_do import what_to_do
 
 _BEFORE_TAKEOFF = ("connect", "checks", "stream", "arm")
@@ -79,10 +86,14 @@ def _headline_and_reasons(figures: Figures) -> tuple[str, list[str]]:
         headline = f"The flight was good, as far as it could be recorded: {names}."
     else:
         headline = f"The flight was good, but the configuration does not fit the vehicle: {names}."
-    lines = [f"! {check.what}: {check.found}; {check.remedy}" for check in beyond]
+    lines = _beyond_limit(beyond)
     lines += [f"! {text}" for text in (*advice, *_gain_warning(figures))]
     lines += _together([check for check in judged if check.good])
     return headline, [*lines, _extent(figures)]
+
+
+def _beyond_limit(beyond: list[Check]) -> list[str]:
+    return [f"! {check.what}: {check.found}; {check.remedy}" for check in beyond]
 
 
 def _together(good: Sequence[Check]) -> list[str]:
@@ -122,6 +133,7 @@ def _ended_early(figures: Figures) -> tuple[str, list[str]]:
         f"  {_vehicle(figures)}",
         f"  what to do: {remedy}",
         *(f"! {text}" for text in (*figures["advice"], *_gain_warning(figures))),
+        *_beyond_limit(cut_steps(figures)),
     ]
 
 

@@ -29,6 +29,8 @@ _WIDTH, _HEIGHT, _HISTORY_HEIGHT = 13.5, 4.4, 7.6
 """Width of the picture, height of its upper panels and of its history, inches."""
 _LARGEST = 1e9
 """Numbers above this, such as times in s and distances in m, are invalid."""
+_SIN_22_5 = 0.3827
+"""A direction counts as north if its north component is larger; so with the others."""
 _ROOM_FOR_LEGEND = 0.2
 """Room above the curves, as a share of their height."""
 
@@ -167,8 +169,8 @@ def _draw_plane(axes: "Axes", runs: list[StepRun]) -> None:
 
 
 def _direction(run: StepRun) -> str:
-    """Direction of the first step of a doublet, in words."""
-    north, east = np.sign(np.round(run.target[0], 6))
+    """Direction of the first step of a doublet, as the nearest of eight, in words."""
+    north, east = np.sign(np.trunc(run.direction / _SIN_22_5))
     words = {-1.0: "south", 1.0: "north"}.get(north), {-1.0: "west", 1.0: "east"}.get(east)
     return "-".join(word for word in words if word)
 

@@ -176,6 +176,8 @@ def test_a_step_that_the_tilt_limit_cut_is_told_with_the_tilt_it_asked_for():
         "(limits.max_tilt_deg: 35); lower steps.coefficient or the corners' coefficients, fly in "
         "less wind, or raise limits.max_tilt_deg"
     )
+    early = closing_words({**cut, **ENDED}, None)
+    assert early.lines[-1] == told.lines[0]
     bent = changed(["response", "cross_axis_max"], 0.1, cut)
     assert "identify" not in words(bent)[1]  # the cut bends the step, not the planner
     within = changed(["response", "asked_tilt_deg"], 35.2, cut)  # cut by less than 3 % of a step

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from companion.attitude import Coefficients, Target, attitude
+from companion.recording.figure import _direction as direction_in_words
 from companion.recording.measurements.dead_time import AxisDeadTime, DeadTimes, SampleAge
 from companion.recording.measurements.response import measure_response
+from companion.recording.measurements.second_order import step_runs
 from companion.recording.measurements.summary import LoopCounts, Summary
 from companion.recording.trace import FlightTrace
 
@@ -70,6 +72,14 @@ def test_the_tilt_that_balances_the_wind_is_no_part_of_a_step():
     assert response.asked_tilt == pytest.approx(math.asin(math.hypot(0.55, 0.3)))
     calm = measure_response(trace_of(0.3).response_rows(), gain=5.0)
     assert (calm.step_size, calm.asked_tilt) == pytest.approx((0.2, math.asin(0.2)))
+
+
+def test_a_step_in_wind_is_drawn_along_its_own_direction():
+    (run,) = step_runs(trace_in_wind().response_rows())
+    assert run.direction == pytest.approx([1.0, 0.0], abs=0.1)
+    assert direction_in_words(run) == "north"
+    calm = step_runs(trace_of(0.3).response_rows())
+    assert [direction_in_words(each) for each in calm] == ["north", "east"]
 
 
 def test_an_axis_that_no_step_moved_has_no_time_constant():

@@ -33,8 +33,11 @@ class StepRun(NamedTuple):
 
     @property
     def direction(self) -> Floats:
-        """(2,), direction of the first target in the plane of the coefficients."""
-        first: Floats = self.target[0]
+        """(2,), direction of the first step in the plane of the coefficients.
+
+        It begins at the attitude when the target changed; in wind this is not level.
+        """
+        first: Floats = self.target[0] - self.measured[0]
         return first / max(float(np.hypot(*first)), 1e-9)
 
     def steps(self) -> list["StepRun"]:

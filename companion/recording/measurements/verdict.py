@@ -123,7 +123,7 @@ def _steps(figures: Figures) -> Iterator[Check]:
     if not size or across is None:
         return
     limit, deviation_limit = STRAIGHTNESS * size, MODEL_DEVIATION * size
-    cut = _cut_step(response.get("asked_tilt_deg"), figures.get("max_tilt_deg"), limit)
+    cut = cut_steps(figures)
     yield from cut
     yield Check(
         "straightness of the steps",
@@ -145,15 +145,14 @@ def _steps(figures: Figures) -> Iterator[Check]:
     )
 
 
-def _cut_step(asked: float | None, limit: float | None, tolerated: float) -> list[Check]:
-    """A failed check if the tilt limit cut a step by more than `tolerated`, else nothing.
-
-    Args:
-        asked: largest tilt that a step asked for, °; None: not measured.
-        limit: `limits.max_tilt_deg`; None: unknown.
-        tolerated: tolerated difference of the coefficients, which are sines of tilts.
-    """
-    if asked is None or limit is None or sin(radians(asked)) - sin(radians(limit)) <= tolerated:
+def cut_steps(figures: Figures) -> list[Check]:
+    """A failed check if the tilt limit cut a step by more than `STRAIGHTNESS`; else empty."""
+    response, limit = figures["response"], figures.get("max_tilt_deg")
+    asked = response.get("asked_tilt_deg")
+    if asked is None or limit is None:  # nothing was measured, or the summary is older
+        return []
+    # A coefficient is the sine of a tilt.
+    if sin(radians(asked)) - sin(radians(limit)) <= STRAIGHTNESS * response["step_size"]:
         return []
     return [
         Check(
