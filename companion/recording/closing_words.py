@@ -97,7 +97,7 @@ def _beyond_limit(beyond: list[Check]) -> list[str]:
 
 
 def _together(good: Sequence[Check]) -> list[str]:
-    """One line for each thing that was checked."""
+    """One line for each subject, with all of its figures."""
     found: dict[str, list[str]] = {}
     for check in good:
         found.setdefault(check.what, []).append(check.found)

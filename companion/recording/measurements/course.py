@@ -54,7 +54,7 @@ class Course:
         unheard: how long the vehicle was silent at the end, s, so that `armed` and `mode` may have
             changed since; None: it was heard.
         battery: remaining charge, 0..1, at take-off and at the end; None: unknown.
-        min_battery: smallest share allowed, `limits.min_battery_percent`.
+        min_battery: smallest remaining charge allowed, 0..1, `limits.min_battery_percent`.
         max_tilt: largest tilt of a target, `limits.max_tilt_deg`, rad; None: unknown.
         deadline: longest latency allowed, `deadman.deadline_ms`, s.
         lockstep: whether the flight ran in vehicle time (in lockstep or on a virtual clock); then

@@ -14,8 +14,8 @@ Floats = NDArray[np.float64]
 
 _GAP = 0.5
 """Rows further apart than this belong to different runs, s."""
-_FEWEST = 10
-"""A run has more rows than this."""
+_TOO_FEW = 10
+"""Runs with this number of rows or fewer are left out."""
 
 
 class StepRun(NamedTuple):
@@ -61,7 +61,7 @@ def step_runs(rows: Floats) -> list[StepRun]:
             part[:, 5:7],
         )
         for part in parts
-        if len(part) > _FEWEST
+        if len(part) > _TOO_FEW
     ]
 
 
@@ -72,8 +72,8 @@ _LAG, _DAMPING, _DEAD_TIME = (0.02, 4.0), (0.2, 10.0), (0.0, 0.5)
 _TRIED_LAGS, _TRIED_DAMPINGS = np.geomspace(0.05, 1.0, 5), (0.7, 1.5)
 _TRIED_DEAD_TIMES = (0.0, 0.04, 0.1, 0.2)
 _BEFORE_EFFECT = 0.03
-"""Time after the first step in which it is assumed to have no effect, s. It gives the coefficients
-and the speed from which the model starts."""
+"""Time after the first change of the target in which it is assumed to have no effect, s. The rows
+in this time give the coefficients and the speed from which the model starts."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -107,7 +107,10 @@ def _without_slow_motion(angles: Floats, half: int) -> Floats:
 
 
 def _autocorrelation(angles: Floats) -> Floats:
-    """(M,) of both angles together, 1 at lag 0, without bias at long lags."""
+    """Autocorrelation (N,) of both angles (N, 2) together, by lag in rows: 1 at lag 0.
+
+    It is unbiased: at long lags it is divided by the number of rows that overlap.
+    """
     count = len(angles)
     spectrum = np.fft.rfft(angles - angles.mean(axis=0), 2 * count, axis=0)
     products = np.fft.irfft((np.abs(spectrum) ** 2).sum(axis=1))[:count]

@@ -138,7 +138,7 @@ def _steps(figures: Figures) -> Iterator[Check]:
         "linearity of the steps",
         f"{deviation:.3f} from the nearest second-order model (limit {deviation_limit:.3f})",
         deviation <= deviation_limit,
-        "the cut step distorts it"
+        "mend the cut step first: it distorts the response"
         if cut
         else "a rate limit distorts large steps: lower steps.coefficient or raise "
         "limits.max_tilt_rate_deg_s",
@@ -168,7 +168,7 @@ def cut_steps(figures: Figures) -> list[Check]:
 
 def _straightness_remedy(planner: str, *, cut: bool) -> str:
     if cut:
-        return "the cut step bends it"
+        return "mend the cut step first: it bends the line"
     if planner == "model-following":
         return (
             "measure vehicle.lag_ms and vehicle.dead_time_ms anew with `companion identify`, lower "
