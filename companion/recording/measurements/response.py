@@ -68,9 +68,13 @@ def measure_response(rows: Floats, gain: float) -> StepResponse | None:
         step_size=max(_longest(run.target - run.measured[0]) for run in runs),
         asked_tilt=asin(min(1.0, max(_longest(run.target) for run in runs))),
         cross_axis_max=max(_largest_deviation(step) for run in runs for step in run.steps()),
-        model_deviation_max=max(_distance(run, first_order(run, 1.0 / gain)) for run in runs),
+        model_deviation_max=max(
+            _largest_distance(run, first_order(run, 1.0 / gain)) for run in runs
+        ),
         second_order=second_order,
-        second_order_deviation_max=max(_distance(run, second_order.path(run)) for run in runs),
+        second_order_deviation_max=max(
+            _largest_distance(run, second_order.path(run)) for run in runs
+        ),
     )
 
 
@@ -118,7 +122,7 @@ def _first_order(steps: list[StepRun], time_constant: float) -> Floats:
     return np.concatenate(parts)
 
 
-def _distance(run: StepRun, model: Floats) -> float:
+def _largest_distance(run: StepRun, model: Floats) -> float:
     return _longest(run.measured - model)
 
 

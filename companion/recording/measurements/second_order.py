@@ -12,7 +12,7 @@ from companion.least_squares import minimise, project
 
 Floats = NDArray[np.float64]
 
-_GAP = 0.5
+_LONGEST_GAP = 0.5
 """Rows further apart than this belong to different runs, s."""
 _TOO_FEW = 10
 """Runs with this number of rows or fewer are left out."""
@@ -53,7 +53,7 @@ def step_runs(rows: Floats) -> list[StepRun]:
     """The runs in rows (N, 7) of `FlightTrace.response`, without those too short to measure."""
     if len(rows) == 0:
         return []
-    parts = np.split(rows, np.flatnonzero(np.diff(rows[:, 0]) > _GAP) + 1)
+    parts = np.split(rows, np.flatnonzero(np.diff(rows[:, 0]) > _LONGEST_GAP) + 1)
     return [
         StepRun(
             part[:, 0],

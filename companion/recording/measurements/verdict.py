@@ -22,9 +22,9 @@ STRAIGHTNESS = 0.03
 """Largest distance from a step's line, as a share of the step."""
 MODEL_DEVIATION = 0.20
 """Largest distance from the nearest second-order model, as a share of the step."""
-UNANSWERED = 0.01
+UNANSWERED_SAMPLES = 0.01
 """Largest share of attitude samples without an answer."""
-LOST = 0.02
+LOST_FRAMES = 0.02
 """Largest share of the vehicle's frames that may be lost."""
 BATTERY_MARGIN = 0.10
 """Charge required at the end beyond `limits.min_battery_percent`, 0..1."""
@@ -185,16 +185,16 @@ def _answers(figures: Figures) -> Iterator[Check]:
     if samples:
         yield Check(
             "attitude samples",
-            f"{unanswered} of {samples} unanswered (limit {100.0 * UNANSWERED:g} %)",
-            unanswered <= UNANSWERED * samples,
+            f"{unanswered} of {samples} unanswered (limit {100.0 * UNANSWERED_SAMPLES:g} %)",
+            unanswered <= UNANSWERED_SAMPLES * samples,
             "the line `unanswered samples` names the reasons",
         )
     frames, lost = figures["link"].get("frames", 0), figures["link"].get("lost", 0)
     if frames:
         yield Check(
             "link",
-            f"{lost} of {frames + lost} frames lost (limit {100.0 * LOST:g} %)",
-            lost <= LOST * (frames + lost),
+            f"{lost} of {frames + lost} frames lost (limit {100.0 * LOST_FRAMES:g} %)",
+            lost <= LOST_FRAMES * (frames + lost),
             "raise the baud rate, lower the rates of other streams, or mend the radio link",
         )
 
