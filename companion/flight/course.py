@@ -59,15 +59,9 @@ def course_of(
     if flight.failed_in is not None:
         # There is no such event if the user left the flight.
         time = next((at for at, text in flight.events if text == result), now - began)
-        early_end = _early_end(
-            time,
-            began,
-            takeoff,
-            flight.failed_in.name,
-            assembled.trace.maneuvers,
-            assembled.ladder.breaches,
-            result,
-        )
+        marks, breaches = assembled.trace.maneuvers, assembled.ladder.breaches
+        failed = flight.failed_in.name
+        early_end = _early_end(time, began, takeoff, failed, marks, breaches, result)
     return Course(
         began=began,
         phases=tuple((at - began, name) for at, name in phases),
