@@ -2,20 +2,13 @@
 
 import asyncio
 from collections.abc import Sequence
-from math import asin, degrees, radians, sin
-
-import numpy as np
 
 from companion.control.expected_response import gain_warning
 from companion.flight.assembled import Assembled
 from companion.flight.context import FlightContext
 from companion.recording.measurements.course import Course, EarlyEnd
 from companion.recording.measurements.dead_time import DeadTimes
-from companion.recording.measurements.verdict import CUT_STEP
 from companion.recording.trace import ManeuverMark
-
-_NUMERIC_TOLERANCE = 1e-6
-"""Difference of two coefficients that is rounding."""
 
 
 def advice(assembled: Assembled, dead_times: DeadTimes) -> tuple[str, ...]:
@@ -26,23 +19,8 @@ def advice(assembled: Assembled, dead_times: DeadTimes) -> tuple[str, ...]:
         guidance_loop.estimate.mismatch_warning(),
         dead_times.warning(),
         assembled.trace.lost_rows_warning(),
-        _cut_steps_warning(assembled),
     )
     return tuple(warning for warning in warnings if warning is not None)
-
-
-def _cut_steps_warning(assembled: Assembled) -> str | None:
-    """A warning if limits.max_tilt_deg cut a step, for example because wind needs some tilt."""
-    targets = assembled.trace.response_rows()[:, 5:7]
-    largest = float(np.hypot(*targets.T).max(initial=0.0))
-    most = assembled.context.config.limits.max_tilt_deg
-    if largest <= sin(radians(most)) + _NUMERIC_TOLERANCE:
-        return None
-    asked = f"{degrees(asin(largest)):.0f}°" if largest < 1.0 else "more than 90°"
-    return (
-        f"limits.max_tilt_deg = {most:g} {CUT_STEP} {asked}, with the tilt against the wind: "
-        "make the steps smaller, or raise the limit"
-    )
 
 
 def _settings(context: FlightContext) -> dict[str, str]:
@@ -81,15 +59,9 @@ def course_of(
     if flight.failed_in is not None and result != "ok":
         # There is no such event if the user left the flight.
         time = next((at for at, text in flight.events if text == result), now - began)
-        early_end = _early_end(
-            time,
-            began,
-            takeoff,
-            flight.failed_in.name,
-            assembled.trace.maneuvers,
-            assembled.ladder.breaches,
-            result,
-        )
+        marks, breaches = assembled.trace.maneuvers, assembled.ladder.breaches
+        failed = flight.failed_in.name
+        early_end = _early_end(time, began, takeoff, failed, marks, breaches, result)
     return Course(
         began=began,
         phases=tuple((at - began, name) for at, name in phases),
@@ -101,6 +73,7 @@ def course_of(
         unheard=_unheard(context, now),
         battery=(reporter.battery_at_takeoff, end),
         min_battery=config.limits.min_battery,
+        max_tilt=config.limits.max_tilt,
         deadline=config.deadman.deadline,
         lockstep=not reporter.real_time,
         advice=advised,

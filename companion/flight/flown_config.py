@@ -63,6 +63,7 @@ def description(config: Config, plan: Plan, *, real_time: bool) -> dict[str, str
         "gain_per_s": repr(config.planner.gain_per_s),
         "deadline_s": repr(deadman.deadline),
         "min_battery": repr(limits.min_battery),
+        "max_tilt_rad": repr(limits.max_tilt),
         "max_tilt_rate_rad_s": repr(limits.max_tilt_rate),
         "max_yaw_rate_rad_s": repr(limits.max_yaw_rate),
         "real_time": "yes" if real_time else "no",

@@ -4,11 +4,18 @@ import shlex
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from companion.recording.measurements.verdict import LOST_ROWS, Check, Figures, checks, is_good
+from companion.recording.measurements.verdict import (
+    LOST_ROWS,
+    Check,
+    Figures,
+    checks,
+    cut_steps,
+    is_good,
+)
 from companion.recording.what_to_do import what_to_do
 
-_BEFORE_TAKEOFF = ("connect", "checks", "stream", "arm")
-_SHARED = ("--endpoint", "--set")
+_PHASES_BEFORE_TAKEOFF = ("connect", "checks", "stream", "arm")
+_SHARED_OPTIONS = ("--endpoint", "--set")
 LEFT_BY_USER = "left at once by the user"
 """Result of a flight that was cancelled, for example by Ctrl-C in a user's program."""
 _INTERRUPTED = ("interrupted by ", LEFT_BY_USER)
@@ -58,7 +65,7 @@ def closing_words(figures: Figures, invocation: Invocation | None) -> ClosingWor
     return ClosingWords(
         headline,
         tuple(lines),
-        None if invocation is None else _next(figures, invocation),
+        None if invocation is None else _next_command(figures, invocation),
         good,
         flown,
     )
@@ -79,14 +86,18 @@ def _headline_and_reasons(figures: Figures) -> tuple[str, list[str]]:
         headline = f"The flight was good, as far as it could be recorded: {names}."
     else:
         headline = f"The flight was good, but the configuration does not fit the vehicle: {names}."
-    lines = [f"! {check.what}: {check.found}; {check.remedy}" for check in beyond]
+    lines = _beyond_limit(beyond)
     lines += [f"! {text}" for text in (*advice, *_gain_warning(figures))]
-    lines += _together([check for check in judged if check.good])
+    lines += _by_subject([check for check in judged if check.good])
     return headline, [*lines, _extent(figures)]
 
 
-def _together(good: Sequence[Check]) -> list[str]:
-    """One line for each thing that was checked."""
+def _beyond_limit(beyond: list[Check]) -> list[str]:
+    return [f"! {check.what}: {check.found}; {check.remedy}" for check in beyond]
+
+
+def _by_subject(good: Sequence[Check]) -> list[str]:
+    """One line for each subject, with all of its figures."""
     found: dict[str, list[str]] = {}
     for check in good:
         found.setdefault(check.what, []).append(check.found)
@@ -98,10 +109,10 @@ def _extent(figures: Figures) -> str:
     parts = [f"{extent['under_control_s']:.0f} s under our control"]
     for key, words in (
         ("height_max_m", "up to {:.1f} m high"),
-        ("speed_max_m_s", "{:.1f} m/s fast"),
-        ("tilt_max_deg", "{:.0f}° tilted"),
+        ("maneuver_speed_max_m_s", "{:.1f} m/s fast"),
+        ("maneuver_tilt_max_deg", "{:.0f}° tilted"),
     ):
-        if extent[key] is not None:
+        if extent.get(key) is not None:  # an older summary has no figures of the maneuvers
             parts.append(words.format(extent[key]))
     return f"  {', '.join(parts)}"
 
@@ -114,14 +125,15 @@ def _ended_early(figures: Figures) -> tuple[str, list[str]]:
         on_ground = end["since_takeoff_s"] is None  # or the take-off was not heard
         what = "disarm it, or take it over if it flies" if on_ground else "take it over or land it"
         then = "" if interrupted else f"; then: {remedy}"
-        armed = "is armed" if _unheard(figures) is None else "was armed when last heard"
+        armed = "is armed" if _silence(figures) is None else "was armed when last heard"
         remedy = f"the vehicle {armed}: {what}{then}"
     result = figures["result"].rstrip(".")
     return f"The flight ended early: {result}{'' if result.endswith('?') else '.'}", [
         f"  when: {_when(end)}",
-        f"  {_vehicle(figures)}",
+        f"  {_vehicle_state(figures)}",
         f"  what to do: {remedy}",
         *(f"! {text}" for text in (*figures["advice"], *_gain_warning(figures))),
+        *_beyond_limit(cut_steps(figures)),
     ]
 
 
@@ -140,30 +152,38 @@ def _when(end: dict[str, Any]) -> str:
     return words
 
 
-def _unheard(figures: Figures) -> float | None:
+def _silence(figures: Figures) -> float | None:
     """How long the vehicle was silent at the end of the flight, s; None: it was heard."""
     silence: float | None = figures["at_the_end"].get("unheard_s")
     return silence
 
 
-def _vehicle(figures: Figures) -> str:
-    state, silence = figures["at_the_end"], _unheard(figures)
+def _vehicle_state(figures: Figures) -> str:
+    state, silence = figures["at_the_end"], _silence(figures)
     heard = "now" if silence is None else f"when last heard, {silence:.1f} s before the end"
     armed = {True: "ARMED", False: "disarmed", None: "not known whether armed"}[state["armed"]]
     mode = "" if state["mode"] is None else f", in mode {state['mode']}"
     return f"vehicle {heard}: {armed}{mode}"
 
 
-def _next(figures: Figures, invocation: Invocation) -> str | None:
+def _next_command(figures: Figures, invocation: Invocation) -> str | None:
     def command(*words: str) -> str:
         return f"{invocation.program} {shlex.join(words)}"
 
     again = invocation.arguments
-    own = None if invocation.config is None else ["--config", invocation.config, *_changes(again)]
+    own = (
+        None
+        if invocation.config is None
+        else ["--config", invocation.config, *_shared_options(again)]
+    )
     if figures["result"].startswith(_INTERRUPTED):
         return command(*again)
     end = figures["early_end"]
-    if end is not None and end["phase"] in _BEFORE_TAKEOFF and end["since_takeoff_s"] is None:
+    if (
+        end is not None
+        and end["phase"] in _PHASES_BEFORE_TAKEOFF
+        and end["since_takeoff_s"] is None
+    ):
         return None if own is None else command("doctor", *own)
     if end is None and figures["settings"]:
         changes = [f"{key}={value}" for key, value in figures["settings"].items()]
@@ -173,13 +193,13 @@ def _next(figures: Figures, invocation: Invocation) -> str | None:
     return command("plot", figures["log"]) if figures["log"] is not None else None
 
 
-def _changes(arguments: Sequence[str]) -> list[str]:
+def _shared_options(arguments: Sequence[str]) -> list[str]:
     """The options that changed the configuration and that other commands take as well."""
     kept: list[str] = []
     for word, value in zip(arguments, (*arguments[1:], ""), strict=True):
-        if word in _SHARED:
+        if word in _SHARED_OPTIONS:
             kept += (word, value)
-        elif word.partition("=")[0] in _SHARED:
+        elif word.partition("=")[0] in _SHARED_OPTIONS:
             kept.append(word)
     return kept
 

@@ -27,7 +27,7 @@ _MEASURED, _IDEAL, _NEAREST, _TARGET = "#0072b2", "#d55e00", "#009e73", "#999999
 _STYLES = ("-", "--", ":")
 _WIDTH, _HEIGHT, _HISTORY_HEIGHT = 13.5, 4.4, 7.6
 """Width of the picture, height of its upper panels and of its history, inches."""
-_LARGEST = 1e9
+_LARGEST_VALID = 1e9
 """Numbers above this, such as times in s and distances in m, are invalid."""
 _ROOM_FOR_LEGEND = 0.2
 """Room above the curves, as a share of their height."""
@@ -56,7 +56,7 @@ def draw_flight(folder: Path, out: Path) -> None:
 
     record = read_flight(folder)
     trace = trace_of(record)
-    panels, motion = _panels(record, trace), _rows(record, "motion", trace.motion)
+    panels, motion = _panels(record, trace), _checked_rows(record, "motion", trace.motion)
     if not panels and motion is None:
         raise FigureError(f"{folder}: no flight with anything to draw is recorded there")
     marks = Marks() if motion is None else _marks(record)
@@ -82,8 +82,8 @@ def draw_flight(folder: Path, out: Path) -> None:
 
 def _panels(record: FlightRecord, trace: FlightTrace) -> "list[Callable[[Axes], None]]":
     """Functions that draw the upper panels."""
-    response = _rows(record, "response", trace.response)
-    tracking = _rows(record, "tracking", trace.tracking)
+    response = _checked_rows(record, "response", trace.response)
+    tracking = _checked_rows(record, "tracking", trace.tracking)
     panels: list[Callable[[Axes], None]] = []
     runs = [] if response is None else step_runs(response)
     if runs:
@@ -94,7 +94,7 @@ def _panels(record: FlightRecord, trace: FlightTrace) -> "list[Callable[[Axes], 
     return panels
 
 
-def _rows(record: FlightRecord, name: str, series: Series) -> Floats | None:
+def _checked_rows(record: FlightRecord, name: str, series: Series) -> Floats | None:
     """The rows of a series; None if it has none.
 
     Raises:
@@ -102,9 +102,10 @@ def _rows(record: FlightRecord, name: str, series: Series) -> Floats | None:
     """
     rows = series.rows()
     # NaN means that there is no value.
-    if np.abs(rows[~np.isnan(rows)]).max(initial=0.0) > _LARGEST:
+    if np.abs(rows[~np.isnan(rows)]).max(initial=0.0) > _LARGEST_VALID:
         raise RecordError(
-            f"{record.folder}: {name}: not as a flight records it: a number is above {_LARGEST:g}"
+            f"{record.folder}: {name}: not as a flight records it: a number is above "
+            f"{_LARGEST_VALID:g}"
         )
     return rows if len(rows) else None
 

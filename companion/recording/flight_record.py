@@ -7,10 +7,10 @@
 The columns of each channel are in `companion.recording.mcap_file` (`loop_channels` and `channels`),
 with their units. A channel without messages has 0 rows. NaN: not known, or does not apply.
 
-Three clocks: our clock (event-loop time; `began` is when the flight began on it), the vehicle's
-clock (`vehicle_time_s`), and the time since the flight began, which phases, events, alarms and the
-channel `motion` are in. `since_start` converts from our clock. A flight in lockstep or on a virtual
-clock has its clock in vehicle time; then `epoch` is 0.
+Times are on one of three clocks. Our clock is event-loop time; on it the flight began at `began`.
+The vehicle's clock gives `vehicle_time_s`. Phases, events, alarms and the channel `motion` have the
+time since the flight began; `since_start` converts our clock to it. In a flight in lockstep or on a
+virtual clock, our clock is the vehicle's; then `epoch` is 0.
 """
 
 import json

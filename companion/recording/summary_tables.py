@@ -59,7 +59,7 @@ def _response(summary: Summary) -> RenderableType:
         ("north", response.time_constant_north_s),
         ("east", response.time_constant_east_s),
     ):
-        found = "no step flown" if isnan(value) else f"{value:.3f} s"
+        found = "not flown" if isnan(value) else f"{value:.3f} s"
         table.add_row(f"time constant {axis}", found, f"{ideal:.3f} s")
     table.add_row(
         "largest deviation from ċ = p(c_d − c)", _coefficient(response.model_deviation_max), "0"
@@ -159,10 +159,9 @@ def _loop_words(summary: Summary) -> Text:
     missed = "" if summary.course.lockstep else f"{counts.missed_deadlines} missed deadlines, "
     rate = f", {counts.rate_hz:.0f} Hz in the maneuvers" if counts.rate_hz else ""
     return Text(
-        f"{counts.setpoints} setpoints for {counts.samples} samples{rate}\n"
-        f"{missed}{counts.stale} stale, {counts.refused} refused; link: "
-        f"{link.get('lost', 0)} lost, {link.get('bad_crc', 0)} damaged, "
-        f"{link.get('non_finite', 0)} not finite{unanswered}"
+        f"{counts.setpoints} setpoints for {counts.samples} samples{rate}\n{missed}"
+        f"{counts.stale} stale, {counts.refused} refused; link: {link.get('lost', 0)} lost, "
+        f"{link.get('bad_crc', 0)} damaged, {link.get('non_finite', 0)} not finite{unanswered}"
     )
 
 

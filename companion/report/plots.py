@@ -22,7 +22,7 @@ _MOST_POINTS = 2000
 """Lines with more points are thinned to about as many; a wide screen has fewer pixels."""
 _SHADES = ("rgba(230,159,0,0.13)", "rgba(86,180,233,0.13)")
 """Colours of the maneuvers, used in turn."""
-_DIGITS = 5
+_SIGNIFICANT_DIGITS = 5
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def even_indices(count: int) -> Any:
 
 def numbers(values: Floats) -> list[float | None]:
     """Rounded numbers for JSON; null for values that are not finite."""
-    rounded = [float(f"{value:.{_DIGITS}g}") for value in values.tolist()]
+    rounded = [float(f"{value:.{_SIGNIFICANT_DIGITS}g}") for value in values.tolist()]
     return [value if np.isfinite(value) else None for value in rounded]
 
 
@@ -123,7 +123,7 @@ def time_axis(flights: Sequence[FlightData], **titles: str) -> dict[str, Any]:
 def end_mark(end: EndMark, *, above: bool = False) -> dict[str, list[dict[str, Any]]]:
     """A line and a label at an early end, for a layout; the label is at the bottom or above."""
     label = {**_end_label(end), "y": 1.0 if above else 0.0}
-    return {"shapes": [_upright(end.time)], "annotations": [label]}
+    return {"shapes": [_vertical_line(end.time)], "annotations": [label]}
 
 
 def limit_lines(flights: Sequence[FlightData], curve: str, **more: Any) -> list[dict[str, Any]]:
@@ -178,7 +178,7 @@ def _name_above(span: Span) -> dict[str, Any]:
     }
 
 
-def _upright(time: float) -> dict[str, Any]:
+def _vertical_line(time: float) -> dict[str, Any]:
     return {
         "type": "line",
         "xref": "x",

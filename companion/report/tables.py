@@ -14,7 +14,7 @@ _EMPTY = "–"
 _AROUND_END = 5.0
 """Events this long before and after an early end stand at the top of the page, s."""
 _MOST_EVENTS = 20
-_PORT = re.compile(r":\d+$")
+_PORT_AT_END = re.compile(r":\d+$")
 
 
 class Table(NamedTuple):
@@ -75,7 +75,9 @@ def comparison_tables(flights: Sequence[FlightData]) -> list[Table]:
     """The figures of several flights and the keys that differ, one column for each flight."""
     names = tuple(flight.name for flight in flights)
     known = [
-        {**dict(_tracking(flight.figures)), **dict(_rows(flight.figures))} if flight.figures else {}
+        {**dict(_tracking(flight.figures)), **dict(_figure_rows(flight.figures))}
+        if flight.figures
+        else {}
         for flight in flights
     ]
     labels = dict.fromkeys(label for figures in known for label in figures)
@@ -109,14 +111,14 @@ def _compared(key: ConfigKey) -> tuple[str, str]:
     value, default = _value(key.value), _value(key.default)
     if key.name != "endpoint":
         return value, default
-    return _PORT.sub("", value), _PORT.sub("", default)
+    return _PORT_AT_END.sub("", value), _PORT_AT_END.sub("", default)
 
 
 def _figures(figures: Any) -> Table:
-    return Table("Figures", ("figure", "measured"), list(_rows(figures)))
+    return Table("Figures", ("figure", "measured"), list(_figure_rows(figures)))
 
 
-def _rows(figures: Any) -> Iterator[tuple[str, str]]:
+def _figure_rows(figures: Any) -> Iterator[tuple[str, str]]:
     """Label and text of each figure that was measured."""
     response = figures.get("response") or {}
     latency, link = figures.get("latency_us") or {}, figures.get("link") or {}

@@ -51,8 +51,10 @@ GOOD = {
     "at_the_end": {"armed": False, "mode": "AUTO.LOITER"},
     "extent": {
         "height_max_m": 5.04,
-        "speed_max_m_s": 5.1,
-        "tilt_max_deg": 24.6,
+        "speed_max_m_s": 6.5,
+        "tilt_max_deg": 31.0,
+        "maneuver_speed_max_m_s": 5.1,
+        "maneuver_tilt_max_deg": 24.6,
         "under_control_s": 38.2,
     },
     "log": "flights/one",
@@ -100,7 +102,7 @@ BEYOND = {
     "circle": (["maneuvers", 2, "level_rms_m"], 0.26, "fly it slower"),
     "hover": (["maneuvers", 0, "level_rms_m"], 0.16, "fly it slower"),
     "steps": (["maneuvers", 1, "height_rms_m"], 0.16, "set thrust.hover_thrust"),
-    "straightness of the steps": (["response", "cross_axis_max"], 0.01, "calmer air"),
+    "straightness of the steps": (["response", "cross_axis_max"], 0.01, "companion identify"),
     "linearity of the steps": (
         ["response", "second_order", "deviation_max"],
         0.06,
@@ -170,6 +172,31 @@ def test_a_gain_above_the_sensible_one_is_told_after_good_and_bad_flights():
     told, _ = words(figures)
     assert (told.good, told.lines[0]) == (True, "! planner.gain_per_s is 10, and 5.2 is …")
     assert words({**figures, **ENDED})[0].lines[-1] == told.lines[0]
+
+
+def test_a_step_that_the_tilt_limit_cut_is_told_with_the_tilt_it_asked_for():
+    cut = changed(["response", "asked_tilt_deg"], 42.46, {**GOOD, "max_tilt_deg": 35.0})
+    told, text = words(cut)
+    assert (told.good, text.count("tilt limit")) == (False, 1)
+    assert told.lines[0] == (
+        "! tilt of the steps: the tilt limit cut a step, which asked for 42.5° "
+        "(limits.max_tilt_deg: 35); lower steps.coefficient or the corners' coefficients, fly in "
+        "less wind, or raise limits.max_tilt_deg"
+    )
+    early = closing_words({**cut, **ENDED}, None)
+    assert early.lines[-1] == told.lines[0]
+    bent = changed(["response", "cross_axis_max"], 0.1, cut)
+    assert "identify" not in words(bent)[1]  # the cut bends the step, not the planner
+    within = changed(["response", "asked_tilt_deg"], 35.2, cut)  # cut by less than 3 % of a step
+    assert "tilt of the steps" not in words(within)[1]
+
+
+def test_a_bent_step_is_not_blamed_on_the_planner_that_follows_the_model():
+    bent = changed(["response", "cross_axis_max"], 0.01)
+    assert "planner.name" not in words(bent)[0].lines[0]
+    assert "measure vehicle.lag_ms and vehicle.dead_time_ms anew" in words(bent)[0].lines[0]
+    told, _ = words({**bent, "planner": "first-order"})
+    assert "fly planner.name: model-following" in told.lines[0]
 
 
 def test_in_lockstep_the_latency_is_not_judged():

@@ -17,7 +17,7 @@ from companion.recording.mcap_file.channels import MOTION
 from companion.recording.mcap_file.fields import CDR
 from companion.recording.mcap_file.loop_channels import SAMPLE, SETPOINT
 from companion.recording.mcap_file.writer import McapWriter
-from companion.recording.measurements.recorded_summary import _KEYS
+from companion.recording.measurements.recorded_summary import _REQUIRED_KEYS
 
 pytestmark = pytest.mark.skipif(find_spec("matplotlib") is None, reason="no Matplotlib")
 
@@ -37,7 +37,7 @@ SUMMARY = {
     ],
     "early_end": {"time_s": 8.2},
 }
-WHOLE = {**dict.fromkeys(_KEYS), **SUMMARY}
+WHOLE = {**dict.fromkeys(_REQUIRED_KEYS), **SUMMARY}
 
 
 def record(folder, *, steps=False, motion=False, gain="5.0", largest=2.0, summary=None):

@@ -14,7 +14,7 @@ from companion.files.yaml_file import ConfigError
 from companion.recording.flight_record import RecordError, read_flight
 from companion.recording.folder import flight_folder
 from companion.recording.mcap_file import cdr, reader, writer
-from companion.recording.mcap_file.batch import _FULL, Batch, messages_of
+from companion.recording.mcap_file.batch import _FULL_BATCH, Batch, messages_of
 from companion.recording.mcap_file.channels import CHANNELS, OTHER_CHANNELS, RESOURCES
 from companion.recording.mcap_file.loop_channels import ACTION, INPUT, REASONS, SETPOINT
 from companion.recording.mcap_file.scene import Entity, scene_message
@@ -289,9 +289,9 @@ def test_a_full_batch_is_sent_at_once_and_an_empty_one_never():
     batch = Batch(sent.append)
     batch.send()
     assert sent == []
-    batch.add("/log", 1, bytes(_FULL))
+    batch.add("/log", 1, bytes(_FULL_BATCH))
     assert len(sent) == 1
-    assert [len(data) for _, _, data in messages_of(sent[0])] == [_FULL]
+    assert [len(data) for _, _, data in messages_of(sent[0])] == [_FULL_BATCH]
     batch.send()
     assert len(sent) == 1
 

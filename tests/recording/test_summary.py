@@ -80,6 +80,53 @@ def test_a_doublet_is_named_by_the_nearest_point_of_the_compass(degrees, words):
     assert run.direction == pytest.approx(way)
 
 
+def trace_in_wind(rest=(0.3, -0.3), noise=0.02):
+    """A doublet north of 0.25 from the attitude that balances a wind, which gusts a little."""
+    trace, along = FlightTrace(), noise
+    for k in range(800):
+        target = 0.25 if k < 200 or k >= 600 else -0.25
+        trace.add_response(
+            k * 0.005,
+            attitude(Coefficients(rest[0] + along, rest[1] + noise * math.cos(k / 100.0)), 0.0),
+            Target(rest[0] + target, rest[1], 0.0),
+        )
+        along = target + (along - target) * math.exp(-0.005 / 0.3)
+    return trace
+
+
+def test_the_tilt_that_balances_the_wind_is_no_part_of_a_step():
+    response = measure_response(trace_in_wind().response_rows(), gain=5.0)
+    assert response.step_size == pytest.approx(0.25, abs=0.03)
+    assert response.asked_tilt == pytest.approx(math.asin(math.hypot(0.55, 0.3)))
+    calm = measure_response(trace_of(0.3).response_rows(), gain=5.0)
+    assert (calm.step_size, calm.asked_tilt) == pytest.approx((0.2, math.asin(0.2)))
+
+
+def test_an_axis_that_no_step_moved_has_no_time_constant():
+    data = summary(trace_in_wind()).as_dict()["response"]
+    assert data["time_constant_s"] == {"north": pytest.approx(0.3, abs=0.03), "east": None}
+    assert data["asked_tilt_deg"] == pytest.approx(38.79, abs=0.01)
+
+
+def test_speed_and_tilt_of_the_maneuvers_are_not_those_of_the_take_off():
+    trace = FlightTrace()
+    trace.add_motion(1.0, (1.0, 101.0, 2.0, 1.5, 9.0, math.nan))
+    for vehicle_time, name in ((102.0, "hover"), (104.0, "steps"), (106.0, None)):
+        trace.begin_maneuver(vehicle_time - 100.0, vehicle_time, name)
+    trace.add_motion(3.0, (3.0, 103.0, 5.0, 0.2, 1.0, 0.1))
+    trace.add_response(105.0, attitude(Coefficients(math.sin(0.2), 0.0), 0.0), Target(0.2, 0, 0))
+    trace.add_motion(7.0, (7.0, 107.0, 4.0, 1.2, 8.0, math.nan))
+    extent = summary(trace).extent()
+    assert (extent["speed_max_m_s"], extent["tilt_max_deg"]) == (
+        1.5,
+        pytest.approx(11.459, abs=1e-3),
+    )
+    assert extent["maneuver_speed_max_m_s"] == 0.2
+    assert extent["maneuver_tilt_max_deg"] == pytest.approx(math.degrees(0.2))
+    never = summary(FlightTrace()).as_dict()["extent"]
+    assert (never["maneuver_speed_max_m_s"], never["maneuver_tilt_max_deg"]) == (None, None)
+
+
 def test_without_steps_there_is_no_response():
     assert measure_response(FlightTrace().response_rows(), 5.0) is None
 

@@ -13,7 +13,7 @@ from companion.recording.measurements.dead_time import AxisDeadTime, DeadTimes, 
 from companion.recording.measurements.summary import LoopCounts, PredictiveFigures, Summary
 from companion.recording.summary_tables import flight_table
 from companion.recording.trace import FlightTrace
-from tests.recording.test_summary import trace_of
+from tests.recording.test_summary import trace_in_wind, trace_of
 
 AS_CONFIGURED = DeadTimes(
     {
@@ -57,6 +57,18 @@ def test_straightness_and_the_nearest_second_order_stand_in_it():
     assert cells(lines, "dead time")[0] == f"{1e3 * model.dead_time:.0f} ms"
     deviation = cells(lines, "largest deviation from it")[0]
     assert float(deviation) == pytest.approx(response.second_order_deviation_max, abs=1e-4)
+
+
+def test_an_axis_that_no_step_moved_was_not_flown():
+    lines = table(trace_in_wind())
+    assert cells(lines, "time constant east")[0] == "not flown"
+    assert cells(lines, "time constant north")[0].endswith(" s")
+
+
+def test_without_a_maneuver_there_is_no_rate_in_the_maneuvers():
+    assert "6 setpoints for 7 samples" in table(FlightTrace())
+    told = table(FlightTrace(), counts=LoopCounts(7, 6, 1, rate_hz=250.0))
+    assert "6 setpoints for 7 samples, 250 Hz in the maneuvers" in told
 
 
 def test_the_reasons_of_unanswered_samples_stand_below_it():

@@ -13,7 +13,7 @@ from companion.recording.mcap_file.channels import TOPICS
 
 _HEAD = struct.Struct("<BQI")
 _NUMBERS = {topic.name: number for number, topic in enumerate(TOPICS)}
-_FULL = 32_000
+_FULL_BATCH = 32_000
 """Length above which a batch is sent, bytes; well below the buffer of a socket."""
 
 SendBatch = Callable[[bytes], None]
@@ -49,7 +49,7 @@ class Batch:
         """Add a message; send the batch if it is full."""
         self._collected += _HEAD.pack(_NUMBERS[topic], time_ns, len(data))
         self._collected += data
-        if len(self._collected) > _FULL:
+        if len(self._collected) > _FULL_BATCH:
             self.send()
 
     def send(self) -> None:

@@ -1,6 +1,7 @@
 """The course of a flight: phases, end, and the circumstances that the verdict considers."""
 
 from dataclasses import dataclass, field
+from math import degrees
 from typing import Any
 
 
@@ -53,7 +54,8 @@ class Course:
         unheard: how long the vehicle was silent at the end, s, so that `armed` and `mode` may have
             changed since; None: it was heard.
         battery: remaining charge, 0..1, at take-off and at the end; None: unknown.
-        min_battery: smallest share allowed, `limits.min_battery_percent`.
+        min_battery: smallest remaining charge allowed, 0..1, `limits.min_battery_percent`.
+        max_tilt: largest tilt of a target, `limits.max_tilt_deg`, rad; None: unknown.
         deadline: longest latency allowed, `deadman.deadline_ms`, s.
         lockstep: whether the flight ran in vehicle time (in lockstep or on a virtual clock); then
             latencies are meaningless.
@@ -74,6 +76,7 @@ class Course:
     unheard: float | None = None
     battery: tuple[float | None, float | None] = (None, None)
     min_battery: float = 0.0
+    max_tilt: float | None = None
     deadline: float = 0.004
     lockstep: bool = False
     advice: tuple[str, ...] = ()
@@ -99,6 +102,7 @@ class Course:
             "battery": {"takeoff": begin, "end": end, "min": self.min_battery},
             "advice": list(self.advice),
             "gain_warning": self.gain_warning,
+            "max_tilt_deg": None if self.max_tilt is None else _rounded(degrees(self.max_tilt)),
             "settings": self.settings,
             "changes": list(self.changes),
         }

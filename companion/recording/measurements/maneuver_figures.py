@@ -114,6 +114,14 @@ def settled_parts(rows: Floats, marks: Sequence[ManeuverMark]) -> list[Floats]:
     return [part[part[:, 0] >= part[0, 0] + _beginning(part)] for part in parts]
 
 
+def in_maneuvers(vehicle_times: Floats, marks: Sequence[ManeuverMark]) -> NDArray[np.bool_]:
+    """Whether each vehicle time (N,), s, lies in a maneuver; not if it is NaN."""
+    begins = np.array([mark.vehicle_time for mark in marks])
+    flown = np.array([False, *(mark.name is not None for mark in marks)])
+    inside = flown[np.searchsorted(begins, vehicle_times, side="right")]
+    return np.asarray(inside & ~np.isnan(vehicle_times))
+
+
 def _parts(rows: Floats, marks: Sequence[ManeuverMark]) -> Iterator[tuple[ManeuverMark, Floats]]:
     """Each maneuver that was flown, with its rows."""
     ends = [*(mark.vehicle_time for mark in marks[1:]), inf]

@@ -21,10 +21,13 @@ from companion.recording.trace import FlightTrace
 _MOST_BYTES = 1 << 26
 """Largest `summary.json` that is read, bytes."""
 _AXES = "roll", "pitch", "yaw"
-_SENT = ["received_s", *(f"commanded_{axis}_rad_s" for axis in _AXES), "thrust"]
-_STEP = ["q_w", "q_x", "q_y", "q_z", "target_north", "target_east"]
+_SETPOINT_COLUMNS = ["received_s", *(f"commanded_{axis}_rad_s" for axis in _AXES), "thrust"]
+"""Columns of the channel "setpoint" that become columns of `FlightTrace.rates`."""
+_STEP_COLUMNS = ["q_w", "q_x", "q_y", "q_z", "target_north", "target_east"]
+"""Columns of the channel "setpoint" that become columns of `FlightTrace.response`."""
 _REFUSALS = ("invalid_attitude", "invalid_setpoint", "not_sent")
-_KEYS = frozenset(
+"""Reasons of unanswered samples that count as `LoopCounts.refused`."""
+_REQUIRED_KEYS = frozenset(
     (
         *("result", "planner", "phases", "maneuvers", "early_end", "samples", "unanswered"),
         *("link", "latency_us", "response", "extent", "battery", "deadline_ms", "lockstep"),
@@ -46,7 +49,7 @@ def summary_of(record: FlightRecord) -> tuple[dict[str, Any], bool]:
     Raises:
         RecordError: the record is not valid.
     """
-    written = _written(record.folder / "summary.json")
+    written = _written_summary(record.folder / "summary.json")
     return (derived_summary(record), True) if written is None else (written, False)
 
 
@@ -84,8 +87,9 @@ def _summary_from_record(record: FlightRecord) -> Summary:
             phases=tuple((each.time, each.name) for each in record.phases),
             takeoff=takeoff,
             early_end=_early_end(record, phase, takeoff),
-            battery=(None, _last(thrust["battery_remaining"])),
+            battery=(None, _last_known(thrust["battery_remaining"])),
             min_battery=float(flight.get("min_battery", "0")),
+            max_tilt=float(flight["max_tilt_rad"]) if "max_tilt_rad" in flight else None,
             deadline=float(flight.get("deadline_s", "0.004")),
             lockstep=flight.get("real_time") == "no",
         ),
@@ -114,10 +118,10 @@ def _trace(record: FlightRecord) -> FlightTrace:
         trace.add_latency(round(1e3 * float(row["latency_us"])))
         time = float(row["vehicle_time_s"])
         if row["offboard_active"] and number >= 0:  # else its sample was not recorded
-            sent = row[_SENT].tolist()
+            sent = row[_SETPOINT_COLUMNS].tolist()
             trace.rates.add([time, *sent, *measured[number].tolist(), float(ages[number])])
         if row["is_step"]:
-            trace.response.add([time, *row[_STEP].tolist()])
+            trace.response.add([time, *row[_STEP_COLUMNS].tolist()])
     for row in tracking_rows(guidance):
         trace.tracking.add(row.tolist())
     for row in record.rows("motion").tolist():
@@ -161,7 +165,7 @@ def _counts(record: FlightRecord, deadline: float) -> LoopCounts:
         missed_deadlines=int((setpoint["latency_us"] > 1e6 * deadline).sum()),
         stale=sum(unanswered.values()) - refused,
         refused=refused,
-        rate_hz=_rate(record),
+        rate_hz=_setpoint_rate(record),
         unanswered=unanswered,
     )
 
@@ -188,7 +192,7 @@ def _takeoff(record: FlightRecord) -> float | None:
     return float(left[0]) if len(left) else None
 
 
-def _rate(record: FlightRecord) -> float:
+def _setpoint_rate(record: FlightRecord) -> float:
     """Rate of setpoints in vehicle time from the first maneuver on, Hz."""
     begun = [mark.vehicle_time for mark in record.maneuvers if mark.name is not None]
     times = record.rows("setpoint")["vehicle_time_s"]
@@ -197,15 +201,15 @@ def _rate(record: FlightRecord) -> float:
     return (len(times) - 1) / span if span > 0.0 else 0.0
 
 
-def _last(values: NDArray[np.float64]) -> float | None:
+def _last_known(values: NDArray[np.float64]) -> float | None:
     known = values[~np.isnan(values)]
     return float(known[-1]) if len(known) else None
 
 
-def _written(path: Path) -> dict[str, Any] | None:
+def _written_summary(path: Path) -> dict[str, Any] | None:
     """`summary.json`; None if it is missing, incomplete, or of another version."""
     try:
         found = json.loads(read_text(path, _MOST_BYTES))
     except (FileRefusedError, ValueError, RecursionError):
         return None
-    return found if isinstance(found, dict) and found.keys() >= _KEYS else None
+    return found if isinstance(found, dict) and found.keys() >= _REQUIRED_KEYS else None

@@ -1,6 +1,8 @@
 """The measured response to acceleration steps, compared with linear models."""
 
 from dataclasses import dataclass
+from math import asin, degrees, isnan, nan
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +30,8 @@ class StepResponse:
             squares), s; NaN: no step goes north or south.
         time_constant_east_s: the same for a_E, east or west.
         step_size: largest change of the coefficients that steps commanded, from the beginning of
-            their run; from level, it is the sine of the tilt.
+            their run; in wind that is not level.
+        asked_tilt: largest tilt of a target, rad, before the tilt limit of the planner.
         cross_axis_max: straightness: largest distance from the line of a step.
         model_deviation_max: largest distance from the ideal model ċ = p·(c_d − c).
         second_order: the second-order model with a dead time that fits best.
@@ -38,6 +41,7 @@ class StepResponse:
     time_constant_north_s: float
     time_constant_east_s: float
     step_size: float
+    asked_tilt: float
     cross_axis_max: float
     model_deviation_max: float
     second_order: SecondOrderFit
@@ -59,11 +63,43 @@ def measure_response(rows: Floats, gain: float) -> StepResponse | None:
         time_constant_north_s=_time_constant(runs, 0, 1.0 / gain),
         time_constant_east_s=_time_constant(runs, 1, 1.0 / gain),
         step_size=max(run.size for run in runs),
+        asked_tilt=asin(min(1.0, max(_longest(run.target) for run in runs))),
         cross_axis_max=max(_largest_deviation(step) for run in runs for step in run.steps()),
-        model_deviation_max=max(_distance(run, first_order(run, 1.0 / gain)) for run in runs),
+        model_deviation_max=max(
+            _largest_distance(run, first_order(run, 1.0 / gain)) for run in runs
+        ),
         second_order=second_order,
-        second_order_deviation_max=max(_distance(run, second_order.path(run)) for run in runs),
+        second_order_deviation_max=max(
+            _largest_distance(run, second_order.path(run)) for run in runs
+        ),
     )
+
+
+def response_as_dict(response: StepResponse | None) -> dict[str, Any]:
+    """The response as JSON; null for what was not measured, such as an axis without a step."""
+    if response is None:
+        model = dict.fromkeys(("frequency_rad_s", "damping", "dead_time_s", "deviation_max"))
+        names = "step_size", "asked_tilt_deg", "cross_axis_max", "model_deviation_max"
+        constants = dict.fromkeys(("north", "east"))
+        return {"time_constant_s": constants, **dict.fromkeys(names), "second_order": model}
+    north, east = response.time_constant_north_s, response.time_constant_east_s
+    fit = response.second_order
+    return {
+        "time_constant_s": {
+            "north": None if isnan(north) else north,
+            "east": None if isnan(east) else east,
+        },
+        "step_size": response.step_size,
+        "asked_tilt_deg": degrees(response.asked_tilt),
+        "cross_axis_max": response.cross_axis_max,
+        "model_deviation_max": response.model_deviation_max,
+        "second_order": {
+            "frequency_rad_s": fit.frequency,
+            "damping": fit.damping,
+            "dead_time_s": fit.dead_time,
+            "deviation_max": response.second_order_deviation_max,
+        },
+    }
 
 
 def first_order(run: StepRun, time_constant: float) -> Floats:
@@ -83,8 +119,13 @@ def _first_order(steps: list[StepRun], time_constant: float) -> Floats:
     return np.concatenate(parts)
 
 
-def _distance(run: StepRun, model: Floats) -> float:
-    return float(np.hypot(*(run.measured - model).T).max())
+def _largest_distance(run: StepRun, model: Floats) -> float:
+    return _longest(run.measured - model)
+
+
+def _longest(coefficients: Floats) -> float:
+    """The largest length of coefficients (n, 2)."""
+    return float(np.hypot(*coefficients.T).max())
 
 
 def _largest_deviation(step: StepRun) -> float:
@@ -106,7 +147,7 @@ def _time_constant(runs: list[StepRun], axis: int, start: float) -> float:
         if np.abs(run.changes[:, axis]).max() > _MIN_SHARE * run.size
     ]
     if not stepped:
-        return float("nan")
+        return nan
 
     steps = [run.steps() for run in stepped]
     measured = np.concatenate([run.measured for run in stepped])

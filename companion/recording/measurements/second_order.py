@@ -12,10 +12,10 @@ from companion.least_squares import minimise, project
 
 Floats = NDArray[np.float64]
 
-_GAP = 0.5
+_LONGEST_GAP = 0.5
 """Rows further apart than this belong to different runs, s."""
-_FEWEST = 10
-"""A run has more rows than this."""
+_TOO_FEW = 10
+"""Runs with this number of rows or fewer are left out."""
 
 
 _COMPASS = (
@@ -73,7 +73,7 @@ def step_runs(rows: Floats) -> list[StepRun]:
     """The runs in rows (N, 7) of `FlightTrace.response`, without those too short to measure."""
     if len(rows) == 0:
         return []
-    parts = np.split(rows, np.flatnonzero(np.diff(rows[:, 0]) > _GAP) + 1)
+    parts = np.split(rows, np.flatnonzero(np.diff(rows[:, 0]) > _LONGEST_GAP) + 1)
     return [
         StepRun(
             part[:, 0],
@@ -81,7 +81,7 @@ def step_runs(rows: Floats) -> list[StepRun]:
             part[:, 5:7],
         )
         for part in parts
-        if len(part) > _FEWEST
+        if len(part) > _TOO_FEW
     ]
 
 
@@ -92,8 +92,8 @@ _LAG, _DAMPING, _DEAD_TIME = (0.02, 4.0), (0.2, 10.0), (0.0, 0.5)
 _TRIED_LAGS, _TRIED_DAMPINGS = np.geomspace(0.05, 1.0, 5), (0.7, 1.5)
 _TRIED_DEAD_TIMES = (0.0, 0.04, 0.1, 0.2)
 _BEFORE_EFFECT = 0.03
-"""Time after the first step in which it is assumed to have no effect, s. It gives the coefficients
-and the speed from which the model starts."""
+"""Time after the first change of the target in which it is assumed to have no effect, s. The rows
+in this time give the coefficients and the speed from which the model starts."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,20 +9,27 @@ from typing import Any
 
 import numpy as np
 
+from companion.attitude.kinematics import tilt_angle
 from companion.recording.measurements.course import Course
 from companion.recording.measurements.dead_time import DeadTimes
 from companion.recording.measurements.maneuver_figures import (
     ManeuverFigures,
+    in_maneuvers,
     measure_maneuvers,
     rms,
 )
-from companion.recording.measurements.response import StepResponse, measure_response
+from companion.recording.measurements.response import (
+    StepResponse,
+    measure_response,
+    response_as_dict,
+)
 from companion.recording.measurements.verdict import checks, is_good
 from companion.recording.trace import FlightTrace
 
 _ROLL_AND_PITCH = [0, 6, 7]
 """Columns of `FlightTrace.rates`: vehicle time, measured roll and pitch rate."""
-_EXTENT = ("height_max_m", "speed_max_m_s", "tilt_max_deg")
+_HEIGHT, _SPEED, _TILT = 2, 3, 4
+"""Columns of `FlightTrace.motion`: height, speed, tilt."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,16 +143,20 @@ class Summary:
         return measure_maneuvers(trace.tracking_rows(), rates, trace.maneuvers, self.course.began)
 
     def extent(self) -> dict[str, float]:
-        """The largest height (m), speed (m/s) and tilt (°) under control, and its time (s)."""
+        """The largest height (m), speed (m/s) and tilt (°), and the time under control (s).
+
+        Speed and tilt are given for the whole flight and for its maneuvers. They come from rows ten
+        times a second; during steps, the tilt comes from every sample.
+        """
         rows, tracked = self.trace.motion.rows(), self.trace.tracking_rows()
-        begin, end = (tracked[0, 0], tracked[-1, 0]) if len(tracked) else (math.inf, -math.inf)
-        controlled = rows[(begin <= rows[:, 1]) & (rows[:, 1] <= end), 2:5]
-        largest = [column[~np.isnan(column)].max(initial=-math.inf) for column in controlled.T]
+        maneuvers = rows[in_maneuvers(rows[:, 1], self.trace.maneuvers)]
+        tilts = np.degrees([tilt_angle(row[2], row[3]) for row in self.trace.response_rows()])
         return {
-            **{
-                key: float(value) if math.isfinite(value) else math.nan
-                for key, value in zip(_EXTENT, largest, strict=True)
-            },
+            "height_max_m": _largest(rows[:, _HEIGHT]),
+            "speed_max_m_s": _largest(rows[:, _SPEED]),
+            "tilt_max_deg": _largest(rows[:, _TILT], tilts),
+            "maneuver_speed_max_m_s": _largest(maneuvers[:, _SPEED]),
+            "maneuver_tilt_max_deg": _largest(maneuvers[:, _TILT], tilts),
             "under_control_s": float(tracked[-1, 0] - tracked[0, 0]) if len(tracked) else 0.0,
         }
 
@@ -164,7 +175,7 @@ class Summary:
             "unanswered": self.counts.unanswered,
             "rate_hz": self.counts.rate_hz,
             "latency_us": _without_nan(self.latency_us()),
-            "response": _response_as_dict(self.response()),
+            "response": response_as_dict(self.response()),
             "dead_time_s": _dead_times_as_dict(self.dead_times),
             "tracking": _without_nan(self.tracking()),
             "maneuvers": [figures.as_dict() for figures in self.maneuvers()],
@@ -201,40 +212,19 @@ def tracking_errors(rows: "np.ndarray[Any, np.dtype[np.float64]]") -> dict[str, 
     }
 
 
-def _response_as_dict(response: StepResponse | None) -> dict[str, Any]:
-    if response is None:
-        return {
-            "time_constant_s": dict.fromkeys(("north", "east")),
-            "step_size": None,
-            "cross_axis_max": None,
-            "model_deviation_max": None,
-            "second_order": dict.fromkeys(
-                ("frequency_rad_s", "damping", "dead_time_s", "deviation_max")
-            ),
-        }
-    model = response.second_order
-    return {
-        "time_constant_s": _without_nan(
-            {"north": response.time_constant_north_s, "east": response.time_constant_east_s}
-        ),
-        "step_size": response.step_size,
-        "cross_axis_max": response.cross_axis_max,
-        "model_deviation_max": response.model_deviation_max,
-        "second_order": {
-            "frequency_rad_s": model.frequency,
-            "damping": model.damping,
-            "dead_time_s": model.dead_time,
-            "deviation_max": response.second_order_deviation_max,
-        },
-    }
-
-
 def _dead_times_as_dict(dead_times: DeadTimes) -> dict[str, float | None]:
     age = dead_times.sample_age
     return {
         **{name: axis.measured for name, axis in dead_times.axes.items()},
         **_without_nan({"sample_age_p50": age.p50, "sample_age_p99": age.p99}),
     }
+
+
+def _largest(*columns: "np.ndarray[Any, np.dtype[np.float64]]") -> float:
+    """The largest number of all columns (n,); NaN: they contain none."""
+    values = np.concatenate(columns)
+    known = values[~np.isnan(values)]
+    return float(known.max()) if len(known) else math.nan
 
 
 def _without_nan(values: dict[str, float]) -> dict[str, float | None]:

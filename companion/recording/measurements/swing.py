@@ -35,9 +35,9 @@ _LONG_HOVER, _SHORT_HOVER = _Rule(5.0, 2.0, 1, 2.5), _Rule(2.9, 1.0, 1, 1.25)
 _MOVING = _Rule(4.0, 1.0, 2, 1.25)
 SHORTEST = _SHORT_HOVER.shortest
 """Shortest part of a flight in which a swing can be measured, s."""
-_LONGEST_STEP = 0.05
+_LONGEST_SAMPLE_PERIOD = 0.05
 """Longest time between samples, s."""
-_PEAK = 0.9
+_PEAK_SHARE = 0.9
 """The first peak of at least this share of the highest one gives the period, because multiples of
 the period also have peaks.
 """
@@ -75,7 +75,9 @@ def measure_swing(time: Floats, rates: Floats, *, at_rest: bool) -> Swing:
         return NOT_MEASURED
     step = float(np.median(np.diff(time)))
     count = duration / step if step > 0.0 else np.inf
-    if step > _LONGEST_STEP or count > 2 * len(time):  # too few samples, or their clock jumped
+    if step > _LONGEST_SAMPLE_PERIOD or count > 2 * len(
+        time
+    ):  # too few samples, or their clock jumped
         return NOT_MEASURED
     even = np.arange(time[0], time[-1], step)
     turned = np.column_stack([np.interp(even, time, column) for column in rates.T]) * step
@@ -90,7 +92,7 @@ def measure_swing(time: Floats, rates: Floats, *, at_rest: bool) -> Swing:
     later = correlation[opposite[0] :] if len(opposite) else correlation[:0]
     if not later.max(initial=-1.0) > 0.0:
         return Swing(rms, nan, 0.0)
-    peaks = np.flatnonzero(later >= _PEAK * later.max())
+    peaks = np.flatnonzero(later >= _PEAK_SHARE * later.max())
     # From the first point that is high enough, up to the top of its own peak.
     top = int(peaks[0])
     while top + 1 < len(later) and later[top + 1] > later[top]:
@@ -107,7 +109,10 @@ def _without_slow_motion(angles: Floats, half: int) -> Floats:
 
 
 def _autocorrelation(angles: Floats) -> Floats:
-    """(M,) of both angles together, 1 at lag 0, without bias at long lags."""
+    """Autocorrelation (N,) of both angles (N, 2) together, by lag in rows: 1 at lag 0.
+
+    It is unbiased: at long lags it is divided by the number of rows that overlap.
+    """
     count = len(angles)
     spectrum = np.fft.rfft(angles - angles.mean(axis=0), 2 * count, axis=0)
     products = np.fft.irfft((np.abs(spectrum) ** 2).sum(axis=1))[:count]

@@ -1,6 +1,7 @@
 """Whether a flight was good: compares the figures of `--json` with their limits."""
 
 from collections.abc import Iterator, Mapping
+from math import radians, sin
 from typing import Any, NamedTuple
 
 from companion.attitude.planner import MODEL_FOLLOWING
@@ -23,9 +24,9 @@ STRAIGHTNESS = 0.03
 """Largest distance from a step's line, as a share of the step."""
 MODEL_DEVIATION = 0.20
 """Largest distance from the nearest second-order model, as a share of the step."""
-UNANSWERED = 0.01
+UNANSWERED_SAMPLES = 0.01
 """Largest share of attitude samples without an answer."""
-LOST = 0.02
+LOST_FRAMES = 0.02
 """Largest share of the vehicle's frames that may be lost."""
 BATTERY_MARGIN = 0.10
 """Charge required at the end beyond `limits.min_battery_percent`, 0..1."""
@@ -33,8 +34,6 @@ BATTERY_MARGIN = 0.10
 
 LOST_ROWS = "rows of the flight's figures were lost"
 """Words that mark the advice about lost rows; their cause is the disk, not the configuration."""
-CUT_STEP = "cut a step that asked for a tilt of"
-"""Words that mark the advice about a step beyond the tilt limit."""
 
 
 class Check(NamedTuple):
@@ -125,13 +124,14 @@ def _steps(figures: Figures) -> Iterator[Check]:
     size, across = response["step_size"], response["cross_axis_max"]
     if not size or across is None:
         return
-    is_cut = any(CUT_STEP in text for text in figures["advice"])
     limit, deviation_limit = STRAIGHTNESS * size, MODEL_DEVIATION * size
+    cut = cut_steps(figures)
+    yield from cut
     yield Check(
         "straightness of the steps",
         f"{across:.4f} from their lines (limit {limit:.4f})",
         across <= limit,
-        _IN_A_CUT_STEP if is_cut else _straightness_remedy(figures["planner"]),
+        _straightness_remedy(figures["planner"], cut=bool(cut)),
     )
     deviation = response["second_order"]["deviation_max"]
     if deviation is None:
@@ -140,25 +140,45 @@ def _steps(figures: Figures) -> Iterator[Check]:
         "linearity of the steps",
         f"{deviation:.3f} from the nearest second-order model (limit {deviation_limit:.3f})",
         deviation <= deviation_limit,
-        _IN_A_CUT_STEP
-        if is_cut
+        "mend the cut step first: it distorts the response"
+        if cut
         else "a rate limit distorts large steps: lower steps.coefficient or raise "
         "limits.max_tilt_rate_deg_s",
     )
 
 
-_IN_A_CUT_STEP = "the tilt limit cut a step, see below"
+def cut_steps(figures: Figures) -> list[Check]:
+    """A failed check if the tilt limit cut a step by more than `STRAIGHTNESS`; else empty."""
+    response, limit = figures["response"], figures.get("max_tilt_deg")
+    asked = response.get("asked_tilt_deg")
+    if asked is None or limit is None:  # nothing was measured, or the summary is older
+        return []
+    # A coefficient is the sine of a tilt.
+    if sin(radians(asked)) - sin(radians(limit)) <= STRAIGHTNESS * response["step_size"]:
+        return []
+    return [
+        Check(
+            "tilt of the steps",
+            f"the tilt limit cut a step, which asked for {asked:.1f}° (limits.max_tilt_deg: "
+            f"{limit:g})",
+            good=False,
+            remedy="lower steps.coefficient or the corners' coefficients, fly in less wind, or "
+            "raise limits.max_tilt_deg",
+        )
+    ]
 
 
-def _straightness_remedy(planner: str) -> str:
-    if planner != MODEL_FOLLOWING:
+def _straightness_remedy(planner: str, *, cut: bool) -> str:
+    if cut:
+        return "mend the cut step first: it bends the line"
+    if planner == MODEL_FOLLOWING:
         return (
-            f"run `companion identify` and fly planner.name: {MODEL_FOLLOWING} with the "
-            "lag and dead time that it finds"
+            "measure vehicle.lag_ms and vehicle.dead_time_ms anew with `companion identify`, lower "
+            "planner.gain_per_s, or fly in less wind"
         )
     return (
-        "run `companion identify`, if vehicle.* does not hold this vehicle's own lag and dead time;"
-        " otherwise fly in calmer air, or lower steps.coefficient"
+        f"run `companion identify` and fly planner.name: {MODEL_FOLLOWING} with the lag and dead "
+        "time that it finds"
     )
 
 
@@ -167,16 +187,16 @@ def _answers(figures: Figures) -> Iterator[Check]:
     if samples:
         yield Check(
             "attitude samples",
-            f"{unanswered} of {samples} unanswered (limit {100.0 * UNANSWERED:g} %)",
-            unanswered <= UNANSWERED * samples,
+            f"{unanswered} of {samples} unanswered (limit {100.0 * UNANSWERED_SAMPLES:g} %)",
+            unanswered <= UNANSWERED_SAMPLES * samples,
             "the line `unanswered samples` names the reasons",
         )
     frames, lost = figures["link"].get("frames", 0), figures["link"].get("lost", 0)
     if frames:
         yield Check(
             "link",
-            f"{lost} of {frames + lost} frames lost (limit {100.0 * LOST:g} %)",
-            lost <= LOST * (frames + lost),
+            f"{lost} of {frames + lost} frames lost (limit {100.0 * LOST_FRAMES:g} %)",
+            lost <= LOST_FRAMES * (frames + lost),
             "raise the baud rate, lower the rates of other streams, or mend the radio link",
         )
 
