@@ -164,7 +164,7 @@ def failed_checks(figures: Mapping[str, Any]) -> str:
     Advice on the configuration does not count, because a campaign sweeps wrong values on purpose.
     """
     return "; ".join(
-        dict.fromkeys(check["what"] for check in figures["verdict"]["checks"] if not check["good"])
+        dict.fromkeys(check["fault"] for check in figures["verdict"]["checks"] if not check["good"])
     )
 
 

@@ -22,6 +22,10 @@ class Airframe:
     mock: dict = field(default_factory=dict)
     estimated: bool = True
 
+    def differs(self, vehicle: str) -> bool:
+        """Whether this describes another airframe than the stock one for that vehicle."""
+        return bool(self.mock if vehicle.startswith("mock-") else getattr(self, vehicle))
+
     def arguments(self, autopilot: str, folder: Path) -> list[str]:
         """Of the autopilot's `start`; parameters of ArduPilot go by a file in `folder`."""
         if autopilot == "px4":

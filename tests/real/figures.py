@@ -126,7 +126,10 @@ def _options():
     )  # fmt: skip
     parser.add_argument("--start", action="append", help="more arguments of `start`, one each")
     parser.add_argument("--out", type=Path, default=Path("flights") / "real")
-    return parser.parse_args()
+    options = parser.parse_args()
+    if options.airframe != "stock" and not AIRFRAMES[options.airframe].differs(options.vehicle):
+        parser.error(f"the airframe {options.airframe} is not described for {options.vehicle}")
+    return options
 
 
 def _changed(settings: list[str]) -> dict:

@@ -44,12 +44,14 @@ class Check(NamedTuple):
         found: the figure and its limit, in words.
         good: whether it is within the limit.
         remedy: what to do if it is not within the limit.
+        fault: what is wrong if it is not within the limit, without figures, to count such flights.
     """
 
     what: str
     found: str
     good: bool
     remedy: str
+    fault: str
 
 
 def checks(figures: Figures) -> list[Check]:
@@ -83,6 +85,7 @@ def _maneuvers(figures: Figures) -> Iterator[Check]:
                 f"at most {maneuver['level_max_m']:.2f} m",
                 level <= limit,
                 "fly it slower; against wind and drag see guidance and `companion identify`",
+                f"{maneuver['name']}: too far from its path",
             )
         if height is not None:
             yield Check(
@@ -90,6 +93,7 @@ def _maneuvers(figures: Figures) -> Iterator[Check]:
                 f"{height:.2f} m RMS in height (limit {HEIGHT_RMS:.2f} m)",
                 height <= HEIGHT_RMS,
                 _height_remedy(height, maneuver.get("height_mean_m")),
+                f"{maneuver['name']}: too far from its height",
             )
         yield from _swing(maneuver)
 
@@ -116,6 +120,7 @@ def _swing(maneuver: Mapping[str, Any]) -> Iterator[Check]:
         rms <= SWING_RMS or not regular,
         "lower planner.gain_per_s or the weights guidance.position_weight_per_s4 and "
         "velocity_weight_per_s2; `companion check-config` names the largest sensible gain",
+        f"{maneuver['name']}: it swings",
     )
 
 
@@ -132,6 +137,7 @@ def _steps(figures: Figures) -> Iterator[Check]:
         f"{across:.4f} from their lines (limit {limit:.4f})",
         across <= limit,
         _straightness_remedy(figures["planner"], cut=bool(cut)),
+        "steps not straight",
     )
     deviation = response["second_order"]["deviation_max"]
     if deviation is None:
@@ -144,6 +150,7 @@ def _steps(figures: Figures) -> Iterator[Check]:
         if cut
         else "a rate limit distorts large steps: lower steps.coefficient or raise "
         "limits.max_tilt_rate_deg_s",
+        "steps not linear",
     )
 
 
@@ -164,6 +171,7 @@ def cut_steps(figures: Figures) -> list[Check]:
             good=False,
             remedy="lower steps.coefficient or the corners' coefficients, fly in less wind, or "
             "raise limits.max_tilt_deg",
+            fault="the tilt limit cut a step",
         )
     ]
 
@@ -190,6 +198,7 @@ def _answers(figures: Figures) -> Iterator[Check]:
             f"{unanswered} of {samples} unanswered (limit {100.0 * UNANSWERED_SAMPLES:g} %)",
             unanswered <= UNANSWERED_SAMPLES * samples,
             "the line `unanswered samples` names the reasons",
+            "too many samples unanswered",
         )
     frames, lost = figures["link"].get("frames", 0), figures["link"].get("lost", 0)
     if frames:
@@ -198,6 +207,7 @@ def _answers(figures: Figures) -> Iterator[Check]:
             f"{lost} of {frames + lost} frames lost (limit {100.0 * LOST_FRAMES:g} %)",
             lost <= LOST_FRAMES * (frames + lost),
             "raise the baud rate, lower the rates of other streams, or mend the radio link",
+            "too many frames lost",
         )
 
 
@@ -211,6 +221,7 @@ def _latency(figures: Figures) -> Iterator[Check]:
         f"{1e-3 * late:.2f} ms in 99 % of the answers (deadline {deadline:g} ms)",
         1e-3 * late <= deadline,
         "end other programs on this computer, or set realtime.scheduler: fifo",
+        "answers too late",
     )
 
 
@@ -225,4 +236,5 @@ def _battery(figures: Figures) -> Iterator[Check]:
         f"{100.0 * end:.0f} % at the end (at least {100.0 * limit:.0f} %)",
         end >= limit,
         "charge it before the next flight: below limits.min_battery_percent the vehicle lands",
+        "battery nearly empty",
     )
