@@ -17,8 +17,8 @@ from typing import Any, TypedDict
 
 from pydantic import ValidationError
 
-from sitl_mock.config.faults import fault_adapter
-from sitl_mock.config.section import ConfigError
+from sitl_mock.config.faults import Fault, fault_adapter
+from sitl_mock.config.section import ConfigError, wrong_member
 from sitl_mock.physics.quaternion import Quaternion, Vector
 from sitl_mock.simulation import Simulation
 
@@ -80,8 +80,8 @@ def add_fault(simulation: Simulation, fault: Mapping[str, Any]) -> None:
     except ValidationError as error:
         detail = error.errors()[0]
         where = ".".join(str(part) for part in detail["loc"])
-        problem = f"fault {where}: {detail['msg']}".replace("fault :", "fault:")
-        raise ConfigError(problem) from error
+        refused = wrong_member(detail, Fault) or f" {where}: {detail['msg']}"
+        raise ConfigError(f"fault{refused}") from error
     simulation.faults.add(valid, simulation.time_us)
 
 

@@ -1,6 +1,7 @@
 """`companion config`, `companion init` and `companion check-config`."""
 
 import argparse
+import difflib
 import sys
 from pathlib import Path
 
@@ -44,10 +45,24 @@ def _found(config: Config, name: str) -> list[ConfigKey]:
     known = list(keys(config))
     found = [key for key in known if name in (key.section, f"{key.section}.{key.name}")]
     if not found:
-        near = [f"{key.section}.{key.name}" for key in known if name in key.name]
+        near = _near(known, name)
         hint = f"did you mean {', '.join(near)}?" if near else "`companion config` prints them all"
         raise ConfigError(f"--get: there is no key `{name}`; {hint}")
     return found
+
+
+def _near(known: list[ConfigKey], name: str) -> list[str]:
+    """The keys whose names contain a mistyped one, else the nearest section or keys."""
+    dotted = {f"{key.section}.{key.name}": key for key in known}
+    containing = [each for each, key in dotted.items() if name in key.name]
+    if containing:
+        return containing
+    meant: dict[str, list[str]] = {key.section: [key.section] for key in known}
+    for each, key in dotted.items():
+        meant[each] = [each]
+        meant.setdefault(key.name, []).append(each)  # several sections may have such a key
+    nearest = difflib.get_close_matches(name, meant, n=1)
+    return meant[nearest[0]] if nearest else []
 
 
 def init(options: argparse.Namespace) -> int:

@@ -40,9 +40,10 @@ def compare(options: argparse.Namespace) -> int:
 def _write(make: Callable[[], Path]) -> int:
     """Call `make`, and print the path of the page that it has written."""
     try:
-        print(make())
+        page = make()
     except OSError as error:
         raise ConfigError(f"{error.filename}: cannot write there: {error.strerror}") from error
+    print(page)
     return EXIT_OK
 
 
@@ -55,10 +56,11 @@ def export(options: argparse.Namespace) -> int:
     write = export_parquet if options.parquet else export_csv
     try:
         into.mkdir(parents=True, exist_ok=True)
-        for path, rows in write(record, into).items():
-            print(f"{path}  {rows:,} rows")
+        written = write(record, into)
     except OSError as error:
         raise ConfigError(f"{into}: cannot write there: {error.strerror}") from error
+    for path, rows in written.items():
+        print(f"{path}  {rows:,} rows")
     return EXIT_OK
 
 

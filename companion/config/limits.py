@@ -1,5 +1,6 @@
 """Limits of commands, and of the age of data."""
 
+from math import tan
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -7,6 +8,7 @@ from pydantic import Field, model_validator
 from companion.config.markers import ANY, LOWERED
 from companion.config.units import Si
 from companion.files.yaml_file import Section
+from companion.guidance.reference import GRAVITY
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
@@ -53,6 +55,11 @@ class LimitsConfig(Section):
     max_yaw_rate = Si("max_yaw_rate_deg_s")
     recovery_angle = Si("recovery_angle_deg")
     min_battery = Si("min_battery_percent")
+
+    @property
+    def largest_horizontal(self) -> float:
+        """Largest horizontal acceleration by `max_tilt` at constant height, m/s²."""
+        return GRAVITY * tan(self.max_tilt)
 
     @model_validator(mode="after")
     def _consistent(self) -> "LimitsConfig":

@@ -141,6 +141,14 @@ def _contradictions(config: Config) -> list[tuple[bool, str]]:
             "√(north² + east²) of corners' coefficients must not exceed the sine of "
             "limits.max_tilt_deg",
         ),
+        (
+            "trajectory" in flown
+            and config.flight.slow_down
+            and config.flight.slow_down_reserve_m_s2 >= limits.largest_horizontal,
+            f"flight.slow_down_reserve_m_s2 {config.flight.slow_down_reserve_m_s2:g} must be less "
+            f"than the {limits.largest_horizontal:.2f} m/s² that limits.max_tilt_deg "
+            f"{limits.max_tilt_deg:g} gives; lower it",
+        ),
         *(_identify_contradictions(config) if "identify" in flown else ()),
     ]
 

@@ -1,6 +1,6 @@
 """Builds the inner loop from the configuration: planner, limits, thrust, vehicle response."""
 
-from math import inf, tan
+from math import inf
 from typing import Any
 
 from companion import plugins
@@ -118,11 +118,6 @@ def thrust_limits(config: Config) -> tuple[float, float]:
     """Smallest and largest specific thrust by the configured hover thrust, m/s²."""
     full = full_thrust(config)
     return config.limits.min_thrust * full, config.limits.max_thrust * full
-
-
-def largest_horizontal(config: Config) -> float:
-    """Largest horizontal acceleration by `limits.max_tilt` at constant height, m/s²."""
-    return GRAVITY * tan(config.limits.max_tilt)
 
 
 def tilt_response(config: Config) -> InnerResponse:

@@ -10,7 +10,6 @@ from companion.config.known_drag import drag_prior
 from companion.control.hold_settings import correction_settings, hold_gains, observer_settings
 from companion.control.inner_loop import (
     heading_response,
-    largest_horizontal,
     plugin,
     slower_tilt,
     thrust_limits,
@@ -81,7 +80,7 @@ def linear_settings(config: Config) -> LinearSettings:
         ),
         tilt=tilt,
         heading=heading,
-        max_horizontal=largest_horizontal(config),
+        max_horizontal=limits.largest_horizontal,
         thrust_lag=config.thrust.lag,
         period=period,
     )

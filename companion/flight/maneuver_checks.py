@@ -11,7 +11,7 @@ import numpy as np
 
 from companion.config import Config
 from companion.config.known_drag import KnownDrag
-from companion.control.inner_loop import full_thrust, largest_horizontal, thrust_limits
+from companion.control.inner_loop import full_thrust, thrust_limits
 from companion.drag import Drag
 from companion.files.yaml_file import ConfigError
 from companion.flight.fence_check import FenceCheck
@@ -200,8 +200,8 @@ def envelope_of(config: Config, drag: KnownDrag) -> Envelope:
 
 def with_reserve(config: Config, envelope: Envelope) -> Envelope:
     """The limits with less tilt, so that `flight.slow_down_reserve_m_s2` is left."""
-    most = largest_horizontal(config) - config.flight.slow_down_reserve_m_s2
-    return replace(envelope, max_tilt=atan(max(most, 0.0) / GRAVITY))
+    most = config.limits.largest_horizontal - config.flight.slow_down_reserve_m_s2
+    return replace(envelope, max_tilt=atan(most / GRAVITY))
 
 
 def _fence_check(config: Config, origin: Place | None) -> FenceCheck:

@@ -96,7 +96,7 @@ def _follow(config: Config, drag: KnownDrag) -> Follow:
     with named_if_impossible(path):
         if config.flight.slow_down:
             slower = slow_down(trajectory, with_reserve(config, envelope))
-            notes = (*notes, *slowing(trajectory, slower))
+            notes = (*notes, *slowing(trajectory, slower, config.flight.slow_down_reserve_m_s2))
             trajectory = slower.trajectory
         elif broken := violations(trajectory, envelope):
             first = min(broken, key=lambda one: one.slowing_helps)

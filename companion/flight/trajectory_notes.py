@@ -4,6 +4,7 @@ import numpy as np
 
 from companion.guidance.trajectory import SlowDown, SlowedPart, Trajectory
 from companion.guidance.trajectory.demand import sampled
+from companion.guidance.trajectory.feasibility import TILT_LIMIT
 
 _MOST_PARTS_SHOWN = 4
 
@@ -20,8 +21,14 @@ def overview(trajectory: Trajectory) -> str:
     )
 
 
-def slowing(before: Trajectory, slow_down: SlowDown) -> tuple[str, ...]:
-    """Messages: what was slowed down, where, for which limit, and what remains; may be empty."""
+def slowing(before: Trajectory, slow_down: SlowDown, reserve: float) -> tuple[str, ...]:
+    """Messages: what was slowed down, where, for which limit, and what remains; may be empty.
+
+    Args:
+        before: the trajectory before it was slowed down.
+        slow_down: what was slowed down.
+        reserve: horizontal acceleration that was left below the tilt limit, m/s².
+    """
     if not slow_down.parts:
         return ()
     after = slow_down.trajectory
@@ -34,12 +41,12 @@ def slowing(before: Trajectory, slow_down: SlowDown) -> tuple[str, ...]:
         note = (
             f"{before.name} is slowed down evenly, by a factor of {whole.factor:.2f}, because "
             f"{slow_down.reason}; "
-            f"{_tightest_limit(after, whole)}"
+            f"{_tightest_limit(after, whole, reserve)}"
         )
         return (f"{note}; {result}",)
     parts = "; ".join(
         f"from {part.begin:.1f} to {part.end:.1f} s by a factor of up to {part.factor:.2f}, "
-        f"{_tightest_limit(after, part)}"
+        f"{_tightest_limit(after, part, reserve)}"
         for part in slow_down.parts[:_MOST_PARTS_SHOWN]
     )
     more_count = len(slow_down.parts) - _MOST_PARTS_SHOWN
@@ -47,10 +54,13 @@ def slowing(before: Trajectory, slow_down: SlowDown) -> tuple[str, ...]:
     return (f"{before.name} is slowed down where limits ask for it: {parts}", result)
 
 
-def _tightest_limit(trajectory: Trajectory, part: SlowedPart) -> str:
+def _tightest_limit(trajectory: Trajectory, part: SlowedPart, reserve: float) -> str:
     north, east, down = trajectory.at(part.time).position
+    less = ""
+    if reserve and part.limit == TILT_LIMIT:
+        less = f" less flight.slow_down_reserve_m_s2 = {reserve:g}"
     return (
-        f"the tightest limit: {part.limit} at {part.time:.1f} s ({north:.1f} m north, "
+        f"the tightest limit: {part.limit}{less} at {part.time:.1f} s ({north:.1f} m north, "
         f"{east:.1f} m east, {0.0 - down:.1f} m up)"
     )
 

@@ -29,10 +29,11 @@ def read(path: Path) -> FlightData:
     """The flight in a folder, or in a `.tlog` of any program.
 
     Raises:
-        RecordError: the folder holds no record of a flight.
+        RecordError: the folder holds no record of a flight, or `path` is the record itself; the
+            message then says to name its folder.
         LogError: the log cannot be used.
     """
-    is_log = path.is_file() and path.name != FILE  # that one is read with its folder
+    is_log = path.is_file() and path.name != FILE
     return logged(path) if is_log else recorded(path)
 
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from companion.config import Config
 from companion.config.files import changed, load, shipped
-from companion.control.inner_loop import largest_horizontal
 from companion.drag import NO_DRAG
 from companion.testing import MockVehicle, fly
 
@@ -211,5 +210,5 @@ def _reserve(config: Config, course: Course, mock: Config) -> float:
     """Horizontal acceleration to leave for feedback, and for holding against the wind, m/s²."""
     strongest = course.wind.get("speed_m_s", 0.0) + _STRONG_GUST * course.wind.get("gust_m_s", 0.0)
     against, _, _ = (mock.guidance.drag or NO_DRAG).deceleration((strongest, 0.0, 0.0))
-    most = _LARGEST_RESERVE * largest_horizontal(config)
+    most = _LARGEST_RESERVE * config.limits.largest_horizontal
     return min(config.flight.slow_down_reserve_m_s2 + against, most)

@@ -72,10 +72,40 @@ def explain(error: ValidationError, model: type[BaseModel]) -> str:
         return f"unknown key {where}{hint}"
     if detail["type"] in ("float_parsing", "int_parsing"):
         return f"{where} must be a number: {_number_in(str(detail['input']))}"
+    if refused := wrong_member(detail, model):
+        return f"{where}{refused}"
+    if detail["type"] == "tuple_type":
+        return f"{where} must be a list (got {detail['input']!r:.60})"
     message = detail["msg"].removeprefix("Value error, ")
     if message[1:2].islower():
         message = message[0].lower() + message[1:]
     return f"{where}: {message} (got {detail['input']!r:.60})"
+
+
+def wrong_member(detail: Any, annotation: Any) -> str:
+    """Return what is wrong with a member of a union told apart by ``kind``, after its place.
+
+    Args:
+        detail: error reported by pydantic.
+        annotation: the union, or a section that has it in a key.
+
+    Returns:
+        The end of the message; empty if the error is another one.
+    """
+    if detail["type"] == "model_attributes_type":
+        return f" must be a mapping of keys to values (got {detail['input']!r:.60})"
+    if detail["type"] not in ("union_tag_invalid", "union_tag_not_found"):
+        return ""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        annotation = annotation.model_fields[detail["loc"][0]].annotation
+    kinds = [kind for each in _models_of(annotation) for kind in _kinds(each)]
+    listed = f"kinds are {', '.join(kinds)}"
+    if detail["type"] == "union_tag_not_found":
+        return f" needs a kind; {listed}"
+    tag = detail["ctx"]["tag"]
+    near = difflib.get_close_matches(tag, kinds, n=1, cutoff=0.5)
+    nearest = f"did you mean {near[0]}?; " if near else ""
+    return f": there is no kind {tag!r:.40}; {nearest}{listed}"
 
 
 def error_path(error: ValidationError) -> list[str]:

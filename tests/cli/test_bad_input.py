@@ -61,6 +61,12 @@ def config(tmp_path, text):
             "safety: {fence_polygon_m: [[1, 1], [1, 5], [5, 1]]}",
             "[0, 0], where control begins, lies outside",
         ),
+        (
+            "limits: {max_tilt_deg: 10}\n"
+            "flight: {maneuvers: [trajectory], slow_down: true, slow_down_reserve_m_s2: 2}",
+            "flight.slow_down_reserve_m_s2 2 must be less than the 1.73 m/s² that "
+            "limits.max_tilt_deg 10 gives; lower it",
+        ),
         ("limits: {max_tilt_deg: 10}", "steps.coefficient must not exceed the sine"),
         ("circle: {radius_m: 1, speed_m_s: 4}", "° of tilt, limits.max_tilt_deg allows 35"),
         ("circle: {radius_m: 26}", "circle: from 33.85 s on it goes up to 2.0 m outside the fence"),

@@ -114,8 +114,27 @@ def test_one_key_or_one_section_is_printed(capsys):
     assert list(yaml.safe_load(capsys.readouterr().out)["circle"]) == list(
         CircleConfig.model_fields
     )
-    assert main(["config", "--get", "max_tilt"]) == 2
-    assert "did you mean limits.max_tilt_deg" in " ".join(capsys.readouterr().err.split())
+
+
+@pytest.mark.parametrize(
+    ("typed", "hint"),
+    [
+        ("max_tilt", "did you mean limits.max_tilt_deg, limits.max_tilt_rate_deg_s?"),
+        ("limits.max_tilt_dg", "did you mean limits.max_tilt_deg?"),
+        ("max_tlt_deg", "did you mean limits.max_tilt_deg?"),
+        ("limit.max_tilt_deg", "did you mean limits.max_tilt_deg?"),
+        ("laops", "did you mean circle.laps?"),
+        ("fence_acton", "did you mean safety.fence_action?"),
+        ("take_off_timeout_s", "did you mean flight.takeoff_timeout_s?"),
+        ("settel_s", "did you mean steps.settle_s, corners.settle_s, identify.settle_s?"),
+        ("circel", "did you mean circle?"),
+        ("xyzzy", "`companion config` prints them all"),
+    ],
+)
+def test_a_mistyped_key_is_answered_with_the_nearest(capsys, typed, hint):
+    assert main(["config", "--get", typed]) == 2
+    told = " ".join(capsys.readouterr().err.split())
+    assert told == f"companion: --get: there is no key `{typed}`; {hint}"
 
 
 def test_a_key_whose_name_ends_in_a_unit_shows_it():

@@ -63,6 +63,28 @@ def test_each_error_is_one_sentence_and_a_code(capsys, error, code, said, debug)
     assert told == ("" if said is None else f"companion: {said}\n")
 
 
+class _ClosedPipe(io.StringIO):
+    """Standard output that nobody reads any more."""
+
+    def write(self, _):
+        raise BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE))
+
+
+@pytest.mark.parametrize("command", ["export --csv", "export --parquet", "report", "plot"])
+def test_a_closed_pipe_ends_a_command_about_a_recording_silently(
+    monkeypatch, capsys, tmp_path, command
+):
+    written = tmp_path / "written"
+    monkeypatch.setattr("companion.cli.recordings.read_flight", lambda _: None)
+    for name in ("export_csv", "export_parquet"):
+        monkeypatch.setattr(f"companion.recording.export.{name}", lambda *_: {written: 1})
+    monkeypatch.setattr("companion.report.page.write_report", lambda *_: written)
+    monkeypatch.setattr("companion.recording.figure.draw_flight", lambda *_: None)
+    monkeypatch.setattr(sys, "stdout", _ClosedPipe())
+    assert main([*command.split(), str(tmp_path)]) == 1
+    assert capsys.readouterr().err == ""
+
+
 def test_ctrl_c_outside_a_flight_is_told(monkeypatch, capsys):
     def loaded(_):
         def interrupted():

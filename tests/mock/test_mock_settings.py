@@ -23,7 +23,14 @@ MISTAKES = {
     "speed: fast": ("mock.speed", "number"),
     "speed: -1": ("mock.speed", "greater than"),
     "faults: [{kind: drop, probabilty: 1}]": ("did you mean probability?",),
-    "faults: [{kind: dropp}]": ("mock.faults.0", "'drop'"),
+    "faults: [{kind: dropp}]": (
+        "line 2: mock.faults.0: there is no kind 'dropp'; did you mean drop?; "
+        "kinds are drop, delay, duplicate, reorder, corrupt, stop_telemetry, ",
+    ),
+    "faults: [{kind: 7}]": ("mock.faults.0: there is no kind '7'; kinds are drop, delay, ",),
+    "faults: [{at_s: 3}]": ("mock.faults.0 needs a kind; kinds are drop, delay, ",),
+    "faults: [drop]": ("mock.faults.0 must be a mapping of keys to values (got 'drop')",),
+    "faults: {kind: drop}": ("mock.faults must be a list (got {'kind': 'drop'})",),
     "lockstep: 5": ("mock.lockstep",),
     "airframe: heavy": ("mock.airframe", "sih, unlike-axes"),
     "rate_loop: {roll: {proportional: 1}}": ("mock.rate_loop.roll",),

@@ -216,7 +216,9 @@ GOOD = ["t,x,y,z", "0,0,0,0", "1,1,0,0", "2,2,0,0", "3,3,0,0"]
 @pytest.mark.parametrize(
     ("lines", "text"),
     [
+        ([], "needs a header and at least 4 samples"),
         (GOOD[:4], "needs a header and at least 4 samples"),
+        (["t,x,y", "0,0,0"], "column z of the position is missing; expected .*found t,x,y"),
         (["t,x,y", *GOOD[1:]], "column z of the position is missing; expected .*found t,x,y"),
         (["t,lat,lon", *GOOD[1:]], "names no position; expected p_x,p_y,p_z or x,y,z"),
         (["0,0,0,0", *GOOD[1:]], "first line must name the columns, such as t,x,y,z"),

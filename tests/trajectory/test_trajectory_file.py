@@ -214,7 +214,7 @@ def test_a_fault_is_told_in_a_sentence_that_names_the_file(tmp_path, text, sente
 @pytest.mark.parametrize(
     ("rows", "sentence"),
     [
-        (["x,y"], "needs a header and at least 4 samples"),
+        (["t,x,y,z"], "needs a header and at least 4 samples"),
         (
             ["t,x,y,z,vx,vy,vz", *(f"{k / 10},{k / 10},0,0,9,9,9" for k in range(40))],
             "the velocity is not the derivative of the positions",

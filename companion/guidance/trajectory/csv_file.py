@@ -104,13 +104,16 @@ def table(lines: Iterable[str], name: str) -> Table:
     """
     frames: list[str] = []
     rows = list(itertools.islice(rows_of(csv.reader(lines), frames), _MOST_SAMPLES + 2))
-    if len(rows) <= _FEWEST_SAMPLES:
-        raise TrajectoryError(f"{name}: needs a header and at least {_FEWEST_SAMPLES} samples")
+    fewest = f"{name}: needs a header and at least {_FEWEST_SAMPLES} samples"
+    if not rows:
+        raise TrajectoryError(fewest)
     if len(rows) > _MOST_SAMPLES + 1:
         raise TrajectoryError(f"{name}: has more than {_MOST_SAMPLES} samples; leave some out")
     named = [column.strip().lower() for column in rows[0][1]]
     header = [without_unit(column) for column in named]
     groups = columns_of(header, named, name)
+    if len(rows) <= _FEWEST_SAMPLES:
+        raise TrajectoryError(fewest)
     _require_no_more_values(rows, name)
     data = {group: _numbers(rows[1:], header, names, name) for group, names in groups.items()}
     times = data["time"][:, 0]

@@ -16,6 +16,8 @@ _ROUNDING = 1e-9
 
 _DEGREES = 180.0 / pi
 
+TILT_LIMIT = "limits.max_tilt_deg"
+"""Configuration key of the tilt limit."""
 SLOWER_REMEDY = "fly it more slowly (--slow-down finds how much), or change the limit"
 """The remedy if a slower motion would keep the limit."""
 
@@ -145,7 +147,7 @@ def _needs(motion: Motion, envelope: Envelope) -> Iterator[_Need]:
     rotors = demand(motion, e.drag, e.gravity)
     turn = np.abs(motion.heading_rate)
     speed = np.linalg.norm(motion.velocity, axis=1)
-    yield _Need("limits.max_tilt_deg", e.max_tilt, rotors.tilt, "° of tilt", _DEGREES)
+    yield _Need(TILT_LIMIT, e.max_tilt, rotors.tilt, "° of tilt", _DEGREES)
     turning = rotors.tilt_rate
     spin = "°/s of roll and pitch"
     yield _Need("limits.max_tilt_rate_deg_s", e.max_tilt_rate, turning, spin, _DEGREES)
