@@ -7,7 +7,12 @@ from companion.attitude import PLANNER_NAMES
 from companion.attitude.reference_model import rates_along
 from companion.config import Config
 from companion.control.hold_settings import attitude_delay, hold_gains, hold_weights
-from companion.control.inner_loop import LARGEST_GAIN_TIMES_DELAY, sensible_gain, tilt_response
+from companion.control.inner_loop import (
+    LARGEST_GAIN_TIMES_DELAY,
+    sensible_gain,
+    tilt_response,
+    with_gain,
+)
 from companion.guidance import InnerResponse
 
 _NOTICEABLE_SHARE = 0.99
@@ -96,7 +101,7 @@ def expected_response(config: Config) -> ExpectedResponse:
     speed = _largest_speed(config)
     gain, largest = config.planner.gain_per_s, sensible_gain(config)
     time_constants_without = {
-        _GAIN_KEY: _with_gain(config, 2.0 * gain).step_time(step, speed),
+        _GAIN_KEY: tilt_response(with_gain(config, 2.0 * gain)).step_time(step, speed),
         _RATE_LIMIT_KEY: response.step_time(step),
         **_without_the_vehicle(config, response, speed),
     }
@@ -106,13 +111,8 @@ def expected_response(config: Config) -> ExpectedResponse:
         time_constants_without,
         gain,
         None if largest == inf else largest,
-        None if largest == inf else _with_gain(config, largest).step_time(step),
+        None if largest == inf else tilt_response(with_gain(config, largest)).step_time(step),
     )
-
-
-def _with_gain(config: Config, gain: float) -> InnerResponse:
-    planner = config.planner.model_copy(update={"gain_per_s": gain})
-    return tilt_response(config.model_copy(update={"planner": planner}))
 
 
 def _without_the_vehicle(config: Config, response: InnerResponse, speed: float) -> dict[str, float]:

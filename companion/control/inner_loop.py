@@ -120,6 +120,12 @@ def thrust_limits(config: Config) -> tuple[float, float]:
     return config.limits.min_thrust * full, config.limits.max_thrust * full
 
 
+def with_gain(config: Config, gain: float) -> Config:
+    """The configuration with another gain of the planner, 1/s."""
+    planner = config.planner.model_copy(update={"gain_per_s": gain})
+    return config.model_copy(update={"planner": planner})
+
+
 def tilt_response(config: Config) -> InnerResponse:
     """Response of the acceleration coefficients to their targets: planner and rate loop."""
     gain, (lag, dead_time) = config.planner.gain_per_s, slower_tilt(config)

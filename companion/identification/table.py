@@ -6,6 +6,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from companion.identification.delayed_model import SecondOrderFit
 from companion.identification.fragment import second_order_axes
 from companion.identification.response import RateResponse
 from companion.identification.thrust_map import ThrustMap
@@ -25,34 +26,35 @@ def vehicle_table(vehicle: IdentifiedVehicle, gravity: float) -> RenderableType:
         gravity: gravity, m/s², which gives the hover thrust.
     """
     written = second_order_axes(vehicle)
-    rows = {name: _cells(each, name in written) for name, each in vehicle.axes.items()}
+    shown = {
+        name: each.second_order if name in written else None for name, each in vehicle.axes.items()
+    }
+    rows = [_cells(each, shown[name]) for name, each in vehicle.axes.items()]
     names = ("lag, ms", "dead time, ms", "damping", "gain", "slew, °/s²", "misfit", "")
-    filled = [
-        any(cells[number] != _NONE for cells in rows.values()) for number in range(len(names))
-    ]
+    columns = [column for column in zip(names, *rows, strict=True) if set(column[1:]) != {_NONE}]
     table = Table(title="Response to body rates", title_justify="left", title_style="bold")
     table.add_column("")
-    for column, has_values in zip(names, filled, strict=True):
-        if has_values:
-            table.add_column(column, justify="right")
-    for name, cells in rows.items():
-        shown = (cell for cell, has_values in zip(cells, filled, strict=True) if has_values)
-        table.add_row(name, *shown)
-    models = [Text(_model_line(name, each, name in written)) for name, each in vehicle.axes.items()]
+    for name, *_ in columns:
+        table.add_column(name, justify="right")
+    for row in zip(vehicle.axes, *(cells for _, *cells in columns), strict=True):
+        table.add_row(*row)
+    models = [Text(_model_line(name, each, shown[name])) for name, each in vehicle.axes.items()]
     noise = Text("± is the standard error by the noise of this flight.")
     return Group(table, noise, *models, Text(_thrust_line(vehicle.thrust, gravity)))
 
 
-def _cells(response: RateResponse, second_order: bool) -> tuple[str, ...]:
+def _cells(response: RateResponse, second_order: SecondOrderFit | None) -> tuple[str, ...]:
+    """The cells of an axis: of this second-order fit, or of the first-order one."""
     verdict = "good" if response.is_good() else "bad"
     if isnan(response.lag):
         return *(_NONE,) * 6, verdict
-    fit, found, damping = response.fit, response.second_order, _NONE
+    fit, damping = response.fit, _NONE
     times = (response.lag, fit.lag_error), (response.dead_time, fit.dead_time_error)
     slew, misfit = response.slew, fit.misfit
-    if second_order and found is not None:
+    if second_order is not None:
+        found, damping = second_order, f"{second_order.damping:.2f}"
         times = (found.lag, found.lag_error), (found.dead_time, found.dead_time_error)
-        slew, misfit, damping = found.slew, found.misfit, f"{found.damping:.2f}"
+        slew, misfit = found.slew, found.misfit
     return (
         *(f"{1e3 * time:.1f} ± {1e3 * error:.1f}" for time, error in times),
         damping,
@@ -63,14 +65,15 @@ def _cells(response: RateResponse, second_order: bool) -> tuple[str, ...]:
     )
 
 
-def _model_line(name: str, response: RateResponse, second_order: bool) -> str:
+def _model_line(name: str, response: RateResponse, second_order: SecondOrderFit | None) -> str:
     """Which model the row of an axis shows, and why."""
-    found, first = response.second_order, f"explains {response.fit.explained:.1%}"
-    if found is None:
+    first, nearer = f"explains {response.fit.explained:.1%}", response.second_order
+    if second_order is not None:
+        explained = f"explains {second_order.explained:.1%}"
+        return f"{name}: second order, which {explained}; first order {first}"
+    if nearer is None:
         return f"{name}: a lag of first order {first}; second order is not clearly better"
-    if second_order:
-        return f"{name}: second order, which explains {found.explained:.1%}; first order {first}"
-    return f"{name}: written as first order, which {first}, though nearer: {found.described}"
+    return f"{name}: written as first order, which {first}, though nearer: {nearer.described}"
 
 
 def _thrust_line(thrust: ThrustMap | None, gravity: float) -> str:

@@ -97,7 +97,7 @@ def _beyond_limit(beyond: list[Check]) -> list[str]:
 
 
 def _by_subject(good: Sequence[Check]) -> list[str]:
-    """One line for each subject, with all of its figures."""
+    """One line for each subject, with its figures within their limits."""
     found: dict[str, list[str]] = {}
     for check in good:
         found.setdefault(check.what, []).append(check.found)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from companion.config import Config
 from companion.control.hold_settings import attitude_delay, slewing_delay
-from companion.control.inner_loop import sensible_gain
+from companion.control.inner_loop import sensible_gain, with_gain
 from companion.tuning.expectation import Disturbances, expected_errors
 from companion.tuning.loop import ModelError, control_loop
 from companion.tuning.margins import Margins, frequencies, margins, smaller
@@ -59,14 +59,13 @@ class Design(NamedTuple):
 
     def applied(self, config: Config) -> Config:
         """The configuration with these values."""
-        planner = config.planner.model_copy(update={"gain_per_s": self.gain})
         weights = {
             "position_weight_per_s4": self.position,
             "velocity_weight_per_s2": self.velocity,
             "disturbance_bandwidth_rad_s": self.bandwidth,
         }
         guidance = config.guidance.model_copy(update=weights)
-        return config.model_copy(update={"planner": planner, "guidance": guidance})
+        return with_gain(config, self.gain).model_copy(update={"guidance": guidance})
 
     def rounded(self) -> "Design":
         """The values rounded to three digits, as they are written."""
@@ -148,8 +147,7 @@ def _starts(config: Config) -> Iterator[Design]:
         (0.8, 1.4, 0.12, 3.5),
     ):
         gain = share * largest_gain(config)
-        planner = config.planner.model_copy(update={"gain_per_s": gain})
-        delay = attitude_delay(config.model_copy(update={"planner": planner}))
+        delay = attitude_delay(with_gain(config, gain))
         yield Design(gain, position / delay**4, velocity / delay**2, bandwidth / delay)
 
 

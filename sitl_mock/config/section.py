@@ -51,10 +51,16 @@ def suggestion(word: str, known: Iterable[str]) -> str:
     If none is near: ``; known are ...`` with all words, or nothing if they are more than 20.
     """
     names = list(known)
-    near = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
+    near = _nearest(word, names)
     if near:
-        return f"; did you mean {near[0]}?"
+        return f"; did you mean {near}?"
     return f"; known are {', '.join(sorted(names))}" if len(names) <= _MOST_LISTED else ""
+
+
+def _nearest(word: str, names: list[str]) -> str | None:
+    """Return the name that is most like a mistyped word; None if none is near."""
+    near = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
+    return near[0] if near else None
 
 
 def explain(error: ValidationError, model: type[BaseModel]) -> str:
@@ -103,9 +109,9 @@ def wrong_member(detail: Any, annotation: Any) -> str:
     if detail["type"] == "union_tag_not_found":
         return f" needs a kind; {listed}"
     tag = detail["ctx"]["tag"]
-    near = difflib.get_close_matches(tag, kinds, n=1, cutoff=0.5)
-    nearest = f"did you mean {near[0]}?; " if near else ""
-    return f": there is no kind {tag!r:.40}; {nearest}{listed}"
+    near = _nearest(tag, kinds)
+    hint = f"did you mean {near}?; " if near else ""
+    return f": there is no kind {tag!r:.40}; {hint}{listed}"
 
 
 def error_path(error: ValidationError) -> list[str]:

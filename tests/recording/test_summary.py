@@ -17,17 +17,17 @@ from companion.recording.trace import FlightTrace
 NORTH, EAST = (1.0, 0.0), (0.0, 1.0)
 
 
-def trace_of(tau, bend=0.0, directions=(NORTH, EAST), wind=(0.0, 0.0)):
+def trace_of(tau, bend=0.0, directions=(NORTH, EAST), wind=(0.0, 0.0), size=0.2, gust=0.0):
     """Doublets answered exactly with the time constant `tau`; `bend` moves across the step.
 
-    `wind` are the coefficients at which the vehicle is at rest.
+    `wind` are the coefficients at which the vehicle is at rest; a `gust` moves where it begins.
     """
     trace = FlightTrace()
     for number, direction in enumerate(directions):
-        along = 0.0
+        along = gust
         for k in range(800):
-            target = 0.2 if k < 200 or k >= 600 else -0.2
-            across = bend * math.sin(k / 100.0)
+            target = size if k < 200 or k >= 600 else -size
+            across = bend * math.sin(k / 100.0) + gust * math.cos(k / 100.0)
             north = wind[0] + along * direction[0] - across * direction[1]
             east = wind[1] + along * direction[1] + across * direction[0]
             trace.add_response(
@@ -80,18 +80,9 @@ def test_a_doublet_is_named_by_the_nearest_point_of_the_compass(degrees, words):
     assert run.direction == pytest.approx(way)
 
 
-def trace_in_wind(rest=(0.3, -0.3), noise=0.02):
+def trace_in_wind():
     """A doublet north of 0.25 from the attitude that balances a wind, which gusts a little."""
-    trace, along = FlightTrace(), noise
-    for k in range(800):
-        target = 0.25 if k < 200 or k >= 600 else -0.25
-        trace.add_response(
-            k * 0.005,
-            attitude(Coefficients(rest[0] + along, rest[1] + noise * math.cos(k / 100.0)), 0.0),
-            Target(rest[0] + target, rest[1], 0.0),
-        )
-        along = target + (along - target) * math.exp(-0.005 / 0.3)
-    return trace
+    return trace_of(0.3, directions=[NORTH], wind=(0.3, -0.3), size=0.25, gust=0.02)
 
 
 def test_the_tilt_that_balances_the_wind_is_no_part_of_a_step():

@@ -169,11 +169,11 @@ def _measured(name: str, begin: float, rows: Floats) -> ManeuverFigures:
         open_loop,
         beginning,
         level_rms=nan if open_loop else rms(level[~early]),
-        level_max=nan if open_loop else _largest(level[~early]),
+        level_max=nan if open_loop else largest(level[~early]),
         height_rms=rms(held_late),
-        height_max=_largest(np.abs(held_late)),
+        height_max=largest(np.abs(held_late)),
         height_mean=float(held_late.mean()) if len(held_late) else nan,
-        beginning_max=_largest(np.hypot(level, height)[early & held]),
+        beginning_max=largest(np.hypot(level, height)[early & held]),
         drift=float(np.hypot(away[:, 0], away[:, 1]).max()),
         speed=_speed(time, reference),
     )
@@ -188,10 +188,16 @@ def _speed(time: Floats, reference: Floats) -> float:
     return float(np.percentile(speeds, 95)) if np.isfinite(speeds).all() and len(speeds) else nan
 
 
-def _largest(values: Floats) -> float:
+def largest(values: Floats) -> float:
+    """The largest of the values; NaN without values."""
     return float(values.max()) if len(values) else nan
 
 
 def rms(values: Floats) -> float:
     """The root mean square; NaN without values."""
     return float(np.sqrt(np.mean(values**2))) if len(values) else nan
+
+
+def without_nan(values: dict[str, float]) -> dict[str, float | None]:
+    """The values as JSON; null for NaN."""
+    return {key: None if isnan(value) else value for key, value in values.items()}

@@ -1,16 +1,18 @@
 """The measured response to acceleration steps, compared with linear models."""
 
 from dataclasses import dataclass
-from math import asin, degrees, isnan, nan
+from math import asin, degrees, nan
 from typing import Any
 
 import numpy as np
 
 from companion.least_squares import minimise
+from companion.recording.measurements.maneuver_figures import without_nan
 from companion.recording.measurements.second_order import (
     Floats,
     SecondOrderFit,
     StepRun,
+    longest,
     nearest_second_order,
     step_runs,
 )
@@ -63,14 +65,14 @@ def measure_response(rows: Floats, gain: float) -> StepResponse | None:
         time_constant_north_s=_time_constant(runs, 0, 1.0 / gain),
         time_constant_east_s=_time_constant(runs, 1, 1.0 / gain),
         step_size=max(run.size for run in runs),
-        asked_tilt=asin(min(1.0, max(_longest(run.target) for run in runs))),
+        asked_tilt=asin(min(1.0, max(longest(run.target) for run in runs))),
         cross_axis_max=max(_largest_deviation(step) for run in runs for step in run.steps()),
         model_deviation_max=max(
-            _largest_distance(run, first_order(run, 1.0 / gain)) for run in runs
+            longest(run.measured - first_order(run, 1.0 / gain)) for run in runs
         ),
         second_order=second_order,
         second_order_deviation_max=max(
-            _largest_distance(run, second_order.path(run)) for run in runs
+            longest(run.measured - second_order.path(run)) for run in runs
         ),
     )
 
@@ -82,13 +84,11 @@ def response_as_dict(response: StepResponse | None) -> dict[str, Any]:
         names = "step_size", "asked_tilt_deg", "cross_axis_max", "model_deviation_max"
         constants = dict.fromkeys(("north", "east"))
         return {"time_constant_s": constants, **dict.fromkeys(names), "second_order": model}
-    north, east = response.time_constant_north_s, response.time_constant_east_s
     fit = response.second_order
     return {
-        "time_constant_s": {
-            "north": None if isnan(north) else north,
-            "east": None if isnan(east) else east,
-        },
+        "time_constant_s": without_nan(
+            {"north": response.time_constant_north_s, "east": response.time_constant_east_s}
+        ),
         "step_size": response.step_size,
         "asked_tilt_deg": degrees(response.asked_tilt),
         "cross_axis_max": response.cross_axis_max,
@@ -119,23 +119,13 @@ def _first_order(steps: list[StepRun], time_constant: float) -> Floats:
     return np.concatenate(parts)
 
 
-def _largest_distance(run: StepRun, model: Floats) -> float:
-    return _longest(run.measured - model)
-
-
-def _longest(coefficients: Floats) -> float:
-    """The largest length of coefficients (n, 2)."""
-    return float(np.hypot(*coefficients.T).max())
-
-
 def _largest_deviation(step: StepRun) -> float:
     """Largest distance of a step from the straight line to its target.
 
     The line begins at the attitude when the target changed; in wind this is not level.
     """
-    way = step.target[0] - step.measured[0]
-    away = step.measured - step.measured[0]
-    across = away @ np.array([-way[1], way[0]]) / max(float(np.hypot(*way)), 1e-9)
+    north, east = step.direction
+    across = (step.measured - step.measured[0]) @ np.array([-east, north])
     return float(np.abs(across).max())
 
 

@@ -46,7 +46,7 @@ class StepRun(NamedTuple):
     @property
     def size(self) -> float:
         """Length of the largest of the `changes`."""
-        return float(np.hypot(*self.changes.T).max())
+        return longest(self.changes)
 
     @property
     def direction(self) -> Floats:
@@ -67,6 +67,11 @@ class StepRun(NamedTuple):
     def _split(self) -> list[list[Floats]]:
         changes = np.flatnonzero(np.any(np.diff(self.target, axis=0), axis=1)) + 1
         return [np.split(column, changes) for column in self]
+
+
+def longest(coefficients: Floats) -> float:
+    """The largest length of coefficients (n, 2)."""
+    return float(np.hypot(*coefficients.T).max())
 
 
 def step_runs(rows: Floats) -> list[StepRun]:

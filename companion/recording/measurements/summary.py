@@ -15,8 +15,10 @@ from companion.recording.measurements.dead_time import DeadTimes
 from companion.recording.measurements.maneuver_figures import (
     ManeuverFigures,
     in_maneuvers,
+    largest,
     measure_maneuvers,
     rms,
+    without_nan,
 )
 from companion.recording.measurements.response import (
     StepResponse,
@@ -75,7 +77,7 @@ class PredictiveFigures:
         """The figures as JSON, in milliseconds."""
         p50, p99 = np.percentile(self.seconds, (50, 99)) if self.seconds else (math.nan, math.nan)
         times = {"p50": 1e3 * float(p50), "p99": 1e3 * float(p99)}
-        return {"flown": self.flown, "troubles": self.troubles, "solve_ms": _without_nan(times)}
+        return {"flown": self.flown, "troubles": self.troubles, "solve_ms": without_nan(times)}
 
 
 @dataclass(frozen=True)
@@ -152,11 +154,11 @@ class Summary:
         maneuvers = rows[in_maneuvers(rows[:, 1], self.trace.maneuvers)]
         tilts = np.degrees([tilt_angle(row[2], row[3]) for row in self.trace.response_rows()])
         return {
-            "height_max_m": _largest(rows[:, _HEIGHT]),
-            "speed_max_m_s": _largest(rows[:, _SPEED]),
-            "tilt_max_deg": _largest(rows[:, _TILT], tilts),
-            "maneuver_speed_max_m_s": _largest(maneuvers[:, _SPEED]),
-            "maneuver_tilt_max_deg": _largest(maneuvers[:, _TILT], tilts),
+            "height_max_m": _largest_known(rows[:, _HEIGHT]),
+            "speed_max_m_s": _largest_known(rows[:, _SPEED]),
+            "tilt_max_deg": _largest_known(rows[:, _TILT], tilts),
+            "maneuver_speed_max_m_s": _largest_known(maneuvers[:, _SPEED]),
+            "maneuver_tilt_max_deg": _largest_known(maneuvers[:, _TILT], tilts),
             "under_control_s": float(tracked[-1, 0] - tracked[0, 0]) if len(tracked) else 0.0,
         }
 
@@ -174,12 +176,12 @@ class Summary:
             "refused": self.counts.refused,
             "unanswered": self.counts.unanswered,
             "rate_hz": self.counts.rate_hz,
-            "latency_us": _without_nan(self.latency_us()),
+            "latency_us": without_nan(self.latency_us()),
             "response": response_as_dict(self.response()),
             "dead_time_s": _dead_times_as_dict(self.dead_times),
-            "tracking": _without_nan(self.tracking()),
+            "tracking": without_nan(self.tracking()),
             "maneuvers": [figures.as_dict() for figures in self.maneuvers()],
-            "extent": _without_nan(self.extent()),
+            "extent": without_nan(self.extent()),
             "nmpc": None if self.predictive is None else self.predictive.as_dict(),
             "realtime": self.realtime,
             "link": self.link,
@@ -216,16 +218,11 @@ def _dead_times_as_dict(dead_times: DeadTimes) -> dict[str, float | None]:
     age = dead_times.sample_age
     return {
         **{name: axis.measured for name, axis in dead_times.axes.items()},
-        **_without_nan({"sample_age_p50": age.p50, "sample_age_p99": age.p99}),
+        **without_nan({"sample_age_p50": age.p50, "sample_age_p99": age.p99}),
     }
 
 
-def _largest(*columns: "np.ndarray[Any, np.dtype[np.float64]]") -> float:
+def _largest_known(*columns: "np.ndarray[Any, np.dtype[np.float64]]") -> float:
     """The largest number of all columns (n,); NaN: they contain none."""
     values = np.concatenate(columns)
-    known = values[~np.isnan(values)]
-    return float(known.max()) if len(known) else math.nan
-
-
-def _without_nan(values: dict[str, float]) -> dict[str, float | None]:
-    return {key: None if math.isnan(value) else value for key, value in values.items()}
+    return largest(values[~np.isnan(values)])

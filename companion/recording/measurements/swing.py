@@ -75,9 +75,8 @@ def measure_swing(time: Floats, rates: Floats, *, at_rest: bool) -> Swing:
         return NOT_MEASURED
     step = float(np.median(np.diff(time)))
     count = duration / step if step > 0.0 else np.inf
-    if step > _LONGEST_SAMPLE_PERIOD or count > 2 * len(
-        time
-    ):  # too few samples, or their clock jumped
+    # Too few samples, or their clock jumped.
+    if step > _LONGEST_SAMPLE_PERIOD or count > 2 * len(time):
         return NOT_MEASURED
     even = np.arange(time[0], time[-1], step)
     turned = np.column_stack([np.interp(even, time, column) for column in rates.T]) * step
