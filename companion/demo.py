@@ -22,7 +22,7 @@ from companion.mavlink.transport.free_port import free_port
 _LOCAL_PORT_OFFSET = 40
 """Distance from the companion's UDP port to the mock vehicle's own port."""
 
-_READY = "ready on "
+_READY_LINE = "ready on "
 """First words of the vehicle's output when its ports are open."""
 
 _START_TIMEOUT = 20.0
@@ -150,7 +150,7 @@ def _end(process: "subprocess.Popen[bytes]", log: Path) -> None:
 
 def _await_ready(process: "subprocess.Popen[bytes]", log: Path) -> None:
     deadline = time.monotonic() + _START_TIMEOUT
-    while not log.read_text(errors="replace").startswith(_READY):
+    while not log.read_text(errors="replace").startswith(_READY_LINE):
         _check_running(process, log)
         if time.monotonic() > deadline:
             raise VehicleStoppedError(

@@ -5,7 +5,7 @@ import shlex
 import sys
 from pathlib import Path
 
-_CLONE = Path(__file__).parents[1]
+_CLONE_FOLDER = Path(__file__).parents[1]
 """The folder of pyproject.toml, if the program runs from a clone."""
 
 
@@ -30,8 +30,12 @@ def require(module: str, extra: str, purpose: str) -> None:
 
 def pip_command(extra: str) -> str:
     """The shell command that installs an extra into the environment that runs this program."""
-    in_clone = (_CLONE / "pyproject.toml").is_file()
-    what = f"-e '{_from_here(_CLONE)}[{extra}]'" if in_clone else f"'mavlink-companion[{extra}]'"
+    in_clone = (_CLONE_FOLDER / "pyproject.toml").is_file()
+    what = (
+        f"-e '{_from_here(_CLONE_FOLDER)}[{extra}]'"
+        if in_clone
+        else f"'mavlink-companion[{extra}]'"
+    )
     return f"{shlex.quote(_from_here(Path(sys.executable)))} -m pip install {what}"
 
 

@@ -15,9 +15,9 @@ Projection = Callable[[Floats], tuple[Floats, Floats]]
 """Computes the best linear unknowns, the weights (c,), and the residual (m,), from the nonlinear
 unknowns (k,)."""
 
-_STEP = 1e-4
+_DIFFERENCE_STEP = 1e-4
 """Step of the central differences."""
-_CONVERGED = 1e-9
+_SMALLEST_REDUCTION = 1e-9
 """The search ends when a step reduces the sum of squares by less than this share, or changes no
 unknown by 1e-7."""
 _MOST_STEPS = 60
@@ -84,17 +84,18 @@ def minimise(projection: Projection, start: Floats, lowest: Floats, highest: Flo
             damping = max(0.2 * damping, 1e-9)
         else:
             damping *= 5.0
-        if moved < 1e-7 or 0.0 < gained < _CONVERGED * float(residual @ residual):
+        if moved < 1e-7 or 0.0 < gained < _SMALLEST_REDUCTION * float(residual @ residual):
             break
     return Solution(unknown, weights, residual, slopes)
 
 
 def _slopes(projection: Projection, unknown: Floats) -> Floats:
     """(m, k), derivatives of the projected residual by central differences."""
-    steps = _STEP * np.eye(unknown.size)
+    steps = _DIFFERENCE_STEP * np.eye(unknown.size)
     return np.stack(
         [
-            (projection(unknown + step)[1] - projection(unknown - step)[1]) / (2.0 * _STEP)
+            (projection(unknown + step)[1] - projection(unknown - step)[1])
+            / (2.0 * _DIFFERENCE_STEP)
             for step in steps
         ],
         axis=1,

@@ -15,7 +15,7 @@ from companion.guidance.source import CommandedSource
 from companion.safety.actions import FlightEnded
 
 _ZERO_VECTOR = (0.0, 0.0, 0.0)
-_COMPONENTS = 3
+_VECTOR_LENGTH = 3
 
 
 class Control:
@@ -188,7 +188,7 @@ def _require_usable(reference: Reference, jerk_ned: Vector) -> None:
         reference.body_rates or _ZERO_VECTOR,
         jerk_ned,
     ]
-    if any(len(vector) != _COMPONENTS for vector in vectors):
+    if any(len(vector) != _VECTOR_LENGTH for vector in vectors):
         raise ValueError(f"each vector must have three components; got {reference}")
     values = [
         *chain.from_iterable(vectors),

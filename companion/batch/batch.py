@@ -20,7 +20,7 @@ Compiling costs 2 to 3 s once in a process, including the import of numba. A ste
 about 4 µs.
 """
 
-_BLOCK = 336
+_BLOCK_SIZE = 336
 """Vehicles advanced together; the data of a step then fits the first-level cache."""
 
 _CACHE_LINE = 8  # numbers
@@ -166,7 +166,7 @@ def _advanced(
     loops: Loops, planner: LawPlanner, q: Array, targets: Array, dt: float, steps: int
 ) -> Array:
     after = np.empty_like(q)
-    blocks = max(1, ceil(q.shape[1] / _BLOCK))
+    blocks = max(1, ceil(q.shape[1] / _BLOCK_SIZE))
     width = _CACHE_LINE * max(1, ceil(q.shape[1] / blocks / _CACHE_LINE))
     for low in range(0, q.shape[1], width):
         block = slice(low, min(low + width, q.shape[1]))

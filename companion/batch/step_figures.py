@@ -17,7 +17,7 @@ from companion.batch.rate_loop import StepFlight
 
 _SHORTEST, _LONGEST = log(0.02), log(2.0)
 """Range in which the time constant is searched, as natural logarithms of s."""
-_GOLDEN = 0.5 * (sqrt(5.0) - 1.0)
+_GOLDEN_RATIO = 0.5 * (sqrt(5.0) - 1.0)
 _NARROWINGS = 17
 """Steps of the golden-section search; the range left is 0.13 % of a time constant."""
 _MIN_STEP = 1e-3
@@ -98,8 +98,8 @@ def _time_constants(path: Array, targets: Array, period: float) -> tuple[float, 
     low, high = np.full(2, _SHORTEST), np.full(2, _LONGEST)
     left, right, tried, asked = np.empty(2), np.empty(2), np.empty(2), np.zeros(2)
     for axis in range(2):
-        left[axis] = high[axis] - _GOLDEN * (high[axis] - low[axis])
-        right[axis] = low[axis] + _GOLDEN * (high[axis] - low[axis])
+        left[axis] = high[axis] - _GOLDEN_RATIO * (high[axis] - low[axis])
+        right[axis] = low[axis] + _GOLDEN_RATIO * (high[axis] - low[axis])
         for k in range(targets.shape[0]):
             asked[axis] = max(asked[axis], abs(targets[k, axis]))
     at_left, at_right, found = np.empty(2), np.empty(2), np.empty(2)
@@ -111,11 +111,11 @@ def _time_constants(path: Array, targets: Array, period: float) -> tuple[float, 
             to_left[axis] = at_left[axis] < at_right[axis]
             if to_left[axis]:
                 high[axis], right[axis], at_right[axis] = right[axis], left[axis], at_left[axis]
-                left[axis] = high[axis] - _GOLDEN * (high[axis] - low[axis])
+                left[axis] = high[axis] - _GOLDEN_RATIO * (high[axis] - low[axis])
                 tried[axis] = left[axis]
             else:
                 low[axis], left[axis], at_left[axis] = left[axis], right[axis], at_right[axis]
-                right[axis] = low[axis] + _GOLDEN * (high[axis] - low[axis])
+                right[axis] = low[axis] + _GOLDEN_RATIO * (high[axis] - low[axis])
                 tried[axis] = right[axis]
         _squares(path, targets, tried, period, found)
         for axis in range(2):

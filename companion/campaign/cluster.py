@@ -23,11 +23,11 @@ DEATHS = 3
 
 An existing cluster follows its own setting, `distributed.scheduler.allowed-failures`.
 """
-_LOST = "the connection to the Dask scheduler is lost"
+_CONNECTION_LOST = "the connection to the Dask scheduler is lost"
 _CONNECT_S = 10.0
 _CLOSE_S = 5.0
 _PACKAGES = ("dask", "distributed", "numba", "pyarrow", "scipy")
-_LOCAL = {
+_LOCAL_SETTINGS = {
     "distributed.scheduler.allowed-failures": DEATHS - 1,
     # Dask's own profiler, which nobody reads here, uses 10 % of a worker's time.
     "distributed.worker.profile.enabled": False,
@@ -87,7 +87,7 @@ def connected(scheduler: str | None, workers: int | None) -> "Iterator[Client]":
     from distributed import Client, LocalCluster  # noqa: PLC0415  an extra
 
     _silence()
-    with dask.config.set(_LOCAL):
+    with dask.config.set(_LOCAL_SETTINGS):
         if scheduler is not None:
             try:
                 client = Client(scheduler, timeout=_CONNECT_S)
@@ -234,8 +234,8 @@ def _ended(number: int, future: "Future") -> EndedUnit:
         if future.status == "error":
             return EndedUnit(number, None, _reason(future.exception()))
     except (OSError, CancelledError) as error:  # it was lost while the rows were on their way
-        raise ClusterError(_LOST) from error
-    raise ClusterError(_LOST)
+        raise ClusterError(_CONNECTION_LOST) from error
+    raise ClusterError(_CONNECTION_LOST)
 
 
 def _reason(error: BaseException) -> str:

@@ -12,9 +12,9 @@ from companion.files.yaml_file import ConfigError
 
 MOST_CASES = {"flights": 2000, "batch": 100_000}
 """Largest number of cases by kind, where `limits.max_cases` is null."""
-_MEASURED = 3
+_MEASURED_FLIGHTS = 3
 """Largest number of flights whose time is measured."""
-_BATCH = 64
+_MEASURED_VEHICLES = 64
 """Largest number of vehicles in the measured batch.
 
 They share one planner, because compiling one takes 2 s.
@@ -32,10 +32,10 @@ def case_time(kind: str, cases: Sequence[Case]) -> float:
     """
     if kind == "batch":
         planner = cases[0].config.planner_name
-        some = [case for case in cases if case.config.planner_name == planner][:_BATCH]
+        some = [case for case in cases if case.config.planner_name == planner][:_MEASURED_VEHICLES]
         run_cases(kind, some)
     else:
-        places = sorted({0, len(cases) // 2, len(cases) - 1})[:_MEASURED]
+        places = sorted({0, len(cases) // 2, len(cases) - 1})[:_MEASURED_FLIGHTS]
         some = [cases[place] for place in places]
         run_cases(kind, [replace(some[0], flight_s=1.0)])
     began = perf_counter()

@@ -13,7 +13,7 @@ from companion.campaign.versions import difference, versions
 from companion.files.yaml_file import ConfigError
 from companion.recording.folder import flight_folder
 
-_CASES = "cases"
+_CASES_FOLDER = "cases"
 """Folder of the recorded flights, in the folder of a campaign."""
 
 
@@ -52,7 +52,7 @@ def rerun(place: Path, index: int) -> Rerun:
     if not 0 <= index < description.cases:
         raise ConfigError(f"{place}: its cases are 0 to {description.cases - 1}, not {index}")
     case = campaign.case(next(islice(campaign.samples(), index, None)))
-    recording = flight_folder(place / _CASES / f"case-{index:05d}")
+    recording = flight_folder(place / _CASES_FOLDER / f"case-{index:05d}")
     row = fly_case(case, recording)
     lines = [f"{case.described()}: {_judged(row)}"]
     if other := difference(description.versions, versions()):

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 DONE, FAILED = 0, 1
-_UNMEASURED = 2
+_UNMEASURED_CASES = 2
 """Up to this number of cases for each worker, the time that a case takes is not measured."""
 _MOST_SHOWN = 3
 """Largest number of lost units, and of internal errors, that are printed."""
@@ -130,7 +130,7 @@ class _Run:
             estimate.check_size(campaign, estimate.case_time(kind, first), workers)
         cases = list(campaign.cases())
         check_cases(kind, cases)
-        if len(cases) <= _UNMEASURED * workers:
+        if len(cases) <= _UNMEASURED_CASES * workers:
             return None
         case_s = estimate.case_time(kind, cases)
         if not self._options.yes:

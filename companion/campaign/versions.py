@@ -16,7 +16,7 @@ _PACKAGES = ("numpy", "numba", "scipy")
 _ROOTS = ("companion", "sitl_mock")
 _NOT_FLOWN = ("cli", "report", "live", "bench", "study", "replay", "mavsdk_link")
 """Rooms of `companion` that no case uses; changing them does not change the results."""
-_DIGITS = 12
+_DIGEST_LENGTH = 12
 
 
 class VersionError(Exception):
@@ -41,7 +41,7 @@ def source_digest() -> str:
     for path in _sources(base):
         found.update(path.relative_to(base).as_posix().encode() + b"\0")
         found.update(path.read_bytes() + b"\0")
-    return found.hexdigest()[:_DIGITS]
+    return found.hexdigest()[:_DIGEST_LENGTH]
 
 
 def _sources(base: Path) -> Iterator[Path]:

@@ -9,9 +9,9 @@ from typing import IO
 from companion.files.ascii_text import ascii_for
 from companion.flight.status import FlightStatus
 
-_COLUMNS = 80
+_USUAL_WIDTH = 80
 """Width of a terminal that does not report one, columns."""
-_ALARM = "\x1b[1;31m{}\x1b[0m"
+_RED = "\x1b[1;31m{}\x1b[0m"
 
 
 def can_redraw(file: IO[str]) -> bool:
@@ -100,7 +100,7 @@ class LiveLines:
         self._lines = [line[: columns - 1] for line in plain]
         drawn = list(self._lines)
         if alarm and drawn:
-            drawn[-1] = _ALARM.format(drawn[-1])
+            drawn[-1] = _RED.format(drawn[-1])
         self._write(back + "".join(f"{line}\x1b[K\n" for line in drawn) + "\x1b[J")
 
     def above(self, text: str) -> None:
@@ -122,9 +122,9 @@ class LiveLines:
 
     def _columns(self) -> int:
         try:
-            return os.get_terminal_size(self._file.fileno()).columns or _COLUMNS
+            return os.get_terminal_size(self._file.fileno()).columns or _USUAL_WIDTH
         except (OSError, ValueError):
-            return _COLUMNS
+            return _USUAL_WIDTH
 
     def _write(self, text: str) -> None:
         self._file.write(text)

@@ -19,7 +19,7 @@ from companion.realtime import RealtimeError
 from companion.recording.figure import FigureError
 from companion.recording.flight_record import RecordError
 
-_USAGE = (
+_USAGE_ERRORS = (
     ConfigError,
     EndpointError,
     FigureError,
@@ -30,7 +30,7 @@ _USAGE = (
     SigningError,
 )
 """The command line or the configuration is wrong, or something that it names cannot be used."""
-_FLIGHT = LinkError, VehicleStoppedError
+_FLIGHT_ERRORS = LinkError, VehicleStoppedError
 """The flight failed, or something that it needs failed."""
 
 Command = Callable[[argparse.Namespace], int]
@@ -53,10 +53,10 @@ def run(command: Command, options: argparse.Namespace) -> int:
     fault: OSError | None = None
     try:
         code = command(options)
-    except _USAGE as error:
+    except _USAGE_ERRORS as error:
         _say(str(error))
         code = EXIT_USAGE
-    except _FLIGHT as error:
+    except _FLIGHT_ERRORS as error:
         _say(str(error))
     except BrokenPipeError:
         pass  # nobody reads our output any more, as after `| head`; a broken link is a LinkError

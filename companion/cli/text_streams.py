@@ -14,18 +14,18 @@ from pathlib import Path
 from companion.files.ascii_text import ascii_for
 from companion.files.os_errors import reason_of
 
-_HANDLER = "companion.transliterated"
+_ERROR_HANDLER = "companion.transliterated"
 
 
 def print_anything() -> None:
     """Make standard output and error transliterate, and discard what goes to a closed one."""
-    codecs.register_error(_HANDLER, _transliterated)
+    codecs.register_error(_ERROR_HANDLER, _transliterated)
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # closed, as by `>&-`
             setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
         stream = getattr(sys, name)
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors=_HANDLER)
+            stream.reconfigure(errors=_ERROR_HANDLER)
     if sys.stdout is sys.__stdout__ and isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout = _Output(sys.stdout)
 

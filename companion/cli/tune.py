@@ -24,8 +24,8 @@ from companion.tuning.noise import measured_disturbances
 from companion.tuning.writing import proposal_text, summary_lines, worse_sentence
 
 _VEHICLE, _CONFIG, _LOG = "vehicle.yaml", "config.yaml", "flight.tlog"
-_OUTPUT = "tuned.yaml"
-_SECTIONS = ("vehicle", "thrust")
+_OUTPUT_NAME = "tuned.yaml"
+_VEHICLE_SECTIONS = ("vehicle", "thrust")
 """The sections in a vehicle file."""
 
 
@@ -34,7 +34,7 @@ def tune(options: argparse.Namespace) -> int:
     console = Console(stderr=options.json, highlight=False, soft_wrap=True, markup=False)
     source: Path = options.vehicle
     vehicle = source / _VEHICLE if source.is_dir() else source
-    output = options.output or vehicle.with_name(_OUTPUT)
+    output = options.output or vehicle.with_name(_OUTPUT_NAME)
     require_writable(output, "--output", force=options.force)
     config, included = _configuration(source, vehicle, options.config)
     config = _with_learned_drag(config, source)
@@ -77,7 +77,7 @@ def _configuration(source: Path, vehicle: Path, base: Path | None) -> tuple[Conf
     identified = load(vehicle)
     if base is None:
         return _flyable(identified), True
-    identified_keys = identified.model_dump(exclude_unset=True, include=set(_SECTIONS))
+    identified_keys = identified.model_dump(exclude_unset=True, include=set(_VEHICLE_SECTIONS))
     return _flyable(changed(load(base), identified_keys, str(vehicle))), True
 
 

@@ -21,7 +21,7 @@ _BOUNDS = (
     ("maximum", "at most {:g}"),
     ("exclusiveMaximum", "less than {:g}"),
 )
-_WIDTH = 98
+_LINE_WIDTH = 98
 
 
 class ConfigKey(NamedTuple):
@@ -136,7 +136,7 @@ def _flow(value: Any) -> str:
 
 def _comment(text: str, indent: str) -> list[str]:
     return textwrap.wrap(
-        _one_line(text), _WIDTH, initial_indent=f"{indent}# ", subsequent_indent=f"{indent}# "
+        _one_line(text), _LINE_WIDTH, initial_indent=f"{indent}# ", subsequent_indent=f"{indent}# "
     )
 
 

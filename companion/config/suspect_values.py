@@ -9,7 +9,7 @@ from companion.config.root import Config
 from companion.files.yaml_faults import other_unit
 
 BODY_RATE = "safety.max_body_rate_deg_s"
-_TYPICAL = {"_deg_s2": 1000.0, "_ms": 50.0}
+_USUAL_VALUES = {"_deg_s2": 1000.0, "_ms": 50.0}
 """Usual value of a key whose default is null, by the end of the key's name."""
 _MAX_SUSPECT_SHARE = 1.0 / 20.0
 """A value may be in the wrong unit if it is below this share of the usual value."""
@@ -71,7 +71,7 @@ def _units(config: Config) -> Iterator[SuspectValue]:
             continue
         usual = key.default
         if usual is None:
-            usual = next((v for end, v in _TYPICAL.items() if key.name.endswith(end)), None)
+            usual = next((v for end, v in _USUAL_VALUES.items() if key.name.endswith(end)), None)
         if key.value == key.default or not isinstance(usual, int | float) or not usual:
             continue
         unit, meant = other_unit(key.name, key.value)

@@ -8,7 +8,7 @@ from companion.guidance.reference import Reference, Vector, VehicleMotion
 _DECELERATION_SHARE = 0.47
 """Mean deceleration of a smooth stop as a share of the largest horizontal acceleration. The peak is
 a share of 0.7; the rest is left for wind and feedback."""
-_JERK = 8.0
+_LARGEST_JERK = 8.0
 """Largest jerk of a smooth stop, m/s³: the vehicle tilts and levels by less than 50°/s."""
 _REST_SPEED = 0.1
 """A slower vehicle is at rest, m/s."""
@@ -45,7 +45,7 @@ def braking_time(speed: float, acceleration: float, assumed: AssumedBraking) -> 
     longest = 2.0 * reaction + speed / assumed.deceleration
     if acceleration <= 0.0:
         return longest
-    smooth = max(speed / (_DECELERATION_SHARE * acceleration), sqrt(6.0 * speed / _JERK))
+    smooth = max(speed / (_DECELERATION_SHARE * acceleration), sqrt(6.0 * speed / _LARGEST_JERK))
     return min(smooth, longest)
 
 

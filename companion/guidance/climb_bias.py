@@ -2,7 +2,7 @@
 
 from companion.attitude.rotation import clamp
 
-_BANDWIDTH = 0.5
+_FILTER_BANDWIDTH = 0.5
 """Both poles of the filter, rad/s: slower than the height hold, quicker than a lap."""
 _LONGEST_GAP = 0.5
 """Longest time between two heights from which the error is learned, s."""
@@ -42,6 +42,6 @@ class ClimbBias:
             return speed - self.bias
         predicted = before + dt * (mean - self.bias)
         error = height - predicted
-        self._height = predicted + min(2.0 * _BANDWIDTH * dt, 1.0) * error
-        self.bias = clamp(self.bias - _BANDWIDTH * _BANDWIDTH * dt * error, _LARGEST_BIAS)
+        self._height = predicted + min(2.0 * _FILTER_BANDWIDTH * dt, 1.0) * error
+        self.bias = clamp(self.bias - _FILTER_BANDWIDTH**2 * dt * error, _LARGEST_BIAS)
         return speed - self.bias

@@ -8,7 +8,7 @@ import numpy as np
 from companion.drag import AxisDrag, Drag
 from companion.guidance.reference import Horizontal, Vector
 
-_WINDOW = 0.2
+_SHORTEST_WINDOW = 0.2
 """Shortest duration of one measurement, s; a longer one suffers less from velocity noise."""
 _MEASUREMENT_DEVIATION = 0.2
 """Standard deviation of a measurement, m/s², from velocity noise and the thrust's direction."""
@@ -117,7 +117,7 @@ class DragEstimate:
             self._squared[axis] += dt * speed * velocity[axis]
             self._residual[axis] += dt * residual[axis]
         self._span += dt
-        if self._span >= _WINDOW:
+        if self._span >= _SHORTEST_WINDOW:
             self._learn()
             self._forget_window()
 

@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 _GRID_PERIOD = 0.004
 """Sample period of the correlation, s."""
-_DELAYS = int(LONGEST_DEAD_TIME / _GRID_PERIOD)
+_DELAY_COUNT = int(LONGEST_DEAD_TIME / _GRID_PERIOD)
 """Number of delays that are compared, besides 0; one `_GRID_PERIOD` apart."""
 _CENTRE_PHASE = 0.38
 """Phase of the lag at the centre frequency of the filter, rad."""
@@ -66,7 +66,12 @@ def dead_time_by_correlation(
         raise ValueError(f"lag must be finite and not negative, not {lag}")
     if slew is not None and not slew > 0.0:
         raise ValueError(f"slew must be positive, not {slew}")
-    products, powers, squares, count = np.zeros(_DELAYS + 1), np.zeros(_DELAYS + 1), 0.0, 0
+    products, powers, squares, count = (
+        np.zeros(_DELAY_COUNT + 1),
+        np.zeros(_DELAY_COUNT + 1),
+        0.0,
+        0,
+    )
     band = _band_pass(lag, damping)
     for part in stretches(time, commanded, measured_time, measured):
         filtered = _filtered(part, lag, slew, band)
@@ -118,7 +123,7 @@ def _band_pass(lag: float, damping: float) -> Floats:
 def _filtered(
     part: Stretch, lag: float, slew: float | None, band: Floats
 ) -> tuple[Floats, Floats] | None:
-    """Filtered commands (n + `_DELAYS`,) and measurements (n,), sampled every `_GRID_PERIOD` s.
+    """Filtered commands (n + `_DELAY_COUNT`,) and measurements (n,), sampled at the same period.
 
     Both end at the same time. None: the measurements are shorter than the filter.
     """
@@ -126,13 +131,13 @@ def _filtered(
     count = int((last - first) / _GRID_PERIOD)
     if count <= band.size:
         return None
-    at = last - _GRID_PERIOD * np.arange(count + _DELAYS)[::-1]
+    at = last - _GRID_PERIOD * np.arange(count + _DELAY_COUNT)[::-1]
     at = np.maximum(at, part.time[0])
     knots = held_commands(part.time, part.commanded)
     if slew is not None:
         knots = slewed(knots, slew)
     commands = lagged(knots, lag, at) if lag > 0.0 else value_at(knots, at)
-    response = np.interp(at[_DELAYS:], part.measured_time, part.measured)
+    response = np.interp(at[_DELAY_COUNT:], part.measured_time, part.measured)
     return np.convolve(commands, band, "valid"), np.convolve(response, band, "valid")
 
 

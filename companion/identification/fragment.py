@@ -12,7 +12,7 @@ Known = Mapping[str, Sequence[float | None]]
 """Lag (ms), dead time (ms), acceleration limit (°/s²) and damping by axis, as configured."""
 
 _KEY_PREFIX = {"roll": "", "pitch": "pitch_", "yaw": "yaw_"}
-_KEYS = "lag_ms", "dead_time_ms", "acceleration_limit_deg_s2", "damping"
+_AXIS_KEYS = "lag_ms", "dead_time_ms", "acceleration_limit_deg_s2", "damping"
 _NO_SLEW_LIMIT = 100_000.0
 """Slew limit written for an axis that has none while roll has one, °/s²; null would mean roll's."""
 _SAME_MS = 3.0
@@ -138,7 +138,7 @@ def _tilt_keys(roll: AxisValues, pitch: AxisValues) -> list[str]:
         _mean(roll.slew, pitch.slew),
         _mean(roll.damping, pitch.damping),
     )
-    return _axis_keys("roll", mean) + [f"  pitch_{key}: null" for key in _KEYS]
+    return _axis_keys("roll", mean) + [f"  pitch_{key}: null" for key in _AXIS_KEYS]
 
 
 def _mean(one: float | None, other: float | None) -> float | None:
@@ -170,7 +170,7 @@ def _axis_keys(name: str, axis: AxisValues, inherited: float | None = None) -> l
         "acceleration_limit_deg_s2": "null" if slew is None else f"{slew:.0f}",
         "damping": "null" if axis.damping is None else f"{axis.damping:.2f}",
     }
-    keys = _KEYS[:-1] if name == "yaw" else _KEYS  # there is no yaw_damping
+    keys = _AXIS_KEYS[:-1] if name == "yaw" else _AXIS_KEYS  # there is no yaw_damping
     return [f"  {_KEY_PREFIX[name]}{key}: {values[key]}" for key in keys]
 
 

@@ -12,7 +12,7 @@ from companion.identification.response import RateResponse
 from companion.identification.thrust_map import ThrustMap
 from companion.identification.vehicle import IdentifiedVehicle
 
-_NONE = "–"
+_NO_VALUE = "–"
 
 
 def vehicle_table(vehicle: IdentifiedVehicle, gravity: float) -> RenderableType:
@@ -31,7 +31,9 @@ def vehicle_table(vehicle: IdentifiedVehicle, gravity: float) -> RenderableType:
     }
     rows = [_cells(each, shown[name]) for name, each in vehicle.axes.items()]
     names = ("lag, ms", "dead time, ms", "damping", "gain", "slew, °/s²", "misfit", "")
-    columns = [column for column in zip(names, *rows, strict=True) if set(column[1:]) != {_NONE}]
+    columns = [
+        column for column in zip(names, *rows, strict=True) if set(column[1:]) != {_NO_VALUE}
+    ]
     table = Table(title="Response to body rates", title_justify="left", title_style="bold")
     table.add_column("")
     for name, *_ in columns:
@@ -47,8 +49,8 @@ def _cells(response: RateResponse, second_order: SecondOrderFit | None) -> tuple
     """The cells of an axis: of this second-order fit, or of the first-order one."""
     verdict = "good" if response.is_good() else "bad"
     if isnan(response.lag):
-        return *(_NONE,) * 6, verdict
-    fit, damping = response.fit, _NONE
+        return *(_NO_VALUE,) * 6, verdict
+    fit, damping = response.fit, _NO_VALUE
     times = (response.lag, fit.lag_error), (response.dead_time, fit.dead_time_error)
     slew, misfit = response.slew, fit.misfit
     if second_order is not None:
@@ -59,7 +61,7 @@ def _cells(response: RateResponse, second_order: SecondOrderFit | None) -> tuple
         *(f"{1e3 * time:.1f} ± {1e3 * error:.1f}" for time, error in times),
         damping,
         f"{response.gain:.2f}",
-        _NONE if slew is None else f"{degrees(slew):.0f}",
+        _NO_VALUE if slew is None else f"{degrees(slew):.0f}",
         f"{misfit:.0%}",
         verdict,
     )

@@ -63,11 +63,11 @@ class StreamAddress(NamedTuple):
         )
 
 
-_ANY = (ip_address("0.0.0.0"), ip_address("::"))
+_ANY_ADDRESS = (ip_address("0.0.0.0"), ip_address("::"))
 
 
 def _shown(host: str) -> str:
-    name = host if ip_address(host) not in _ANY else socket.gethostname()
+    name = host if ip_address(host) not in _ANY_ADDRESS else socket.gethostname()
     return f"[{name}]" if ":" in name else name
 
 

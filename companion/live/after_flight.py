@@ -11,7 +11,7 @@ from companion.live.addresses import leave_address
 
 _LONGEST_UNUSED = 5.0
 """Time after which a page or stream without users ends, s."""
-_LONGEST = 3600.0
+_LONGEST_STAY = 3600.0
 """Longest time that a page or stream stays after the flight, s."""
 
 
@@ -26,7 +26,7 @@ async def until_unused(port: int, is_open: Callable[[], bool]) -> None:
     """
     async with _leave_request(port) as asked:
         quiet = 0.0
-        for _ in range(int(_LONGEST)):
+        for _ in range(int(_LONGEST_STAY)):
             quiet = 0.0 if is_open() else quiet + 1.0
             if asked.is_set() or quiet > _LONGEST_UNUSED:
                 break

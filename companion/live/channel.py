@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from math import inf
 from typing import Any
 
-_LARGEST = 200_000
+_LARGEST_MESSAGE = 200_000
 """Largest message, bytes; the system's buffer holds at least one of this size."""
 
 Message = dict[str, Any]
@@ -51,7 +51,7 @@ class Channel:
             self.dropped += 1
             return False
         except OSError:  # gone, or larger than the buffer
-            self.open = len(data) > _LARGEST
+            self.open = len(data) > _LARGEST_MESSAGE
             self.dropped += 1
             return False
         return True
@@ -63,7 +63,7 @@ class Channel:
             BlockingIOError: the socket is non-blocking and there is no message.
         """
         try:
-            data = self._end.recv(_LARGEST)
+            data = self._end.recv(_LARGEST_MESSAGE)
         except BlockingIOError:
             raise
         except OSError:
@@ -132,7 +132,7 @@ def datagrams(end: socket.socket, max_count: int) -> Iterator[bytes]:
     """At most `max_count` datagrams that arrived at a non-blocking socket; b"": it was closed."""
     for _ in range(max_count):
         try:
-            datagram = end.recv(_LARGEST)
+            datagram = end.recv(_LARGEST_MESSAGE)
         except BlockingIOError:
             return
         except OSError:

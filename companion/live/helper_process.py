@@ -21,7 +21,7 @@ _LOOK_PERIOD = 0.06
 """Period of checks of the watched file, s; an edit needs three of them."""
 _ANSWER_TIMEOUT = 3.0
 """Time allowed for the flight to answer, s."""
-_NICE = 5
+_NICENESS = 5
 """Niceness of the process, so that it yields to the flight."""
 
 
@@ -185,5 +185,5 @@ async def _watch_until_over(relay: Relay) -> None:
 
 
 if __name__ == "__main__":
-    os.nice(_NICE)
+    os.nice(_NICENESS)
     asyncio.run(_serve(*map(int, sys.argv[1:])))

@@ -9,9 +9,9 @@ from companion.config.files import files_of, load
 from companion.config.in_flight import Values, differences
 from companion.files.yaml_file import ConfigError
 
-_LONGEST = 400
+_LONGEST_EXPLANATION = 400
 """Largest length of an explanation, characters."""
-_SETTLED = 3
+_UNCHANGED_CHECKS = 3
 """Number of unchanged checks after which a file counts as complete; editors remove it briefly."""
 
 Signature = tuple[tuple[int, int, int] | None, ...]
@@ -57,7 +57,7 @@ class WatchedFile:
         if signature != self._seen:
             self._seen, self._looks = signature, 0
         self._looks += 1
-        if self._looks < _SETTLED or signature == self._judged:
+        if self._looks < _UNCHANGED_CHECKS or signature == self._judged:
             return None
         self._files = files_of(self._path)
         self._seen = self._judged = self._signature()
@@ -77,7 +77,7 @@ class WatchedFile:
             self._check(values, name)
         except ConfigError as error:
             text = " ".join(str(error).split())
-            text = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
+            text = text if len(text) <= _LONGEST_EXPLANATION else f"{text[:_LONGEST_EXPLANATION]}…"
             return Edit({}, f"{name} is not applied, and nothing has changed: {text}")
         return Edit(values)
 

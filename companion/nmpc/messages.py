@@ -12,7 +12,7 @@ from companion.nmpc.reference import Start
 READY = b"ready"
 """First message of the solver's process, sent when it can take requests."""
 
-_HEAD = struct.Struct("<q25d")
+_REQUEST_HEAD = struct.Struct("<q25d")
 _INPUT = struct.Struct("<5d")
 _ANSWER = struct.Struct("<2q9d")
 
@@ -122,7 +122,7 @@ class Answer(NamedTuple):
 def pack_request(request: Request) -> bytes:
     """The bytes of a request."""
     vehicle, start = request.vehicle, request.start
-    head = _HEAD.pack(
+    head = _REQUEST_HEAD.pack(
         request.number,
         request.at,
         *start.position,
@@ -141,7 +141,7 @@ def pack_request(request: Request) -> bytes:
 
 def unpack_request(message: bytes) -> Request:
     """The request in these bytes."""
-    number, at, *v = _HEAD.unpack_from(message)
+    number, at, *v = _REQUEST_HEAD.unpack_from(message)
     vehicle = Vehicle(
         v[4],
         (v[5], v[6], v[7]),
@@ -152,7 +152,7 @@ def unpack_request(message: bytes) -> Request:
         Drag(v[21], v[22]),
         v[23],
     )
-    inputs = tuple(Input(*values) for values in _INPUT.iter_unpack(message[_HEAD.size :]))
+    inputs = tuple(Input(*values) for values in _INPUT.iter_unpack(message[_REQUEST_HEAD.size :]))
     return Request(number, vehicle, at, Start((v[0], v[1], v[2]), v[3]), inputs)
 
 

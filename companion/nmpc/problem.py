@@ -15,7 +15,7 @@ from companion.nmpc.settings import Settings
 Floats = NDArray[np.float64]
 
 _ITERATION_LIMIT = "SOLVER_RET_LIMITED"
-_SQP: dict[str, Any] = {
+_SQP_OPTIONS: dict[str, Any] = {
     "qpsol": "hpipm",
     "tol_pr": 1e-6,
     "tol_du": 1e-3,
@@ -222,4 +222,4 @@ def _sqp_function(program: Program, iterations: int) -> ca.Function:
         "f": 0.5 * ca.sumsqr(program.residual),
         "g": program.constraints,
     }
-    return ca.nlpsol("nmpc", "sqpmethod", problem, _SQP | options)
+    return ca.nlpsol("nmpc", "sqpmethod", problem, _SQP_OPTIONS | options)

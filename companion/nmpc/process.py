@@ -29,7 +29,7 @@ from companion.realtime import schedule_as_usual
 _LARGEST_MESSAGE = 4096  # bytes
 _EXIT_TIME = 0.02
 """Time allowed for the process to exit after its socket has closed, s; it usually takes < 1 ms."""
-_TOLERANCE = 0.02
+_ANSWER_TOLERANCE = 0.02
 """Margin for rounding when an answer is checked: a share of the tilt limit; for thrust, of gravity.
 """
 
@@ -218,9 +218,9 @@ def _why_implausible(answer: Answer, longest: float, settings: Settings) -> str 
     if not all(isfinite(value) for value in values):
         return "a number that is not finite"
     length = hypot(answer.north, answer.east)
-    if length > (1.0 + _TOLERANCE) * longest:
+    if length > (1.0 + _ANSWER_TOLERANCE) * longest:
         return f"coefficients of length {length:.3f}, more than the limit {longest:.3f}"
-    slack = _TOLERANCE * settings.gravity
+    slack = _ANSWER_TOLERANCE * settings.gravity
     if not settings.min_thrust - slack <= answer.thrust <= settings.max_thrust + slack:
         limits = f"{settings.min_thrust:.2f} to {settings.max_thrust:.2f}"
         return f"a thrust of {answer.thrust:.2f} m/s², outside {limits}"

@@ -13,7 +13,7 @@ from companion.preflight.finding import Finding
 from companion.preflight.parameter_fixes import Outcome
 from companion.vehicle.parameter_rules import CheckResult
 
-_TITLES = {
+_GROUP_TITLES = {
     CheckResult.NOT_CONNECTED: ("NOT CONNECTED: nothing was judged", "bold red"),
     CheckResult.UNSAFE: ("UNSAFE: somebody may be hurt or the vehicle lost", "bold red"),
     CheckResult.INEFFECTIVE: ("INEFFECTIVE: something will not work as configured", "bold yellow"),
@@ -35,7 +35,7 @@ def lists(config: Config, findings: Sequence[Finding]) -> RenderableType:
     The worst findings stand last, beside the summary line, where a terminal shows them.
     """
     parts: list[RenderableType] = []
-    for result, (title, style) in reversed(_TITLES.items()):
+    for result, (title, style) in reversed(_GROUP_TITLES.items()):
         matching = [finding for finding in findings if finding.result is result]
         if matching:
             parts += [Text(title, style=style), _list(matching, config.flight.accept), Text()]
@@ -95,7 +95,8 @@ def outcome_line(outcome: Outcome) -> str:
 def as_dict(config: Config, findings: Sequence[Finding]) -> dict[str, Any]:
     """The findings for JSON; `doctor --json` prints them."""
     counts = {
-        result.value: sum(finding.result is result for finding in findings) for result in _TITLES
+        result.value: sum(finding.result is result for finding in findings)
+        for result in _GROUP_TITLES
     }
     return {
         "result": _RESULT_WORDS[overall_result(config, findings)],

@@ -19,13 +19,13 @@ from companion.files.os_errors import DISK_HANGS, DISK_TIMEOUT, reason_of
 T = TypeVar("T")
 Item_contra = TypeVar("Item_contra", contravariant=True)
 
-_PERIOD = 0.05
+_CHECK_PERIOD = 0.05
 """Time between two checks for new items, s."""
-_SLICE = 20
+_SMALLEST_SLICE = 20
 """Number of items in a slice, if few are waiting."""
 _MOST_SLICES = 50
 """Largest number of slices in which a backlog is written."""
-_PAUSE = 0.001
+_SLICE_PAUSE = 0.001
 """Pause after a slice, s."""
 _SYNC_PERIOD = 0.5
 """Period of syncs, s; a power cut loses this much, plus the time that the disk takes."""
@@ -129,7 +129,7 @@ class BackgroundFile(ABC, Generic[T]):
                 self._fail(DISK_HANGS)
 
     def _run(self, file: ItemFile[T]) -> None:
-        while not self._closing.wait(_PERIOD):
+        while not self._closing.wait(_CHECK_PERIOD):
             self._write_waiting(file)
             self._sync_when_due(file)
         self._write_waiting(file)
@@ -138,14 +138,14 @@ class BackgroundFile(ABC, Generic[T]):
     def _write_waiting(self, file: ItemFile[T]) -> None:
         """Write the items that are waiting now; items that arrive later wait for the next call."""
         left = len(self._waiting)
-        size = max(_SLICE, -(-left // _MOST_SLICES))
+        size = max(_SMALLEST_SLICE, -(-left // _MOST_SLICES))
         while left > 0:
             items = [self._waiting.popleft() for _ in range(min(size, left))]
             left -= len(items)
             self._write_slice(file, items)
             self._sync_when_due(file)
             if not self._closing.is_set():
-                sleep(_PAUSE)
+                sleep(_SLICE_PAUSE)
 
     def _write_slice(self, file: ItemFile[T], items: Sequence[T]) -> None:
         if self.failure is None:

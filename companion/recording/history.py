@@ -15,11 +15,11 @@ Floats = NDArray[np.float64]
 
 HEIGHTS = (1.0, 1.0, 1.0, 1.4)
 """Relative heights of the panels, from top to bottom."""
-_MARGIN = 0.02
+_MARGIN_AFTER_END = 0.02
 """Margin after the end, as a share of the flight."""
 _ROOM_FOR_NAMES = 1.5
 """Factor on the height axis, which leaves space for the names of the phases."""
-_LATEST = 1e9
+_LATEST_TIME = 1e9
 """Later times are invalid, s."""
 _LINE, _PHASE, _END = "#0072b2", "#666666", "#cc0000"
 _SHADES = ("#f0e6c8", "#d5e8f0")
@@ -106,7 +106,7 @@ def draw_history(panels: Sequence["Axes"], motion: Floats, marks: Marks) -> None
             axes.axvline(marks.end, color=_END, linewidth=1.5)
         axes.set_ylabel(f"{name}, {unit}")
         axes.grid(alpha=0.3)
-        axes.set_xlim(float(time[0]), float(time[0]) + (1.0 + _MARGIN) * length)
+        axes.set_xlim(float(time[0]), float(time[0]) + (1.0 + _MARGIN_AFTER_END) * length)
         low, high = axes.get_ylim()
         axes.set_ylim(min(low, 0.0), high * (_ROOM_FOR_NAMES if axes is panels[-1] else 1.0))
     panels[-1].set_xlabel("time since the flight began, s")
@@ -166,6 +166,6 @@ def _plain(text: str) -> str:
 
 def _time(value: Any) -> float:
     time = float(value)
-    if not isfinite(time) or abs(time) > _LATEST:
+    if not isfinite(time) or abs(time) > _LATEST_TIME:
         raise ValueError(f"a time is {value}")
     return time

@@ -60,13 +60,13 @@ def _in_order(messages: "_Messages") -> Iterator[Entry]:
             yield recorded_action(messages.take(ACTION))
         elif topic == ATTITUDE_TARGET.topic:
             yield attitude_target(messages.take(ATTITUDE_TARGET))
-        elif topic == _CHANGE:
+        elif topic == _CHANGE_TOPIC:
             yield messages.take_change()
         else:  # its sample or its step was not recorded
             messages.skip(topic)
 
 
-_CHANGE = "/change"
+_CHANGE_TOPIC = "/change"
 _CHANNELS = (SAMPLE, SETPOINT, INPUT, TARGET, GUIDANCE, ACTION, ATTITUDE_TARGET)
 
 
@@ -74,7 +74,7 @@ class _Messages:
     """The messages of the replayed channels and the changes, in the order of the file."""
 
     def __init__(self, record: FlightRecord) -> None:
-        used = {_CHANGE, *(channel.topic for channel in _CHANNELS)}
+        used = {_CHANGE_TOPIC, *(channel.topic for channel in _CHANNELS)}
         self._order = [topic for topic in record.content.order if topic in used]
         self._changes = iter(record.changes)
         self._rows = {each.topic: iter(record.rows(each.name).tolist()) for each in _CHANNELS}

@@ -22,7 +22,7 @@ from companion.vehicle.records import (
 Row = dict[str, Any]
 """One message: value by column name."""
 
-_TARGET = "north", "east", "heading_rad", "heading_rate_rad_s"
+_TARGET_COLUMNS = "north", "east", "heading_rad", "heading_rate_rad_s"
 _MISFITS = (None, Misfit.NOT_NEWER, Misfit.AHEAD)
 
 
@@ -138,10 +138,10 @@ def recorded_step(row: Row, target: Row | None, made: Row | None) -> RecordedSte
 def _command(row: Row) -> GuidanceCommand:
     later = None
     if not isnan(row["later_north"]):
-        later = Target(*(row[f"later_{name}"] for name in _TARGET))
+        later = Target(*(row[f"later_{name}"] for name in _TARGET_COLUMNS))
     free = isnan(row["body_roll_rad_s"])
     return GuidanceCommand(
-        Target(*(row[name] for name in _TARGET)),
+        Target(*(row[name] for name in _TARGET_COLUMNS)),
         row["acceleration_down_m_s2"],
         row["time_s"],
         bool(row["idle"]),

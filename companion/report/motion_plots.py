@@ -23,7 +23,7 @@ from companion.report.plots import (
 )
 
 _NORTH, _EAST, _HEIGHT = range(3)
-_EYE = {"x": 1.3, "y": -1.7, "z": 1.0}
+_CAMERA_POSITION = {"x": 1.3, "y": -1.7, "z": 1.0}
 """Position of the camera: from the south-east and above, far enough to show the axis titles."""
 _LONGEST_EDGE = 1.2
 """Longest edge of the box around the track, in Plotly's units: the camera sees all of it."""
@@ -94,7 +94,7 @@ def _space(flights: Sequence[FlightData]) -> Plot:
             traces.append(_track("reference", flight, "reference", REFERENCE))
     scene: dict[str, Any] = {
         **axes(x="east, m", y="north, m", z="height, m"),
-        "camera": {"eye": _EYE, "center": {"x": 0.0, "y": 0.0, "z": -0.15}},
+        "camera": {"eye": _CAMERA_POSITION, "center": {"x": 0.0, "y": 0.0, "z": -0.15}},
     }
     ranges = _cube_ranges(traces)
     for axis, (low, high) in ranges.items():

@@ -7,7 +7,7 @@ from companion.recording.history import Span
 from companion.report.flight_data import FlightData
 from companion.report.plots import IDEAL, MEASURED, REFERENCE, Plot, axes, end_mark
 
-_COLOURS = {2: MEASURED, 3: "#e69f00", 4: REFERENCE}
+_EVENT_COLOURS = {2: MEASURED, 3: "#e69f00", 4: REFERENCE}
 """Colour of an event, by its level."""
 _LANES = ("events", "maneuvers", "phases", "modes")
 """Lanes of events, maneuvers and phases or modes, from the bottom up."""
@@ -29,7 +29,9 @@ def timeline(flight: FlightData) -> Iterator[Plot]:
                 "y": ["events"] * len(flight.events),
                 "text": [event.text for event in flight.events],
                 "hovertemplate": "%{x:.1f} s: %{text}<extra></extra>",
-                "marker": {"color": [_COLOURS.get(event.level, IDEAL) for event in flight.events]},
+                "marker": {
+                    "color": [_EVENT_COLOURS.get(event.level, IDEAL) for event in flight.events]
+                },
             }
         )
     layout = axes(x="time, s")

@@ -17,7 +17,7 @@ from companion.report.flight_data import Curve, FlightData, Floats, spans
 from companion.vehicle.flight_log import read_flight_log
 from companion.vehicle.registry import BY_NUMBER
 
-_NAMES = frozenset(
+_MESSAGE_NAMES = frozenset(
     {"ATTITUDE_QUATERNION", "ATTITUDE", "LOCAL_POSITION_NED", "HEARTBEAT", "STATUSTEXT"}
 )
 _INFORMATION, _WARNING, _ERROR = 2, 3, 4
@@ -33,7 +33,7 @@ def logged(path: Path) -> FlightData:
         LogError: the file cannot be read, is not a `.tlog`, or has no telemetry of an autopilot.
     """
     reader = _Reader()
-    for frame, message in messages(path, _NAMES):
+    for frame, message in messages(path, _MESSAGE_NAMES):
         reader.take((frame.system, frame.component), message)
     if reader.vehicle is None or reader.began is None:
         raise LogError(f"{path}: has no telemetry of PX4 or ArduPilot")

@@ -21,7 +21,7 @@ _MAX_TEXT_LENGTH = 200
 _TEXT_REPEAT_PERIOD = 5.0
 """Shortest time between two equal texts to the same client, s."""
 _AUTOPILOT_INVALID, _STATE_ACTIVE, _VERSION = 8, 4, 3
-_COMMANDS = dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT
+_COMMAND_IDS = dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT
 
 WARNING, NOTICE = dialect.MAV_SEVERITY_WARNING, dialect.MAV_SEVERITY_NOTICE
 
@@ -95,7 +95,7 @@ class Component:
 
     def on_own_frame(self, client: Channel, frame: Frame) -> None:
         """Refuse a command to our component, which carries out none; ignore other frames."""
-        if frame.message_id in _COMMANDS and isinstance(client, Client):
+        if frame.message_id in _COMMAND_IDS and isinstance(client, Client):
             self.acknowledge(client, frame, dialect.MAV_RESULT_UNSUPPORTED, self._own_address)
 
     def _not_sent_lately(self, client: Client | None, text: str) -> bool:

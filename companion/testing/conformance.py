@@ -25,7 +25,7 @@ from companion.testing.vehicle import MockVehicle
 _LIMITS = Limits(max_tilt=radians(40.0), max_tilt_rate=radians(200.0), max_yaw_rate=radians(90.0))
 _GAIN = 5.0  # 1/s
 _DT = 0.004  # s
-_CASES = 200
+_CASE_COUNT = 200
 _SETTLING_TIME = 3.0
 """Time allowed for a step, s: 15 time constants of `_GAIN`."""
 _MAX_REMAINING_ERROR = 0.02
@@ -50,7 +50,7 @@ def check_planner(planner: str | Law | type[Planner], seed: int = 0) -> None:
     if isinstance(planner, str) and planner in plugins.names(plugins.PLANNERS):
         planner = plugins.load(plugins.PLANNERS, planner)
     rng = random.Random(seed)
-    for _ in range(_CASES):
+    for _ in range(_CASE_COUNT):
         q, target = _any_attitude(rng), _any_target(rng)
         rates = _first_rates(planner, q, target)
         case = f"at q = {q} towards {target}"
@@ -66,7 +66,7 @@ def check_planner(planner: str | Law | type[Planner], seed: int = 0) -> None:
         other = _first_rates(planner, (-w, -x, -y, -z), target)
         apart = max(abs(a - b) for a, b in zip(rates, other, strict=True))
         assert apart < 1e-6, f"q and −q give rates that differ by {apart} rad/s, {case}"
-    for _ in range(_CASES // 20):
+    for _ in range(_CASE_COUNT // 20):
         _check_convergence(planner, _any_target(rng), _any_target(rng))
 
 

@@ -14,11 +14,11 @@ from companion.tuning.margins import Margins, frequencies, margins, smaller
 
 Floats = NDArray[np.float64]
 
-_SETTLED = 0.05
+_SETTLED_SHARE = 0.05
 """Share of its peak below which the response to a gust has settled."""
-_LONGEST = 10.0
+_RESPONSE_DURATION = 10.0
 """Duration of the computed response to a gust, s."""
-_STEP = 0.01
+_RESPONSE_PERIOD = 0.01
 """Time between computed points of the response to a gust, s."""
 
 
@@ -176,12 +176,12 @@ def _after_gust(config: Config) -> tuple[float, float]:
     omega = np.arange(0.0, 60.0, 0.05)
     s = np.asarray(offset + 1j * omega, dtype=np.complex128)
     place, _ = control_loop(config, s).by_acceleration()
-    time = np.arange(0.0, _LONGEST, _STEP)
+    time = np.arange(0.0, _RESPONSE_DURATION, _RESPONSE_PERIOD)
     terms = np.real(np.exp(1j * np.outer(time, omega)) @ (place * _trapezoid(omega)))
     response = np.abs(np.exp(offset * time) * terms / pi)
     peak = float(response.max())
-    beyond = np.flatnonzero(response > _SETTLED * peak)
-    return peak, float(time[beyond[-1]]) + _STEP
+    beyond = np.flatnonzero(response > _SETTLED_SHARE * peak)
+    return peak, float(time[beyond[-1]]) + _RESPONSE_PERIOD
 
 
 def _trapezoid(omega: Floats) -> Floats:

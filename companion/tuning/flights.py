@@ -22,12 +22,12 @@ _STRONG_GUST = 2.0
 _LARGEST_RESERVE = 0.8
 """Largest reserve for feedback and wind, as a share of what the tilt limit gives."""
 _MAX_THRUST = 0.95
-_FENCE = 50.0  # m
+_FENCE_SIZE = 50.0  # m
 _WIRE_S = 0.0005
 """Delay of each datagram between program and mock vehicle, s."""
 _TRUTH_EVERY = 5
 """Steps of the mock vehicle between two true positions."""
-_QUICK = {
+_QUICK_TAKEOFF_AND_LANDING = {
     "px4": {"MPC_TKO_RAMP_T": 0.3, "MPC_TKO_SPEED": 3.0, "MPC_LAND_SPEED": 3.0},
     "ardupilot": {"LAND_SPEED": 150.0},
 }
@@ -115,7 +115,7 @@ def fly_course(config: Config, course: Course, autopilot: str, seed: int = 3) ->
         prearm_delay_s=0.2,
         seed=seed,
         wind=dict(course.wind),
-        parameters={**parameters, **_QUICK[autopilot]},
+        parameters={**parameters, **_QUICK_TAKEOFF_AND_LANDING[autopilot]},
     )
     flown_config = _flight_config(config, course, mock)
     with _truth(vehicle) as rows:
@@ -189,8 +189,8 @@ def _flight_config(config: Config, course: Course, mock: Config) -> Config:
             "thrust": mock.thrust.model_dump(),
             "limits": {
                 "max_thrust": _MAX_THRUST,
-                "fence_radius_m": _FENCE,
-                "fence_ceiling_m": _FENCE,
+                "fence_radius_m": _FENCE_SIZE,
+                "fence_ceiling_m": _FENCE_SIZE,
                 "fence_floor_m": 1.0,
             },
             "flight": {

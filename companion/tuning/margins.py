@@ -7,22 +7,22 @@ import numpy as np
 
 from companion.tuning.feedback import Complex
 
-_OFFSET = 1e-2
+_REAL_PART = 1e-2
 """Real part of the frequencies, 1/s, so that the integrators of the loop lie to their left."""
 _UP_TO = 150.0
 """Highest frequency, rad/s; guidance at 50 Hz has its Nyquist frequency at 157 rad/s."""
-_POINTS = 120
+_FREQUENCY_COUNT = 120
 
 
 def frequencies() -> Complex:
     """Complex frequencies s (n,) for margins and errors, rad/s.
 
-    The real part is `_OFFSET`; the imaginary part rises from 0 to `_UP_TO`, with most points above
-    0.05 rad/s.
+    The real part is `_REAL_PART`; the imaginary part rises from 0 to `_UP_TO`, with most points
+    above 0.05 rad/s.
     """
     low = np.geomspace(1e-3, 0.05, 12)[:-1]
-    high = np.geomspace(0.05, _UP_TO, _POINTS)
-    s: Complex = _OFFSET + 1j * np.concatenate([[0.0], low, high])
+    high = np.geomspace(0.05, _UP_TO, _FREQUENCY_COUNT)
+    s: Complex = _REAL_PART + 1j * np.concatenate([[0.0], low, high])
     return s
 
 

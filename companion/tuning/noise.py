@@ -14,11 +14,11 @@ from companion.vehicle.registry import AUTOPILOTS
 
 Floats = NDArray[np.float64]
 
-_BAND = 0.15, 1.5
+_HOLD_BAND = 0.15, 1.5
 """Frequencies at which the hold responds to disturbances, Hz."""
-_WHITE = 0.6
+_WHITE_NOISE_SHARE = 0.6
 """Share of half the telemetry rate above which only the noise of single messages remains."""
-_SEGMENT = 8.0
+_SEGMENT_DURATION = 8.0
 """Duration of one segment of the record for a spectrum, s."""
 _LEAST_HEIGHT = 1.0
 """Positions less than this above the first one of the log are left out, m."""
@@ -109,7 +109,7 @@ def _densities(time: Floats, rest: Floats) -> tuple[float, float]:
         rest: (n, 2), north and east.
     """
     period = float(np.median(np.diff(time)))
-    length = round(_SEGMENT / period)
+    length = round(_SEGMENT_DURATION / period)
     gaps = np.flatnonzero(np.diff(time) > 3.0 * period)
     inside, fast = [], []
     for part in np.split(rest, gaps + 1):
@@ -119,8 +119,8 @@ def _densities(time: Floats, rest: Floats) -> tuple[float, float]:
             spectrum = np.abs(np.fft.rfft((piece - piece.mean(axis=0)) * window, axis=0)) ** 2
             density = 2.0 * period * spectrum / np.sum(window**2)
             hertz = np.fft.rfftfreq(length, period)
-            inside.append(density[(hertz >= _BAND[0]) & (hertz <= _BAND[1])].mean())
-            upper = hertz >= _WHITE * hertz[-1]
+            inside.append(density[(hertz >= _HOLD_BAND[0]) & (hertz <= _HOLD_BAND[1])].mean())
+            upper = hertz >= _WHITE_NOISE_SHARE * hertz[-1]
             # A difference of white noise over a period has this density.
             gain = (2.0 * np.sin(np.pi * hertz[upper] * period) / period) ** 2
             fast.append((density[upper].mean(axis=1) / gain).mean())
@@ -128,6 +128,6 @@ def _densities(time: Floats, rest: Floats) -> tuple[float, float]:
         return float("nan"), float("nan")
     white = float(np.median(fast))
     # The noise of single messages belongs to the measurement, not to the motion.
-    middle = 0.5 * (_BAND[0] + _BAND[1])
+    middle = 0.5 * (_HOLD_BAND[0] + _HOLD_BAND[1])
     slow = max(float(np.median(inside)) - white * (2.0 * np.pi * middle) ** 2, 0.0)
     return float(np.sqrt(slow)), float(np.sqrt(white / (2.0 * period)))

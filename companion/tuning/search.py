@@ -14,7 +14,7 @@ from companion.tuning.margins import Margins, frequencies, margins, smaller
 
 _FIRST_STEP, _LAST_STEP = 0.4, 0.08
 """First and last step of the search: changes of the natural logarithm of a value."""
-_PENALTY = 30.0
+_COST_OF_MISSED_AIM = 30.0
 """Cost of a missed aim, per unit by which it is missed (`_missed`). The expected error counts by
 its natural logarithm."""
 
@@ -72,7 +72,7 @@ class Design(NamedTuple):
         return Design(*(float(f"{value:.3g}") for value in self))
 
 
-_LARGEST = Design(20.0, 10000.0, 10000.0, 14.0)
+_LARGEST_DESIGN = Design(20.0, 10000.0, 10000.0, 14.0)
 """Largest values that are searched."""
 _SMALLEST_DESIGN = Design(1.0, 0.01, 0.01, 0.3)
 """Smallest values that are searched."""
@@ -92,14 +92,14 @@ Without any, a figure-eight in gusts could swing by more than 1 m on the mock ve
 
 def largest_gain(config: Config) -> float:
     """The largest sensible planner gain, as in `companion check-config`, but at most 20, 1/s."""
-    return min(_LARGEST.gain, sensible_gain(config))
+    return min(_LARGEST_DESIGN.gain, sensible_gain(config))
 
 
 def largest_design(config: Config) -> Design:
     """The largest values that are searched for this vehicle."""
     slews = [axis.acceleration_limit for axis in config.vehicle.axes.values()]
-    bandwidth = _LARGEST.bandwidth if slews[0] is None else _LARGEST_BANDWIDTH_SLEWING
-    return _LARGEST._replace(gain=largest_gain(config), bandwidth=bandwidth)
+    bandwidth = _LARGEST_DESIGN.bandwidth if slews[0] is None else _LARGEST_BANDWIDTH_SLEWING
+    return _LARGEST_DESIGN._replace(gain=largest_gain(config), bandwidth=bandwidth)
 
 
 def search(config: Config, disturbances: Disturbances, aims: Aims) -> Design:
@@ -178,14 +178,14 @@ def _cost(
     exact = smaller(margins(s, loop.whole), margins(s, loop.outer))
     missed = _missed(exact, aims.gain_db, aims.phase_deg)
     missed += max(0.0, 3.0 * expected.rate / (aims.rate_share * config.limits.max_tilt_rate) - 1.0)
-    cost = log(expected.position) + _PENALTY * missed
+    cost = log(expected.position) + _COST_OF_MISSED_AIM * missed
     for error in errors_to_tolerate(tried, aims):
         if cost >= most:
             break
         loop = control_loop(tried, s, error)
         share = _SLEWING_SHARE if error.delay else 1.0
         needed = share * aims.mismatch_gain_db, share * aims.mismatch_phase_deg
-        cost += _PENALTY * _missed(margins(s, loop.whole), *needed)
+        cost += _COST_OF_MISSED_AIM * _missed(margins(s, loop.whole), *needed)
     return cost
 
 

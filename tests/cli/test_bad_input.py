@@ -201,7 +201,7 @@ def test_a_key_whose_extra_is_not_installed_is_named(capsys, tmp_path, monkeypat
 
 
 def test_the_command_for_an_extra_is_the_one_that_works_here(monkeypatch, tmp_path):
-    monkeypatch.setattr(extras, "_CLONE", tmp_path)
+    monkeypatch.setattr(extras, "_CLONE_FOLDER", tmp_path)
     monkeypatch.setattr(sys, "executable", str(tmp_path / ".venv/bin/python"))
     assert extras.pip_command("plot").endswith(" -m pip install 'mavlink-companion[plot]'")
     (tmp_path / "pyproject.toml").touch()

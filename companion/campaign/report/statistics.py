@@ -12,7 +12,7 @@ from companion.campaign.report.results import Column, Floats, Results
 CONFIDENCE = 0.95
 _MOST_LEVELS = 12
 """A factor with more different values is shown in ranges."""
-_RANGES = 5
+_RANGE_COUNT = 5
 _MOST_CHOICES = 300
 _NOT_CHOSEN = ("mock.", "fault", "flight.", "vehicle.")
 """Beginnings of the factors that a user does not choose."""
@@ -74,8 +74,8 @@ class Group(NamedTuple):
 def levels(column: Column) -> list[Group]:
     """The cases grouped by the levels of a factor: its values, or ranges of them.
 
-    Up to `_MOST_LEVELS` different values give one level each. More numbers give `_RANGES` ranges
-    with about equally many cases each; null is then a level of its own. More words give
+    Up to `_MOST_LEVELS` different values give one level each. More numbers give `_RANGE_COUNT`
+    ranges with about equally many cases each; null is then a level of its own. More words give
     `_MOST_LEVELS` levels, the last of which holds all remaining words.
     """
     known = sorted({_key(value) for value in column})
@@ -87,10 +87,10 @@ def levels(column: Column) -> list[Group]:
         if others:
             found.append(Group(f"{others} others", np.array([key not in own for key in keys])))
         return found
-    edges = np.nanquantile(column, np.linspace(0.0, 1.0, _RANGES + 1))
+    edges = np.nanquantile(column, np.linspace(0.0, 1.0, _RANGE_COUNT + 1))
     found = []
     for number, (low, high) in enumerate(pairwise(edges)):
-        last = number == _RANGES - 1
+        last = number == _RANGE_COUNT - 1
         inside = (column >= low) & ((column <= high) if last else (column < high))
         found.append(Group(f"{low:.3g} to {high:.3g}", inside))
     unknown = np.isnan(column)

@@ -18,7 +18,7 @@ from companion.report.tables import Table
 from companion.testing.settings import complete_mock
 
 EMPTY = "–"
-_WORST = 10
+_WORST_SHOWN = 10
 _MOST_ROWS = 200
 _MOST_FACTORS = 12
 
@@ -34,7 +34,7 @@ def worst_cases(results: Results) -> Table:
             *(_cell(columns[name][row]) for name in (results.error, *shown)),
             _values(results, row),
         )
-        for row in worst(results, _WORST)
+        for row in worst(results, _WORST_SHOWN)
     ]
     header = ("case", "fly it again, recorded", label(results.error), *shown, "factors")
     return Table("Worst cases", tuple(each.replace("_", " ") for each in header), rows)

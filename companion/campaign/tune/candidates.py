@@ -25,7 +25,7 @@ Values = Mapping[str, Any]
 """Value of each searched key."""
 _UNSEEN_SEED_OFFSET = 1_000_003
 """Offset of the campaign's seed for the cases that the search does not see."""
-_SPREAD = 0.15
+_NEARBY_DEVIATION = 0.15
 """Standard deviation of the candidates near a start, as a share of the (logarithmic) range."""
 
 
@@ -132,10 +132,10 @@ def near(start: Start, search: Mapping[str, Swept], count: int, seed: int) -> It
             swept = search[key]
             if swept.loguniform is not None:
                 low, high = swept.loguniform
-                moved[key] = value * (high / low) ** float(rng.normal(0.0, _SPREAD))
+                moved[key] = value * (high / low) ** float(rng.normal(0.0, _NEARBY_DEVIATION))
             elif swept.uniform is not None:
                 low, high = swept.uniform
-                moved[key] = value + (high - low) * float(rng.normal(0.0, _SPREAD))
+                moved[key] = value + (high - low) * float(rng.normal(0.0, _NEARBY_DEVIATION))
         yield Start(f"near {start.name}", within(moved, search))
 
 

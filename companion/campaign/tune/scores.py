@@ -11,7 +11,7 @@ from companion.campaign.swept import Value
 
 Floats = NDArray[np.float64]
 Row = Mapping[str, Value]
-_ERRORS = "true", "estimated", "estimate"
+_ERROR_NAMES = "true", "estimated", "estimate"
 """Attributes of a score that are errors in m."""
 
 
@@ -62,7 +62,7 @@ class Score(NamedTuple):
         """The score as JSON; an infinite number is null."""
         attributes: dict[str, Any] = {
             name: [each if isfinite(each) else None for each in getattr(self, name)]
-            for name in _ERRORS
+            for name in _ERROR_NAMES
         }
         return {**attributes, "inside": list(self.inside)}
 
@@ -71,7 +71,7 @@ class Score(NamedTuple):
         """The score that `as_attributes` wrote."""
         true, estimated, estimate = (
             tuple(inf if each is None else float(each) for each in attributes[name])
-            for name in _ERRORS
+            for name in _ERROR_NAMES
         )
         return cls(true, estimated, estimate, tuple(attributes["inside"]))
 

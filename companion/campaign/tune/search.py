@@ -33,13 +33,13 @@ Fly = Callable[[Sequence[Case]], Sequence[Row]]
 
 STORAGE = "tune.db"
 """Optuna's storage in the folder of the search."""
-_NAME = "tune"
+_STUDY_NAME = "tune"
 _STARTS, _FEWEST_NEAR = 3, 4
 """Largest number of starts, and smallest number of candidates near the last of them."""
 _FIRST_DIVISOR = 4
-"""A candidate flies the first 1/4 of its cases, at least `_FEWEST`, before the others."""
-_FEWEST = 2
-_HOPELESS = 1.3
+"""A candidate flies the first 1/4 of its cases, at least 2, before the others."""
+_FEWEST_FIRST_CASES = 2
+_HOPELESS_FACTOR = 1.3
 """A candidate is abandoned when its error on the first cases is more than this factor times that of
 the best candidate on the same cases.
 """
@@ -118,7 +118,7 @@ class Search:
         with storage_errors(self.path):
             self._study: Study = optuna.create_study(
                 storage=f"sqlite:///{self.path}",
-                study_name=_NAME,
+                study_name=_STUDY_NAME,
                 sampler=self._sampler(0),
                 load_if_exists=True,
             )
@@ -188,7 +188,7 @@ class Search:
         except ConfigError:  # keys that do not fit together, such as a minimum above a maximum
             self._stop(trial, _LARGEST_ERROR, 1.0)
             return
-        count = min(len(flown), max(_FEWEST, len(flown) // _FIRST_DIVISOR))
+        count = min(len(flown), max(_FEWEST_FIRST_CASES, len(flown) // _FIRST_DIVISOR))
         score = scored(self._fly(flown[:count]), self._tune.envelope_m)
         missed = self._missed_share(score, len(flown))
         if count < len(flown) and (missed > 0.0 or self._hopeless(score)):
@@ -227,7 +227,10 @@ class Search:
 
     def _hopeless(self, score: Score) -> bool:
         best = self.found().best
-        return best is not None and score.rms > _HOPELESS * best.score.first(len(score.true)).rms
+        return (
+            best is not None
+            and score.rms > _HOPELESS_FACTOR * best.score.first(len(score.true)).rms
+        )
 
     def _missed(self, trial: "FrozenTrial") -> bool:
         return float(trial.user_attrs[_MISSED]) > 0.0

@@ -37,7 +37,7 @@ _SHORTEST_STEP, _LONGEST_STEP = 1e-4, 10.0
 _SHORTEST_DURATION = 0.1
 """Shortest duration of a table, s."""
 
-_RANGES = {
+_LARGEST_VALUES = {
     "time": (1e10, "s"),
     "position": (FARTHEST, "m from where it begins"),
     "velocity": (FASTEST, "m/s"),
@@ -207,7 +207,7 @@ def _require_range(
     Raises:
         TrajectoryError: it is not; the message names the line.
     """
-    most, unit = _RANGES[group]
+    most, unit = _LARGEST_VALUES[group]
     outside = np.argwhere(~(np.abs(values) <= most))
     if outside.size:
         k, i = (int(index) for index in outside[0])

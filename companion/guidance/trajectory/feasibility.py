@@ -14,7 +14,7 @@ from companion.guidance.trajectory.sample import Trajectory, computable
 _ROUNDING = 1e-9
 """Tolerance of limits for rounding, as a share. Some trajectories just meet a limit."""
 
-_DEGREES = 180.0 / pi
+_TO_DEGREES = 180.0 / pi
 
 TILT_LIMIT = "limits.max_tilt_deg"
 """Configuration key of the tilt limit."""
@@ -147,11 +147,11 @@ def _needs(motion: Motion, envelope: Envelope) -> Iterator[_Need]:
     rotors = demand(motion, e.drag, e.gravity)
     turn = np.abs(motion.heading_rate)
     speed = np.linalg.norm(motion.velocity, axis=1)
-    yield _Need(TILT_LIMIT, e.max_tilt, rotors.tilt, "° of tilt", _DEGREES)
+    yield _Need(TILT_LIMIT, e.max_tilt, rotors.tilt, "° of tilt", _TO_DEGREES)
     turning = rotors.tilt_rate
     spin = "°/s of roll and pitch"
-    yield _Need("limits.max_tilt_rate_deg_s", e.max_tilt_rate, turning, spin, _DEGREES)
-    yield _Need("limits.max_yaw_rate_deg_s", e.max_yaw_rate, turn, "°/s of yaw", _DEGREES)
+    yield _Need("limits.max_tilt_rate_deg_s", e.max_tilt_rate, turning, spin, _TO_DEGREES)
+    yield _Need("limits.max_yaw_rate_deg_s", e.max_yaw_rate, turn, "°/s of yaw", _TO_DEGREES)
     force, full = " m/s² of thrust", e.full_thrust
     lowest, highest = e.min_thrust, e.max_thrust
     yield _Need("limits.min_thrust", lowest, rotors.thrust, force, least=True, key_scale=full)

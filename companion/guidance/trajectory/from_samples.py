@@ -55,7 +55,7 @@ class _Quantity(NamedTuple):
     floor: float
 
 
-_DERIVATIVES = (
+_DERIVATIVE_QUANTITIES = (
     _Quantity("velocity", "m/s", 0.2, 0.1),
     _Quantity("acceleration", "m/s²", 0.5, 1.0),
 )
@@ -168,7 +168,9 @@ def _require_derivatives(
 ) -> None:
     """Check that velocity and acceleration are the derivatives of the position."""
     motion = spline.along(times)
-    for order, (known, quantity) in enumerate(zip(derivatives, _DERIVATIVES, strict=False), 1):
+    for order, (known, quantity) in enumerate(
+        zip(derivatives, _DERIVATIVE_QUANTITIES, strict=False), 1
+    ):
         missed = np.linalg.norm(motion[:, :, order] - known, axis=1)
         size = np.linalg.norm(known, axis=1)
         if _root_mean_square(missed) > quantity.share * _root_mean_square(size) + quantity.floor:

@@ -11,13 +11,13 @@ Floats = NDArray[np.float64]
 STATE_SIZE = 4
 """Size of the state at a knot: the value and its first three derivatives."""
 
-_DEGREE = 2 * STATE_SIZE - 1
+_POLYNOMIAL_DEGREE = 2 * STATE_SIZE - 1
 
 
 def derivative_rows(fractions: Floats, derivative: int) -> Floats:
     """Derivatives of 1, u, … u⁷, (n, 8), at the fractions u, (n,), of a piece."""
-    rows = np.zeros((fractions.size, _DEGREE + 1))
-    for power in range(derivative, _DEGREE + 1):
+    rows = np.zeros((fractions.size, _POLYNOMIAL_DEGREE + 1))
+    for power in range(derivative, _POLYNOMIAL_DEGREE + 1):
         factor = np.prod(np.arange(power - derivative + 1, power + 1))
         rows[:, power] = factor * fractions ** (power - derivative)
     return rows
@@ -49,7 +49,7 @@ class SepticSpline:
             (states[:-1] * scale[:, :, None], states[1:] * scale[:, :, None]), axis=1
         )
         unit = np.einsum("ij,kjn->kni", FROM_ENDS, ends)
-        pieces = unit / (spans[:, None, None] ** np.arange(_DEGREE + 1))
+        pieces = unit / (spans[:, None, None] ** np.arange(_POLYNOMIAL_DEGREE + 1))
         self._arrays = knots, pieces
         self._knots: list[float] = knots.tolist()
         self._pieces: list[list[list[float]]] = pieces.tolist()

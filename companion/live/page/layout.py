@@ -10,7 +10,7 @@ from companion.live.page.guard import Guard
 from companion.live.page.panel import Panel
 from companion.live.page.store import Store
 
-_HERE = Path(__file__).parent
+_PAGE_FOLDER = Path(__file__).parent
 _PUSH_PERIOD = 0.2
 """Period with which new states are sent to the browsers, s."""
 
@@ -99,4 +99,4 @@ def _canvas(name: str, label: str, shape: str) -> None:
 
 
 def _text(name: str) -> str:
-    return (_HERE / name).read_text(encoding="utf-8")
+    return (_PAGE_FOLDER / name).read_text(encoding="utf-8")

@@ -15,8 +15,8 @@ from companion.live.helper_process import Relay
 from companion.live.page.guard import Guard
 from companion.live.page.store import Store
 
-_BY = "the live page"
-_FILE = "changed.yaml"
+_SOURCE = "the live page"
+_DOWNLOAD_NAME = "changed.yaml"
 _WRONG_TOKEN_DELAY = 1.0
 """Delay of the answer to a wrong token, s."""
 
@@ -75,10 +75,10 @@ class Panel:
         if not values:
             self._say("no value differs from what is flown")
             return
-        await self._ask(self._relay.change(values, _BY))
+        await self._ask(self._relay.change(values, _SOURCE))
 
     async def _undo_last(self) -> None:
-        await self._ask(self._relay.undo(_BY))
+        await self._ask(self._relay.undo(_SOURCE))
 
     async def _ask(self, request: Any) -> None:
         if not self._unlocked:
@@ -96,12 +96,12 @@ class Panel:
     async def _save(self) -> None:
         """Send the changed values to the browser; if unlocked, also write them to the folder."""
         text = self._store.changed_yaml()
-        ui.download.content(text, _FILE)
+        ui.download.content(text, _DOWNLOAD_NAME)
         folder = self._relay.first["folder"]
         if folder is None or not self._unlocked:
             self._say("saved where the browser saves files")
             return
-        path = Path(folder, _FILE)
+        path = Path(folder, _DOWNLOAD_NAME)
         try:
             await asyncio.to_thread(write_whole, path, text)
         except OSError as error:

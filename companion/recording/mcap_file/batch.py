@@ -12,7 +12,7 @@ from typing import NamedTuple
 from companion.recording.mcap_file.channels import TOPICS
 
 _HEAD = struct.Struct("<BQI")
-_NUMBERS = {topic.name: number for number, topic in enumerate(TOPICS)}
+_TOPIC_NUMBERS = {topic.name: number for number, topic in enumerate(TOPICS)}
 _FULL_BATCH = 32_000
 """Length above which a batch is sent, bytes; well below the buffer of a socket."""
 
@@ -47,7 +47,7 @@ class Batch:
 
     def add(self, topic: str, time_ns: int, data: bytes) -> None:
         """Add a message; send the batch if it is full."""
-        self._collected += _HEAD.pack(_NUMBERS[topic], time_ns, len(data))
+        self._collected += _HEAD.pack(_TOPIC_NUMBERS[topic], time_ns, len(data))
         self._collected += data
         if len(self._collected) > _FULL_BATCH:
             self.send()

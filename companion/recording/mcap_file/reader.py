@@ -14,7 +14,7 @@ from companion.recording.mcap_file.channels import TOPICS
 
 _MOST_BYTES = 1 << 28
 """Largest length of a record that we write, bytes; a longer one is damaged."""
-_DAMAGE = (
+_DAMAGE_ERRORS = (
     McapError,
     ZstdError,
     ValueError,
@@ -65,7 +65,7 @@ def read_mcap(path: Path) -> McapContent:
             for record in reader.records:
                 _take(record, topics, schemas, content)
             content.complete = True
-        except _DAMAGE as error:
+        except _DAMAGE_ERRORS as error:
             if file.read(1):  # else it was cut off in the middle of this record
                 content.damage = str(error) or type(error).__name__
     return content

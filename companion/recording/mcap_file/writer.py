@@ -9,7 +9,7 @@ from mcap.writer import CompressionType, Writer
 from companion.recording.mcap_file.batch import Batch, SendBatch
 from companion.recording.mcap_file.channels import ENCODING, SCHEMA_ENCODING, TOPICS
 
-_CHUNK = 1 << 20
+_CHUNK_LENGTH = 1 << 20
 """Length at which a chunk is ended, bytes."""
 
 
@@ -29,7 +29,7 @@ class McapWriter:
 
     def __init__(self, path: Path, stream: SendBatch | None = None) -> None:
         self._file = path.open("wb")
-        self._writer = Writer(self._file, _CHUNK, CompressionType.LZ4)
+        self._writer = Writer(self._file, _CHUNK_LENGTH, CompressionType.LZ4)
         self._writer.start("ros2", "mavlink-companion")
         self._ids: dict[str, int] = {}
         self._schemas: dict[str, int] = {}

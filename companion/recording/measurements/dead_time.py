@@ -4,9 +4,9 @@ from dataclasses import dataclass, field
 from math import nan
 from typing import NamedTuple
 
-_TOLERATED = 0.3
+_TOLERATED_SHARE = 0.3
 """Share of the configured dead time by which the measured one may differ."""
-_UNCERTAINTY = 0.008
+_TOLERATED_DIFFERENCE = 0.008
 """Difference that is always tolerated, s: no rate loop is exactly a lag with a dead time, so the
 result depends on the maneuver: by up to 3 ms over a flight, by up to 7 ms over a few seconds."""
 
@@ -31,7 +31,7 @@ class AxisDeadTime(NamedTuple):
         if self.measured is None or self.configured is None:
             return False
         apart = abs(self.measured - self.configured)
-        return apart > max(_TOLERATED * self.configured, _UNCERTAINTY)
+        return apart > max(_TOLERATED_SHARE * self.configured, _TOLERATED_DIFFERENCE)
 
 
 class SampleAge(NamedTuple):

@@ -32,7 +32,7 @@ class _Rule(NamedTuple):
 
 
 _LONG_HOVER, _SHORT_HOVER = _Rule(5.0, 2.0, 1, 2.5), _Rule(2.9, 1.0, 1, 1.25)
-_MOVING = _Rule(4.0, 1.0, 2, 1.25)
+_IN_MOTION = _Rule(4.0, 1.0, 2, 1.25)
 SHORTEST = _SHORT_HOVER.shortest
 """Shortest part of a flight in which a swing can be measured, s."""
 _LONGEST_SAMPLE_PERIOD = 0.05
@@ -70,7 +70,7 @@ def measure_swing(time: Floats, rates: Floats, *, at_rest: bool) -> Swing:
     """
     duration = float(time[-1] - time[0]) if len(time) > 1 else 0.0
     hover = _LONG_HOVER if duration >= _LONG_HOVER.shortest else _SHORT_HOVER
-    rule = hover if at_rest else _MOVING
+    rule = hover if at_rest else _IN_MOTION
     if duration < rule.shortest:
         return NOT_MEASURED
     step = float(np.median(np.diff(time)))

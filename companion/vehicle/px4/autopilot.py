@@ -26,7 +26,7 @@ from companion.vehicle.px4.parameters import PX4_PARAMETERS
 
 _ESTIMATOR_NEEDED = 0x1 | 0x2 | 0x4 | 0x8  # attitude, both velocities, horizontal position
 _CUSTOM_MODE_ENABLED = 1.0
-_AUTO = 4
+_AUTO_MAIN_MODE = 4
 
 
 def _custom_mode(main: int, sub: int = 0) -> int:
@@ -37,14 +37,14 @@ _MODES = {
     "MANUAL": _custom_mode(1),
     "ALTCTL": _custom_mode(2),
     "POSCTL": _custom_mode(3),
-    "AUTO.READY": _custom_mode(_AUTO, 1),
-    "AUTO.TAKEOFF": _custom_mode(_AUTO, 2),
-    "AUTO.LOITER": _custom_mode(_AUTO, 3),
-    "AUTO.MISSION": _custom_mode(_AUTO, 4),
-    "AUTO.RTL": _custom_mode(_AUTO, 5),
-    "AUTO.LAND": _custom_mode(_AUTO, 6),
-    "AUTO.FOLLOW": _custom_mode(_AUTO, 8),
-    "AUTO.PRECLAND": _custom_mode(_AUTO, 9),
+    "AUTO.READY": _custom_mode(_AUTO_MAIN_MODE, 1),
+    "AUTO.TAKEOFF": _custom_mode(_AUTO_MAIN_MODE, 2),
+    "AUTO.LOITER": _custom_mode(_AUTO_MAIN_MODE, 3),
+    "AUTO.MISSION": _custom_mode(_AUTO_MAIN_MODE, 4),
+    "AUTO.RTL": _custom_mode(_AUTO_MAIN_MODE, 5),
+    "AUTO.LAND": _custom_mode(_AUTO_MAIN_MODE, 6),
+    "AUTO.FOLLOW": _custom_mode(_AUTO_MAIN_MODE, 8),
+    "AUTO.PRECLAND": _custom_mode(_AUTO_MAIN_MODE, 9),
     "ACRO": _custom_mode(5),
     "OFFBOARD": _custom_mode(6),
     "STABILIZED": _custom_mode(7),
@@ -52,7 +52,9 @@ _MODES = {
 _DESCEND = "AUTO.DESCEND"
 """Mode in which PX4's failsafe lands without a position; it cannot be commanded. It replaces
 AUTO.LAND 4.8 s after GPS is lost (measured)."""
-_NAMES = {number: name for name, number in _MODES.items()} | {_custom_mode(_AUTO, 20): _DESCEND}
+_NAMES = {number: name for name, number in _MODES.items()} | {
+    _custom_mode(_AUTO_MAIN_MODE, 20): _DESCEND
+}
 _ROLES = {
     "AUTO.TAKEOFF": frozenset({Role.TAKEOFF, Role.READY}),
     "AUTO.LOITER": frozenset({Role.HOLD, Role.READY}),
