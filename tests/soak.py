@@ -38,6 +38,7 @@ AFTERMATH_S = 12.0
 EXPECTED = (
     "preflight warnings: ",  # on the ground, by a vehicle as PX4 sets it up
     "mode ",
+    "maneuver: ",
     "armed",
     "disarmed",
     "autopilot: ",

@@ -178,15 +178,16 @@ def test_another_vehicle_is_found_as_the_judge_finds_it(tmp_path):
 
 
 @pytest.mark.slow
-def test_gusts_and_a_noisy_gyroscope_do_not_move_what_is_found(tmp_path):
+def test_gusts_and_a_noisy_gyroscope_hardly_move_what_is_found(px4, tmp_path):
     summary, vehicle = identified(
         tmp_path, wind={"speed_m_s": 1.5, "gust_m_s": 0.7}, sensors={"rate_noise_rad_s": 0.02}
     )
     assert summary.result == "ok", summary.events
     for axis in AXES:
-        lag, dead_time = judged(axis, {})
-        assert vehicle.axes[axis].lag == pytest.approx(lag, rel=0.05), axis
-        assert vehicle.axes[axis].dead_time == pytest.approx(dead_time, abs=0.004), axis
+        calm, found = px4[1].axes[axis], vehicle.axes[axis]
+        # Of eight flights, seeds 1 to 8, the farthest: 4.0 % and 0.9 ms.
+        assert found.lag == pytest.approx(calm.lag, rel=0.05), axis
+        assert found.dead_time == pytest.approx(calm.dead_time, abs=0.0015), axis
     assert vehicle.faults() == {}
 
 
