@@ -33,14 +33,14 @@ class Drag(NamedTuple):
     ) -> tuple[Number, Number, Number]:
         """Deceleration in m/s², along a velocity in m/s."""
         north, east, down = velocity
-        share = self.linear + self.quadratic * _speed(velocity)
+        share = self.linear + self.quadratic * _smooth_speed(velocity)
         return share * north, share * east, share * down
 
     def deceleration_rate(
         self, velocity: tuple[Number, Number, Number], acceleration: tuple[Number, Number, Number]
     ) -> tuple[Number, Number, Number]:
         """The time derivative of `deceleration`, m/s³, at a velocity and an acceleration."""
-        speed = _speed(velocity)
+        speed = _smooth_speed(velocity)
         share = self.linear + self.quadratic * speed
         north, east, down = velocity
         a_north, a_east, a_down = acceleration
@@ -101,7 +101,7 @@ class AxisDrag(NamedTuple):
         a_forward, a_right = _in_axes(cosine, sine, *acceleration)
         # Derivatives of the components along the axes, which turn.
         g_forward, g_right = a_forward + heading_rate * right, a_right - heading_rate * forward
-        speed = _speed((forward, right, 0.0))
+        speed = _smooth_speed((forward, right, 0.0))
         mean = _MEAN_SHARE * speed
         mean_rate = _MEAN_SHARE * (forward * g_forward + right * g_right) / speed
         f_forward = forward * (abs(forward) - mean)
@@ -118,7 +118,7 @@ def along_axes(
 ) -> tuple[Number, Number]:
     """The deceleration of `AxisDrag` with this cosine and sine of its heading, m/s²."""
     forward, right = _in_axes(cosine, sine, north, east)
-    mean = _MEAN_SHARE * _speed((forward, right, 0.0 * right))
+    mean = _MEAN_SHARE * _smooth_speed((forward, right, 0.0 * right))
     forward = coefficient * forward * (abs(forward) - mean)
     right = coefficient * right * (abs(right) - mean)
     return cosine * forward - sine * right, sine * forward + cosine * right
@@ -132,7 +132,7 @@ ROUND = AxisDrag()
 """A body whose drag is the same in all directions."""
 
 
-def _speed(velocity: tuple[Number, Number, Number]) -> Number:
+def _smooth_speed(velocity: tuple[Number, Number, Number]) -> Number:
     north, east, down = velocity
     speed: Number = (north * north + east * east + down * down + _TINY) ** 0.5
     return speed

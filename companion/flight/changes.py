@@ -118,7 +118,7 @@ class Changes:
         except (ValueError, ArithmeticError) as error:
             raise ChangeRefusedError(f"{by}: {error}; nothing has changed") from error
         before = self.wanted
-        text = self._begin(wanted, by)
+        text = self._begin_change(wanted, by)
         self._earlier_configs = [*self._earlier_configs, before][-_MAX_UNDO_COUNT:]
         self.on_change(wanted)
         return text
@@ -131,7 +131,7 @@ class Changes:
         """
         if not self._earlier_configs:
             raise ChangeRefusedError(f"{by}: there is no change to undo")
-        text = self._begin(self._earlier_configs[-1], by)
+        text = self._begin_change(self._earlier_configs[-1], by)
         self._earlier_configs.pop()
         self.on_change(self.wanted)
         return text
@@ -188,7 +188,7 @@ class Changes:
             self._slew.stop()
             self.note(fault_message(error))
 
-    def _begin(self, wanted: Config, by: str) -> str:
+    def _begin_change(self, wanted: Config, by: str) -> str:
         """Begin to move from the present values to `wanted`.
 
         Raises:

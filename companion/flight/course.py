@@ -23,7 +23,7 @@ def advice(assembled: Assembled, dead_times: DeadTimes) -> tuple[str, ...]:
     return tuple(warning for warning in warnings if warning is not None)
 
 
-def _settings(context: FlightContext) -> dict[str, str]:
+def _learned_settings(context: FlightContext) -> dict[str, str]:
     """The keys of thrust and drag that the advice names, with the values that were learned."""
     learning, estimate = context.guidance_loop.learning, context.guidance_loop.estimate
     settings: dict[str, str] = {}
@@ -70,7 +70,7 @@ def course_of(
         vehicle_uid=context.same_vehicle.uid,
         armed=state.armed,
         mode=state.mode,
-        unheard=_unheard(context, now),
+        unheard=_silence_duration(context, now),
         battery=(reporter.battery_at_takeoff, end),
         min_battery=config.limits.min_battery,
         max_tilt=config.limits.max_tilt,
@@ -78,12 +78,12 @@ def course_of(
         lockstep=not reporter.real_time,
         advice=advised,
         gain_warning=gain_warning(config),
-        settings=_settings(context),
+        settings=_learned_settings(context),
         changes=tuple(change.as_dict(began) for change in assembled.changes.made_in_flight),
     )
 
 
-def _unheard(context: FlightContext, now: float) -> float | None:
+def _silence_duration(context: FlightContext, now: float) -> float | None:
     """How long the vehicle, or its heartbeat, was not heard at `now`, s; None: it is heard."""
     heartbeat = context.link.state.heartbeat
     if heartbeat is None:

@@ -74,7 +74,7 @@ class DeadTimeWatch:
             first = self._rows[0]
             name = _AXES[self._measurements % len(_AXES)]
             self._measurements += 1
-            self._judge(name, self._dead_time(name, self._trace.rates_rows(first)))
+            self._judge_axis(name, self._dead_time(name, self._trace.rates_rows(first)))
 
     def over_the_flight(self) -> DeadTimes:
         """Measure over the flight (its last `_MAX_ROWS` rows); warn if no warning was given yet."""
@@ -87,7 +87,7 @@ class DeadTimeWatch:
             SampleAge(*np.percentile(ages, (50, 99)).tolist()) if ages.size else SampleAge(),
             lag_known=any(axis.lag is not None for axis in self._axes.values()),
         )
-        self._warn(measured)
+        self._warn_once(measured)
         return measured
 
     def _dead_time(self, name: str, rows: NDArray[np.float64]) -> AxisDeadTime:
@@ -110,16 +110,16 @@ class DeadTimeWatch:
             )
         return AxisDeadTime(dead_time, axis.dead_time)
 
-    def _judge(self, name: str, dead_time: AxisDeadTime) -> None:
+    def _judge_axis(self, name: str, dead_time: AxisDeadTime) -> None:
         """Warn at the second wrong measurement in a row; a gust may cause a single one."""
         if not dead_time.is_wrong:
             self._suspected.discard(name)
         elif name in self._suspected:
-            self._warn(DeadTimes({name: dead_time}))
+            self._warn_once(DeadTimes({name: dead_time}))
         else:
             self._suspected.add(name)
 
-    def _warn(self, dead_times: DeadTimes) -> None:
+    def _warn_once(self, dead_times: DeadTimes) -> None:
         warning = dead_times.warning()
         if warning is not None and not self._warned:
             self._warned = True

@@ -50,7 +50,7 @@ class FenceCheck:
         time, breach = worst if worst_at_rest is None else worst_at_rest
         begin = self._begin_time(motion if worst_at_rest is None else still, time)
         slowing_helps = worst_at_rest is None
-        text, remedy = _text(breach, begin, slowing_helps), _remedy(slowing_helps)
+        text, remedy = _breach_text(breach, begin, slowing_helps), _remedy(slowing_helps)
         return Violation(breach.limit, begin, time, text, remedy, slowing_helps=slowing_helps)
 
     def _worst(self, motion: Motion) -> tuple[float, Breach] | None:
@@ -61,7 +61,7 @@ class FenceCheck:
         stops = np.stack(columns, axis=1)
         breaches = [
             (motion.times[k], breach)
-            for k in self._candidates(stops)
+            for k in self._candidate_indices(stops)
             if (breach := self._breach(motion, k)) is not None
         ]
         if not breaches:
@@ -69,7 +69,7 @@ class FenceCheck:
         time, breach = max(breaches, key=lambda each: each[1].by)
         return float(time), breach
 
-    def _candidates(self, stops: Floats) -> list[int]:
+    def _candidate_indices(self, stops: Floats) -> list[int]:
         """Indices that contain the worst moment: farthest, highest, lowest, and along a polygon."""
         distance = np.hypot(stops[:, 0], stops[:, 1])
         indices = {int(distance.argmax()), int(stops[:, 2].argmin()), int(stops[:, 2].argmax())}
@@ -99,7 +99,7 @@ class FenceCheck:
         return worst
 
 
-def _text(breach: Breach, time: float, slowing_helps: bool) -> str:
+def _breach_text(breach: Breach, time: float, slowing_helps: bool) -> str:
     if breach.by > 0.0:
         what_happens = "braking would end" if slowing_helps else "it goes"
         what_happens = f"{what_happens} up to {breach.by:.1f} m outside the fence"

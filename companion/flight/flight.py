@@ -157,11 +157,11 @@ class Flight:
         if not self._end.done():
             self._judge(self._watch.judge)  # before the phase commands anything
         if not self._end.done():
-            await self._race(phase.work(self._context), phase.timeout)
+            await self._run_until_end(phase.work(self._context), phase.timeout)
         if self._end.done():
             raise self._end.result()
 
-    async def _race(self, work: Coroutine[Any, Any, Any], seconds: float) -> Any:
+    async def _run_until_end(self, work: Coroutine[Any, Any, Any], seconds: float) -> Any:
         """Run `work` until it is done, the flight is ended, or `seconds` are over."""
         task = asyncio.create_task(work)
         either: set[asyncio.Future[Any]] = {task, self._end}
@@ -190,13 +190,13 @@ class Flight:
     async def _leave(self, exit_: Exit) -> None:
         """Fly the exit, then land if the user wants it; a failure is noted, not raised."""
         try:
-            await self._exit(exit_)
+            await self._fly_exit(exit_)
             if exit_ is Exit.HOLD and self._interruption and await self._user_wants_landing():
-                await self._exit(Exit.LAND)
+                await self._fly_exit(Exit.LAND)
         except FlightEnded as ended:
             self.note(ended.reason)
 
-    async def _exit(self, exit_: Exit) -> None:
+    async def _fly_exit(self, exit_: Exit) -> None:
         """Fly the phases of an exit; if one fails, fly the exit of that phase."""
         self.note(exit_.value)
         self._end = self._new_end()
@@ -208,13 +208,13 @@ class Flight:
             if next_exit in (exit_, Exit.LEAVE, Exit.RELEASE):
                 raise
             self.note(ended.reason)
-            await self._exit(next_exit)
+            await self._fly_exit(next_exit)
 
     async def _user_wants_landing(self) -> bool:
         """Ask the user whether to land; somebody else may take over meanwhile."""
         self._asking = True
         try:
-            return bool(await self._race(self._ask_landing(), inf))
+            return bool(await self._run_until_end(self._ask_landing(), inf))
         finally:
             self._asking = False
 

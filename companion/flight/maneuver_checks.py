@@ -45,12 +45,12 @@ def require_flyable(config: Config, part: Maneuver, drag: KnownDrag) -> None:
         ConfigError: the maneuver cannot be flown within the limits and the fence.
     """
     with named_if_impossible(part.name):
-        motions = list(_motions(part, drag.least))
+        motions = list(_predicted_motions(part, drag.least))
         _require_motions_inside(config, part, motions, None)
     if isinstance(part, HeldFigure):
         envelope = replace(envelope_of(config, drag), max_tilt_rate=None, fence=None)
         for broken in judge(motions[0], envelope):
-            _refuse(part.name, broken, drag.assumption)
+            _refuse_violation(part.name, broken, drag.assumption)
 
 
 def require_inside(
@@ -68,7 +68,7 @@ def require_inside(
         ConfigError: a maneuver leaves the fence, or could not stop inside it.
     """
     for part in parts:
-        _require_motions_inside(config, part, _motions(part, drag.least), origin)
+        _require_motions_inside(config, part, _predicted_motions(part, drag.least), origin)
 
 
 def require_followable(config: Config, maneuver: Maneuver, begin: Vector, drag: KnownDrag) -> None:
@@ -144,10 +144,10 @@ def _require_motions_inside(
     """Check predicted motions of a maneuver; see `require_inside`."""
     check = _fence_check(config, origin)
     for motion in motions:
-        _refuse(part.name, check(motion))
+        _refuse_violation(part.name, check(motion))
 
 
-def _motions(part: Maneuver, drag: Drag) -> Iterator[Motion]:
+def _predicted_motions(part: Maneuver, drag: Drag) -> Iterator[Motion]:
     """Predicted motions of a maneuver; for body-rate doublets, at eight initial headings."""
     turns = 8 if isinstance(part, Doublets) else 1
     for k in range(turns):
@@ -156,10 +156,10 @@ def _motions(part: Maneuver, drag: Drag) -> Iterator[Motion]:
         if isinstance(part, Hashable):
             yield _cached_motion(part, heading, drag)
         else:
-            yield _motion(part, heading, drag)
+            yield _predicted_motion(part, heading, drag)
 
 
-def _motion(part: Maneuver, heading: float, drag: Drag) -> Motion:
+def _predicted_motion(part: Maneuver, heading: float, drag: Drag) -> Motion:
     """The predicted motion of a maneuver that begins at a heading (rad)."""
     times, offset, velocity, acceleration = (
         np.array(column) for column in zip(*predict(part, heading, drag), strict=True)
@@ -168,10 +168,10 @@ def _motion(part: Maneuver, heading: float, drag: Drag) -> Motion:
     return Motion(times, offset, velocity, acceleration, jerk, turning)
 
 
-_cached_motion = lru_cache(maxsize=32)(_motion)
+_cached_motion = lru_cache(maxsize=32)(_predicted_motion)
 
 
-def _refuse(name: str, broken: Violation | None, assumption: str = "") -> None:
+def _refuse_violation(name: str, broken: Violation | None, assumption: str = "") -> None:
     if broken is None:
         return
     # `--slow-down` applies to trajectories only.

@@ -95,10 +95,10 @@ class PreflightChecks:
         drag = self.drag_of(evidence.identity)
         planned = self._maneuvers if self._maneuvers.parts else None
         evidence = replace(evidence, stage=stage, maneuvers=planned, known_drag=drag)
-        self._apply(run_checks(self._config, evidence, again=before is not None))
+        self._act_on(run_checks(self._config, evidence, again=before is not None))
         return evidence
 
-    def _apply(self, findings: list[Finding]) -> None:
+    def _act_on(self, findings: list[Finding]) -> None:
         """End the flight for findings that block it; report other unsafe and ineffective ones."""
         refused = blocking(self._config, findings)
         warnings = [

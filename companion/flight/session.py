@@ -113,19 +113,19 @@ class Session:
                 for text in (*self._early_notes, *map(str, grants)):
                     self._assembled.flight.note(text)
                 try:
-                    result = await self._run(link, self._assembled)
+                    result = await self._fly_connected(link, self._assembled)
                 finally:
                     self._assembled.close()
             summary = record.summary(link.stats, self._assembled, recorder, result, grants)
         await asyncio.sleep(0)  # lets a failure of the writing thread arrive
         return record.save(summary)
 
-    async def _run(self, link: Link, assembled: Assembled) -> str:
+    async def _fly_connected(self, link: Link, assembled: Assembled) -> str:
         flight = assembled.flight
         with connected(link, assembled):
             # In a task of its own: `leave` ends the flight but not the writing of the files.
             self._flying = asyncio.ensure_future(flight.run())
-            reporting = asyncio.create_task(self._report(assembled))
+            reporting = asyncio.create_task(self._report_status(assembled))
             try:
                 return await self._flying
             except asyncio.CancelledError:
@@ -135,7 +135,7 @@ class Session:
                 await cancel(reporting)
 
     @staticmethod
-    async def _report(assembled: Assembled) -> None:
+    async def _report_status(assembled: Assembled) -> None:
         """Record and show the state of the flight; a fault in it does not end the flight."""
         try:
             await assembled.reporter.run()

@@ -37,12 +37,12 @@ class StatusRows:
         if recorder is None or self._fence is None:
             return
         self._fence.record(now)
-        recorder.row(now, THRUST, self._thrust(now))
+        recorder.row(now, THRUST, self._thrust_row(now))
         if now >= self._due:
             self._due = now + _RESOURCES_PERIOD
-            recorder.row(now, RESOURCES, self._resources(now, recorder))
+            recorder.row(now, RESOURCES, self._resources_row(now, recorder))
 
-    def _thrust(self, now: float) -> tuple[float, ...]:
+    def _thrust_row(self, now: float) -> tuple[float, ...]:
         context = self._context
         learning, battery = context.guidance_loop.learning, context.link.state.battery
         voltage = None if battery is None else battery.voltage_v
@@ -56,7 +56,7 @@ class StatusRows:
             nan if remaining is None else remaining,
         )
 
-    def _resources(self, now: float, recorder: FlightRecorder) -> tuple[float, ...]:
+    def _resources_row(self, now: float, recorder: FlightRecorder) -> tuple[float, ...]:
         """The row of `RESOURCES`; in a test, the mock vehicle's processor time is included."""
         processor_s, before = process_time(), self._processor_s
         elapsed, self._measured_at = now - self._measured_at, now

@@ -19,7 +19,7 @@ async def check_airborne(context: FlightContext) -> None:
     Raises:
         FlightEnded: the vehicle does not fly, or a finding blocks the takeover.
     """
-    await _check(context, Stage.AIRBORNE, _require_flying)
+    await _check_stage(context, Stage.AIRBORNE, _require_flying)
     context.ground.note_flying()
 
 
@@ -34,11 +34,11 @@ async def check_armed_on_ground(context: FlightContext) -> None:
     with suppress(TimeoutError):
         async with asyncio.timeout(_ARMED_REPORT_TIMEOUT):
             await context.until(context.armed, "the vehicle to show that it is armed")
-    await _check(context, Stage.ARMED, _require_armed_on_ground)
+    await _check_stage(context, Stage.ARMED, _require_armed_on_ground)
     await context.until(lambda: context.link.state.home is not None, "the home position")
 
 
-async def _check(
+async def _check_stage(
     context: FlightContext, stage: Stage, require: Callable[[FlightContext], None]
 ) -> None:
     """Run the checks of a stage; before and after them, `require` raises if the state is wrong."""

@@ -14,10 +14,10 @@ def overview(trajectory: Trajectory) -> str:
     motion = sampled(trajectory)
     fastest = float(np.linalg.norm(motion.velocity, axis=1).max())
     lows, highs = motion.position.min(axis=0), motion.position.max(axis=0)
-    north, east = (_range(low, high) for low, high in zip(lows[:2], highs[:2], strict=True))
+    north, east = (_range_text(low, high) for low, high in zip(lows[:2], highs[:2], strict=True))
     return (
         f"{trajectory.name}: {trajectory.duration:.1f} s, at most {fastest:.2f} m/s; from its "
-        f"start {north} m north, {east} m east, {_range(-highs[2], -lows[2])} m up"
+        f"start {north} m north, {east} m east, {_range_text(-highs[2], -lows[2])} m up"
     )
 
 
@@ -69,6 +69,6 @@ def _fastest(trajectory: Trajectory) -> float:
     return float(np.linalg.norm(sampled(trajectory).velocity, axis=1).max())
 
 
-def _range(low: float, high: float) -> str:
+def _range_text(low: float, high: float) -> str:
     low, high = round(low, 1) + 0.0, round(high, 1) + 0.0  # no "-0.0"
     return f"{low:.1f} to {high:.1f}"

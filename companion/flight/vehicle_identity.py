@@ -99,13 +99,13 @@ class SameVehicle:
             ChecksVoid: it may be another vehicle, and nothing is armed yet.
             FlightEnded: it may be another vehicle; control is released.
         """
-        if self.same or (reason := self._reason()) is None:
+        if self.same or (reason := self._sign_of_replacement()) is None:
             return
         if self._committed:
             raise FlightEnded(reason, Exit.RELEASE)
         raise ChecksVoid(reason)
 
-    def _reason(self) -> str | None:
+    def _sign_of_replacement(self) -> str | None:
         """The sign of a replacement, in words.
 
         None: there is none, or a silence still lasts, which is judged when it ends.
@@ -157,11 +157,11 @@ class VehicleMemory:
         if self._known_drag is None or identity.uid != self._uid:
             self._uid = identity.uid
             self._known_drag = of_vehicle(self._config, self._directory, identity.uid)
-            self._begin(self._known_drag)
+            self._begin_estimate(self._known_drag)
             self.on_known(self._known_drag)
         return self._known_drag
 
-    def _begin(self, known: KnownDrag) -> None:
+    def _begin_estimate(self, known: KnownDrag) -> None:
         """Start the estimate for another vehicle; one without an id changes nothing."""
         if self._uid is None or self._directory is None:
             return

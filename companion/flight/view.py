@@ -17,10 +17,10 @@ def view(context: FlightContext, now: float) -> dict[str, Any]:
     Values that are not known are left out.
     """
     loop, guidance_loop, state = context.loop, context.guidance_loop, context.link.state
-    shown = {**_attitude(context, now), **_motion(context, now)}
+    shown = {**_attitude(context, now), **_motion_values(context, now)}
     origin = context.snapshot_builder.origin_ned
     if origin is not None:
-        shown.update(_named("fence", origin, "m"))
+        shown.update(_with_axis_names("fence", origin, "m"))
     wind = guidance_loop.estimate.disturbance
     stats, round_trip = context.link.stats, context.link.timesync.round_trip_s
     shown.update(
@@ -51,7 +51,7 @@ def _attitude(context: FlightContext, now: float) -> dict[str, float | None]:
         north, east = coefficients(sample.q)
         shown.update(zip(("q_w", "q_x", "q_y", "q_z"), sample.q, strict=True))
         shown.update(measured_north=north, measured_east=east)
-        shown.update(_named("measured", sample.body_rates, "rad_s", _RATE_AXES))
+        shown.update(_with_axis_names("measured", sample.body_rates, "rad_s", _RATE_AXES))
     if command is not None and loop.on:
         target = command.target_at(now)
         shown.update(target_north=target.north, target_east=target.east)
@@ -59,17 +59,17 @@ def _attitude(context: FlightContext, now: float) -> dict[str, float | None]:
     return shown
 
 
-def _motion(context: FlightContext, now: float) -> dict[str, float | None]:
+def _motion_values(context: FlightContext, now: float) -> dict[str, float | None]:
     """Values of the estimated motion, and of the reference that is flown."""
     motion, height = context.guidance_loop.motion, context.link.state.height
     if motion is None:
         return {}
     shown: dict[str, float | None] = {}
-    shown.update(_named("estimated", motion.position_ned, "m"))
-    shown.update(_named("estimated", motion.velocity_ned, "m_s"))
+    shown.update(_with_axis_names("estimated", motion.position_ned, "m"))
+    shown.update(_with_axis_names("estimated", motion.velocity_ned, "m_s"))
     reference = _reference(context, now)
     if reference is not None:
-        shown.update(_named("reference", reference.position_ned, "m"))
+        shown.update(_with_axis_names("reference", reference.position_ned, "m"))
         north, east, down = reference.acceleration_ned
         thrust = hypot(north, east, GRAVITY - down)
         if thrust > 0.0:  # in free fall no direction of the thrust is wanted
@@ -89,7 +89,7 @@ def _reference(context: FlightContext, now: float) -> Reference | None:
     return flown.reference(now, motion, 0.0)(now)
 
 
-def _named(
+def _with_axis_names(
     prefix: str, values: tuple[float, ...], unit: str, axes: tuple[str, ...] = _AXES
 ) -> dict[str, float]:
     names = (f"{prefix}_{axis}_{unit}" for axis in axes)

@@ -57,9 +57,9 @@ class RateRequester:
     def _request_once(self, message: str, rate: float) -> None:
         if message not in self._tasks:
             self.note(f"{message} comes too rarely: requesting {rate:g} Hz again")
-            self._tasks[message] = asyncio.create_task(self._request(message, rate))
+            self._tasks[message] = asyncio.create_task(self._request_rate(message, rate))
 
-    async def _request(self, message: str, rate: float) -> None:
+    async def _request_rate(self, message: str, rate: float) -> None:
         try:
             await self._link.set_rates({message: rate}, window_s=_COUNTING_TIME)
         except LinkError as error:
@@ -129,9 +129,9 @@ class Watch:
     def ask_mode(self) -> None:
         """Request the mode, and let the loop resume after a gap if the vehicle still obeys us."""
         # Without an answer the silence monitor ends the flight.
-        self._mode_request = asyncio.create_task(self._confirm())
+        self._mode_request = asyncio.create_task(self._confirm_control())
 
-    async def _confirm(self) -> None:
+    async def _confirm_control(self) -> None:
         """Wait for a fresh heartbeat, because one from the backlog may carry an old mode."""
         await self._context.fresh_heartbeat()
         loop, state = self._context.loop, self._context.link.state

@@ -37,11 +37,11 @@ class _Doublet(NamedTuple):
     def at(self, time: float, hold: Reference) -> Reference:
         """The reference `time` s after the beginning; `hold` is the reference of position hold."""
         if self.body_rates is None:
-            return self._climbing(time, hold)
-        sign = self._sign(time)
+            return self._climb_reference(time, hold)
+        sign = self._doublet_sign(time)
         return hold._replace(body_rates=BodyRates(*(sign * rate for rate in self.body_rates)))
 
-    def _climbing(self, time: float, hold: Reference) -> Reference:
+    def _climb_reference(self, time: float, hold: Reference) -> Reference:
         step = self.step
         if time < step:
             speed, height = time, 0.5 * time * time
@@ -55,11 +55,11 @@ class _Doublet(NamedTuple):
         return hold._replace(
             position_ned=(north, east, down - self.climb * height),
             velocity_ned=(0.0, 0.0, -self.climb * speed),
-            acceleration_ned=(0.0, 0.0, -self.climb * self._sign(time)),
+            acceleration_ned=(0.0, 0.0, -self.climb * self._doublet_sign(time)),
             thrust_steps=True,
         )
 
-    def _sign(self, time: float) -> float:
+    def _doublet_sign(self, time: float) -> float:
         if time >= 4.0 * self.step:
             return 0.0
         return -1.0 if self.step <= time < 3.0 * self.step else 1.0

@@ -118,10 +118,10 @@ class DragEstimate:
             self._residual[axis] += dt * residual[axis]
         self._span += dt
         if self._span >= _SHORTEST_WINDOW:
-            self._learn()
+            self._update_filter()
             self._forget_window()
 
-    def _learn(self) -> None:
+    def _update_filter(self) -> None:
         """Update the filter with the window: one measurement of north and one of east."""
         span = self._span
         self.top_speed = max(self.top_speed, hypot(*self._passed) / span)
@@ -142,9 +142,9 @@ class DragEstimate:
             self._measurements += 1
             self._state = self._state + gain * innovation
             self._covariance = self._covariance - np.outer(gain, spread)
-        self.drag = self._bounded()
+        self.drag = self._drag_within_bounds()
 
-    def _bounded(self) -> Drag:
+    def _drag_within_bounds(self) -> Drag:
         """The most likely drag within the bounds.
 
         If the quadratic drag is clamped, the linear drag is the most likely one with it.

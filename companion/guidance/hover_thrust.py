@@ -84,12 +84,12 @@ class HoverThrust:
     @property
     def present_hover(self) -> float:
         """Learned normalised thrust at hover, at the present battery voltage."""
-        return self._normalised(GRAVITY)
+        return self._to_normalised(GRAVITY)
 
     @property
     def largest_specific(self) -> float:
         """Largest specific thrust that is sent, m/s²."""
-        return self._specific(self._settings.highest)
+        return self._to_specific(self._settings.highest)
 
     @property
     def largest_specific_tilted(self) -> float:
@@ -98,12 +98,12 @@ class HoverThrust:
         An autopilot that compensates the tilt itself may raise the thrust above `largest_specific`.
         """
         settings = self._settings
-        return self._specific(1.0 if settings.tilt_compensated else settings.highest)
+        return self._to_specific(1.0 if settings.tilt_compensated else settings.highest)
 
     @property
     def smallest_specific(self) -> float:
         """Smallest specific thrust that is sent, m/s²."""
-        return self._specific(self._settings.lowest)
+        return self._to_specific(self._settings.lowest)
 
     def normalised(self, acceleration_down: float, q: Quaternion, body_rates: BodyRates) -> float:
         """Normalised thrust within its bounds for a wanted vertical acceleration.
@@ -116,7 +116,7 @@ class HoverThrust:
         settings = self._settings
         cosine = cos_tilt_ahead(q, body_rates, settings.lag)
         thrust = specific_thrust(acceleration_down, 1.0 if settings.tilt_compensated else cosine)
-        return self.within_limits(self._normalised(thrust))
+        return self.within_limits(self._to_normalised(thrust))
 
     def within_limits(self, normalised: float) -> float:
         """The normalised thrust, limited to its bounds."""
@@ -161,10 +161,10 @@ class HoverThrust:
         self.pause()
         self._battery.reset()
 
-    def _normalised(self, specific: float) -> float:
+    def _to_normalised(self, specific: float) -> float:
         return self._curve.signal(specific / (self._filter.gain * self._battery.factor))
 
-    def _specific(self, normalised: float) -> float:
+    def _to_specific(self, normalised: float) -> float:
         return self._filter.gain * self._battery.factor * self._curve.share(normalised)
 
     def _begin_window(self, time: float, velocity_down: float) -> None:

@@ -71,21 +71,23 @@ class Steps:
     @property
     def duration(self) -> float:
         """Three doublets, each with the pause before it and the settling after it, s."""
-        return len(self.DIRECTIONS) * self._period
+        return len(self.DIRECTIONS) * self._doublet_period
 
     @property
-    def _period(self) -> float:
+    def _doublet_period(self) -> float:
         return _HOLD_PAUSE + 4.0 * self.step + self.settle
 
     def check_times(self) -> list[float]:
         """Times 0.01 s apart over each doublet, s; pauses and settling are not checked."""
-        begins = [index * self._period + _HOLD_PAUSE for index in range(len(self.DIRECTIONS))]
+        begins = [
+            index * self._doublet_period + _HOLD_PAUSE for index in range(len(self.DIRECTIONS))
+        ]
         return [time for begin in begins for time in spread(begin, begin + 4.0 * self.step)]
 
     def at(self, time: float, start: Pose) -> Reference:
         """The reference: a pause, open-loop coefficients in the doublet, then position hold."""
-        index = min(max(int(time / self._period), 0), len(self.DIRECTIONS) - 1)
-        within = time - index * self._period - _HOLD_PAUSE
+        index = min(max(int(time / self._doublet_period), 0), len(self.DIRECTIONS) - 1)
+        within = time - index * self._doublet_period - _HOLD_PAUSE
         rest = Reference(start.position_ned, heading=start.heading)
         if within < 0.0:
             return rest._replace(drifting=True)

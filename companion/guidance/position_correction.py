@@ -102,7 +102,7 @@ class PositionCorrection:
         if before is None or not 0.0 < dt < _LONGEST_GAP:
             self._raw = self._filtered = self._correction = (0.0, 0.0)
         else:
-            self._take(before, measured, dt)
+            self._filter_unexplained(before, measured, dt)
         (north, east, down), velocity = measured
         return VehicleMotion(
             (
@@ -113,7 +113,7 @@ class PositionCorrection:
             velocity,
         )
 
-    def _take(self, before: VehicleMotion, now: VehicleMotion, dt: float) -> None:
+    def _filter_unexplained(self, before: VehicleMotion, now: VehicleMotion, dt: float) -> None:
         """Filter r, the change of position per time that the velocity does not explain."""
         settings = self._settings
         (p_before, v_before), (p_now, v_now) = before, now
@@ -121,7 +121,7 @@ class PositionCorrection:
         for axis in (0, 1):
             explained = 0.5 * (v_before[axis] + v_now[axis])
             raw[axis] = (p_now[axis] - p_before[axis]) / dt - explained
-        kept = exp(-dt / self._window(raw, dt))
+        kept = exp(-dt / self._filter_window(raw, dt))
         change = limited(raw[0] - self._filtered[0], raw[1] - self._filtered[1], _LARGEST_CHANGE)
         for axis in (0, 1):
             filtered[axis] = self._filtered[axis] + (1.0 - kept) * change[axis]
@@ -132,7 +132,7 @@ class PositionCorrection:
         self._filtered = limited(filtered[0], filtered[1], most)
         self._correction = limited(correction[0], correction[1], settings.largest_correction)
 
-    def _window(self, raw: list[float], dt: float) -> float:
+    def _filter_window(self, raw: list[float], dt: float) -> float:
         """Time constant of the low-pass filters, s, from the changes of r between two positions."""
         change = hypot(raw[0] - self._raw[0], raw[1] - self._raw[1])
         kept = exp(-dt / _NOISE_TIME)

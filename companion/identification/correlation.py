@@ -66,26 +66,31 @@ def dead_time_by_correlation(
         raise ValueError(f"lag must be finite and not negative, not {lag}")
     if slew is not None and not slew > 0.0:
         raise ValueError(f"slew must be positive, not {slew}")
-    products, powers, squares, count = (
-        np.zeros(_DELAY_COUNT + 1),
-        np.zeros(_DELAY_COUNT + 1),
-        0.0,
-        0,
-    )
     band = _band_pass(lag, damping)
-    for part in stretches(time, commanded, measured_time, measured):
-        filtered = _filtered(part, lag, slew, band)
-        if filtered is None:
-            continue
-        commands, response = filtered
+    parts = stretches(time, commanded, measured_time, measured)
+    filtered = [pair for part in parts if (pair := _filtered(part, lag, slew, band)) is not None]
+    correlation = _correlation(filtered)
+    found = None if correlation is None else _peak_delay(correlation)
+    return None if found is None else max(0.0, found - _second_order_delay(lag, damping))
+
+
+def _correlation(pairs: list[tuple[Floats, Floats]]) -> Floats | None:
+    """(`_DELAY_COUNT` + 1,), correlation of filtered commands and measurements by their delay.
+
+    None: there are no pairs, or the commands or the measurements hardly changed.
+    """
+    products, powers = np.zeros(_DELAY_COUNT + 1), np.zeros(_DELAY_COUNT + 1)
+    squares, count = 0.0, 0
+    for commands, response in pairs:
         products += np.correlate(commands, response, "valid")[::-1]
         powers += np.correlate(commands**2, np.ones(response.size), "valid")[::-1]
         squares += float(response @ response)
         count += response.size
-    if count == 0 or powers.max() < count * _LEAST_EXCITATION**2 or squares == 0.0:
+    least_power = count * _LEAST_EXCITATION**2
+    if count == 0 or powers.max() < least_power or squares == 0.0:
         return None
-    found = _peak(products / np.sqrt(np.maximum(powers, count * _LEAST_EXCITATION**2) * squares))
-    return None if found is None else max(0.0, found - _second_order_delay(lag, damping))
+    correlation: Floats = products / np.sqrt(np.maximum(powers, least_power) * squares)
+    return correlation
 
 
 def _centre_frequency(lag: float, damping: float) -> float:
@@ -141,7 +146,7 @@ def _filtered(
     return np.convolve(commands, band, "valid"), np.convolve(response, band, "valid")
 
 
-def _peak(correlation: Floats) -> float | None:
+def _peak_delay(correlation: Floats) -> float | None:
     """Delay of the largest correlation, s, interpolated by a parabola.
 
     None if this correlation is too small, or is at the first or last delay.

@@ -138,7 +138,7 @@ def second_order(commands: Knots, frequency: float, damping: float, at: Floats) 
         damping: ζ.
         at: (m,), s.
     """
-    first, second = _lags(frequency, damping)
+    first, second = _two_lags(frequency, damping)
     if first.imag:
         oscillating: Floats = np.imag(first * complex_lagged(commands, first, at)) / first.imag
         return oscillating
@@ -149,7 +149,7 @@ def second_order(commands: Knots, frequency: float, damping: float, at: Floats) 
 
 def second_order_decay(since: Floats, frequency: float, damping: float) -> Floats:
     """(m, 2), components of the free response, `since` (m,) seconds after the start."""
-    first, second = _lags(frequency, damping)
+    first, second = _two_lags(frequency, damping)
     if first.imag:
         turning = np.exp(-since / first)
         return np.column_stack((np.real(turning), np.imag(turning)))
@@ -158,7 +158,7 @@ def second_order_decay(since: Floats, frequency: float, damping: float) -> Float
     return np.column_stack((slow, (slow - quick) / (first.real - second.real)))
 
 
-def _lags(frequency: float, damping: float) -> tuple[complex, complex]:
+def _two_lags(frequency: float, damping: float) -> tuple[complex, complex]:
     """The two first-order lags of which a second-order lag is made, s; the longer one first."""
     apart = damping * damping - 1.0
     apart = copysign(max(abs(apart), _NEARLY_CRITICAL), apart)

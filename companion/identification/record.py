@@ -54,8 +54,8 @@ def stretches(
     Raises:
         ValueError: a time series and its values are not one-dimensional and equally long.
     """
-    t, u = _series(time, commanded)
-    sampled, y = _series(measured_time, measured)
+    t, u = _checked_series(time, commanded)
+    sampled, y = _checked_series(measured_time, measured)
     found = []
     for part in np.split(np.arange(t.size), np.flatnonzero(np.diff(t) > _LONGEST_HOLD) + 1):
         if part.size == 0:
@@ -101,7 +101,7 @@ def _windows(part: Stretch) -> list[Stretch]:
     return windows
 
 
-def _series(time: ArrayLike, values: ArrayLike) -> tuple[Floats, Floats]:
+def _checked_series(time: ArrayLike, values: ArrayLike) -> tuple[Floats, Floats]:
     t, v = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if t.ndim != 1 or t.shape != v.shape:
         raise ValueError(

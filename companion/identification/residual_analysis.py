@@ -60,10 +60,12 @@ def analyse(
         columns = np.column_stack([commands(delay) for delay in each.tolist()])
         _, noise = project(np.column_stack((columns, np.ones(residual.size))), residual)
     lost = excited / max(excited - delays, 1)
-    return Residuals(_rms(residual - noise), _errors(slopes, noise, correlated) * np.sqrt(lost))
+    return Residuals(
+        _rms(residual - noise), _standard_errors(slopes, noise, correlated) * np.sqrt(lost)
+    )
 
 
-def _errors(slopes: Floats, noise: Floats, correlated: int) -> Floats:
+def _standard_errors(slopes: Floats, noise: Floats, correlated: int) -> Floats:
     """Standard errors that allow for correlated noise (Newey & West)."""
     scores = slopes * noise[:, np.newaxis]
     spread = scores.T @ scores

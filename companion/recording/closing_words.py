@@ -74,7 +74,7 @@ def closing_words(figures: Figures, invocation: Invocation | None) -> ClosingWor
 def _headline_and_reasons(figures: Figures) -> tuple[str, list[str]]:
     judged, advice = checks(figures), list(figures["advice"])
     beyond = [check for check in judged if not check.good]
-    names = _enumerated([maneuver["name"] for maneuver in figures["maneuvers"]])
+    names = _joined_by_and([maneuver["name"] for maneuver in figures["maneuvers"]])
     if is_good(figures):
         headline = f"The flight was good: {names}, all within their limits."
     elif beyond:
@@ -89,7 +89,7 @@ def _headline_and_reasons(figures: Figures) -> tuple[str, list[str]]:
     lines = _beyond_limit(beyond)
     lines += [f"! {text}" for text in (*advice, *_gain_warning(figures))]
     lines += _by_subject([check for check in judged if check.good])
-    return headline, [*lines, _extent(figures)]
+    return headline, [*lines, _extent_line(figures)]
 
 
 def _beyond_limit(beyond: list[Check]) -> list[str]:
@@ -104,7 +104,7 @@ def _by_subject(good: Sequence[Check]) -> list[str]:
     return [f"  {what}: {'; '.join(words)}" for what, words in found.items()]
 
 
-def _extent(figures: Figures) -> str:
+def _extent_line(figures: Figures) -> str:
     extent = figures["extent"]
     parts = [f"{extent['under_control_s']:.0f} s under our control"]
     for key, words in (
@@ -125,11 +125,11 @@ def _ended_early(figures: Figures) -> tuple[str, list[str]]:
         on_ground = end["since_takeoff_s"] is None  # or the take-off was not heard
         what = "disarm it, or take it over if it flies" if on_ground else "take it over or land it"
         then = "" if interrupted else f"; then: {remedy}"
-        armed = "is armed" if _silence(figures) is None else "was armed when last heard"
+        armed = "is armed" if _final_silence(figures) is None else "was armed when last heard"
         remedy = f"the vehicle {armed}: {what}{then}"
     result = figures["result"].rstrip(".")
     return f"The flight ended early: {result}{'' if result.endswith('?') else '.'}", [
-        f"  when: {_when(end)}",
+        f"  when: {_when_ended(end)}",
         f"  {_vehicle_state(figures)}",
         f"  what to do: {remedy}",
         *(f"! {text}" for text in (*figures["advice"], *_gain_warning(figures))),
@@ -143,7 +143,7 @@ def _gain_warning(figures: Figures) -> list[str]:
     return [] if warning is None else [warning]
 
 
-def _when(end: dict[str, Any]) -> str:
+def _when_ended(end: dict[str, Any]) -> str:
     words = f"at {end['time_s']:.1f} s, in phase `{end['phase']}`"
     if end["since_takeoff_s"] is None:
         words += ", before take-off"
@@ -152,14 +152,14 @@ def _when(end: dict[str, Any]) -> str:
     return words
 
 
-def _silence(figures: Figures) -> float | None:
+def _final_silence(figures: Figures) -> float | None:
     """How long the vehicle was silent at the end of the flight, s; None: it was heard."""
     silence: float | None = figures["at_the_end"].get("unheard_s")
     return silence
 
 
 def _vehicle_state(figures: Figures) -> str:
-    state, silence = figures["at_the_end"], _silence(figures)
+    state, silence = figures["at_the_end"], _final_silence(figures)
     heard = "now" if silence is None else f"when last heard, {silence:.1f} s before the end"
     armed = {True: "ARMED", False: "disarmed", None: "not known whether armed"}[state["armed"]]
     mode = "" if state["mode"] is None else f", in mode {state['mode']}"
@@ -204,7 +204,7 @@ def _shared_options(arguments: Sequence[str]) -> list[str]:
     return kept
 
 
-def _enumerated(names: Sequence[str]) -> str:
+def _joined_by_and(names: Sequence[str]) -> str:
     if not names:
         return "no maneuver"
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

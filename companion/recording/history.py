@@ -76,13 +76,17 @@ def marks_of(summary: Any) -> Marks:
     """
     early = summary["early_end"]
     maneuvers = [
-        Span(begin := _time(each["begin_s"]), begin + _time(each["duration_s"]), _title(each))
+        Span(
+            begin := _valid_time(each["begin_s"]),
+            begin + _valid_time(each["duration_s"]),
+            _title(each),
+        )
         for each in summary["maneuvers"]
     ]
     return Marks(
-        [(_time(each["time_s"]), str(each["name"])) for each in summary["phases"]],
+        [(_valid_time(each["time_s"]), str(each["name"])) for each in summary["phases"]],
         maneuvers,
-        None if early is None else _time(early["time_s"]),
+        None if early is None else _valid_time(early["time_s"]),
         str(summary["result"]),
     )
 
@@ -122,7 +126,7 @@ def _name_maneuvers(axes: "Axes", marks: Marks) -> None:
         axes.text(
             0.5 * (span.begin + span.end),
             1.02,
-            _plain(span.name),
+            _without_formulas(span.name),
             transform=axes.get_xaxis_transform(),
             ha="center",
             va="bottom",
@@ -133,7 +137,10 @@ def _name_maneuvers(axes: "Axes", marks: Marks) -> None:
         if len(reason) > _LONGEST_REASON:
             reason = f"{reason[:_LONGEST_REASON]}…"
         axes.set_title(
-            _plain(f"ended at {marks.end:.1f} s: {reason}"), color=_END, fontsize="medium", pad=18
+            _without_formulas(f"ended at {marks.end:.1f} s: {reason}"),
+            color=_END,
+            fontsize="medium",
+            pad=18,
         )
 
 
@@ -149,7 +156,7 @@ def _name_phases(axes: "Axes", marks: Marks, length: float) -> None:
         axes.text(
             begin,
             0.96,
-            " " + _plain(", ".join(names)),
+            " " + _without_formulas(", ".join(names)),
             transform=axes.get_xaxis_transform(),
             rotation=90,
             ha="left",
@@ -159,12 +166,12 @@ def _name_phases(axes: "Axes", marks: Marks, length: float) -> None:
         )
 
 
-def _plain(text: str) -> str:
+def _without_formulas(text: str) -> str:
     """The text with each `$` escaped, which would otherwise begin a formula."""
     return text.replace("$", r"\$")
 
 
-def _time(value: Any) -> float:
+def _valid_time(value: Any) -> float:
     time = float(value)
     if not isfinite(time) or abs(time) > _LATEST_TIME:
         raise ValueError(f"a time is {value}")

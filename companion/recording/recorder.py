@@ -67,9 +67,9 @@ class FlightRecorder(BackgroundFile[Entry]):
 
     def _make_file(self) -> "_McapEntries":
         writer = McapWriter(self.path, self._stream)
-        return _McapEntries(writer, self._epoch, self._drop)
+        return _McapEntries(writer, self._epoch, self._count_dropped)
 
-    def _drop(self, error: Exception) -> None:
+    def _count_dropped(self, error: Exception) -> None:
         """Count an entry that cannot be recorded; report the first one."""
         self.dropped += 1
         report, self._on_bad_entry = self._on_bad_entry, None
@@ -92,16 +92,16 @@ class FlightRecorder(BackgroundFile[Entry]):
     def phase(self, name: str, waits_for: str) -> None:
         """Record that a phase begins now."""
         now = self._clock()
-        self.add(now, _fields, ("/phase", (now,), (name, waits_for)))
+        self.add(now, _write_fields, ("/phase", (now,), (name, waits_for)))
 
     def maneuver(self, time: float, vehicle_time: float, name: str | None) -> None:
         """Record the beginning of a maneuver or the end of the last one (None): `ManeuverMark`."""
-        self.add(time, _fields, ("/maneuver", (time, vehicle_time), (name or "",)))
+        self.add(time, _write_fields, ("/maneuver", (time, vehicle_time), (name or "",)))
 
     def alarm(self, raised: bool, monitor: str, reason: str, action: str) -> None:
         """Record that the alarm of a safety monitor is raised or ended now."""
         now = self._clock()
-        self.add(now, _fields, ("/alarm", (now, float(raised)), (monitor, reason, action)))
+        self.add(now, _write_fields, ("/alarm", (now, float(raised)), (monitor, reason, action)))
 
     def action(
         self,
@@ -130,17 +130,17 @@ class FlightRecorder(BackgroundFile[Entry]):
             at_once: whether the values change at once, without slewing.
         """
         now = self._clock()
-        self.add(now, _fields, ("/change", (now, float(at_once)), (json.dumps(values),)))
+        self.add(now, _write_fields, ("/change", (now, float(at_once)), (json.dumps(values),)))
 
     def event(self, text: str) -> None:
         """Record an event at the present time."""
         source, colon, _ = text.partition(": ")
         source = source if colon and source in ("safety", "autopilot", "phase") else "flight"
-        self.add(self._clock(), _log, (text, source))
+        self.add(self._clock(), _write_log, (text, source))
 
     def row(self, time: float, channel: Channel, values: Sequence[float]) -> None:
         """Record a message of a numeric channel: the float64 columns, then the uint8 columns."""
-        self.add(time, _row, (channel, values))
+        self.add(time, _write_row, (channel, values))
 
 
 class _McapEntries:
@@ -153,7 +153,7 @@ class _McapEntries:
     """
 
     def __init__(self, writer: McapWriter, epoch: float, drop: Callable[[Exception], None]) -> None:
-        self._writer, self._drop = writer, drop
+        self._writer, self._count_dropped = writer, drop
         self._epoch_ns = round(epoch * 1e9)
 
     def write(self, items: Sequence[Entry]) -> None:
@@ -164,7 +164,7 @@ class _McapEntries:
             except OSError:
                 raise
             except Exception as error:  # one bad entry must not end the record of the flight
-                self._drop(error)
+                self._count_dropped(error)
         writer.stream()
 
     def sync(self) -> None:
@@ -178,7 +178,7 @@ def _metadata(writer: McapWriter, _: int, values: tuple[str, Mapping[str, str]])
     writer.metadata(*values)
 
 
-def _fields(
+def _write_fields(
     writer: McapWriter,
     time_ns: int,
     values: tuple[str, tuple[float, ...], tuple[str, ...]],
@@ -187,12 +187,12 @@ def _fields(
     writer.message(topic, time_ns, cdr.fields_message(numbers, texts))
 
 
-def _log(writer: McapWriter, time_ns: int, values: tuple[str, str]) -> None:
+def _write_log(writer: McapWriter, time_ns: int, values: tuple[str, str]) -> None:
     text, source = values
     level = _WARNING if source == "safety" else _INFORMATION
     writer.message("/log", time_ns, cdr.log_message(time_ns, level, text, source))
 
 
-def _row(writer: McapWriter, time_ns: int, values: tuple[Channel, Sequence[float]]) -> None:
+def _write_row(writer: McapWriter, time_ns: int, values: tuple[Channel, Sequence[float]]) -> None:
     channel, numbers = values
     writer.message(channel.topic, time_ns, channel.packing.pack(CDR, *numbers))

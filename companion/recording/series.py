@@ -95,7 +95,7 @@ class Spool:
         if not self._begun:
             self._begun = True
             work = (self._queue, self._failures)  # not self, which the thread would keep alive
-            threading.Thread(target=_write, args=work, name="spool", daemon=True).start()
+            threading.Thread(target=_append_chunks, args=work, name="spool", daemon=True).start()
             weakref.finalize(self, self._queue.put, None)
         self._queue.put((file, chunk))
         return True
@@ -111,7 +111,7 @@ class Spool:
         return not self._stuck
 
 
-def _write(queue: "SimpleQueue[_Work]", failures: list[str]) -> None:
+def _append_chunks(queue: "SimpleQueue[_Work]", failures: list[str]) -> None:
     while (work := queue.get()) is not None:
         if isinstance(work, threading.Event):
             work.set()

@@ -41,7 +41,7 @@ def words_text(words: ClosingWords) -> Text:
     return text
 
 
-def _table(title: str, *columns: str) -> Table:
+def _empty_table(title: str, *columns: str) -> Table:
     table = Table(title=title, title_justify="left", title_style="bold", min_width=66)
     table.add_column("")
     for column in columns:
@@ -54,7 +54,7 @@ def _response(summary: Summary) -> RenderableType:
     if response is None:
         return Text("no acceleration step was flown to its end", style="dim")
     ideal = 1.0 / summary.gain
-    table = _table("Acceleration response to steps", "measured", "ideal (1/p)")
+    table = _empty_table("Acceleration response to steps", "measured", "ideal (1/p)")
     for axis, value in (
         ("north", response.time_constant_north_s),
         ("east", response.time_constant_east_s),
@@ -86,11 +86,11 @@ def _dead_times(summary: Summary) -> list[RenderableType]:
     if not found.lag_known:
         words = "dead time not measured: vehicle.lag_ms is not set (`companion identify` finds it)"
         return [Text(words, style="dim")]
-    table = _table(
+    table = _empty_table(
         "Dead time, from a sample to the effect of its setpoint", "measured", "configured"
     )
     for name, axis in found.axes.items():
-        table.add_row(name, _measured(axis), _milliseconds(axis.configured))
+        table.add_row(name, _dead_time_text(axis), _milliseconds(axis.configured))
     age = found.sample_age
     if not isnan(age.p50):
         table.add_row(
@@ -101,7 +101,7 @@ def _dead_times(summary: Summary) -> list[RenderableType]:
     return [table]
 
 
-def _measured(axis: AxisDeadTime) -> str:
+def _dead_time_text(axis: AxisDeadTime) -> str:
     return (
         "not enough rotation to measure" if axis.measured is None else _milliseconds(axis.measured)
     )
@@ -113,17 +113,19 @@ def _milliseconds(value: float | None) -> str:
 
 def _tracking(summary: Summary) -> RenderableType:
     """Horizontal and vertical errors of the maneuvers."""
-    table = _table("Tracking by maneuver", "horizontal RMS", "largest", "height RMS", "largest")
+    table = _empty_table(
+        "Tracking by maneuver", "horizontal RMS", "largest", "height RMS", "largest"
+    )
     for flown in summary.maneuvers():
         level = (
             ("open loop", f"{flown.drift:.2f} m away")
             if flown.open_loop
             else (
-                _number(flown.level_rms, "m", 2),
-                _number(flown.level_max, "m", 2),
+                _with_unit(flown.level_rms, "m", 2),
+                _with_unit(flown.level_max, "m", 2),
             )
         )
-        heights = _number(flown.height_rms, "m", 2), _number(flown.height_max, "m", 2)
+        heights = _with_unit(flown.height_rms, "m", 2), _with_unit(flown.height_max, "m", 2)
         table.add_row(flown.name, *level, *heights)
     return table
 
@@ -142,10 +144,10 @@ def _predictive_words(figures: PredictiveFigures) -> Text:
 
 def _loop(summary: Summary) -> RenderableType:
     latency = summary.latency_us()
-    table = _table("Control loop", "p50", "p99", "largest")
+    table = _empty_table("Control loop", "p50", "p99", "largest")
     table.add_row(
         "sample in → setpoint out",
-        *(_number(latency[key], "µs", 0) for key in ("p50", "p99", "max")),
+        *(_with_unit(latency[key], "µs", 0) for key in ("p50", "p99", "max")),
     )
     return table
 
@@ -170,5 +172,5 @@ def _coefficient(value: float) -> str:
     return f"{value:.4f}"
 
 
-def _number(value: float, unit: str, digits: int) -> str:
+def _with_unit(value: float, unit: str, digits: int) -> str:
     return "–" if isnan(value) else f"{value:.{digits}f} {unit}"

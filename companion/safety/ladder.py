@@ -55,7 +55,9 @@ class SafetyLadder:
 
     def step(self, snapshot: Snapshot) -> Verdict | None:
         """Judge one snapshot; return the action to take now, or None."""
-        raised = [alarm for alarm in self._alarms if alarm.step(snapshot) and self._report(alarm)]
+        raised = [
+            alarm for alarm in self._alarms if alarm.step(snapshot) and self._report_change(alarm)
+        ]
         worst = max(raised, key=_severity, default=None)
         if worst is not None and worst.monitor.action.severity > Action.HOLD.severity:
             return _verdict(worst, worst.monitor.action)
@@ -76,7 +78,7 @@ class SafetyLadder:
         worst = max(breaches, key=lambda alarm: alarm.monitor.then.severity)
         return _verdict(worst, worst.monitor.then)
 
-    def _report(self, alarm: Alarm) -> bool:
+    def _report_change(self, alarm: Alarm) -> bool:
         """Report that an alarm was raised or ended; return whether it was raised."""
         name = alarm.monitor.name
         if alarm.reason is None:

@@ -28,10 +28,15 @@ def monitors(config: Config) -> tuple[Monitor, ...]:
     The table does not contain a takeover by the pilot or an unknown mode: `companion.flight.watch`
     detects both, and releases control.
     """
-    return (*_fixed(config), *_autopilot(config), *_motion(config), *_link(config))
+    return (
+        *_fixed_monitors(config),
+        *_autopilot_monitors(config),
+        *_motion_monitors(config),
+        *_link_monitors(config),
+    )
 
 
-def _fixed(config: Config) -> tuple[Monitor, ...]:
+def _fixed_monitors(config: Config) -> tuple[Monitor, ...]:
     """Monitors of silence, clock, arming, landing and failsafe; all their actions are fixed."""
     limit = config.deadman.silence_limit
     unheard = link_judges.silence(limit, heard=False)
@@ -47,7 +52,7 @@ def _fixed(config: Config) -> tuple[Monitor, ...]:
     )
 
 
-def _autopilot(config: Config) -> tuple[Monitor, ...]:
+def _autopilot_monitors(config: Config) -> tuple[Monitor, ...]:
     """Monitors of battery, GPS and estimator."""
     safety = config.safety
     resets = autopilot_judges.too_many_estimator_resets(
@@ -64,7 +69,7 @@ def _autopilot(config: Config) -> tuple[Monitor, ...]:
     )
 
 
-def _motion(config: Config) -> tuple[Monitor, ...]:
+def _motion_monitors(config: Config) -> tuple[Monitor, ...]:
     """Monitors of flight envelope, fence, tracking error and thrust."""
     safety, limits, fence = config.safety, config.limits, fence_of(config)
     tilt = motion_judges.tilt(limits.max_tilt + safety.tilt_margin)
@@ -85,7 +90,7 @@ def _motion(config: Config) -> tuple[Monitor, ...]:
     )
 
 
-def _link(config: Config) -> tuple[Monitor, ...]:
+def _link_monitors(config: Config) -> tuple[Monitor, ...]:
     """Monitors of the link and of this computer."""
     safety = config.safety
     link, computer = Action(safety.link_action), Action(safety.computer_action)

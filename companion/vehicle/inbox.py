@@ -95,7 +95,7 @@ class Inbox:
         self, loop: LockstepEventLoop, answer: Callable[[int], None]
     ) -> LockstepClient:
         """Switch to lockstep: from now on frames wait until the vehicle closes its step."""
-        self.lockstep = LockstepClient(loop, self._process, self._deliver, answer)
+        self.lockstep = LockstepClient(loop, self._pass_on_held, self._deliver_samples, answer)
         return self.lockstep
 
     def receive(self, data: bytes, received_ns: int) -> bool:
@@ -108,7 +108,7 @@ class Inbox:
             for frame in self._scanner.feed(data):
                 if frame.message_id not in CRC_EXTRA:
                     self._call_on_frame(frame)
-                elif self._admit(frame):
+                elif self._is_admitted(frame):
                     accepted = True
                     if self._candidate is not None:
                         self._peer_rule.set_peer(self._candidate)
@@ -127,7 +127,7 @@ class Inbox:
         Without a valid claim in the bytes, no frame in them is accepted. Never raises.
         """
         known = (frame for frame in self._scanner.feed(data) if frame.message_id in CRC_EXTRA)
-        admitted = [frame for frame in known if self._admit(frame)]
+        admitted = [frame for frame in known if self._is_admitted(frame)]
         if not any(map(self._peer_rule.is_claim, admitted)):
             self._stats.unclaimed += len(admitted)
             return False
@@ -163,7 +163,7 @@ class Inbox:
         """Pass the remarks about the time stamps of signatures to the user."""
         self._filter.tell_remarks()
 
-    def _admit(self, frame: Frame) -> bool:
+    def _is_admitted(self, frame: Frame) -> bool:
         if self._filter.admits_source(frame):
             return self._filter.signature_good(frame)
         if self.on_foreign is not None:
@@ -221,13 +221,13 @@ class Inbox:
         if self.on_attitude is not None:
             self._router.guard(self.on_attitude, sample)
 
-    def _process(self) -> None:
+    def _pass_on_held(self) -> None:
         """In lockstep: pass on the frames of a step in order, after its beacon set the clock."""
         held, self._held = self._held, []
         for frame, received_ns in held:
             self._pass_on(frame, received_ns)
 
-    def _deliver(self) -> None:
+    def _deliver_samples(self) -> None:
         """In lockstep: pass the samples of a step to the control loop, after its tasks have run."""
         samples, self._samples = self._samples, []
         for sample in samples:

@@ -72,12 +72,12 @@ class TimeSync:
     @property
     def round_trip_s(self) -> float | None:
         """The shortest recent round trip, s; `None` if no recent request was answered."""
-        return min(self._recent(), default=None)
+        return min(self._recent_round_trips(), default=None)
 
     @property
     def jitter_s(self) -> float | None:
         """Range of the recent round trips, s; `None` if no recent request was answered."""
-        trips = self._recent()
+        trips = self._recent_round_trips()
         return max(trips) - min(trips) if trips else None
 
     def ask(self) -> None:
@@ -100,7 +100,7 @@ class TimeSync:
             self._round_trips.append((now * _S_PER_NS, (now - message.ts1) * _S_PER_NS))
             self._vehicle_clock.exchange(message.ts1 * _S_PER_NS, now * _S_PER_NS, message.tc1)
 
-    def _recent(self) -> list[float]:
+    def _recent_round_trips(self) -> list[float]:
         oldest = self._clock() - EXCHANGE_LIFETIME
         return [round_trip for received, round_trip in self._round_trips if received >= oldest]
 

@@ -61,7 +61,7 @@ def test_a_judge_and_a_row_are_all_that_a_flight_needs(monkeypatch):
         height = snapshot.motion.height
         return f"{height:.0f} m is too high" if height is not None and height > 1.0 else None
 
-    rows = table._autopilot
+    rows = table._autopilot_monitors
 
     def with_new_row(config):
         judge = autopilot_judges.high
@@ -72,7 +72,7 @@ def test_a_judge_and_a_row_are_all_that_a_flight_needs(monkeypatch):
         )
 
     monkeypatch.setattr(autopilot_judges, "high", high, raising=False)
-    monkeypatch.setattr(table, "_autopilot", with_new_row)
+    monkeypatch.setattr(table, "_autopilot_monitors", with_new_row)
     with mock_vehicle() as mock:
         summary = fly(mock, hover={"duration_s": 8.0})
         assert mock.state()["armed"] is False

@@ -84,15 +84,15 @@ def minimum_snap(
     # Time is counted in mean spans: the entries, powers of spans up to the seventh, stay near 1.
     unit = float((knots[-1] - knots[0]) / (knots.size - 1))
     spans = np.diff(knots) / unit
-    equations = _smoothness(spans, stiffness / unit**7, fixed.states.shape[2])
+    equations = _smoothness_equations(spans, stiffness / unit**7, fixed.states.shape[2])
     for observed in observations:
         _add_observations(equations, knots, spans, unit, observed)
     scale = unit ** np.arange(STATE_SIZE)
-    states = _solved(equations, fixed.states * scale[:, None], fixed.mask)
+    states = _cheapest_states(equations, fixed.states * scale[:, None], fixed.mask)
     return SepticSpline(knots, states / scale[:, None])
 
 
-def _smoothness(spans: Floats, stiffness: float, series: int) -> _Equations:
+def _smoothness_equations(spans: Floats, stiffness: float, series: int) -> _Equations:
     """Half the gradient of the integral of squared snap."""
     powers = np.arange(STATE_SIZE)
     # Snap of uᵏ is k!/(k−4)!·uᵏ⁻⁴, and ∫ uᵐ over a piece is 1/(m + 1).
@@ -131,7 +131,7 @@ def _add_observations(
     np.add.at(equations.right, piece + 1, moments[:, STATE_SIZE:])
 
 
-def _solved(equations: _Equations, states: Floats, mask: NDArray[np.bool_]) -> Floats:
+def _cheapest_states(equations: _Equations, states: Floats, mask: NDArray[np.bool_]) -> Floats:
     """The states (k, 4, n) of smallest cost that equal `states` where `mask` is true."""
     met = np.where(mask[:, :, None], states, 0.0)
     diagonal, upper, right = equations
@@ -144,10 +144,10 @@ def _solved(equations: _Equations, states: Floats, mask: NDArray[np.bool_]) -> F
         STATE_SIZE
     )
     upper = upper * (free[:-1, :, None] & free[1:, None, :])
-    return _eliminated(diagonal, upper, right)
+    return _solve_block_tridiagonal(diagonal, upper, right)
 
 
-def _eliminated(diagonal: Floats, upper: Floats, right: Floats) -> Floats:
+def _solve_block_tridiagonal(diagonal: Floats, upper: Floats, right: Floats) -> Floats:
     """Solve a symmetric positive definite block-tridiagonal system by Gaussian elimination.
 
     Raises:

@@ -72,7 +72,7 @@ class SlowerTime:
 
     def __post_init__(self) -> None:
         areas = np.array([float(np.asarray(piece.area(1.0))) for piece in self._pieces()])
-        ends = np.concatenate(([0.0], np.cumsum(areas * self._width)))
+        ends = np.concatenate(([0.0], np.cumsum(areas * self._piece_duration)))
         object.__setattr__(self, "_ends", tuple(ends.tolist()))
 
     def _pieces(self) -> list[_Piece]:
@@ -80,7 +80,7 @@ class SlowerTime:
         return [_spline_piece(*four) for four in zip(c, c[1:], c[2:], c[3:], strict=False)]
 
     @property
-    def _width(self) -> float:
+    def _piece_duration(self) -> float:
         """Original time of one piece, s."""
         return self.length / (len(self.coefficients) - 3)
 
@@ -98,7 +98,7 @@ class SlowerTime:
             return self._progress(_spline_piece(*self.coefficients[last:]), 1.0, last)
         index = min(bisect_right(self._ends, time) - 1, last)
         piece = _spline_piece(*self.coefficients[index : index + 4])
-        area = (time - self._ends[index]) / self._width
+        area = (time - self._ends[index]) / self._piece_duration
         u = area / float(piece.area(1.0))
         for _ in range(_MOST_NEWTON_STEPS):
             step = (float(piece.area(u)) - area) / float(piece.factor(u))
@@ -110,11 +110,11 @@ class SlowerTime:
     def stretched(self, moments: Floats) -> tuple[Floats, Progress]:
         """Stretched times and progress (m,) at the original times `moments` (m,), s."""
         count = len(self.coefficients) - 3
-        index = np.clip((moments / self._width).astype(int), 0, count - 1)
+        index = np.clip((moments / self._piece_duration).astype(int), 0, count - 1)
         c = np.array(self.coefficients)
         piece = _spline_piece(c[index], c[index + 1], c[index + 2], c[index + 3])
-        u = moments / self._width - index
-        times = np.array(self._ends)[index] + self._width * np.asarray(piece.area(u))
+        u = moments / self._piece_duration - index
+        times = np.array(self._ends)[index] + self._piece_duration * np.asarray(piece.area(u))
         return times, self._progress(piece, u, index)
 
     def _progress(self, piece: _Piece, u: Number, index: Number) -> Progress:
@@ -122,7 +122,7 @@ class SlowerTime:
 
         With r = 1/w: ṙ = −w'/w³ and r̈ = −w''/w⁴ + 3w'²/w⁵.
         """
-        width = self._width
+        width = self._piece_duration
         w, slope, bend = piece.factor(u), piece.slope(u) / width, piece.bend(u) / (width * width)
         rate = 1.0 / w
         cube = rate * rate * rate

@@ -101,9 +101,9 @@ def slow_down(trajectory: Trajectory, envelope: Envelope) -> SlowDown:
         broken = broken_limits(motion, envelope)
         if not broken:
             return SlowDown(trajectory)
-        whole = _evenly(trajectory, motion, broken, envelope)
+        whole = _slowed_evenly(trajectory, motion, broken, envelope)
         even = SlowDown(evenly_slowed(trajectory, whole.factor), (whole,), even=True)
-        moments = _moments(motion.times)
+        moments = _denser_times(motion.times)
         if moments.size > _MOST_MOMENTS:
             return even._replace(reason="it is too long to be slowed down in parts")
         fine = sampled(trajectory, moments.tolist())
@@ -116,7 +116,7 @@ def slow_down(trajectory: Trajectory, envelope: Envelope) -> SlowDown:
         return SlowDown(slower, tuple(_parts(fine, best, envelope)))
 
 
-def _evenly(
+def _slowed_evenly(
     trajectory: Trajectory, motion: Motion, broken: tuple[Violation, ...], envelope: Envelope
 ) -> SlowedPart:
     """The whole trajectory, slowed by the least factor that is enough; an error if none is."""
@@ -140,7 +140,7 @@ def _evenly(
     return SlowedPart(0.0, end, slow, last.time * slow / too_fast, last.limit)
 
 
-def _moments(times: Floats) -> Floats:
+def _denser_times(times: Floats) -> Floats:
     """The check times, evenly spaced ones, and more in laps and other gaps without check times."""
     gaps = np.diff(times)
     usual = float(np.median(gaps[gaps > 0.0])) if gaps.size else 1.0

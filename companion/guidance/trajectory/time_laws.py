@@ -42,13 +42,13 @@ def derivatives(
     """
     _, r, s, t = progress
     return (
-        _sum(first, r, second, 0.0, third, 0.0),
-        _sum(first, s, second, r * r, third, 0.0),
-        _sum(first, t, second, 3.0 * r * s, third, r * r * r),
+        _weighted_sum(first, r, second, 0.0, third, 0.0),
+        _weighted_sum(first, s, second, r * r, third, 0.0),
+        _weighted_sum(first, t, second, 3.0 * r * s, third, r * r * r),
     )
 
 
-def _sum(a: Triple, x: Any, b: Triple, y: Any, c: Triple, z: Any) -> Triple:
+def _weighted_sum(a: Triple, x: Any, b: Triple, y: Any, c: Triple, z: Any) -> Triple:
     """x·a + y·b + z·c."""
     return (
         x * a[0] + y * b[0] + z * c[0],
@@ -202,7 +202,7 @@ class LimitedJerk:
         self._length = length
         faster = ((jerk_time, jerk), (steady, 0.0), (jerk_time, -jerk))
         slower = ((jerk_time, -jerk), (steady, 0.0), (jerk_time, jerk))
-        self._pieces = _joined((*faster, (cruising, 0.0), *slower))
+        self._pieces = _joined_pieces((*faster, (cruising, 0.0), *slower))
         self._ends = [start for start, _, _ in self._pieces[1:]]
         self.duration = 2.0 * ramp + cruising
 
@@ -227,7 +227,7 @@ _JerkPiece = tuple[float, Progress, float]
 """(beginning in s, progress there, jerk)."""
 
 
-def _joined(jerks: Sequence[tuple[float, float]]) -> list[_JerkPiece]:
+def _joined_pieces(jerks: Sequence[tuple[float, float]]) -> list[_JerkPiece]:
     """Join pieces (duration s, constant jerk) into one motion that begins at rest."""
     pieces = []
     start, state = 0.0, Progress(0.0)

@@ -41,8 +41,10 @@ def check_times(sampling: PhaseSampling, law: TimeLaw, longest: float = LONGEST)
         for part in _checked_parts(piece, sampling, law)
     ]
     phases = [(law.at(part.begin).phase, law.at(part.end).phase) for part in parts]
-    require_checkable(sum(_count(sampling, *span) for span in phases))
-    grids = [_times(part, sampling, law, span) for part, span in zip(parts, phases, strict=True)]
+    require_checkable(sum(_check_count(sampling, *span) for span in phases))
+    grids = [
+        _check_times_in(part, sampling, law, span) for part, span in zip(parts, phases, strict=True)
+    ]
     times: list[float] = np.unique(np.concatenate(([0.0, law.duration], *grids))).tolist()
     return times
 
@@ -70,13 +72,13 @@ def _checked_parts(piece: Piece, sampling: PhaseSampling, law: TimeLaw) -> Itera
     yield piece
 
 
-def _count(sampling: PhaseSampling, begin: float, end: float) -> float:
+def _check_count(sampling: PhaseSampling, begin: float, end: float) -> float:
     if sampling.step is None:
         return bisect_right(sampling.phases, end) - bisect_left(sampling.phases, begin)
     return (end - begin) / sampling.step + _CHECKS_PER_PIECE
 
 
-def _times(
+def _check_times_in(
     piece: Piece, sampling: PhaseSampling, law: TimeLaw, span: tuple[float, float]
 ) -> Floats:
     """The times of the checks in a piece, both ends included."""

@@ -56,10 +56,10 @@ def waypoints(
     if along and headings:
         raise TrajectoryError("waypoints have either their own headings or one along the path")
     places, distances = places_of(points, headings)
-    knots = np.concatenate(([0.0], np.cumsum(_trapezoids(distances, speed, acceleration))))
-    knots *= _stretch(_through(knots, places), knots, speed, acceleration)
+    knots = np.concatenate(([0.0], np.cumsum(_trapezoid_durations(distances, speed, acceleration))))
+    knots *= _stretch_factor(_spline_through(knots, places), knots, speed, acceleration)
     require_duration(float(knots[-1]))
-    spline = _through(knots, places)
+    spline = _spline_through(knots, places)
     heading: Heading = HeldHeading()
     curve = SplineCurve(spline)
     if along:
@@ -84,11 +84,11 @@ def places_of(points: Sequence[Vector], headings: Sequence[float | None]) -> tup
     places = np.array([(0.0, 0.0, 0.0), *points])
     distances = np.linalg.norm(np.diff(places, axis=0), axis=1)
     if not points or distances.min() < SMALLEST_DISTANCE:
-        raise TrajectoryError(_fault(distances))
+        raise TrajectoryError(_distance_fault(distances))
     return places, distances
 
 
-def _fault(distances: Floats) -> str:
+def _distance_fault(distances: Floats) -> str:
     if not distances.size:
         return "there are no waypoints"
     index = int(np.flatnonzero(distances < SMALLEST_DISTANCE)[0])
@@ -96,14 +96,14 @@ def _fault(distances: Floats) -> str:
     return f"waypoint {index + 1} is the same as {before}; leave it out"
 
 
-def _trapezoids(distances: Floats, speed: float, acceleration: float) -> Floats:
+def _trapezoid_durations(distances: Floats, speed: float, acceleration: float) -> Floats:
     """Duration of a trapezoidal speed profile from rest to rest over each distance, s."""
     full = distances / speed + speed / acceleration
     short = 2.0 * np.sqrt(distances / acceleration)
     return np.where(distances < speed**2 / acceleration, short, full)
 
 
-def _through(knots: Floats, places: Floats) -> SepticSpline:
+def _spline_through(knots: Floats, places: Floats) -> SepticSpline:
     """A spline through the places (k, n) at the knots, from rest to rest."""
     states = np.zeros((knots.size, STATE_SIZE, places.shape[1]))
     states[:, 0] = places
@@ -118,7 +118,9 @@ def _rest_to_rest_mask(values: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return mask
 
 
-def _stretch(spline: SepticSpline, knots: Floats, speed: float, acceleration: float) -> float:
+def _stretch_factor(
+    spline: SepticSpline, knots: Floats, speed: float, acceleration: float
+) -> float:
     """Factor for the knots with which the spline just meets the speed or the acceleration limit.
 
     A minimum-snap spline over stretched knots has the same path.

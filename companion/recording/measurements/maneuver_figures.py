@@ -97,8 +97,8 @@ def measure_maneuvers(
         began: beginning of the flight, s on our clock.
     """
     measured = []
-    for mark, part in _parts(rows, marks):
-        figures = _measured(mark.name or "", mark.time - began, part)
+    for mark, part in _flown_maneuvers(rows, marks):
+        figures = _figures_of(mark.name or "", mark.time - began, part)
         measured.append(replace(figures, swing=_swing(figures, rates, part[0, 0], part[-1, 0])))
     return tuple(measured)
 
@@ -110,8 +110,8 @@ def settled_parts(rows: Floats, marks: Sequence[ManeuverMark]) -> list[Floats]:
         rows: (N, 7), rows of `FlightTrace.tracking`.
         marks: marks of `FlightTrace.maneuvers`.
     """
-    parts = [part for _, part in _parts(rows, marks) if not _is_open_loop(part)]
-    return [part[part[:, 0] >= part[0, 0] + _beginning(part)] for part in parts]
+    parts = [part for _, part in _flown_maneuvers(rows, marks) if not _is_open_loop(part)]
+    return [part[part[:, 0] >= part[0, 0] + _left_out_time(part)] for part in parts]
 
 
 def in_maneuvers(vehicle_times: Floats, marks: Sequence[ManeuverMark]) -> NDArray[np.bool_]:
@@ -122,7 +122,9 @@ def in_maneuvers(vehicle_times: Floats, marks: Sequence[ManeuverMark]) -> NDArra
     return np.asarray(inside & ~np.isnan(vehicle_times))
 
 
-def _parts(rows: Floats, marks: Sequence[ManeuverMark]) -> Iterator[tuple[ManeuverMark, Floats]]:
+def _flown_maneuvers(
+    rows: Floats, marks: Sequence[ManeuverMark]
+) -> Iterator[tuple[ManeuverMark, Floats]]:
     """Each maneuver that was flown, with its rows."""
     ends = [*(mark.vehicle_time for mark in marks[1:]), inf]
     for mark, end in zip(marks, ends, strict=False):  # without marks, `ends` still has one entry
@@ -135,7 +137,7 @@ def _is_open_loop(rows: Floats) -> bool:
     return bool(np.isnan(rows[:, 1]).any())
 
 
-def _beginning(rows: Floats) -> float:
+def _left_out_time(rows: Floats) -> float:
     """Time that is left out at the beginning of a maneuver, s."""
     if _is_open_loop(rows):
         return 0.0
@@ -152,10 +154,10 @@ def _swing(figures: ManeuverFigures, rates: Floats, begin: float, end: float) ->
     return measure_swing(part[:, 0], part[:, 1:], at_rest=figures.speed <= _AT_REST)
 
 
-def _measured(name: str, begin: float, rows: Floats) -> ManeuverFigures:
+def _figures_of(name: str, begin: float, rows: Floats) -> ManeuverFigures:
     time, reference, position = rows[:, 0], rows[:, 1:4], rows[:, 4:7]
     duration = float(time[-1] - time[0])
-    open_loop, beginning = _is_open_loop(rows), _beginning(rows)
+    open_loop, beginning = _is_open_loop(rows), _left_out_time(rows)
     early = time < time[0] + beginning
     error = position - reference
     level, height = np.hypot(error[:, 0], error[:, 1]), -error[:, 2]
@@ -175,11 +177,11 @@ def _measured(name: str, begin: float, rows: Floats) -> ManeuverFigures:
         height_mean=float(held_late.mean()) if len(held_late) else nan,
         beginning_max=largest(np.hypot(level, height)[early & held]),
         drift=float(np.hypot(away[:, 0], away[:, 1]).max()),
-        speed=_speed(time, reference),
+        speed=_largest_speed(time, reference),
     )
 
 
-def _speed(time: Floats, reference: Floats) -> float:
+def _largest_speed(time: Floats, reference: Floats) -> float:
     """The largest speed of the reference (95th percentile), m/s; NaN without a reference."""
     spans = np.diff(time)
     steps = np.linalg.norm(np.diff(reference, axis=0), axis=1)

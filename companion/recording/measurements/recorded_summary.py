@@ -68,13 +68,13 @@ def _summary_from_record(record: FlightRecord) -> Summary:
     reason = f"the record ends {record.duration:.1f} s after the flight began, before it was over"
     phase = record.phases[-1].name if record.phases else "connect"
     resources, thrust = record.rows("resources"), record.rows("thrust")
-    takeoff = _takeoff(record)
+    takeoff = _takeoff_time(record)
     return Summary(
         result=reason,
         phase=phase,
         planner=flight.get("planner", ""),
         gain=float(flight.get("gain_per_s", "0")),
-        counts=_counts(record, float(flight.get("deadline_s", "0.004"))),
+        counts=_loop_counts(record, float(flight.get("deadline_s", "0.004"))),
         link={
             name: int(resources[column][-1]) if len(resources) else 0
             for name, column in (("frames", "frames"), ("lost", "frames_lost"), ("sent", "sent"))
@@ -103,10 +103,10 @@ def trace_of(record: FlightRecord) -> FlightTrace:
         RecordError: the record is not valid.
     """
     with as_recorded(record.folder):
-        return _trace(record)
+        return _flight_trace(record)
 
 
-def _trace(record: FlightRecord) -> FlightTrace:
+def _flight_trace(record: FlightRecord) -> FlightTrace:
     trace = FlightTrace()
     sample, setpoint, guidance = map(record.rows, ("sample", "setpoint", "guidance"))
     sample = sample[sample["unanswered"] == 0]
@@ -153,7 +153,7 @@ def _sample_indices(
     return np.where(samples[at] == setpoints, at, -1)
 
 
-def _counts(record: FlightRecord, deadline: float) -> LoopCounts:
+def _loop_counts(record: FlightRecord, deadline: float) -> LoopCounts:
     sample, setpoint = record.rows("sample"), record.rows("setpoint")
     taken = sample[sample["unanswered"] != REASONS.index("control_off")]
     found = np.bincount(taken["unanswered"], minlength=len(REASONS)).tolist()
@@ -180,7 +180,7 @@ def _early_end(record: FlightRecord, phase: str, takeoff: float | None) -> Early
     return EarlyEnd(end, since, phase, latest.name, end + record.began - latest.time)
 
 
-def _takeoff(record: FlightRecord) -> float | None:
+def _takeoff_time(record: FlightRecord) -> float | None:
     """See `Course.takeoff`; a vehicle that is taken over in the air has no phase of take-off."""
     read = record.rows("guidance_input")
     flying = ("takeoff", "offboard")

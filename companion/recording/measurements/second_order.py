@@ -62,9 +62,9 @@ class StepRun(NamedTuple):
 
     def steps(self) -> list["StepRun"]:
         """The single steps: each from one change of the target to the next."""
-        return [StepRun(*parts) for parts in zip(*self._split(), strict=True)]
+        return [StepRun(*parts) for parts in zip(*self._by_target(), strict=True)]
 
-    def _split(self) -> list[list[Floats]]:
+    def _by_target(self) -> list[list[Floats]]:
         changes = np.flatnonzero(np.any(np.diff(self.target, axis=0), axis=1)) + 1
         return [np.split(column, changes) for column in self]
 
@@ -185,7 +185,7 @@ def nearest_second_order(runs: list[StepRun]) -> SecondOrderFit:
     measured = np.concatenate([run.measured[::thinning] for run in runs])
 
     def residuals(unknown: Floats) -> tuple[Floats, Floats]:
-        fit = _fit(unknown)
+        fit = _second_order_fit(unknown)
         paths = np.concatenate([fit.along(data) for data in thinned])
         return np.empty(0), (measured - paths).ravel()
 
@@ -197,10 +197,10 @@ def nearest_second_order(runs: list[StepRun]) -> SecondOrderFit:
     ]
     start = min(grid, key=lambda point: float(np.sum(residuals(point)[1] ** 2)))
     lowest, highest = np.array([np.log(_LAG), np.log(_DAMPING), _DEAD_TIME]).T
-    return _fit(minimise(residuals, start, lowest, highest).unknown)
+    return _second_order_fit(minimise(residuals, start, lowest, highest).unknown)
 
 
-def _fit(unknown: Floats) -> SecondOrderFit:
+def _second_order_fit(unknown: Floats) -> SecondOrderFit:
     """The model from (log 2ζ/ω, log ζ, dead time), which are less correlated than ω and ζ."""
     damping = exp(unknown[1])
     return SecondOrderFit(2.0 * damping / exp(unknown[0]), damping, float(unknown[2]))

@@ -201,12 +201,12 @@ class EventReader:
             self._failing.add(number)
             known = self._failed_before | _SETPOINT_CHECK_IDS
             if number not in known and severity <= _WARNING_SEVERITY:
-                self._report(severity, number, _CHECKS_BY_ID.get(number))
+                self._add_text(severity, number, _CHECKS_BY_ID.get(number))
         elif severity < _PROGRAMS_ONLY_SEVERITY:
             words = _WORDS_BY_ID.get(number)
-            self._report(severity, number, words and _filled_in(words, arguments))
+            self._add_text(severity, number, words and _filled_in(words, arguments))
 
-    def _report(self, severity: int, number: int, words: str | None) -> None:
+    def _add_text(self, severity: int, number: int, words: str | None) -> None:
         if words is not None:
             self._texts.take_event(severity, words, self._clock())
         elif number not in self._unknown:

@@ -50,7 +50,7 @@ def _attitude_rate(value: float, _: Values, settings: CompanionSettings) -> Prob
     )
 
 
-def _termination(value: float, values: Values, settings: CompanionSettings) -> Problem | None:
+def _termination_tilt(value: float, values: Values, settings: CompanionSettings) -> Problem | None:
     """Check that the largest tilt of a flight cannot trigger flight termination."""
     if value == _TERMINATION_OFF:
         return None
@@ -235,7 +235,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
         ("CBRK_FLIGHTTERM",),
         "whether the failure detector stops motors",
-        _termination,
+        _termination_tilt,
         _REFERENCE,
         universal=True,
         reboot=True,
