@@ -33,35 +33,34 @@ def slowing(before: Trajectory, slow_down: SlowDown, reserve: float) -> tuple[st
         return ()
     after = slow_down.trajectory
     result = (
-        f"it lasts {after.duration:.1f} s instead of {before.duration:.1f} s, at most "
-        f"{_fastest(after):.2f} m/s instead of {_fastest(before):.2f} m/s"
+        f"{before.name} now lasts {after.duration:.1f} s instead of {before.duration:.1f} s, and "
+        f"its highest speed is {_fastest(after):.2f} m/s instead of {_fastest(before):.2f} m/s"
     )
     if slow_down.even:
         (whole,) = slow_down.parts
         note = (
             f"{before.name} is slowed down evenly, by a factor of {whole.factor:.2f}, because "
-            f"{slow_down.reason}; "
-            f"{_tightest_limit(after, whole, reserve)}"
+            f"{slow_down.reason}; its tightest limit is {_tightest_limit(after, whole, reserve)}"
         )
-        return (f"{note}; {result}",)
+        return note, result
     parts = "; ".join(
         f"from {part.begin:.1f} to {part.end:.1f} s by a factor of up to {part.factor:.2f}, "
-        f"{_tightest_limit(after, part, reserve)}"
+        f"because of {_tightest_limit(after, part, reserve)}"
         for part in slow_down.parts[:_MOST_PARTS_SHOWN]
     )
     more_count = len(slow_down.parts) - _MOST_PARTS_SHOWN
-    parts += f"; and {more_count} more" if more_count > 0 else ""
-    return (f"{before.name} is slowed down where limits ask for it: {parts}", result)
+    parts += f"; and in {more_count} more parts" if more_count > 0 else ""
+    return f"{before.name} is slowed down to keep its limits: {parts}", result
 
 
 def _tightest_limit(trajectory: Trajectory, part: SlowedPart, reserve: float) -> str:
     north, east, down = trajectory.at(part.time).position
-    less = ""
+    kept_back = ""
     if reserve and part.limit == TILT_LIMIT:
-        less = f" less flight.slow_down_reserve_m_s2 = {reserve:g}"
+        kept_back = f" (less flight.slow_down_reserve_m_s2: {reserve:g})"
     return (
-        f"the tightest limit: {part.limit}{less} at {part.time:.1f} s ({north:.1f} m north, "
-        f"{east:.1f} m east, {0.0 - down:.1f} m up)"
+        f"{part.limit or 'a limit'}{kept_back} at {part.time:.1f} s "
+        f"({north:.1f} m north, {east:.1f} m east, {0.0 - down:.1f} m up)"
     )
 
 

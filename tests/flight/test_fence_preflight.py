@@ -67,7 +67,7 @@ def test_a_line_that_ends_inside_but_could_not_stop_there_is_refused(tmp_path):
     assert "fly it more slowly (--slow-down" in told
     slow = merged(following(tmp_path, LINE), {"flight": {"slow_down": True}})
     (part,) = configured_maneuvers(config_of(slow, limits={"fence_radius_m": 8.01})).parts
-    assert any("tightest limit: limits.fence_radius_m" in note for note in part.notes)
+    assert any("because of limits.fence_radius_m at" in note for note in part.notes)
     (quick,) = configured_maneuvers(config_of(slow, limits={"fence_radius_m": 30.0})).parts
     assert part.duration > 1.02 * quick.duration
 

@@ -114,7 +114,7 @@ def test_what_the_limits_do_not_allow_is_refused_or_slowed_down():
         summary = fly(mock, **merged(slow, {"flight": {"slow_down": True}}))
     assert summary.result == "ok", summary.events
     assert summary.tracking()["position_rms_m"] <= 0.06
-    assert any("is slowed down where limits ask for it" in text for _, text in summary.events)
+    assert any("is slowed down to keep its limits" in text for _, text in summary.events)
 
 
 @pytest.mark.parametrize("heading", [0.0, 2.0, -3.0])

@@ -158,22 +158,22 @@ def test_two_corners_are_slowed_down_and_the_legs_are_not():
     for t in as_before:
         assert found.trajectory.law.at(t).first > 0.97
     notes = slowing(ANGULAR, found, 0.5)
-    assert notes[0].startswith("angular is slowed down where limits ask for it: from ")
-    assert "tightest limit: limits.max_tilt_rate_deg_s at" in notes[0]  # without the reserve
-    assert f"instead of {ANGULAR.duration:.1f} s, at most" in notes[1]
+    assert notes[0].startswith("angular is slowed down to keep its limits: from ")
+    assert ", because of limits.max_tilt_rate_deg_s at" in notes[0]  # without the reserve
+    assert f"instead of {ANGULAR.duration:.1f} s, and its highest speed is" in notes[1]
     assert f"{found.trajectory.duration:.1f} s, at most" in overview(found.trajectory)
 
 
 @pytest.mark.parametrize(
     ("reserve", "limit"),
     [
-        (0.5, "limits.max_tilt_deg less flight.slow_down_reserve_m_s2 = 0.5 at"),
+        (0.5, "limits.max_tilt_deg (less flight.slow_down_reserve_m_s2: 0.5) at"),
         (0.0, "limits.max_tilt_deg at"),
     ],
 )
 def test_a_part_that_the_tilt_limit_slows_names_the_reserve_below_it(reserve, limit):
     found = slow_down(EIGHT, Envelope(max_tilt=radians(2.0)))
-    assert f"the tightest limit: {limit}" in slowing(EIGHT, found, reserve)[0]
+    assert f", because of {limit}" in slowing(EIGHT, found, reserve)[0]
 
 
 @pytest.mark.parametrize(
@@ -214,8 +214,8 @@ def test_what_is_too_long_is_slowed_evenly_and_says_so():
     found = slow_down(laps, ENVELOPE)
     assert found.even
     assert violations(found.trajectory, ENVELOPE) == ()
-    (note,) = slowing(laps, found, 0.5)
-    assert "because it is too long to be slowed down in parts; the tightest limit: limits." in note
+    note, _ = slowing(laps, found, 0.5)
+    assert "it is too long to be slowed down in parts; its tightest limit is limits." in note
 
 
 def test_an_even_slowing_names_the_limit_that_asks_for_most():
