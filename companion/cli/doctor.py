@@ -123,7 +123,7 @@ class _DoctorRun:
         self.result: dict[str, Any] = {}
 
     async def run_checks(self, wait: float, *, fix: bool, without_asking: bool) -> int:
-        """Run the checks and report; with `fix`, set parameters and repeat. Return the exit code."""
+        """Run the checks and report; with `fix`, set parameters and repeat. Return exit code."""
         config = self._config
         async with open_session(config, self._make_link) as vehicle:
             self.say(f"Asking the vehicle on {config.link.endpoint} …")

@@ -26,7 +26,7 @@ _DEFAULT_HANDLERS: dict[signal.Signals, Handler] = {
 
 
 def unhandled() -> list[signal.Signals]:
-    """The signals that still have their default handler; with `nohup`, SIGHUP is ignored instead."""
+    """The signals that still have their default handler; with `nohup`, SIGHUP is ignored."""
     return [
         number
         for number, handler in _DEFAULT_HANDLERS.items()
