@@ -157,17 +157,19 @@ def _thrust_contradictions(config: Config) -> list[tuple[bool, str]]:
     """Like `_contradictions`: whether thrust can hold the height at the largest tilt."""
     limits, thrust = config.limits, config.thrust
     curve = ThrustCurve(thrust.curve_factor)
-    hover_thrust = curve.share(thrust.hover_thrust)
+    hover_share = curve.share(thrust.hover_thrust)
     # An autopilot that compensates the tilt may use the full thrust.
-    most_thrust = 1.0 if thrust.autopilot_compensates_tilt else curve.share(limits.max_thrust)
-    tilt = degrees(largest_tilt(hover_thrust, most_thrust))
-    needed = hover_thrust / cos(limits.max_tilt) / TILT_THRUST_SHARE
+    most_share = 1.0 if thrust.autopilot_compensates_tilt else curve.share(limits.max_thrust)
+    tilt = degrees(largest_tilt(hover_share, most_share))
+    needed_share = hover_share / cos(limits.max_tilt) / TILT_THRUST_SHARE
     remedy = f"lower limits.max_tilt_deg to {max(1, floor(tilt))}"
-    if needed <= 1.0 and not thrust.autopilot_compensates_tilt:
-        remedy += f" or raise limits.max_thrust to {ceil(100.0 * curve.signal(needed)) / 100.0:.2f}"
+    if needed_share <= 1.0 and not thrust.autopilot_compensates_tilt:
+        remedy += (
+            f" or raise limits.max_thrust to {ceil(100.0 * curve.signal(needed_share)) / 100.0:.2f}"
+        )
     return [
         (
-            hover_thrust < most_thrust and tilt < limits.max_tilt_deg,
+            hover_share < most_share and tilt < limits.max_tilt_deg,
             f"limits.max_tilt_deg {limits.max_tilt_deg:g} does not fit limits.max_thrust "
             f"{limits.max_thrust:g}: with thrust.hover_thrust {thrust.hover_thrust:g} the "
             f"vehicle holds its height only up to {tilt:.0f}°; {remedy}",
