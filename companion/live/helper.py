@@ -194,7 +194,7 @@ def _helper_name(tasks: HelperTasks) -> str:
 def _start_process(
     sockets: tuple[socket.socket | None, ...], folder: Path | None
 ) -> "subprocess.Popen[bytes]":
-    """Start the process. It survives Ctrl-C, and the flight while page or stream is open."""
+    """Start the process. It survives Ctrl-C, and outlives the flight if page or stream is open."""
     descriptors = [-1 if each is None else each.fileno() for each in sockets]
     command = [sys.executable, "-m", "companion.live.helper_process", *map(str, descriptors)]
     log = Path("/dev/null") if folder is None else folder / "live.log"

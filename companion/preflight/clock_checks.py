@@ -13,7 +13,9 @@ from companion.vehicle.parameter_rules import CheckResult
 SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 
 _UNSAFE_NOT_NEWER_SHARE = 0.2
+"""Largest share of samples stamped no later than the one before that is not unsafe."""
 _MIN_SAMPLES = 10
+"""Smallest number of samples to judge the rate of the clock."""
 _SHAKING_PRODUCT, _MAYBE_SHAKING_PRODUCT = 0.3, 0.15
 """Products of planner.gain_per_s and the round trip, from mock vehicles. Above the first, attitude
 oscillates at the limit of the roll-pitch rate; above the second, a slow vehicle may oscillate.

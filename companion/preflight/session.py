@@ -28,6 +28,7 @@ from companion.vehicle.streams import StreamRate
 _LISTENING_TIME = 3.0
 """Time for listening, s; enough to count messages at 2 Hz."""
 _POLL_PERIOD = 0.05
+"""Period of the checks for readiness, s."""
 _WARNING_SEVERITY = 4
 """MAV_SEVERITY of a warning; a lower number is worse."""
 _RELEASE_SUFFIXES = {0: "-dev", 64: "-alpha", 128: "-beta", 192: "-rc", 255: ""}
