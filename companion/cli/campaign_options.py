@@ -13,11 +13,11 @@ _SUB_COMMANDS = (_RUN, "report", "rerun", "tune", "-h", "--help")
 def with_campaign_command(arguments: Sequence[str]) -> list[str]:
     """The arguments, with `campaign FILE` expanded to `campaign run FILE`."""
     words = list(arguments)
-    place = next((n for n, word in enumerate(words) if not word.startswith("-")), len(words))
-    if words[place : place + 1] == [_CAMPAIGN] and not (
-        words[place + 1 : place + 2] and words[place + 1] in _SUB_COMMANDS
+    position = next((n for n, word in enumerate(words) if not word.startswith("-")), len(words))
+    if words[position : position + 1] == [_CAMPAIGN] and not (
+        words[position + 1 : position + 2] and words[position + 1] in _SUB_COMMANDS
     ):
-        words.insert(place + 1, _RUN)
+        words.insert(position + 1, _RUN)
     return words
 
 
@@ -62,13 +62,13 @@ def _add_run(kinds: Commands) -> None:
 
 def add_cluster_options(command: argparse.ArgumentParser) -> None:
     """Add `--scheduler` and `--workers`."""
-    where = command.add_mutually_exclusive_group()
-    where.add_argument(
+    cluster_or_workers = command.add_mutually_exclusive_group()
+    cluster_or_workers.add_argument(
         "--scheduler",
         metavar="ADDRESS",
         help="run on this Dask cluster, such as tcp://10.0.0.1:8786",
     )
-    where.add_argument(
+    cluster_or_workers.add_argument(
         "--workers",
         type=whole_number(1, 1024),
         metavar="NUMBER",

@@ -1,4 +1,4 @@
-"""The options of the command line. It imports no command, so that `--help` answers at once."""
+"""The options of the command line. No command is imported, so that `--help` answers at once."""
 
 import argparse
 import sys
@@ -114,13 +114,13 @@ def _add_doctor(commands: Commands) -> None:
         metavar="SECONDS",
         help="longest wait until the vehicle is ready (10)",
     )
-    what = command.add_mutually_exclusive_group()
-    what.add_argument(
+    fix_or_undo = command.add_mutually_exclusive_group()
+    fix_or_undo.add_argument(
         "--fix",
         action="store_true",
         help="write an undo file, then set the proposed parameters, asking before each",
     )
-    what.add_argument(
+    fix_or_undo.add_argument(
         "--undo", type=Path, metavar="FILE", help="only restore the parameters in an undo file"
     )
     command.add_argument("--yes", action="store_true", help="with --fix: set all without asking")
@@ -137,11 +137,11 @@ def _add_identify(commands: Commands) -> None:
         "it as a YAML file for the configuration to include. An axis with a bad fit keeps the "
         "values of the flight's configuration.",
     )
-    which = command.add_mutually_exclusive_group(required=True)
-    which.add_argument(
+    flight_source = command.add_mutually_exclusive_group(required=True)
+    flight_source.add_argument(
         "--config", type=Path, metavar="FILE", help="fly the vehicle of this configuration"
     )
-    which.add_argument(
+    flight_source.add_argument(
         "--bundled",
         type=Path,
         metavar="FILE",
@@ -149,7 +149,7 @@ def _add_identify(commands: Commands) -> None:
         const=Path(),  # the configuration that ships
         help="start and fly the bundled vehicle (default: the shipped mock-px4.yaml)",
     )
-    which.add_argument(
+    flight_source.add_argument(
         "--log",
         type=Path,
         metavar="PATH",

@@ -31,38 +31,38 @@ def show(options: argparse.Namespace) -> int:
         text = as_yaml(changes) if changes else f"# {options.diff} changes no default\n"
     else:
         config = load(options.file) if options.file else Config()
-        text = as_yaml(_found(config, options.get) if options.get else keys(config))
+        text = as_yaml(_named_keys(config, options.get) if options.get else keys(config))
     sys.stdout.write(text)
     return EXIT_OK
 
 
-def _found(config: Config, name: str) -> list[ConfigKey]:
+def _named_keys(config: Config, name: str) -> list[ConfigKey]:
     """The key with that name, or all keys of a section.
 
     Raises:
         ConfigError: there is no such key.
     """
     known = list(keys(config))
-    found = [key for key in known if name in (key.section, f"{key.section}.{key.name}")]
-    if not found:
-        near = _near(known, name)
+    matching = [key for key in known if name in (key.section, f"{key.section}.{key.name}")]
+    if not matching:
+        near = _suggestions(known, name)
         hint = f"did you mean {', '.join(near)}?" if near else "`companion config` prints them all"
         raise ConfigError(f"--get: there is no key `{name}`; {hint}")
-    return found
+    return matching
 
 
-def _near(known: list[ConfigKey], name: str) -> list[str]:
-    """The keys whose names contain a mistyped one, else the nearest section or keys."""
+def _suggestions(known: list[ConfigKey], name: str) -> list[str]:
+    """The keys whose names contain a mistyped name, else the most similar section or keys."""
     dotted = {f"{key.section}.{key.name}": key for key in known}
     containing = [each for each, key in dotted.items() if name in key.name]
     if containing:
         return containing
-    meant: dict[str, list[str]] = {key.section: [key.section] for key in known}
+    candidates: dict[str, list[str]] = {key.section: [key.section] for key in known}
     for each, key in dotted.items():
-        meant[each] = [each]
-        meant.setdefault(key.name, []).append(each)  # several sections may have such a key
-    nearest = difflib.get_close_matches(name, meant, n=1)
-    return meant[nearest[0]] if nearest else []
+        candidates[each] = [each]
+        candidates.setdefault(key.name, []).append(each)  # several sections may have such a key
+    nearest = difflib.get_close_matches(name, candidates, n=1)
+    return candidates[nearest[0]] if nearest else []
 
 
 def init(options: argparse.Namespace) -> int:

@@ -62,7 +62,9 @@ def doctor(options: argparse.Namespace) -> int:
     doctor_run = _DoctorRun(config, Console(stderr=options.json, highlight=False, markup=False))
     try:
         if undo is None:
-            code = run(doctor_run.run_checks(options.wait, fix=options.fix, unasked=options.yes))
+            code = run(
+                doctor_run.run_checks(options.wait, fix=options.fix, without_asking=options.yes)
+            )
         else:
             code = run(doctor_run.restore(undo, options.undo))
     except KeyboardInterrupt:
@@ -92,7 +94,7 @@ def _with_options(config: Config, options: argparse.Namespace) -> Config:
 
 
 def _maneuvers(config: Config, drag: KnownDrag) -> tuple[ManeuverSequence | None, list[Finding]]:
-    """The maneuvers to be flown by this vehicle, or the reason why they cannot be."""
+    """The maneuvers of the flight; or None, and the finding why this vehicle cannot fly them."""
     try:
         return configured_maneuvers(config, drag), []
     except ConfigError as error:
@@ -120,10 +122,10 @@ class _DoctorRun:
         self._outcomes: list[Outcome] = []
         self.result: dict[str, Any] = {}
 
-    async def run_checks(self, wait: float, *, fix: bool, unasked: bool) -> int:
-        """Run the checks, report, and fix what was asked; the final findings give the exit code."""
+    async def run_checks(self, wait: float, *, fix: bool, without_asking: bool) -> int:
+        """Run the checks and report; with `fix`, set parameters and repeat. Return exit code."""
         config = self._config
-        async with open_session(config, self._link) as vehicle:
+        async with open_session(config, self._make_link) as vehicle:
             self.say(f"Asking the vehicle on {config.link.endpoint} …")
             findings = await vehicle.wait_for_vehicle()
             if findings:
@@ -138,15 +140,15 @@ class _DoctorRun:
             findings = [*refusals, *run_checks(config, evidence), *_response(config)]
             code = self._report(findings)
             if fix:
-                code = await self._fix(vehicle, evidence, findings, unasked=unasked)
+                code = await self._fix(vehicle, evidence, findings, without_asking=without_asking)
         return code
 
-    def _link(self, notice: Notice) -> Link:
+    def _make_link(self, notice: Notice) -> Link:
         return open_link(self._config, None, notice)
 
     async def restore(self, undo: Undo, path: Path) -> int:
         """Restore the parameters that an undo file lists."""
-        async with open_session(self._config, self._link) as vehicle:
+        async with open_session(self._config, self._make_link) as vehicle:
             findings = await vehicle.wait_for_vehicle()
             if findings:
                 return self._report(findings)
@@ -167,7 +169,7 @@ class _DoctorRun:
         evidence: Evidence,
         findings: list[Finding],
         *,
-        unasked: bool,
+        without_asking: bool,
     ) -> int:
         link, config = vehicle.link, self._config
         proposed = [finding for finding in findings if finding.change is not None]
@@ -180,7 +182,9 @@ class _DoctorRun:
         require_disarmed(link)
         undo = UndoFile(config.recording.directory, link, evidence.identity)
         try:
-            await apply_fixes(link, proposed, _agree if unasked else self._ask, undo, self._note)
+            await apply_fixes(
+                link, proposed, _accept_all if without_asking else self._ask, undo, self._note
+            )
         finally:
             if undo.path.exists():
                 self.say(f"Undo with: companion doctor --config FILE --undo {undo.path}")
@@ -222,5 +226,5 @@ class _DoctorRun:
         self._console.print(text, soft_wrap=True)
 
 
-async def _agree(_: Finding) -> Answer:
+async def _accept_all(_: Finding) -> Answer:
     return Answer.ALL

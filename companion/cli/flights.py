@@ -15,16 +15,16 @@ from companion.report import PAGE
 
 def fly(options: argparse.Namespace) -> int:
     """Fly the vehicle that the configuration names."""
-    read = load(options.config)
-    config = flying.with_options(read, options)
+    config_as_read = load(options.config)
+    config = flying.with_options(config_as_read, options)
     folder = flight_folder(config.recording.directory)
     invocation = flying.invocation(options)
     console = _console(options)
     with helper_process(
-        options, config, options.config, read, folder, console, follows=True
+        options, config, options.config, config_as_read, folder, console, follows=True
     ) as helper:
         summary = flying.fly(config, folder, console, invocation, helper)
-    return _ended(summary, options)
+    return _report_result(summary, options)
 
 
 def demo(options: argparse.Namespace) -> int:
@@ -34,14 +34,15 @@ def demo(options: argparse.Namespace) -> int:
     summary = flying.fly_bundled(path, options, console, invocation=invocation)
     if options.open and summary.log is not None and (page := summary.log / PAGE).is_file():
         webbrowser.open(page.resolve().as_uri())
-    return _ended(summary, options)
+    return _report_result(summary, options)
 
 
 def _console(options: argparse.Namespace) -> FlightConsole:
     return FlightConsole(stderr=options.json, highlight=False)
 
 
-def _ended(summary: Summary, options: argparse.Namespace) -> int:
+def _report_result(summary: Summary, options: argparse.Namespace) -> int:
+    """Print the summary for `--json`; return the exit code."""
     if options.json:
         print(summary.as_json())
     return EXIT_OK if summary.result == "ok" else EXIT_FLIGHT

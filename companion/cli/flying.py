@@ -127,7 +127,7 @@ def fly(
 
 
 def page_about(folder: Path) -> str:
-    """Write the page about a flight; return a sentence with its place or why there is none."""
+    """Write the page about a flight; return a sentence that says where it is, or why it failed."""
     from companion.report.page import write_report  # noqa: PLC0415  after the flight only
 
     try:
@@ -159,7 +159,7 @@ def fly_bundled(
         VehicleStoppedError: the vehicle ended before the flight did.
     """
     path = path or demo.default_config()
-    config = read = load(path)
+    config = config_as_read = load(path)
     with demo.wire_like(config.link.endpoint) as wire:
         options.endpoint, options.arm = wire.endpoint, True
         config = with_options(config, options, planner)
@@ -167,7 +167,9 @@ def fly_bundled(
         folder = flight_folder(config.recording.directory)
         in_lockstep = config.link.lockstep
         with (
-            helper_process(options, config, path, read, folder, console, follows=True) as helper,
+            helper_process(
+                options, config, path, config_as_read, folder, console, follows=True
+            ) as helper,
             demo.bundled_vehicle(path, wire, folder / "mock.log", lockstep=in_lockstep),
         ):
             return fly(config, folder, console, invocation, helper)

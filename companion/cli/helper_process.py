@@ -29,7 +29,7 @@ def helper_process(
     """Run the helper process that the options ask for, if any, while the block runs.
 
     Args:
-        options: options of the command line; `watch`, `live` and `foxglove` count.
+        options: options of the command line: `watch`, `live` and `foxglove`.
         config: configuration of the flight.
         path: file of the configuration, which `--watch` watches.
         config_as_read: the configuration as it was read from this file.
@@ -51,7 +51,7 @@ def helper_process(
         require("foxglove", "foxglove", "--foxglove")
     if options.live is not None:
         page = open_page_socket(options.live)
-    if options.foxglove is not None:  # after the page, which may have the same port
+    if options.foxglove is not None:  # after the page, so that a port given to both is refused
         stream = stream_address(options.foxglove)
     for each in (page, stream):
         if each is not None:
@@ -69,7 +69,7 @@ def helper_process(
 
 
 def environment(helper: Helper | None) -> Environment:
-    """What a flight gets from this computer, with the live stream of the helper process."""
+    """The `Environment` of a flight: this computer, and the live stream of the helper process."""
     if helper is None or helper.feed is None:
         return THIS_COMPUTER
     return replace(THIS_COMPUTER, stream=helper.feed.send)

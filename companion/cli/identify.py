@@ -80,14 +80,14 @@ def _fly_doublets(options: argparse.Namespace, console: FlightConsole) -> Summar
 
 
 def _fit(log: Path, out: Path, options: argparse.Namespace, console: FlightConsole) -> int:
-    """Fit the data of a log, show the fit, write it to `out` if it is usable; the exit code."""
+    """Fit the data of a log, show the fit, write it to `out` if usable; return the exit code."""
     with suppress(OSError):
         console.print("fitting…")
     rows = read_flight_log(log)
     vehicle = identify_vehicle(rows.setpoints, rows.rates, rows.specific_thrust)
-    known = _configured_axes(log)
+    configured_axes = _configured_axes(log)
     try:
-        text = vehicle_fragment(vehicle, GRAVITY, known, _flight_name(log))
+        text = vehicle_fragment(vehicle, GRAVITY, configured_axes, _flight_name(log))
     except BadFitError as error:
         with suppress(OSError):
             console.print(vehicle_table(vehicle, GRAVITY))
@@ -96,10 +96,10 @@ def _fit(log: Path, out: Path, options: argparse.Namespace, console: FlightConso
                 console.print(f"  {axis}: {reason}", soft_wrap=True)
         _print_json(options, {"result": str(error), "log": str(log), **_figures(vehicle)})
         return EXIT_FLIGHT
-    _write_fit(out, text, flown=None if options.log is not None else log.parent)
+    _write_fit(out, text, flown_folder=None if options.log is not None else log.parent)
     kept = {
         axis: f"kept from the configuration ({keys.described()}): {vehicle.axes[axis].reason()}"
-        for axis, keys in kept_axes(vehicle, known).items()
+        for axis, keys in kept_axes(vehicle, configured_axes).items()
     }
     with suppress(OSError):
         console.print(vehicle_table(vehicle, GRAVITY))
@@ -126,23 +126,23 @@ def _flight_name(log: Path) -> str:
     return name.encode("utf-8", "replace").decode("utf-8")[:_LONGEST_NAME]
 
 
-def _write_fit(out: Path, text: str, flown: Path | None) -> None:
+def _write_fit(out: Path, text: str, flown_folder: Path | None) -> None:
     """Write a file completely or not at all, because a flight may read it.
 
     Args:
         out: the file.
         text: its text.
-        flown: folder of the flight that was just flown; None: no flight was flown.
+        flown_folder: folder of the flight that was just flown; None: no flight was flown.
 
     Raises:
-        OSError: the file cannot be written; its text is a complete sentence.
+        OSError: the file cannot be written; the error is a complete sentence.
     """
     try:
         write_whole(out, text)
     except OSError as error:
         reason = f"{out}: cannot write the identified response: {error.strerror}"
-        if flown is not None:
-            reason += f"; the flight is recorded: run `{_fit_command(flown)} --out FILE`"
+        if flown_folder is not None:
+            reason += f"; the flight is recorded: run `{_fit_command(flown_folder)} --out FILE`"
         raise OSError(reason) from error
 
 
@@ -152,14 +152,14 @@ def _fit_command(folder: Path) -> str:
 
 
 def _how_to_include(out: Path, config: Path | None) -> str:
-    place = out.resolve()
+    include_path = out.resolve()
     if config is not None:
-        place = Path(os.path.relpath(place, config.resolve().parent))
+        include_path = Path(os.path.relpath(include_path, config.resolve().parent))
     return "\n".join(
         (
             f"Written to {out}. Add this line to your configuration, and remove `vehicle` and",
             "`thrust.hover_thrust` from it, because its keys override those of an included file:",
-            f"  include: {place}",
+            f"  include: {include_path}",
         )
     )
 

@@ -10,7 +10,7 @@ import signal
 
 from companion.cli.exit_codes import EXIT_FLIGHT
 
-TYPE_CHECKING = False  # as typing's, which is not worth its 5 ms at the start of each command
+TYPE_CHECKING = False  # type checkers take it for typing's, whose import would cost 5 ms
 if TYPE_CHECKING:
     from collections.abc import Callable
     from types import FrameType
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     Handler = Callable[[int, FrameType | None], Any] | int | None
 
-_DEFAULTS: dict[signal.Signals, Handler] = {
+_DEFAULT_HANDLERS: dict[signal.Signals, Handler] = {
     signal.SIGINT: signal.default_int_handler,
     signal.SIGTERM: signal.SIG_DFL,
     signal.SIGHUP: signal.SIG_DFL,
@@ -26,8 +26,12 @@ _DEFAULTS: dict[signal.Signals, Handler] = {
 
 
 def unhandled() -> list[signal.Signals]:
-    """The signals that nobody handles and nobody ignores, as `nohup` ignores SIGHUP."""
-    return [number for number, handler in _DEFAULTS.items() if signal.getsignal(number) is handler]
+    """The signals that still have their default handler; with `nohup`, SIGHUP is ignored."""
+    return [
+        number
+        for number, handler in _DEFAULT_HANDLERS.items()
+        if signal.getsignal(number) is handler
+    ]
 
 
 def leave_at_once(numbers: list[signal.Signals]) -> None:
@@ -42,17 +46,17 @@ def leave_at_once(numbers: list[signal.Signals]) -> None:
 def raise_interrupt(numbers: list[signal.Signals]) -> None:
     """Have these signals raise KeyboardInterrupt in the main thread.
 
-    The event loop of a flight drops all handlers when it is closed; call this again then.
+    Closing the event loop of a flight removes all handlers; call this again afterwards.
     """
     for number in numbers:
         # asyncio ends its tasks in good order only if SIGINT has Python's own handler
-        signal.signal(number, _DEFAULTS[number] if number == signal.SIGINT else _interrupt)
+        signal.signal(number, _DEFAULT_HANDLERS[number] if number == signal.SIGINT else _interrupt)
 
 
 def restore(numbers: list[signal.Signals]) -> None:
-    """Have these signals do again what they do in any Python program."""
+    """Give these signals the default handlers of a Python program again."""
     for number in numbers:
-        signal.signal(number, _DEFAULTS[number])
+        signal.signal(number, _DEFAULT_HANDLERS[number])
 
 
 def _leave(_number: int, _frame: FrameType | None) -> NoReturn:

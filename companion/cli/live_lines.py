@@ -10,7 +10,7 @@ from companion.files.ascii_text import ascii_for
 from companion.flight.status import FlightStatus
 
 _USUAL_WIDTH = 80
-"""Width of a terminal that does not report one, columns."""
+"""Width assumed for a terminal that does not report its own, columns."""
 _RED = "\x1b[1;31m{}\x1b[0m"
 
 
@@ -23,19 +23,21 @@ def can_redraw(file: IO[str]) -> bool:
 def status_lines(status: FlightStatus) -> list[str]:
     """The three lines: maneuver; motion of the vehicle; safety, setpoints and battery."""
     return [
-        f"{status.phase:<9} {status.time:.0f} s   {_doing(status)}",
+        f"{status.phase:<9} {status.time:.0f} s   {_activity(status)}",
         f"{'':<9} height {_number(status.height, '.1f', 'm')}   "
         f"speed {_number(status.speed, '.1f', 'm/s')}   "
         f"tilt {_number(None if status.tilt is None else degrees(status.tilt), '.0f', '°')}   "
         f"tracking error {_number(status.error, '.2f', 'm')}",
-        f"{'':<9} safety {_safety(status)}  {_loop(status)}  battery {_battery(status)}",
+        f"{'':<9} safety {_safety(status)}  {_setpoints(status)}  battery {_battery(status)}",
     ]
 
 
-def _doing(status: FlightStatus) -> str:
+def _activity(status: FlightStatus) -> str:
     if status.maneuver is not None:
-        known = "" if status.maneuver_duration is None else f" of {status.maneuver_duration:.0f}"
-        return f"{status.maneuver}, {status.maneuver_elapsed:.0f}{known} s"
+        of_duration = (
+            "" if status.maneuver_duration is None else f" of {status.maneuver_duration:.0f}"
+        )
+        return f"{status.maneuver}, {status.maneuver_elapsed:.0f}{of_duration} s"
     return f"{status.detail or 'working'} ({allowed_time(status.elapsed, status.timeout)})"
 
 
@@ -44,7 +46,7 @@ def allowed_time(elapsed: float, timeout: float) -> str:
     return f"{elapsed:.0f} s" if isinf(timeout) else f"{elapsed:.0f} of at most {timeout:.0f} s"
 
 
-def _loop(status: FlightStatus) -> str:
+def _setpoints(status: FlightStatus) -> str:
     rate = "no setpoints" if status.rate is None else f"{status.rate:.0f} Hz"
     if status.latency is None:
         return rate
@@ -85,7 +87,7 @@ class LiveLines:
     def __init__(self, file: IO[str]) -> None:
         self._file = file
         encoding = getattr(file, "encoding", None) or "ascii"
-        self._takes_all = codecs.lookup(encoding).name.startswith("utf")
+        self._is_unicode = codecs.lookup(encoding).name.startswith("utf")
         self._lines: list[str] = []
 
     def show(self, lines: Sequence[str], *, alarm: bool = False) -> None:
@@ -93,29 +95,29 @@ class LiveLines:
 
         Args:
             lines: the new lines, from top to bottom.
-            alarm: whether the last one is an alarm.
+            alarm: whether the last line shows an alarm.
         """
-        back, columns = self._back(), self._columns()
-        plain = lines if self._takes_all else [ascii_for(line) for line in lines]
+        go_back, columns = self._to_first_line(), self._columns()
+        plain = lines if self._is_unicode else [ascii_for(line) for line in lines]
         self._lines = [line[: columns - 1] for line in plain]
         drawn = list(self._lines)
         if alarm and drawn:
             drawn[-1] = _RED.format(drawn[-1])
-        self._write(back + "".join(f"{line}\x1b[K\n" for line in drawn) + "\x1b[J")
+        self._write(go_back + "".join(f"{line}\x1b[K\n" for line in drawn) + "\x1b[J")
 
     def above(self, text: str) -> None:
         """Write `text`, which consists of whole lines, above the status lines."""
         kept = "".join(f"{line}\n" for line in self._lines)
-        self._write(f"{self._back()}\x1b[J{text}{kept}")
+        self._write(f"{self._to_first_line()}\x1b[J{text}{kept}")
 
     def clear(self) -> None:
         """Remove the lines."""
         if self._lines:
-            self._write(f"{self._back()}\x1b[J")
+            self._write(f"{self._to_first_line()}\x1b[J")
             self._lines = []
 
-    def _back(self) -> str:
-        """Move to the beginning of the first line, even if a narrower terminal wrapped lines."""
+    def _to_first_line(self) -> str:
+        """Code that moves the cursor to the first line, even if a narrow terminal wrapped lines."""
         columns = self._columns()
         rows = sum(max(1, -(-len(line) // columns)) for line in self._lines)
         return f"\x1b[{rows}F" if rows else "\r"

@@ -12,7 +12,7 @@ import sys
 from companion.cli import interrupts
 from companion.cli.exit_codes import EXIT_FLIGHT
 
-TYPE_CHECKING = False  # as typing's, which is not worth its 5 ms here
+TYPE_CHECKING = False  # type checkers take it for typing's, whose import would cost 5 ms
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
@@ -23,25 +23,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Args:
         arguments: arguments of the command line; None: those of this process.
     """
-    ours = interrupts.unhandled()
-    interrupts.leave_at_once(ours)
+    our_signals = interrupts.unhandled()
+    interrupts.leave_at_once(our_signals)
     try:
         try:
-            run = _loaded(arguments)
+            run = _load_command(arguments)
         finally:
-            interrupts.raise_interrupt(ours)
+            interrupts.raise_interrupt(our_signals)
         return run()
     except KeyboardInterrupt:
         sys.stderr.write("companion: interrupted\n")
         return EXIT_FLIGHT
     finally:
-        interrupts.restore(ours)
-        if arguments is None and signal.SIGINT in ours:  # Ctrl-C may end the interpreter exit
+        interrupts.restore(our_signals)
+        if arguments is None and signal.SIGINT in our_signals:  # Ctrl-C may end Python's shutdown
             signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def _loaded(arguments: Sequence[str] | None) -> Callable[[], int]:
-    """Parse the arguments, and import the command they name."""
+def _load_command(arguments: Sequence[str] | None) -> Callable[[], int]:
+    """Parse the arguments and import their command; return a function that runs it."""
     # Our matrices are small: a second thread takes twice the CPU time and is slower.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from companion.cli.text_streams import lost_output, print_anything  # noqa: PLC0415
@@ -52,7 +52,7 @@ def _loaded(arguments: Sequence[str] | None) -> Callable[[], int]:
     try:
         options = parse(arguments)
     finally:
-        lost_output()  # help that is not read to its end is no error
+        lost_output()  # no error if nobody reads the help to its end
     from companion.cli.run import command_of, run  # noqa: PLC0415
 
     command = command_of(options)

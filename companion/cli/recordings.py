@@ -27,17 +27,17 @@ def report(options: argparse.Namespace) -> int:
     """Write the page about a flight."""
     from companion.report.page import write_report  # noqa: PLC0415  no other command needs it
 
-    return _write(lambda: write_report(options.flight, options.out))
+    return _write_page(lambda: write_report(options.flight, options.out))
 
 
 def compare(options: argparse.Namespace) -> int:
     """Write a page that compares flights."""
     from companion.report.page import write_comparison  # noqa: PLC0415  no other command needs it
 
-    return _write(lambda: write_comparison(options.flights, options.out))
+    return _write_page(lambda: write_comparison(options.flights, options.out))
 
 
-def _write(make: Callable[[], Path]) -> int:
+def _write_page(make: Callable[[], Path]) -> int:
     """Call `make`, and print the path of the page that it has written."""
     try:
         page = make()
@@ -70,15 +70,15 @@ def replay(options: argparse.Namespace) -> int:
     from companion.replay.report import words, write_csv  # noqa: PLC0415
 
     record = read_flight(options.folder)
-    own = options.config is None and not options.set
+    own_config = options.config is None and not options.set
     config = load(options.config or options.folder / "config.yaml")
     if options.set:
         config = changed(config, assigned(options.set), "--set")
-    flown = Replay(record, config)
-    samples = flown.run()
+    replayed = Replay(record, config)
+    samples = replayed.run()
     if not samples:
         raise ConfigError(f"{options.folder}: no attitude sample is recorded there to replay")
-    for line in words(samples, record.began, follows_record=flown.follows_record):
+    for line in words(samples, record.began, follows_record=replayed.follows_record):
         print(line)
     if options.csv is not None:
         try:
@@ -86,4 +86,4 @@ def replay(options: argparse.Namespace) -> int:
         except OSError as error:
             raise ConfigError(f"{options.csv}: cannot write it: {error.strerror}") from error
         print(options.csv)
-    return EXIT_OK if not own or all(each.same for each in samples) else EXIT_FLIGHT
+    return EXIT_OK if not own_config or all(each.same for each in samples) else EXIT_FLIGHT

@@ -50,38 +50,39 @@ def run(command: Command, options: argparse.Namespace) -> int:
         KeyboardInterrupt: Ctrl-C where no flight handles it.
     """
     code = EXIT_FLIGHT
-    fault: OSError | None = None
+    os_error: OSError | None = None
     try:
         code = command(options)
     except _USAGE_ERRORS as error:
-        _say(str(error))
+        _print_error(str(error))
         code = EXIT_USAGE
     except _FLIGHT_ERRORS as error:
-        _say(str(error))
+        _print_error(str(error))
     except BrokenPipeError:
         pass  # nobody reads our output any more, as after `| head`; a broken link is a LinkError
     except OSError as error:
-        fault = error
+        os_error = error
     except asyncio.CancelledError:
-        _say("interrupted before anything was sent")
+        _print_error("interrupted before anything was sent")
     except Exception as error:
         if options.debug:
             traceback.print_exc()
-        _say(f"internal error: {error!r}; run again with --debug for where it happened")
+        _print_error(f"internal error: {error!r}; run again with --debug for where it happened")
     lost = lost_output()
-    if fault is not None and (lost is None or fault.filename is not None):
-        _say(_in_words(fault))
+    # An error without a file may be that of standard output, which is reported below.
+    if os_error is not None and (lost is None or os_error.filename is not None):
+        _print_error(_os_error_text(os_error))
     if lost:
-        _say(f"standard output cannot be written: {lost}")
+        _print_error(f"standard output cannot be written: {lost}")
         return code or EXIT_FLIGHT
     return code
 
 
-def _in_words(error: OSError) -> str:
-    """What the operating system refused, with the file if it names one."""
+def _os_error_text(error: OSError) -> str:
+    """The reason that the system gives, after the name of the file if there is one."""
     reason = reason_of(error)
     return reason if error.filename is None else f"{error.filename}: {reason}"
 
 
-def _say(text: str) -> None:
+def _print_error(text: str) -> None:
     Console(stderr=True).print(f"companion: {text}", markup=False, highlight=False, soft_wrap=True)

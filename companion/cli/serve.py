@@ -22,23 +22,23 @@ from companion.mavlink import loop as link_loop
 from companion.serve.report_pages import ReportPages
 from companion.serve.session import ServeSession
 
-_PAGE_AFTER_STOP = 40.0
+_REPORT_TIMEOUT = 40.0
 """Time allowed after a stop for the report of a flight, s."""
 
 
 def serve(options: argparse.Namespace) -> int:
     """Relay between the vehicle and other programs, and fly the setpoints of those programs."""
-    read = load(options.config)
-    config = _with_options(read, options)
+    config_as_read = load(options.config)
+    config = _with_options(config_as_read, options)
     console = FlightConsole(stderr=options.json, highlight=False)
-    observer = _Events(console)
+    observer = _ServeObserver(console)
     began = time.monotonic()
 
     def note(text: str) -> None:
         observers.event(time.monotonic() - began, text)
 
     with helper_process(
-        options, config, options.config, read, None, console, follows=False
+        options, config, options.config, config_as_read, None, console, follows=False
     ) as helper:
         observers = observer if helper is None else SeveralObservers(observer, helper)
         session = ServeSession(
@@ -60,8 +60,8 @@ def serve(options: argparse.Namespace) -> int:
     return EXIT_OK
 
 
-class _Events(TerminalObserver):
-    """Shows phases and events, all on the clock of this command, which may see several flights.
+class _ServeObserver(TerminalObserver):
+    """Shows the phases and events of all flights; times count from the start of the command.
 
     There are no live lines: they would stay visible between flights.
     """
@@ -75,7 +75,7 @@ class _Events(TerminalObserver):
         super().event(time.monotonic() - self._began, text)
 
     def status(self, status: FlightStatus) -> None:
-        """Ignore it."""
+        """Do nothing: there are no live lines."""
 
 
 async def _until_stopped(session: ServeSession, pages: ReportPages) -> dict[str, Any]:
@@ -85,7 +85,7 @@ async def _until_stopped(session: ServeSession, pages: ReportPages) -> dict[str,
 
     def stop() -> None:
         session.stop()
-        loop.call_later(_PAGE_AFTER_STOP, pages.leave)
+        loop.call_later(_REPORT_TIMEOUT, pages.leave)
 
     def interrupt() -> None:
         nonlocal stopped_at

@@ -21,7 +21,7 @@ class SignalHandler:
     """Handles the signals that arrive while a session flies.
 
     A terminal that closes sends several: the shell and the kernel each send SIGHUP, and SIGTERM may
-    follow. So a repeated SIGHUP or SIGTERM changes nothing. Only Ctrl-C can end a hand-back.
+    follow. So a repeated SIGHUP or SIGTERM changes nothing. Only a second Ctrl-C ends a hand-back.
 
     Args:
         session: the session that flies.
@@ -59,8 +59,8 @@ class SignalHandler:
         elif self._ctrl_c_at - before >= SECOND_CTRL_C_AFTER:
             self._session.leave()
 
-    def _hand_back(self, name: str) -> None:
-        if not self._session.interrupt(f"interrupted by {name}") and not self._gave_up:
+    def _hand_back(self, cause: str) -> None:
+        if not self._session.interrupt(f"interrupted by {cause}") and not self._gave_up:
             self._gave_up = True  # only once: closing the link must not be interrupted
             self._give_up()
 
@@ -83,6 +83,6 @@ async def fly_interruptibly(session: Session) -> Summary:
 
 
 def hangup_signal() -> list[signal.Signals]:
-    """SIGHUP, unless whoever started this process ignores it, as `nohup` does."""
+    """SIGHUP in a list; empty if this process was started with SIGHUP ignored, as by `nohup`."""
     ignored = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     return [] if ignored else [signal.SIGHUP]

@@ -24,7 +24,7 @@ _QUEUE_LENGTH = 1000
 """Most lines queued for a stalled terminal; further lines are dropped."""
 
 _CLOSE_TIMEOUT = 2.0
-"""Longest wait at the end for room in a stalled terminal's queue, and then for its lines, s."""
+"""Time allowed at close for room in the queue, and again for printing the queued lines, s."""
 
 
 class _PrintThread:
@@ -35,10 +35,10 @@ class _PrintThread:
         self._thread = threading.Thread(target=self._print_lines, name="terminal", daemon=True)
         self._thread.start()
 
-    def say(self, line: Callable[[], None]) -> bool:
-        """Queue a line; return false if too many are waiting."""
+    def say(self, print_line: Callable[[], None]) -> bool:
+        """Queue a call that prints a line; return false if the queue is full."""
         try:
-            self._lines.put_nowait(line)
+            self._lines.put_nowait(print_line)
         except queue.Full:
             return False
         return True
@@ -53,12 +53,12 @@ class _PrintThread:
 
     def _print_lines(self) -> None:
         broken = False
-        while (line := self._lines.get()) is not None:
+        while (print_line := self._lines.get()) is not None:
             if broken:
                 continue
             try:
-                line()
-            except (OSError, ValueError):  # gone, or closed
+                print_line()
+            except (OSError, ValueError):  # the terminal is gone or closed
                 broken = True
 
 
@@ -96,19 +96,19 @@ class TerminalObserver:
         self._printer = _PrintThread()
         self._live = LiveLines(console.file) if can_redraw(console.file) else None
         self._newest: FlightStatus | None = None
-        self._queued = self._asking = False
-        self._drawn = -inf
-        self._said = 0.0
+        self._redraw_queued = self._asking = False
+        self._drawn_at = -inf
+        self._status_printed_at = 0.0
 
     def phase(self, name: str, waits_for: str) -> None:
         """Show that a phase began."""
-        self._said = 0.0
+        self._status_printed_at = 0.0
         self._printer.say(lambda: self._print(f"[bold]{name:<10}[/] waiting for {waits_for}", True))
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
-        """Print from time to time what the phase waits for; live lines always show it."""
-        if self._live is None and elapsed - self._said >= _STATUS_PERIOD:
-            self._said = elapsed
+        """Print periodically what the phase waits for, unless live lines already show it."""
+        if self._live is None and elapsed - self._status_printed_at >= _STATUS_PERIOD:
+            self._status_printed_at = elapsed
             text = f"{name}: {detail or 'working'} ({allowed_time(elapsed, timeout)})"
             self._printer.say(lambda: self._print(f"           {text}"))
 
@@ -116,10 +116,15 @@ class TerminalObserver:
         """Redraw the live lines if they are old; a stalled terminal skips states."""
         self._newest = status
         now = time.monotonic()
-        if self._live is None or self._asking or self._queued or now - self._drawn < _REDRAW_PERIOD:
+        if (
+            self._live is None
+            or self._asking
+            or self._redraw_queued
+            or now - self._drawn_at < _REDRAW_PERIOD
+        ):
             return
-        self._drawn = now
-        self._queued = self._printer.say(self._draw)
+        self._drawn_at = now
+        self._redraw_queued = self._printer.say(self._draw)
 
     def event(self, time: float, text: str) -> None:
         """Show an event."""
@@ -148,7 +153,7 @@ class TerminalObserver:
             self._asking = False
 
     def _draw(self) -> None:
-        self._queued = False
+        self._redraw_queued = False
         status = self._newest
         if self._live is not None and status is not None and not self._asking:
             self._live.show(status_lines(status), alarm=bool(status.alarms))

@@ -33,8 +33,8 @@ def print_anything() -> None:
 class _Output(io.TextIOWrapper):
     """Standard output that remembers a failed write.
 
-    The next flush does not repeat the failure if the text was longer than the buffer, or if there
-    is no buffer, as with PYTHONUNBUFFERED or `python -u`.
+    A later flush does not report the failure again if the text was longer than the buffer, or if
+    there is no buffer (PYTHONUNBUFFERED, `python -u`).
 
     Attributes:
         failure: the first failure, or None.
@@ -43,10 +43,10 @@ class _Output(io.TextIOWrapper):
     failure: OSError | None = None
 
     def __init__(self, stream: io.TextIOWrapper) -> None:
-        buffer, each_line = stream.buffer, stream.line_buffering
-        if isinstance(buffer, io.RawIOBase):  # without one, a long text may be written in part
-            buffer, each_line = io.BufferedWriter(buffer), True
-        super().__init__(buffer, stream.encoding, stream.errors, line_buffering=each_line)
+        buffer, line_buffering = stream.buffer, stream.line_buffering
+        if isinstance(buffer, io.RawIOBase):  # without a buffer, a long text may be cut off
+            buffer, line_buffering = io.BufferedWriter(buffer), True
+        super().__init__(buffer, stream.encoding, stream.errors, line_buffering=line_buffering)
 
     def write(self, text: str) -> int:
         """Write text, and remember a failure."""
@@ -69,8 +69,8 @@ def lost_output() -> str | None:
     """Why the text printed so far does not reach standard output.
 
     Returns:
-        None if it does; empty if nobody reads on, as after `| head`; else the reason in words. What
-        is printed later is then discarded: Python would complain about it at the end.
+        None: it does. Empty: the reader has stopped, as after `| head`. Otherwise: the reason in
+        words. After a failure, later text is discarded, or Python would report it again at its end.
     """
     failure: OSError | None = getattr(sys.stdout, "failure", None)
     try:

@@ -100,13 +100,13 @@ def add_benches(commands: Commands) -> None:
         each.add_argument(
             "--rate", type=number(1.0, 2000.0), default=250.0, help="samples per second (250)"
         )
-    step = benches.add_parser(
+    step_bench = benches.add_parser(
         "planner", help="time of one step of each planner, in a flight and in batches"
     )
-    step.add_argument(
+    step_bench.add_argument(
         "--seconds", type=number(0.001, 3600.0), default=5.0, help="duration of the measurement (5)"
     )
-    step.set_defaults(run="tools.bench_planner")
+    step_bench.set_defaults(run="tools.bench_planner")
     flight = benches.add_parser(
         "flight", help="speed of whole flights in one process, as a multiple of real time"
     )
@@ -120,7 +120,7 @@ def add_benches(commands: Commands) -> None:
         "--profile", action="store_true", help="also show the processor time of each part"
     )
     flight.set_defaults(run="tools.bench_flight")
-    for each in (link, serve, step, flight):
+    for each in (link, serve, step_bench, flight):
         each.add_argument("--json", action="store_true", help="print the figures as one JSON line")
 
 
@@ -169,16 +169,18 @@ def add_config(commands: Commands) -> None:
         help="print the configuration: every key, its default, unit, range and meaning",
         description="Print every key as commented YAML, with the values of FILE or the defaults.",
     )
-    which = show.add_mutually_exclusive_group()
-    which.add_argument("file", type=Path, nargs="?", metavar="FILE", help="configuration")
-    which.add_argument(
+    selection = show.add_mutually_exclusive_group()
+    selection.add_argument("file", type=Path, nargs="?", metavar="FILE", help="configuration")
+    selection.add_argument(
         "--diff", type=Path, metavar="FILE", help="print only the keys that FILE changes"
     )
-    which.add_argument(
+    selection.add_argument(
         "--get", metavar="KEY", help="print only this key, such as limits.max_tilt_deg"
     )
-    which.add_argument("--schema", action="store_true", help="print the JSON Schema, for editors")
-    which.add_argument(
+    selection.add_argument(
+        "--schema", action="store_true", help="print the JSON Schema, for editors"
+    )
+    selection.add_argument(
         "--markdown", action="store_true", help="print tables, as in docs/configuration.md"
     )
     show.set_defaults(run="config.show")

@@ -65,8 +65,8 @@ def study(options: argparse.Namespace) -> int:
     try:
         page, rows = runner.run(options.name, options.case, options.out, console, count)
     except KeyboardInterrupt:
-        told = f"Interrupted: in {options.out} only the files of finished studies are complete."
-        console.print(f"{told} Run the command again.", highlight=False)
+        message = f"Interrupted: in {options.out} only the files of finished studies are complete."
+        console.print(f"{message} Run the command again.", highlight=False)
         return EXIT_FLIGHT
     console.print(f"Open {page}", soft_wrap=True, highlight=False)
     if options.json:

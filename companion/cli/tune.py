@@ -43,10 +43,12 @@ def tune(options: argparse.Namespace) -> int:
     if source.is_dir() and log.exists():
         disturbances = measured_disturbances(log, drag_prior(config).drag.linear, disturbances)
     proposal = propose(config, disturbances)
-    flights = {} if options.no_flights else _flights(proposal, console)
-    known = _relative(vehicle, output) if included else _vehicle_of(proposal.tuned)
+    flights = {} if options.no_flights else _fly_courses(proposal, console)
+    vehicle_source = (
+        _include_path(vehicle, output) if included else _vehicle_section(proposal.tuned)
+    )
     console.print("\n".join(summary_lines(proposal, flights)))  # kept if the disk is full
-    write_whole(output, proposal_text(proposal, known, flights, source.name))
+    write_whole(output, proposal_text(proposal, vehicle_source, flights, source.name))
     load(output)
     keys = [f"{section}.{key}" for section, keys in proposal.changes.items() for key in keys]
     console.print(
@@ -94,23 +96,26 @@ def _with_learned_drag(config: Config, source: Path) -> Config:
 
 
 def _flyable(config: Config) -> Config:
-    """The configuration with `planner.name` auto and only `hover`: `identify` flew others."""
+    """The configuration with planner `auto` and maneuver `hover`; `identify` flew with others."""
     return changed(
         config, {"planner": {"name": "auto"}, "flight": {"maneuvers": ("hover",)}}, "tune"
     )
 
 
-def _vehicle_of(config: Config) -> dict[str, Any]:
-    """The section `vehicle` of a flight without a vehicle file; only values that are not null."""
+def _vehicle_section(config: Config) -> dict[str, Any]:
+    """The section `vehicle` as YAML keys, without null and default values."""
     values = config.vehicle.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
     return {"vehicle": values}
 
 
-def _relative(vehicle: Path, output: Path) -> Path:
+def _include_path(vehicle: Path, output: Path) -> Path:
+    """The path of the vehicle file, relative to the folder of the output."""
     return Path(os.path.relpath(vehicle.resolve(), output.resolve().parent))
 
 
-def _flights(proposal: Proposal, console: Console) -> dict[str, tuple[CourseResult, CourseResult]]:
+def _fly_courses(
+    proposal: Proposal, console: Console
+) -> dict[str, tuple[CourseResult, CourseResult]]:
     """Fly each course with the previous configuration and with the proposal."""
     autopilot = autopilot_like(proposal.tuned)
     flights = {}
@@ -129,11 +134,11 @@ def _figures(
     """The figures for `--json`; a value that a failed flight did not measure is null."""
     expected = {}
     for name, each in (("before", proposal.before), ("after", proposal.after)):
-        found = each.margins
+        margins = each.margins
         expected[name] = {
-            "gain_margin_db": round(found.gain_db, 2),
-            "phase_margin_deg": round(found.phase_deg, 1),
-            "delay_margin_ms": round(1e3 * found.delay, 1),
+            "gain_margin_db": round(margins.gain_db, 2),
+            "phase_margin_deg": round(margins.phase_deg, 1),
+            "delay_margin_ms": round(1e3 * margins.delay, 1),
             "error_by_gusts_m": round(each.errors.gusts, 4),
             "error_on_a_path_m": round(each.errors.path, 4),
             "error_by_noise_m": round(each.errors.noise, 4),

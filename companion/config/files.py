@@ -70,21 +70,21 @@ def _read(path: Path) -> Contents:
 
 def _drop_foreign_identified(merged: Contents) -> None:
     """Drop `vehicle.identified` if another key of `vehicle` comes from another file."""
-    mark = merged.places.get(("vehicle", "identified"))
+    identified_place = merged.places.get(("vehicle", "identified"))
     files = {
         place.file
         for where, place in merged.places.items()
         if where[:1] == ("vehicle",) and len(where) > 1
     }
-    if mark is not None and files != {mark.file}:
+    if identified_place is not None and files != {identified_place.file}:
         merged.keys["vehicle"]["identified"] = None
 
 
 class _IncludeReader:
-    """Reads included files; an including file overrides them.
+    """Reads included files; the keys of an including file override theirs.
 
     Args:
-        merged: receives their keys.
+        merged: receives the keys of the included files.
 
     Attributes:
         files: files that were opened.
@@ -95,11 +95,11 @@ class _IncludeReader:
         self.files: list[Path] = []
 
     def add_included(self, chain: tuple[Path, ...], keys: dict[str, Any]) -> None:
-        """Add the files that the last file of `chain` includes, without its own keys.
+        """Add the keys of the files that the last file of `chain` includes, not its own keys.
 
         Args:
             chain: the including files, the outermost first, and at the end the file itself.
-            keys: keys of the file.
+            keys: keys of that last file.
 
         Raises:
             ConfigError: see `load`.
@@ -108,7 +108,7 @@ class _IncludeReader:
             self._add((*chain, path))
 
     def _add(self, chain: tuple[Path, ...]) -> None:
-        *_, by, path = chain
+        *_, including_file, path = chain
         self.files.append(path)
         if len(self.files) > MOST_INCLUDED:
             raise ConfigError(f"{chain[0]}: more than {MOST_INCLUDED} files are included")
@@ -116,11 +116,13 @@ class _IncludeReader:
             names = " includes ".join(str(one) for one in chain)
             raise ConfigError(f"{chain[0]}: a file must not include itself: {names}")
         if len(chain) - 1 > _MAX_DEPTH:
-            raise ConfigError(f"{by}: an include must not be deeper than {_MAX_DEPTH} files")
+            raise ConfigError(
+                f"{including_file}: an include must not be deeper than {_MAX_DEPTH} files"
+            )
         try:
             part = _read(path)
         except UnreadableFileError as error:
-            raise ConfigError(f"{error} (included by {by})") from error
+            raise ConfigError(f"{error} (included by {including_file})") from error
         _check_part(path, part.keys)
         self.add_included(chain, part.keys)
         _merge(self._merged, part)
@@ -219,8 +221,8 @@ def shipped(name: str) -> Path:
     """
     repository = Path(__file__).parents[2]
     installed = Path(sysconfig.get_path("data"), "share", "mavlink-companion")
-    for place in (repository, installed):
-        path = place / "configs" / name
+    for folder in (repository, installed):
+        path = folder / "configs" / name
         if path.is_file():
             return path
     raise ConfigError(f"{name} is not in {installed}; name a configuration with --config")

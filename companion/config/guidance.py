@@ -16,10 +16,10 @@ LINEAR = "linear"
 GUIDANCE_NAMES = (LINEAR, "nmpc")
 
 
-def _require_known(what: str, name: str, own: tuple[str, ...], group: str) -> None:
+def _require_known(kind: str, name: str, our_names: tuple[str, ...], group: str) -> None:
     """Raise `ValueError` unless the name is ours or that of an installed plug-in."""
-    if name not in own and name not in (installed := plugins.names(group)):
-        raise ValueError(f"unknown {what} {name!r}; known: {', '.join((*own, *installed))}")
+    if name not in our_names and name not in (installed := plugins.names(group)):
+        raise ValueError(f"unknown {kind} {name!r}; known: {', '.join((*our_names, *installed))}")
 
 
 class PlannerConfig(Section):

@@ -74,7 +74,7 @@ def changed_in_flight(start: Config, now: Config, values: Values, name: str) -> 
 
     Args:
         start: the configuration with which the flight began.
-        now: the present one.
+        now: the configuration in force.
         values: the new values.
         name: name of the change in error messages.
 

@@ -58,8 +58,8 @@ def before_connecting(config: Config) -> KnownDrag:
     """The configured drag, or the one of the vehicle that flew last; unknown without either."""
     if config.guidance.drag is not None:
         return KnownDrag(config.guidance.drag)
-    kept = newest(config.recording.directory)
-    return KnownDrag() if kept is None else KnownDrag(kept.drag, kept.path)
+    learned = newest(config.recording.directory)
+    return KnownDrag() if learned is None else KnownDrag(learned.drag, learned.path)
 
 
 def of_vehicle(config: Config, directory: Path | None, uid: str | None) -> KnownDrag:
@@ -76,8 +76,8 @@ def of_vehicle(config: Config, directory: Path | None, uid: str | None) -> Known
         return KnownDrag(config.guidance.drag)
     if uid is None or directory is None:
         return KnownDrag()
-    kept, trouble = LearnedFile(directory, uid).load()
-    return KnownDrag(trouble=trouble) if kept is None else KnownDrag(kept.drag, kept.path)
+    learned, trouble = LearnedFile(directory, uid).load()
+    return KnownDrag(trouble=trouble) if learned is None else KnownDrag(learned.drag, learned.path)
 
 
 def prior_of(drag: Drag) -> DragPrior:

@@ -9,7 +9,7 @@ IN_FLIGHT = "in_flight"
 """Name of the marker of a key that may change in flight."""
 
 UP_TO_START = "up to its value at the start"
-"""Marks limits that were used to check the vehicle before take-off."""
+"""Permitted change of the limits with which the vehicle was checked before take-off."""
 
 ANY: dict[str, Any] = {IN_FLIGHT: "within its range"}
 LOWERED: dict[str, Any] = {IN_FLIGHT: UP_TO_START}

@@ -96,9 +96,9 @@ def as_yaml(described: Iterable[ConfigKey]) -> str:
         lines += _comment(key.meaning, "  ")
         limits = ", ".join(part for part in (key.unit, key.allowed) if part)
         if key.value != key.default:
-            limits += f"; default: {_flow(key.default)}"
+            limits += f"; default: {_yaml(key.default)}"
         note = f"  # {limits.removeprefix('; ')}" if limits else ""
-        lines.append(f"  {key.name}: {_flow(key.value)}{note}")
+        lines.append(f"  {key.name}: {_yaml(key.value)}{note}")
     return "\n".join(lines).strip() + "\n"
 
 
@@ -110,7 +110,7 @@ def as_markdown(described: Iterable[ConfigKey]) -> str:
             section = key.section
             lines += ["", f"## {section}", "", _one_line(models[section].__doc__ or ""), ""]
             lines += ["| key | default | unit | range | meaning |", "|---|---|---|---|---|"]
-        cells = (f"`{key.name}`", f"`{_flow(key.default)}`", key.unit, key.allowed, key.meaning)
+        cells = (f"`{key.name}`", f"`{_yaml(key.default)}`", key.unit, key.allowed, key.meaning)
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(lines).strip() + "\n"
 
@@ -130,7 +130,7 @@ def _allowed(schema: dict[str, Any]) -> str:
     return ", ".join(words)
 
 
-def _flow(value: Any) -> str:
+def _yaml(value: Any) -> str:
     return bounded_yaml.dump_value(value)
 
 

@@ -45,7 +45,7 @@ FORMER_KEYS = {
 """Keys that were renamed or removed, or belong in another file, with what to do instead; see
 `Section.former_keys`."""
 
-_TILT_SHARE = 0.75
+_DOUBLET_TILT_SHARE = 0.75
 """Share of max_tilt_deg that a doublet may use; wind and overshoot need the rest."""
 
 
@@ -157,17 +157,19 @@ def _thrust_contradictions(config: Config) -> list[tuple[bool, str]]:
     """Like `_contradictions`: whether thrust can hold the height at the largest tilt."""
     limits, thrust = config.limits, config.thrust
     curve = ThrustCurve(thrust.curve_factor)
-    hover = curve.share(thrust.hover_thrust)
+    hover_share = curve.share(thrust.hover_thrust)
     # An autopilot that compensates the tilt may use the full thrust.
-    most = 1.0 if thrust.autopilot_compensates_tilt else curve.share(limits.max_thrust)
-    tilt = degrees(largest_tilt(hover, most))
-    needed = hover / cos(limits.max_tilt) / TILT_THRUST_SHARE
+    most_share = 1.0 if thrust.autopilot_compensates_tilt else curve.share(limits.max_thrust)
+    tilt = degrees(largest_tilt(hover_share, most_share))
+    needed_share = hover_share / cos(limits.max_tilt) / TILT_THRUST_SHARE
     remedy = f"lower limits.max_tilt_deg to {max(1, floor(tilt))}"
-    if needed <= 1.0 and not thrust.autopilot_compensates_tilt:
-        remedy += f" or raise limits.max_thrust to {ceil(100.0 * curve.signal(needed)) / 100.0:.2f}"
+    if needed_share <= 1.0 and not thrust.autopilot_compensates_tilt:
+        remedy += (
+            f" or raise limits.max_thrust to {ceil(100.0 * curve.signal(needed_share)) / 100.0:.2f}"
+        )
     return [
         (
-            hover < most and tilt < limits.max_tilt_deg,
+            hover_share < most_share and tilt < limits.max_tilt_deg,
             f"limits.max_tilt_deg {limits.max_tilt_deg:g} does not fit limits.max_thrust "
             f"{limits.max_thrust:g}: with thrust.hover_thrust {thrust.hover_thrust:g} the "
             f"vehicle holds its height only up to {tilt:.0f}°; {remedy}",
@@ -184,9 +186,10 @@ def _identify_contradictions(config: Config) -> list[tuple[bool, str]]:
             "flight.maneuvers: identify must be the only maneuver of a flight",
         ),
         (
-            identify.tilt_rate_deg_s * identify.tilt_duration_s > _TILT_SHARE * limits.max_tilt_deg,
+            identify.tilt_rate_deg_s * identify.tilt_duration_s
+            > _DOUBLET_TILT_SHARE * limits.max_tilt_deg,
             "identify.tilt_rate_deg_s × identify.tilt_duration_s must not exceed "
-            f"{_TILT_SHARE} × limits.max_tilt_deg",
+            f"{_DOUBLET_TILT_SHARE} × limits.max_tilt_deg",
         ),
         (
             identify.tilt_rate_deg_s > limits.max_tilt_rate_deg_s,

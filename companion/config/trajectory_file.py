@@ -32,7 +32,7 @@ from companion.guidance.trajectory.waypoints import largest_detour
 
 _MOST_COLUMNS_SHOWN = 10
 _SMALLEST_DETOUR = 0.05
-"""Smallest distance of a curve from the lines between its waypoints that is told, m."""
+"""Smallest distance of a curve from the lines between its waypoints that a note reports, m."""
 
 
 class _Shape(Protocol):
@@ -81,17 +81,17 @@ class CsvShape(Section):
             raise TrajectoryError(f"{path}: {error}") from error
         return LoadedTrajectory(trajectory, _table_notes(path, frame, table.unused))
 
-    def _frame(self, named: str | None, path: Path) -> Frame | None:
-        """The frame that this file or the table names; None if neither does."""
-        if named is not None and named not in {frame.value for frame in Frame}:
+    def _frame(self, table_frame: str | None, path: Path) -> Frame | None:
+        """The frame that this section or the table names; None if neither does."""
+        if table_frame is not None and table_frame not in {frame.value for frame in Frame}:
             known = ", ".join(frame.value for frame in Frame)
-            raise TrajectoryError(f"{path}: its frame {named!r:.40} is not one of {known}")
-        if None not in (self.frame, named) and self.frame != named:
+            raise TrajectoryError(f"{path}: its frame {table_frame!r:.40} is not one of {known}")
+        if None not in (self.frame, table_frame) and self.frame != table_frame:
             raise TrajectoryError(
-                f"{path}: its comment says frame: {named}, and csv.frame says {self.frame}; "
+                f"{path}: its comment says frame: {table_frame}, and csv.frame says {self.frame}; "
                 "remove one of them"
             )
-        frame = self.frame or named
+        frame = self.frame or table_frame
         return None if frame is None else Frame(frame)
 
 
@@ -128,7 +128,7 @@ def _table_notes(path: Path, frame: Frame | None, unused: tuple[str, ...]) -> tu
 
 
 def _detour_notes(trajectory: Trajectory) -> tuple[str, ...]:
-    """By how much a curve through waypoints leaves the straight lines between them."""
+    """A note on how far a curve through waypoints leaves the lines between them; may be empty."""
     if not (isinstance(trajectory, TimedCurve) and isinstance(trajectory.curve, SplineCurve)):
         return ()
     detour = largest_detour(trajectory.curve.spline)
@@ -200,8 +200,9 @@ def read(path: Path) -> LoadedTrajectory:
                 if is_table(path)
                 else yaml_file.load(path, TrajectoryFile).read(path.parent)
             )
-            loaded.trajectory.check_times()  # may overflow too
+            loaded.trajectory.check_times()  # this may overflow, too
             return loaded
     except TrajectoryError as error:
-        named = is_table(path) and str(error).startswith(str(path))  # a table's errors name it
+        # The errors of a table name it already.
+        named = is_table(path) and str(error).startswith(str(path))
         raise ConfigError(str(error) if named else f"{path}: {error}") from error

@@ -41,7 +41,7 @@ def seconds(milliseconds: float) -> float:
 
 
 def share(percent: float) -> float:
-    """Percent as a share, divided in the same way as the vehicle's own percentages."""
+    """Percent as a share of 1, computed as for telemetry, so that equal percentages stay equal."""
     return percent / 100.0
 
 
@@ -76,5 +76,5 @@ class Si(property):
     @overload
     def __get__(self, section: Any, owner: type | None = None, /) -> float: ...
     def __get__(self, section: Any, owner: type | None = None, /) -> Self | float:
-        """The value of that section, in rad, rad/s, s or as a share."""
+        """The value of the key in that section, in SI units."""
         return self if section is None else float(super().__get__(section, owner))

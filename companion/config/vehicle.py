@@ -38,9 +38,9 @@ class AxisKeys(NamedTuple):
         return converted(self.acceleration_limit_deg_s2, radians)
 
     def overridden_by(self, *keys: float | None) -> "AxisKeys":
-        """A copy with those `keys` that are not None; a given lag drops the copied damping."""
-        mine = self if keys[0] is None else self._replace(damping=None)
-        return AxisKeys(*(a if b is None else b for a, b in zip(mine, keys, strict=True)))
+        """A copy with those `keys` that are not None; with a new lag the old damping is dropped."""
+        base = self if keys[0] is None else self._replace(damping=None)
+        return AxisKeys(*(a if b is None else b for a, b in zip(base, keys, strict=True)))
 
 
 class VehicleConfig(Section):

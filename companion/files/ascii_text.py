@@ -41,10 +41,10 @@ _REPLACEMENTS = {
 def ascii_for(text: str) -> str:
     """A readable ASCII form of a text: m/s² as m/s^2, ω as omega, ċ as c."""
     out: list[str] = []
-    raised = False
+    is_super = False
     for char in text:
-        was_raised, raised = raised, unicodedata.decomposition(char).startswith("<super>")
-        if raised and not was_raised:
+        was_super, is_super = is_super, unicodedata.decomposition(char).startswith("<super>")
+        if is_super and not was_super:
             out.append("^")
         out.append(char if char.isascii() else _ascii_for_char(char))
     return "".join(out)

@@ -87,7 +87,7 @@ def read(text: str) -> Document:
             builder.take(event)
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else None
-        raise YamlError(_explained(error, text), line) from error
+        raise YamlError(_error_text(error, text), line) from error
     except yaml.reader.ReaderError as error:
         line = text.count("\n", 0, error.position) + 1
         raise YamlError(f"not valid YAML: {error.reason}", line) from error
@@ -96,7 +96,7 @@ def read(text: str) -> Document:
     return Document(builder.root, builder.lines)
 
 
-def _explained(error: yaml.MarkedYAMLError, text: str) -> str:
+def _error_text(error: yaml.MarkedYAMLError, text: str) -> str:
     """The error message, with a remedy for the most common mistakes."""
     problem = str(error.problem)
     lines, mark = text.splitlines(), error.problem_mark
@@ -145,8 +145,9 @@ class _Builder:
         self.root: Any = None
         self.lines: dict[Where, int] = {}
         self._path: list[str | int] = []
-        self._open: list[dict[str, Any] | list[Any]] = []
-        self._keys: list[str | None] = []
+        # From the outermost node to the innermost; a key is None while the next event is a key.
+        self._open_nodes: list[dict[str, Any] | list[Any]] = []
+        self._pending_keys: list[str | None] = []
         self._nodes = 0
         self._documents = 0
 
@@ -167,23 +168,23 @@ class _Builder:
             case yaml.MappingStartEvent():
                 self._begin({}, event, line)
             case yaml.SequenceEndEvent() | yaml.MappingEndEvent():
-                self._open.pop()
-                self._keys.pop()
+                self._open_nodes.pop()
+                self._pending_keys.pop()
                 if self._path:
                     self._path.pop()
 
     def _begin(
         self, node: dict[str, Any] | list[Any], event: yaml.CollectionStartEvent, line: int
     ) -> None:
-        step: list[str | int] = []
-        if self._open:
-            into, key = self._open[-1], self._keys[-1]
-            step = [len(into) if isinstance(into, list) else key or ""]
+        path_part: list[str | int] = []
+        if self._open_nodes:
+            parent, key = self._open_nodes[-1], self._pending_keys[-1]
+            path_part = [len(parent) if isinstance(parent, list) else key or ""]
         self._add(node, event, line)
-        self._path += step
-        self._open.append(node)
-        self._keys.append(None)
-        if len(self._open) > DEEPEST:
+        self._path += path_part
+        self._open_nodes.append(node)
+        self._pending_keys.append(None)
+        if len(self._open_nodes) > DEEPEST:
             raise YamlError(f"nested deeper than {DEEPEST} levels", line)
 
     def _add(
@@ -194,27 +195,27 @@ class _Builder:
             raise YamlError(f"more than {MOST_NODES} keys and values", line)
         if event.tag is not None:
             raise YamlError(f"take out the tag {event.tag:.40}: tags are refused", line)
-        if not self._open:
+        if not self._open_nodes:
             self.root = value
             return
-        into, key = self._open[-1], self._keys[-1]
-        if isinstance(into, list):
-            self.lines[(*self._path, len(into))] = line
-            into.append(value)
+        parent, key = self._open_nodes[-1], self._pending_keys[-1]
+        if isinstance(parent, list):
+            self.lines[(*self._path, len(parent))] = line
+            parent.append(value)
         elif key is None:
-            self._keys[-1] = _new_key(value, into, line)
+            self._pending_keys[-1] = _new_key(value, parent, line)
             self.lines[(*self._path, value)] = line
         else:
-            into[key] = value
-            self._keys[-1] = None
+            parent[key] = value
+            self._pending_keys[-1] = None
 
 
-def _new_key(key: Any, into: dict[str, Any], line: int) -> str:
+def _new_key(key: Any, parent: dict[str, Any], line: int) -> str:
     if not isinstance(key, str):
         raise YamlError(f"a key must be a word, not {key!r:.40}", line)
     if len(key) > LONGEST_KEY:
         raise YamlError(f"the key {key[:20]!r}... is longer than {LONGEST_KEY} characters", line)
-    if key in into:
+    if key in parent:
         raise YamlError(f"not valid YAML: the key {key!r} is given twice", line)
     return key
 
@@ -225,11 +226,11 @@ def _scalar(event: yaml.ScalarEvent, line: int) -> Any:
         raise YamlError(f"a value is longer than {LONGEST_TEXT} characters", line)
     if _CONTROL_CHARACTER.search(text):
         raise YamlError("a value holds a control character", line)
-    return _plain(text, line) if event.style is None else text
+    return _unquoted_value(text, line) if event.style is None else text
 
 
-def _plain(text: str, line: int) -> Any:
-    """The meaning of an unquoted value in YAML 1.2's core schema."""
+def _unquoted_value(text: str, line: int) -> Any:
+    """The value of an unquoted text by the core schema of YAML 1.2."""
     if text in _CONSTANTS:
         return _CONSTANTS[text]
     whole = _INTEGER.fullmatch(text)

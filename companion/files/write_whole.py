@@ -13,16 +13,16 @@ from companion.files.os_errors import DISK_HANGS, DISK_TIMEOUT, reason_of
 
 
 class ReservedRoom:
-    """Room on a disk for a file that is written later, however full the disk is then.
+    """Disk space reserved for a file that is written later, when the disk may be full.
 
-    A file without a name holds the room, so nothing is left of it when the process is killed.
+    An unnamed file holds the space, so the system frees it even if the process is killed.
 
     Attributes:
-        free: releases the room; the end of this object does so, too.
+        free: releases the space; the deletion of this object does so, too.
 
     Args:
-        folder: folder of the later file. If there is no room, or the file system cannot reserve
-            any, nothing is reserved.
+        folder: folder of the later file. If the disk is full, or the file system cannot reserve
+            space, nothing is reserved.
         size: bytes.
     """
 
@@ -81,7 +81,7 @@ def write_whole(path: Path, text: str, mode: int = 0o666) -> None:
             os.fsync(file.fileno())
         temporary.replace(path)
         sync_folder(path.parent)
-    except OSError as error:  # it names the temporary file, or none where the disk is full
+    except OSError as error:  # it names the temporary file, or no file
         raise OSError(error.errno, error.strerror, str(path)) from error
     finally:
         with suppress(OSError):  # after a success it no longer exists

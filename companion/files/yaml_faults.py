@@ -14,7 +14,7 @@ _MOST_PLACES = 3
 _MIN_SIMILARITY = 0.5
 """Smallest similarity to an unknown key at which a key of the same section is suggested."""
 _MIN_SIMILARITY_ELSEWHERE = 0.75
-"""The same for a key of another section."""
+"""Smallest similarity at which a key of another section is suggested."""
 
 _NUMBER_AND_UNIT = re.compile(r"([-+]?[0-9]+(?:[.,][0-9]+)?(?:[eE][-+]?[0-9]+)?)\s*(\D*)")
 
@@ -50,7 +50,7 @@ def kinds_in(annotation: Any) -> frozenset[Any]:
     return _kinds_in(annotation)
 
 
-@cache  # apart, because mypy does not regard a type as hashable
+@cache  # a function of its own, because mypy does not regard a type as hashable
 def _kinds_in(annotation: Any) -> frozenset[Any]:
     return frozenset({annotation}).union(*(kinds_in(part) for part in get_args(annotation)))
 
@@ -88,14 +88,16 @@ def explained(detail: Any, model: type[BaseModel], former: Mapping[str, str]) ->
     where = ".".join(str(part) for part in location)
     if detail["type"] == "extra_forbidden":
         advice = former.get(where)
-        return f"`{where}` {advice}" if advice else f"`{where}` {_unknown(location, value, model)}"
+        return (
+            f"`{where}` {advice}" if advice else f"`{where}` {_unknown_key(location, value, model)}"
+        )
     if detail["type"] == "missing" and isinstance(value, list | tuple):
-        held = ".".join(str(part) for part in location[:-1])
-        return f"`{held}` has too few values (got {shortened(value)})"
+        list_key = ".".join(str(part) for part in location[:-1])
+        return f"`{list_key}` has too few values (got {shortened(value)})"
     message = detail["msg"].removeprefix("Value error, ").replace("tuple", "list")
     if not where:
         return str(message)
-    if remedy := _remedy(detail, str(location[-1])) or _other_length(detail):
+    if remedy := _remedy(detail, str(location[-1])) or _length_fault(detail):
         return f"`{where}` {remedy}"
     if detail["type"] == "path_type":
         message = "must name a file or a folder"
@@ -108,9 +110,9 @@ def _remedy(detail: Any, key: str) -> str | None:
     kind, value = detail["type"], detail["input"]
     message = detail["msg"].removeprefix("Value error, ")
     if kind == "value_error" and message.startswith("must be a number") and isinstance(value, str):
-        return f"must be a number: {_number_in(key, value)} (got {shortened(value)})"
+        return f"must be a number: {_number_advice(key, value)} (got {shortened(value)})"
     if kind in ("float_parsing", "int_parsing"):
-        return f"must be a number: {_number_in(key, str(value))} (got {shortened(value)})"
+        return f"must be a number: {_number_advice(key, str(value))} (got {shortened(value)})"
     if value is None and kind in ("float_type", "int_type", "string_type", "tuple_type"):
         return "has no value; write one, or take the key out"
     if kind in ("model_type", "dict_type", "model_attributes_type"):
@@ -123,7 +125,7 @@ def _remedy(detail: Any, key: str) -> str | None:
     return None
 
 
-def _other_length(detail: Any) -> str | None:
+def _length_fault(detail: Any) -> str | None:
     """How many values a list has, and how many it may have."""
     bounds = detail.get("ctx", {})
     if detail["type"] == "too_short":
@@ -133,54 +135,56 @@ def _other_length(detail: Any) -> str | None:
     return None
 
 
-def _number_in(key: str, text: str) -> str:
+def _number_advice(key: str, text: str) -> str:
     """A suggestion to replace a text by a number."""
-    found = _NUMBER_AND_UNIT.fullmatch(text.strip())
-    if found is None:
+    match = _NUMBER_AND_UNIT.fullmatch(text.strip())
+    if match is None:
         return "write digits, with a point for decimals"
-    number, unit = found[1].replace(",", "."), found[2].strip()
-    other, meant = other_unit(key, float(number))
-    if unit == other:
-        return f"write {meant:.4g}"
+    number, unit = match[1].replace(",", "."), match[2].strip()
+    confused_unit, converted = other_unit(key, float(number))
+    if unit == confused_unit:
+        return f"write {converted:.4g}"
     if unit:
         return f"write {number} without {unit!r}, because the key's name gives the unit"
-    if "," in found[1]:
+    if "," in match[1]:
         return f"write {number}, with a point for decimals"
     return f"write {number} without quotation marks"
 
 
 def _unit_hint(detail: Any, where: str) -> str:
-    """A hint if the value would be in range in the unit often confused with the key's, else ""."""
+    """A hint if the value, converted from the unit often confused with the key's, is in range."""
     bound = detail.get("ctx", {})
     value = detail["input"]
     if not isinstance(value, int | float) or not value:
         return ""
-    unit, meant = other_unit(where, value)
+    unit, converted = other_unit(where, value)
     if unit == "%" and bound.get("le", bound.get("lt", inf)) > 1.0:
         return ""  # only a share of 1 is confused with a percentage
-    kept = [keeps(meant, bound[name]) for name, keeps in _BOUNDS.items() if name in bound]
-    return f"; if it is in {unit}, write {meant:.4g}" if kept and all(kept) else ""
+    in_range = [
+        satisfies(converted, bound[name]) for name, satisfies in _BOUNDS.items() if name in bound
+    ]
+    return f"; if it is in {unit}, write {converted:.4g}" if in_range and all(in_range) else ""
 
 
-def _unknown(location: tuple[int | str, ...], value: Any, model: type[BaseModel]) -> str:
+def _unknown_key(location: tuple[int | str, ...], value: Any, model: type[BaseModel]) -> str:
     """The message about an unknown key, with the key that was probably meant."""
     name = str(location[-1])
     section, _, key = name.partition(".")
     if len(location) == 1 and ((section,), key) in _keys(model):
         return f"contains a dot; write `{section}: {{{key}: {shortened(value)}}}`"
-    beside = list(_model_at(location, model).model_fields)
-    everywhere = [(key, place) for place, key in _keys(model) if place != location[:-1]]
-    if not isinstance(value, dict) and not any(key.startswith(f"{name}_") for key in beside):
-        same = [".".join((*place, key)) for key, place in everywhere if key == name]
-        if same:
-            return f"is in the wrong section; write {_either(same)}"
-    near = _nearest(name, beside, _MIN_SIMILARITY)
+    section_keys = list(_model_at(location, model).model_fields)
+    other_keys = [(key, place) for place, key in _keys(model) if place != location[:-1]]
+    if not isinstance(value, dict) and not any(key.startswith(f"{name}_") for key in section_keys):
+        same_name = [".".join((*place, key)) for key, place in other_keys if key == name]
+        if same_name:
+            return f"is in the wrong section; write {_either(same_name)}"
+    near = _nearest(name, section_keys, _MIN_SIMILARITY)
     if not isinstance(value, dict):
-        far = _nearest(name, [key for key, _ in everywhere], _MIN_SIMILARITY_ELSEWHERE)
+        far = _nearest(name, [key for key, _ in other_keys], _MIN_SIMILARITY_ELSEWHERE)
         if far and (not near or _similarity(name, far) > _similarity(name, near)):
-            places = [".".join((*place, key)) for key, place in everywhere if key == far]
+            places = [".".join((*place, key)) for key, place in other_keys if key == far]
             return f"is not a known key; did you mean {_either(places)}?"
-    hint = f"did you mean `{near}`?" if near else f"known here: {', '.join(beside)}"
+    hint = f"did you mean `{near}`?" if near else f"known here: {', '.join(section_keys)}"
     return f"is not a known key; {hint}"
 
 
@@ -195,7 +199,7 @@ def _either(places: list[str]) -> str:
 
 
 def _similarity(written: str, known: str) -> float:
-    """Similarity of a written key to a known one; nearly 1 if that begins or ends with it."""
+    """Similarity from 0 to 1; nearly 1 if the known key begins or ends with the written one."""
     if known.startswith(f"{written}_"):
         return 0.99
     if known.endswith(f"_{written}"):
@@ -203,10 +207,10 @@ def _similarity(written: str, known: str) -> float:
     return difflib.SequenceMatcher(None, written, known).ratio()
 
 
-def _nearest(name: str, keys: Iterable[str], least: float) -> str | None:
+def _nearest(name: str, keys: Iterable[str], min_similarity: float) -> str | None:
     similarity = {key: _similarity(name, key) for key in keys}
     best = max(similarity, key=similarity.__getitem__, default=None)
-    return best if best is not None and similarity[best] >= least else None
+    return best if best is not None and similarity[best] >= min_similarity else None
 
 
 def _keys(model: type[BaseModel]) -> Iterator[tuple[tuple[str, ...], str]]:

@@ -1,4 +1,4 @@
-"""Reads YAML into a typed model; an error says what is wrong, where, and how to mend it."""
+"""Reads YAML into a typed model; an error says what is wrong, where, and how to correct it."""
 
 from collections.abc import Mapping
 from os.path import expanduser
@@ -27,7 +27,7 @@ def is_path(text: str) -> bool:
 
 
 def expanded(path: str) -> str:
-    """A path with the home folder for `~`, which no shell expands in a file or after `--set`."""
+    """A path with `~` replaced by the home folder; no shell does it in a file or after `--set`."""
     return expanduser(path)  # noqa: PTH111  Path.expanduser raises for an unknown user
 
 
@@ -156,11 +156,11 @@ def _contents(text: str, name: str, model: type[Section]) -> Contents:
     if not isinstance(data, dict):
         first = next(iter(model.model_fields))
         raise ConfigError(f"{name}: expected keys such as `{first}:` at the top level")
-    keys = {key: _filled(key, value, model) for key, value in data.items()}
+    keys = {key: _value_or_section(key, value, model) for key, value in data.items()}
     return Contents(keys, {where: Place(name, line) for where, line in lines.items()})
 
 
-def _filled(key: Any, value: Any, model: type[Section]) -> Any:
+def _value_or_section(key: Any, value: Any, model: type[Section]) -> Any:
     """The value, or an empty section if only a section's name is given."""
     field = model.model_fields.get(key)
     if value is not None or field is None:
@@ -192,16 +192,16 @@ def validated(
         return model.model_validate(data)
     except ValidationError as error:
         details = without_consequences(error.errors(include_url=False))
-        faults, before = [], Place("")
+        faults, previous_place = [], Place("")
         for detail in details[:_MOST_FAULTS_SHOWN]:
             place = place_of(detail["loc"], places or {}, name)
             where = f"{place}: "
-            if place == before:
+            if place == previous_place:
                 where = ""
-            elif place.file == before.file and place.line:
+            elif place.file == previous_place.file and place.line:
                 where = f"line {place.line}: "
             faults.append(where + explained(detail, model, model.former_keys))
-            before = place
+            previous_place = place
         more = len(details) - _MOST_FAULTS_SHOWN
         raise ConfigError("; ".join(faults) + (f"; and {more} more" if more > 0 else "")) from error
 

@@ -35,7 +35,7 @@ class PageSocket(NamedTuple):
 
     def words(self) -> str:
         """Address of the page, for the user."""
-        shown = _shown(self.host)
+        shown = _displayed(self.host)
         if ip_address(self.host).is_loopback:
             return (
                 f"Live page: http://{shown}:{self.port}/  token to change values there: "
@@ -58,7 +58,7 @@ class StreamAddress(NamedTuple):
     def words(self) -> str:
         """Address of the stream, for the user."""
         return (
-            f"Live stream: ws://{_shown(self.host)}:{self.port}/  in Foxglove or Lichtblick: "
+            f"Live stream: ws://{_displayed(self.host)}:{self.port}/  in Foxglove or Lichtblick: "
             "open connection, Foxglove WebSocket"
         )
 
@@ -66,7 +66,7 @@ class StreamAddress(NamedTuple):
 _ANY_ADDRESS = (ip_address("0.0.0.0"), ip_address("::"))
 
 
-def _shown(host: str) -> str:
+def _displayed(host: str) -> str:
     name = host if ip_address(host) not in _ANY_ADDRESS else socket.gethostname()
     return f"[{name}]" if ":" in name else name
 
@@ -78,7 +78,7 @@ def open_page_socket(address: str) -> PageSocket:
         ConfigError: the address is not valid or not of this computer, or the port is in use or
             not permitted.
     """
-    host, listening = _listening(address, "--live", PORT)
+    host, listening = _listen(address, "--live", PORT)
     return PageSocket(host, listening.getsockname()[1], secrets.token_urlsafe(9), listening)
 
 
@@ -91,19 +91,19 @@ def stream_address(address: str) -> StreamAddress:
         ConfigError: the address is not valid or not of this computer, or the port is in use or
             not permitted.
     """
-    host, listening = _listening(address, "--foxglove", STREAM_PORT)
+    host, listening = _listen(address, "--foxglove", STREAM_PORT)
     with listening:
         return StreamAddress(host, listening.getsockname()[1])
 
 
-def _listening(address: str, option: str, usual: int) -> tuple[str, socket.socket]:
+def _listen(address: str, option: str, default_port: int) -> tuple[str, socket.socket]:
     """Listen at the address given to an option; return host and socket.
 
     Raises:
         ConfigError: the address is not valid or not of this computer, or the port is in use or
             not permitted.
     """
-    host, port = _parts(address, option, usual)
+    host, port = _host_and_port(address, option, default_port)
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listening = socket.socket(family, socket.SOCK_STREAM)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -121,7 +121,7 @@ def _listening(address: str, option: str, usual: int) -> tuple[str, socket.socke
     return host, listening
 
 
-def _parts(address: str, option: str, usual: int) -> tuple[str, int]:
+def _host_and_port(address: str, option: str, default_port: int) -> tuple[str, int]:
     """Host and port of an address.
 
     Raises:
@@ -129,7 +129,7 @@ def _parts(address: str, option: str, usual: int) -> tuple[str, int]:
     """
     host, colon, port = address.rpartition(":")
     if not colon and not address.isdigit():
-        host, port = address, str(usual)
+        host, port = address, str(default_port)
     host = host.strip("[]") or "127.0.0.1"
     host = "127.0.0.1" if host == "localhost" else host
     try:
@@ -137,7 +137,7 @@ def _parts(address: str, option: str, usual: int) -> tuple[str, int]:
         ip_address(host)
     except ValueError as error:
         raise ConfigError(
-            f"{option} {address}: write an IP address, a port, or both, as 0.0.0.0:{usual}"
+            f"{option} {address}: write an IP address, a port, or both, as 0.0.0.0:{default_port}"
         ) from error
     if not 0 <= number <= 65535:
         raise ConfigError(f"{option} {address}: a port is at most 65535")
@@ -170,7 +170,7 @@ def leave_address(port: int) -> str:
 
 
 def ask_to_leave(port: int) -> bool:
-    """Ask for the release of a port; return whether a flight that has ended was served there."""
+    """Ask the page or stream of an ended flight to release its port; return whether it agreed."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as asking:
         asking.settimeout(1.0)
         try:

@@ -24,13 +24,13 @@ async def until_unused(port: int, is_open: Callable[[], bool]) -> None:
         port: port of the page or stream.
         is_open: returns whether somebody has it open.
     """
-    async with _leave_request(port) as asked:
+    async with _leave_request(port) as leave_requested:
         quiet = 0.0
         for _ in range(int(_LONGEST_STAY)):
             quiet = 0.0 if is_open() else quiet + 1.0
-            if asked.is_set() or quiet > _LONGEST_UNUSED:
+            if leave_requested.is_set() or quiet > _LONGEST_UNUSED:
                 break
-            waiting = asyncio.create_task(asked.wait())
+            waiting = asyncio.create_task(leave_requested.wait())
             await asyncio.wait({waiting}, timeout=1.0)
             waiting.cancel()
 
@@ -38,7 +38,7 @@ async def until_unused(port: int, is_open: Callable[[], bool]) -> None:
 @asynccontextmanager
 async def _leave_request(port: int) -> AsyncGenerator[asyncio.Event, None]:
     """Yield an event that the next flight of the same user sets when it needs the port."""
-    asked = asyncio.Event()
+    leave_requested = asyncio.Event()
 
     async def answer(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         sock = writer.get_extra_info("socket")
@@ -46,13 +46,13 @@ async def _leave_request(port: int) -> AsyncGenerator[asyncio.Event, None]:
         _, user, _ = struct.unpack("3i", credentials)
         if user == os.getuid():
             writer.write(b"leaving")
-            asked.set()
+            leave_requested.set()
         writer.close()
 
     try:
         server = await asyncio.start_unix_server(answer, leave_address(port))
-    except OSError:  # another process has this name, so nobody can ask us
-        yield asked
+    except OSError:  # another process has this name, so no request can arrive
+        yield leave_requested
         return
     async with server:
-        yield asked
+        yield leave_requested

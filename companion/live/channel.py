@@ -75,7 +75,7 @@ class Channel:
         return message if isinstance(message, dict) else {}
 
     def waiting(self, most: float = inf) -> Iterator[Message | None]:
-        """At most `most` messages that have arrived; a last None: the other end is closed.
+        """Yield at most `most` messages that have arrived, and None if the other end is closed.
 
         The socket must not block.
         """
@@ -129,7 +129,7 @@ class Feed:
 
 
 def datagrams(end: socket.socket, max_count: int) -> Iterator[bytes]:
-    """At most `max_count` datagrams that arrived at a non-blocking socket; b"": it was closed."""
+    """Yield at most `max_count` datagrams of a non-blocking socket, and b"" if it was closed."""
     for _ in range(max_count):
         try:
             datagram = end.recv(_LARGEST_MESSAGE)

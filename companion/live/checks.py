@@ -36,12 +36,12 @@ class ChangeChecks:
     def __init__(self, start: Config, *, follows: bool) -> None:
         self.start = self.now = start
         self._drag = before_connecting(start)
-        self._flown: ManeuverSequence | None = None
-        self._unknown: ConfigError | None = None
+        self._maneuvers: ManeuverSequence | None = None
+        self._maneuvers_error: ConfigError | None = None
         try:
-            self._flown = configured_maneuvers(start, self._drag) if follows else None
+            self._maneuvers = configured_maneuvers(start, self._drag) if follows else None
         except ConfigError as error:  # a file has changed since the flight read it
-            self._unknown = error
+            self._maneuvers_error = error
 
     @staticmethod
     def of(message: dict[str, Any]) -> "ChangeChecks":
@@ -50,7 +50,7 @@ class ChangeChecks:
         return ChangeChecks(start, follows=bool(message["follows"]))
 
     def note(self, message: dict[str, Any]) -> None:
-        """Take a message of a changed configuration."""
+        """Take a message that holds the changed configuration."""
         self.now = Config.model_validate(message["config"])
 
     def note_drag(self, message: dict[str, Any]) -> None:
@@ -77,12 +77,12 @@ class ChangeChecks:
             _require_margins(self.start, wanted, name)
         except (ValueError, ArithmeticError) as error:
             raise ConfigError(f"{name}: {error}") from error
-        if self._unknown is not None:
+        if self._maneuvers_error is not None:
             raise ConfigError(
-                f"{name}: the maneuvers of this flight are not known: {self._unknown}"
+                f"{name}: the maneuvers of this flight are not known: {self._maneuvers_error}"
             )
-        if self._flown is not None:
-            require_still_flyable(wanted, self._flown, self._drag)
+        if self._maneuvers is not None:
+            require_still_flyable(wanted, self._maneuvers, self._drag)
 
 
 def _require_margins(start: Config, wanted: Config, name: str) -> None:
@@ -96,8 +96,8 @@ def _require_margins(start: Config, wanted: Config, name: str) -> None:
         raise ConfigError(f"{name}: with these values the control loop is unstable")
     gain_db = min(_LEAST_GAIN_DB, before.gain_db) if before.stable else _LEAST_GAIN_DB
     phase_deg = min(_LEAST_PHASE_DEG, before.phase_deg) if before.stable else _LEAST_PHASE_DEG
-    kept = 1.0 - _ROUNDING
-    if not (after.gain_db >= kept * gain_db and after.phase_deg >= kept * phase_deg):
+    tolerance = 1.0 - _ROUNDING
+    if not (after.gain_db >= tolerance * gain_db and after.phase_deg >= tolerance * phase_deg):
         raise ConfigError(
             f"{name}: with these values the control loop keeps margins of {after.sentence()} only; "
             f"a change in flight must keep {gain_db:.1f} dB and {phase_deg:.0f}°"

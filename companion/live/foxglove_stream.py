@@ -18,7 +18,7 @@ from companion.live.helper_process import Relay
 from companion.recording.mcap_file.batch import messages_of
 from companion.recording.mcap_file.channels import ENCODING, SCHEMA_ENCODING, TOPICS
 
-_MOST_A_TURN = 20
+_MOST_PER_TURN = 20
 """Largest number of datagrams handled in one turn of the event loop."""
 
 
@@ -26,19 +26,19 @@ class _Subscriptions(ServerListener):
     """Tracks whether somebody has the stream open. The library calls it in its own threads."""
 
     def __init__(self) -> None:
-        self._found: set[tuple[int, int]] = set()
+        self._active: set[tuple[int, int]] = set()
 
     def on_subscribe(self, client: Client, channel: ChannelView) -> None:
         """Count a subscription."""
-        self._found.add((client.id, channel.id))
+        self._active.add((client.id, channel.id))
 
     def on_unsubscribe(self, client: Client, channel: ChannelView) -> None:
         """End a subscription; a client that leaves also unsubscribes."""
-        self._found.discard((client.id, channel.id))
+        self._active.discard((client.id, channel.id))
 
     def any(self) -> bool:
         """Whether a client has subscribed to a channel."""
-        return bool(self._found)
+        return bool(self._active)
 
 
 class Stream:
@@ -102,7 +102,7 @@ class Stream:
 
 
 async def serve_stream(relay: Relay, feed: socket.socket) -> None:
-    """Serve the stream of a flight until the flight has ended, and then as `until_unused` says.
+    """Serve the stream of a flight until the flight has ended and `until_unused` has returned.
 
     Args:
         relay: receives messages of the flight.
@@ -111,7 +111,7 @@ async def serve_stream(relay: Relay, feed: socket.socket) -> None:
     host, port = str(relay.first["stream_host"]), int(relay.first["stream_port"])
     try:
         stream = Stream(host, port)
-    except RuntimeError as error:  # since the flight has looked, another program took the port
+    except RuntimeError as error:  # another program took the port after the flight's check
         relay.note(f"there is no live stream: {error}; the flight goes on without it")
         feed.close()
         return
@@ -119,7 +119,7 @@ async def serve_stream(relay: Relay, feed: socket.socket) -> None:
     os.set_blocking(feed.fileno(), False)
 
     def on_readable() -> None:
-        for datagram in datagrams(feed, _MOST_A_TURN):
+        for datagram in datagrams(feed, _MOST_PER_TURN):
             if datagram:
                 stream.take(datagram)
             else:

@@ -19,7 +19,7 @@ from companion.realtime import schedule_as_usual
 
 T = TypeVar("T")
 
-_MOST_A_TURN = 10
+_MOST_PER_TURN = 10
 """Largest number of messages handled in one turn of the event loop; samples come between turns."""
 
 
@@ -63,17 +63,17 @@ class Helper:
         self.changes = Changes(config)
         self.note: Callable[[str], None] = lambda _: None
         self._name, self._has_ended = _helper_name(tasks), False
-        self._channel, theirs = Channel.pair()
+        self._channel, process_end = Channel.pair()
         self.feed: Feed | None = None
-        fed: socket.socket | None = None
+        feed_end: socket.socket | None = None
         if tasks.stream is not None:
-            self.feed, fed = Feed.pair()
-        served = None if tasks.page is None else tasks.page.listening
-        self._process = _started((theirs, served, fed), tasks.folder)
-        theirs.close()
-        if fed is not None:
-            fed.close()
-        self._send("start", **_first(tasks, config))
+            self.feed, feed_end = Feed.pair()
+        page_socket = None if tasks.page is None else tasks.page.listening
+        self._process = _start_process((process_end, page_socket, feed_end), tasks.folder)
+        process_end.close()
+        if feed_end is not None:
+            feed_end.close()
+        self._send("start", **_first_message(tasks, config))
 
     @property
     def dropped(self) -> int:
@@ -148,8 +148,8 @@ class Helper:
             self.note(f"{self._name} has ended by itself; the flight goes on without it")
 
     def _tell_change(self, config: Config) -> None:
-        made = str(self.changes.made[-1])
-        self._send("config", config=_plain(config), can_undo=self.changes.can_undo, text=made)
+        change = str(self.changes.made[-1])
+        self._send("config", config=_as_json(config), can_undo=self.changes.can_undo, text=change)
 
     def _tell_drag(self, known: KnownDrag) -> None:
         drag, source = known.drag, known.source
@@ -161,7 +161,7 @@ class Helper:
 
     def _on_readable(self) -> None:
         """Handle the requests of the process."""
-        for message in self._channel.waiting(_MOST_A_TURN):
+        for message in self._channel.waiting(_MOST_PER_TURN):
             if message is None:
                 asyncio.get_running_loop().remove_reader(self._channel.fileno())
                 self._note_ended()
@@ -185,25 +185,25 @@ class Helper:
 
 
 def _helper_name(tasks: HelperTasks) -> str:
-    """Name of the helper process in messages: what the user sees of it."""
+    """Name of the helper process in messages: the part that the user sees."""
     if tasks.page is not None:
         return "the live page"
     return "the file watcher" if tasks.stream is None else "the live stream"
 
 
-def _started(
+def _start_process(
     sockets: tuple[socket.socket | None, ...], folder: Path | None
 ) -> "subprocess.Popen[bytes]":
-    """Start the process. It survives Ctrl-C, and the flight's end while page or stream is open."""
+    """Start the process. It survives Ctrl-C, and outlives the flight if page or stream is open."""
     descriptors = [-1 if each is None else each.fileno() for each in sockets]
     command = [sys.executable, "-m", "companion.live.helper_process", *map(str, descriptors)]
     log = Path("/dev/null") if folder is None else folder / "live.log"
-    with log.open("ab") as words:
+    with log.open("ab") as output:
         process = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,
-            stdout=words,
-            stderr=words,
+            stdout=output,
+            stderr=output,
             pass_fds=[each for each in descriptors if each >= 0],
             start_new_session=True,
         )
@@ -211,11 +211,11 @@ def _started(
     return process
 
 
-def _first(tasks: HelperTasks, config: Config) -> Message:
+def _first_message(tasks: HelperTasks, config: Config) -> Message:
     page, stream = tasks.page, tasks.stream
     return {
-        "config": _plain(config),
-        "read": _plain(tasks.read),
+        "config": _as_json(config),
+        "read": _as_json(tasks.read),
         "follows": tasks.follows,
         "watch": None if tasks.watch is None else str(tasks.watch.absolute()),
         "folder": None if tasks.folder is None else str(tasks.folder.absolute()),
@@ -227,6 +227,6 @@ def _first(tasks: HelperTasks, config: Config) -> Message:
     }
 
 
-def _plain(config: Config) -> Message:
+def _as_json(config: Config) -> Message:
     plain: Message = json.loads(config.model_dump_json())
     return plain

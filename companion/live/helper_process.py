@@ -43,9 +43,9 @@ class Relay:
         self.over = asyncio.Event()
         self._channel = channel
         self._ids = count()
-        self._asked: dict[int, asyncio.Future[Message]] = {}
+        self._pending_answers: dict[int, asyncio.Future[Message]] = {}
         self._listeners: list[Any] = []
-        self._one_at_a_time = asyncio.Lock()
+        self._request_lock = asyncio.Lock()
         asyncio.get_running_loop().add_reader(channel.fileno(), self._on_readable)
 
     def listen(self, take: Any) -> None:
@@ -62,19 +62,19 @@ class Relay:
             ChangeRefusedError: the flight refuses them, cannot take them, or has ended.
             NoAnswerError: the flight did not answer in time; the change may be in force.
         """
-        async with self._one_at_a_time:
+        async with self._request_lock:
             await asyncio.to_thread(self.checks.check, values, by)
             return await self._ask({"kind": "change", "values": values, "by": by})
 
     async def undo(self, by: str) -> str:
-        """Request from the flight the values before the newest change; return them in words.
+        """Ask the flight to undo the newest change; return the new change in words.
 
-        Their margins are not checked again.
+        The stability margins are not checked again.
 
         Raises:
             ChangeRefusedError, NoAnswerError: see `change`.
         """
-        async with self._one_at_a_time:
+        async with self._request_lock:
             return await self._ask({"kind": "undo", "by": by})
 
     async def _ask(self, message: Message) -> str:
@@ -85,7 +85,7 @@ class Relay:
             NoAnswerError: the flight did not answer in time; the request may be in force.
         """
         number = next(self._ids)
-        answer = self._asked[number] = asyncio.get_running_loop().create_future()
+        answer = self._pending_answers[number] = asyncio.get_running_loop().create_future()
         try:
             if self.over.is_set() or not self._channel.send({**message, "id": number}):
                 ended = self.over.is_set() or not self._channel.open
@@ -99,7 +99,7 @@ class Relay:
                 "applied, so look at the values of the flight"
             ) from error
         finally:
-            del self._asked[number]
+            del self._pending_answers[number]
         if reply.get("refusal") is not None:
             raise ChangeRefusedError(str(reply["refusal"]))
         return str(reply.get("text"))
@@ -121,7 +121,7 @@ class Relay:
             self.checks.note(message)
         elif message["kind"] == "drag":
             self.checks.note_drag(message)
-        answered = self._asked.get(message.get("id", -1))
+        answered = self._pending_answers.get(message.get("id", -1))
         if answered is not None and not answered.done():
             answered.set_result(message)
         for take in self._listeners:
@@ -145,7 +145,7 @@ async def watch(relay: Relay, path: Path) -> None:
                 relay.note(f"{path.name} is not applied: {refused}")
             except NoAnswerError as error:
                 relay.note(f"{path.name}: {error}")
-                watched.accept()  # so that an edit that takes it back is sent
+                watched.accept()  # so that an edit back to the old values is sent
         await asyncio.sleep(_LOOK_PERIOD)
 
 
@@ -176,7 +176,7 @@ async def _serve(descriptor: int, listening: int, feed: int) -> None:
 
 
 async def _watch_until_over(relay: Relay) -> None:
-    """Watch the file, if that is asked for, until the flight ends."""
+    """Watch the file, if there is one to watch, until the flight ends."""
     path = relay.first["watch"]
     watching = None if path is None else asyncio.create_task(watch(relay, Path(path)))
     await relay.over.wait()

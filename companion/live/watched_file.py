@@ -12,7 +12,7 @@ from companion.files.yaml_file import ConfigError
 _LONGEST_EXPLANATION = 400
 """Largest length of an explanation, characters."""
 _UNCHANGED_CHECKS = 3
-"""Number of unchanged checks after which a file counts as complete; editors remove it briefly."""
+"""A file counts as complete after this many checks without a change; editors save in steps."""
 
 Signature = tuple[tuple[int, int, int] | None, ...]
 """Inode, size and time (ns) of the file and of all its includes; None: it cannot be found."""
@@ -45,33 +45,33 @@ class WatchedFile:
 
     def __init__(self, path: Path, read: Config, check: Callable[[Values, str], None]) -> None:
         self._path, self._check = path, check
-        self._accepted = self._offered = read
+        self._accepted = self._newest_loaded = read
         self._files = files_of(path)
         self._seen = self._signature()
-        self._judged: Signature | None = None
-        self._looks = 0
+        self._last_judged: Signature | None = None
+        self._unchanged_looks = 0
 
     def look(self) -> Edit | None:
         """The newest edit; None: there is none, or the file is being written."""
         signature = self._signature()
         if signature != self._seen:
-            self._seen, self._looks = signature, 0
-        self._looks += 1
-        if self._looks < _UNCHANGED_CHECKS or signature == self._judged:
+            self._seen, self._unchanged_looks = signature, 0
+        self._unchanged_looks += 1
+        if self._unchanged_looks < _UNCHANGED_CHECKS or signature == self._last_judged:
             return None
         self._files = files_of(self._path)
-        self._seen = self._judged = self._signature()
+        self._seen = self._last_judged = self._signature()
         return self._edit()
 
     def accept(self) -> None:
         """Accept the newest edit: later edits are compared with it."""
-        self._accepted = self._offered
+        self._accepted = self._newest_loaded
 
     def _edit(self) -> Edit | None:
         name = self._path.name
         try:
-            self._offered = load(self._path)
-            values = _values(self._accepted, self._offered)
+            self._newest_loaded = load(self._path)
+            values = _values(self._accepted, self._newest_loaded)
             if not values:
                 return None
             self._check(values, name)

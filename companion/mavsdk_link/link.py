@@ -2,9 +2,9 @@
 
 Setpoints are not sent by MAVSDK's offboard plugin. The plugin repeats the last setpoint 20 times a
 second, in its own thread, until it is told to stop, which can be too late. Measured: a process was
-stopped in flight and resumed, and the plugin sent old body rates before any other thread ran. PX4,
-whose failsafe was landing, took them for a request for offboard, and obeyed them. So each setpoint
-is one frame of this program, sent once, in answer to a fresh sample.
+stopped in flight and resumed, and the plugin sent old body rates before any other thread ran. PX4
+was landing by its failsafe; it took them as a request for offboard mode, and obeyed them. So each
+setpoint is one frame of this program, sent once, in answer to a fresh sample.
 """
 
 import logging

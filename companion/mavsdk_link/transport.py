@@ -71,7 +71,7 @@ def _address(where: Endpoint) -> str:
 _MOST_WAITING = 1000
 """Largest number of frames that wait for the event loop; beyond it the oldest are dropped."""
 _SOURCE = slice(5, 7)  # system and component of a MAVLink 2 frame
-_REASONS = {
+_OPEN_FAILURES = {
     "BIND_ERROR": "the port is in use by another program, or the address is not this computer's",
     "DESTINATION_IP_UNKNOWN": "the host is unknown; use its IP address",
     "CONNECTION_ERROR": "check that the device is there and that you may use it",
@@ -86,7 +86,7 @@ class MavsdkTransport:
             `source_component`, because it does not forward frames that are addressed to itself.
         receive: Called in the event loop for each frame except MAVSDK's own.
         speaks_first: Whether frames can be sent before one has been received. A listening UDP
-            endpoint does not know the vehicle's address before.
+            endpoint does not know the vehicle's address until then.
 
     Raises:
         EndpointError: The endpoint cannot be parsed, or MAVSDK cannot open it; the message says
@@ -146,6 +146,6 @@ class MavsdkTransport:
                 self._receive(frame, received_ns)
 
 
-def _open_error(endpoint: str, words: str) -> str:
-    known = (reason for name, reason in _REASONS.items() if name in words)
-    return f"{endpoint} cannot be opened by MAVSDK: {next(known, words)}"
+def _open_error(endpoint: str, message: str) -> str:
+    known = (reason for name, reason in _OPEN_FAILURES.items() if name in message)
+    return f"{endpoint} cannot be opened by MAVSDK: {next(known, message)}"

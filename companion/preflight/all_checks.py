@@ -78,5 +78,5 @@ def overall_result(config: Config, findings: Iterable[Finding]) -> CheckResult:
 
 
 def unsafe(findings: Iterable[Finding]) -> list[Finding]:
-    """The findings because of which somebody may be hurt or the vehicle lost."""
+    """The unsafe findings: somebody may be hurt, or the vehicle lost."""
     return [finding for finding in findings if finding.result is CheckResult.UNSAFE]

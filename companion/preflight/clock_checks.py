@@ -13,10 +13,12 @@ from companion.vehicle.parameter_rules import CheckResult
 SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 
 _UNSAFE_NOT_NEWER_SHARE = 0.2
+"""Largest share of samples stamped no later than the one before that is not unsafe."""
 _MIN_SAMPLES = 10
+"""Smallest number of samples to judge the rate of the clock."""
 _SHAKING_PRODUCT, _MAYBE_SHAKING_PRODUCT = 0.3, 0.15
 """Products of planner.gain_per_s and the round trip, from mock vehicles. Above the first, attitude
-oscillates at the limit of the roll-pitch rate; above the second, that of a slow vehicle may.
+oscillates at the limit of the roll-pitch rate; above the second, a slow vehicle may oscillate.
 """
 
 
@@ -102,11 +104,11 @@ def _clock_rate(config: Config, evidence: Evidence, rate: float, source: str) ->
 
     A pause of the samples at either end of the window makes the measured rate uncertain.
     """
-    behind = 1.0 - rate - MOST_DRIFT
-    stale_after = config.deadman.telemetry_stale / behind if behind > 0.0 else inf
-    unsure = evidence.samples.longest_pause / max(evidence.window, 1e-3)
-    too_slow = behind > unsure
-    apart = abs(rate - 1.0) > MOST_DRIFT
+    lag_per_s = 1.0 - rate - MOST_DRIFT
+    stale_after = config.deadman.telemetry_stale / lag_per_s if lag_per_s > 0.0 else inf
+    uncertainty = evidence.samples.longest_pause / max(evidence.window, 1e-3)
+    too_slow = lag_per_s > uncertainty
+    differs = abs(rate - 1.0) > MOST_DRIFT
     because = "time limits, such as those of `deadman`, are longer or shorter than configured"
     if too_slow:
         because = (
@@ -115,9 +117,9 @@ def _clock_rate(config: Config, evidence: Evidence, rate: float, source: str) ->
         )
     return Finding(
         Key.CLOCK,
-        UNSAFE if too_slow else INEFFECTIVE if apart else SAFE,
+        UNSAFE if too_slow else INEFFECTIVE if differs else SAFE,
         f"the vehicle's clock runs {rate:.3f} times as fast as ours",
-        because if apart else "",
-        "run a simulation at the speed of real time, or in lockstep" if apart else "",
+        because if differs else "",
+        "run a simulation at the speed of real time, or in lockstep" if differs else "",
         source,
     )

@@ -130,7 +130,7 @@ def _newest_dead_times(config: Config, uid: str | None) -> tuple[Path | None, di
                 continue
             axes = {name: flight["dead_time_s"][name] for name in ("roll", "pitch", "yaw")}
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
-            continue  # of another program, or of a flight that was cut off
+            continue  # written by another program, or cut off
         known = {
             name: float(value)
             for name, value in axes.items()

@@ -162,7 +162,7 @@ class Evidence:
 
     @property
     def booting(self) -> bool:
-        """Whether no estimator status came lately: before its first one, ArduPilot sends little."""
+        """Whether no recent estimator status is known; ArduPilot sends little before the first."""
         return self.state.readiness.estimator_flags is None
 
     @property

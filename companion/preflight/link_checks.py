@@ -16,9 +16,9 @@ SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.IN
 _MIN_RATE_SHARE = 0.7
 """Smallest share of the requested rate; PX4 sends 197 Hz of 250 requested (measured)."""
 _MIN_EXPECTED_COUNT = 5.0
-"""Smallest number of expected messages while we listen to judge a rate by counting."""
+"""A rate is judged by counting only if at least this many messages are expected."""
 _SENT_ON_CHANGE = {"CURRENT_MODE": 2.0}
-"""Messages sent on change, and otherwise only at this rate, Hz, whatever rate is requested (PX4).
+"""Messages that PX4 sends on change, and otherwise at this rate, Hz, whatever rate is requested.
 """
 _RATE_KEYS = {
     "ATTITUDE_QUATERNION": "link.attitude_rate_hz",
@@ -73,10 +73,10 @@ def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
 
 def _effective_rate(name: str, rate: StreamRate, evidence: Evidence) -> float:
     """The effective rate, Hz: for attitudes, the pauses between bursts lower it."""
-    samples = evidence.samples.rate
-    if name != "ATTITUDE_QUATERNION" or samples is None:
+    sample_rate = evidence.samples.rate
+    if name != "ATTITUDE_QUATERNION" or sample_rate is None:
         return rate.achieved
-    return min(rate.achieved, samples)
+    return min(rate.achieved, sample_rate)
 
 
 def _rate_fault(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, str] | None:

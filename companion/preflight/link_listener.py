@@ -43,6 +43,7 @@ class LinkListener:
 
     def __init__(self, link: Link, clock: Callable[[], float]) -> None:
         self._link, self._clock = link, clock
+        # Arrival by our clock, and time stamp of the vehicle, s.
         self._stamps: list[tuple[float, float]] = []
         self._ages: list[float] = []
         self._clock_changes = link.clock.changes
@@ -75,7 +76,7 @@ class LinkListener:
         if not pairs:
             return SampleTimes(len(self._stamps), unusable=self._unusable)
         (first, first_stamp), (last, last_stamp) = self._stamps[0], self._stamps[-1]
-        known = len(self._stamps) >= _MIN_SAMPLES and last > first
+        enough = len(self._stamps) >= _MIN_SAMPLES and last > first
         arrivals, clock = IntervalSums(), self._link.clock
         for earlier, later in pairs:
             arrivals.add(later[0] - earlier[0])
@@ -84,10 +85,10 @@ class LinkListener:
             longest_pause=max(later[0] - earlier[0] for earlier, later in pairs),
             not_newer=sum(later[1] <= earlier[1] for earlier, later in pairs),
             unusable=self._unusable,
-            clock_rate=(last_stamp - first_stamp) / (last - first) if known else None,
+            clock_rate=(last_stamp - first_stamp) / (last - first) if enough else None,
             age=median(self._ages) if self._ages and clock.age_known else None,
             clock_change=clock.last_change if clock.changes != self._clock_changes else "",
-            rate=arrivals.rate_since(IntervalSums()) if known else None,
+            rate=arrivals.rate_since(IntervalSums()) if enough else None,
         )
 
     @property

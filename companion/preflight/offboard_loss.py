@@ -87,7 +87,7 @@ def worst_reach(
 ) -> WorstReach:
     """The largest reach over the maneuvers.
 
-    `hold_time`, `drag` and `brakes` are `held`, `drag` and `brakes` of `LossFailsafe`.
+    `LossFailsafe` describes `hold_time`, `drag` and `brakes`.
     """
     fence = replace(config.fence, places=())
     max_tilt_rate = config.limits.max_tilt_rate
@@ -122,12 +122,12 @@ def _breach(config: Config, offset: Vector, reached: Reach, fence: Fence) -> str
     if distance == 0.0:
         farthest = (reached.spread, 0.0, offset[2])
     height = config.flight.takeoff_height_m - offset[2]
-    for place, its_height in (
+    for place, height_there in (
         (farthest, height),
         ((north, east, offset[2] - reached.up), height),
         ((north, east, offset[2]), height - reached.down),
     ):
-        breach = fence.breach(place, its_height, None)
+        breach = fence.breach(place, height_there, None)
         if breach is not None:
             return str(breach)
     return None
@@ -143,13 +143,13 @@ def _motions(
     gain = config.planner.gain_per_s
     period = max(_POINT_PERIOD, maneuvers.duration / _MAX_POINTS)
     velocity: Vector = (0.0, 0.0, 0.0)
-    place: Vector = (0.0, 0.0, 0.0)
+    offset: Vector = (0.0, 0.0, 0.0)
     tilt = (0.0, 0.0)
     for index in range(int(maneuvers.duration / period) + 1):
         time = index * period
         reference = maneuvers.at(time, _START_POSE)
         if reference.closed_loop:
-            place, velocity = reference.position_ned, reference.velocity_ned
+            offset, velocity = reference.position_ned, reference.velocity_ned
             thrust = path_thrust(reference.acceleration_ned, velocity, drag)
             reference_after = maneuvers.at(time + _DERIVATIVE_STEP, _START_POSE)
             thrust_after = path_thrust(
@@ -163,7 +163,7 @@ def _motions(
             yield (
                 time,
                 MotionAtLoss(
-                    place, velocity, thrust, (thrust_rate[0], thrust_rate[1], thrust_rate[2])
+                    offset, velocity, thrust, (thrust_rate[0], thrust_rate[1], thrust_rate[2])
                 ),
             )
             continue
@@ -172,7 +172,7 @@ def _motions(
         thrust_rate_north, thrust_rate_east = (hypot(*thrust) * rate for rate in rates)
         yield (
             time,
-            MotionAtLoss(place, velocity, thrust, (thrust_rate_north, thrust_rate_east, 0.0)),
+            MotionAtLoss(offset, velocity, thrust, (thrust_rate_north, thrust_rate_east, 0.0)),
         )
         tilt = tilt_after
         north, east, _ = tilted_thrust(*tilt)
@@ -182,7 +182,7 @@ def _motions(
             velocity[1] + (east - drag_deceleration[1]) * period,
             0.0,
         )
-        place = (place[0] + velocity[0] * period, place[1] + velocity[1] * period, place[2])
+        offset = (offset[0] + velocity[0] * period, offset[1] + velocity[1] * period, offset[2])
 
 
 def _tilt_step(
@@ -197,9 +197,12 @@ def _tilt_step(
     if reference.coefficients is not None:
         tilt_goal = reference.coefficients
         remaining_share = exp(-gain * period)
-        north, east = (goal - now for goal, now in zip(tilt_goal, tilt, strict=True))
-        tilt_after = (tilt_goal[0] - north * remaining_share, tilt_goal[1] - east * remaining_share)
-        return (gain * north, gain * east), tilt_after
+        north_error, east_error = (goal - now for goal, now in zip(tilt_goal, tilt, strict=True))
+        tilt_after = (
+            tilt_goal[0] - north_error * remaining_share,
+            tilt_goal[1] - east_error * remaining_share,
+        )
+        return (gain * north_error, gain * east_error), tilt_after
     assert reference.body_rates is not None
-    north, east = -reference.body_rates.pitch, reference.body_rates.roll
-    return (north, east), (tilt[0] + north * period, tilt[1] + east * period)
+    north_rate, east_rate = -reference.body_rates.pitch, reference.body_rates.roll
+    return (north_rate, east_rate), (tilt[0] + north_rate * period, tilt[1] + east_rate * period)

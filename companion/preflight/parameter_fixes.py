@@ -61,7 +61,7 @@ class UndoFile:
 
     def __init__(self, directory: Path, link: Link, identity: Identity) -> None:
         began = datetime.now(UTC)
-        self.path = _unused(directory, f"doctor-undo-{began:%Y-%m-%dT%H-%M-%SZ}")
+        self.path = _unused_path(directory, f"doctor-undo-{began:%Y-%m-%dT%H-%M-%SZ}")
         self._undo = Undo(
             autopilot=link.autopilot.name,
             system=link.settings.target_system,
@@ -71,14 +71,14 @@ class UndoFile:
         )
 
     def add(self, parameter: str, old: float) -> None:
-        """Write a parameter's old value to the file, unless the file has one of it already.
+        """Write a parameter's old value to the file, unless the file already holds one for it.
 
         Raises:
             ConfigError: the file cannot be written, so no parameter must be set.
         """
-        grown = dict(self._undo.parameters)
-        grown.setdefault(parameter, old)
-        self._undo = self._undo.model_copy(update={"parameters": grown})
+        old_values = dict(self._undo.parameters)
+        old_values.setdefault(parameter, old)
+        self._undo = self._undo.model_copy(update={"parameters": old_values})
         text = bounded_yaml.dump(self._undo.model_dump())
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -90,7 +90,7 @@ class UndoFile:
             ) from error
 
 
-def _unused(directory: Path, name: str) -> Path:
+def _unused_path(directory: Path, name: str) -> Path:
     """A path that does not exist yet, even if another run began within the same second."""
     path, number = directory / f"{name}.yaml", 1
     while path.exists():
@@ -102,7 +102,7 @@ def _unused(directory: Path, name: str) -> Path:
 _FLOAT32_RESOLUTION = 1e-6
 """Relative resolution of a single-precision parameter."""
 _MAX_HEARTBEAT_AGE = 3.0
-"""Largest age of a heartbeat from which the vehicle counts as known to be armed or disarmed, s."""
+"""Largest age of a heartbeat that still tells whether the vehicle is armed, s."""
 
 
 class Answer(Enum):
@@ -167,7 +167,7 @@ async def apply_fixes(
             continue
         require_disarmed(link)
         undo.add(change.parameter, change.old)
-        report(await _set(link, change))
+        report(await _set_and_read_back(link, change))
 
 
 async def restore(link: Link, undo: Undo, report: Callable[[Outcome], None]) -> None:
@@ -189,7 +189,7 @@ async def restore(link: Link, undo: Undo, report: Callable[[Outcome], None]) -> 
         except ParameterError as error:
             report(Outcome(Change(parameter, old, old, reboot=False), str(error)))
             continue
-        report(await _set(link, Change(parameter, now, old, reboot=False)))
+        report(await _set_and_read_back(link, Change(parameter, now, old, reboot=False)))
 
 
 def require_disarmed(link: Link) -> None:
@@ -210,17 +210,17 @@ def require_disarmed(link: Link) -> None:
         )
 
 
-async def _set(link: Link, change: Change) -> Outcome:
+async def _set_and_read_back(link: Link, change: Change) -> Outcome:
     """Set a parameter and read it back. Raises `LinkLost`."""
     try:
         await link.write_parameter(change.parameter, change.new)
-        value_held = await link.read_parameter(change.parameter)
+        value_read = await link.read_parameter(change.parameter)
     except ParameterError as error:
         return Outcome(change, str(error))
-    if isclose(value_held, change.new, rel_tol=_FLOAT32_RESOLUTION, abs_tol=_FLOAT32_RESOLUTION):
+    if isclose(value_read, change.new, rel_tol=_FLOAT32_RESOLUTION, abs_tol=_FLOAT32_RESOLUTION):
         return Outcome(change)
     return Outcome(
         change,
-        f"{change.parameter}: {value_held:g} was read back instead of {change.new:g}; "
+        f"{change.parameter}: {value_read:g} was read back instead of {change.new:g}; "
         "set it with a ground station, and check again",
     )

@@ -42,9 +42,9 @@ class Survey(NamedTuple):
 
     Attributes:
         values: Values by newest name.
-        names: Name of each in this autopilot, by newest name.
-        unread: Newest names of the parameters that the autopilot may have although no value came:
-            it did not report them as unknown.
+        names: Name of each parameter in this autopilot, by newest name.
+        unread: Newest names of the parameters without a value that the autopilot did not report as
+            unknown, so it may have them.
         lossy: Whether the link lost frames during the survey, in either direction.
     """
 
@@ -127,7 +127,7 @@ class _Requests:
         return self._repeated or lost > TOLERABLE_LOSS
 
     def leave_out(self, names: Iterable[str]) -> None:
-        """Do not request these names, because the parameters have others in this autopilot."""
+        """Do not request these names, because this autopilot uses other names."""
         self._skipped_names.update(names)
 
     def unread(self, rules: Iterable[ParameterRule]) -> list[ParameterRule]:
@@ -145,12 +145,14 @@ class _Requests:
     async def _ask_under_each_name(self, rule: ParameterRule, policy: RetryPolicy) -> None:
         async with self._request_slots:
             for name in rule.names:
-                value = None if name in self._skipped_names else await self._value(name, policy)
+                value = (
+                    None if name in self._skipped_names else await self._read_value(name, policy)
+                )
                 if value is not None:
                     self.values[rule.name], self.names[rule.name] = value, name
                     return
 
-    async def _value(self, name: str, policy: RetryPolicy) -> float | None:
+    async def _read_value(self, name: str, policy: RetryPolicy) -> float | None:
         for attempt in range(policy.tries):
             try:
                 value = await self._link.read_parameter(name, timeout_s=policy.timeout_s, retries=0)

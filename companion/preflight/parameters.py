@@ -54,7 +54,7 @@ def parameters(config: Config, evidence: Evidence) -> Iterator[Finding]:
                 "fix the link; if the autopilot really has no such parameter, update "
                 + evidence.autopilot.name,
             )
-    yield from _unread(evidence)
+    yield from _missing_parameters(evidence)
     for found in judge(rules, survey.values, companion_settings(config)):
         yield _finding(found, survey.names[found.rule.name])
 
@@ -64,7 +64,7 @@ def _unknown(rule: ParameterRule, found: str, fix: str) -> Finding:
     return Finding(rule.name, CheckResult.UNSAFE, found, because, fix, rule.source)
 
 
-def _unread(evidence: Evidence) -> Iterator[Finding]:
+def _missing_parameters(evidence: Evidence) -> Iterator[Finding]:
     """Findings about parameters that were not received.
 
     On a link that loses frames, a missing parameter that every version has is unsafe. The other
@@ -73,19 +73,19 @@ def _unread(evidence: Evidence) -> Iterator[Finding]:
     survey = evidence.survey
     lossy = survey.lossy or evidence.link.loss > TOLERABLE_LOSS
     rules = [rule for rule in evidence.autopilot.parameters if not rule.vital]
-    hidden = [rule for rule in rules if rule.universal and _hidden(rule, survey)]
-    unread = [rule.name for rule in hidden]
+    unread_rules = [rule for rule in rules if rule.universal and _may_exist_unread(rule, survey)]
+    missing_names = [rule.name for rule in unread_rules]
     if lossy:
-        for rule in hidden:
+        for rule in unread_rules:
             found = f"{rule.name} was not received, and the link loses frames"
             yield _unknown(rule, found, "fix the link")
         others = (rule.name for rule in rules if rule.name in survey.unread)
-        unread = [name for name in others if name not in unread]
-    if unread:
+        missing_names = [name for name in others if name not in missing_names]
+    if missing_names:
         yield Finding(
             Key.PARAMETERS,
             CheckResult.INEFFECTIVE,
-            f"parameters not received: {', '.join(unread)}",
+            f"parameters not received: {', '.join(missing_names)}",
             "the autopilot has no such parameter, or the link lost the answer; so their values "
             "were not checked",
             "fix the link, or check them with a ground station",
@@ -93,10 +93,10 @@ def _unread(evidence: Evidence) -> Iterator[Finding]:
         )
 
 
-def _hidden(rule: ParameterRule, survey: Survey) -> bool:
-    """Whether the parameter, or the one that other versions have instead, may exist unread."""
-    places = {rule.name, rule.instead}
-    return places.isdisjoint(survey.values) and not places.isdisjoint(survey.unread)
+def _may_exist_unread(rule: ParameterRule, survey: Survey) -> bool:
+    """Whether neither the rule's parameter nor its alternative has a value, but one may exist."""
+    names = {rule.name, rule.instead}
+    return names.isdisjoint(survey.values) and not names.isdisjoint(survey.unread)
 
 
 def _finding(found: ParameterFinding, name: str) -> Finding:

@@ -43,7 +43,7 @@ def lists(config: Config, findings: Sequence[Finding]) -> RenderableType:
 
 
 def _list(findings: Iterable[Finding], accepted: Sequence[str]) -> RenderableType:
-    """One entry for each finding; what is wrong has its remedy and its source on own lines."""
+    """One entry for each finding; if it is not safe, remedy and source have their own lines."""
     entries = Table.grid(padding=(0, 1))
     entries.add_column()
     entries.add_column()
@@ -77,10 +77,10 @@ def _last_line(config: Config, findings: Sequence[Finding]) -> Text:
     if unsafe_count:
         return Text(f"{unsafe_count} unsafe, each excepted by flight.accept", style="bold yellow")
     ineffective = sum(finding.result is CheckResult.INEFFECTIVE for finding in findings)
-    then = (
+    ending = (
         f"; {ineffective} ineffective, see above" if ineffective else ": `companion fly` flies it"
     )
-    return Text(f"nothing unsafe was found{then}", style="bold green")
+    return Text(f"nothing unsafe was found{ending}", style="bold green")
 
 
 def outcome_line(outcome: Outcome) -> str:

@@ -28,6 +28,7 @@ from companion.vehicle.streams import StreamRate
 _LISTENING_TIME = 3.0
 """Time for listening, s; enough to count messages at 2 Hz."""
 _POLL_PERIOD = 0.05
+"""Period of the checks for readiness, s."""
 _WARNING_SEVERITY = 4
 """MAV_SEVERITY of a warning; a lower number is worse."""
 _RELEASE_SUFFIXES = {0: "-dev", 64: "-alpha", 128: "-beta", 192: "-rc", 255: ""}
@@ -73,7 +74,7 @@ async def gather(
         parameters_read, achieved, identity = await asyncio.gather(
             survey(link, link.autopilot.parameters, before=known),
             link.measure_rates(granted, seconds),
-            _identity_and_words(link) if thorough else identify(link),
+            _identity_and_texts(link) if thorough else identify(link),
         )
     counts = link.stats.by_message
     return Evidence(
@@ -118,7 +119,7 @@ async def identify(link: Link) -> Identity:
     )
 
 
-async def _identity_and_words(link: Link) -> Identity:
+async def _identity_and_texts(link: Link) -> Identity:
     """Run the pre-arm checks, whose results come as texts, and identify the autopilot."""
     if not link.state.armed:
         # ArduPilot sends these texts by itself only every 30 s.
@@ -184,8 +185,8 @@ class PreflightSession:
             "COMMAND_ACK",
         )
         alarms = (vehicle_checks.armed(state), *vehicle_checks.failsafe(state))
-        amiss = (finding for finding in alarms if finding.result is CheckResult.UNSAFE)
-        return [*hints, silence, *amiss]
+        unsafe = (finding for finding in alarms if finding.result is CheckResult.UNSAFE)
+        return [*hints, silence, *unsafe]
 
     async def gather(self, ready_within: float) -> Evidence:
         """Request telemetry, wait up to `ready_within` s for readiness, and listen.

@@ -98,7 +98,7 @@ def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
     state, stage = evidence.state, evidence.stage
     yield from failsafe(state)
     ready = state.readiness
-    if stage is Stage.AIRBORNE:  # its checks before arming are over
+    if stage is Stage.AIRBORNE:  # the pre-arm checks no longer apply
         ready = ready._replace(prearm_good=True)
     missing = evidence.autopilot.not_ready(ready)
     texts = "; ".join(dict.fromkeys(evidence.words))

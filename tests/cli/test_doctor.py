@@ -299,7 +299,7 @@ def test_without_a_change_to_propose_nothing_is_set(result, code, told):
     run, shown = run_of()
     run.result = {"result": result}
     vehicle = SimpleNamespace(link=None)
-    assert asyncio.run(run._fix(vehicle, None, [FINDING], unasked=True)) == code
+    assert asyncio.run(run._fix(vehicle, None, [FINDING], without_asking=True)) == code
     assert shown.getvalue() == f"{told}\n"
 
 

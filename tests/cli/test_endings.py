@@ -92,7 +92,7 @@ def test_ctrl_c_outside_a_flight_is_told(monkeypatch, capsys):
 
         return interrupted
 
-    monkeypatch.setattr(entry, "_loaded", loaded)
+    monkeypatch.setattr(entry, "_load_command", loaded)
     before = signal.getsignal(signal.SIGINT)
     assert main(["demo"]) == 1
     assert capsys.readouterr().err == "companion: interrupted\n"
@@ -227,7 +227,7 @@ def test_a_second_ctrl_c_leaves_but_not_one_of_a_bouncing_key(monkeypatch):
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_stops_serving_and_the_page_of_a_flight_gets_some_time(monkeypatch, number):
-    monkeypatch.setattr(serving, "_PAGE_AFTER_STOP", 0.05)
+    monkeypatch.setattr(serving, "_REPORT_TIMEOUT", 0.05)
     told = []
     session = Session(told)
     session.signals = ((0.02, number),)

@@ -53,7 +53,7 @@ def test_events_of_flights_and_of_the_command_are_on_one_clock(monkeypatch):
     now = iter((100.0, 112.0, 190.5))
     monkeypatch.setattr(command.time, "monotonic", lambda: next(now))
     shown = io.StringIO()
-    observer = command._Events(FlightConsole(file=shown))
+    observer = command._ServeObserver(FlightConsole(file=shown))
     observer.event(12.0, "outside a flight")
     observer.event(3.5, "in its second flight")
     observer.close()

@@ -86,7 +86,7 @@ class Guard:
 
 
 def _is_address_or_own_name(host: str) -> bool:
-    """Whether a Host header has an address, or a name of ours that no other site can take."""
+    """Whether a Host header is an IP address, or a name of this computer that no site can take."""
     name = urlsplit(f"//{host}").hostname or ""
     try:
         ip_address(name)

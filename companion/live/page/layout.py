@@ -39,13 +39,13 @@ _PLOTS = (
 
 def add_page(relay: Relay, store: Store, guard: Guard) -> None:
     """Add the page, and send new states to all browsers that show it."""
-    shared = f"<style>{_text('live.css')}</style><script>{_text('live.js')}</script>"
+    shared = f"<style>{_file_text('live.css')}</style><script>{_file_text('live.js')}</script>"
     ui.add_head_html(shared, shared=True)
     sent: dict[str, tuple[int, int]] = {}
 
     @ui.page("/")
     def page(client: Client, token: str = "") -> None:
-        _drawings()
+        _add_drawings()
         Panel(relay, store, guard, unlocked=guard.knows(token))
         state = {"fence": store.fence(), "frames": store.since(0), "events": store.events_since(0)}
         sent[client.id] = store.count, store.event_count
@@ -70,7 +70,7 @@ def add_page(relay: Relay, store: Store, guard: Guard) -> None:
     app.timer(_PUSH_PERIOD, push)
 
 
-def _drawings() -> None:
+def _add_drawings() -> None:
     with ui.element("header").classes("live-cells"):
         for name, label in _CELLS:
             with ui.element("div").classes("live-cell"):
@@ -83,14 +83,14 @@ def _drawings() -> None:
             ("disc", "tilt: ● measured, ○ target, + reference"),
             ("map", "plan: ● vehicle, + reference, dashed: fence"),
         ):
-            _canvas(name, label, "live-square")
+            _add_canvas(name, label, "live-square")
     with ui.element("div").classes("live-grid"):
         for name, label in _PLOTS:
-            _canvas(name, label, "live-plot")
+            _add_canvas(name, label, "live-plot")
     ui.html('<ol id="live-events"></ol>', sanitize=False).classes("live-wide")
 
 
-def _canvas(name: str, label: str, shape: str) -> None:
+def _add_canvas(name: str, label: str, shape: str) -> None:
     ui.html(
         f'<figure class="{shape}"><figcaption>{label}</figcaption>'
         f'<canvas id="live-{name}"></canvas></figure>',
@@ -98,5 +98,5 @@ def _canvas(name: str, label: str, shape: str) -> None:
     )
 
 
-def _text(name: str) -> str:
+def _file_text(name: str) -> str:
     return (_PAGE_FOLDER / name).read_text(encoding="utf-8")

@@ -37,7 +37,7 @@ class Panel:
         self._inputs: dict[tuple[str, str], ui.input] = {}
         self._shown: dict[tuple[str, str], str] = {}
         with ui.expansion("Change values in flight").classes("live-wide").props("id=live-panel"):
-            self._lock()
+            self._add_unlock_row()
             with ui.element("div").classes("live-values"):
                 for key in store.values():
                     name = key.section, key.name
@@ -49,20 +49,22 @@ class Panel:
                 ui.button("Apply", on_click=self._apply).props("id=live-apply")
                 self._undo = ui.button("Undo", on_click=self._undo_last).props("id=live-undo")
                 ui.button("Save as YAML", on_click=self._save).props("id=live-save outline")
-            self._said = ui.label().props("id=live-said role=status")
-        ui.timer(0.5, self._follow)
+            self._message = ui.label().props("id=live-said role=status")
+        ui.timer(0.5, self._refresh)
 
-    def _lock(self) -> None:
+    def _add_unlock_row(self) -> None:
         with ui.row().bind_visibility_from(self, "_unlocked", value=False):
             token = ui.input("token, as shown at the start").props("dense")
 
             async def unlock() -> None:
                 if self._guard.knows(str(token.value or "").strip()):
                     self._unlocked = True
-                    self._say("values can be changed in this tab now")
+                    self._show_message("values can be changed in this tab now")
                 else:
                     await asyncio.sleep(_WRONG_TOKEN_DELAY)
-                    self._say("this is not the token; the program showed it when it started")
+                    self._show_message(
+                        "this is not the token; the program showed it when it started"
+                    )
 
             ui.button("Unlock", on_click=unlock).props("id=live-unlock")
 
@@ -71,9 +73,9 @@ class Panel:
         for (section, key), field in self._inputs.items():
             text = str(field.value or "").strip()
             if text != self._shown[section, key]:
-                values.setdefault(section, {})[key] = _typed(text)
+                values.setdefault(section, {})[key] = _parsed(text)
         if not values:
-            self._say("no value differs from what is flown")
+            self._show_message("no value differs from what is flown")
             return
         await self._ask(self._relay.change(values, _SOURCE))
 
@@ -83,15 +85,15 @@ class Panel:
     async def _ask(self, request: Any) -> None:
         if not self._unlocked:
             request.close()
-            self._say("refused: give the token first")
+            self._show_message("refused: give the token first")
             return
         try:
-            self._say(await request)
-            self._follow()  # otherwise the next request would send these values again
+            self._show_message(await request)
+            self._refresh()  # otherwise the next request would send these values again
         except (ConfigError, ChangeRefusedError) as refused:
-            self._say(f"refused: {refused}")
+            self._show_message(f"refused: {refused}")
         except NoAnswerError as error:
-            self._say(str(error))
+            self._show_message(str(error))
 
     async def _save(self) -> None:
         """Send the changed values to the browser; if unlocked, also write them to the folder."""
@@ -99,18 +101,18 @@ class Panel:
         ui.download.content(text, _DOWNLOAD_NAME)
         folder = self._relay.first["folder"]
         if folder is None or not self._unlocked:
-            self._say("saved where the browser saves files")
+            self._show_message("saved where the browser saves files")
             return
         path = Path(folder, _DOWNLOAD_NAME)
         try:
             await asyncio.to_thread(write_whole, path, text)
         except OSError as error:
-            self._say(f"{path} was not written: {error.strerror}")
+            self._show_message(f"{path} was not written: {error.strerror}")
         else:
-            self._say(f"saved as {path}")
+            self._show_message(f"saved as {path}")
 
-    def _follow(self) -> None:
-        """Show values that somebody else changed, except in fields edited here; enable the undo."""
+    def _refresh(self) -> None:
+        """Show values changed elsewhere, except in edited fields; enable or disable the undo."""
         for key in self._store.values():
             name, value = (key.section, key.name), shown(key.value)
             field = self._inputs[name]
@@ -120,8 +122,8 @@ class Panel:
                 self._shown[name] = value
         self._undo.set_enabled(self._store.can_undo and self._store.over is None)
 
-    def _say(self, text: str) -> None:
-        self._said.set_text(text)
+    def _show_message(self, text: str) -> None:
+        self._message.set_text(text)
 
 
 def _range(allowed: str) -> str:
@@ -133,7 +135,7 @@ def _range(allowed: str) -> str:
     )
 
 
-def _typed(text: str) -> Any:
+def _parsed(text: str) -> Any:
     """A number, or null for an empty field; other texts stay unchanged and are then refused."""
     if text in ("", "null"):
         return None

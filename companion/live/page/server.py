@@ -1,4 +1,4 @@
-"""Serves the live page during the flight, and after it as long as `until_unused` says."""
+"""Serves the live page during the flight, and after it until `until_unused` returns."""
 
 import asyncio
 import os
@@ -45,9 +45,9 @@ async def _serve(relay: Relay, listening: socket.socket) -> None:
     def is_open() -> bool:
         return any(client.has_socket_connection for client in Client.instances.values())
 
-    alone = asyncio.create_task(until_unused(int(relay.first["port"]), is_open))
-    await asyncio.wait({alone, serving}, return_when=asyncio.FIRST_COMPLETED)
-    alone.cancel()
+    unused = asyncio.create_task(until_unused(int(relay.first["port"]), is_open))
+    await asyncio.wait({unused, serving}, return_when=asyncio.FIRST_COMPLETED)
+    unused.cancel()
     server.should_exit = True
     for each in server.servers:
         each.close()  # the next flight's page waits for the port

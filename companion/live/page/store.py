@@ -57,7 +57,7 @@ class Store:
                 self.over = str(message["text"])
 
     def end(self) -> None:
-        """Note that the flight has ended, if its last message has not come."""
+        """Note the end of the flight, if its message `end` was not received."""
         self.over = self.over or "the program that flew has ended"
 
     def since(self, count: int) -> list[Message]:
@@ -97,7 +97,7 @@ class Store:
     def _take_state(self, message: Message) -> None:
         state = {key: value for key, value in message.items() if key != "kind"}
         if self.frames and state["time_s"] < self.frames[-1]["time_s"]:
-            self.frames.clear()  # another flight of `companion serve`
+            self.frames.clear()  # the time begins again with the next flight of `serve`
         self.frames.append(state)
         self.count += 1
         while state["time_s"] - self.frames[0]["time_s"] > SHOWN_S:
