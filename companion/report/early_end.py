@@ -25,7 +25,7 @@ class CrossedLimit:
             "latency", "height" or "track".
         key: configuration key of the limit.
         levels: values that the curve must not cross, in its unit; "latency" may, but not often.
-        outline: fence outline the track, (N, 2) north and east, m; empty for other curves.
+        outline: fence around the track, (N, 2) north and east, m; empty for other curves.
     """
 
     curve: str
