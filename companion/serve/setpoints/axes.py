@@ -58,8 +58,8 @@ class Axes:
         limits: limits of motions after a jump, one for each axis. A motion along several axes is
             limited along its direction.
         continuity: largest jumps that are followed directly.
-        timeout: time for which a command that is repeated unchanged is extrapolated by its
-            velocity or acceleration, s.
+        timeout: time for which a command that is repeated unchanged goes on moving its position or
+            changing its velocity, s.
     """
 
     def __init__(

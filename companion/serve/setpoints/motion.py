@@ -33,8 +33,8 @@ class MotionLimits(NamedTuple):
         jerk: largest jerk, m/s³; vertically at most `_VERTICAL_JERK`.
         climb, descent: largest vertical speeds, m/s.
         yaw_rate: largest yaw rate, rad/s.
-        timeout: time for which a request that is repeated unchanged is extrapolated by its velocity
-            or acceleration, s.
+        timeout: time for which a request that is repeated unchanged goes on moving its position or
+            changing its velocity, s.
     """
 
     speed: float
