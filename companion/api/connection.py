@@ -79,15 +79,15 @@ async def flying(
     """Like `connect`, for a complete configuration; nothing is recorded without a folder."""
     loop, wait_cancelled = flight_loop(), False
     try:
-        session, program = await loop.start(_begin(config, folder, observer, environment))
-        loop.on_lost(partial(_end, session, program))
+        session, program = await loop.start(_make_session(config, folder, observer, environment))
+        loop.on_lost(partial(_end_lost_flight, session, program))
         flight = loop.start(_fly(session, program))
         try:
             with on_ctrl_c(loop, session.interrupt):
-                async with _vehicle(loop, session, program, flight) as vehicle:
+                async with _connected_vehicle(loop, session, program, flight) as vehicle:
                     yield vehicle
         finally:
-            wait_cancelled = True  # if the next line is cancelled
+            wait_cancelled = True  # stays true if the wait is cancelled
             await asyncio.wait({flight})
             wait_cancelled = False
         flight.result()
@@ -96,12 +96,12 @@ async def flying(
 
 
 @asynccontextmanager
-async def _vehicle(
+async def _connected_vehicle(
     loop: FlightLoop, session: Session, program: Program, flight: asyncio.Future[None]
 ) -> AsyncGenerator[Vehicle, None]:
     """The vehicle after the preflight checks; at the end of the block the flight ends."""
     try:
-        context, newest = await loop.start(_connected(loop, program))
+        context, newest = await loop.start(_wait_connected(loop, program))
     except asyncio.CancelledError:
         if not await loop.start(_interrupt(session, "the program was cancelled")):
             flight.cancel()
@@ -111,9 +111,9 @@ async def _vehicle(
     except BaseException as error:
         loop.post(session.note, f"the program raised {error!r}")
         with suppress(FlightEnded):
-            await asyncio.shield(loop.start(_leave(program)))
+            await asyncio.shield(loop.start(_end_flight(program)))
         raise
-    await asyncio.shield(loop.start(_leave(program)))
+    await asyncio.shield(loop.start(_end_flight(program)))
 
 
 def run(main: Coroutine[Any, Any, T], *, in_lockstep: bool = False) -> T:
@@ -131,7 +131,7 @@ def run(main: Coroutine[Any, Any, T], *, in_lockstep: bool = False) -> T:
 # The coroutines below run in the flight's loop.
 
 
-async def _begin(
+async def _make_session(
     config: Config, folder: Path | None, observer: Observer | None, environment: Environment
 ) -> tuple[Session, Program]:
     program = Program()
@@ -154,7 +154,7 @@ async def _fly(session: Session, program: Program) -> None:
     program.end(ended_by(summary.result))
 
 
-async def _connected(loop: FlightLoop, program: Program) -> tuple[FlightContext, NewestState]:
+async def _wait_connected(loop: FlightLoop, program: Program) -> tuple[FlightContext, NewestState]:
     context = await asyncio.shield(program.connected)
     return context, NewestState(context, loop)
 
@@ -163,20 +163,20 @@ async def _interrupt(session: Session, reason: str) -> bool:
     return session.interrupt(reason)
 
 
-async def _leave(program: Program) -> None:
+async def _end_flight(program: Program) -> None:
     """End the flight: hand back in the air; on the ground leave the vehicle as it is."""
     if program.busy:
         program.interrupt("the program ended before what it had asked for")
     elif not program.over:
-        await program.request(_leaving, last=True)
+        await program.request(_ending_phases, last=True)
 
 
-def _leaving(context: FlightContext) -> Sequence[Phase]:
+def _ending_phases(context: FlightContext) -> Sequence[Phase]:
     """The phases that end the flight: hand back in the air, none on the ground."""
     return (hand_back_phase(),) if context.loop.offboard_active else ()
 
 
-async def _end(session: Session, program: Program) -> None:
-    """End the flight of a program that no longer exists."""
+async def _end_lost_flight(session: Session, program: Program) -> None:
+    """End the flight of a program whose loop or thread has ended; wait for its end."""
     if not program.finished.is_set() and session.interrupt("the program ended in flight"):
         await program.finished.wait()

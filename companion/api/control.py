@@ -30,7 +30,7 @@ class Control:
         newest: the state of the vehicle.
         loop: loop of the flight.
         source: takes the references.
-        flown: future that is done when control has ended.
+        control_end: future that is done when control has ended.
     """
 
     def __init__(
@@ -40,13 +40,13 @@ class Control:
         newest: NewestState,
         loop: FlightLoop,
         source: CommandedSource,
-        flown: asyncio.Future[None],
+        control_end: asyncio.Future[None],
     ) -> None:
         self._program, self._context, self._newest = program, context, newest
-        self._loop, self._source, self._flown = loop, source, flown
+        self._loop, self._source, self._control_end = loop, source, control_end
         self._command: tuple[Reference, float, Vector | None] | None = None
         self._posted = False
-        self._began = self.state
+        self._start_state = self.state
 
     @property
     def state(self) -> State:
@@ -62,23 +62,23 @@ class Control:
         Raises:
             FlightEnded: control has ended.
         """
-        news = asyncio.Event()
+        new_state = asyncio.Event()
 
         def wake(_: object) -> None:
-            news.set()
+            new_state.set()
 
-        unsubscribe = self._newest.subscribe(news.set)
-        self._flown.add_done_callback(wake)
-        until = self._loop.time() + seconds
+        unsubscribe = self._newest.subscribe(new_state.set)
+        self._control_end.add_done_callback(wake)
+        end_time = self._loop.time() + seconds
         try:
-            while self._loop.time() < until:
+            while self._loop.time() < end_time:
                 self._require_control()
                 yield self.state
-                news.clear()
-                await news.wait()
+                new_state.clear()
+                await new_state.wait()
         finally:
             unsubscribe()
-            self._flown.remove_done_callback(wake)
+            self._control_end.remove_done_callback(wake)
 
     def accelerate(self, acceleration_ned: Vector, heading: float | None = None) -> None:
         """Command an acceleration, which the vehicle reaches with its known linear response.
@@ -96,7 +96,7 @@ class Control:
         self.follow(
             Reference(
                 self.state.position_ned,
-                self.state.velocity_ned,  # its drag is compensated
+                self.state.velocity_ned,  # the drag at this velocity is compensated
                 acceleration_ned,
                 heading=self._heading(heading),
                 drifting=True,
@@ -108,8 +108,8 @@ class Control:
     def follow(self, reference: Reference, jerk_ned: Vector | None = None) -> None:
         """Command a reference: the position, velocity and acceleration wanted now.
 
-        It is followed without lag, and moves on by itself until the next one comes. A reference far
-        from the vehicle makes it turn as hard as the limits allow: `Vehicle.go_to` is for that.
+        The vehicle follows it without lag; until the next reference comes, it is extrapolated. Far
+        from it, the vehicle turns as hard as the limits allow; to fly there, use `Vehicle.go_to`.
 
         Args:
             reference: state that the vehicle should have now.
@@ -120,10 +120,10 @@ class Control:
             ValueError: a number is not finite or missing; the newest command still counts.
             FlightEnded: control has ended.
         """
-        _require_usable(reference, jerk_ned or _ZERO_VECTOR)
+        _require_valid(reference, jerk_ned or _ZERO_VECTOR)
         self._require_control()
         self._command = reference, self._loop.time(), jerk_ned
-        if not self._posted:  # else the flight has yet to take a command, and takes this one
+        if not self._posted:  # else the callback posted before will take this command
             self._posted = True
             self._loop.post(self._post_command)
 
@@ -146,7 +146,9 @@ class Control:
             ValueError: a number is not finite or missing; the newest command still counts.
             FlightEnded: control has ended.
         """
-        self.follow(self._open_loop(heading)._replace(coefficients=Coefficients(north, east)))
+        self.follow(
+            self._open_loop_reference(heading)._replace(coefficients=Coefficients(north, east))
+        )
 
     def rotate(self, body_rates: BodyRates) -> None:
         """Command body rates, within the limits, and hold the height at which control began.
@@ -158,24 +160,26 @@ class Control:
             ValueError: a number is not finite or missing; the newest command still counts.
             FlightEnded: control has ended.
         """
-        self.follow(self._open_loop(None)._replace(body_rates=BodyRates(*body_rates)))
+        self.follow(self._open_loop_reference(None)._replace(body_rates=BodyRates(*body_rates)))
 
-    def _open_loop(self, heading: float | None) -> Reference:
+    def _open_loop_reference(self, heading: float | None) -> Reference:
         north, east, _ = self.state.position_ned
-        return Reference((north, east, self._began.position_ned[2]), heading=self._heading(heading))
+        return Reference(
+            (north, east, self._start_state.position_ned[2]), heading=self._heading(heading)
+        )
 
     def _heading(self, heading: float | None) -> float:
-        return self._began.heading if heading is None else heading
+        return self._start_state.heading if heading is None else heading
 
     def _require_control(self) -> None:
         if self._program.ended is not None:
             raise self._program.ended
-        if self._flown.done():
-            self._flown.result()
+        if self._control_end.done():
+            self._control_end.result()
             raise FlightEnded("the program has ended its control")
 
 
-def _require_usable(reference: Reference, jerk_ned: Vector) -> None:
+def _require_valid(reference: Reference, jerk_ned: Vector) -> None:
     """Check that vectors have three components, and that all numbers are finite.
 
     Raises:

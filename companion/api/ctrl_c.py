@@ -26,25 +26,25 @@ def on_ctrl_c(loop: FlightLoop, interrupt: Callable[[str], object]) -> Iterator[
         interrupt: hands the vehicle back for a reason; called in the flight's loop.
     """
     before = signal.getsignal(signal.SIGINT)
-    in_main = threading.current_thread() is threading.main_thread()
-    if not in_main or not isinstance(loop, OwnThread) or not callable(before):
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    if not in_main_thread or not isinstance(loop, OwnThread) or not callable(before):
         yield
         return
     previous: Callable[[int, FrameType | None], object] = before
 
-    def take(number: int, frame: FrameType | None) -> None:
-        loop.post(_Reaction(loop, interrupt).expect)
+    def on_signal(number: int, frame: FrameType | None) -> None:
+        loop.post(_ReactionCheck(loop, interrupt).begin)
         previous(number, frame)
 
-    signal.signal(signal.SIGINT, take)
+    signal.signal(signal.SIGINT, on_signal)
     try:
         yield
     finally:
-        if signal.getsignal(signal.SIGINT) is take:
+        if signal.getsignal(signal.SIGINT) is on_signal:
             signal.signal(signal.SIGINT, before)
 
 
-class _Reaction:
+class _ReactionCheck:
     """Waits in the flight's loop until the program's loop runs, and hands back if it does not.
 
     Args:
@@ -55,14 +55,14 @@ class _Reaction:
     def __init__(self, loop: FlightLoop, interrupt: Callable[[str], object]) -> None:
         self._loop, self._interrupt, self._reacted = loop, interrupt, False
 
-    def expect(self) -> None:
+    def begin(self) -> None:
         """Begin to wait for the program's loop to run."""
         self._loop.tell(self._note_reaction)
-        asyncio.get_running_loop().call_later(REACTION_TIMEOUT, self._judge)
+        asyncio.get_running_loop().call_later(REACTION_TIMEOUT, self._hand_back_without_reaction)
 
     def _note_reaction(self) -> None:
         self._reacted = True
 
-    def _judge(self) -> None:
+    def _hand_back_without_reaction(self) -> None:
         if not self._reacted:
             self._interrupt("interrupted by the user (Ctrl-C)")

@@ -20,8 +20,8 @@ T = TypeVar("T")
 Arguments = TypeVarTuple("Arguments")
 
 SWITCH_INTERVAL = 5e-5
-"""Time for which a busy thread of the program keeps the interpreter, s. Python's 5 ms would delay
-each answer by a multiple of it, because every system call of the flight releases the
+"""Time for which a busy thread of the program keeps the interpreter, s. Python's default of 5 ms
+would delay each answer by several times 5 ms, because every system call of the flight releases the
 interpreter.
 """
 
@@ -53,7 +53,7 @@ class FlightLoop(Protocol):
         ...
 
     def on_lost(self, end: Callable[[], Awaitable[object]]) -> None:
-        """Register `end`, which ends a flight that still runs after `close` or a lost program."""
+        """Register `end`, which ends a flight that runs at `close` or when the program is lost."""
         ...
 
     def close(self, *, wait: bool) -> None:
@@ -64,7 +64,7 @@ class FlightLoop(Protocol):
 class SharedLoop:
     """Runs the flight in the program's own loop, if the vehicle waits for each answer.
 
-    It waits in lockstep, and when `companion.testing` runs it on a virtual clock.
+    The vehicle waits in lockstep, and when `companion.testing` runs it on a virtual clock.
     """
 
     def __init__(self) -> None:
@@ -97,13 +97,13 @@ class OwnThread:
     """
 
     def __init__(self) -> None:
-        self._end: Callable[[], Awaitable[object]] | None = None
+        self._end_flight: Callable[[], Awaitable[object]] | None = None
         self._program = asyncio.get_running_loop()
         self._program_thread = threading.current_thread()
         self._loop = LinkEventLoop()
         self.time = self._loop.time
         self._closing = asyncio.Event()
-        self._started: set[Future[Any]] = set()
+        self._unfinished: set[Future[Any]] = set()
         self._thread = threading.Thread(target=self._run, name="flight")
         self._thread.start()
 
@@ -114,13 +114,13 @@ class OwnThread:
             FlightEnded: the flight is over.
         """
         try:
-            started = asyncio.run_coroutine_threadsafe(work, self._loop)
+            future = asyncio.run_coroutine_threadsafe(work, self._loop)
         except RuntimeError as error:  # the loop is closed
             work.close()
             raise ended_by("ok") from error
-        self._started.add(started)
-        started.add_done_callback(self._started.discard)
-        return asyncio.wrap_future(started)
+        self._unfinished.add(future)
+        future.add_done_callback(self._unfinished.discard)
+        return asyncio.wrap_future(future)
 
     def post(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
         """Call the function soon; not after the flight has ended."""
@@ -134,7 +134,7 @@ class OwnThread:
 
     def on_lost(self, end: Callable[[], Awaitable[object]]) -> None:
         """Register `end`, which is awaited in the flight's loop when this thread ends."""
-        self._end = end
+        self._end_flight = end
 
     def close(self, *, wait: bool) -> None:
         """End the flight if it still runs, and the thread; `wait` for both."""
@@ -150,15 +150,15 @@ class OwnThread:
             ):
                 runner.run(self._until_closed())
         finally:
-            for started in tuple(self._started):  # whoever waits for them would wait for ever
-                started.cancel()
+            for future in tuple(self._unfinished):  # else its caller would wait for ever
+                future.cancel()
 
     async def _until_closed(self) -> None:
         while not self._closing.is_set() and not self._program_is_lost():
             with suppress(TimeoutError):
                 await asyncio.wait_for(self._closing.wait(), _CHECK_PERIOD)
-        if self._end is not None:
-            await self._end()
+        if self._end_flight is not None:
+            await self._end_flight()
 
     def _program_is_lost(self) -> bool:
         """Whether the program's loop or thread has ended, or is ending with the interpreter."""

@@ -57,13 +57,13 @@ class Program:
         self.interrupt: Callable[[str], object] = lambda _: None
         self._waiting: deque[Request] = deque()
         self._running: Request | None = None
-        self._wake = asyncio.Event()
+        self._new_request = asyncio.Event()
         self.ended: Exception | None = None
         self.finished = asyncio.Event()
 
     async def phases(self, context: FlightContext) -> AsyncGenerator[Phase, None]:
         """The phases on the ground, then the requested ones, until the last request is done."""
-        if self._running is not None:  # the checks are repeated, and what was begun after them
+        if self._running is not None:  # the checks are repeated, and then this request
             self._waiting.appendleft(self._running)
         for phase in ground_phases(context.config.flight):
             yield phase
@@ -86,7 +86,7 @@ class Program:
     ) -> None:
         """Run phases, and wait until they have ended.
 
-        Cancelling this ends the flight, whether the phases run already or not.
+        Cancelling this call ends the flight, whether the phases run already or not.
 
         Args:
             phases: function that returns the phases for the flight's context.
@@ -102,7 +102,7 @@ class Program:
             raise RuntimeError("another call of this vehicle has not ended yet: await it first")
         request = Request(phases, last)
         self._waiting.append(request)
-        self._wake.set()
+        self._new_request.set()
         try:
             await request.done
         except asyncio.CancelledError:
@@ -124,7 +124,7 @@ class Program:
         for request in (self._running, *self._waiting):
             if request is not None and not request.done.done():
                 request.done.set_exception(reason)
-                request.done.exception()  # nobody may wait for it any more
+                request.done.exception()  # no warning of asyncio if nobody waits for it any more
 
     def _waiting_phase(self, context: FlightContext) -> Phase:
         if context.loop.offboard_active:
@@ -134,8 +134,8 @@ class Program:
     async def _next_request(self, context: FlightContext) -> None:
         context.detail = _NEXT_CALL
         while not self._waiting:
-            self._wake.clear()
-            await self._wake.wait()
+            self._new_request.clear()
+            await self._new_request.wait()
 
 
 def ended_by(result: str) -> FlightEnded:

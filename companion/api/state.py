@@ -22,8 +22,8 @@ class State(NamedTuple):
         velocity_ned: m/s.
         q: attitude, body to world, w first.
         body_rates: rad/s, about body x, y, z (FRD).
-        heading: heading, rad, clockwise from north: the turn about the vertical that is left when
-            the tilt is taken out; it differs from the Euler yaw in tilted attitudes.
+        heading: heading, rad, clockwise from north: the rotation about the vertical that remains
+            without the tilt; it differs from the Euler yaw in tilted attitudes.
         height: height above home, m, as the autopilot reports it, so it may jump; None: unknown.
     """
 

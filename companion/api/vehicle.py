@@ -41,7 +41,7 @@ _START_TIMEOUT = 1.0
 
 
 class Vehicle:
-    """One vehicle for one flight; `companion.connect` gives it.
+    """One vehicle for one flight; `companion.connect` makes it.
 
     Every coroutine raises `FlightEnded` once the flight has ended early: a pilot took over, a
     safety monitor ended it, or the vehicle refused. It is then handed back or landed already.
@@ -126,15 +126,13 @@ class Vehicle:
             FlightEnded: the vehicle is not under our control.
             TrajectoryError: a limit given here is not positive, or the vehicle is there already.
         """
-        here = self._pose()
-        north, east, down = (
-            goal - begin for goal, begin in zip(position_ned, here.position_ned, strict=True)
-        )
-        way = line((north, east, down), speed, acceleration, jerk)
+        start = self._held_pose().position_ned
+        north, east, down = (goal - begin for goal, begin in zip(position_ned, start, strict=True))
+        path = line((north, east, down), speed, acceleration, jerk)
         if heading is None:
-            await self._fly(HeldFigure(way))
+            await self._fly(HeldFigure(path))
         else:
-            await self.follow(replace(way, heading=FixedHeading(heading)))
+            await self.follow(replace(path, heading=FixedHeading(heading)))
 
     async def follow(self, trajectory: Trajectory | Path | str) -> None:
         """Follow a trajectory from the present position.
@@ -165,24 +163,26 @@ class Vehicle:
         Raises:
             FlightEnded: the vehicle is not under our control, or control ended before the block.
         """
-        self._pose()  # raises if the vehicle is not under our control
+        self._held_pose()  # raises if the vehicle is not under our control
         source = CommandedSource(name, self._context.config.deadman.target_stale, _START_TIMEOUT)
         work = partial(fly_commanded, source=source)
         phase = program_phase("control", f"{name} to end its control", work)
-        flown = self._request(lambda _: (phase,))
+        control_end = self._request(lambda _: (phase,))
         try:
-            await self._begun(source, flown)
-            yield Control(self._program, self._context, self._newest, self._loop, source, flown)
+            await self._wait_begun(source, control_end)
+            yield Control(
+                self._program, self._context, self._newest, self._loop, source, control_end
+            )
         except BaseException as error:
             if not isinstance(error, FlightEnded):
                 self._loop.post(source.fail, f"{name} raised {error!r}")
             raise
         finally:
             self._loop.post(source.end)
-            await asyncio.wait({flown})
-            if not flown.cancelled():
-                flown.exception()
-        flown.result()
+            await asyncio.wait({control_end})
+            if not control_end.cancelled():
+                control_end.exception()
+        control_end.result()
 
     async def land(self) -> None:
         """Let the autopilot land where the vehicle is; after touchdown the flight ends."""
@@ -198,19 +198,19 @@ class Vehicle:
         """Request phases; the future is done when they have ended."""
         return self._loop.start(self._program.request(phases, last=last))
 
-    async def _begun(self, source: CommandedSource, flown: asyncio.Future[None]) -> None:
+    async def _wait_begun(self, source: CommandedSource, control_end: asyncio.Future[None]) -> None:
         """Wait until guidance flies the source.
 
         Raises:
             FlightEnded: the flight ended before.
         """
         while source.pose is None:
-            done, _ = await asyncio.wait({flown}, timeout=0.01)
+            done, _ = await asyncio.wait({control_end}, timeout=0.01)
             if done:
-                flown.result()
+                control_end.result()
 
     async def _fly(self, maneuver: Maneuver) -> None:
-        self._pose()  # raises if the vehicle is not under our control
+        self._held_pose()  # raises if the vehicle is not under our control
         await beside_the_loop(self._require_followable, maneuver)
         sequence = ManeuverSequence((maneuver,))
         work = partial(fly_maneuvers, sequence=sequence)
@@ -219,13 +219,13 @@ class Vehicle:
         )
 
     def _require_followable(self, maneuver: Maneuver) -> None:
-        context, here = self._context, self._pose().position_ned
+        context, here = self._context, self._held_pose().position_ned
         origin = context.snapshot_builder.origin_ned or (0.0, 0.0, 0.0)
         north, east, down = (place - begin for place, begin in zip(here, origin, strict=True))
         require_followable(context.config, maneuver, (north, east, down), context.known_drag)
 
-    def _pose(self) -> Pose:
-        """The held pose.
+    def _held_pose(self) -> Pose:
+        """The pose at which guidance began to fly its present source.
 
         Raises:
             FlightEnded: the flight has ended, or the vehicle is not under our control.

@@ -27,7 +27,7 @@ No other mask is sent: with any other the autopilot chooses a value itself."""
 _FLOAT32_MAX = 3.4028234663852886e38
 _ATTITUDE_LAYOUT = struct.Struct("<I7f")
 _ATTITUDE_BYTES = _ATTITUDE_LAYOUT.size
-_RESET_COUNTER_AT = struct.calcsize("<Q55fBB")
+_RESET_COUNTER_OFFSET = struct.calcsize("<Q55fBB")
 _SETPOINT_LAYOUT = struct.Struct("<BBBBBBBHB I4f3ff BBB")
 _SETPOINT_PAYLOAD_BYTES = 39
 _SETPOINT_CRC_EXTRA = CRC_EXTRA[SET_ATTITUDE_TARGET]
@@ -51,11 +51,8 @@ def decode_attitude(payload: bytes) -> tuple[int, Quaternion, BodyRates] | None:
 
 
 def decode_reset_counter(payload: bytes) -> int:
-    """`reset_counter` of an ODOMETRY payload; 0 where an old autopilot does not send it.
-
-    The message has 60 other numbers, which nothing here uses.
-    """
-    return payload[_RESET_COUNTER_AT] if len(payload) > _RESET_COUNTER_AT else 0
+    """`reset_counter` of an ODOMETRY payload; 0 where an old autopilot does not send it."""
+    return payload[_RESET_COUNTER_OFFSET] if len(payload) > _RESET_COUNTER_OFFSET else 0
 
 
 class SetpointEncoder:

@@ -38,7 +38,7 @@ class Command(NamedTuple):
 _ACCEPTED = 0
 _IN_PROGRESS = 5
 _IN_PROGRESS_TIMEOUT_S = 30.0  # from the ACK "in progress" to the final one
-_STALL_S = 0.1  # a timeout that ends this late means that our process stood still
+_STALL_S = 0.1  # a timeout that ends this late means that our process was stalled
 _BACKLOG_S = 0.5  # after a stall the backlog of frames is read within this time
 _REASON_DELAY_S = 0.3  # the reason of a refusal may come as a STATUSTEXT this long after the ACK
 
@@ -60,20 +60,21 @@ class _Try:
     """A COMMAND_LONG that was sent and has no final ACK yet.
 
     Attributes:
-        answers: where its ACKs go.
-        until: time until which its ACK is expected, s of event-loop time; inf while a call waits.
+        answers: receives the results of its ACKs.
+        deadline: time until which its ACK is expected, s of event-loop time; inf while a call
+            waits.
     """
 
     answers: Pending[int]
-    until: float = inf
+    deadline: float = inf
 
 
 class CommandClient:
     """Sends commands and waits for their ACKs.
 
     An ACK names only the command, so a call waits until an earlier call with the same command ends.
-    ACKs come in the order of the tries. So the ACK of a call that was cancelled, or that waited in
-    the backlog while our process stood still, does not count for the next call.
+    ACKs come in the order of the tries, so each ACK counts for the oldest try that expects one. The
+    late ACK of a cancelled call, or of a call before a stall, does not count for the next call.
     """
 
     def __init__(
@@ -129,7 +130,7 @@ class CommandClient:
     ) -> int:
         time = asyncio.get_running_loop().time
         for confirmation in range(retries + 1):
-            sent, ends = _Try(answers), time() + timeout_s
+            sent, deadline = _Try(answers), time() + timeout_s
             self._expected_tries(command).append(sent)
             self._send_try(command, params, confirmation)
             try:
@@ -137,10 +138,10 @@ class CommandClient:
                 return (
                     await self._final_result(command, answers) if result == _IN_PROGRESS else result
                 )
-            except TimeoutError:  # lost; but after a stall the ACK may be in the backlog
-                ends = time() + _BACKLOG_S if time() - ends > _STALL_S else -inf
+            except TimeoutError:  # the ACK is lost, or after a stall it may be in the backlog
+                deadline = time() + _BACKLOG_S if time() - deadline > _STALL_S else -inf
             finally:
-                sent.until = ends
+                sent.deadline = deadline
         raise CommandTimeout(
             f"{command_name(command)}: no answer after {retries + 1} tries of {timeout_s:g} s; "
             f"is system {self._settings.target_system} still there?"
@@ -193,6 +194,6 @@ class CommandClient:
             asyncio.get_running_loop().time(),
             self._unanswered.setdefault(command, deque()),
         )
-        while tries and tries[0].until < now:
+        while tries and tries[0].deadline < now:
             tries.popleft()
         return tries

@@ -74,7 +74,7 @@ class FrameScanner:
         self._streaming = streaming
         self._keep_unknown = keep_unknown
         self._stats = stats or LinkStats()
-        self._rest = b""
+        self._rest = b""  # the beginning of an incomplete frame
 
     def feed(self, data: bytes) -> list[Frame]:
         """Take the next bytes; return the frames that they complete, in order."""
@@ -82,66 +82,68 @@ class FrameScanner:
             data = self._rest + data
             self._rest = b""
         frames: list[Frame] = []
-        at, end = 0, len(data)
-        while at < end:
-            magic = data[at]
+        start, end = 0, len(data)
+        while start < end:
+            magic = data[start]
             if magic == V2:
-                length = self._version_2(data, at, frames)
+                length = self._scan_version_2(data, start, frames)
             elif magic == V1:
-                length = self._version_1(data, at, frames)
+                length = self._scan_version_1(data, start, frames)
             else:
                 length = _NOT_A_FRAME
             if length == _INCOMPLETE:
                 if self._streaming:
-                    self._rest = data[at:]
+                    self._rest = data[start:]
                     break
                 length = _NOT_A_FRAME
-            at += length or 1
+            start += length or 1
         return frames
 
-    def _version_2(self, data: bytes, at: int, frames: list[Frame]) -> int:
-        if len(data) - at < _V2_HEADER_LENGTH:
+    def _scan_version_2(self, data: bytes, start: int, frames: list[Frame]) -> int:
+        if len(data) - start < _V2_HEADER_LENGTH:
             return _INCOMPLETE
         # Indexing single bytes is quicker than `struct` when the caches are cold.
-        incompatible = data[at + 2]
+        incompatible = data[start + 2]
         if incompatible & ~SIGNED:
             return _NOT_A_FRAME
-        message_id = data[at + 7] | data[at + 8] << 8 | data[at + 9] << 16
-        check_at = at + _V2_HEADER_LENGTH + data[at + 1]
-        end = check_at + (2 + SIGNATURE_LENGTH if incompatible else 2)
-        fault = self._fault(data, at, check_at, end, message_id)
-        if fault is not None and not (fault == end - at and self._keep_unknown):
+        message_id = data[start + 7] | data[start + 8] << 8 | data[start + 9] << 16
+        checksum_start = start + _V2_HEADER_LENGTH + data[start + 1]
+        end = checksum_start + (2 + SIGNATURE_LENGTH if incompatible else 2)
+        fault = self._frame_fault(data, start, checksum_start, end, message_id)
+        if fault is not None and not (fault == end - start and self._keep_unknown):
             return fault
         frames.append(
             Frame(
                 message_id,
-                data[at + 5],
-                data[at + 6],
-                data[at + 4],
-                data[at + _V2_HEADER_LENGTH : check_at],
-                data[at:end],
+                data[start + 5],
+                data[start + 6],
+                data[start + 4],
+                data[start + _V2_HEADER_LENGTH : checksum_start],
+                data[start:end],
                 incompatible != 0,
             )
         )
-        return end - at
+        return end - start
 
-    def _version_1(self, data: bytes, at: int, frames: list[Frame]) -> int:
-        if len(data) - at < _V1_HEADER_LENGTH:
+    def _scan_version_1(self, data: bytes, start: int, frames: list[Frame]) -> int:
+        if len(data) - start < _V1_HEADER_LENGTH:
             return _INCOMPLETE
-        _, size, sequence, system, component, message_id = data[at : at + _V1_HEADER_LENGTH]
-        check_at = at + _V1_HEADER_LENGTH + size
-        end = check_at + 2
-        fault = self._fault(data, at, check_at, end, message_id)
-        if fault is not None and not (fault == end - at and self._keep_unknown):
+        _, size, sequence, system, component, message_id = data[start : start + _V1_HEADER_LENGTH]
+        checksum_start = start + _V1_HEADER_LENGTH + size
+        end = checksum_start + 2
+        fault = self._frame_fault(data, start, checksum_start, end, message_id)
+        if fault is not None and not (fault == end - start and self._keep_unknown):
             return fault
-        payload = data[at + _V1_HEADER_LENGTH : check_at]
+        payload = data[start + _V1_HEADER_LENGTH : checksum_start]
         frames.append(
-            Frame(message_id, system, component, sequence, payload, data[at:end], signed=False)
+            Frame(message_id, system, component, sequence, payload, data[start:end], signed=False)
         )
-        return end - at
+        return end - start
 
-    def _fault(self, data: bytes, at: int, check_at: int, end: int, message_id: int) -> int | None:
-        """Check that the bytes `at`..`end` are an intact frame of a known message.
+    def _frame_fault(
+        self, data: bytes, start: int, checksum_start: int, end: int, message_id: int
+    ) -> int | None:
+        """Check that the bytes `start`..`end` are an intact frame of a known message.
 
         Returns:
             None if they are; else `_NOT_A_FRAME`, `_INCOMPLETE`, or the length of a frame of an
@@ -149,29 +151,29 @@ class FrameScanner:
         """
         extra = self._crc_extra.get(message_id)
         if extra is None:
-            return self._unknown_frame(data, at, end)
+            return self._unknown_frame(data, start, end)
         if end > len(data):
             return _INCOMPLETE
-        stated = data[check_at] | data[check_at + 1] << 8
-        if crc16.mcrf4xx(data[at + 1 : check_at] + extra) == stated:
+        received_checksum = data[checksum_start] | data[checksum_start + 1] << 8
+        if crc16.mcrf4xx(data[start + 1 : checksum_start] + extra) == received_checksum:
             return None
         self._stats.bad_crc += 1
         return _NOT_A_FRAME
 
-    def _unknown_frame(self, data: bytes, at: int, end: int) -> int:
-        # The checksum cannot tell this frame from garbage. It counts as a frame if another frame
-        # or the end of the data follows it.
+    def _unknown_frame(self, data: bytes, start: int, end: int) -> int:
+        # Without CRC_EXTRA the checksum cannot be checked. The bytes count as a frame if another
+        # frame or the end of the data follows them.
         if end == len(data) or (end < len(data) and data[end] in (V1, V2)):
             self._stats.unknown += 1
-            return end - at
-        if self._keep_unknown and end > len(data) and _is_plausible(data, at):
+            return end - start
+        if self._keep_unknown and end > len(data) and _is_plausible(data, start):
             return _INCOMPLETE
         return _NOT_A_FRAME
 
 
-def _is_plausible(data: bytes, at: int) -> bool:
+def _is_plausible(data: bytes, start: int) -> bool:
     """Whether this may be a version 2 header: no compatibility flags, message id below 65536."""
-    return data[at] == V2 and data[at + 3] == 0 and data[at + 9] == 0
+    return data[start] == V2 and data[start + 3] == 0 and data[start + 9] == 0
 
 
 def build_frame(

@@ -28,7 +28,9 @@ _SPIN_S = 0.0005
 """Wall time of polling for the next beacon before the process sleeps, s."""
 
 _TIMERS_IN_ORDER = 1_000_000
-_TIMER_SPACING_S = 1e-12  # a million of them are a microsecond, below any step
+"""Number of consecutive timers whose order is kept if they are due at the same time."""
+_TIMER_SPACING_S = 1e-12
+"""Shift between two such timers, s; all shifts together are 1 us, shorter than any step."""
 
 _MAX_ITERATIONS = 200
 """The loop counts as settled after this many iterations, so that a busy task cannot block it."""
@@ -52,31 +54,31 @@ class _BeaconClock:
     def __init__(self) -> None:
         self._wall_start = time.monotonic()
         self._waiting_since = self._wall_start
-        self._vehicle: float | None = None
-        self._offset = 0.0  # stays 0 unless the vehicle went away or restarted in between
+        self._vehicle_time: float | None = None
+        self._offset = 0.0  # added to vehicle time, s; 0 until the vehicle is silent or restarts
 
     def read(self) -> float:
-        if self._vehicle is None:
+        if self._vehicle_time is None:
             return time.monotonic() - self._wall_start
-        return self._vehicle + self._offset
+        return self._vehicle_time + self._offset
 
     def advance(self, vehicle_time: float) -> bool:
         """Set the vehicle time, s; return False for a repeated beacon."""
-        if self._vehicle is not None and vehicle_time <= self._vehicle:
-            if self._vehicle - vehicle_time < 1.0:
+        if self._vehicle_time is not None and vehicle_time <= self._vehicle_time:
+            if self._vehicle_time - vehicle_time < 1.0:
                 return False
-            # The vehicle restarted. Our time does not go back; its time continues from here.
-            self._offset += self._vehicle - vehicle_time
-        self._vehicle = vehicle_time
+            # The vehicle restarted. Our time must not go back, so it continues from here.
+            self._offset += self._vehicle_time - vehicle_time
+        self._vehicle_time = vehicle_time
         return True
 
     def start_waiting(self) -> None:
-        """Start the time in which the vehicle must send its next beacon."""
+        """Start the timeout for the vehicle's next beacon."""
         self._waiting_since = time.monotonic()
 
     def time_left(self) -> float | None:
         """Wall time left for the next beacon, s; `None` before the first beacon."""
-        if self._vehicle is None:
+        if self._vehicle_time is None:
             return None
         return max(0.0, self._waiting_since + BEACON_TIMEOUT_S - time.monotonic())
 
@@ -91,26 +93,26 @@ class SettlingSelector(HotSelector, ABC):
 
     def __init__(self) -> None:
         super().__init__()
-        self._when_idle: Callable[[], None] | None = None
+        self._on_settled: Callable[[], None] | None = None
         self._iterations = 0
 
     def settle(self, callback: Callable[[], None]) -> None:
         """Call `callback`, without I/O, once no other callback or timer of the loop is ready."""
-        self._when_idle, self._iterations = callback, 0
+        self._on_settled, self._iterations = callback, 0
 
     @property
     def settling(self) -> bool:
         """Whether a step is open: ready callbacks and due timers run, and no I/O happens."""
-        return self._when_idle is not None
+        return self._on_settled is not None
 
     def select(self, timeout: float | None = None) -> Ready:
         """Settle an open step; otherwise wait for the vehicle."""
-        if self._when_idle is None:
+        if self._on_settled is None:
             return self.wait(timeout)
         # The loop polls with timeout 0 exactly when callbacks or timers are ready.
         self._iterations += 1
         if timeout != 0 or self._iterations > _MAX_ITERATIONS:
-            callback, self._when_idle = self._when_idle, None
+            callback, self._on_settled = self._on_settled, None
             callback()
         return []
 
@@ -134,20 +136,20 @@ class _SteppingSelector(SettlingSelector):
         return ready
 
     def wait(self, timeout: float | None) -> Ready:
-        left = None if timeout == 0 else self._clock.time_left()
-        if left is None:
+        time_left = None if timeout == 0 else self._clock.time_left()
+        if time_left is None:
             return HotSelector.select(self, timeout)
         ready = self._spin()
         if not ready and not self.settling:
-            ready = HotSelector.select(self, left)
+            ready = HotSelector.select(self, time_left)
         if not self.settling and self._clock.time_left() == 0.0:
             self._clock.advance_alone()
         return ready
 
     def _spin(self) -> Ready:
         """Poll for the next beacon without sleeping: waking up would take longer."""
-        give_up = time.perf_counter() + _SPIN_S
-        while time.perf_counter() < give_up:
+        deadline = time.perf_counter() + _SPIN_S
+        while time.perf_counter() < deadline:
             ready = HotSelector.select(self, 0)
             if ready or self.settling:
                 return ready
@@ -170,13 +172,13 @@ class LockstepEventLoop(LinkEventLoop):
         self, clock: LockstepClock | None = None, selector: SettlingSelector | None = None
     ) -> None:
         if clock is None or selector is None:
-            clock = wall_or_vehicle = _BeaconClock()
-            selector = _SteppingSelector(wall_or_vehicle)
+            clock = beacon_clock = _BeaconClock()
+            selector = _SteppingSelector(beacon_clock)
         self._clock: LockstepClock = clock
-        self._stepping = selector
-        self._scheduled_so_far = 0
-        self._read_clock = clock.read  # asyncio and the link ask a dozen times a step
-        super().__init__(self._stepping)
+        self._settling_selector = selector
+        self._timer_count = 0
+        self._read_clock = clock.read  # stored, because it is called a dozen times in each step
+        super().__init__(self._settling_selector)
 
     def time(self) -> float:
         """Event-loop time, s: vehicle time from the first beacon on."""
@@ -194,11 +196,11 @@ class LockstepEventLoop(LinkEventLoop):
         In asyncio the order of such timers depends on the shape of its heap, which still depends on
         timers that were scheduled in wall time, before the first beacon.
         """
-        self._scheduled_so_far += 1
-        order = self._scheduled_so_far % _TIMERS_IN_ORDER * _TIMER_SPACING_S
-        # A timer later than requested, even by a picosecond, would run a whole step late.
-        early = _TIMERS_IN_ORDER * _TIMER_SPACING_S
-        return super().call_at(when - early + order, callback, *args, context=context)
+        self._timer_count += 1
+        order = self._timer_count % _TIMERS_IN_ORDER * _TIMER_SPACING_S
+        # All timers are set early: a timer late by a picosecond would run a whole step late.
+        lead = _TIMERS_IN_ORDER * _TIMER_SPACING_S
+        return super().call_at(when - lead + order, callback, *args, context=context)
 
     def advance(self, vehicle_time: float) -> bool:
         """Move the clock to a beacon's time, s; return False for a repeated beacon."""
@@ -206,7 +208,7 @@ class LockstepEventLoop(LinkEventLoop):
 
     def settle(self, callback: Callable[[], None]) -> None:
         """Run all that is ready and due, without I/O, and then call `callback`."""
-        self._stepping.settle(callback)
+        self._settling_selector.settle(callback)
 
 
 def run(main: Coroutine[Any, Any, T]) -> T:

@@ -40,7 +40,7 @@ class LockstepClient:
     def beacon(self, time_boot_ms: int) -> None:
         """Take a beacon: start a step, or answer a repeated beacon again."""
         if self._step_ms is not None:
-            return  # a beacon repeated during the step, whose answer will follow
+            return  # a beacon repeated during the step; the answer to the step will follow
         if not self._loop.advance(time_boot_ms / 1000.0):
             self._answer(time_boot_ms)
             return
@@ -48,20 +48,20 @@ class LockstepClient:
         if not self.first_beacon.done():
             self.first_beacon.set_result(None)
         self._process()
-        self._loop.settle(self._after_tasks)
+        self._loop.settle(self._deliver_samples)
 
     def close(self) -> None:
         """Stop: the open step is not answered, and its samples are not delivered any more."""
         self._closed = True
 
-    def _after_tasks(self) -> None:
+    def _deliver_samples(self) -> None:
         if self._closed:
             return
         self._deliver()
         # Settle again, so that tasks started by the control loop send before the step closes.
-        self._loop.settle(self._close)
+        self._loop.settle(self._close_step)
 
-    def _close(self) -> None:
+    def _close_step(self) -> None:
         step, self._step_ms = self._step_ms, None
         if step is not None and not self._closed:
             self._answer(step)

@@ -45,15 +45,15 @@ class HotSelector(selectors.DefaultSelector):
 
     def select(self, timeout: float | None = None) -> Ready:
         """Wait for I/O; hot readers are called before this returns."""
-        others = False
+        others_ready = False
         # Rounded up: a timer that is woken early would only poll again.
         for fd, _ in self._poll.poll(None if timeout is None else ceil(timeout * 1e3)):
             callback = self._hot.get(fd)
             if callback is not None:
                 callback()
             else:
-                others = True
-        return super().select(0) if others else []
+                others_ready = True
+        return super().select(0) if others_ready else []
 
 
 class LinkEventLoop(asyncio.SelectorEventLoop):

@@ -66,8 +66,8 @@ _IN_FIELD_ORDER: dict[int, Callable[[tuple[Any, ...]], tuple[Any, ...]]] = {
     for number, kind in _CLASSES.items()
     if len(kind.orders) > 1 and set(kind.lengths) == {1} and "s" not in kind.unpacker.format
 }
-"""Puts the values of a payload in the order of the constructor, for messages that hold neither
-arrays nor texts: most of what comes often.
+"""Functions that put the values of a payload in the order of the constructor, by message number.
+They exist for messages without arrays and texts, as most frequent messages are.
 """
 
 
@@ -92,16 +92,16 @@ def decode(number: int, payload: bytes) -> Message:
     flat = kind.unpacker.unpack(payload[:size].ljust(size, b"\0"))
     if number in _IN_FIELD_ORDER:
         return kind(*_IN_FIELD_ORDER[number](flat))
-    wire: list[Any] = []
-    at = 0
+    fields: list[Any] = []  # in the order of the payload
+    index = 0
     for length in kind.lengths:
-        field = flat[at]
-        if isinstance(field, bytes):
-            wire.append(field.rstrip(b"\0"))
+        value = flat[index]
+        if isinstance(value, bytes):
+            fields.append(value.rstrip(b"\0"))
         else:
-            wire.append(field if length == 1 else list(flat[at : at + length]))
-        at += length
-    return kind(*(wire[order] for order in kind.orders))
+            fields.append(value if length == 1 else list(flat[index : index + length]))
+        index += length
+    return kind(*(fields[order] for order in kind.orders))
 
 
 def encode(message: Message) -> bytes:

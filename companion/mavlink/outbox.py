@@ -26,7 +26,7 @@ class Outbox:
         self._signing = settings.signing
         self._loop = asyncio.get_running_loop()
         self._sequence = 0
-        self._setpoints = SetpointEncoder(
+        self._setpoint_encoder = SetpointEncoder(
             settings.source_system,
             settings.source_component,
             settings.target_system,
@@ -48,7 +48,9 @@ class Outbox:
         Raises:
             InvalidSetpoint: A value must not reach the vehicle; nothing was sent.
         """
-        sent = self._send_frame(self._setpoints.frame(self._sequence, time_boot_ms, rates, thrust))
+        sent = self._send_frame(
+            self._setpoint_encoder.frame(self._sequence, time_boot_ms, rates, thrust)
+        )
         self.last_setpoint_at = self._loop.time()
         return sent
 
@@ -58,7 +60,7 @@ class Outbox:
         Raises:
             InvalidSetpoint: A value must not reach the vehicle; nothing was kept.
         """
-        self._setpoints.frame(0, time_boot_ms, rates, thrust)
+        self._setpoint_encoder.frame(0, time_boot_ms, rates, thrust)
         self._latched = (time_boot_ms, rates, thrust)
 
     def close_step(self, time_boot_ms: int) -> None:
@@ -102,7 +104,7 @@ class Outbox:
     def _send_frame(self, frame: bytes, *, record: bool = True) -> bool:
         if self._signing is not None:
             frame = self._signing.sign(frame)
-        if record:  # how often a step is closed depends on wall time: it must not be counted
+        if record:  # not for frames that close a step: their number depends on wall time
             self._sequence = (self._sequence + 1) & 0xFF
         if self.transport is None or not self.transport.send(frame):
             self._stats.not_sent += 1

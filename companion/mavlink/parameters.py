@@ -20,8 +20,8 @@ from companion.mavlink.settings import LinkSettings
 _VALUE_LAYOUT = struct.Struct("<4sHH16sB")
 _SET_LAYOUT = struct.Struct("<4sBB16sB")
 _READ_LAYOUT = struct.Struct("<hBB16s")
-_BY_NAME = -1
-_MAX_NAME = 16
+_BY_NAME = -1  # `param_index` of a request by name
+_MAX_NAME_LENGTH = 16
 
 _INTEGER_LAYOUTS = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}
 _ERROR_TEXTS = {
@@ -34,6 +34,8 @@ _ERROR_TEXTS = {
 
 
 class _Value(NamedTuple):
+    """The four bytes of a value, and its MAV_PARAM_TYPE."""
+
     raw: bytes
     kind: int
 
@@ -60,7 +62,7 @@ class ParameterClient:
     ) -> None:
         self._outbox, self._registry = outbox, registry
         self._target = settings.target_system, settings.target_component
-        self._waiting: dict[str, Pending[_Value | int]] = {}  # a value, or a MAV_PARAM_ERROR
+        self._pending: dict[str, Pending[_Value | int]] = {}  # a value, or a MAV_PARAM_ERROR
         self._locks: dict[str, asyncio.Lock] = {}
         self._bytewise = bytewise
         router.subscribe_raw("PARAM_VALUE", self._on_value)
@@ -78,7 +80,7 @@ class ParameterClient:
         """
         self._require_valid_name(name)
         async with self._locks.setdefault(name, asyncio.Lock()):
-            return self._decoded(await self._ask(name, timeout_s, retries))
+            return self._decoded(await self._request_value(name, timeout_s, retries))
 
     async def write(self, name: str, value: float, timeout_s: float, retries: int) -> float | int:
         """Write a parameter in the autopilot's own type; return the value that it then has.
@@ -91,20 +93,20 @@ class ParameterClient:
         """
         self._require_valid_name(name)
         async with self._locks.setdefault(name, asyncio.Lock()):
-            kind = (await self._ask(name, timeout_s, retries)).kind
+            kind = (await self._request_value(name, timeout_s, retries)).kind
             value_wanted = _Value(self._encoded(name, value, kind), kind)
             payload = _SET_LAYOUT.pack(value_wanted.raw, *self._target, name.encode(), kind)
             value_held = await self._exchange("PARAM_SET", payload, name, timeout_s, retries)
             if value_held != value_wanted:
                 # It may be a late or second answer to an earlier read.
-                value_held = await self._ask(name, timeout_s, retries)
+                value_held = await self._request_value(name, timeout_s, retries)
             if value_held != value_wanted:
                 raise ParameterRefused(
                     f"{name}: the autopilot keeps {self._decoded(value_held)} instead of {value}"
                 )
             return self._decoded(value_held)
 
-    async def _ask(self, name: str, timeout_s: float, retries: int) -> _Value:
+    async def _request_value(self, name: str, timeout_s: float, retries: int) -> _Value:
         payload = _READ_LAYOUT.pack(_BY_NAME, *self._target, name.encode())
         return await self._exchange("PARAM_REQUEST_READ", payload, name, timeout_s, retries)
 
@@ -112,7 +114,7 @@ class ParameterClient:
         self, message: str, payload: bytes, name: str, timeout_s: float, retries: int
     ) -> _Value:
         with Pending[_Value | int](self._registry) as answers:
-            self._waiting[name] = answers
+            self._pending[name] = answers
             try:
                 for _ in range(retries + 1):
                     self._outbox.send_payload(MESSAGE_IDS[message], payload)
@@ -121,17 +123,17 @@ class ParameterClient:
                     except TimeoutError:
                         continue
                     if isinstance(answer, int):
-                        raise _refused(name, answer)
+                        raise _refusal(name, answer)
                     return answer
             finally:
-                del self._waiting[name]
+                del self._pending[name]
         raise UnansweredParameter(
             f"{name}: no answer after {retries + 1} tries of {timeout_s:g} s; the autopilot "
             "probably has no parameter of that name (names change between versions)"
         )
 
     def _require_valid_name(self, name: str) -> None:
-        if not (0 < len(name) <= _MAX_NAME and name.isascii()):
+        if not (0 < len(name) <= _MAX_NAME_LENGTH and name.isascii()):
             raise UnknownParameter(f"{name!r} is no parameter name: 1 to 16 ASCII characters")
 
     def _decoded(self, value: _Value) -> float | int:
@@ -158,18 +160,18 @@ class ParameterClient:
 
     def _on_value(self, payload: bytes) -> None:
         raw, _, _, name, kind = _VALUE_LAYOUT.unpack_from(payload.ljust(_VALUE_LAYOUT.size, b"\0"))
-        text = name.split(b"\0", 1)[0].decode("ascii", errors="replace")
-        answers = self._waiting.get(text)
+        name_text = name.split(b"\0", 1)[0].decode("ascii", errors="replace")
+        answers = self._pending.get(name_text)
         if answers is not None:
             answers.put(_Value(raw, kind))
 
     def _on_error(self, message: Message) -> None:
-        answers = self._waiting.get(message.param_id)
+        answers = self._pending.get(message.param_id)
         if answers is not None:
             answers.put(message.error)
 
 
-def _refused(name: str, code: int) -> UnknownParameter | ParameterRefused:
+def _refusal(name: str, code: int) -> UnknownParameter | ParameterRefused:
     reason = _ERROR_TEXTS.get(code, f"error {code}")
     kind = UnknownParameter if code == 1 else ParameterRefused
     return kind(f"{name}: {reason}")

@@ -1,4 +1,4 @@
-"""Which sender is the peer: who may become it, by which frames, and for how long."""
+"""The peer: which sender may become the peer, by which frames, and for how long it remains it."""
 
 import asyncio
 import ipaddress
@@ -80,8 +80,8 @@ _CONTROL_LASTS_S = 2.0
 """Time after the last setpoint during which the peer changes only if it is silent, s."""
 
 HEARTBEAT = 0
-# Of a HEARTBEAT payload, which may lack trailing zeros.
-_TYPE_AT, _AUTOPILOT_AT, _FIELD_BYTES = 4, 5, 6
+# Offsets in a HEARTBEAT payload, and its length; a received payload may lack trailing zeros.
+_TYPE_OFFSET, _AUTOPILOT_OFFSET, _FIELD_BYTES = 4, 5, 6
 _AUTOPILOT_INVALID = 8
 
 
@@ -98,7 +98,7 @@ class PeerRule:
         notice: Called with a sentence for the user at each change, and at each `ignore`.
         clock: Returns the event-loop time, s.
         last_setpoint: Returns the event-loop time of the last setpoint, s; −inf before the first.
-        every_frame_claims: Signing is on, or the link runs in lockstep.
+        every_frame_claims: Whether each accepted frame is a claim: with signing or in lockstep.
     """
 
     def __init__(
@@ -123,7 +123,9 @@ class PeerRule:
         if frame.message_id != HEARTBEAT:
             return False
         fields = frame.payload.ljust(_FIELD_BYTES, b"\0")
-        return fields[_AUTOPILOT_AT] != _AUTOPILOT_INVALID and fields[_TYPE_AT] != MAV_TYPE_GCS
+        return (
+            fields[_AUTOPILOT_OFFSET] != _AUTOPILOT_INVALID and fields[_TYPE_OFFSET] != MAV_TYPE_GCS
+        )
 
     def renew(self) -> None:
         """Note that the peer has repeated its claim."""

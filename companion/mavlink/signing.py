@@ -21,20 +21,20 @@ from companion.mavlink.stamps import LATEST_TICKS, TICKS_PER_S, SignatureResult,
 _STAMP_BYTES = 6
 _HASH_BYTES = 6
 
-_ID_AT = slice(7, 10)  # of a version 2 frame
-_PAYLOAD_AT = 10
+_ID_BYTES = slice(7, 10)  # of a version 2 frame
+_PAYLOAD_OFFSET = 10
 _TIMESYNC_ID = 111
 _TIMESYNC = _TIMESYNC_ID.to_bytes(3, "little")
-_REQUESTS_KEPT = 16
+_MAX_REQUESTS = 16  # TIMESYNC requests whose answers are recognised
 
 WRITE_PERIOD_S = 10.0
 """Time between two writes of the stamps, s. The guide demands one write a minute."""
 _STAMP_RESERVE = 15 * TICKS_PER_S
 """How far the stamps in the file are ahead of the newest stamps while the link is open, ticks.
 
-It is longer than a period. If this program is killed, the stamps that it sends later are still
-newer, and no older frame is accepted again. In that case the vehicle's frames are also refused
-until their stamps are newer than those in the file, for 15 s at most.
+It is longer than `WRITE_PERIOD_S`. So even if this program is killed, the stamps that its next run
+sends are newer, and no older frame is accepted again. In that case the vehicle's frames are also
+refused until their stamps are newer than those in the file, for 15 s at most.
 """
 _LAST_WRITE_TIMEOUT_S = 2.0
 """Time allowed for the last write, s."""
@@ -89,23 +89,23 @@ class Signing:
         self._key = key
         self._link = bytes([link_id])
         self.file = file
-        kept, trouble = file.load() if file is not None else (Stamps(), None)
+        kept, load_error = file.load() if file is not None else (Stamps(), None)
         self._judge = StampJudge(kept, clock, elapsed)
         self.remarks, self.changed = self._judge.remarks, self._judge.changed
-        if trouble is not None:
-            self.remarks.append(trouble)
-        self._stamp = kept.sent
-        self._requests: deque[bytes] = deque(maxlen=_REQUESTS_KEPT)
+        if load_error is not None:
+            self.remarks.append(load_error)
+        self._newest_stamp = kept.sent
+        self._timesync_requests: deque[bytes] = deque(maxlen=_MAX_REQUESTS)
         self._unproven_stamp = 0
 
     def sign(self, frame: bytes) -> bytes:
         """Append the signature to a frame built with `signed=True`."""
-        self._stamp = max(self._stamp + 1, self._judge.date())
-        if frame[_ID_AT] == _TIMESYNC:
-            answer_at, question = _timesync_fields(frame[_PAYLOAD_AT : _PAYLOAD_AT + frame[1]])
-            if not any(answer_at):
-                self._requests.append(question)
-        tail = self._link + self._stamp.to_bytes(_STAMP_BYTES, "little")
+        self._newest_stamp = max(self._newest_stamp + 1, self._judge.date())
+        if frame[_ID_BYTES] == _TIMESYNC:
+            tc1, ts1 = _timesync_fields(frame[_PAYLOAD_OFFSET : _PAYLOAD_OFFSET + frame[1]])
+            if not any(tc1):
+                self._timesync_requests.append(ts1)
+        tail = self._link + self._newest_stamp.to_bytes(_STAMP_BYTES, "little")
         return frame + tail + self._hash(frame + tail)
 
     def check(self, frame: Frame) -> SignatureResult:
@@ -118,14 +118,14 @@ class Signing:
             return SignatureResult.WRONG_KEY
         stamp = int.from_bytes(signature[1 : 1 + _STAMP_BYTES], "little")
         stream = (frame.system, frame.component, signature[0])
-        verdict = self._judge.judge(stream, stamp, answers=self._answers_timesync(frame))
-        if verdict is SignatureResult.GOOD:
-            self._stamp = max(self._stamp, stamp)
-        elif verdict is SignatureResult.AHEAD and self._judge.awaits_answer(stamp):
+        result = self._judge.judge(stream, stamp, answers=self._answers_timesync(frame))
+        if result is SignatureResult.GOOD:
+            self._newest_stamp = max(self._newest_stamp, stamp)
+        elif result is SignatureResult.AHEAD and self._judge.awaits_answer(stamp):
             # The vehicle would ignore a request with a stamp older than those it has seen.
-            self._stamp = max(self._stamp, stamp)
+            self._newest_stamp = max(self._newest_stamp, stamp)
             self._unproven_stamp = stamp
-        return verdict
+        return result
 
     @property
     def awaits_answer(self) -> bool:
@@ -134,14 +134,14 @@ class Signing:
 
     def stamps(self) -> Stamps:
         """The stamps of this run, to be kept in the file; called by another thread."""
-        return Stamps(self._judge.date(), self._stamp, self._judge.streams())
+        return Stamps(self._judge.date(), self._newest_stamp, self._judge.streams())
 
     def _answers_timesync(self, frame: Frame) -> bool:
         """Whether a frame answers a TIMESYNC request of this run, which no recording can do."""
         if frame.message_id != _TIMESYNC_ID:
             return False
-        answer_at, question = _timesync_fields(frame.payload)
-        return any(answer_at) and any(question) and question in self._requests
+        tc1, ts1 = _timesync_fields(frame.payload)
+        return any(tc1) and any(ts1) and ts1 in self._timesync_requests
 
     def _hash(self, data: bytes) -> bytes:
         return hashlib.sha256(self._key + data).digest()[:_HASH_BYTES]
@@ -149,14 +149,15 @@ class Signing:
 
 def _timesync_fields(payload: bytes) -> tuple[bytes, bytes]:
     """Fields tc1 and ts1 of TIMESYNC; tc1 is zero in a request, and an answer repeats ts1."""
-    whole = payload.ljust(16, b"\0")
-    return whole[:8], whole[8:16]
+    padded = payload.ljust(16, b"\0")
+    return padded[:8], padded[8:16]
 
 
 class StampKeeper:
     """A thread that writes the stamps every 10 s, when a new stream is heard, and at the end.
 
-    So the event loop never waits for a disk. A failure is reported once, in `Signing.remarks`.
+    It is a thread, so that the event loop never waits for a disk. A failure is reported once, in
+    `Signing.remarks`.
 
     Args:
         signing: Holds the stamps.
@@ -190,7 +191,7 @@ class StampKeeper:
 
     def _write(self, stamps: Stamps) -> None:
         try:
-            # Streams of another vehicle with this key belong to another program.
+            # The file may also hold streams that other programs heard, of vehicles with this key.
             others = self._file.load()[0].streams
             self._file.save(replace(stamps, streams=others | stamps.streams))
         except OSError as error:

@@ -73,9 +73,9 @@ class StampFile:
 
 
 def _state_directory() -> Path:
-    named = Path(os.environ.get("XDG_STATE_HOME", ""))
-    if named.is_absolute():  # the XDG standard: a relative path is ignored
-        return named
+    directory = Path(os.environ.get("XDG_STATE_HOME", ""))
+    if directory.is_absolute():  # the XDG standard: a relative path is ignored
+        return directory
     try:
         return Path.home() / ".local" / "state"
     except RuntimeError:
@@ -88,10 +88,10 @@ def _state_directory() -> Path:
 def _parsed(text: bytes) -> Stamps:
     kept = json.loads(text)
     streams = {
-        _stream(name): tuple(_ticks(stamp) for stamp in stamps)
+        _stream(name): tuple(_valid_ticks(stamp) for stamp in stamps)
         for name, stamps in kept["streams"].items()
     }
-    return Stamps(_ticks(kept["date"]), _ticks(kept["sent"]), streams)
+    return Stamps(_valid_ticks(kept["date"]), _valid_ticks(kept["sent"]), streams)
 
 
 def _stream(name: str) -> Stream:
@@ -99,7 +99,7 @@ def _stream(name: str) -> Stream:
     return system, component, link
 
 
-def _ticks(value: Any) -> int:
+def _valid_ticks(value: Any) -> int:
     if type(value) is not int or not 0 <= value <= LATEST_TICKS:
         raise ValueError(value)
     return value

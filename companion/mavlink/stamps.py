@@ -62,7 +62,7 @@ class StampJudge:
 
     The date of this program is the latest of three: the computer's clock at the start, the date
     kept on disk, and the date of the release. From then on it follows the monotonic clock, so that
-    an NTP step in flight makes no good stamp bad.
+    good stamps stay good when NTP sets the computer's clock in flight.
 
     - A stamp up to a day ahead of the date must be newer than all before it on its stream,
       including those on disk. On a stream not yet heard in this run it must also be less than a
@@ -92,27 +92,27 @@ class StampJudge:
         self.remarks: list[str] = []
         self.changed = Event()
         self._remarked: set[str] = set()
-        self._elapsed = elapsed
+        self._monotonic_time = elapsed
         start = int((clock() - EPOCH_UNIX_S) * TICKS_PER_S)
         self._check_clock(start, kept.date)
         self._start = min(max(start, kept.date, _PROGRAM_DATE), LATEST_TICKS)
-        self._started = elapsed()
-        self._limit = self._start + _DAY
-        self._kept = kept.streams
-        self._heard: dict[tuple[Stream, bool], int] = {}
-        self._newest = {False: 0, True: 0}
-        self._answered = False
+        self._start_monotonic = elapsed()
+        self._ahead_limit = self._start + _DAY
+        self._kept_streams = kept.streams
+        self._newest_by_stream: dict[tuple[Stream, bool], int] = {}  # the bool as in `_newest`
+        self._newest = {False: 0, True: 0}  # of all streams; True: of stamps far ahead of the date
+        self._date_proven = False
 
     def date(self) -> int:
         """The date of this program now, ticks."""
-        return self._start + int((self._elapsed() - self._started) * TICKS_PER_S)
+        return self._start + int((self._monotonic_time() - self._start_monotonic) * TICKS_PER_S)
 
     def awaits_answer(self, stamp: int) -> bool:
         """Whether `stamp` would be accepted if its frame answered a TIMESYNC request."""
         date = self.date()
         in_reach = date + _DAY < stamp <= date + _MAX_AHEAD
-        # Once a signer near the date was heard, no other changes the date.
-        return in_reach and not self._answered and not self._newest[False]
+        # Once a stamp near the date was accepted, no other stamp changes the date.
+        return in_reach and not self._date_proven and not self._newest[False]
 
     def judge(self, stream: Stream, stamp: int, *, answers: bool) -> SignatureResult:
         """Judge a stamp; only a good one is remembered.
@@ -135,27 +135,27 @@ class StampJudge:
                     f"yet (GPS), or this computer's clock is ahead: {SET_CLOCK}"
                 )
             return SignatureResult.REPLAYED
-        if ahead and not self._answered:
+        if ahead and not self._date_proven:
             if not answers:
                 self._remark_ahead(
                     stamp - date,
                     f"and refused until the vehicle answers a TIMESYNC request; {SET_CLOCK}",
                 )
                 return SignatureResult.AHEAD
-            self._answered = True
+            self._date_proven = True
             self._remark(
                 f"this computer's clock is wrong: it is {_days(stamp - date)} behind the vehicle, "
                 f"which has the right key and answers, so its date is used; {SET_CLOCK}"
             )
-        if (stream, ahead) not in self._heard:
+        if (stream, ahead) not in self._newest_by_stream:
             self.changed.set()
-        self._heard[stream, ahead] = stamp
+        self._newest_by_stream[stream, ahead] = stamp
         self._newest[ahead] = max(self._newest[ahead], stamp)
         return SignatureResult.GOOD
 
     def streams(self) -> dict[Stream, tuple[int, ...]]:
         """The newest stamps of each stream that was heard in this run; see `Stamps.streams`."""
-        heard = dict(self._heard)  # a copy: another thread calls this
+        heard = dict(self._newest_by_stream)  # a copy: another thread calls this
         newest = {}
         for stream in {stream for stream, _ in heard}:
             stamps = (
@@ -167,7 +167,7 @@ class StampJudge:
 
     def _lower_bound(self, stream: Stream, ahead: bool, date: int) -> int:
         """Lower bound of the next stamp of this stream, exclusive, ticks."""
-        heard = self._heard.get((stream, ahead))
+        heard = self._newest_by_stream.get((stream, ahead))
         if heard is not None:
             return heard
         newest = self._newest[ahead] if ahead else max(self._newest[ahead], date)
@@ -180,10 +180,11 @@ class StampJudge:
             stream: the signer's stream.
             ahead: true: among the stamps far ahead of the date; false: among the others.
         """
-        stamps = (s for s in self._kept.get(stream, ()) if (s > self._limit) == ahead)
+        stamps = (s for s in self._kept_streams.get(stream, ()) if (s > self._ahead_limit) == ahead)
         return max(stamps, default=0)
 
     def _check_clock(self, start: int, kept: int) -> None:
+        """Remark that this computer's clock, `start`, is before the date on disk or the release."""
         if start < kept - _MINUTE and kept > _PROGRAM_DATE:
             self._remark(
                 f"this computer's clock is wrong: it says {_date(start)}, but an earlier run ended "

@@ -79,8 +79,8 @@ class FrameCounter:
 
     def __init__(self, stats: LinkStats) -> None:
         self._stats = stats
-        self._last: int | None = None
-        self._explained = 0
+        self._last_sequence: int | None = None
+        self._explained_by_unknown = 0
 
     def count(self, message_id: int, sequence: int) -> None:
         """Count one accepted frame."""
@@ -90,20 +90,20 @@ class FrameCounter:
             stats.repeated += 1
         elif missing:
             # A frame of an unknown message has a sequence number too. It came, so it is not lost.
-            explained = min(missing, stats.unknown - self._explained)
-            self._explained += explained
+            explained = min(missing, stats.unknown - self._explained_by_unknown)
+            self._explained_by_unknown += explained
             stats.lost += missing - explained
         stats.frames += 1
         stats.by_message[message_id] = stats.by_message.get(message_id, 0) + 1
 
     def reset(self) -> None:
         """Count no gap before the next frame, after a reconnect."""
-        self._last = None
+        self._last_sequence = None
 
     def _missing(self, sequence: int) -> int:
         """Number of frames missing before this one; −1 if it is repeated or up to 127 late."""
-        step = 1 if self._last is None else (sequence - self._last) & 0xFF
+        step = 1 if self._last_sequence is None else (sequence - self._last_sequence) & 0xFF
         if step == 0 or step > 128:
             return -1
-        self._last = sequence
+        self._last_sequence = sequence
         return step - 1

@@ -30,14 +30,14 @@ class StatusText(NamedTuple):
 class TextAssembler:
     """Joins the pieces of long texts. The newest 100 texts are kept in `texts`.
 
-    If a text begins before the last one is complete, the incomplete one is kept as it is. A text
-    that PX4 sends both as STATUSTEXT and as event is kept once.
+    If a new text begins before the previous text is complete, the incomplete text is kept as it is.
+    A text that PX4 sends both as STATUSTEXT and as event is kept once.
     """
 
     def __init__(self) -> None:
         self.texts: deque[StatusText] = deque(maxlen=_MAX_TEXTS)
         self._id = 0
-        self._parts: list[str] = []
+        self._pieces: list[str] = []
         self._severity = 6
         self._events: deque[StatusText] = deque(maxlen=_MAX_TEXTS)
 
@@ -49,7 +49,7 @@ class TextAssembler:
             words: The text.
             now: Event-loop time, s.
         """
-        if not _recent(self.texts, words, now):
+        if not _is_repetition(self.texts, words, now):
             event = StatusText(now, severity, words)
             self.texts.append(event)
             self._events.append(event)
@@ -65,7 +65,7 @@ class TextAssembler:
             self._finish(now)
             self._id = message.id
         self._severity = message.severity
-        self._parts.append(text)
+        self._pieces.append(text)
         if len(text) < _CHUNK_CHARACTERS:  # a shorter piece is the last one
             self._finish(now)
 
@@ -74,17 +74,17 @@ class TextAssembler:
         return tuple(entry.text for entry in self.texts if entry.time >= start)
 
     def _finish(self, now: float) -> None:
-        if self._parts:
-            self._keep(now, self._severity, "".join(self._parts))
-        self._id, self._parts = 0, []
+        if self._pieces:
+            self._keep(now, self._severity, "".join(self._pieces))
+        self._id, self._pieces = 0, []
 
     def _keep(self, now: float, severity: int, text: str) -> None:
         words = text.rstrip("\t ").strip()
-        if words and not _recent(self._events, words, now):
+        if words and not _is_repetition(self._events, words, now):
             self.texts.append(StatusText(now, severity, words))
 
 
-def _recent(texts: deque[StatusText], words: str, now: float) -> bool:
+def _is_repetition(texts: deque[StatusText], words: str, now: float) -> bool:
     """Whether one of `texts` from the last second has the same words."""
     return any(text.text == words for text in texts if text.time >= now - _REPETITION_TIME_S)
 
@@ -101,9 +101,9 @@ def status_texts(text: str, severity: int, number: int) -> list[Message]:
         return [dialect.MAVLink_statustext_message(severity, text.encode("ascii"))]
     return [
         dialect.MAVLink_statustext_message(
-            severity, text[at : at + _CHUNK_CHARACTERS].encode("ascii"), number, order
+            severity, text[start : start + _CHUNK_CHARACTERS].encode("ascii"), number, order
         )
-        for order, at in enumerate(range(0, len(text) + 1, _CHUNK_CHARACTERS))
+        for order, start in enumerate(range(0, len(text) + 1, _CHUNK_CHARACTERS))
     ]
 
 

@@ -37,20 +37,20 @@ def _records(path: Path) -> Iterator[bytes]:
         data = path.read_bytes()
     except OSError as error:
         raise LogError(f"{path}: cannot read the log: {error.strerror}") from error
-    at = _STAMP_BYTES
-    while at + 3 <= len(data):
-        magic, size, flags = data[at : at + 3]
+    start = _STAMP_BYTES
+    while start + 3 <= len(data):
+        magic, size, flags = data[start : start + 3]
         if magic == V2:
-            end = at + _V2_OVERHEAD + size + (_SIGNATURE_BYTES if flags & 1 else 0)
+            end = start + _V2_OVERHEAD + size + (_SIGNATURE_BYTES if flags & 1 else 0)
         elif magic == V1:
-            end = at + _V1_OVERHEAD + size
-        elif at == _STAMP_BYTES:
+            end = start + _V1_OVERHEAD + size
+        elif start == _STAMP_BYTES:
             break
         else:
-            raise LogError(f"{path}: damaged after {at} bytes: no MAVLink frame begins there")
-        yield data[at:end]
-        at = end + _STAMP_BYTES
-    if at == _STAMP_BYTES:
+            raise LogError(f"{path}: damaged after {start} bytes: no MAVLink frame begins there")
+        yield data[start:end]
+        start = end + _STAMP_BYTES
+    if start == _STAMP_BYTES:
         raise LogError(
             f"{path}: not a .tlog; expected MAVLink frames, each after 8 bytes with its time"
         )

@@ -30,7 +30,7 @@ from companion.replay.recorded import (
 from companion.vehicle.records import AttitudeTarget
 
 Entry = RecordedSample | RecordedStep | RecordedAction | ValuesChange | AttitudeTarget
-"""An input of the loops, with what the flight made of it."""
+"""An input of the loops, with what the flight computed from it."""
 
 
 def entries(record: FlightRecord) -> Iterator[Entry]:
@@ -40,10 +40,10 @@ def entries(record: FlightRecord) -> Iterator[Entry]:
         RecordError: an entry is not valid.
     """
     with as_recorded(record.folder):
-        yield from _in_order(_Messages(record))
+        yield from _ordered_entries(_Messages(record))
 
 
-def _in_order(messages: "_Messages") -> Iterator[Entry]:
+def _ordered_entries(messages: "_Messages") -> Iterator[Entry]:
     while (topic := messages.next()) is not None:
         if topic == SAMPLE.topic:
             row = messages.take(SAMPLE)
@@ -52,17 +52,17 @@ def _in_order(messages: "_Messages") -> Iterator[Entry]:
                 return  # the record was cut off between the sample and its setpoint
             yield recorded_sample(row, messages.take(SETPOINT) if answered else None)
         elif topic == INPUT.topic:
-            read = messages.take(INPUT)
+            row = messages.take(INPUT)
             target = messages.take(TARGET) if messages.next() == TARGET.topic else None
-            made = messages.take(GUIDANCE) if messages.next() == GUIDANCE.topic else None
-            yield recorded_step(read, target, made)
+            guidance = messages.take(GUIDANCE) if messages.next() == GUIDANCE.topic else None
+            yield recorded_step(row, target, guidance)
         elif topic == ACTION.topic:
             yield recorded_action(messages.take(ACTION))
         elif topic == ATTITUDE_TARGET.topic:
             yield attitude_target(messages.take(ATTITUDE_TARGET))
         elif topic == _CHANGE_TOPIC:
             yield messages.take_change()
-        else:  # its sample or its step was not recorded
+        else:  # an output; the sample or the step before it was not recorded
             messages.skip(topic)
 
 
@@ -78,19 +78,19 @@ class _Messages:
         self._order = [topic for topic in record.content.order if topic in used]
         self._changes = iter(record.changes)
         self._rows = {each.topic: iter(record.rows(each.name).tolist()) for each in _CHANNELS}
-        self._at = 0
+        self._index = 0
 
     def next(self) -> str | None:
         """Topic of the next message; None at the end."""
-        return self._order[self._at] if self._at < len(self._order) else None
+        return self._order[self._index] if self._index < len(self._order) else None
 
     def take_change(self) -> ValuesChange:
-        self._at += 1
+        self._index += 1
         return next(self._changes)
 
     def skip(self, topic: str) -> None:
         """Skip the next message, which has this topic."""
-        self._at += 1
+        self._index += 1
         next(self._rows[topic])
 
     def take(self, channel: Channel) -> Row:
@@ -98,5 +98,5 @@ class _Messages:
         names = channel.dtype.names or ()
         if self.next() != channel.topic:
             return dict.fromkeys(names, float("nan"))
-        self._at += 1
+        self._index += 1
         return dict(zip(names, next(self._rows[channel.topic]), strict=True))

@@ -23,7 +23,7 @@ Row = dict[str, Any]
 """One message: value by column name."""
 
 _TARGET_COLUMNS = "north", "east", "heading_rad", "heading_rate_rad_s"
-_MISFITS = (None, Misfit.NOT_NEWER, Misfit.AHEAD)
+_MISFITS = (None, Misfit.NOT_NEWER, Misfit.AHEAD)  # by number in the record
 
 
 class Setpoint(NamedTuple):
@@ -39,7 +39,7 @@ class RecordedSample(NamedTuple):
     Attributes:
         sample: the sample; `received_ns`, from which latencies are computed, is 0.
         flags: state of the control loop at its arrival.
-        checked: time of the check of its age before sending, s; NaN: not checked.
+        checked: time at which its age was checked before sending, s; NaN: not checked.
         reason: "answered", or why it is unanswered; one of `REASONS`.
         setpoint: setpoint that was sent, or None.
     """
@@ -99,7 +99,7 @@ def recorded_sample(row: Row, sent: Row | None) -> RecordedSample:
     return RecordedSample(sample, flags, row["checked_s"], REASONS[row["unanswered"]], setpoint)
 
 
-def recorded_step(row: Row, target: Row | None, made: Row | None) -> RecordedStep:
+def recorded_step(row: Row, target: Row | None, guidance: Row | None) -> RecordedStep:
     """The step of a row of `INPUT`; its rows of `TARGET` and `GUIDANCE` may each be None."""
     position = None
     if not isnan(row["position_received_s"]):
@@ -111,26 +111,26 @@ def recorded_step(row: Row, target: Row | None, made: Row | None) -> RecordedSte
         )
     battery = thrust = None
     if not isnan(row["battery_received_s"]):
-        battery = Battery(row["battery_received_s"], _known(row["battery_v"]), None)
+        battery = Battery(row["battery_received_s"], _none_if_nan(row["battery_v"]), None)
     if not isnan(received := row["autopilot_thrust_received_s"]):
         thrust = AttitudeTargetThrust(received, row["autopilot_thrust"])
     read = StepInput(
         row["time_s"],
         position,
-        _known(row["clock_offset_s"]),
+        _none_if_nan(row["clock_offset_s"]),
         battery,
         thrust,
-        _known(row["height_m"]),
+        _none_if_nan(row["height_m"]),
         bool(row["armed"]),
         StepFlags(*(bool(row[name]) for name in StepFlags._fields)),
     )
     reference = None
-    if made is not None:
+    if guidance is not None:
         reference = Reference(
-            _vector(made, "reference", "m"),
-            _vector(made, "reference", "m_s"),
-            heading=made["reference_heading_rad"],
-            thrust_steps=not made["height_steady"],
+            _vector(guidance, "reference", "m"),
+            _vector(guidance, "reference", "m_s"),
+            heading=guidance["reference_heading_rad"],
+            thrust_steps=not guidance["height_steady"],
         )
     return RecordedStep(read, None if target is None else _command(target), reference)
 
@@ -139,15 +139,15 @@ def _command(row: Row) -> GuidanceCommand:
     later = None
     if not isnan(row["later_north"]):
         later = Target(*(row[f"later_{name}"] for name in _TARGET_COLUMNS))
-    free = isnan(row["body_roll_rad_s"])
+    no_body_rates = isnan(row["body_roll_rad_s"])
     return GuidanceCommand(
         Target(*(row[name] for name in _TARGET_COLUMNS)),
         row["acceleration_down_m_s2"],
         row["time_s"],
         bool(row["idle"]),
         bool(row["is_step"]),
-        None if free else _rates(row, "body"),
-        _known(row["thrust"]),
+        None if no_body_rates else _rates(row, "body"),
+        _none_if_nan(row["thrust"]),
         row["turn_rad"],
         later,
         row["period_s"],
@@ -159,7 +159,7 @@ def recorded_action(row: Row) -> RecordedAction:
     linear = row["drag_per_s"]
     drag = None if isnan(linear) else Drag(linear, row["quadratic_drag_per_m"])
     name = ACTIONS[row["action"]]
-    return RecordedAction(row["time_s"], name, _known(row["clock_offset_s"]), drag)
+    return RecordedAction(row["time_s"], name, _none_if_nan(row["clock_offset_s"]), drag)
 
 
 def attitude_target(row: Row) -> AttitudeTarget:
@@ -167,7 +167,7 @@ def attitude_target(row: Row) -> AttitudeTarget:
     return AttitudeTarget(int(row["time_boot_ms"]), _quaternion(row))
 
 
-def _known(value: float) -> float | None:
+def _none_if_nan(value: float) -> float | None:
     return None if isnan(value) else value
 
 

@@ -1,9 +1,9 @@
 """Replays a recorded flight: the same loops with the recorded inputs, in the same order.
 
-Guidance flies the maneuvers of the configuration again. If a program commanded the flight, or the
-configuration asks for predictive control, the record lacks what came from the program or from the
-solver's process. Then the recorded commands of guidance are used, and only the control loop is
-replayed. Changes in flight are repeated.
+Guidance flies the maneuvers of the configuration again. But the record lacks the inputs from a
+program that commanded the flight, and from the solver's process of predictive control. In these two
+cases the recorded commands of guidance are used, and only the control loop is replayed. Changes of
+values in flight are repeated.
 """
 
 from math import isnan
@@ -73,8 +73,8 @@ class Replay:
     """
 
     def __init__(self, record: FlightRecord, config: Config) -> None:
-        flew_program = record.metadata["flight"].get("plan") == "program"
-        self.follows_record = flew_program or config.guidance.kind == "nmpc"
+        by_program = record.metadata["flight"].get("plan") == "program"
+        self.follows_record = by_program or config.guidance.kind == "nmpc"
         self._record = record
         self._now = 0.0
         self._vehicle = vehicle = ReplayedVehicle()
@@ -92,8 +92,8 @@ class Replay:
         self._loop.planner.attitude_target = lambda: vehicle.attitude_target
         self._wanted, self._slew = config, Slew(config)
         self._retuning = Retuning(self._loop, self._guidance)
-        self._guidance.before_step = self._step_change
-        self._same_vehicle = self._accepts = True
+        self._guidance.before_step = self._apply_slew
+        self._same_vehicle = self._accepts_setpoint = True
         self._sent: Setpoint | None = None
         self._encoder = SetpointEncoder(1, 1, 1, 1, signed=False)
         self._recorded_source = _RecordedSource()
@@ -113,48 +113,48 @@ class Replay:
         samples = []
         for entry in entries(self._record):
             if isinstance(entry, RecordedSample):
-                samples.append(self._answer(entry))
+                samples.append(self._replay_sample(entry))
             elif isinstance(entry, RecordedStep):
-                self._step(entry)
+                self._replay_step(entry)
             elif isinstance(entry, RecordedAction):
-                self._act(entry)
+                self._replay_action(entry)
             elif isinstance(entry, ValuesChange):
-                self._change(entry)
+                self._replay_change(entry)
             else:
                 self._vehicle.attitude_target = entry
         return samples
 
-    def _answer(self, entry: RecordedSample) -> ReplayedSample:
+    def _replay_sample(self, entry: RecordedSample) -> ReplayedSample:
         loop, flags, sample = self._loop, entry.flags, entry.sample
         loop.on, loop.taking_over = flags.on, flags.taking_over
         loop.offboard_active = flags.offboard_active
         self._same_vehicle = flags.same_vehicle
         if loop.awaiting_mode and not flags.awaiting_mode:
             loop.resume()
-        self._accepts = entry.reason != "not_sent"
+        self._accepts_setpoint = entry.reason != "not_sent"
         self._now = sample.received if isnan(entry.checked) else entry.checked
         self._sent = None
         loop.on_sample(sample)
         self._guidance.note_attitude(sample)
         reason = loop.record.reason
-        code = REASONS[1] if not flags.on else REASONS[0] if reason is None else reason.value
-        sent = self._sent if code == REASONS[0] else None
+        name = REASONS[1] if not flags.on else REASONS[0] if reason is None else reason.value
+        sent = self._sent if name == REASONS[0] else None
         return ReplayedSample(
-            sample.received, sample.vehicle_time, entry.setpoint, sent, entry.reason, code
+            sample.received, sample.vehicle_time, entry.setpoint, sent, entry.reason, name
         )
 
-    def _step(self, entry: RecordedStep) -> None:
-        read = entry.read
-        self._vehicle.take(read)
-        self._now = read.time
-        self._loop.offboard_active = read.flags.offboard_active
-        self._recorded_source.held = entry.reference
+    def _replay_step(self, entry: RecordedStep) -> None:
+        inputs = entry.read
+        self._vehicle.take(inputs)
+        self._now = inputs.time
+        self._loop.offboard_active = inputs.flags.offboard_active
+        self._recorded_source.step_reference = entry.reference
         before = self._loop.command
         self._guidance.step()
         if self.follows_record:
             self._loop.command = before if entry.command is None else entry.command
 
-    def _act(self, entry: RecordedAction) -> None:
+    def _replay_action(self, entry: RecordedAction) -> None:
         guidance = self._guidance
         self._now, self._vehicle.offset = entry.time, entry.clock_offset
         match entry.name:
@@ -178,8 +178,8 @@ class Replay:
             case _:
                 guidance.give_up()
 
-    def _change(self, entry: ValuesChange) -> None:
-        """Begin a change of values, if the loops can change."""
+    def _replay_change(self, entry: ValuesChange) -> None:
+        """Begin a change of values, if the loops can change values in flight."""
         if fixed_because(self._wanted) is not None:
             return
         self._wanted = changed(self._wanted, entry.values, "the record")
@@ -189,19 +189,19 @@ class Replay:
         else:
             self._slew.begin(self._wanted, entry.time)
 
-    def _step_change(self, now: float) -> None:
+    def _apply_slew(self, now: float) -> None:
         values = self._slew.step(now)
         if values is not None:
             self._retuning.apply(values)
 
     def _send(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> bool:
-        self._encoder.frame(0, time_boot_ms, rates, thrust)  # refuses what the link refuses
+        self._encoder.frame(0, time_boot_ms, rates, thrust)  # raises for an invalid setpoint
         self._sent = Setpoint(rates, thrust)
-        return self._accepts
+        return self._accepts_setpoint
 
 
 def _assumed_drag(record: FlightRecord, config: Config) -> KnownDrag:
-    """The drag assumed for the maneuvers before the flight, whatever was learned since."""
+    """The drag that the flight assumed for its maneuvers, without what was learned since."""
     if config.guidance.drag is not None:
         return KnownDrag(config.guidance.drag)
     flight = record.metadata["flight"]
@@ -219,15 +219,16 @@ class _RecordedSource:
     failure: str | None = None
 
     def __init__(self) -> None:
-        self.held: Reference | None = None
+        self.step_reference: Reference | None = None
 
     def begin(self, now: float, pose: Pose) -> None:
         """Do nothing, because the references come one by one."""
 
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
         """The recorded reference of this step."""
-        held = Reference(motion.position_ned) if self.held is None else self.held
-        return lambda _: held
+        recorded = self.step_reference
+        reference = Reference(motion.position_ned) if recorded is None else recorded
+        return lambda _: reference
 
     def finished(self, now: float) -> bool:
         """Always false: a recorded action ends this source."""

@@ -44,13 +44,13 @@ def words(samples: Sequence[ReplayedSample], began: float, *, follows_record: bo
         f"{len(different)} of {len(samples)} samples have another answer than in the flight, the"
         f" first {different[0].received - began:.2f} s after it began."
     )
-    both = [each for each in different if each.recorded and each.replayed]
-    if both:
-        lines.append(_largest_differences(both, began))
-    return lines + _reasons(different)
+    both_answered = [each for each in different if each.recorded and each.replayed]
+    if both_answered:
+        lines.append(_largest_differences(both_answered, began))
+    return lines + _reason_changes(different)
 
 
-def _largest_differences(both: Sequence[ReplayedSample], began: float) -> str:
+def _largest_differences(both_answered: Sequence[ReplayedSample], began: float) -> str:
     def distances(each: ReplayedSample) -> list[float]:
         assert each.recorded is not None
         assert each.replayed is not None
@@ -61,16 +61,16 @@ def _largest_differences(both: Sequence[ReplayedSample], began: float) -> str:
         )
         return [abs(before - after) for before, after in pairs]
 
-    found = []
+    differences = []
     for index, name in enumerate(("roll", "pitch", "yaw", "thrust")):
-        worst = max(both, key=lambda each: distances(each)[index])
+        worst = max(both_answered, key=lambda each: distances(each)[index])
         value = distances(worst)[index]
         number = f"{value:.4f}" if name == "thrust" else f"{degrees(value):.2f} °/s"
-        found.append(f"{name} {number} at {worst.received - began:.2f} s")
-    return f"{len(both)} setpoints differ, at most by: {', '.join(found)}."
+        differences.append(f"{name} {number} at {worst.received - began:.2f} s")
+    return f"{len(both_answered)} setpoints differ, at most by: {', '.join(differences)}."
 
 
-def _reasons(different: Sequence[ReplayedSample]) -> list[str]:
+def _reason_changes(different: Sequence[ReplayedSample]) -> list[str]:
     """Differences in answering: only one of both answered, or the reasons differ."""
     changes = Counter(
         (each.recorded_reason, each.replayed_reason)

@@ -41,5 +41,5 @@ class ReplayedVehicle:
         self.offset = read.clock_offset
 
     def age(self, vehicle_time: float, now: float) -> float | None:
-        """Always None (unknown): `take` has left out a position that is not fresh."""
+        """Always None (unknown): `take` leaves out every position that is not fresh."""
         return None

@@ -27,8 +27,8 @@ _STEPS_SHOWN = 6
 
 def control_plots(flight: FlightData) -> Iterator[Plot]:
     """The plots of control for one flight, without plots that have no curves."""
-    found = [_step_response(flight), _plane(flight), *_coefficients(flight), *_rates(flight)]
-    yield from (plot for plot in (*found, _thrust(flight), _latency(flight)) if plot.traces)
+    plots = [_step_response(flight), _step_paths(flight), *_coefficients(flight), *_rates(flight)]
+    yield from (plot for plot in (*plots, _thrust(flight), _latency(flight)) if plot.traces)
 
 
 def compared_steps(flights: Sequence[FlightData]) -> Iterator[Plot]:
@@ -72,8 +72,8 @@ def _step_response(flight: FlightData) -> Plot:
     return Plot("Step response", note, traces, axes(x="time, s", y="acceleration / thrust"))
 
 
-def _plane(flight: FlightData) -> Plot:
-    """The first doublets in the plane of the coefficients."""
+def _step_paths(flight: FlightData) -> Plot:
+    """The first doublets as paths in the plane of the acceleration coefficients."""
     traces = []
     for number, run in enumerate(flight.runs[:_STEPS_SHOWN]):
         colour = FLIGHTS[number % len(FLIGHTS)]
@@ -89,9 +89,9 @@ def _coefficients(flight: FlightData) -> Iterator[Plot]:
     for column, axis in enumerate(("north", "east")):
         shown = (("target", "target", REFERENCE), ("measured", "coefficients", MEASURED))
         traces = [
-            over_time(name, flight.curves[which], column, colour)
-            for name, which, colour in shown
-            if which in flight.curves
+            over_time(label, flight.curves[curve_name], column, colour)
+            for label, curve_name, colour in shown
+            if curve_name in flight.curves
         ]
         layout = time_axis([flight], y="acceleration / thrust")
         note = "Horizontal acceleration per specific thrust: target, and measured by the tilt."
@@ -101,9 +101,9 @@ def _coefficients(flight: FlightData) -> Iterator[Plot]:
 def _rates(flight: FlightData) -> Iterator[Plot]:
     for column, axis in enumerate(("roll", "pitch", "yaw")):
         traces = [
-            over_time(which, flight.curves[which], column, colour)
-            for which, colour in (("commanded", REFERENCE), ("measured", MEASURED))
-            if which in flight.curves
+            over_time(curve_name, flight.curves[curve_name], column, colour)
+            for curve_name, colour in (("commanded", REFERENCE), ("measured", MEASURED))
+            if curve_name in flight.curves
         ]
         if traces:
             traces += limit_lines([flight], "rate")
@@ -126,7 +126,7 @@ def _thrust(flight: FlightData) -> Plot:
 
 def _latency(flight: FlightData) -> Plot:
     curve = flight.curves.get("latency")
-    if curve is None or not curve.values.any():  # Vehicle time has no latency.
+    if curve is None or not curve.values.any():  # In lockstep, all latencies are 0.
         return Plot("", "", [])
     traces = [over_time("latency", curve, 0, MEASURED), *limit_lines([flight], "latency")]
     layout = time_axis([flight], y="latency, ms")

@@ -21,11 +21,11 @@ class CrossedLimit:
     """The limit whose monitor ended the flight.
 
     Attributes:
-        curve: name of the curve that it bounds: "speed", "tilt", "error", "rate", "thrust",
+        curve: name of the curve that the limit bounds: "speed", "tilt", "error", "rate", "thrust",
             "latency", "height" or "track".
         key: configuration key of the limit.
-        levels: values that the curve must not cross, in its unit; "latency" may do so rarely.
-        outline: (N, 2) north and east, m: the fence around the track; empty for other curves.
+        levels: values that the curve must not cross, in its unit; "latency" may, but not often.
+        outline: fence around the track, (N, 2) north and east, m; empty for other curves.
     """
 
     curve: str
@@ -70,12 +70,12 @@ def early_end(
     if config is None or monitor is None:
         return EndMark(end["time_s"], reason)
     if monitor in ("fence", "braking"):
-        return EndMark(end["time_s"], reason, _fence(config, reason, record))
-    return EndMark(end["time_s"], reason, _levels(config).get(monitor))
+        return EndMark(end["time_s"], reason, _fence_side(config, reason, record))
+    return EndMark(end["time_s"], reason, _constant_limits(config).get(monitor))
 
 
-def _levels(config: Config) -> dict[str, CrossedLimit]:
-    """The limits that are constant levels, by monitor."""
+def _constant_limits(config: Config) -> dict[str, CrossedLimit]:
+    """The limits that are constant over the flight, by monitor."""
     limits, safety = config.limits, config.safety
     tilt, rate = limits.max_tilt_deg + safety.tilt_margin_deg, safety.max_body_rate_deg_s
     return {
@@ -92,11 +92,11 @@ def _levels(config: Config) -> dict[str, CrossedLimit]:
     }
 
 
-def _fence(config: Config, reason: str, record: FlightRecord) -> CrossedLimit | None:
+def _fence_side(config: Config, reason: str, record: FlightRecord) -> CrossedLimit | None:
     """The side of the fence that `reason` names, in the coordinates of the plots.
 
-    Radius, ceiling and polygon count from where control began, the floor from home. None: nothing
-    was flown under control, or the polygon is given in degrees, which no plot shows.
+    Radius, ceiling and polygon are relative to the position where control began, the floor to home.
+    None: nothing was flown under control, or the polygon is given in degrees, which no plot shows.
     """
     guidance, limits = record.rows("guidance"), config.limits
     flown = guidance[guidance["offboard_active"] == 1]
@@ -105,13 +105,13 @@ def _fence(config: Config, reason: str, record: FlightRecord) -> CrossedLimit | 
     north, east = float(flown["estimated_north_m"][0]), float(flown["estimated_east_m"][0])
     if "fence_ceiling_m" in reason or "fence_floor_m" in reason:
         motion = record.rows("motion")
-        began = record.since_start(flown["time_s"][:1])
-        at_start = float(np.interp(began, motion["time_s"], motion["height_m"])[0])
+        start_time = record.since_start(flown["time_s"][:1])
+        start_height = float(np.interp(start_time, motion["time_s"], motion["height_m"])[0])
         ceiling = "fence_ceiling_m" in reason
         return CrossedLimit(
             "height",
             f"limits.fence_{'ceiling' if ceiling else 'floor'}_m",
-            (at_start + limits.fence_ceiling_m if ceiling else limits.fence_floor_m,),
+            (start_height + limits.fence_ceiling_m if ceiling else limits.fence_floor_m,),
         )
     if "fence_radius_m" in reason:
         key = "limits.fence_radius_m"
@@ -120,5 +120,5 @@ def _fence(config: Config, reason: str, record: FlightRecord) -> CrossedLimit | 
         key, corners = "safety.fence_polygon_m", config.safety.fence_polygon_m
     else:
         return None
-    around = [(north + corner[0], east + corner[1]) for corner in (*corners, corners[0])]
-    return CrossedLimit("track", key, outline=tuple(around))
+    outline = [(north + corner[0], east + corner[1]) for corner in (*corners, corners[0])]
+    return CrossedLimit("track", key, outline=tuple(outline))

@@ -75,8 +75,8 @@ class FlightData:
     @property
     def last(self) -> float | None:
         """Time at which the phases or modes end, s since the flight began; None: there are none."""
-        lane = self.phases or self.modes
-        return lane[-1].end if lane else None
+        sections = self.phases or self.modes
+        return sections[-1].end if sections else None
 
 
 def recorded(folder: Path) -> FlightData:
@@ -111,13 +111,13 @@ def spans(begins: list[tuple[float, str]], end: float) -> tuple[Span, ...]:
 
 
 def _maneuvers(record: FlightRecord, phases: tuple[Span, ...]) -> tuple[Span, ...]:
-    """The maneuvers; the last one of a flight that ended early ends with its phase."""
+    """The maneuvers; each ends at the latest with the phase in which it began."""
     marks = [(mark.time - record.began, mark.name or "") for mark in record.maneuvers]
-    found = [span for span in spans(marks, record.duration) if span.name]
-    ends = [phase.end for phase in phases]
+    maneuvers = [span for span in spans(marks, record.duration) if span.name]
+    phase_ends = [phase.end for phase in phases]
     return tuple(
-        span._replace(end=min([span.end, *(end for end in ends if end > span.begin)]))
-        for span in found
+        span._replace(end=min([span.end, *(end for end in phase_ends if end > span.begin)]))
+        for span in maneuvers
     )
 
 
@@ -133,22 +133,24 @@ def _curves(record: FlightRecord) -> dict[str, Curve]:
     guidance, sent, sample = map(record.rows, ("guidance", "setpoint", "sample"))
     setpoint = sent[sent["idle"] == 0]  # on the ground there is no target
     motion, thrust = record.rows("motion"), record.rows("thrust")
-    stepped = record.since_start(guidance["time_s"])
-    answered = record.since_start(setpoint["received_s"])
+    step_times = record.since_start(guidance["time_s"])
+    setpoint_times = record.since_start(setpoint["received_s"])
     return {
-        "position": Curve(stepped, _place(guidance, "estimated")),
-        "reference": Curve(stepped, _held(guidance)),
-        "error": Curve(stepped, _columns(guidance, "error_m")),
+        "position": Curve(step_times, _positions(guidance, "estimated")),
+        "reference": Curve(step_times, _reference_positions(guidance)),
+        "error": Curve(step_times, _columns(guidance, "error_m")),
         "motion": Curve(motion["time_s"], _columns(motion, "height_m", "speed_m_s", "tilt_deg")),
-        "coefficients": Curve(answered, _columns(setpoint, "measured_north", "measured_east")),
-        "target": Curve(answered, _columns(setpoint, "target_north", "target_east")),
-        "commanded": Curve(answered, _rates(setpoint, "commanded")),
+        "coefficients": Curve(
+            setpoint_times, _columns(setpoint, "measured_north", "measured_east")
+        ),
+        "target": Curve(setpoint_times, _columns(setpoint, "target_north", "target_east")),
+        "commanded": Curve(setpoint_times, _rates(setpoint, "commanded")),
         "measured": Curve(record.since_start(sample["received_s"]), _rates(sample, "measured")),
         "thrust": Curve(record.since_start(sent["received_s"]), _columns(sent, "thrust")),
         "hover_thrust": Curve(
             record.since_start(thrust["time_s"]), _columns(thrust, "hover_thrust")
         ),
-        "latency": Curve(answered, 1e-3 * _columns(setpoint, "latency_us")),
+        "latency": Curve(setpoint_times, 1e-3 * _columns(setpoint, "latency_us")),
     }
 
 
@@ -156,21 +158,21 @@ def _columns(rows: Rows, *names: str) -> Floats:
     return np.column_stack([rows[name] for name in names])
 
 
-def _place(rows: Rows, whose: str) -> Floats:
-    """Columns (n, 3) north, east and height of `whose`, "estimated" or "reference", m."""
-    return _columns(rows, *(f"{whose}_{axis}_m" for axis in ("north", "east", "down"))) * (1, 1, -1)
+def _positions(rows: Rows, which: str) -> Floats:
+    """Positions (N, 3): north, east and height, m; `which` is "estimated" or "reference"."""
+    return _columns(rows, *(f"{which}_{axis}_m" for axis in ("north", "east", "down"))) * (1, 1, -1)
 
 
-def _held(guidance: Rows) -> Floats:
-    """The reference; NaN where there is none, as in open loop."""
-    reference = _place(guidance, "reference")
+def _reference_positions(guidance: Rows) -> Floats:
+    """Positions of the reference; NaN where there is none, as in open loop."""
+    reference = _positions(guidance, "reference")
     reference[guidance["holds_position"] == 0, :2] = np.nan
     reference[guidance["holds_height"] == 0, 2] = np.nan
     return reference
 
 
 def _rates(rows: Rows, which: str) -> Floats:
-    """Roll, pitch and yaw rate, °/s."""
+    """Body rates (N, 3): roll, pitch and yaw rate, °/s; `which` is "commanded" or "measured"."""
     return np.degrees(
         _columns(rows, *(f"{which}_{axis}_rad_s" for axis in ("roll", "pitch", "yaw")))
     )

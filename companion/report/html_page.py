@@ -50,26 +50,26 @@ def rendered(package: str, template: str, title: str, plots: Sequence[Plot], **s
     return environment.get_template(template).render(
         title=title,
         plots=plots,
-        plots_json=_script_safe([_plain(plot) for plot in plots]),
-        plotly=_packed(plotly.read_bytes()),
+        plots_json=_script_safe([_plot_data(plot) for plot in plots]),
+        plotly=_gzip_base64(plotly.read_bytes()),
         version=version("mavlink-companion"),
         **shown,
     )
 
 
 def _with_code(text: str) -> "Markup":
-    """A text as HTML, with its parts between backticks as code."""
+    """A text as HTML; text between backticks becomes code."""
     from markupsafe import Markup, escape  # noqa: PLC0415  comes with jinja2
 
     return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
 
-def _packed(data: bytes) -> str:
-    """Data for a script element: base64 of gzip, which browsers since 2023 can unpack."""
+def _gzip_base64(data: bytes) -> str:
+    """Data for a script element, as base64 of gzip, which browsers since 2023 can unpack."""
     return b64encode(compress(data, mtime=0)).decode("ascii")
 
 
-def _plain(plot: Plot) -> dict[str, Any]:
+def _plot_data(plot: Plot) -> dict[str, Any]:
     return {"traces": plot.traces, "layout": {**plot.layout, "height": plot.height}}
 
 

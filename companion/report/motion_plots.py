@@ -31,14 +31,14 @@ _LONGEST_EDGE = 1.2
 
 def motion_plots(flights: Sequence[FlightData]) -> Iterator[Plot]:
     """The plots of the motion, without plots that have no curves."""
-    found = (
-        _plan(flights),
-        _space(flights),
+    plots = (
+        _track_from_above(flights),
+        _track_in_space(flights),
         _height(flights),
         _error_plot(flights),
         _speed(flights),
     )
-    yield from (plot for plot in found if plot.traces)
+    yield from (plot for plot in plots if plot.traces)
 
 
 def _colour(flights: Sequence[FlightData], number: int) -> str:
@@ -49,19 +49,23 @@ def _name(flights: Sequence[FlightData], flight: FlightData, label: str) -> str:
     return label if len(flights) == 1 else f"{flight.name}: {label}"
 
 
-def _plan(flights: Sequence[FlightData]) -> Plot:
+def _track_from_above(flights: Sequence[FlightData]) -> Plot:
     """The track from above."""
     traces = []
     for number, flight in enumerate(flights):
-        for curve_name, dash in (("position", "solid"), ("reference", "dash")):  # the latter on top
+        for curve_name, dash in (
+            ("position", "solid"),
+            ("reference", "dash"),
+        ):  # the last is on top
             if curve_name in flight.curves:
                 values = flight.curves[curve_name].values
-                place = values[even_indices(len(values))]
-                alone = curve_name == "reference" and len(flights) == 1
-                colour = REFERENCE if alone else _colour(flights, number)
+                positions = values[even_indices(len(values))]
+                is_only_reference = curve_name == "reference" and len(flights) == 1
+                colour = REFERENCE if is_only_reference else _colour(flights, number)
                 name = _name(flights, flight, "flown" if curve_name == "position" else curve_name)
-                traces.append(line(name, place[:, _EAST], place[:, _NORTH], colour, dash=dash))
-    traces += [*_place_of_end(flights), *limit_lines(flights, "track")]
+                east, north = positions[:, _EAST], positions[:, _NORTH]
+                traces.append(line(name, east, north, colour, dash=dash))
+    traces += [*_end_cross(flights), *limit_lines(flights, "track")]
     layout = axes(x="east, m", y="north, m")
     layout["yaxis"]["scaleanchor"] = "x"
     note = "The track from above."
@@ -70,7 +74,7 @@ def _plan(flights: Sequence[FlightData]) -> Plot:
     return Plot("Track", note, traces, layout, 420)
 
 
-def _place_of_end(flights: Sequence[FlightData]) -> list[dict[str, Any]]:
+def _end_cross(flights: Sequence[FlightData]) -> list[dict[str, Any]]:
     """A cross at the place where a single flight ended early."""
     flight = flights[0]
     if len(flights) > 1 or flight.end is None or "position" not in flight.curves:
@@ -83,7 +87,7 @@ def _place_of_end(flights: Sequence[FlightData]) -> list[dict[str, Any]]:
     return [{**cross, "hovertext": flight.end.reason}]
 
 
-def _space(flights: Sequence[FlightData]) -> Plot:
+def _track_in_space(flights: Sequence[FlightData]) -> Plot:
     """The track in three dimensions; for a single flight with its reference."""
     traces = []
     for number, flight in enumerate(flights):
@@ -109,15 +113,15 @@ def _space(flights: Sequence[FlightData]) -> Plot:
 
 
 def _cube_ranges(traces: Sequence[Mapping[str, Any]]) -> dict[str, tuple[float, float]]:
-    """Range of each axis around the tracks, m; a short axis has half the longest one's length."""
+    """Range of each axis around the tracks, m; at least half as long as the longest axis."""
     shown = {
         axis: [value for trace in traces for value in trace[axis] if value is not None]
         for axis in "xyz"
     }
-    ends = {axis: (min(values), max(values)) for axis, values in shown.items() if values}
-    longest = max((high - low for low, high in ends.values()), default=0.0) or 1.0
+    extents = {axis: (min(values), max(values)) for axis, values in shown.items() if values}
+    longest = max((high - low for low, high in extents.values()), default=0.0) or 1.0
     ranges = {}
-    for axis, (low, high) in ends.items():
+    for axis, (low, high) in extents.items():
         middle, half = 0.5 * (low + high), 0.52 * max(high - low, 0.5 * longest)
         ranges[axis] = (middle - half, middle + half)
     return ranges
@@ -125,14 +129,14 @@ def _cube_ranges(traces: Sequence[Mapping[str, Any]]) -> dict[str, tuple[float, 
 
 def _track(name: str, flight: FlightData, curve_name: str, colour: str) -> dict[str, Any]:
     curve = flight.curves[curve_name]
-    place = curve.values[even_indices(len(curve.time))]
+    positions = curve.values[even_indices(len(curve.time))]
     return {
         "type": "scatter3d",
         "mode": "lines",
         "name": name,
-        "x": numbers(place[:, _EAST]),
-        "y": numbers(place[:, _NORTH]),
-        "z": numbers(place[:, _HEIGHT]),
+        "x": numbers(positions[:, _EAST]),
+        "y": numbers(positions[:, _NORTH]),
+        "z": numbers(positions[:, _HEIGHT]),
         "line": {"color": colour, "width": 4 if curve_name == "position" else 2},
     }
 
@@ -170,11 +174,11 @@ def _largest_error(flights: Sequence[FlightData]) -> float | None:
     if len(flights) > 1 or flight.end is not None or "error" not in flight.curves:
         return None
     time, error = flight.curves["error"].time, flight.curves["error"].values[:, 0]
-    parts = [error[(time >= span.begin) & (time < span.end)] for span in flight.maneuvers]
-    throughout = [part.max() for part in parts if len(part) and not np.isnan(part).any()]
-    if not throughout or max(throughout) >= np.nanmax(error):
+    errors = [error[(time >= span.begin) & (time < span.end)] for span in flight.maneuvers]
+    largest = [each.max() for each in errors if len(each) and not np.isnan(each).any()]
+    if not largest or max(largest) >= np.nanmax(error):
         return None
-    return float(max(throughout))
+    return float(max(largest))
 
 
 def _lines(flights: Sequence[FlightData], curve: str, label: str) -> list[dict[str, Any]]:
@@ -193,8 +197,8 @@ def _speed(flights: Sequence[FlightData]) -> Plot:
             motion, colour = flight.curves["motion"], _colour(flights, number)
             traces.append(over_time(_name(flights, flight, "speed, m/s"), motion, 1, colour))
             tilt = _name(flights, flight, "tilt, °")
-            second = REFERENCE if len(flights) == 1 else colour
-            traces.append(over_time(tilt, motion, 2, second, dash="dot", yaxis="y2"))
+            tilt_colour = REFERENCE if len(flights) == 1 else colour
+            traces.append(over_time(tilt, motion, 2, tilt_colour, dash="dot", yaxis="y2"))
     traces += limit_lines(flights, "speed") + limit_lines(flights, "tilt", yaxis="y2")
     layout = time_axis(flights, y="speed, m/s", y2="tilt, °")
     layout["yaxis2"] |= {"overlaying": "y", "side": "right", "showgrid": False, "tickmode": "auto"}

@@ -54,7 +54,7 @@ def write_report(path: Path, out: Path | None = None) -> Path:
     flight = read(path)
     if out is None:
         out = path.with_suffix(".html") if path.is_file() else path / PAGE
-    with _of_this_version(path):
+    with _explain_other_version(path):
         words = None if flight.figures is None else closing_words(flight.figures, None)
         plots = [*timeline(flight), *motion_plots([flight]), *control_plots(flight)]
         tables = [*events_at_end(flight), *flight_tables(flight)]
@@ -72,7 +72,7 @@ def write_comparison(paths: Sequence[Path], out: Path) -> Path:
     require_extra()
     flights = [read(path) for path in paths]
     title = " and ".join(flight.name for flight in flights)
-    with _of_this_version(*paths):
+    with _explain_other_version(*paths):
         plots = [*compared_steps(flights), *motion_plots(flights)]
         page = _page(title, None, flights, comparison_tables(flights), plots, None)
     write_whole(out, page)
@@ -80,7 +80,7 @@ def write_comparison(paths: Sequence[Path], out: Path) -> Path:
 
 
 @contextmanager
-def _of_this_version(*paths: Path) -> Iterator[None]:
+def _explain_other_version(*paths: Path) -> Iterator[None]:
     """Turn errors caused by figures of another version into an error for the user.
 
     Raises:
@@ -109,15 +109,15 @@ def _page(
         title,
         plots,
         words=words,
-        verdicts=_verdicts(flights),
+        words_by_flight=_words_by_flight(flights),
         flights=flights,
         tables=tables,
         settings=settings,
-        told_by_telemetry=extremes(flights[0]),
+        telemetry_extremes=extremes(flights[0]),
     )
 
 
-def _verdicts(flights: Sequence[FlightData]) -> list[tuple[str, ClosingWords]]:
+def _words_by_flight(flights: Sequence[FlightData]) -> list[tuple[str, ClosingWords]]:
     """Name and closing words of each flight that is no `.tlog`."""
     known = [(flight.name, flight.figures) for flight in flights if flight.figures is not None]
     return [(name, closing_words(figures, None)) for name, figures in known]

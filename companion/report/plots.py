@@ -18,8 +18,8 @@ CROSSED = "#c1121f"
 """Colour of an early end, and of the limit that was crossed."""
 FLIGHTS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """One colour for each flight of a comparison."""
-_MOST_POINTS = 2000
-"""Lines with more points are thinned to about as many; a wide screen has fewer pixels."""
+_MAX_POINTS = 2000
+"""Lines with more points are thinned to about this number, more than the pixels of a screen."""
 _SHADES = ("rgba(230,159,0,0.13)", "rgba(86,180,233,0.13)")
 """Colours of the maneuvers, used in turn."""
 _SIGNIFICANT_DIGITS = 5
@@ -31,7 +31,7 @@ class Plot:
 
     Attributes:
         title: shown above it.
-        note: what is shown, and what to look for.
+        note: text above the plot: the quantities shown, and how a good flight looks.
         traces: Plotly's traces.
         layout: Plotly's layout; the page adds fonts and colours.
         height: height, px.
@@ -65,24 +65,24 @@ def over_time(name: str, curve: Curve, column: int, colour: str, **more: Any) ->
 
 
 def kept_indices(values: Floats) -> Any:
-    """Indices (M,) of the points to draw: smallest and largest of each of many equal parts."""
+    """Indices (M,) of the points to draw: the extremes of each of many equal parts, and gaps."""
     count = len(values)
-    if count <= _MOST_POINTS:
+    if count <= _MAX_POINTS:
         return np.arange(count)
-    parts = np.array_split(np.arange(count), _MOST_POINTS // 2)
+    parts = np.array_split(np.arange(count), _MAX_POINTS // 2)
     kept = {0, count - 1}
     for part in parts:
-        known = part[~np.isnan(values[part])]
-        if len(known) < len(part):  # A gap stays a gap.
+        valid = part[~np.isnan(values[part])]
+        if len(valid) < len(part):  # A gap stays a gap.
             kept.add(int(part[np.isnan(values[part])][0]))
-        if len(known):
-            kept |= {int(known[values[known].argmin()]), int(known[values[known].argmax()])}
+        if len(valid):
+            kept |= {int(valid[values[valid].argmin()]), int(valid[values[valid].argmax()])}
     return np.array(sorted(kept))
 
 
 def even_indices(count: int) -> Any:
     """Indices (M,) of evenly chosen points of a track, few enough for a small page."""
-    return np.unique(np.linspace(0, count - 1, min(count, _MOST_POINTS)).astype(int))
+    return np.unique(np.linspace(0, count - 1, min(count, _MAX_POINTS)).astype(int))
 
 
 def numbers(values: Floats) -> list[float | None]:
@@ -112,7 +112,7 @@ def time_axis(flights: Sequence[FlightData], **titles: str) -> dict[str, Any]:
         return layout
     maneuvers, end = flights[0].maneuvers, flights[0].end
     mark = {"shapes": [], "annotations": []} if end is None else end_mark(end)
-    shades = [_shade(span, number) for number, span in enumerate(maneuvers)]
+    shades = [_maneuver_shade(span, number) for number, span in enumerate(maneuvers)]
     return {
         **layout,
         "shapes": [*shades, *mark["shapes"]],
@@ -149,7 +149,7 @@ def limit_lines(flights: Sequence[FlightData], curve: str, **more: Any) -> list[
     ]
 
 
-def _shade(span: Span, number: int) -> dict[str, Any]:
+def _maneuver_shade(span: Span, number: int) -> dict[str, Any]:
     return {
         "type": "rect",
         "xref": "x",

@@ -11,9 +11,9 @@ from companion.config.reference import ConfigKey
 from companion.report.flight_data import FlightData
 
 _EMPTY = "–"
-_AROUND_END = 5.0
-"""Events this long before and after an early end stand at the top of the page, s."""
-_MOST_EVENTS = 20
+_END_WINDOW = 5.0
+"""Events at most this long before or after an early end are listed at the top of the page, s."""
+_MAX_EVENTS = 20
 _PORT_AT_END = re.compile(r":\d+$")
 
 
@@ -34,7 +34,7 @@ class Table(NamedTuple):
 def flight_tables(flight: FlightData) -> list[Table]:
     """The tables about one flight, without empty ones."""
     figures = flight.figures
-    tables = [] if figures is None else [_maneuvers(figures), _figures(figures)]
+    tables = [] if figures is None else [_maneuver_table(figures), _figure_table(figures)]
     return [table for table in tables if table.rows]
 
 
@@ -42,9 +42,9 @@ def events_at_end(flight: FlightData) -> list[Table]:
     """The events around the early end of a flight; no table if there was none, or no event."""
     if flight.end is None:
         return []
-    around = [each for each in flight.events if abs(each.time - flight.end.time) <= _AROUND_END]
-    rows = [(f"{each.time:.1f}", each.source, each.text) for each in around[:_MOST_EVENTS]]
-    title = f"Events within {_AROUND_END:.0f} s of the end"
+    around = [each for each in flight.events if abs(each.time - flight.end.time) <= _END_WINDOW]
+    rows = [(f"{each.time:.1f}", each.source, each.text) for each in around[:_MAX_EVENTS]]
+    title = f"Events within {_END_WINDOW:.0f} s of the end"
     return [Table(title, ("time, s", "from", "what happened"), rows)] if rows else []
 
 
@@ -65,7 +65,7 @@ def extremes(flight: FlightData) -> str:
 def configuration(flight: FlightData) -> Table:
     """The keys that are not the default."""
     rows = [
-        (f"{key.section}.{key.name}", _value(key.value), _value(key.default), key.unit)
+        (f"{key.section}.{key.name}", _value_text(key.value), _value_text(key.default), key.unit)
         for key in flight.differences or ()
     ]
     return Table("Configuration that is not the default", ("key", "flown", "default", "unit"), rows)
@@ -74,15 +74,17 @@ def configuration(flight: FlightData) -> Table:
 def comparison_tables(flights: Sequence[FlightData]) -> list[Table]:
     """The figures of several flights and the keys that differ, one column for each flight."""
     names = tuple(flight.name for flight in flights)
-    known = [
-        {**dict(_tracking(flight.figures)), **dict(_figure_rows(flight.figures))}
+    figures_by_flight = [
+        {**dict(_tracking_rows(flight.figures)), **dict(_figure_rows(flight.figures))}
         if flight.figures
         else {}
         for flight in flights
     ]
-    labels = dict.fromkeys(label for figures in known for label in figures)
-    figures = [(label, *(each.get(label, _EMPTY) for each in known)) for label in labels]
-    keys = [
+    labels = dict.fromkeys(label for figures in figures_by_flight for label in figures)
+    figures = [
+        (label, *(each.get(label, _EMPTY) for each in figures_by_flight)) for label in labels
+    ]
+    keys_by_flight = [
         None
         if flight.differences is None
         else {
@@ -93,28 +95,28 @@ def comparison_tables(flights: Sequence[FlightData]) -> list[Table]:
         }
         for flight in flights
     ]
-    changed = sorted({key for each in keys for key in each or {}})
+    changed = sorted({key for each in keys_by_flight for key in each or {}})
     settings = [
-        (key, *(_EMPTY if each is None else each.get(key, "default") for each in keys))
+        (key, *(_EMPTY if each is None else each.get(key, "default") for each in keys_by_flight))
         for key in changed
     ]
-    differ = [row for row in settings if len(set(row[1:])) > 1]
+    differing = [row for row in settings if len(set(row[1:])) > 1]
     tables = [
         Table("Figures", ("figure", *names), figures),
-        Table("Keys that differ", ("key", *names), differ),
+        Table("Keys that differ", ("key", *names), differing),
     ]
     return [table for table in tables if table.rows]
 
 
 def _compared(key: ConfigKey) -> tuple[str, str]:
     """Value and default of a key; endpoints without the port, because `demo` varies it."""
-    value, default = _value(key.value), _value(key.default)
+    value, default = _value_text(key.value), _value_text(key.default)
     if key.name != "endpoint":
         return value, default
     return _PORT_AT_END.sub("", value), _PORT_AT_END.sub("", default)
 
 
-def _figures(figures: Any) -> Table:
+def _figure_table(figures: Any) -> Table:
     return Table("Figures", ("figure", "measured"), list(_figure_rows(figures)))
 
 
@@ -126,39 +128,39 @@ def _figure_rows(figures: Any) -> Iterator[tuple[str, str]]:
     wanted: list[tuple[str, Any, Callable[[Any], str]]] = [
         ("result", figures.get("result"), str),
         ("planner", figures.get("planner"), str),
-        ("time constant, north", constants.get("north"), _unit("{:.3f} s")),
-        ("time constant, east", constants.get("east"), _unit("{:.3f} s")),
+        ("time constant, north", constants.get("north"), _formatter("{:.3f} s")),
+        ("time constant, east", constants.get("east"), _formatter("{:.3f} s")),
         (
             "largest distance from the line of a step",
             response.get("cross_axis_max"),
-            _unit("{:.4f}"),
+            _formatter("{:.4f}"),
         ),
-        ("samples", figures.get("samples"), _unit("{:,}")),
-        ("setpoints", figures.get("setpoints"), _unit("{:,}")),
-        ("frames lost", link.get("lost"), _unit("{:,}")),
+        ("samples", figures.get("samples"), _formatter("{:,}")),
+        ("setpoints", figures.get("setpoints"), _formatter("{:,}")),
+        ("frames lost", link.get("lost"), _formatter("{:,}")),
     ]
-    if not figures.get("lockstep"):  # Vehicle time has no latency.
+    if not figures.get("lockstep"):  # In lockstep, all latencies are 0.
         wanted += [
-            ("missed deadlines", figures.get("missed_deadlines"), _unit("{:,}")),
-            ("latency, median", latency.get("p50"), _unit("{:.0f} µs")),
-            ("latency, 99th percentile", latency.get("p99"), _unit("{:.0f} µs")),
+            ("missed deadlines", figures.get("missed_deadlines"), _formatter("{:,}")),
+            ("latency, median", latency.get("p50"), _formatter("{:.0f} µs")),
+            ("latency, 99th percentile", latency.get("p99"), _formatter("{:.0f} µs")),
         ]
     yield from ((label, show(value)) for label, value, show in wanted if value not in (None, ""))
 
 
-def _tracking(figures: Any) -> Iterator[tuple[str, str]]:
+def _tracking_rows(figures: Any) -> Iterator[tuple[str, str]]:
     """Label and text of each maneuver's RMS errors."""
     for maneuver in figures.get("maneuvers", ()):
-        for key, what in (("level_rms_m", "horizontal RMS"), ("height_rms_m", "height RMS")):
+        for key, label in (("level_rms_m", "horizontal RMS"), ("height_rms_m", "height RMS")):
             if maneuver.get(key) is not None:
-                yield f"{maneuver['name']}, {what}", f"{maneuver[key]:.3f} m"
+                yield f"{maneuver['name']}, {label}", f"{maneuver[key]:.3f} m"
 
 
-def _unit(text: str) -> Callable[[Any], str]:
+def _formatter(text: str) -> Callable[[Any], str]:
     return text.format
 
 
-def _maneuvers(figures: Any) -> Table:
+def _maneuver_table(figures: Any) -> Table:
     columns = (
         ("name", "maneuver", "{}"),
         ("duration_s", "duration, s", "{:.1f}"),
@@ -182,5 +184,5 @@ def _maneuvers(figures: Any) -> Table:
     return Table("Tracking by maneuver", tuple(title for _, title, _ in columns), rows)
 
 
-def _value(value: Any) -> str:
+def _value_text(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False) if not isinstance(value, str) else value

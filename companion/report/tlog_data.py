@@ -32,12 +32,12 @@ def logged(path: Path) -> FlightData:
     Raises:
         LogError: the file cannot be read, is not a `.tlog`, or has no telemetry of an autopilot.
     """
-    reader = _Reader()
+    reader = _TelemetryReader()
     for frame, message in messages(path, _MESSAGE_NAMES):
         reader.take((frame.system, frame.component), message)
     if reader.vehicle is None or reader.began is None:
         raise LogError(f"{path}: has no telemetry of PX4 or ArduPilot")
-    curves = {**reader.curves(), **_control(path, reader.began)}
+    curves = {**reader.curves(), **_rates_and_thrust(path, reader.began)}
     return FlightData(
         name=path.name,
         curves={name: curve for name, curve in curves.items() if len(curve.time)},
@@ -46,8 +46,8 @@ def logged(path: Path) -> FlightData:
     )
 
 
-class _Reader:
-    """Collects the messages in the order of the log.
+class _TelemetryReader:
+    """Collects the autopilot's telemetry from the messages of a log, in their order.
 
     Attributes:
         vehicle: system and component of the autopilot, from its first heartbeat.
@@ -59,7 +59,7 @@ class _Reader:
         self.vehicle: tuple[int, int] | None = None
         self.began: float | None = None
         self.events: list[Event] = []
-        self._now = 0.0
+        self._now = 0.0  # time of the newest attitude or position, s since `began`
         self._attitudes: list[tuple[float, ...]] = []
         self._positions: list[tuple[float, ...]] = []
         self._tilts: list[tuple[float, float]] = []
@@ -69,21 +69,21 @@ class _Reader:
         """Take one message from `source` (system, component)."""
         kind = message.get_type()
         if kind == "HEARTBEAT":
-            self._heartbeat(source, message)
+            self._note_heartbeat(source, message)
         elif source != self.vehicle:
             return
         elif kind == "STATUSTEXT":
-            self._text(message)
+            self._note_text(message)
         elif kind == "LOCAL_POSITION_NED":
-            self._stamp(message)
-            velocity = np.linalg.norm((message.vx, message.vy, message.vz))
-            place = message.x, message.y, -message.z
-            self._positions.append((self._now, *place, float(velocity)))
+            self._update_time(message)
+            speed = np.linalg.norm((message.vx, message.vy, message.vz))
+            position = message.x, message.y, -message.z
+            self._positions.append((self._now, *position, float(speed)))
         else:
-            self._stamp(message)
-            self._attitude(kind, message)
+            self._update_time(message)
+            self._note_attitude(kind, message)
 
-    def _heartbeat(self, source: tuple[int, int], heartbeat: Message) -> None:
+    def _note_heartbeat(self, source: tuple[int, int], heartbeat: Message) -> None:
         autopilot = BY_NUMBER.get(heartbeat.autopilot)
         if autopilot is None or self.vehicle not in (None, source):
             return
@@ -92,13 +92,13 @@ class _Reader:
         if not self._modes or self._modes[-1][1] != mode:
             self._modes.append((self._now, mode))
 
-    def _stamp(self, message: Message) -> None:
+    def _update_time(self, message: Message) -> None:
         time = 1e-3 * message.time_boot_ms
         if self.began is None:
             self.began = time
         self._now = time - self.began
 
-    def _attitude(self, kind: str, message: Message) -> None:
+    def _note_attitude(self, kind: str, message: Message) -> None:
         if kind == "ATTITUDE":
             tilt = np.arccos(np.cos(message.roll) * np.cos(message.pitch))
         else:
@@ -110,7 +110,7 @@ class _Reader:
             tilt = tilt_angle(message.q2, message.q3)
         self._tilts.append((self._now, float(np.degrees(tilt))))
 
-    def _text(self, message: Message) -> None:
+    def _note_text(self, message: Message) -> None:
         severity = message.severity
         level = _INFORMATION
         if severity <= _MAV_WARNING:
@@ -123,12 +123,12 @@ class _Reader:
 
     def curves(self) -> dict[str, Curve]:
         """Attitude and position; see `FlightData.curves`."""
-        positions, tilts = _rows(self._positions, 5), _rows(self._tilts, 2)
+        positions, tilts = _array(self._positions, 5), _array(self._tilts, 2)
         tilt = (
             np.interp(positions[:, 0], *tilts.T) if len(tilts) else np.full(len(positions), np.nan)
         )
         motion = np.column_stack([positions[:, 3], positions[:, 4], tilt])
-        attitudes = _rows(self._attitudes, 3)
+        attitudes = _array(self._attitudes, 3)
         return {
             "position": Curve(positions[:, 0], positions[:, 1:4]),
             "motion": Curve(positions[:, 0], motion),
@@ -136,17 +136,17 @@ class _Reader:
         }
 
 
-def _rows(rows: Iterable[tuple[float, ...]], columns: int) -> Floats:
+def _array(rows: Iterable[tuple[float, ...]], columns: int) -> Floats:
     return np.array(list(rows), dtype=float).reshape(-1, columns)
 
 
-def _control(path: Path, began: float) -> dict[str, Curve]:
+def _rates_and_thrust(path: Path, began: float) -> dict[str, Curve]:
     """Rates and thrust, if the log has setpoints that the autopilot obeyed; else empty."""
     try:
         log = read_flight_log(path)
     except LogError:
         return {}
-    sent, rates = _rows(log.setpoints, 5), _rows(log.rates, 4)
+    sent, rates = _array(log.setpoints, 5), _array(log.rates, 4)
     return {
         "commanded": Curve(sent[:, 0] - began, np.degrees(sent[:, 1:4])),
         "measured": Curve(rates[:, 0] - began, np.degrees(rates[:, 1:4])),

@@ -1,4 +1,4 @@
-"""Our component on the clients' network: heartbeat, texts, values, and answers to commands."""
+"""Our component on the clients' network: heartbeat, texts, named values, answers to commands."""
 
 import asyncio
 import time
@@ -20,7 +20,7 @@ _MAX_TEXT_LENGTH = 200
 """Number of characters after which a text is cut."""
 _TEXT_REPEAT_PERIOD = 5.0
 """Shortest time between two equal texts to the same client, s."""
-_AUTOPILOT_INVALID, _STATE_ACTIVE, _VERSION = 8, 4, 3
+_AUTOPILOT_INVALID, _STATE_ACTIVE, _MAVLINK_VERSION = 8, 4, 3
 _COMMAND_IDS = dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT
 
 WARNING, NOTICE = dialect.MAV_SEVERITY_WARNING, dialect.MAV_SEVERITY_NOTICE
@@ -32,7 +32,7 @@ class Component:
     Args:
         settings: our ids and our signing key.
         network: network of the clients.
-        to_vehicle: sends a message over the link, for a pilot whose ground station is connected to
+        to_vehicle: sends a message over the link, so that it reaches ground stations connected to
             the autopilot.
     """
 
@@ -43,7 +43,7 @@ class Component:
         self._loop = asyncio.get_running_loop()
         self._own_address = Address(settings.source_system, settings.source_component)
         self._sequence = self._text_id = 0
-        self._began = time.monotonic()
+        self._start_time = time.monotonic()
         self._sent_at: dict[tuple[Client | None, str], float] = {}
 
     async def run(self) -> None:
@@ -57,20 +57,20 @@ class Component:
 
         A text that was sent within the last 5 s is not sent again.
         """
-        if self._not_sent_lately(None, text):
-            for piece in self._pieces(text, severity):
-                self._network.send(self._frame(piece))
-                self._to_vehicle(piece)
+        if self._note_unless_repeated(None, text):
+            for message in self._text_messages(text, severity):
+                self._network.send(self._frame(message))
+                self._to_vehicle(message)
 
     def answer(self, client: Client, text: str, severity: int = WARNING) -> None:
         """Send a text to one client, such as the reason of a refusal, but not twice within 5 s."""
-        if self._not_sent_lately(client, text):
-            for piece in self._pieces(text, severity):
-                self._network.send_to(client, self._frame(piece))
+        if self._note_unless_repeated(client, text):
+            for message in self._text_messages(text, severity):
+                self._network.send_to(client, self._frame(message))
 
     def send_value(self, name: str, value: float) -> None:
         """Send a NAMED_VALUE_FLOAT; the name has at most 10 characters."""
-        boot_ms = round((time.monotonic() - self._began) * 1e3) & 0xFFFFFFFF
+        boot_ms = round((time.monotonic() - self._start_time) * 1e3) & 0xFFFFFFFF
         message = dialect.MAVLink_named_value_float_message(boot_ms, name.encode(), value)
         self._network.send(self._frame(message))
 
@@ -98,17 +98,18 @@ class Component:
         if frame.message_id in _COMMAND_IDS and isinstance(client, Client):
             self.acknowledge(client, frame, dialect.MAV_RESULT_UNSUPPORTED, self._own_address)
 
-    def _not_sent_lately(self, client: Client | None, text: str) -> bool:
+    def _note_unless_repeated(self, client: Client | None, text: str) -> bool:
+        """Note a text as sent now; return False if it was sent within the last 5 s."""
         now = self._loop.time()
         self._sent_at = {
-            who: at for who, at in self._sent_at.items() if now - at < _TEXT_REPEAT_PERIOD
+            key: sent for key, sent in self._sent_at.items() if now - sent < _TEXT_REPEAT_PERIOD
         }
         if (client, text) in self._sent_at:
             return False
         self._sent_at[client, text] = now
         return True
 
-    def _pieces(self, text: str, severity: int) -> list[Message]:
+    def _text_messages(self, text: str, severity: int) -> list[Message]:
         self._text_id = self._text_id % MOST_TEXT_NUMBER + 1
         return status_texts(ascii_for(text)[:_MAX_TEXT_LENGTH], severity, self._text_id)
 
@@ -130,5 +131,5 @@ class Component:
 
 def _heartbeat() -> Message:
     return dialect.MAVLink_heartbeat_message(
-        MAV_TYPE_ONBOARD_CONTROLLER, _AUTOPILOT_INVALID, 0, 0, _STATE_ACTIVE, _VERSION
+        MAV_TYPE_ONBOARD_CONTROLLER, _AUTOPILOT_INVALID, 0, 0, _STATE_ACTIVE, _MAVLINK_VERSION
     )

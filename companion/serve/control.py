@@ -36,9 +36,9 @@ from companion.serve.situation import SituationKeeper
 from companion.vehicle.autopilot import ControlEntry, Role
 from companion.vehicle.link import Link
 
-_IS_ENDING = "control is ending and the vehicle is held; request control again when it has ended"
+_ENDING_TEXT = "control is ending and the vehicle is held; request control again when it has ended"
 _RETRY_PAUSE = 2.0
-"""Time after a failed takeover in which setpoints alone begin no other takeover, s."""
+"""Time after a failed takeover during which setpoints alone do not begin another takeover, s."""
 
 
 class ServedControl:
@@ -51,7 +51,7 @@ class ServedControl:
         keeper: keeps track of the vehicle's position.
         observer: receives phases and events of each flight.
         environment: environment of the flights.
-        records: makes their records.
+        records: makes the records of the flights.
         changes: changes of values in flight.
     """
 
@@ -68,7 +68,7 @@ class ServedControl:
     ) -> None:
         self._config, self._link, self._component = config, link, component
         self._keeper, self._observer, self._environment = keeper, observer, environment
-        self._clock, self._not_before = asyncio.get_running_loop().time, 0.0
+        self._clock, self._retry_time = asyncio.get_running_loop().time, 0.0
         self._records, self._changes = records, changes
         self.ownership = Ownership(config.serve.setpoint_timeout, config.serve.hold_s)
         self._programs, self._fence = Programs(), KeptFence(config, link)
@@ -137,7 +137,7 @@ class ServedControl:
             self._component.answer(client, "setpoint refused: the vehicle's position is unknown")
             return
         now, owner = self._clock(), Program(client, source_of(frame))
-        before = self.ownership.owner
+        owner_before = self.ownership.owner
         try:
             request = understand(
                 frame, situation, self._targets, body_yaw_is_relative=autopilot.body_yaw_is_relative
@@ -148,7 +148,7 @@ class ServedControl:
         except RefusedSetpoint as error:
             refusal = str(error)
         except UnplannableError as error:
-            self.ownership.withdraw(owner, before)
+            self.ownership.withdraw(owner, owner_before)
             refusal = str(error)
         if refusal is not None:
             self._component.answer(client, f"setpoint refused: {refusal}")
@@ -164,18 +164,18 @@ class ServedControl:
             flight.give(request)
         self._programs.keep(owner, request)
         if flight is not None and flight.is_ending:
-            return _IS_ENDING
+            return _ENDING_TEXT
         if self._flight is None and self._give_control(owner, now):
-            self._begin(owner, None, from_ground=False)
+            self._begin_flight(owner, None, from_ground=False)
         return None
 
     def _give_control(self, program: Program, now: float) -> bool:
         """Give control to a program whose setpoints alone begin a flight; return whether it has it.
 
-        They do in ArduPilot's GUIDED, in the air. This tells the program why control is refused.
+        They do so in the air in ArduPilot's GUIDED. A refused program receives the reason.
         """
         autopilot, state = self._link.autopilot, self._link.state
-        if autopilot.control_entry is not ControlEntry.BY_FIRST_SETPOINT or now < self._not_before:
+        if autopilot.control_entry is not ControlEntry.BY_FIRST_SETPOINT or now < self._retry_time:
             return False
         if state.mode is None or Role.READY not in autopilot.roles(state.mode):
             return False
@@ -192,12 +192,12 @@ class ServedControl:
     def _take_control_request(self, client: Client, frame: Frame) -> None:
         """Answer a command that requests control: by a takeover or a refusal."""
         now, owner = self._clock(), self._programs.sender_of(client, frame)
-        refusal, standing = self.ownership.request_control(owner, now), not self._link.state.flying
+        refusal, on_ground = self.ownership.request_control(owner, now), not self._link.state.flying
         if refusal is None and self._flight is not None and self._flight.is_ending:
-            refusal = _IS_ENDING
+            refusal = _ENDING_TEXT
         elif refusal is None and self._flight is None:
             refusal = self._fence.refusal()
-            if refusal is None and standing:
+            if refusal is None and on_ground:
                 refusal = self._keeper.takeoff_refusal(self._programs.newest(owner))
         if refusal is not None:
             if self._flight is None:
@@ -205,11 +205,13 @@ class ServedControl:
             self._component.answer(client, f"control refused: {refusal}")
             self._answer(client, frame, REJECTED)
         elif self._flight is None:
-            self._begin(owner, ControlRequest(client, frame), from_ground=standing)
+            self._begin_flight(owner, ControlRequest(client, frame), from_ground=on_ground)
         else:
             self._answer(client, frame, ACCEPTED if self.in_control else IN_PROGRESS)
 
-    def _begin(self, owner: Program, command: ControlRequest | None, *, from_ground: bool) -> None:
+    def _begin_flight(
+        self, owner: Program, command: ControlRequest | None, *, from_ground: bool
+    ) -> None:
         self._flight = flight = ServedFlight(
             str(owner),
             self._config,
@@ -238,7 +240,7 @@ class ServedControl:
             self._fence.keep(flight.fence_centre)
             self._flight = self._task = None
             if not begun:
-                self._not_before = self._clock() + _RETRY_PAUSE
+                self._retry_time = self._clock() + _RETRY_PAUSE
             await flight.save()
             if self._flight is None and self._config.realtime.freeze_gc:  # between flights
                 gc.collect()

@@ -54,7 +54,7 @@ class FlightRecords:
             self._tap(time, frame)
 
     def new(self, config: Config) -> FlightFiles:
-        """The open record of a new flight; if it cannot be created, it is a record without folder.
+        """The open record of a new flight; a record without folder if none can be created.
 
         Args:
             config: configuration at the beginning of the flight.
@@ -107,7 +107,7 @@ class FlightRecords:
 
     async def _in_thread(self, work: Callable[[Argument], Result], argument: Argument) -> Result:
         """Call `work` in a thread, so that a slow disk blocks nothing; return its result."""
-        if not self._environment.realtime:  # a virtual clock knows no threads
+        if not self._environment.realtime:  # on a virtual clock, all work runs in the event loop
             return work(argument)
         return await asyncio.to_thread(work, argument)
 

@@ -15,10 +15,11 @@ class KeptFence:
 
     Otherwise a client could move the fence by releasing control and requesting it again.
 
-    A vehicle does not move when its estimator resets the position, or when somebody sets another
-    origin of its local frame. So the centre moves with these jumps, as it does in flight, and the
-    fence stays where it is over the ground. After jumps of more than `safety.max_reset_m`, which
-    would end a flight, control is refused: the position before them may have been wrong.
+    The estimated position jumps, without a motion of the vehicle, when the estimator is reset or
+    somebody sets another origin of the local frame. The centre moves with these jumps, as it does
+    in flight, so the fence stays where it is over the ground. Jumps of more than
+    `safety.max_reset_m` would end a flight. After such jumps control is refused, because the
+    position before them may have been wrong.
 
     Args:
         config: configuration of the vehicle.
@@ -26,13 +27,13 @@ class KeptFence:
     """
 
     def __init__(self, config: Config, link: Link) -> None:
-        self._kept: FenceCentre | None = None
+        self._kept_centre: FenceCentre | None = None
         self._fence, self._state = fence_of(config), link.state
-        self._most_shift = config.safety.max_reset_m
+        self._max_shift = config.safety.max_reset_m
         self._resets = EstimatorResets()
         self._shift_when_kept: Vector = (0.0, 0.0, 0.0)
         link.subscribe("HEARTBEAT", self._forget_if_disarmed)
-        link.subscribe("LOCAL_POSITION_NED", self._find_jump)
+        link.subscribe("LOCAL_POSITION_NED", self._note_position)
 
     @property
     def centre(self) -> FenceCentre | None:
@@ -40,29 +41,30 @@ class KeptFence:
 
         It is given in the autopilot's present local frame.
         """
-        if self._kept is None:
+        if self._kept_centre is None:
             return None
-        back = minus(self._shift_when_kept, self._resets.shift)
-        return self._kept._replace(position_ned=minus(self._kept.position_ned, back))
+        negative_shift = minus(self._shift_when_kept, self._resets.shift)
+        position = minus(self._kept_centre.position_ned, negative_shift)
+        return self._kept_centre._replace(position_ned=position)
 
     def keep(self, centre: FenceCentre | None) -> None:
         """Keep the centre of a flight that has ended; an earlier flight's centre takes precedence.
 
         Nothing is kept if the vehicle is disarmed.
         """
-        if self._kept is None and self._state.armed is not False:
-            self._kept, self._shift_when_kept = centre, self._resets.shift
+        if self._kept_centre is None and self._state.armed is not False:
+            self._kept_centre, self._shift_when_kept = centre, self._resets.shift
 
     def refusal(self) -> str | None:
         """Why control must not begin; None if it may.
 
-        It must not if the vehicle is outside the fence, or the place of the fence is not certain.
+        Possible reasons: the vehicle is outside the fence, or the fence's position is uncertain.
         """
         position, kept = self._state.position, self.centre
         if kept is None or position is None:
             return None
         shift = dist(self._resets.shift, self._shift_when_kept)
-        if shift > self._most_shift:
+        if shift > self._max_shift:
             return (
                 f"the estimator has moved the position by {shift:.1f} m since the first flight, "
                 "more than safety.max_reset_m, so it is not certain where the fence lies; land and "
@@ -76,8 +78,8 @@ class KeptFence:
 
     def _forget_if_disarmed(self, _: object) -> None:
         if self._state.armed is False:
-            self._kept = None
+            self._kept_centre = None
 
-    def _find_jump(self, _: object) -> None:
+    def _note_position(self, _: object) -> None:
         if self._state.position is not None:
             self._resets.without_jumps(self._state.position)

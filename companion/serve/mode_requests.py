@@ -1,4 +1,7 @@
-"""Clients' messages that request our mode, steer in it, or would starve our control. Pure."""
+"""Recognizes clients' messages that request our mode, steer in it, leave it, or reduce telemetry.
+
+All functions are pure.
+"""
 
 from math import isfinite
 
@@ -58,9 +61,9 @@ def asks_for_control(frame: Frame, autopilot: Autopilot) -> bool:
 def steers_in_our_mode(frame: Frame, autopilot: Autopilot) -> bool:
     """Whether a frame makes the autopilot fly elsewhere without leaving the mode of our setpoints.
 
-    In GUIDED, ArduPilot flies to DO_REPOSITION and to single mission items as to setpoints, and
-    after DO_PAUSE_CONTINUE it ignores setpoints until the pause ends. So such a frame would fight
-    the client in control. PX4 leaves OFFBOARD for these commands.
+    In GUIDED, ArduPilot flies to the position of a DO_REPOSITION or of a single mission item, as to
+    that of a setpoint. After DO_PAUSE_CONTINUE, it ignores setpoints until the pause ends. Such a
+    frame would work against the client in control. PX4 leaves OFFBOARD for these commands.
     """
     if autopilot.control_entry is not ControlEntry.BY_FIRST_SETPOINT:
         return False

@@ -36,13 +36,13 @@ def change_refusal(before: Config, after: Config) -> str | None:
     vehicle could not keep up with them. So these limits must not change, and the tilt limit must
     stay large enough.
     """
-    names = {each.name for each in differences(before, after)} & _MOTION_LIMITS
-    if names:
-        return f"{', '.join(sorted(names))} must not change while a client is in control"
-    needed = atan2(after.serve.max_acceleration_m_s2, GRAVITY)
-    if after.limits.max_tilt < min(needed, before.limits.max_tilt):
+    changed_names = {each.name for each in differences(before, after)} & _MOTION_LIMITS
+    if changed_names:
+        return f"{', '.join(sorted(changed_names))} must not change while a client is in control"
+    needed_tilt = atan2(after.serve.max_acceleration_m_s2, GRAVITY)
+    if after.limits.max_tilt < min(needed_tilt, before.limits.max_tilt):
         return (
             f"limits.max_tilt_deg {after.limits.max_tilt_deg:g} is less than the "
-            f"{degrees(needed):.1f}° that serve.max_acceleration_m_s2 needs"
+            f"{degrees(needed_tilt):.1f}° that serve.max_acceleration_m_s2 needs"
         )
     return None

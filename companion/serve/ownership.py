@@ -1,4 +1,4 @@
-"""Which client controls the vehicle: one at a time, until its release or silence. Pure."""
+"""Which client controls the vehicle: one at a time, until it releases control or is silent."""
 
 from collections.abc import Hashable
 from dataclasses import dataclass
@@ -24,11 +24,11 @@ class _Stream:
 
     Attributes:
         newest: arrival of the newest setpoint, s.
-        before: arrival of the previous one, s.
+        previous: arrival of the setpoint before the newest, s.
     """
 
     newest: float = -inf
-    before: float = -inf
+    previous: float = -inf
 
 
 class Ownership:
@@ -58,7 +58,7 @@ class Ownership:
                 return f"{owner} is in control"
             self.owner = client
         stream = self._streams.setdefault(client, _Stream())
-        stream.before, stream.newest = stream.newest, now
+        stream.previous, stream.newest = stream.newest, now
         if len(self._streams) > _MAX_CLIENTS:
             self._forget_silent(now)
         return None
@@ -72,7 +72,7 @@ class Ownership:
         """
         self.owner = owner_before
         stream = self._streams[client]
-        stream.newest = stream.before
+        stream.newest = stream.previous
 
     def request_control(self, client: Hashable, now: float) -> str | None:
         """Give control to a client that requests it; return the reason of a refusal, or None."""
@@ -87,7 +87,7 @@ class Ownership:
     def has_stream(self, client: Hashable, now: float) -> bool:
         """Whether a client sends a stream: its last two setpoints came in time."""
         stream = self._streams.get(client, _Stream())
-        return self._is_live(client, now) and stream.newest - stream.before <= self._timeout
+        return self._is_live(client, now) and stream.newest - stream.previous <= self._timeout
 
     def begin(self, now: float) -> None:
         """Note the beginning of control; the hold of an owner that is already silent starts now."""
@@ -102,10 +102,10 @@ class Ownership:
         """How the vehicle is controlled for its owner now."""
         if self.owner is None:
             return ControlState.FREE
-        silent = now - self._streams.get(self.owner, _Stream()).newest - self._timeout
-        if silent <= 0.0:
+        overdue = now - self._streams.get(self.owner, _Stream()).newest - self._timeout
+        if overdue <= 0.0:
             return ControlState.LIVE
-        return ControlState.HOLDING if silent <= self._hold else ControlState.EXPIRED
+        return ControlState.HOLDING if overdue <= self._hold else ControlState.EXPIRED
 
     def _is_live(self, client: Hashable, now: float) -> bool:
         return now - self._streams.get(client, _Stream()).newest <= self._timeout

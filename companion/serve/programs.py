@@ -12,7 +12,7 @@ _MAX_PROGRAMS = 32
 
 
 class Program(NamedTuple):
-    """One program of a client, identified by its address behind the connection."""
+    """A program, identified by its client's connection and by its MAVLink address."""
 
     client: Client
     address: Address
@@ -28,7 +28,7 @@ class Programs:
         self._newest: dict[Program, Request] = {}  # in the order of their newest requests
 
     def keep(self, program: Program, request: Request) -> None:
-        """Keep a program's newest request; of too many, drop those of programs silent longest."""
+        """Keep a program's newest request; if too many are kept, drop the oldest ones."""
         self._newest.pop(program, None)
         self._newest[program] = request
         while len(self._newest) > _MAX_PROGRAMS:

@@ -25,7 +25,7 @@ class ReportPages:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._process: subprocess.Popen[str] | None = None
-        self._has_left = False
+        self._is_leaving = False
 
     def write(self, folder: Path) -> str:
         """Write `report.html` about the flight in `folder`.
@@ -35,24 +35,24 @@ class ReportPages:
         """
         with self._lock:
             try:
-                return f"Report: {self._written(folder)}"
+                return f"Report: {self._run_report(folder)}"
             except (OSError, RuntimeError) as error:
                 return f"No report: {error}; `companion report {folder}` tries again"
 
     def leave(self) -> None:
         """Write no further page, because the program ends."""
-        self._has_left = True
+        self._is_leaving = True
         if self._process is not None:
             self._process.kill()
 
-    def _written(self, folder: Path) -> str:
+    def _run_report(self, folder: Path) -> str:
         """Return the path of the page when the process has written it.
 
         Raises:
             OSError: the process cannot be started.
             RuntimeError: the process wrote no page; the message says why.
         """
-        if self._has_left:
+        if self._is_leaving:
             raise RuntimeError(_INTERRUPTED)
         self._process = subprocess.Popen(
             [sys.executable, "-m", "companion", "report", str(folder)],
@@ -63,28 +63,28 @@ class ReportPages:
             start_new_session=True,  # Ctrl-C must reach only this program
         )
         _lower_priority(self._process.pid)
-        out, errors = self._output(self._process)
+        out, errors = self._wait_for_output(self._process)
         if self._process.returncode != 0:
             raise RuntimeError(" ".join(errors.split()) or f"exit {self._process.returncode}")
         return out.strip()
 
-    def _output(self, process: "subprocess.Popen[str]") -> tuple[str, str]:
+    def _wait_for_output(self, process: "subprocess.Popen[str]") -> tuple[str, str]:
         """Return the output of the process when it has ended.
 
         Raises:
-            RuntimeError: the wait was ended. The process is killed without waiting for its end,
-                because no process ends on a disk that hangs.
+            RuntimeError: the program ends, or the time is over. The process is killed without
+                waiting for its end, because it may be blocked by a disk that hangs.
         """
         deadline = time.monotonic() + _PAGE_TIMEOUT
         while True:
             with suppress(subprocess.TimeoutExpired):
                 output = process.communicate(timeout=_CHECK_PERIOD)
-                if not self._has_left:
+                if not self._is_leaving:
                     return output
-            if self._has_left or time.monotonic() > deadline:
+            if self._is_leaving or time.monotonic() > deadline:
                 process.kill()
                 late_text = f"it was not written within {_PAGE_TIMEOUT:g} s"
-                raise RuntimeError(_INTERRUPTED if self._has_left else late_text)
+                raise RuntimeError(_INTERRUPTED if self._is_leaving else late_text)
 
 
 def _lower_priority(pid: int) -> None:

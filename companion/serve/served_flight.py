@@ -37,8 +37,8 @@ _PROGRESS_PERIOD = 0.4
 """Period of progress messages to a client that requested control, s."""
 _CHECK_PERIOD = 0.05
 _RELEASE_TIME = 2.0
-"""Longest time from the owner's command of another mode to that mode, s; a later change of mode is
-somebody else's."""
+"""Longest time from the owner's command of another mode to the change of mode, s. A later change
+counts as somebody else's."""
 _VALUES_PERIOD = 0.5
 
 
@@ -177,7 +177,7 @@ class ServedFlight:
     async def _fly(self, command: ControlRequest | None) -> str:
         """Fly and inform clients; return the result."""
         background = [
-            self._follow_up(command),
+            self._answer_and_tell(command),
             self._send_values(),
             self._assembled.reporter.run(),
         ]
@@ -197,6 +197,7 @@ class ServedFlight:
             self._assembled.flight.note(fault_message(error))
 
     def _released_by(self) -> str:
+        """Name of the owner if it has just commanded another mode, else an empty text."""
         lately = self._clock() - self._release_commanded_at <= _RELEASE_TIME
         return self._source.name if lately else ""
 
@@ -208,14 +209,14 @@ class ServedFlight:
         name = self._source.name
         if self._source.start_pose is not None:
             released = self._assembled.flight.failed_in is not None
-            usual = "released by the client" if released else "handed back"
-            ended = usual if result == "ok" else result
+            normal_end = "released by the client" if released else "handed back"
+            ended = normal_end if result == "ok" else result
             self._component.tell(f"control by {name} has ended: {ended}")
             return
         self._component.tell(f"control was not given to {name}: {result}")
         self._answer(command, REJECTED)
 
-    async def _follow_up(self, command: ControlRequest | None) -> None:
+    async def _answer_and_tell(self, command: ControlRequest | None) -> None:
         """Answer the client until control begins; then tell all clients when it falls silent."""
         while self._source.start_pose is None:
             self._answer(command, IN_PROGRESS)

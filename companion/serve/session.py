@@ -98,9 +98,9 @@ class ServeSession:
             self.records.grants = grants
             for grant in grants:
                 self._note(str(grant))
-            return await self._run_open()
+            return await self._run_with_link()
 
-    async def _run_open(self) -> dict[str, Any]:
+    async def _run_with_link(self) -> dict[str, Any]:
         config, opener = self._config, self._environment.open_transport
         async with open_link(config, self.records, self._note, opener) as link:
             self._log_state(link)
@@ -183,16 +183,16 @@ class _Gate:
         assert isinstance(client, Client)
         refusal = self._permission.refusal(client, frame)
         if refusal is not None:
-            if frame.message_id != HEARTBEAT:  # every client sends it, and means no command
+            if frame.message_id != HEARTBEAT:  # every client sends heartbeats; no answer is due
                 self._component.answer(client, refusal)
             return True
         if self._control is None:
             return False
         target = target_of(frame)
         for_another_system = target.system not in (0, self._system)
-        known = self._routing.is_at_client(target, client)
+        target_is_client = self._routing.is_at_client(target, client)
         # A setpoint for another system would reach the vehicle, which may obey it.
-        if for_another_system and (known or frame.message_id not in SETPOINTS):
+        if for_another_system and (target_is_client or frame.message_id not in SETPOINTS):
             return False
         return self._control.intercept(client, frame)
 

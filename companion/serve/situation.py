@@ -21,7 +21,7 @@ from companion.vehicle.link import Link
 
 _CHECK_PERIOD = 1.0
 _COUNTING_TIME = 0.1
-"""Time over which messages are counted after a request, s; short, as nothing uses the count."""
+"""Time over which messages are counted after a request, s; short, as the count is not used."""
 _MAX_TELEMETRY_AGE = 0.5
 """Largest age of a position or attitude that is used, s."""
 _MAX_PAIR_INTERVAL = 0.3
@@ -81,19 +81,19 @@ class SituationKeeper:
             before, newest = newest, self._network.attitude
             if newest != before or self._link.state.autopilot is None:
                 continue
-            with suppress(LinkError):  # it may be booting; asked again
+            with suppress(LinkError):  # the autopilot may be booting; the request is repeated
                 await self._link.set_rates(wanted(), window_s=_COUNTING_TIME)
 
     def _on_global_position(self, message: Message) -> None:
         position = self._link.state.position
         if position is None or message.lat == message.lon == 0:
             return
-        later = self._link.clock.vehicle_time(message.time_boot_ms) - position.vehicle_time
-        if abs(later) > _MAX_PAIR_INTERVAL:
+        interval = self._link.clock.vehicle_time(message.time_boot_ms) - position.vehicle_time
+        if abs(interval) > _MAX_PAIR_INTERVAL:
             return
         north, east, down = (
-            there + later * speed
-            for there, speed in zip(position.position_ned, position.velocity_ned, strict=True)
+            coordinate + interval * speed
+            for coordinate, speed in zip(position.position_ned, position.velocity_ned, strict=True)
         )
         self._origin.note(
             (north, east, down),
@@ -122,12 +122,12 @@ class OriginEstimate:
         altitude: float,
         height: float,
     ) -> None:
-        """Take a pair of positions.
+        """Take a pair of positions of the vehicle: one local, one global, at the same time.
 
         Args:
             position_ned: position in the local frame, m.
-            latitude: latitude of the same place, degrees.
-            longitude: longitude of the same place, degrees.
+            latitude: latitude, degrees.
+            longitude: longitude, degrees.
             altitude: altitude above mean sea level, m.
             height: height above home, m.
         """

@@ -21,7 +21,7 @@ _FLOWN_STATES = frozenset({ControlState.LIVE, ControlState.HOLDING})
 
 
 class ServedSource:
-    """Flies the requests of the client in control; stops and holds while it is silent.
+    """Flies the requests of the client in control; stops and holds while the client is silent.
 
     Requests are in the autopilot's frame, references in the frame without estimator resets.
 
@@ -52,8 +52,8 @@ class ServedSource:
         self.resets = EstimatorResets()
         self._motion, self._ownership, self._heading_now = motion, ownership, heading_now
         self._vehicle = VehicleMotion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-        self._direct: Reference | None = None
-        self._waiting: Request | None = None
+        self._direct: Reference | None = None  # of commanded attitudes or body rates
+        self._waiting_request: Request | None = None
         self._stopped = False
 
     def begin(self, now: float, pose: Pose) -> None:
@@ -63,9 +63,9 @@ class ServedSource:
         self._ownership.begin(now)
         self._vehicle = VehicleMotion(pose.position_ned, (0.0, 0.0, 0.0))
         self._motion.begin(pose.position_ned, (0.0, 0.0, 0.0), pose.heading, now)
-        if self._waiting is not None and live:
-            with suppress(UnplannableError):  # held; the client's next setpoint is refused in words
-                self.give(self._waiting, now)
+        if self._waiting_request is not None and live:
+            with suppress(UnplannableError):  # hold; the client's next setpoint gets a refusal
+                self.give(self._waiting_request, now)
 
     def give(self, request: Request, now: float) -> None:
         """Fly a request from now on; before `begin`, keep it.
@@ -74,7 +74,7 @@ class ServedSource:
             UnplannableError: no motion leads to it; the previous request stays in force.
         """
         if self.start_pose is None:
-            self._waiting = request
+            self._waiting_request = request
             return
         if isinstance(request, MotionRequest):
             direct = self._direct

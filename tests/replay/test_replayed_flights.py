@@ -339,7 +339,7 @@ def test_each_action_of_the_record_is_repeated(good, name, drag, asked):
     folder, _ = good
     made = Replay(read_flight(folder), load(folder / "config.yaml"))
     made._loop = made._guidance = loops = Loops()
-    made._act(RecordedAction(5.0, name, 0.25, drag))
+    made._replay_action(RecordedAction(5.0, name, 0.25, drag))
     ((found, *told),) = loops.asked
     assert found == asked
     if asked == "begin":
@@ -352,15 +352,15 @@ def test_a_change_of_values_is_replayed_as_it_was_made(good):
     slower = {"planner": {"gain_per_s": 4.0}}
     made = Replay(read_flight(folder), load(folder / "config.yaml"))
     made._slew = slew = Loops()
-    made._change(ValuesChange(7.0, False, slower))
+    made._replay_change(ValuesChange(7.0, False, slower))
     (begun,) = slew.asked
     assert (begun[0], begun[1].planner.gain_per_s, begun[2]) == ("begin", 4.0, 7.0)
-    made._change(ValuesChange(8.0, True, slower))
+    made._replay_change(ValuesChange(8.0, True, slower))
     assert slew.asked[1][0] == "jump"
     fixed = changed(load(folder / "config.yaml"), {"guidance": {"kind": "nmpc"}}, "a test")
     made = Replay(read_flight(folder), fixed)
     made._slew = slew = Loops()
-    made._change(ValuesChange(7.0, False, slower))
+    made._replay_change(ValuesChange(7.0, False, slower))
     assert slew.asked == []
 
 

@@ -9,12 +9,12 @@ _HELP = (
     "write udpin://0.0.0.0:14540, udpout://HOST:PORT, tcp://HOST:PORT, tcpin://0.0.0.0:PORT "
     "or serial:///dev/ttyACM0:921600"
 )
-_PEER = re.compile(r"(\[[0-9a-fA-F:.]+\]|[^:/\[\]]+)(?::(\d{1,5}))?")
-_NETWORK = re.compile(r"(\[[0-9a-fA-F:.]+\]|[^:/\[\]]*):(\d{1,5})")
-_SERIAL = re.compile(r"(/[^:]+|COM\d+):(\d{1,8})")
-_DEVICE = re.compile(r"(?:serial:/*)?(/?dev/[^:,]+|tty[^:,/]+|COM\d+)(?:[:,](\d{1,8}))?")
+_PEER_PATTERN = re.compile(r"(\[[0-9a-fA-F:.]+\]|[^:/\[\]]+)(?::(\d{1,5}))?")
+_NETWORK_PATTERN = re.compile(r"(\[[0-9a-fA-F:.]+\]|[^:/\[\]]*):(\d{1,5})")
+_SERIAL_PATTERN = re.compile(r"(/[^:]+|COM\d+):(\d{1,8})")
+_DEVICE_PATTERN = re.compile(r"(?:serial:/*)?(/?dev/[^:,]+|tty[^:,/]+|COM\d+)(?:[:,](\d{1,8}))?")
 """A serial device as other programs write it, and its baud rate."""
-_ADDRESS = re.compile(r"(?:(\w+):/*)?([^:/\[\]]*|\[[0-9a-fA-F:.]+\]):(\d{1,5})/?")
+_ADDRESS_PATTERN = re.compile(r"(?:(\w+):/*)?([^:/\[\]]*|\[[0-9a-fA-F:.]+\]):(\d{1,5})/?")
 """An address as other programs write it: in pymavlink's notation, or without a scheme."""
 _LISTENING_HOSTS = ("", "0.0.0.0", "127.0.0.1", "localhost", "::", "::1")
 """Hosts for which `udp://` can only mean listening."""
@@ -102,7 +102,7 @@ def parse_endpoint(text: str) -> Endpoint:
     if not separator or kind is None:
         raise EndpointError(f"endpoint {text!r} is not understood: {_remedy(text)}")
     rest, question, query = rest.partition("?")
-    match = _NETWORK.fullmatch(rest.rstrip("/"))
+    match = _NETWORK_PATTERN.fullmatch(rest.rstrip("/"))
     if match is None:
         raise EndpointError(f"endpoint {text!r} needs HOST:PORT after {scheme}://: {_HELP}")
     listens = kind in (UdpIn, TcpServer)
@@ -131,7 +131,7 @@ def _peers(text: str, query: str) -> tuple[PeerAddress, ...]:
     key, _, names = query.partition("=")
     peers = []
     for name in names.split(","):
-        match = _PEER.fullmatch(name.strip())
+        match = _PEER_PATTERN.fullmatch(name.strip())
         port = int(match[2]) if match and match[2] else None
         if (
             key != "peer"
@@ -150,14 +150,14 @@ def _peers(text: str, query: str) -> tuple[PeerAddress, ...]:
 def is_host(text: str) -> bool:
     """Whether this is a valid host name: labels of 1 to 63 characters, 253 in all, no blanks."""
     try:
-        text.encode("idna")  # as the resolver does, whose UnicodeError would surprise its caller
+        text.encode("idna")  # the resolver does this too, and would raise UnicodeError
     except UnicodeError:
         return False
     return 1 <= len(text) <= 253 and text.isprintable() and not any(map(str.isspace, text))
 
 
 def _serial(text: str, rest: str) -> SerialPort:
-    match = _SERIAL.fullmatch(rest)
+    match = _SERIAL_PATTERN.fullmatch(rest)
     if match is None:
         raise EndpointError(f"endpoint {text!r} needs DEVICE:BAUD: {_remedy(text)}")
     return SerialPort(match[1], int(match[2]))
@@ -166,22 +166,22 @@ def _serial(text: str, rest: str) -> SerialPort:
 def _remedy(text: str) -> str:
     """How to write another program's endpoint here; if it is unknown, all notations."""
     text = text.strip()
-    if device := _DEVICE.fullmatch(text):
+    if device := _DEVICE_PATTERN.fullmatch(text):
         name, baud = device[1], device[2]
-        unix = name.removeprefix("/").removeprefix("dev/")
-        place = name if name.startswith("COM") else f"/dev/{unix}"
+        base_name = name.removeprefix("/").removeprefix("dev/")
+        path = name if name.startswith("COM") else f"/dev/{base_name}"
         if baud:
-            return f"write serial://{place}:{baud}"
+            return f"write serial://{path}:{baud}"
         return (
-            f"write serial://{place}:BAUD with the baud rate of the autopilot's port, such as "
-            f"serial://{place}:57600"
+            f"write serial://{path}:BAUD with the baud rate of the autopilot's port, such as "
+            f"serial://{path}:57600"
         )
-    if address := _ADDRESS.fullmatch(text):
+    if address := _ADDRESS_PATTERN.fullmatch(text):
         scheme, host, port = address[1], address[2], address[3]
         kind = _NETWORK_KINDS.get(scheme or "")
         if kind is not None and (scheme != "udp" or host in _LISTENING_HOSTS):
-            usual = "udpin" if scheme == "udp" else scheme
-            return f"write {usual}://{host or '0.0.0.0'}:{port}"
+            own_scheme = "udpin" if scheme == "udp" else scheme
+            return f"write {own_scheme}://{host or '0.0.0.0'}:{port}"
         if scheme in (None, "udp"):
             out = f", or udpout://{host}:{port} to send to {host} first" if host else ""
             return f"write udpin://0.0.0.0:{port} to wait for the vehicle{out}"

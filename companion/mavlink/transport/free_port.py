@@ -7,10 +7,11 @@ import socket
 from companion.mavlink.errors import LinkError
 
 _FIRST_PORT, _PORT_COUNT = 20_000, 12_000
-"""Below 32768, where Linux begins to give ports to sockets that ask for any."""
+"""The ports tried are below 32768, from which on Linux assigns ports to sockets that ask for any.
+"""
 
 _PORTS_PER_PROCESS = 50
-"""Processes with neighboring numbers start this many ports apart."""
+"""Processes with neighboring process ids start this many ports apart."""
 
 _counter = itertools.count()
 
@@ -21,8 +22,8 @@ def free_port(*offsets: int) -> int:
     The ports that lie above it by one of the `offsets` are free, too.
 
     Another program could open the port before the caller does. So a process gets the same port
-    again only after it has tried all others, and processes with neighboring numbers begin 50 ports
-    apart.
+    again only after it has tried all others, and processes with neighboring process ids begin 50
+    ports apart.
 
     Raises:
         LinkError: all ports are in use.

@@ -26,19 +26,19 @@ async def open_transport(endpoint: str | Endpoint, receiver: Receiver, lost: Los
     Args:
         endpoint: A parsed endpoint or its text.
         receiver: Takes all bytes that arrive.
-        lost: Called with the reason when an open connection drops: once, but for a TCP server at
-            each drop of its peer. Never called for UDP, nor after `close`.
+        lost: Called with the reason when an open connection drops: once; for a TCP server, each
+            time that its peer drops. Never called for UDP, nor after `close`.
 
     Raises:
         EndpointError: The transport cannot be opened; the message says why and what to do.
     """
-    where = parse_endpoint(endpoint) if isinstance(endpoint, str) else endpoint
-    match where:
+    parsed = parse_endpoint(endpoint) if isinstance(endpoint, str) else endpoint
+    match parsed:
         case UdpIn() | UdpOut():
-            return await open_udp(where, receiver)
+            return await open_udp(parsed, receiver)
         case TcpClient():
-            return await open_tcp_client(where, receiver, lost)
+            return await open_tcp_client(parsed, receiver, lost)
         case TcpServer():
-            return await open_tcp_server(where, receiver, lost)
+            return await open_tcp_server(parsed, receiver, lost)
         case SerialPort():
-            return SerialTransport(where, receiver.receive, lost)
+            return SerialTransport(parsed, receiver.receive, lost)

@@ -68,7 +68,7 @@ class SerialTransport:
         except BlockingIOError:
             return False
         except OSError as error:
-            # Not called from inside `send`, whose caller may be in the middle of anything.
+            # Called later, because the caller of `send` may not be ready for a lost connection.
             self._loop.call_soon(self._report_lost, f"serial device failed: {error.strerror}")
             return False
         if written < len(data):

@@ -105,7 +105,7 @@ class TcpTransport:
             self._receiver.note_stranger(host_and_port(address))
             return False
         if self._connection is not None:
-            if not self._replaceable():
+            if not self._may_be_replaced():
                 return False
             connection_before = self._connection
             self.connection_dropped(
@@ -118,7 +118,7 @@ class TcpTransport:
         self._claimed = False
         return True
 
-    def _replaceable(self) -> bool:
+    def _may_be_replaced(self) -> bool:
         if self._claimed:
             return self._receiver.claim_lapsed()
         return self._loop.time() - self._connected_at > CLAIM_LASTS_S

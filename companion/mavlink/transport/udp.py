@@ -78,7 +78,7 @@ class UdpTransport:
     kernel then drops datagrams of other senders, and a round trip is about 8 us shorter. The
     kernel's queue may still hold earlier datagrams of other senders, so the source of each datagram
     is checked. If the peer of a listening socket is silent for 2 to 4 s, or its claim has lapsed, a
-    new socket is opened, so that a vehicle is heard that returns at another port. ICMP refusals
+    new socket is opened, so that a vehicle that returns at another port is heard. ICMP refusals
     (the vehicle has not started yet) are ignored.
 
     A datagram counts as received when the kernel received it, not when this process read it. So
@@ -99,7 +99,7 @@ class UdpTransport:
         self._endpoint, self._receiver = endpoint, receiver
         self._family, self._address, self._named_peers = addresses
         self._loop = asyncio.get_running_loop()
-        self._heard = False
+        self._heard_in_period = False
         self._connected = False
         self._peer: Any = None
         self._socket = self._open()
@@ -138,7 +138,7 @@ class UdpTransport:
             for _ in range(_MAX_READS_AT_ONCE):
                 data, stamps, _, address = read(_MAX_DATAGRAM, _STAMP_SPACE)
                 if address == peer and receive(data, _arrival_ns(stamps)):
-                    self._heard = True
+                    self._heard_in_period = True
         except OSError:
             return  # nothing left to read, or an ICMP refusal of something sent before
 
@@ -148,7 +148,7 @@ class UdpTransport:
             if self._take_unconnected(data, _arrival_ns(stamps), address):
                 self._socket.connect(address)
                 self._peer = self._socket.getpeername()
-                self._connected = self._heard = True
+                self._connected = self._heard_in_period = True
         except OSError:
             return
 
@@ -163,14 +163,14 @@ class UdpTransport:
             self._receiver.note_stranger(sender)
             return False
         if address == self._peer and not self._receiver.claim_lapsed():
-            accepted = self._receiver.receive(data, received_ns)  # it was only silent
+            accepted = self._receiver.receive(data, received_ns)  # the peer was only silent
         else:
             accepted = self._receiver.claim(data, received_ns, sender)
         return accepted or self._receiver.may_answer(sender)
 
     def _check_peer(self) -> None:
         self._timer = self._loop.call_later(PEER_SILENCE_S, self._check_peer)
-        silent, self._heard = not self._heard, False
+        silent, self._heard_in_period = not self._heard_in_period, False
         if not self._connected or isinstance(self._endpoint, UdpOut):
             return
         if silent or self._receiver.claim_lapsed():

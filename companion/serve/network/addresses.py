@@ -42,21 +42,21 @@ def target_of(frame: Frame) -> Address:
 
 def _target_fields() -> dict[int, tuple[int, int | None]]:
     """Offsets of target system and component in the payload, by message id."""
-    found: dict[int, tuple[int, int | None]] = {}
+    fields_by_id: dict[int, tuple[int, int | None]] = {}
     for number, kind in dialect.mavlink_map.items():
-        offsets, at = {}, 0
+        offsets, offset = {}, 0
         for name, code, count in zip(
             kind.ordered_fieldnames,
             kind.native_format.decode()[1:],
             kind.array_lengths,
             strict=True,
         ):
-            offsets[name] = at
-            at += struct.calcsize(f"<{code}") * max(1, count)
+            offsets[name] = offset
+            offset += struct.calcsize(f"<{code}") * max(1, count)
         system_at = offsets.get("target" if number == _MANUAL_CONTROL else "target_system")
         if system_at is not None:
-            found[number] = system_at, offsets.get("target_component")
-    return found
+            fields_by_id[number] = system_at, offsets.get("target_component")
+    return fields_by_id
 
 
 _TARGET_FIELDS = _target_fields()

@@ -66,7 +66,7 @@ class Client(ABC):
             CRC_EXTRA, streaming=streaming, stats=LinkStats(), keep_unknown=True
         )
         self._waiting: deque[bytes] = deque()
-        self._bytes = 0
+        self._queued_bytes = 0
 
     @property
     def is_local(self) -> bool:
@@ -75,11 +75,11 @@ class Client(ABC):
 
     def put(self, frame: bytes) -> None:
         """Queue one frame; drop it if the queue is full."""
-        if self._bytes + len(frame) > _MAX_QUEUED_BYTES:
+        if self._queued_bytes + len(frame) > _MAX_QUEUED_BYTES:
             self.stats.dropped += 1
             return
         self._waiting.append(frame)
-        self._bytes += len(frame)
+        self._queued_bytes += len(frame)
 
     def scan(self, data: bytes) -> list[Frame]:
         """The intact frames that these bytes complete."""
@@ -96,27 +96,27 @@ class Client(ABC):
     def _flush(self) -> None:
         """Send queued frames without blocking; called only if some are queued."""
 
-    def _dequeue(self, most: int) -> tuple[bytes, int]:
+    def _dequeue(self, max_bytes: int) -> tuple[bytes, int]:
         """Remove whole frames from the queue, at least one.
 
         Args:
-            most: largest total number of bytes, if there are several frames.
+            max_bytes: largest total number of bytes, if there are several frames.
 
         Returns:
             The bytes, and the number of frames in them.
         """
         frames = [self._waiting.popleft()]
         size = len(frames[0])
-        while self._waiting and size + len(self._waiting[0]) <= most:
+        while self._waiting and size + len(self._waiting[0]) <= max_bytes:
             size += len(self._waiting[0])
             frames.append(self._waiting.popleft())
-        self._bytes -= size
+        self._queued_bytes -= size
         return b"".join(frames), len(frames)
 
     def _drop_waiting(self) -> None:
         self.stats.dropped += len(self._waiting)
         self._waiting.clear()
-        self._bytes = 0
+        self._queued_bytes = 0
 
 
 class FloodDetector:
@@ -124,16 +124,16 @@ class FloodDetector:
 
     WINDOW = 0.02
     """Length of the window in which frames are counted, and of a pause in reading, s."""
-    _MOST = 64
+    _MAX_COUNT = 64
     """Largest number of frames or datagrams in one window."""
 
     def __init__(self) -> None:
-        self._began = 0.0
+        self._window_start = 0.0
         self._count = 0
 
     def count(self, number: int, now: float) -> bool:
         """Count `number` frames received at `now`, s; return whether reading must pause."""
-        if now - self._began > self.WINDOW:
-            self._began, self._count = now, 0
+        if now - self._window_start > self.WINDOW:
+            self._window_start, self._count = now, 0
         self._count += number
-        return self._count > self._MOST
+        return self._count > self._MAX_COUNT

@@ -1,8 +1,8 @@
 """The network: joins the link to the vehicle and the clients' endpoints by the routing rules.
 
-The control loop comes first: an arriving frame is only queued. It is forwarded after the next
-attitude sample has been answered, when another one is a whole period away; if that takes longer
-than `_MAX_FORWARDING_DELAY`, it is forwarded without waiting for the sample.
+Forwarding must not delay the control loop, so an arriving frame is only queued. The queue is
+forwarded right after the next attitude sample has been answered, when the following sample is a
+whole period away. If no sample comes within `_MAX_FORWARDING_DELAY`, the queue is forwarded then.
 """
 
 import asyncio
@@ -57,7 +57,7 @@ class Network:
         ports: the open endpoints, in the order of `endpoints`.
         attitude: payload of the autopilot's newest ATTITUDE_QUATERNION; empty before the first.
         attitude_at: arrival of that payload, s on our clock.
-        overflowed: frames of the vehicle that were dropped after a stall.
+        overflowed: frames of the vehicle that were dropped because the queue was full.
 
     Raises:
         EndpointError: an endpoint cannot be parsed, or (entering the block) cannot be opened.
@@ -147,7 +147,9 @@ class Network:
             try:
                 self.routing.from_client(client, frame)
             except Exception as error:
-                self._tell_once(f"{fault_message(error)}; a frame of {client.name} was dropped")
+                self._note_fault_once(
+                    f"{fault_message(error)}; a frame of {client.name} was dropped"
+                )
         self._flush_later()
 
     def flush(self) -> None:
@@ -157,12 +159,12 @@ class Network:
             self._timer.cancel()
             self._timer = None
         from_vehicle, self._from_vehicle = self._from_vehicle, []
-        left = self.uplink.drain()
+        frames_remain = self.uplink.drain()
         for frame in from_vehicle:
             self.routing.from_vehicle(frame)
         for client in self._clients:
             client.flush()
-        if left:
+        if frames_remain:
             self._flush_later()
 
     def _queue_frame(self, frame: Frame) -> None:
@@ -178,7 +180,7 @@ class Network:
         elif self._timer is None:
             self._timer = self._loop.call_later(_MAX_FORWARDING_DELAY, self.flush)
 
-    def _tell_once(self, text: str) -> None:
+    def _note_fault_once(self, text: str) -> None:
         if text not in self._faults and len(self._faults) < _MAX_FAULTS:
             self._faults.add(text)
             self._note_event(text)

@@ -37,10 +37,10 @@ _READING_COMMANDS = frozenset(
     }
 )
 _COMMAND_IDS = dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT
-_COMMAND_AT = 28
-"""Offset of the command's number in both payloads, after seven numbers of four bytes."""
+_COMMAND_OFFSET = 28
+"""Offset of the command's number in both payloads, after seven fields of four bytes each."""
 _FTP_ID = dialect.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL
-_OPCODE_AT = 6
+_OPCODE_OFFSET = 6
 """Offset of the FTP opcode, after three address bytes, a sequence number and a session."""
 _READING_OPCODES = frozenset({0, 1, 2, 3, 4, 5, 14, 15})
 """None, TerminateSession, ResetSessions, ListDirectory, OpenFileRO, ReadFile, CalcFileCRC32 and
@@ -50,10 +50,13 @@ BurstReadFile. Source: "File Transfer Protocol" of the MAVLink guide."""
 def reads_only(frame: Frame) -> bool:
     """Whether a frame changes nothing on the vehicle."""
     if frame.message_id in _COMMAND_IDS:
-        whole = frame.payload.ljust(_COMMAND_AT + 2, b"\0")
-        return int.from_bytes(whole[_COMMAND_AT : _COMMAND_AT + 2], "little") in _READING_COMMANDS
+        padded = frame.payload.ljust(_COMMAND_OFFSET + 2, b"\0")
+        return (
+            int.from_bytes(padded[_COMMAND_OFFSET : _COMMAND_OFFSET + 2], "little")
+            in _READING_COMMANDS
+        )
     if frame.message_id == _FTP_ID:
-        return frame.payload.ljust(_OPCODE_AT + 1, b"\0")[_OPCODE_AT] in _READING_OPCODES
+        return frame.payload.ljust(_OPCODE_OFFSET + 1, b"\0")[_OPCODE_OFFSET] in _READING_OPCODES
     return frame.message_id in _READING_MESSAGES
 
 

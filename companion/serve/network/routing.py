@@ -1,6 +1,6 @@
 """Where a frame goes: learned addresses, targets, no loops (MAVLink guide, "Routing").
 
-Pure: it only queues frames at the given channels, and uses the given clock.
+Nothing here sends: frames are only queued at the given channels. The clock is given, too.
 """
 
 from collections import OrderedDict
@@ -34,7 +34,7 @@ class VehicleChannel(Protocol):
 
 
 Intercept = Callable[[Channel, Frame], bool]
-"""Called with a client's frame before it is forwarded; returns whether it must not be."""
+"""Called with a client's frame before forwarding; returns True if it must not be forwarded."""
 
 
 @dataclass
@@ -42,7 +42,7 @@ class RoutingStats:
     """Counters of forwarded and dropped frames.
 
     Attributes:
-        to_clients: frames of the vehicle that were queued for clients, each client counted.
+        to_clients: frames of the vehicle that were queued for clients, counted for each client.
         to_vehicle: clients' frames that were queued for the vehicle.
         between_clients: clients' frames that were queued for other clients.
         looped: frames dropped because they were repetitions, or claimed to be the autopilot's or
@@ -63,8 +63,8 @@ class Routing:
     - A frame without a target, or for everybody, goes to all channels but its own.
     - A targeted frame goes to the channels on which its target was heard. A frame for a component
       of the vehicle's system that was never heard goes to the vehicle.
-    - Frames for our own component end here.
-    - Messages of unknown kinds go to everybody, as their target is not known.
+    - A frame for our own component is not forwarded.
+    - A message of an unknown kind goes to all channels but its own, as its target is not known.
 
     Args:
         vehicle: the channel to the autopilot.
@@ -74,8 +74,7 @@ class Routing:
 
     Attributes:
         stats: counters of frames.
-        intercept: called with a client's frame before it is forwarded; returns whether it must not
-            be. Until it is set, nothing of a client is forwarded.
+        intercept: see `Intercept`. Until it is set, no frame of a client is forwarded.
         on_own_frame: called with each client's frame for our component; None: it is dropped.
     """
 
@@ -127,7 +126,8 @@ class Routing:
     def from_client(self, client: Channel, frame: Frame) -> None:
         """Forward a client's frame, unless it is looped, for our component, or intercepted.
 
-        A looped frame (`RoutingStats`) is dropped. One for our component goes to `on_own_frame`.
+        A looped frame (`RoutingStats`) is dropped. A frame for our component goes to
+        `on_own_frame`.
         """
         source = source_of(frame)
         if (
@@ -186,7 +186,7 @@ class _Repeats:
     """Detects frames that have come before, on any channel.
 
     Sequence number and checksum distinguish a frame from its sender's next 255 frames. If a sender
-    does not count its frames, the same content is forwarded once in 0.2 s.
+    never increases its sequence number, equal frames are forwarded only once in 0.2 s.
 
     Args:
         clock: our clock, s.
@@ -194,16 +194,16 @@ class _Repeats:
 
     def __init__(self, clock: Callable[[], float]) -> None:
         self._clock = clock
-        self._passed: OrderedDict[bytes, float] = OrderedDict()
+        self._forwarded_at: OrderedDict[bytes, float] = OrderedDict()
 
     def is_repeat(self, raw: bytes) -> bool:
         """Whether these bytes were forwarded just before; if not, remember them."""
-        now, passed = self._clock(), self._passed
-        at = passed.pop(raw, None)
-        if at is not None and now - at <= _REPETITION_TIME:
-            passed[raw] = at
+        now, forwarded_at = self._clock(), self._forwarded_at
+        previous = forwarded_at.pop(raw, None)
+        if previous is not None and now - previous <= _REPETITION_TIME:
+            forwarded_at[raw] = previous
             return True
-        passed[raw] = now
-        while len(passed) > _MAX_REMEMBERED_FRAMES:
-            passed.popitem(last=False)
+        forwarded_at[raw] = now
+        while len(forwarded_at) > _MAX_REMEMBERED_FRAMES:
+            forwarded_at.popitem(last=False)
         return False

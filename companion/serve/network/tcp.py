@@ -14,8 +14,8 @@ _MAX_CLIENTS = 16
 _MAX_UNSENT_BYTES = 65_536
 """Unsent bytes above which frames are dropped."""
 _KERNEL_BUFFER = 65_536
-"""Size of the kernel's buffer for a client, bytes. A client that paused must read these old bytes
-before it reads anything new.
+"""Size of the kernel's buffer for a client, bytes. It is small, because a client that paused must
+read all old bytes in it before it reads anything new.
 """
 _RETRY_PAUSE = 2.0
 """Pause before connecting again, s."""
@@ -59,7 +59,7 @@ class TcpPort:
     def __init__(self, clients: Clients, named_peers: NamedPeers) -> None:
         self._clients, self._named_peers = clients, named_peers
         self._server: asyncio.Server | None = None
-        self._dialling: asyncio.Task[None] | None = None
+        self._connecting: asyncio.Task[None] | None = None
         self._open: set[TcpClient] = set()
         self._closed = False
         self.local: tuple[str, int] | None = None
@@ -75,9 +75,9 @@ class TcpPort:
 
     def connect(self, endpoint: TcpOut) -> None:
         """Keep a connection to `endpoint` open."""
-        self._dialling = asyncio.get_running_loop().create_task(self._dial(endpoint))
+        self._connecting = asyncio.get_running_loop().create_task(self._keep_connected(endpoint))
 
-    async def _dial(self, endpoint: TcpOut) -> None:
+    async def _keep_connected(self, endpoint: TcpOut) -> None:
         loop = asyncio.get_running_loop()
         while True:
             try:
@@ -87,7 +87,7 @@ class TcpPort:
                     )
                 await connection.lost.wait()
             except OSError:
-                pass  # TimeoutError is one, too
+                pass  # not reachable now; TimeoutError is an OSError, too
             await asyncio.sleep(_RETRY_PAUSE)
 
     def accept(self, transport: asyncio.Transport) -> "TcpClient | None":
@@ -120,8 +120,8 @@ class TcpPort:
     def close(self) -> None:
         """Close all connections at once."""
         self._closed = True
-        if self._dialling is not None:
-            self._dialling.cancel()
+        if self._connecting is not None:
+            self._connecting.cancel()
         if self._server is not None:
             self._server.close()
         for client in tuple(self._open):

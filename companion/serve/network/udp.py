@@ -60,20 +60,20 @@ class UdpPort:
         self._by_address: dict[Any, UdpClient] = {}
         self._only_address: Any = None
         self._flood = FloodDetector()
-        self._pause: asyncio.TimerHandle | None = None
-        self._timer = self._loop.call_later(_SILENCE_TIMEOUT, self._expire)
+        self._resume_timer: asyncio.TimerHandle | None = None
+        self._expiry_timer = self._loop.call_later(_SILENCE_TIMEOUT, self._expire)
         self._loop.add_reader(sock.fileno(), self._read)
 
     def send_only_to(self, address: Any) -> None:
-        """Send to one client, which need not send first; ignore all others."""
+        """Send to this client even before it has sent anything; ignore all others."""
         self._only_address = address
         self._attach(address)
 
     def close(self) -> None:
         """Close the socket; its clients are gone."""
-        self._timer.cancel()
-        if self._pause is not None:
-            self._pause.cancel()
+        self._expiry_timer.cancel()
+        if self._resume_timer is not None:
+            self._resume_timer.cancel()
         self._loop.remove_reader(self._socket.fileno())
         self._socket.close()
         for client in self._by_address.values():
@@ -83,7 +83,7 @@ class UdpPort:
     def send(self, data: bytes, address: Any) -> bool:
         """Send a datagram; return False if the kernel's buffer is full.
 
-        After another error it is lost, and True is returned: the next one may arrive.
+        After any other error the datagram is lost, and True is returned: the next may arrive.
         """
         try:
             self._socket.sendto(data, address)
@@ -99,17 +99,17 @@ class UdpPort:
                 data, address = self._socket.recvfrom(_READ_BYTES)
             except OSError:
                 return  # nothing left, or an ICMP refusal of something sent before
-            self._take(data, address)
+            self._receive(data, address)
             if self._flood.count(1, self._loop.time()):
                 self._loop.remove_reader(self._socket.fileno())
-                self._pause = self._loop.call_later(FloodDetector.WINDOW, self._resume)
+                self._resume_timer = self._loop.call_later(FloodDetector.WINDOW, self._resume)
                 return
 
     def _resume(self) -> None:
-        self._pause = None
+        self._resume_timer = None
         self._loop.add_reader(self._socket.fileno(), self._read)
 
-    def _take(self, data: bytes, address: Any) -> None:
+    def _receive(self, data: bytes, address: Any) -> None:
         client = self._by_address.get(address)
         if client is None:
             if self._only_address is not None or not self._named_peers.admit(address):
@@ -129,7 +129,7 @@ class UdpPort:
         self._clients.attach(client)
 
     def _expire(self) -> None:
-        self._timer = self._loop.call_later(1.0, self._expire)
+        self._expiry_timer = self._loop.call_later(1.0, self._expire)
         now = self._loop.time()
         for address, client in tuple(self._by_address.items()):
             if address != self._only_address and now - client.heard_at > _SILENCE_TIMEOUT:

@@ -1,4 +1,4 @@
-"""Clients' frames to the vehicle: bounded, fair, and without delaying setpoints."""
+"""Queues clients' frames to the vehicle: limited, fair, and without delay of our setpoints."""
 
 from collections import deque
 from collections.abc import Callable
@@ -8,7 +8,7 @@ from companion.mavlink.transport.endpoint import Endpoint, SerialPort
 _MAX_QUEUED_FRAMES = 64
 """Largest number of frames that wait for one client."""
 _MAX_FRAME_AGE = 1.0
-"""Largest age of a frame that is sent, s: a command from before an outage must not arm later."""
+"""Largest age of a frame that is sent, s: a command to arm must not arrive after an outage."""
 _LARGEST_FRAME = 280
 _SERIAL_SHARE = 0.5
 """Share of a serial line that clients may use; our setpoints and requests need the rest."""
@@ -45,9 +45,9 @@ class Uplink:
     ) -> None:
         self.sent = self.dropped = 0
         self._send, self._rate, self._burst, self._clock = send, rate, burst, clock
-        self._allowed, self._since = burst, clock()
+        self._allowed_bytes, self._refilled_at = burst, clock()
         self._queues: dict[object, deque[tuple[float, bytes]]] = {}
-        self._turns: deque[object] = deque()
+        self._turns: deque[object] = deque()  # clients with queued frames, the next one first
 
     def put(self, frame: bytes, origin: object) -> None:
         """Queue a frame of the client `origin`; drop it if that client has too many queued."""
@@ -63,16 +63,18 @@ class Uplink:
     def drain(self) -> bool:
         """Send what may be sent now, a frame of each client in turn; return whether more remain."""
         now = self._clock()
-        self._allowed = min(self._burst, self._allowed + self._rate * (now - self._since))
-        self._since = now
-        while self._turns and self._allowed > 0.0:
+        self._allowed_bytes = min(
+            self._burst, self._allowed_bytes + self._rate * (now - self._refilled_at)
+        )
+        self._refilled_at = now
+        while self._turns and self._allowed_bytes > 0.0:
             origin = self._turns[0]
             queue = self._queues[origin]
             queued_at, frame = queue[0]
             if now - queued_at > _MAX_FRAME_AGE:
                 self.dropped += 1
             elif self._send(frame):
-                self._allowed -= len(frame)
+                self._allowed_bytes -= len(frame)
                 self.sent += 1
             else:
                 return True

@@ -21,7 +21,7 @@ class AxisLimits(NamedTuple):
 
     Attributes:
         velocity: largest velocity along the axis.
-        backward: largest velocity against the axis.
+        backward: largest speed against the axis.
         acceleration: largest acceleration in both directions.
         jerk: largest jerk in both directions.
     """
@@ -42,7 +42,7 @@ class Approach:
     Args:
         error: initial error.
         limits: limits of each axis.
-        begin_time: time when it begins, s.
+        begin_time: time when the motion begins, s.
         by_velocity: whether only the velocity must become zero, at any position.
 
     Raises:
@@ -68,9 +68,9 @@ class Approach:
         self._trajectory = Trajectory(axes)
         try:
             result = Ruckig(axes).calculate(problem, self._trajectory)
-        # A ValueError comes of a Result that Ruckig's enumeration lacks.
-        except (RuckigError, RuntimeError, ValueError) as refusal:
-            raise _unplannable(refusal) from refusal
+        # Ruckig raises ValueError for a result code that its Python enumeration lacks.
+        except (RuckigError, RuntimeError, ValueError) as error_of_solver:
+            raise _unplannable(error_of_solver) from error_of_solver
         if int(result) < 0:
             raise _unplannable(result)
 
@@ -81,7 +81,7 @@ class Approach:
         return State(tuple(position), tuple(velocity), tuple(acceleration))
 
 
-def _unplannable(solver: object) -> UnplannableError:
+def _unplannable(reason: object) -> UnplannableError:
     return UnplannableError(
-        f"no motion within the limits leads to this setpoint ({' '.join(str(solver).split())})"
+        f"no motion within the limits leads to this setpoint ({' '.join(str(reason).split())})"
     )

@@ -2,8 +2,8 @@
 
 Sources: MAVLink common (ATTITUDE_TARGET_TYPEMASK); "Offboard Mode" of the PX4 guide; "Copter
 Commands in Guided Mode" of ArduPilot's developer wiki. Both autopilots support two kinds: attitude
-with thrust, and body rates with thrust. With other masks they differ, or do something else
-(measured).
+with thrust, and body rates with thrust. Under other masks the two autopilots act differently, or
+not as the mask says (measured).
 """
 
 from math import isfinite
@@ -71,7 +71,8 @@ def _attitude(message: Message) -> tuple[float, float, float, float]:
         q = normalised(tuple(message.q))
     except AttitudeError as error:
         raise RefusedSetpoint("q is no unit quaternion (w, x, y, z)") from error
-    # Beyond 90 degrees two attitudes have the same horizontal acceleration per specific thrust.
+    # An attitude beyond 90 degrees of tilt has the same horizontal acceleration per specific thrust
+    # as one below, and could not be told from it.
     if cos_tilt(q[1], q[2]) <= 0.0:
         raise RefusedSetpoint("an attitude beyond 90 degrees of tilt is not supported")
     return q

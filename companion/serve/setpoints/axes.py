@@ -1,8 +1,8 @@
-"""Axes that follow commands: a stream directly, a jump by a motion within limits.
+"""Axes that follow a stream of commands directly, and a jump by a motion within limits.
 
 The commanded state is extrapolated between setpoints (`CommandedState`). When it jumps, the
 difference between the present and the commanded state becomes an error, which a jerk-limited motion
-reduces to zero (`Approach`). The state is the sum of both.
+reduces to zero (`Approach`). The state is the sum of the commanded state and this error.
 """
 
 from collections.abc import Sequence
@@ -27,16 +27,16 @@ _DERIVATIVE_WEIGHT = 0.5
 _LARGEST_ACCELERATION = 15.0
 """Largest estimated acceleration, m/s²; faster changes of the velocity are jumps."""
 _MAX_BRAKING_FACTOR = 2.0
-"""Largest acceleration with which a motion begins, as a multiple of its limit."""
+"""Largest acceleration at the beginning of a motion, as a multiple of the acceleration limit."""
 _MAX_LEAD_DISTANCE = 1.5
 """Largest distance of the reference ahead of the vehicle if no position is commanded, m."""
 _MAX_LEAD_SPEED = 2.0
-"""Largest velocity of the reference ahead of the vehicle's if only accelerations are commanded,
-m/s.
+"""Largest difference between the velocities of reference and vehicle if only accelerations are
+commanded, m/s.
 """
 
 _MIN_LIMIT_SHARE = 0.25
-"""Smallest share of the limits for an axis, also if the motion is across this axis."""
+"""Smallest share of its limits that an axis gets, even if the motion is perpendicular to it."""
 
 
 class Continuity(NamedTuple):
@@ -58,7 +58,8 @@ class Axes:
         limits: limits of motions after a jump, one for each axis. A motion along several axes is
             limited along its direction.
         continuity: largest jumps that are followed directly.
-        timeout: time for which a stream that repeats the same moving state is continued, s.
+        timeout: time for which a command that is repeated unchanged goes on moving its position or
+            changing its velocity, s.
     """
 
     def __init__(
@@ -67,7 +68,7 @@ class Axes:
         self._limits, self._continuity, self._timeout = limits, continuity, timeout
         self._zero: Values = (0.0,) * len(limits)
         self._demand: AxisDemand | None = None
-        self._given_at = 0.0
+        self._commanded_at = 0.0
         self._approach: Approach | None = None
         self._commanded = CommandedState(self._zero, self._zero, self._zero, self._zero, 0.0)
 
@@ -126,7 +127,7 @@ class Axes:
             self._follow_position(demand, current, now)
         else:
             self._follow_motion(demand, _near_vehicle(current, actual, demand), now)
-        self._demand, self._given_at = demand, now
+        self._demand, self._commanded_at = demand, now
 
     def _repeat(self, demand: AxisDemand, now: float, actual: AxisMotion | None) -> None:
         """Follow a repeated command for a limited time, because its sender may hang."""
@@ -134,9 +135,9 @@ class Axes:
             self._repeat_motion(demand, now, actual)
             return
         moving = any(demand.velocity or ()) or any(demand.acceleration or ())
-        if moving and now - self._given_at > self._timeout:
+        if moving and now - self._commanded_at > self._timeout:
             self._follow_position(AxisDemand(demand.position, None, None), self.at(now), now)
-            self._given_at = inf
+            self._commanded_at = inf
 
     def _repeat_motion(self, demand: AxisDemand, now: float, actual: AxisMotion | None) -> None:
         """Follow a repeated velocity or acceleration.
@@ -144,13 +145,13 @@ class Axes:
         The reference stays at most `_MAX_LEAD_DISTANCE` ahead of the vehicle.
         """
         current = self.at(now)
-        if demand.velocity is not None and now - self._given_at > self._timeout:
+        if demand.velocity is not None and now - self._commanded_at > self._timeout:
             demand = AxisDemand(None, demand.velocity, None)
         strayed = actual is not None and are_far_apart(
             current.position, actual.position, _MAX_LEAD_DISTANCE
         )
-        accelerates_on = demand.acceleration is None and any(self._commanded.acceleration)
-        if demand.velocity is None or strayed or accelerates_on:
+        still_accelerates = demand.acceleration is None and any(self._commanded.acceleration)
+        if demand.velocity is None or strayed or still_accelerates:
             self._follow_motion(demand, _near_vehicle(current, actual, demand), now)
 
     def _follow_position(self, demand: AxisDemand, current: State, now: float) -> None:
@@ -159,7 +160,7 @@ class Axes:
         acceleration, jerk = self._derivatives(demand, now)
         target = CommandedState(demand.position, velocity, acceleration, jerk, now)
         error = target.error_of(current)
-        if demand.velocity is not None and self._is_continued(error):
+        if demand.velocity is not None and self._is_continuous(error):
             approach = None
         else:
             approach = self._plan(error, error.position, now, by_velocity=False)
@@ -179,8 +180,8 @@ class Axes:
         """A motion of the error to zero; the limits hold along its direction, not for each axis."""
         length = hypot(*direction)
         limits = [
-            each if length == 0.0 else _scaled(each, max(_MIN_LIMIT_SHARE, abs(part) / length))
-            for each, part in zip(self._limits, direction, strict=True)
+            each if length == 0.0 else _scaled(each, max(_MIN_LIMIT_SHARE, abs(along) / length))
+            for each, along in zip(self._limits, direction, strict=True)
         ]
         acceleration = tuple(
             clamp(value, _MAX_BRAKING_FACTOR * each.acceleration)
@@ -191,24 +192,26 @@ class Axes:
 
     def _derivatives(self, demand: AxisDemand, now: float) -> tuple[Values, Values]:
         """Acceleration and jerk of a stream; estimated if they are not commanded."""
-        before, since = self._demand, now - self._given_at
+        before, interval = self._demand, now - self._commanded_at
         commanded = demand.acceleration
-        fresh = (
-            before is not None and before.position is not None and 0.0 < since <= _MAX_STREAM_PERIOD
+        is_stream = (
+            before is not None
+            and before.position is not None
+            and 0.0 < interval <= _MAX_STREAM_PERIOD
         )
-        if not fresh or before is None or demand.velocity is None or before.velocity is None:
+        if not is_stream or before is None or demand.velocity is None or before.velocity is None:
             return commanded or self._zero, self._zero
         if commanded is None:
-            rate = change_rate(before.velocity, demand.velocity, since, _LARGEST_ACCELERATION)
+            rate = change_rate(before.velocity, demand.velocity, interval, _LARGEST_ACCELERATION)
             if rate is None:
                 return self._zero, self._zero
             return _blend(self._commanded.acceleration, rate), self._zero
         if before.acceleration is None:
             return commanded, self._zero
-        jerk = change_rate(before.acceleration, commanded, since, LARGEST_JERK)
+        jerk = change_rate(before.acceleration, commanded, interval, LARGEST_JERK)
         return commanded, self._zero if jerk is None else _blend(self._commanded.jerk, jerk)
 
-    def _is_continued(self, error: State) -> bool:
+    def _is_continuous(self, error: State) -> bool:
         return (
             hypot(*error.position) <= self._continuity.position
             and hypot(*error.velocity) <= self._continuity.velocity

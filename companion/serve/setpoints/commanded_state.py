@@ -35,14 +35,14 @@ class CommandedState(NamedTuple):
         t = max(0.0, time - self.begins)
         position, velocity, acceleration = [], [], []
         rows = zip(self.position, self.velocity, self.acceleration, self.jerk, strict=True)
-        for p, v, a, j in rows:  # guidance asks for a dozen states in each of its steps
+        for p, v, a, j in rows:  # one fast loop: each step of guidance asks for a dozen states
             position.append(p + t * (v + t * (0.5 * a + t * j / 6.0)))
             velocity.append(v + t * (a + 0.5 * t * j))
             acceleration.append(a + t * j)
         return State(tuple(position), tuple(velocity), tuple(acceleration))
 
     def error_of(self, state: State) -> State:
-        """Difference between a state and the commanded one at `begins`."""
+        """A state minus the commanded state at `begins`."""
         return State(
             _minus(state.position, self.position),
             _minus(state.velocity, self.velocity),

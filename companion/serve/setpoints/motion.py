@@ -21,7 +21,7 @@ _YAW_ACCELERATION, _YAW_JERK = 2.0, 10.0
 """Largest yaw acceleration, rad/s², and jerk, rad/s³, after a jump of the yaw; yaw responds slowly.
 """
 _MAX_STREAM_PERIOD = 0.25
-"""Longest period of yaws that count as a stream, whose rate is estimated, s."""
+"""Longest period of yaw setpoints that count as a stream, whose yaw rate is estimated, s."""
 
 
 class MotionLimits(NamedTuple):
@@ -33,7 +33,8 @@ class MotionLimits(NamedTuple):
         jerk: largest jerk, m/s³; vertically at most `_VERTICAL_JERK`.
         climb, descent: largest vertical speeds, m/s.
         yaw_rate: largest yaw rate, rad/s.
-        timeout: time for which a stream that repeats the same moving state is continued, s.
+        timeout: time for which a request that is repeated unchanged goes on moving its position or
+            changing its velocity, s.
     """
 
     speed: float
@@ -55,20 +56,20 @@ class CommandedMotion:
     """
 
     def __init__(self, limits: MotionLimits) -> None:
-        each = AxisLimits(limits.speed, limits.speed, limits.acceleration, limits.jerk)
+        level = AxisLimits(limits.speed, limits.speed, limits.acceleration, limits.jerk)
         down = AxisLimits(
             limits.descent,
             limits.climb,
             min(limits.acceleration, _VERTICAL_ACCELERATION),
             min(limits.jerk, _VERTICAL_JERK),
         )
-        turn = AxisLimits(limits.yaw_rate, limits.yaw_rate, _YAW_ACCELERATION, _YAW_JERK)
-        self._horizontal = Axes((each, each), _HORIZONTAL_CONTINUITY, limits.timeout)
+        yaw = AxisLimits(limits.yaw_rate, limits.yaw_rate, _YAW_ACCELERATION, _YAW_JERK)
+        self._horizontal = Axes((level, level), _HORIZONTAL_CONTINUITY, limits.timeout)
         self._vertical = Axes((down,), _VERTICAL_CONTINUITY, limits.timeout)
-        self._heading = Axes((turn,), _HEADING_CONTINUITY, limits.timeout)
+        self._heading = Axes((yaw,), _HEADING_CONTINUITY, limits.timeout)
         self._climb, self._descent = limits.climb, limits.descent
         self._largest_yaw_rate = limits.yaw_rate
-        self._yaw: tuple[float, float, float] | None = None
+        self._newest_yaw: tuple[float, float, float] | None = None  # request, heading demand, time
 
     def begin(self, position_ned: Vector, velocity_ned: Vector, heading: float, now: float) -> None:
         """Start from a motion, and come to rest until a request comes."""
@@ -76,7 +77,7 @@ class CommandedMotion:
         self._horizontal.begin(State((x, y), (u, v), (0.0, 0.0)), now)
         self._vertical.begin(State((z,), (w,), (0.0,)), now)
         self._heading.begin(State((heading,), (0.0,), (0.0,)), now)
-        self._yaw = None
+        self._newest_yaw = None
 
     def command(self, request: MotionRequest, now: float, actual: VehicleMotion) -> None:
         """Follow a request; `actual` is the motion of the vehicle.
@@ -84,14 +85,14 @@ class CommandedMotion:
         Raises:
             UnplannableError: no motion leads to it; the previous request stays in force.
         """
-        before = copy(self._horizontal), copy(self._vertical), copy(self._heading), self._yaw
+        before = copy(self._horizontal), copy(self._vertical), copy(self._heading), self._newest_yaw
         horizontal, vertical = _by_axes(actual)
         try:
             self._horizontal.command(request.horizontal, now, horizontal)
             self._vertical.command(self._clamped(request.vertical), now, vertical)
-            self._heading.command(self._turn(request, now), now)
+            self._heading.command(self._heading_demand(request, now), now)
         except UnplannableError:
-            self._horizontal, self._vertical, self._heading, self._yaw = before
+            self._horizontal, self._vertical, self._heading, self._newest_yaw = before
             raise
 
     def stop(self, now: float, actual: VehicleMotion) -> None:
@@ -115,30 +116,30 @@ class CommandedMotion:
         (down,) = vertical.velocity
         return vertical._replace(velocity=(min(max(down, -self._climb), self._descent),))
 
-    def _turn(self, request: MotionRequest, now: float) -> AxisDemand:
-        """The demand on the heading: a yaw (turning the short way), a yaw rate, or no rotation."""
+    def _heading_demand(self, request: MotionRequest, now: float) -> AxisDemand:
+        """The demand on the heading: a yaw (by the shorter turn), a yaw rate, or no rotation."""
         if request.yaw is None:
-            self._yaw = None
+            self._newest_yaw = None
             return AxisDemand(None, (request.yaw_rate or 0.0,), None)
-        before, self._yaw = self._yaw, None
+        before, self._newest_yaw = self._newest_yaw, None
         rate = request.yaw_rate
         if before is not None:
-            yaw, heading, at = before
+            yaw, heading, commanded_at = before
             if request.yaw == yaw and rate is None:
-                self._yaw = before
+                self._newest_yaw = before
                 return AxisDemand((heading,), None, None)
             heading += wrap_angle(request.yaw - yaw)
-            turned = wrap_angle(request.yaw - yaw) / max(now - at, 1e-3)
+            mean_rate = wrap_angle(request.yaw - yaw) / max(now - commanded_at, 1e-3)
             if (
                 rate is None
-                and now - at <= _MAX_STREAM_PERIOD
-                and abs(turned) <= self._largest_yaw_rate
+                and now - commanded_at <= _MAX_STREAM_PERIOD
+                and abs(mean_rate) <= self._largest_yaw_rate
             ):
-                rate = turned
+                rate = mean_rate
         else:
             (heading,), _, _ = self._heading.at(now)
             heading += wrap_angle(request.yaw - heading)
-        self._yaw = request.yaw, heading, now
+        self._newest_yaw = request.yaw, heading, now
         return AxisDemand((heading,), None if rate is None else (rate,), None)
 
 

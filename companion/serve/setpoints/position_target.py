@@ -35,19 +35,19 @@ class _Frame(NamedTuple):
 
     Attributes:
         offset: whether positions are relative to the vehicle.
-        body: whether directions are relative to its heading.
-        position: whether a position in this frame means the same to PX4 and ArduPilot.
+        body: whether directions are relative to the vehicle's heading.
+        same_position: whether a position in this frame means the same to PX4 and ArduPilot.
     """
 
     offset: bool
     body: bool
-    position: bool = True
+    same_position: bool = True
 
 
 _LOCAL_FRAMES = {
     dialect.MAV_FRAME_LOCAL_NED: _Frame(offset=False, body=False),
     dialect.MAV_FRAME_LOCAL_OFFSET_NED: _Frame(offset=True, body=False),
-    dialect.MAV_FRAME_BODY_NED: _Frame(offset=False, body=True, position=False),
+    dialect.MAV_FRAME_BODY_NED: _Frame(offset=False, body=True, same_position=False),
     dialect.MAV_FRAME_BODY_OFFSET_NED: _Frame(offset=True, body=True),
     dialect.MAV_FRAME_BODY_FRD: _Frame(offset=True, body=True),
 }
@@ -79,7 +79,7 @@ def local_target(
         raise RefusedSetpoint(f"coordinate_frame {message.coordinate_frame} is not supported")
     groups = _groups(message, (message.x, message.y, message.z))
     position, velocity, acceleration = groups
-    if not frame.position and any(value is not None for value in position):
+    if not frame.same_position and any(value is not None for value in position):
         raise RefusedSetpoint("position in BODY_NED is ambiguous: use LOCAL_NED or BODY_OFFSET_NED")
     turn = situation.yaw if frame.body else 0.0
     start = situation.position_ned if frame.offset else (0.0, 0.0, 0.0)
@@ -108,7 +108,7 @@ def global_target(message: Message, situation: Situation) -> MotionRequest:
             raise RefusedSetpoint("the vehicle's global position is not known yet")
         place = _to_local(message, situation.origin, above_home=frame in _ABOVE_HOME_FRAMES)
         position = tuple(
-            None if value is None else here for value, here in zip(position, place, strict=True)
+            None if value is None else local for value, local in zip(position, place, strict=True)
         )
     yaw, yaw_rate = _heading(message)
     return _request((position, velocity, acceleration), yaw, yaw_rate)
@@ -125,9 +125,11 @@ def _groups(message: Message, position: Vector) -> tuple[_Values, _Values, _Valu
     if mask & ~_KNOWN_BITS:
         raise RefusedSetpoint(f"type_mask {mask} has bits that mean nothing to a multirotor")
     return (
-        _masked(mask, _POSITION_BITS, position, _MAX_POSITION, "position"),
-        _masked(mask, _VELOCITY_BITS, (message.vx, message.vy, message.vz), _MAX_SPEED, "velocity"),
-        _masked(
+        _used_values(mask, _POSITION_BITS, position, _MAX_POSITION, "position"),
+        _used_values(
+            mask, _VELOCITY_BITS, (message.vx, message.vy, message.vz), _MAX_SPEED, "velocity"
+        ),
+        _used_values(
             mask,
             _ACCELERATION_BITS,
             (message.afx, message.afy, message.afz),
@@ -137,7 +139,7 @@ def _groups(message: Message, position: Vector) -> tuple[_Values, _Values, _Valu
     )
 
 
-def _masked(
+def _used_values(
     mask: int, bits: tuple[int, int, int], values: Vector, largest: float, name: str
 ) -> _Values:
     used = tuple(None if mask & bit else value for bit, value in zip(bits, values, strict=True))
@@ -190,7 +192,7 @@ def _request(
 def _demand(
     groups: tuple[_Values, _Values, _Values], axes: tuple[int, ...], name: str
 ) -> AxisDemand:
-    position, velocity, acceleration = (_picked(values, axes) for values in groups)
+    position, velocity, acceleration = (_complete_vector(values, axes) for values in groups)
     if position is velocity is acceleration is None:
         raise RefusedSetpoint(f"nothing {name} is commanded: give position, velocity or accel.")
     if position is not None and velocity is None and acceleration is not None:
@@ -202,15 +204,16 @@ def _demand(
     return AxisDemand(position, velocity, acceleration)
 
 
-def _picked(values: _Values, axes: tuple[int, ...]) -> tuple[float, ...] | None:
-    picked = tuple(value for value in (values[axis] for axis in axes) if value is not None)
-    return picked if len(picked) == len(axes) else None
+def _complete_vector(values: _Values, axes: tuple[int, ...]) -> tuple[float, ...] | None:
+    """The values of these axes; None if one of them is not commanded."""
+    given = tuple(value for value in (values[axis] for axis in axes) if value is not None)
+    return given if len(given) == len(axes) else None
 
 
 def _to_local(message: Message, origin: Origin, *, above_home: bool) -> Vector:
-    """A place in the local frame; the earth counts as flat over the distances flown."""
+    """The commanded global position in the local frame, NED, m; the earth is taken as flat."""
     degrees = 1e-7
     place = Place(message.lat_int * degrees, message.lon_int * degrees)
     north, east = local_offset(place, Place(origin.latitude, origin.longitude))
-    reference = origin.home_altitude if above_home else 0.0
-    return north, east, origin.altitude - reference - message.alt
+    zero_altitude = origin.home_altitude if above_home else 0.0
+    return north, east, origin.altitude - zero_altitude - message.alt

@@ -33,7 +33,7 @@ class MotionRequest(NamedTuple):
     Attributes:
         horizontal: (north, east).
         vertical: (down,).
-        yaw: rad from north; None: the present yaw, turned by `yaw_rate`.
+        yaw: rad from north; None: the present yaw, which `yaw_rate` changes.
         yaw_rate: rad/s; None: not commanded.
     """
 
