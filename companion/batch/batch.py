@@ -23,7 +23,7 @@ about 4 µs.
 _BLOCK_SIZE = 336
 """Vehicles advanced together; the data of a step then fits the first-level cache."""
 
-_CACHE_LINE = 8  # numbers
+_CACHE_LINE = 8  # float64 numbers
 
 
 class History(NamedTuple):
@@ -132,7 +132,7 @@ def coefficients(q: ArrayLike) -> Array:
 def _prepared(
     planner: LawPlanner, q: ArrayLike, targets: ArrayLike, steps: int, compiled: bool | None
 ) -> tuple[Array, Array, Loops]:
-    """The arrays as the law accepts them, and the loops to use."""
+    """The attitudes normalised, the targets limited, and the loops to use."""
     if not isinstance(planner, LawPlanner):
         raise TypeError(
             f"a batch maps planners without memory ({', '.join(LAW_NAMES)}), and "
@@ -146,15 +146,15 @@ def _prepared(
         raise ValueError(f"steps must not be negative, not {steps}")
     if compiled is None:
         compiled = q.shape[1] * steps >= COMPILE_FROM and can_compile()
-    longest = planner.constants.longest_target
+    longest_target = planner.constants.longest_target
     if compiled:
         require("numba", "study", "a compiled batch")
         loops = compiled_loops(planner.law)
-        if compiled_check()(q, targets, longest):
+        if compiled_check()(q, targets, longest_target):
             return q, targets, loops
     else:
         loops = plain_loops(planner.law)
-    return unit_quaternions(q), limited_targets(targets, longest), loops
+    return unit_quaternions(q), limited_targets(targets, longest_target), loops
 
 
 def _turned_too_far(loops: Loops, q: Array) -> bool:
@@ -165,15 +165,16 @@ def _turned_too_far(loops: Loops, q: Array) -> bool:
 def _advanced(
     loops: Loops, planner: LawPlanner, q: Array, targets: Array, dt: float, steps: int
 ) -> Array:
+    """The attitudes (4, n) after all steps, computed block by block."""
     after = np.empty_like(q)
     blocks = max(1, ceil(q.shape[1] / _BLOCK_SIZE))
     width = _CACHE_LINE * max(1, ceil(q.shape[1] / blocks / _CACHE_LINE))
-    for low in range(0, q.shape[1], width):
-        block = slice(low, min(low + width, q.shape[1]))
-        even, odd, goals, rates_of_step = _work_space(block.stop - block.start)
+    for begin in range(0, q.shape[1], width):
+        block = slice(begin, min(begin + width, q.shape[1]))
+        even, odd, block_targets, block_rates = _work_space(block.stop - block.start)
         even[...] = q[:, block]
-        goals[...] = targets[:, block]
-        loops.advance(even, odd, goals, rates_of_step, dt, planner.constants, steps)
+        block_targets[...] = targets[:, block]
+        loops.advance(even, odd, block_targets, block_rates, dt, planner.constants, steps)
         after[:, block] = odd if steps % 2 else even
     return after
 

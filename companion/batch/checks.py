@@ -43,7 +43,7 @@ def all_fit(q: Array, targets: Array, longest: float) -> bool:
     """Whether no quaternion needs normalising and no target needs limiting, for n vehicles.
 
     `q` and `targets` are (4, n); `longest` is the largest length of a target's coefficients.
-    Conditions are joined by `&` and counted: without branches the loop is vectorised.
+    Conditions are joined by `&` and counted, because only a loop without branches is vectorised.
     """
     unfit = 0
     for i in range(q.shape[1]):
@@ -78,7 +78,7 @@ def unit_quaternions(q: Array) -> Array:
 def limited_targets(targets: Array, longest: float) -> Array:
     """`targets` (4, n), each as `limited_target` returns it.
 
-    Targets within the limits are passed in bulk, the others are treated one by one.
+    Targets within the limits are copied all at once, the others are limited one by one.
 
     Raises:
         InvalidTargetError: a value is not finite or far too large.
@@ -87,10 +87,10 @@ def limited_targets(targets: Array, longest: float) -> Array:
     with np.errstate(over="ignore", invalid="ignore"):  # such a target is refused below
         fit = north * north + east * east <= longest * longest
     fit &= (heading > -pi) & (heading <= pi) & (np.abs(heading_rate) <= LARGEST_HEADING_RATE)
-    admitted = targets.copy()
+    limited = targets.copy()
     for i in np.flatnonzero(~fit):
         try:
-            admitted[:, i] = limited_target(Target(*targets[:, i].tolist()), longest)
+            limited[:, i] = limited_target(Target(*targets[:, i].tolist()), longest)
         except InvalidTargetError as error:
             raise InvalidTargetError(f"vehicle {i}: {error}") from None
-    return admitted
+    return limited

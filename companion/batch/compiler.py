@@ -17,22 +17,24 @@ _OPTIONS: dict[str, Any] = {
 class Compiler:
     """Compiles functions together with everything they call, every call inlined.
 
-    Only inlined calls let the loop around a law be vectorised. A law finds other functions in its
-    module's globals; it is rebuilt with globals that hold the compiled ones.
+    The loop around a law is vectorised only if its calls are inlined. A law finds other functions
+    in its module's globals; it is rebuilt with globals that hold the compiled ones.
     """
 
     def __init__(self, substitutes: Substitutes) -> None:
         _use_wide_registers()
         self._substitutes = substitutes
-        self._done: dict[Callable[..., Any], Any] = {}
+        self._compiled: dict[Callable[..., Any], Any] = {}
 
     def function(self, function: Callable[..., Any]) -> Any:
         """Compile a function for use in compiled code; it must have no closure and no defaults."""
-        if function not in self._done:
+        if function not in self._compiled:
             import numba  # noqa: PLC0415  optional, and slow to import
 
-            self._done[function] = numba.njit(self._rebuilt(function), forceinline=True, **_OPTIONS)
-        return self._done[function]
+            self._compiled[function] = numba.njit(
+                self._rebuilt(function), forceinline=True, **_OPTIONS
+            )
+        return self._compiled[function]
 
     def loop(self, function: Callable[..., Any]) -> Any:
         """Compile a loop; it may close over functions that `function()` returned."""
@@ -41,15 +43,16 @@ class Compiler:
         return numba.njit(function, **_OPTIONS)
 
     def _rebuilt(self, function: Callable[..., Any]) -> FunctionType:
+        """The function with globals in which all functions that it calls are compiled ones."""
         assert isinstance(function, FunctionType)
-        known = dict(function.__globals__)
+        names = dict(function.__globals__)
         for name in function.__code__.co_names:
-            called = known.get(name)
+            called = names.get(name)
             if callable(called):
                 called = self._substitutes.get(called, called)
             if isinstance(called, FunctionType):
-                known[name] = self.function(called)
-        return FunctionType(function.__code__, known, function.__name__)
+                names[name] = self.function(called)
+        return FunctionType(function.__code__, names, function.__name__)
 
 
 def _use_wide_registers() -> None:

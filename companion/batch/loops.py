@@ -1,8 +1,8 @@
 """The loops over vehicles and samples around a law, in Python or compiled.
 
 Compiled inner loops are vectorised. For that they run over whole C-contiguous arrays, from 0 to the
-end, and write to other arrays than they read. Law and turn are two loops, because one loop with
-both needs more registers than a processor has.
+end, and write to other arrays than they read. The law and the rotation (`turn`) have a loop each,
+because one loop for both needs more registers than a processor has.
 """
 
 import math
@@ -97,8 +97,13 @@ def plain_loops(law: Law) -> Loops:
     return _over_samples(apply, turn, lambda loop: loop, any_angle=True)
 
 
-def _over_samples(apply: _Apply, turn: _Turn, made: Callable[[Any], Any], any_angle: bool) -> Loops:
-    """Make loops over samples from the loops over vehicles; `made` may compile them."""
+def _over_samples(
+    apply: _Apply, turn: _Turn, compiled: Callable[[Any], Any], any_angle: bool
+) -> Loops:
+    """Make the loops over samples from the loops over vehicles.
+
+    `compiled` compiles a loop, or returns it unchanged.
+    """
 
     def advance(
         q: Array,
@@ -123,4 +128,4 @@ def _over_samples(apply: _Apply, turn: _Turn, made: Callable[[Any], Any], any_an
             apply(q[k], targets, rates[k], dt, constants)
             turn(q[k], rates[k], q[k + 1], dt)
 
-    return Loops(apply, made(advance), made(record), any_angle)
+    return Loops(apply, compiled(advance), compiled(record), any_angle)

@@ -1,7 +1,7 @@
 """One vehicle behind its rate loop: dead time, slew limit and lag of each axis, compiled.
 
-Unlike the loops over many vehicles this one goes through the samples of one vehicle. Each vehicle
-may have limits, gains and a rate loop of its own, and the memory does not grow with their number.
+Unlike `companion.batch.loops`, this loop goes through the samples of one vehicle. Each vehicle may
+have its own limits, gains and rate loop, and the memory does not grow with the number of vehicles.
 """
 
 from collections.abc import Callable, Sequence
@@ -34,7 +34,7 @@ class StepFlight(NamedTuple):
 
     Attributes:
         path: (samples, 2), coefficients north and east at the sample.
-        targets: (samples, 2), target coefficients of the answer to the sample.
+        targets: (samples, 2), target coefficients that the command for the sample follows.
         commanded: (samples, 3), commanded body rates, rad/s.
         q: attitude at the end.
     """
@@ -97,7 +97,7 @@ def _compiled(law: Law) -> Callable[..., Quaternion]:
     """The flight of one vehicle under `law`."""
     compiler = Compiler({})
     one_law, turn = compiler.function(law), compiler.function(after_constant_rates)
-    lagged, limited = compiler.function(lag_step), compiler.function(clamp)
+    lag_response, limited = compiler.function(lag_step), compiler.function(clamp)
     products = compiler.function(tilt_products)
     dt = 1.0 / STEP_HZ
 
@@ -112,28 +112,28 @@ def _compiled(law: Law) -> Callable[..., Quaternion]:
         commanded: Array,
     ) -> Quaternion:
         length = delays.max() + 1
-        sent = np.zeros((length, 3))  # the newest commands, a ring
-        aims, now, slopes, mean = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
+        commands = np.zeros((length, 3))  # ring buffer of the newest commands
+        slewed, actual, slopes, mean_rates = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
         k = 0
         for sample in range(targets.shape[0]):
-            goal = targets[sample, 0], targets[sample, 1], targets[sample, 2], targets[sample, 3]
+            target = targets[sample, 0], targets[sample, 1], targets[sample, 2], targets[sample, 3]
             _, ax, ay = products(q[0], q[1], q[2], q[3])
             path[sample, 0], path[sample, 1] = -2.0 * ay, 2.0 * ax
-            roll, pitch, yaw = one_law(q, goal, steps * dt, constants)
+            roll, pitch, yaw = one_law(q, target, steps * dt, constants)
             commanded[sample, 0], commanded[sample, 1], commanded[sample, 2] = roll, pitch, yaw
             for _ in range(steps):
-                place = k % length
-                sent[place, 0], sent[place, 1], sent[place, 2] = roll, pitch, yaw
+                slot = k % length
+                commands[slot, 0], commands[slot, 1], commands[slot, 2] = roll, pitch, yaw
                 for axis in range(3):
-                    acting = sent[(k + length - delays[axis]) % length, axis]
-                    lag, square, slew = rates[axis, 0], rates[axis, 1], rates[axis, 2]
-                    aims[axis] += limited(acting - aims[axis], slew)
+                    delayed = commands[(k + length - delays[axis]) % length, axis]
+                    lag, sigma, slew = rates[axis, 0], rates[axis, 1], rates[axis, 2]
+                    slewed[axis] += limited(delayed - slewed[axis], slew)
                     transition = rates[axis, 3], rates[axis, 4], rates[axis, 5], rates[axis, 6]
-                    moved, now[axis], slopes[axis] = lagged(
-                        now[axis], slopes[axis], aims[axis], dt, lag, square, transition
+                    angle, actual[axis], slopes[axis] = lag_response(
+                        actual[axis], slopes[axis], slewed[axis], dt, lag, sigma, transition
                     )
-                    mean[axis] = moved / dt
-                q = turn(q, (mean[0], mean[1], mean[2]), dt)
+                    mean_rates[axis] = angle / dt
+                q = turn(q, (mean_rates[0], mean_rates[1], mean_rates[2]), dt)
                 k += 1
         return q
 

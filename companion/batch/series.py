@@ -1,8 +1,8 @@
 """Elementary functions as polynomials that a compiler can vectorise over many vehicles.
 
 A call of the C library takes one number and prevents vectorising the loop around it. The functions
-here have no branches and are within 5e-15 of the C library on their domains. The sums are taken in
-pairs (Estrin), because in a row (Horner) each term waits for the one before.
+here have no branches and are within 5e-15 of the C library on their domains. They add the terms in
+pairs (Estrin's scheme), because with Horner's scheme each term waits for the one before.
 """
 
 from collections.abc import Callable
@@ -46,7 +46,7 @@ def arctangent(t: float) -> float:
 
 
 def cos_and_sinc(square: float) -> tuple[float, float]:
-    """cos(h) and sin(h)/h for h² from 0 to `LARGEST_SQUARE`, replacing that of `rotation`.
+    """cos(h) and sin(h)/h for h² from 0 to `LARGEST_SQUARE`; replaces `rotation.cos_and_sinc`.
 
     A larger h² gives NaN. The attitude then stays NaN, which the caller detects.
     """

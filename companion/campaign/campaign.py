@@ -64,12 +64,12 @@ class Campaign:
             ConfigError: the program or the mock vehicle refuses its configuration; the message
                 names the case and the key.
         """
-        factors = {name: _factor(name, value) for name, value in sample.values.items()}
+        factors = {name: _stored_value(name, value) for name, value in sample.values.items()}
         changes: dict[str, Any] = {}
         for name, value in sample.values.items():
             if name not in FAULT_FACTORS:
                 for key in self.file.sweep[name].changed_keys(name):
-                    changes[key] = self._value(name, key, value)
+                    changes[key] = self._new_value(name, key, value)
         try:
             config = with_keys(self.base, changes)
             _check_flyable(config)
@@ -87,8 +87,8 @@ class Campaign:
             self.file.limits.flight_s,
         )
 
-    def _value(self, name: str, key: str, value: Any) -> Any:
-        """The new value of a key: `value`, times that of the base for a factor with `times_base`.
+    def _new_value(self, name: str, key: str, value: Any) -> Any:
+        """The new value of a key: `value`, or with `times_base` `value` times the base's value.
 
         Raises:
             ConfigError: the base holds no number to multiply.
@@ -104,10 +104,11 @@ class Campaign:
         return value * base
 
     def _base_value(self, key: str) -> Any:
-        found: Any = self.base  # its section `mock` is complete: `with_keys` made it
+        """The value of a dotted key in the base configuration; None: there is no such key."""
+        value: Any = self.base  # its section `mock` is complete: `with_keys` made it
         for name in key.split("."):
-            found = found.get(name) if isinstance(found, dict) else getattr(found, name, None)
-        return found
+            value = value.get(name) if isinstance(value, dict) else getattr(value, name, None)
+        return value
 
     def _fault(self, values: Mapping[str, Any]) -> Fault | None:
         name = values.get(FAULT, NO_FAULT)
@@ -140,9 +141,10 @@ def _check_flyable(config: Config) -> None:
         )
 
 
-def _factor(name: str, value: Any) -> Value:
-    """A value as written in the results; of a trajectory's path only the folder of its copy.
+def _stored_value(name: str, value: Any) -> Value:
+    """The value of a factor as stored in the results; for a trajectory the folder of its copy.
 
-    The folder is called like the file. Files of the same name have folders such as `circle-2`.
+    The folder has the name of the file. Further files of the same name get folders such as
+    `circle-2`.
     """
     return Path(value).parent.name if name == TRAJECTORY else column_value(value)

@@ -57,11 +57,11 @@ class Case:
 
     def described(self) -> str:
         """Number and factors of the case, for messages."""
-        factors = ", ".join(f"{key} = {_shown(value)}" for key, value in self.factors.items())
+        factors = ", ".join(f"{key} = {_value_text(value)}" for key, value in self.factors.items())
         return f"case {self.index}" + (f" ({factors})" if factors else "")
 
 
-def _shown(value: Value) -> str:
+def _value_text(value: Value) -> str:
     if value is None:
         return "null"
     return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from distributed import Client, Future
 
 DEATHS = 3
-"""A unit is given up when its worker dies for the third time, even if the unit only waited there.
+"""A unit is given up when its worker dies for the third time, even if it was only queued there.
 
 An existing cluster follows its own setting, `distributed.scheduler.allowed-failures`.
 """
@@ -77,7 +77,7 @@ def connected(scheduler: str | None, workers: int | None) -> "Iterator[Client]":
     Args:
         scheduler: address of an existing cluster; None: worker processes of our own, which end with
             the context.
-        workers: number of our own worker processes; None: one a core.
+        workers: number of our own worker processes; None: one for each core.
 
     Raises:
         ConfigError: the scheduler cannot be reached.
@@ -107,7 +107,7 @@ def connected(scheduler: str | None, workers: int | None) -> "Iterator[Client]":
             _compare_versions(client)
             yield client
         finally:
-            with suppress(Exception):  # what matters is on the disk
+            with suppress(Exception):  # the results are already on the disk
                 client.close(timeout=_CLOSE_S)
                 if cluster is not None:
                     cluster.close(timeout=_CLOSE_S)
@@ -126,12 +126,12 @@ def _interrupts_blocked() -> Iterator[None]:
 
     Ctrl-C in a terminal reaches all processes. Only the client may act on it: it ends the workers.
     """
-    resource_tracker.ensure_running()  # its start inside of the block would unblock the signal
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    resource_tracker.ensure_running()  # started below, it would unblock SIGINT
+    previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)
 
 
 @contextmanager
@@ -143,13 +143,13 @@ def _termination_deferred() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():  # signals are not handled here
         yield
         return
-    came: list[int] = []
-    handler = signal.signal(signal.SIGTERM, lambda number, _: came.append(number))
+    received: list[int] = []
+    handler = signal.signal(signal.SIGTERM, lambda number, _: received.append(number))
     try:
         yield
     finally:
         signal.signal(signal.SIGTERM, handler)
-        if came:
+        if received:
             signal.raise_signal(signal.SIGTERM)
 
 
@@ -171,26 +171,27 @@ def number_of_workers(client: "Client") -> int:
 def _compare_versions(client: "Client") -> None:
     """Refuse a scheduler or workers of other versions.
 
-    Of the scheduler only the minor version of Python and the version of Dask are compared.
+    For the scheduler, only Python's minor version and the version of Dask are compared.
 
     Raises:
-        VersionError: says who has which.
+        VersionError: names the process, and the versions that differ.
     """
     dask_versions = client.get_versions()
-    ours, scheduler = (_dask_and_python(dask_versions[who]) for who in ("client", "scheduler"))
+    ours, scheduler = (_dask_and_python(dask_versions[side]) for side in ("client", "scheduler"))
     require_equal(ours, scheduler, "the Dask scheduler")
-    for address, found in client.run(versions, on_error="return").items():
-        if isinstance(found, BaseException):
+    for address, worker_versions in client.run(versions, on_error="return").items():
+        if isinstance(worker_versions, BaseException):
             raise VersionError(
-                f"the worker {address} cannot run this version of companion ({found}): install the "
-                "same version there"
+                f"the worker {address} cannot run this version of companion ({worker_versions}): "
+                "install the same version there"
             )
-        require_equal(versions(), as_versions(found), f"the worker {address}")
+        require_equal(versions(), as_versions(worker_versions), f"the worker {address}")
 
 
-def _dask_and_python(versions: Mapping[str, Any]) -> dict[str, str]:
-    python = ".".join(str(versions["host"]["python"]).split(".")[:2])
-    return {"python": python, "distributed": str(versions["packages"]["distributed"])}
+def _dask_and_python(process: Mapping[str, Any]) -> dict[str, str]:
+    """Versions of Python (minor) and Dask from the entry of a process in `Client.get_versions`."""
+    python = ".".join(str(process["host"]["python"]).split(".")[:2])
+    return {"python": python, "distributed": str(process["packages"]["distributed"])}
 
 
 def run_tasks(client: "Client", tasks: Mapping[int, tuple[Any, ...]]) -> Iterator[EndedUnit]:
@@ -213,15 +214,15 @@ def run_tasks(client: "Client", tasks: Mapping[int, tuple[Any, ...]]) -> Iterato
     try:
         for future in as_completed(futures):
             number = futures.pop(future)
-            yield _ended(number, future)
+            yield _ended_unit(number, future)
             future.release()
     finally:
         with suppress(Exception):
             client.cancel(list(futures), force=True)
 
 
-def _ended(number: int, future: "Future") -> EndedUnit:
-    """The unit of a future that ended.
+def _ended_unit(number: int, future: "Future") -> EndedUnit:
+    """The unit whose future has ended.
 
     Raises:
         ClusterError: the connection to the scheduler is lost.
@@ -232,13 +233,13 @@ def _ended(number: int, future: "Future") -> EndedUnit:
         if future.status == "finished":
             return EndedUnit(number, future.result())
         if future.status == "error":
-            return EndedUnit(number, None, _reason(future.exception()))
-    except (OSError, CancelledError) as error:  # it was lost while the rows were on their way
+            return EndedUnit(number, None, _failure_reason(future.exception()))
+    except (OSError, CancelledError) as error:  # lost while the rows were in transit
         raise ClusterError(_CONNECTION_LOST) from error
     raise ClusterError(_CONNECTION_LOST)
 
 
-def _reason(error: BaseException) -> str:
+def _failure_reason(error: BaseException) -> str:
     """Why a unit was given up; a VersionError or ConfigError is raised instead."""
     from distributed import KilledWorker  # noqa: PLC0415  an extra
 

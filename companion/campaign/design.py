@@ -32,24 +32,26 @@ class Sample:
 
 def number_of_cases(file: CampaignFile) -> int:
     """The number of cases, computed without building them."""
-    sampled = sum(swept.sampled for swept in file.sweep.values())
-    repeats = file.samples**sampled if file.sampling == "grid" and sampled else file.samples
+    distributions = sum(swept.sampled for swept in file.sweep.values())
+    repeats = (
+        file.samples**distributions if file.sampling == "grid" and distributions else file.samples
+    )
     return repeats * prod(len(swept.grid()) for swept in file.sweep.values() if not swept.sampled)
 
 
 def too_few_samples(file: CampaignFile) -> str | None:
     """A warning if `samples` is too small for the distributions; else None."""
-    most = file.samples
+    samples = file.samples
     names = [
         name
         for name, swept in file.sweep.items()
-        if swept.sampled and most < (2 if swept.choice is None else len(swept.choice))
+        if swept.sampled and samples < (2 if swept.choice is None else len(swept.choice))
     ]
     if not names:
         return None
-    values = "a single value" if most == 1 else f"{most} values at most"
+    values = "a single value" if samples == 1 else f"{samples} values at most"
     return (
-        f"samples is {most}, so {values} of {', '.join(names)} will be flown; raise samples, or "
+        f"samples is {samples}, so {values} of {', '.join(names)} will be flown; raise samples, or "
         "give a list, of which every value is flown"
     )
 
@@ -59,18 +61,18 @@ def samples_of(file: CampaignFile) -> Iterator[Sample]:
 
     A campaign that is stopped has therefore flown all points of the grid about equally often.
     """
-    fixed = {name: swept.grid() for name, swept in file.sweep.items() if not swept.sampled}
-    sampled = {name: swept for name, swept in file.sweep.items() if swept.sampled}
-    points = [dict(zip(fixed, point, strict=True)) for point in product(*fixed.values())]
+    grids = {name: swept.grid() for name, swept in file.sweep.items() if not swept.sampled}
+    distributions = {name: swept for name, swept in file.sweep.items() if swept.sampled}
+    points = [dict(zip(grids, point, strict=True)) for point in product(*grids.values())]
     index = 0
-    for number, shares in enumerate(_shares(file, len(sampled))):
+    for sample_number, probabilities in enumerate(_probabilities(file, len(distributions))):
         drawn = {
-            name: swept.at(float(share))
-            for (name, swept), share in zip(sampled.items(), shares, strict=True)
+            name: swept.at(float(probability))
+            for (name, swept), probability in zip(distributions.items(), probabilities, strict=True)
         }
         for point in points:
             values = {**point, **drawn}
-            seed = seed_of(file.seed, number if file.same_seeds else index)
+            seed = seed_of(file.seed, sample_number if file.same_seeds else index)
             yield Sample(index, seed, {name: values[name] for name in file.sweep})
             index += 1
 
@@ -81,10 +83,10 @@ def seed_of(campaign_seed: int, number: int) -> int:
     return int.from_bytes(digest[:8], "big") & _LARGEST_SEED
 
 
-def _shares(file: CampaignFile, dimensions: int) -> NDArray[np.float64]:
+def _probabilities(file: CampaignFile, dimensions: int) -> NDArray[np.float64]:
     """(n, dimensions): cumulative probability of each sample in each distribution.
 
-    n is `samples`, but samples**dimensions for `sampling: grid` if there is a distribution.
+    n is `samples`; with `sampling: grid` and at least one distribution, samples**dimensions.
     """
     count = file.samples
     if dimensions == 0:
@@ -97,5 +99,5 @@ def _shares(file: CampaignFile, dimensions: int) -> NDArray[np.float64]:
     from scipy.stats import qmc  # noqa: PLC0415  takes half a second to import
 
     kind = qmc.LatinHypercube if file.sampling == "latin-hypercube" else qmc.Sobol
-    shares: NDArray[np.float64] = kind(dimensions, rng=file.seed).random(count)
-    return shares
+    probabilities: NDArray[np.float64] = kind(dimensions, rng=file.seed).random(count)
+    return probabilities

@@ -54,7 +54,7 @@ def run(
     Args:
         client: client of the cluster.
         campaign: the campaign.
-        description: description of the folder.
+        description: content of the folder's `campaign.json`.
         folder: folder of the campaign; it exists and is locked.
         on_unit: called once before the first unit, and after each unit.
 
@@ -75,14 +75,15 @@ def run(
         for number, unit in missing.items()
     }
     for ended in run_tasks(client, tasks):
-        _keep(ended, units[ended.number], campaign, folder, progress)
+        _store_unit(ended, units[ended.number], campaign, folder, progress)
         on_unit(progress)
     return progress
 
 
-def _keep(
+def _store_unit(
     ended: EndedUnit, unit: range, campaign: Campaign, folder: Path, progress: Progress
 ) -> None:
+    """Store the result of a unit, or note in `progress` that it was given up."""
     first, last = unit[0], unit[-1]
     if ended.result is None:
         progress.lost.append(f"unit {ended.number} (cases {first} to {last}): {ended.reason}")
@@ -94,7 +95,7 @@ def _keep(
 
 
 def internal_errors(folder: Path, file: CampaignFile) -> Counter[str]:
-    """By internal error of the program: the number of flights that it ended; empty for a batch."""
+    """The number of flights that each internal error of the program ended; empty for a batch."""
     if file.kind != "flights":
         return Counter()
     results = store.read(folder)["result"].to_pylist()
@@ -102,7 +103,7 @@ def internal_errors(folder: Path, file: CampaignFile) -> Counter[str]:
 
 
 def run_on_cluster(client: "Client", kind: str, cases: Sequence[Case], case_s: float) -> list[Row]:
-    """Run cases that need not belong to a campaign; return their rows in order; nothing is written.
+    """Run cases that need not belong to a campaign; return their rows in order. Nothing is stored.
 
     Args:
         client: client of the cluster.
@@ -121,9 +122,9 @@ def run_on_cluster(client: "Client", kind: str, cases: Sequence[Case], case_s: f
         number: (fly_cases, kind, [cases[index] for index in unit], versions())
         for number, unit in enumerate(units)
     }
-    found: dict[int, list[Row]] = {}
+    rows: dict[int, list[Row]] = {}
     for ended in run_tasks(client, tasks):
         if ended.result is None:
             raise ClusterError(f"a unit of work was given up: {ended.reason}")
-        found[ended.number] = ended.result.rows
-    return [row for number in range(len(units)) for row in found[number]]
+        rows[ended.number] = ended.result.rows
+    return [row for number in range(len(units)) for row in rows[number]]

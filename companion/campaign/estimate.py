@@ -32,15 +32,15 @@ def case_time(kind: str, cases: Sequence[Case]) -> float:
     """
     if kind == "batch":
         planner = cases[0].config.planner_name
-        some = [case for case in cases if case.config.planner_name == planner][:_MEASURED_VEHICLES]
-        run_cases(kind, some)
+        timed = [case for case in cases if case.config.planner_name == planner][:_MEASURED_VEHICLES]
+        run_cases(kind, timed)
     else:
-        places = sorted({0, len(cases) // 2, len(cases) - 1})[:_MEASURED_FLIGHTS]
-        some = [cases[place] for place in places]
-        run_cases(kind, [replace(some[0], flight_s=1.0)])
+        indices = sorted({0, len(cases) // 2, len(cases) - 1})[:_MEASURED_FLIGHTS]
+        timed = [cases[index] for index in indices]
+        run_cases(kind, [replace(timed[0], flight_s=1.0)])
     began = perf_counter()
-    run_cases(kind, some)
-    return (perf_counter() - began) / len(some)
+    run_cases(kind, timed)
+    return (perf_counter() - began) / len(timed)
 
 
 def check_size(campaign: Campaign, case_s: float, workers: int) -> None:

@@ -20,9 +20,9 @@ WIRE_S = 0.0005
 """Delay of a datagram, as over UDP, s."""
 INTERNAL_ERROR = "internal error: "
 """Prefix of the result of a case in which the program itself failed."""
-_TRUTH_EVERY = 5
-"""Steps of the mock vehicle between two rows of its true motion."""
-_AFTERWARDS_S = 10.0
+_STEPS_PER_TRUTH_ROW = 5
+"""Steps of the mock vehicle from one recorded row of its true motion to the next."""
+_WATCHED_AFTERWARDS_S = 10.0
 """Time for which a vehicle that is still armed is watched after the flight, s."""
 _PILOT_MODES = (  # of PX4 and ArduPilot
     "POSCTL",
@@ -47,14 +47,14 @@ def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
         error is a row, too: its `result` is the error.
     """
     row: dict[str, Value] = {"case": case.index, "seed": case.seed, **case.factors}
-    with tempfile.TemporaryDirectory(prefix="companion-case-") as place:
+    with tempfile.TemporaryDirectory(prefix="companion-case-") as files_folder:
         try:
-            return row | CaseFlight(case, Path(place)).fly(folder)
+            return row | CaseFlight(case, Path(files_folder)).fly(folder)
         except ConfigError as error:  # such as a trajectory that the limits do not allow
             reason = str(error)
         except Exception as error:
             reason = f"{INTERNAL_ERROR}{type(error).__name__}: {error}"
-        return row | outcomes.unflown(reason.replace(f"{place}/", ""))
+        return row | outcomes.unflown(reason.replace(f"{files_folder}/", ""))
 
 
 class CaseFlight:
@@ -62,60 +62,70 @@ class CaseFlight:
 
     Args:
         case: the case to fly.
-        place: a new folder, into which the files that the flight reads are written.
+        files_folder: a new folder; the files that the flight reads are written into it.
 
     Raises:
         ConfigError: the configuration cannot be flown.
     """
 
-    def __init__(self, case: Case, place: Path) -> None:
+    def __init__(self, case: Case, files_folder: Path) -> None:
         for name, text in case.files.items():
-            path = place / name
+            path = files_folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8")
-        self._case, self._place = case, place
-        self._config = _placed(case.config, place)
+        self._case, self._files_folder = case, files_folder
+        self._config = _with_paths_in(case.config, files_folder)
         settings = {**case.mock, "lockstep": False}
         self._vehicle = MockVehicle(delay_s=WIRE_S, compiled=can_compile(), **settings)
         self._truth: list[tuple[float, ...]] = []
         self._steps = 0
-        self._too_long = False
+        self._time_limit_reached = False
 
     def fly(self, folder: Path | None) -> dict[str, Value]:
-        """Fly the case; return its outcomes. For `folder` see `fly_case`."""
+        """Fly the case; return its outcomes.
+
+        Args:
+            folder: folder for the files of a fully recorded flight; None: nothing is written.
+        """
         vehicle, case = self._vehicle, self._case
-        vehicle.after_step.append(self._note_truth)
+        vehicle.after_step.append(self._record_truth)
         fault = _FaultInjector(vehicle, case.fault)
         flight = session(self._config, vehicle, folder, fault)
 
         def end() -> None:
-            self._too_long = True
+            self._time_limit_reached = True
             flight.leave()
 
         vehicle.at(case.flight_s, end)
         summary = run(vehicle, flight.fly())
-        at_end = vehicle.state()
+        state_at_end = vehicle.state()
         flight_s = vehicle.time
         vehicle.after_step.clear()
-        while vehicle.state()["armed"] and vehicle.time < flight_s + _AFTERWARDS_S:
+        while vehicle.state()["armed"] and vehicle.time < flight_s + _WATCHED_AFTERWARDS_S:
             vehicle.step()
-        final = vehicle.state()
-        return self._outcomes(summary, at_end, final, flight_s, begun=fault.begun)
+        final_state = vehicle.state()
+        return self._outcomes(summary, state_at_end, final_state, flight_s, begun=fault.begun)
 
     def _outcomes(
-        self, summary: Summary, at_end: Truth, final: Truth, flight_s: float, *, begun: bool
+        self,
+        summary: Summary,
+        state_at_end: Truth,
+        final_state: Truth,
+        flight_s: float,
+        *,
+        begun: bool,
     ) -> dict[str, Value]:
         """The outcomes of the flight.
 
         Args:
             summary: the program's summary.
-            at_end: true state of the vehicle when the program ended.
-            final: its true state after it disarmed, or `_AFTERWARDS_S` later.
+            state_at_end: true state of the vehicle when the program ended.
+            final_state: its true state after it disarmed, or `_WATCHED_AFTERWARDS_S` later.
             flight_s: time from boot to the end of the program, s.
             begun: whether the phase of the fault was reached.
         """
         figures, setpoints = summary.as_dict(), self._vehicle.setpoints
-        crashed, fault = final["crashed"], self._case.fault
+        crashed, fault = final_state["crashed"], self._case.fault
         measured = {
             **outcomes.tracking(summary, np.array(self._truth).reshape(-1, 5)),
             **outcomes.response(summary),
@@ -124,27 +134,27 @@ class CaseFlight:
         }
         documented = None
         if fault is not None and begun and fault.ends:
-            documented = not crashed and _ending(at_end, summary.result) in fault.ends
+            documented = not crashed and _ending(state_at_end, summary.result) in fault.ends
         result = summary.result
-        if self._too_long:
+        if self._time_limit_reached:
             result = f"not over after {self._case.flight_s:g} s of vehicle time"
         failed = outcomes.failed_checks(figures)
         good = result == "ok" and not failed and not crashed
         return {
             "ok": good,
-            "result": result.replace(f"{self._place}/", ""),
+            "result": result.replace(f"{self._files_folder}/", ""),
             "failed_checks": failed,
             "phase": summary.phase,
             "crashed": crashed,
             "as_documented": documented,
             **outcomes.without_nan(measured),
             "setpoints": len(setpoints),
-            "digest": outcomes.digest(setpoints, final),
+            "digest": outcomes.digest(setpoints, final_state),
         }
 
-    def _note_truth(self) -> None:
+    def _record_truth(self) -> None:
         self._steps += 1
-        if self._steps % _TRUTH_EVERY == 0:
+        if self._steps % _STEPS_PER_TRUTH_ROW == 0:
             state = self._vehicle.state()
             _, x, y, _ = state["q"]
             self._truth.append((self._vehicle.time, *state["position"], tilt_angle(x, y)))
@@ -173,9 +183,9 @@ class _FaultInjector(SilentObserver):
         if self._fault is None or self.begun or name not in self._phases:
             return
         self.begun = True
-        at = self._vehicle.time + self._fault.after
+        begin_s = self._vehicle.time + self._fault.after
         for each in self._fault.inject:
-            self._vehicle.inject({**each, "at_s": at})
+            self._vehicle.inject({**each, "at_s": begin_s})
 
 
 def _ending(state: Truth, result: str) -> str:
@@ -189,12 +199,14 @@ def _ending(state: Truth, result: str) -> str:
     return "ground" if state["touchdown_speed"] is None else "landed"
 
 
-def _placed(config: Config, place: Path) -> Config:
+def _with_paths_in(config: Config, files_folder: Path) -> Config:
     """The configuration with `recording.directory` and the trajectory in the folder of this flight.
 
-    `recording.directory` is empty, so that nothing an earlier flight learned changes this one.
+    `recording.directory` is a new folder, so that values learned by earlier flights are not used.
     """
-    recording = config.recording.model_copy(update={"directory": place / "learned"})
+    recording = config.recording.model_copy(update={"directory": files_folder / "learned"})
     path = config.flight.trajectory
-    flight = config.flight.model_copy(update={"trajectory": None if path is None else place / path})
+    flight = config.flight.model_copy(
+        update={"trajectory": None if path is None else files_folder / path}
+    )
     return config.model_copy(update={"recording": recording, "flight": flight})

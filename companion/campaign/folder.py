@@ -38,7 +38,7 @@ class Description:
         kind: flights or batch.
         seed: seed of the campaign.
         cases: number of cases.
-        unit: number of cases in a unit of work; the last unit may have fewer.
+        unit: number of cases in each unit of work; the last unit may have fewer.
         case_s: time that a case took in the client before the campaign began, s; None: unknown.
         versions: versions of the program and of all that results depend on.
         began: time at which the folder was made, ISO 8601, UTC.
@@ -71,7 +71,7 @@ def make(folder: Path, campaign: Campaign, description: Description) -> None:
     """Write the folder of a new campaign.
 
     Raises:
-        ConfigError: it cannot be written, or holds files already.
+        ConfigError: the folder cannot be written, or holds files already.
     """
     try:
         if folder.exists() and any(path.name != _LOCK for path in folder.iterdir()):
@@ -122,7 +122,7 @@ def resume(folder: Path, campaign: Campaign) -> Description:
         VersionError: it was begun by another version.
     """
     description = read_description(folder)
-    _compare(folder, campaign)
+    _require_same(folder, campaign)
     if found := difference(description.versions, versions()):
         raise VersionError(
             f"{folder} was begun by another version: this one has {found}. Results of two versions "
@@ -132,7 +132,7 @@ def resume(folder: Path, campaign: Campaign) -> Description:
     return description
 
 
-def _compare(folder: Path, campaign: Campaign) -> None:
+def _require_same(folder: Path, campaign: Campaign) -> None:
     """Refuse a folder with another campaign; only the limits on the campaign's size may differ.
 
     Raises:
@@ -147,8 +147,10 @@ def _compare(folder: Path, campaign: Campaign) -> None:
         raise ConfigError(f"{path}: {error}") from error
     if not isinstance(before, Mapping):
         raise ConfigError(f"{path}: is damaged")
-    changed = [key for key in now if _without_size(before, key) != _without_size(now, key)]
-    files = [name for name, text in campaign.files.items() if _text(folder / name) != text]
+    changed = [
+        key for key in now if _without_size_limits(before, key) != _without_size_limits(now, key)
+    ]
+    files = [name for name, text in campaign.files.items() if _text_or_none(folder / name) != text]
     if changed or files:
         raise ConfigError(
             f"{folder} holds another campaign: {', '.join((*changed, *files))} differ; name "
@@ -156,15 +158,16 @@ def _compare(folder: Path, campaign: Campaign) -> None:
         )
 
 
-def _without_size(data: Mapping[str, Any], key: str) -> Any:
-    """A key of a campaign file without the limits on the campaign's size."""
+def _without_size_limits(data: Mapping[str, Any], key: str) -> Any:
+    """The value of a key of a campaign file; `limits` without those on the campaign's size."""
     value = data.get(key)
     if key == "limits" and isinstance(value, Mapping):
         return {name: each for name, each in value.items() if name not in _SIZE_LIMITS}
     return value
 
 
-def _text(path: Path) -> str | None:
+def _text_or_none(path: Path) -> str | None:
+    """The text of a file; None: it cannot be read."""
     try:
         return path.read_text("utf-8")
     except (OSError, UnicodeDecodeError):
@@ -173,10 +176,10 @@ def _text(path: Path) -> str | None:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Hold the folder, so that no other process runs the same campaign.
+    """Lock the folder, so that no other process runs the same campaign.
 
     Raises:
-        ConfigError: another process holds it, or it cannot be written.
+        ConfigError: another process has locked it, or it cannot be written.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -25,7 +25,7 @@ _WITHOUT_EFFECT = (
     "serve",
 )
 """Keys and sections that a campaign ignores or sets itself."""
-_SIGNING = ("link.signing_key_file", "mock.signing")
+_SIGNING_KEYS = ("link.signing_key_file", "mock.signing")
 
 
 def check_key(key: str, base: Config, where: str) -> None:
@@ -34,7 +34,7 @@ def check_key(key: str, base: Config, where: str) -> None:
     Args:
         key: dotted key.
         base: configuration that the key belongs to.
-        where: place of the key in its file, for messages.
+        where: file, line and section of the key, for messages.
 
     Raises:
         ConfigError: the key is not SECTION.KEY, does not exist, has no effect in a campaign, or
@@ -48,11 +48,12 @@ def check_key(key: str, base: Config, where: str) -> None:
         raise ConfigError(
             f"{where}: `{key}` has no effect in a campaign, or the campaign sets it itself"
         )
-    if any(f"{key}.".startswith(f"{other}.") for other in _SIGNING):
+    if any(f"{key}.".startswith(f"{other}.") for other in _SIGNING_KEYS):
         raise ConfigError(f"{where}: `{key}`: campaigns fly without signing")
     if section == "mock":
         _check_mock_key(name, base.mock or {}, where)
     elif name not in getattr(type(getattr(base, section, None)), "model_fields", ()):
+        # This raises the error that names the nearest key, if there is one.
         validated({section: {name: 0.0}}, where, Config)
         raise ConfigError(f"{where}: there is no key `{key}`")
 
@@ -61,8 +62,8 @@ def _check_mock_key(name: str, section: Mapping[str, Any], where: str) -> None:
     """Check that a key of the mock vehicle exists; its value is checked later, with each case."""
     *path, last = name.split(".")
     complete: Any = complete_mock(section)
-    for part in path:
-        complete = complete.get(part) if isinstance(complete, dict) else None
+    for subsection in path:
+        complete = complete.get(subsection) if isinstance(complete, dict) else None
     if isinstance(complete, dict) and last in complete:
         return
     try:

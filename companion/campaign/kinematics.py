@@ -1,9 +1,9 @@
-"""Batch kinematics: the open-loop steps of a maneuver, flown by attitude and rate loop alone.
+"""Batch kinematics: the open-loop steps of a maneuver, simulated with attitude and rate loop only.
 
-There is no position, no estimator and no link. The planner's law and the functions of the attitude
+There is no position, no estimator and no link. The planner's control law and the attitude functions
 are those of a flight, compiled. The section `vehicle` gives the dead time, slew limit, lag and
-damping of the simulated rate loop. In a flight it only gives what the program assumes. The vehicle
-begins level and without rotation, at the heading `mock.home.heading_deg`.
+damping of the simulated rate loop; in a flight it only gives what the program assumes of them. The
+vehicle begins level and without rotation, at the heading `mock.home.heading_deg`.
 """
 
 import hashlib
@@ -37,7 +37,7 @@ from companion.recording.measurements.verdict import STRAIGHTNESS
 def run_cases(cases: Sequence[Case]) -> list[dict[str, Value]]:
     """Fly cases one after the other; return a row for each, in order.
 
-    `ok` is true if every step stayed as close to its line as a good flight must.
+    In a row, `ok` is true if every step stayed as close to its line as a good flight must.
 
     Raises:
         ConfigError: a case cannot be flown in a batch; see `check_case`.
@@ -80,35 +80,35 @@ def _unflyable(case: Case) -> str | None:
 def _run_case(case: Case) -> dict[str, Value]:
     check_case(case)
     config = case.config
-    law = planner(config)
-    assert isinstance(law, LawPlanner)
+    law_planner = planner(config)
+    assert isinstance(law_planner, LawPlanner)
     heading = wrap_angle(radians(case.mock["home"]["heading_deg"]))
-    targets = _targets(config, law.constants.longest_target, heading)
+    targets = _targets(config, law_planner.constants.longest_target, heading)
     start = attitude(Coefficients(0.0, 0.0), heading)
     rate_hz = config.link.attitude_rate_hz
-    flight = fly_steps(law, _rate_loop(config), start, targets, round(STEP_HZ / rate_hz))
+    flight = fly_steps(law_planner, _rate_loop(config), start, targets, round(STEP_HZ / rate_hz))
     figures = step_figures(flight, config.planner.gain_per_s, 1.0 / rate_hz)
-    size = float(np.hypot(*targets[:, :2].T).max())
+    longest_target = float(np.hypot(*targets[:, :2].T).max())
     return {
         "case": case.index,
         "seed": case.seed,
         **case.factors,
-        **_outcomes(flight, figures, size),
+        **_outcomes(flight, figures, longest_target),
     }
 
 
-def _outcomes(flight: StepFlight, figures: StepFigures, size: float) -> dict[str, Value]:
-    """The outcomes of a case; `size` is the largest length of a target's coefficients."""
-    constants = [each for each in figures[-2:] if isfinite(each)]  # north and east
+def _outcomes(flight: StepFlight, figures: StepFigures, longest_target: float) -> dict[str, Value]:
+    """The outcomes of a case; `longest_target` is the largest length of a target's coefficients."""
+    time_constants = [each for each in figures[-2:] if isfinite(each)]  # north and east
     values = {
         "cross_axis_max": figures.cross_axis_max,
         "model_deviation_max": figures.model_deviation_max,
-        "time_constant_s": fmean(constants) if constants else inf,
+        "time_constant_s": fmean(time_constants) if time_constants else inf,
         "rate_rms_rad_s": figures.rate_rms,
         "rate_max_rad_s": figures.rate_max,
     }
     finite = bool(np.isfinite(flight.commanded).all() and np.isfinite(flight.q).all())
-    straight = finite and figures.cross_axis_max <= STRAIGHTNESS * size
+    straight = finite and figures.cross_axis_max <= STRAIGHTNESS * longest_target
     result = "ok" if straight else "not straight" if finite else "not finite"
     return {
         "ok": straight,
@@ -120,13 +120,16 @@ def _outcomes(flight: StepFlight, figures: StepFigures, size: float) -> dict[str
 
 def _digest(flight: StepFlight) -> str:
     """SHA-256 of all commanded body rates and of the final attitude."""
-    found = hashlib.sha256(np.ascontiguousarray(flight.commanded).data)
-    found.update(np.array(flight.q).data)
-    return found.hexdigest()
+    sha256 = hashlib.sha256(np.ascontiguousarray(flight.commanded).data)
+    sha256.update(np.array(flight.q).data)
+    return sha256.hexdigest()
 
 
 def _rate_loop(config: Config) -> list[AxisResponse]:
-    """Response of roll, pitch and yaw to commanded rates; a key that is null delays nothing."""
+    """Response of roll, pitch and yaw to commanded rates.
+
+    A null key means no lag, no dead time, no slew limit, or a lag of first order.
+    """
     return [
         AxisResponse(
             axis.lag or 0.0,
@@ -138,28 +141,28 @@ def _rate_loop(config: Config) -> list[AxisResponse]:
     ]
 
 
-def _targets(config: Config, longest: float, heading: float) -> Array:
+def _targets(config: Config, longest_target: float, heading: float) -> Array:
     """Targets of the open-loop steps, limited as the planner limits them.
 
     Returns:
         (samples, 4): coefficients north and east, heading (rad), heading rate (rad/s).
     """
     name = next(each for each in config.flight.maneuvers if each in ACCELERATION_STEPS)
-    scale: tuple[float, float]
+    amplitude: tuple[float, float]
     if name == "corners":
         corners = config.corners
-        scale = corners.north_coefficient, corners.east_coefficient
-        unit: Corners | Steps = Corners(1.0, 1.0, corners.duration_s, corners.settle_s)
+        amplitude = corners.north_coefficient, corners.east_coefficient
+        unit_maneuver: Corners | Steps = Corners(1.0, 1.0, corners.duration_s, corners.settle_s)
     else:
         steps = config.steps
-        scale = steps.coefficient, steps.coefficient
-        unit = Steps(1.0, steps.duration_s, steps.settle_s)
-    pattern = _pattern(unit, config.link.attitude_rate_hz)
+        amplitude = steps.coefficient, steps.coefficient
+        unit_maneuver = Steps(1.0, steps.duration_s, steps.settle_s)
+    pattern = _pattern(unit_maneuver, config.link.attitude_rate_hz)
     targets = np.zeros((pattern.samples, 4))
     targets[:, 2] = heading
     for begin, end, (north, east) in pattern.steps:
-        wanted = Target(north * scale[0], east * scale[1], heading)
-        targets[begin:end] = limited_target(wanted, longest)
+        wanted = Target(north * amplitude[0], east * amplitude[1], heading)
+        targets[begin:end] = limited_target(wanted, longest_target)
     return targets
 
 
@@ -178,12 +181,13 @@ class _Pattern(NamedTuple):
 
 @lru_cache(maxsize=64)
 def _pattern(maneuver: Corners | Steps, rate_hz: float) -> _Pattern:
+    """The pattern of a maneuver of amplitude 1, so that cases with other amplitudes reuse it."""
     pose = Pose((0.0, 0.0, 0.0), 0.0)
     times = np.arange(round(maneuver.duration * rate_hz)) / rate_hz
-    asked = [maneuver.at(float(time), pose).coefficients for time in times]
-    steps = [k for k, coefficients in enumerate(asked) if coefficients is not None]
+    commanded = [maneuver.at(float(time), pose).coefficients for time in times]
+    steps = [k for k, coefficients in enumerate(commanded) if coefficients is not None]
     level = Coefficients(0.0, 0.0)
-    wanted = [each or level for each in asked[steps[0] : steps[-1] + 1]]
-    ends = [k for k in range(1, len(wanted)) if wanted[k] != wanted[k - 1]]
-    parts = zip((0, *ends), (*ends, len(wanted)), strict=True)
-    return _Pattern(len(wanted), tuple((begin, end, wanted[begin]) for begin, end in parts))
+    targets = [each or level for each in commanded[steps[0] : steps[-1] + 1]]
+    ends = [k for k in range(1, len(targets)) if targets[k] != targets[k - 1]]
+    parts = zip((0, *ends), (*ends, len(targets)), strict=True)
+    return _Pattern(len(targets), tuple((begin, end, targets[begin]) for begin, end in parts))

@@ -36,7 +36,7 @@ FLOAT_OUTCOMES = (
     "flight_s",
 )
 """Outcomes of a flight that are numbers; null where they were not measured."""
-_AT_LIMIT = 0.99
+_SATURATED_FROM = 0.99
 """A setpoint counts as saturated if its rate or thrust is at least this share of the upper limit,
 or its thrust is at most the lower limit divided by this share.
 """
@@ -45,13 +45,13 @@ or its thrust is at most the lower limit divided by this share.
 def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
     """Tracking errors by the true and the estimated position, m, and the largest true tilt, rad.
 
-    Errors are those of maneuvers in closed loop, each after its settling time. The tilt is that
-    from the first such maneuver, after its settling time, to the end of the last. Without such a
-    maneuver or without rows in `truth` the result is empty.
+    The errors cover the maneuvers in closed loop, each after its settling time. The tilt covers the
+    time from the settling of the first such maneuver to the end of the last. The result is empty
+    without such a maneuver, or without rows in `truth`.
 
     Args:
         summary: summary of the flight.
-        truth: (N, 5), vehicle time s, north, east, down m, tilt rad.
+        truth: (N, 5), vehicle time (s), north, east, down (m), tilt (rad).
     """
     rows = summary.trace.tracking_rows()
     parts = settled_parts(rows, summary.trace.maneuvers)
@@ -59,8 +59,8 @@ def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
     if len(truth) and parts:
         settled = np.concatenate(parts)
         figures["estimated_rms_m"] = tracking_errors(settled)["position_rms_m"]
-        place = [np.interp(settled[:, 0], truth[:, 0], each) for each in truth[:, 1:4].T]
-        true = np.column_stack([settled[:, :4], *place])
+        true_position = [np.interp(settled[:, 0], truth[:, 0], each) for each in truth[:, 1:4].T]
+        true = np.column_stack([settled[:, :4], *true_position])
         figures.update(tracking_errors(true))
         figures.update(_horizontal_errors(settled, true))
         in_maneuvers = (truth[:, 0] >= settled[0, 0]) & (truth[:, 0] <= settled[-1, 0])
@@ -73,18 +73,19 @@ def _horizontal_errors(estimated: Floats, true: Floats) -> dict[str, float]:
 
     Args:
         estimated: (N, 7), as `FlightTrace.tracking`.
-        true: the same with the true position.
+        true: (N, 7), the same rows with the true position instead of the estimated one.
     """
     known = np.isfinite(true[:, 1])
-    place, believed, reference = true[known, 4:6], estimated[known, 4:6], true[known, 1:3]
+    true_position, reference = true[known, 4:6], true[known, 1:3]
+    position_estimate = estimated[known, 4:6]
 
     def rms(offsets: Floats) -> float:
         return float(np.sqrt(np.mean(np.sum(offsets**2, axis=1)))) if len(offsets) else nan
 
     return {
-        "level_rms_m": rms(place - reference),
-        "estimated_level_rms_m": rms(believed - reference),
-        "estimate_level_rms_m": rms(place - believed),
+        "level_rms_m": rms(true_position - reference),
+        "estimated_level_rms_m": rms(position_estimate - reference),
+        "estimate_level_rms_m": rms(true_position - position_estimate),
     }
 
 
@@ -93,8 +94,8 @@ def response(summary: Summary) -> dict[str, float]:
     measured = summary.response()
     if measured is None:
         return {}
-    both = [measured.time_constant_north_s, measured.time_constant_east_s]
-    finite = [value for value in both if isfinite(value)]
+    constants = [measured.time_constant_north_s, measured.time_constant_east_s]
+    finite = [value for value in constants if isfinite(value)]
     return {
         "cross_axis_max": measured.cross_axis_max,
         "model_deviation_max": measured.model_deviation_max,
@@ -121,9 +122,9 @@ def activity(
         return {}
     rates, thrust, limits = np.hypot(rows[:, 0], rows[:, 1]), rows[:, 3], config.limits
     saturated = (
-        (rates >= _AT_LIMIT * limits.max_tilt_rate)
-        | (thrust >= _AT_LIMIT * limits.max_thrust)
-        | (thrust * _AT_LIMIT <= limits.min_thrust)
+        (rates >= _SATURATED_FROM * limits.max_tilt_rate)
+        | (thrust >= _SATURATED_FROM * limits.max_thrust)
+        | (thrust * _SATURATED_FROM <= limits.min_thrust)
     )
     return {
         "rate_rms_rad_s": float(np.sqrt(np.mean(rates**2))),
@@ -135,12 +136,12 @@ def activity(
 
 def digest(setpoints: Sequence[ReceivedSetpoint], state: Truth) -> str:
     """SHA-256 of all setpoints that the autopilot received, and of the final true state."""
-    found = hashlib.sha256()
+    sha256 = hashlib.sha256()
     for each in setpoints:
-        found.update(struct.pack("<dq4d", each.time, each.answers, *each.rates, each.thrust))
+        sha256.update(struct.pack("<dq4d", each.time, each.answers, *each.rates, each.thrust))
     motion = (*state["position"], *state["velocity"], *state["q"], *state["rates"])
-    found.update(struct.pack(f"<{len(motion)}d", *motion))
-    return found.hexdigest()
+    sha256.update(struct.pack(f"<{len(motion)}d", *motion))
+    return sha256.hexdigest()
 
 
 def unflown(result: str) -> dict[str, Value]:
@@ -169,6 +170,6 @@ def failed_checks(figures: Mapping[str, Any]) -> str:
 
 
 def without_nan(values: Mapping[str, float]) -> dict[str, Value]:
-    """The numbers with null for missing and for non-finite values."""
-    found = {name: values.get(name, nan) for name in FLOAT_OUTCOMES}
-    return {name: value if isfinite(value) else None for name, value in found.items()}
+    """All of `FLOAT_OUTCOMES`; a missing or non-finite value is None."""
+    outcomes = {name: values.get(name, nan) for name in FLOAT_OUTCOMES}
+    return {name: value if isfinite(value) else None for name, value in outcomes.items()}

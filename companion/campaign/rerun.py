@@ -21,11 +21,11 @@ class Rerun(NamedTuple):
     """A case that was flown again.
 
     Attributes:
-        row: row of the results from the repeated flight.
+        row: results of the repeated flight, as one row.
         folder: folder of its recording.
-        identical: whether the flight equals that of the results to the bit. A case that has no
-            results yet counts as identical.
-        lines: what to tell the user.
+        identical: whether the row equals the stored row to the bit. A case that has no stored row
+            yet counts as identical.
+        lines: messages for the user.
     """
 
     row: dict[str, Value]
@@ -34,33 +34,35 @@ class Rerun(NamedTuple):
     lines: tuple[str, ...]
 
 
-def rerun(place: Path, index: int) -> Rerun:
+def rerun(campaign_folder: Path, index: int) -> Rerun:
     """Fly a case a second time.
 
     Args:
-        place: folder of the campaign.
+        campaign_folder: folder of the campaign.
         index: number of the case.
 
     Raises:
         ConfigError: there is no such campaign or case, the case is not a flight, the results are
             damaged, or the folder of the recording cannot be made.
     """
-    description = folder.read_description(place)
-    campaign = load(place / folder.FILE)
+    description = folder.read_description(campaign_folder)
+    campaign = load(campaign_folder / folder.FILE)
     if campaign.file.kind != "flights":
-        raise ConfigError(f"{place}: a batch has no flights to record")
+        raise ConfigError(f"{campaign_folder}: a batch has no flights to record")
     if not 0 <= index < description.cases:
-        raise ConfigError(f"{place}: its cases are 0 to {description.cases - 1}, not {index}")
+        raise ConfigError(
+            f"{campaign_folder}: its cases are 0 to {description.cases - 1}, not {index}"
+        )
     case = campaign.case(next(islice(campaign.samples(), index, None)))
-    recording = flight_folder(place / _CASES_FOLDER / f"case-{index:05d}")
+    recording = flight_folder(campaign_folder / _CASES_FOLDER / f"case-{index:05d}")
     row = fly_case(case, recording)
-    lines = [f"{case.described()}: {_judged(row)}"]
+    lines = [f"{case.described()}: {_verdict_text(row)}"]
     if other := difference(description.versions, versions()):
         lines.append(f"The campaign was flown by another version: this one has {other}.")
-    before = _row(place, campaign, description, index)
-    if before is None:
+    stored = _stored_row(campaign_folder, campaign, description, index)
+    if stored is None:
         return Rerun(row, recording, True, (*lines, "The campaign has not flown this case yet."))
-    changed = [name for name, value in before.items() if row.get(name) != value]
+    changed = [name for name, value in stored.items() if row.get(name) != value]
     lines.append(
         f"It differs from the campaign's flight in {', '.join(changed)}."
         if changed
@@ -69,20 +71,20 @@ def rerun(place: Path, index: int) -> Rerun:
     return Rerun(row, recording, not changed, tuple(lines))
 
 
-def _judged(row: dict[str, Value]) -> str:
+def _verdict_text(row: dict[str, Value]) -> str:
     """Verdict on a flight, in words."""
     if row["ok"]:
         return "good"
     return f"not good: {row['failed_checks'] or row['result']}"
 
 
-def _row(
-    place: Path, campaign: Campaign, description: folder.Description, index: int
+def _stored_row(
+    campaign_folder: Path, campaign: Campaign, description: folder.Description, index: int
 ) -> dict[str, Any] | None:
     """The stored row of a case, or None."""
     unit = index // description.unit
-    if unit not in store.finished_units(place):
+    if unit not in store.finished_units(campaign_folder):
         return None
-    rows = store.read_unit(place, unit).to_pylist()
-    found: dict[str, Any] | None = next((row for row in rows if row["case"] == index), None)
-    return found
+    rows = store.read_unit(campaign_folder, unit).to_pylist()
+    stored: dict[str, Any] | None = next((row for row in rows if row["case"] == index), None)
+    return stored

@@ -67,10 +67,10 @@ def run(options: argparse.Namespace) -> int:
             )
         path, out = path / folder.FILE, path
     campaign = load(path)
-    place = out or folder.new_path(campaign)
+    campaign_folder = out or folder.new_path(campaign)
     console = Console(highlight=False, soft_wrap=True, markup=False)
     try:
-        return _Run(campaign, place, options, console).run()
+        return _Run(campaign, campaign_folder, options, console).run()
     except VersionError as error:
         raise ConfigError(str(error)) from error
 
@@ -80,23 +80,27 @@ class _Run:
 
     Args:
         campaign: the campaign to run.
-        place: folder of the campaign.
+        campaign_folder: folder of the campaign.
         options: options of the command line.
         console: console for messages.
     """
 
     def __init__(
-        self, campaign: Campaign, place: Path, options: argparse.Namespace, console: Console
+        self,
+        campaign: Campaign,
+        campaign_folder: Path,
+        options: argparse.Namespace,
+        console: Console,
     ) -> None:
-        self._campaign, self._place, self._console = campaign, place, console
+        self._campaign, self._folder, self._console = campaign, campaign_folder, console
         self._options = options
         self._noun = NOUNS[campaign.file.kind]
 
     def run(self) -> int:
         """Run the campaign; return the exit code."""
-        begun = folder.begun(self._place)
+        begun = folder.begun(self._folder)
         if begun:
-            folder.resume(self._place, self._campaign)
+            folder.resume(self._folder, self._campaign)
         case_s = None if begun else self._check_all_cases()
         try:
             with (
@@ -107,7 +111,7 @@ class _Run:
                     self._console.print("waiting for the cluster's first worker…")
                     wait_for_workers(client)
                 workers = number_of_workers(client)
-                with folder.locked(self._place):
+                with folder.locked(self._folder):
                     description = self._open_folder(case_s, workers)
                     self._console.print(f"Dask's dashboard: {client.dashboard_link}")
                     return self._run_with_progress(client, description)
@@ -144,16 +148,16 @@ class _Run:
             case_s: time that a case takes, s; None: it was not measured.
             workers: number of workers.
         """
-        if folder.begun(self._place):
-            return folder.resume(self._place, self._campaign)
+        if folder.begun(self._folder):
+            return folder.resume(self._folder, self._campaign)
         cases = self._campaign.number_of_cases
         unit = 1 if case_s is None else size_of_units(cases, case_s, workers)
         description = folder.describe(self._campaign, unit, case_s)
-        folder.make(self._place, self._campaign, description)
-        words = f"{cases} {self._noun}"
+        folder.make(self._folder, self._campaign, description)
+        size = f"{cases} {self._noun}"
         if case_s is not None:
-            words = estimate.size_in_words(self._campaign, cases * case_s / workers, workers)
-        self._console.print(f"{words}; results in {self._place}")
+            size = estimate.size_in_words(self._campaign, cases * case_s / workers, workers)
+        self._console.print(f"{size}; results in {self._folder}")
         if warning := too_few_samples(self._campaign.file):
             self._console.print(warning)
         return description
@@ -166,7 +170,7 @@ class _Run:
             def show(progress: engine.Progress) -> None:
                 bar.update(task, completed=progress.flown)
 
-            progress = engine.run(client, self._campaign, description, self._place, show)
+            progress = engine.run(client, self._campaign, description, self._folder, show)
         return self._finished(progress, description)
 
     def _finished(self, progress: engine.Progress, description: Description) -> int:
@@ -177,27 +181,27 @@ class _Run:
         if progress.flown < description.cases:
             lost = len(progress.lost)
             return self._stopped(f"{lost} unit{'s were' if lost > 1 else ' was'} given up")
-        errors = engine.internal_errors(self._place, self._campaign.file)
+        errors = engine.internal_errors(self._folder, self._campaign.file)
         for error, times in errors.most_common(_MOST_SHOWN):
             say(f"{times} of the {self._noun} ended by an {error}")
-        results = Results.read(self._place)
+        results = Results.read(self._folder)
         say(f"{results.good.sum()} of {progress.flown} {self._noun} were good.")
         if results.documented.size:
             kept, faulty = results.documented.sum(), results.documented.size
             say(f"{kept} of {faulty} flights with a fault ended as documented.")
-        say(f"The results are in {self._place}. Write their report with")
-        say(f"  companion campaign report {shlex.quote(str(self._place))}")
+        say(f"The results are in {self._folder}. Write their report with")
+        say(f"  companion campaign report {shlex.quote(str(self._folder))}")
         return FAILED if errors else DONE
 
     def _stopped(self, why: str) -> int:
         """Tell how to continue; return the exit code."""
-        if not folder.begun(self._place):
+        if not folder.begun(self._folder):
             self._console.print(f"{why}; nothing was begun")
             return FAILED
-        description = folder.read_description(self._place)
+        description = folder.read_description(self._folder)
         units = ranges(description.cases, description.unit)
-        kept = sum(len(units[number]) for number in store.finished_units(self._place))
-        command = f"companion campaign {shlex.quote(str(self._place))}"
+        kept = sum(len(units[number]) for number in store.finished_units(self._folder))
+        command = f"companion campaign {shlex.quote(str(self._folder))}"
         if self._options.scheduler:
             command += f" --scheduler {self._options.scheduler}"
         self._console.print(
@@ -207,16 +211,16 @@ class _Run:
         return FAILED
 
 
-def progress_bar(console: Console, what: ProgressColumn, *more: ProgressColumn) -> Progress:
-    """A progress bar with numbers and times; `what` stands before it, the columns `more` after."""
+def progress_bar(console: Console, before: ProgressColumn, *after: ProgressColumn) -> Progress:
+    """A progress bar with numbers and times, between the columns `before` and `after`."""
     return Progress(
-        what,
+        before,
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
         TextColumn("left"),
         TimeRemainingColumn(),
-        *more,
+        *after,
         console=console,
     )
 
@@ -230,9 +234,11 @@ def interruptible() -> Iterator[None]:
             signal.signal(each, signal.SIG_IGN)
         raise KeyboardInterrupt
 
-    before = {each: signal.signal(each, interrupt) for each in (signal.SIGINT, signal.SIGTERM)}
+    previous_handlers = {
+        each: signal.signal(each, interrupt) for each in (signal.SIGINT, signal.SIGTERM)
+    }
     try:
         yield
     finally:
-        for each, handler in before.items():
+        for each, handler in previous_handlers.items():
             signal.signal(each, handler)

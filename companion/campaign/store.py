@@ -50,19 +50,19 @@ def schema(file: CampaignFile) -> "pa.Schema":
     """The columns of the results, derived from the campaign's file alone."""
     import pyarrow as pa  # noqa: PLC0415  an extra
 
-    factors = [(name, _type(file, name)) for name in file.sweep]
+    factors = [(name, _column_type(file, name)) for name in file.sweep]
     columns = [("case", "int64"), ("seed", "int64"), *factors, *_OUTCOMES[file.kind]]
-    described = {
+    factor_metadata = {
         name: {**each.described(), "unit": unit_of(name)} for name, each in file.sweep.items()
     }
-    contents = {"name": file.name, "kind": file.kind, "factors": described}
+    contents = {"name": file.name, "kind": file.kind, "factors": factor_metadata}
     return pa.schema(
         [(name, pa.bool_() if kind == "bool" else getattr(pa, kind)()) for name, kind in columns],
         metadata={METADATA: json.dumps(contents).encode()},
     )
 
 
-def _type(file: CampaignFile, name: str) -> str:
+def _column_type(file: CampaignFile, name: str) -> str:
     swept = file.sweep[name]
     if swept.is_bool:
         return "bool"
@@ -75,13 +75,14 @@ def table(file: CampaignFile, rows: Sequence[Mapping[str, Value]]) -> "pa.Table"
 
     columns = schema(file)
     data = {
-        field.name: [_cell(row.get(field.name), field.type) for row in rows] for field in columns
+        field.name: [_stored(row.get(field.name), field.type) for row in rows] for field in columns
     }
     return pa.table(data, schema=columns)
 
 
-def _cell(value: Value, kind: Any) -> Value:
-    if str(kind) == "string" and value is not None and not isinstance(value, str):
+def _stored(value: Value, column_type: Any) -> Value:
+    """A value for a column; in a column of text, any other value becomes JSON."""
+    if str(column_type) == "string" and value is not None and not isinstance(value, str):
         return json.dumps(value)
     return value
 
@@ -100,7 +101,7 @@ def write_unit(
         file: content of the campaign file.
         number: number of the unit.
         rows: one row for each case, in order.
-        timing: figures that differ from run to run and are therefore stored apart from the results.
+        timing: wall times and worker; they differ between runs, so they get a file of their own.
 
     Raises:
         OSError: a file cannot be written; no results of the unit are left.
@@ -145,14 +146,14 @@ def read(folder: Path) -> "pa.Table":
     numbers = sorted(finished_units(folder))
     if not numbers:
         raise ConfigError(f"{folder}: there are no results of a campaign")
-    mixed = f"{folder / RESULTS}: its files are not of one campaign"
+    message = f"{folder / RESULTS}: its files are not of one campaign"
     units = [read_unit(folder, number) for number in numbers]
     if any(not (unit.schema.metadata or {}).get(METADATA) for unit in units):
-        raise ConfigError(mixed)
+        raise ConfigError(message)
     try:
         return pa.concat_tables(units).sort_by("case")
     except pa.ArrowException as error:
-        raise ConfigError(mixed) from error
+        raise ConfigError(message) from error
 
 
 def read_unit(folder: Path, number: int) -> "pa.Table":

@@ -66,8 +66,8 @@ class Swept(Section):
                 raise ValueError("each value must be a number, a word, true, false, null or a list")
             if any(isinstance(item, float) and not isfinite(item) for item in items):
                 raise ValueError("each number must be finite")
-        shown = [column_value(value) for value in values or ()]
-        if any(shown.index(value) != place for place, value in enumerate(shown)):
+        stored = [column_value(value) for value in values or ()]
+        if any(stored.index(value) != position for position, value in enumerate(stored)):
             raise ValueError("a value is listed twice")
         return values
 
@@ -126,19 +126,19 @@ class Swept(Section):
         if self.range is None:
             return self.values or ()
         (low, high), count = self.range, self.count or 2
-        return tuple(low + (high - low) * place / (count - 1) for place in range(count))
+        return tuple(low + (high - low) * step / (count - 1) for step in range(count))
 
-    def at(self, share: float) -> Any:
-        """Quantile of the distribution at cumulative probability `share`, 0..1."""
+    def at(self, probability: float) -> Any:
+        """Quantile of the distribution at a cumulative probability, 0..1."""
         if self.choice is not None:
-            return self.choice[min(int(share * len(self.choice)), len(self.choice) - 1)]
+            return self.choice[min(int(probability * len(self.choice)), len(self.choice) - 1)]
         if self.normal is not None:
-            return _normal_quantile(self.normal, self.within, share)
+            return _normal_quantile(self.normal, self.within, probability)
         if self.loguniform is not None:
             low, high = map(log, self.loguniform)
-            return exp(low + (high - low) * share)
+            return exp(low + (high - low) * probability)
         low, high = self.uniform or (0.0, 1.0)
-        return low + (high - low) * share
+        return low + (high - low) * probability
 
     def described(self) -> dict[str, Any]:
         """Kind and values, for the metadata of the results."""
@@ -152,11 +152,11 @@ class Swept(Section):
         }
 
 
-def _normal_quantile(normal: TwoNumbers, within: TwoNumbers | None, share: float) -> float:
+def _normal_quantile(normal: TwoNumbers, within: TwoNumbers | None, probability: float) -> float:
     distribution = NormalDist(*normal)
     low, high = (0.0, 1.0) if within is None else map(distribution.cdf, within)
-    share = min(max(low + (high - low) * share, 1e-12), 1.0 - 1e-12)
-    value = distribution.inv_cdf(share)
+    probability = min(max(low + (high - low) * probability, 1e-12), 1.0 - 1e-12)
+    value = distribution.inv_cdf(probability)
     return value if within is None else min(max(value, within[0]), within[1])
 
 

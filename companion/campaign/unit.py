@@ -20,7 +20,7 @@ Long compared with the time to send a unit, and short enough that a lost unit co
 _UNITS_PER_WORKER = 4
 """Number of units planned for each worker, so that all workers end at about the same time.
 
-Rounding may give fewer units; many cases give more, because a unit has a limited duration.
+Rounding may give fewer units. Many cases give more, because `SECONDS` limits a unit.
 """
 
 
@@ -29,7 +29,7 @@ class UnitResult(NamedTuple):
 
     Attributes:
         rows: one row for each case, in order.
-        wall_s: wall time of each case, s; for a batch one number for all cases.
+        wall_s: wall time of each case, s; for a batch a single number, for all cases together.
         worker: address of the worker.
     """
 
@@ -43,16 +43,16 @@ def fly_samples(campaign: Campaign, samples: Sequence[Sample], expected: Version
 
     Raises:
         ConfigError: a case is refused.
-        VersionError: this process has other versions than the client.
+        VersionError: the versions of this process differ from the client's.
     """
-    require_equal(expected, versions(), f"the worker {_worker()}")
-    return _timed(campaign.file.kind, [campaign.case(sample) for sample in samples])
+    require_equal(expected, versions(), f"the worker {_worker_address()}")
+    return _run_timed(campaign.file.kind, [campaign.case(sample) for sample in samples])
 
 
 def fly_cases(kind: str, cases: Sequence[Case], expected: Versions) -> UnitResult:
     """Fly cases that the client has built; otherwise like `fly_samples`."""
-    require_equal(expected, versions(), f"the worker {_worker()}")
-    return _timed(kind, cases)
+    require_equal(expected, versions(), f"the worker {_worker_address()}")
+    return _run_timed(kind, cases)
 
 
 def run_cases(kind: str, cases: Sequence[Case]) -> list[Row]:
@@ -69,14 +69,15 @@ def run_cases(kind: str, cases: Sequence[Case]) -> list[Row]:
     return kinematics.run_cases(cases)
 
 
-def _timed(kind: str, cases: Sequence[Case]) -> UnitResult:
+def _run_timed(kind: str, cases: Sequence[Case]) -> UnitResult:
+    """Run cases and measure their wall time: of each flight, or of a batch as a whole."""
     rows: list[Row] = []
     wall_s: list[float] = []
-    for part in [cases] if kind == "batch" else [[case] for case in cases]:
+    for group in [cases] if kind == "batch" else [[case] for case in cases]:
         began = perf_counter()
-        rows += run_cases(kind, part)
+        rows += run_cases(kind, group)
         wall_s.append(round(perf_counter() - began, 4))
-    return UnitResult(rows, wall_s, _worker())
+    return UnitResult(rows, wall_s, _worker_address())
 
 
 def check_cases(kind: str, cases: Sequence[Case]) -> None:
@@ -92,7 +93,7 @@ def check_cases(kind: str, cases: Sequence[Case]) -> None:
             kinematics.check_case(case)
 
 
-def _worker() -> str:
+def _worker_address() -> str:
     """The address of the Dask worker that runs this code, or "this process" without one."""
     from distributed import get_worker  # noqa: PLC0415  an extra
 

@@ -14,8 +14,8 @@ Versions = dict[str, str]
 _PACKAGE = "mavlink-companion"
 _PACKAGES = ("numpy", "numba", "scipy")
 _ROOTS = ("companion", "sitl_mock")
-_NOT_FLOWN = ("cli", "report", "live", "bench", "study", "replay", "mavsdk_link")
-"""Rooms of `companion` that no case uses; changing them does not change the results."""
+_UNUSED_BY_CASES = ("cli", "report", "live", "bench", "study", "replay", "mavsdk_link")
+"""Subpackages of `companion` that no case runs; changing them does not change the results."""
 _DIGEST_LENGTH = 12
 
 
@@ -26,29 +26,29 @@ class VersionError(Exception):
 @cache
 def versions() -> Versions:
     """The versions of this process."""
-    found = {
+    own = {
         "companion": _version(_PACKAGE),
         "source": source_digest(),
         "python": platform.python_version(),
     }
-    return found | {name: _version(name) for name in _PACKAGES}
+    return own | {name: _version(name) for name in _PACKAGES}
 
 
 def source_digest() -> str:
-    """The first digits of a SHA-256 over all source code that a case may run."""
-    found = hashlib.sha256()
+    """The first digits of the SHA-256 of all source code that a case may run."""
+    sha256 = hashlib.sha256()
     base = Path(__file__).parents[2]
     for path in _sources(base):
-        found.update(path.relative_to(base).as_posix().encode() + b"\0")
-        found.update(path.read_bytes() + b"\0")
-    return found.hexdigest()[:_DIGEST_LENGTH]
+        sha256.update(path.relative_to(base).as_posix().encode() + b"\0")
+        sha256.update(path.read_bytes() + b"\0")
+    return sha256.hexdigest()[:_DIGEST_LENGTH]
 
 
 def _sources(base: Path) -> Iterator[Path]:
     for root in _ROOTS:
         for path in sorted((base / root).rglob("*.py")):
             parts = path.relative_to(base).parts
-            if not (parts[0] == _ROOTS[0] and parts[1] in _NOT_FLOWN):
+            if not (parts[0] == _ROOTS[0] and parts[1] in _UNUSED_BY_CASES):
                 yield path
 
 
@@ -81,16 +81,14 @@ def require_equal(ours: Versions, others: Versions, who: str) -> None:
     Raises:
         VersionError: says what differs.
     """
-    found = difference(ours, others)
-    if found:
+    differs = difference(ours, others)
+    if differs:
         raise VersionError(
-            f"{who} has {found}: results of two versions must not be mixed, so install the same "
+            f"{who} has {differs}: results of two versions must not be mixed, so install the same "
             "version there"
         )
 
 
-def as_versions(found: Any) -> Versions:
+def as_versions(data: Any) -> Versions:
     """Versions from JSON or from another process, all converted to text."""
-    return (
-        {str(name): str(value) for name, value in found.items()} if isinstance(found, dict) else {}
-    )
+    return {str(name): str(value) for name, value in data.items()} if isinstance(data, dict) else {}

@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 _GRID_PERIOD = 0.004
 """Sample period of the correlation, s."""
 _DELAY_COUNT = int(LONGEST_DEAD_TIME / _GRID_PERIOD)
-"""Number of delays that are compared, besides 0; one `_GRID_PERIOD` apart."""
+"""Number of compared delays besides 0; they are `_GRID_PERIOD` apart."""
 _CENTRE_PHASE = 0.38
 """Phase of the lag at the centre frequency of the filter, rad."""
 _CENTRE_FREQUENCIES = 5.0, 9.0
@@ -68,10 +68,10 @@ def dead_time_by_correlation(
         raise ValueError(f"slew must be positive, not {slew}")
     band = _band_pass(lag, damping)
     parts = stretches(time, commanded, measured_time, measured)
-    filtered = [pair for part in parts if (pair := _filtered(part, lag, slew, band)) is not None]
+    filtered = [pair for each in parts if (pair := _filtered(each, lag, slew, band)) is not None]
     correlation = _correlation(filtered)
-    found = None if correlation is None else _peak_delay(correlation)
-    return None if found is None else max(0.0, found - _second_order_delay(lag, damping))
+    delay = None if correlation is None else _peak_delay(correlation)
+    return None if delay is None else max(0.0, delay - _second_order_delay(lag, damping))
 
 
 def _correlation(pairs: list[tuple[Floats, Floats]]) -> Floats | None:
@@ -95,54 +95,54 @@ def _correlation(pairs: list[tuple[Floats, Floats]]) -> Floats | None:
 
 def _centre_frequency(lag: float, damping: float) -> float:
     """Centre frequency of the filter, rad/s."""
-    slowest, quickest = _CENTRE_FREQUENCIES
+    lowest, highest = _CENTRE_FREQUENCIES
     if damping < np.inf:
         lag *= FIRST_ORDER_SHARE
-    return min(max(_CENTRE_PHASE / max(lag, _GRID_PERIOD), slowest), quickest)
+    return min(max(_CENTRE_PHASE / max(lag, _GRID_PERIOD), lowest), highest)
 
 
 def _second_order_delay(lag: float, damping: float) -> float:
     """Extra delay of a second-order lag compared with a first-order one, s."""
     frequency = _centre_frequency(lag, damping)
-    turned = frequency * lag
-    phase = np.arctan2(turned, 1.0 - (0.5 * turned / damping) ** 2)
-    return float(phase - np.arctan(turned)) / frequency
+    lag_phase = frequency * lag
+    phase = np.arctan2(lag_phase, 1.0 - (0.5 * lag_phase / damping) ** 2)
+    return float(phase - np.arctan(lag_phase)) / frequency
 
 
 def _band_pass(lag: float, damping: float) -> Floats:
     """(k,), taps of a band-pass filter for samples on the grid: a Gaussian's third derivative.
 
-    Its gain, proportional to ω³·exp(−1.5·(ω/ω₀)²), has a maximum of 1 and nearly suppresses slow
-    turns. It delays commands and measurements equally.
+    Its gain, proportional to ω³·exp(−1.5·(ω/ω₀)²), is 1 at ω₀, its maximum, and nearly 0 for slow
+    turns. The filter delays commands and measurements equally.
     """
     frequency = _centre_frequency(lag, damping)
     deviation = 3.0**0.5 / frequency
-    half = int(_FILTER_REACH * deviation / _GRID_PERIOD)
-    time = _GRID_PERIOD * np.arange(-half, half + 1)
-    at = time / deviation
-    shape = at * (3.0 - at**2) * np.exp(-0.5 * at**2)
+    half_count = int(_FILTER_REACH * deviation / _GRID_PERIOD)
+    time = _GRID_PERIOD * np.arange(-half_count, half_count + 1)
+    scaled_time = time / deviation
+    shape = scaled_time * (3.0 - scaled_time**2) * np.exp(-0.5 * scaled_time**2)
     taps: Floats = shape / abs(float(np.sin(frequency * time) @ shape))
     return taps
 
 
 def _filtered(
-    part: Stretch, lag: float, slew: float | None, band: Floats
+    stretch: Stretch, lag: float, slew: float | None, band: Floats
 ) -> tuple[Floats, Floats] | None:
     """Filtered commands (n + `_DELAY_COUNT`,) and measurements (n,), sampled at the same period.
 
     Both end at the same time. None: the measurements are shorter than the filter.
     """
-    first, last = part.measured_time[0], part.measured_time[-1]
+    first, last = stretch.measured_time[0], stretch.measured_time[-1]
     count = int((last - first) / _GRID_PERIOD)
     if count <= band.size:
         return None
-    at = last - _GRID_PERIOD * np.arange(count + _DELAY_COUNT)[::-1]
-    at = np.maximum(at, part.time[0])
-    knots = held_commands(part.time, part.commanded)
+    times = last - _GRID_PERIOD * np.arange(count + _DELAY_COUNT)[::-1]
+    times = np.maximum(times, stretch.time[0])
+    knots = held_commands(stretch.time, stretch.commanded)
     if slew is not None:
         knots = slewed(knots, slew)
-    commands = lagged(knots, lag, at) if lag > 0.0 else value_at(knots, at)
-    response = np.interp(at[_DELAY_COUNT:], part.measured_time, part.measured)
+    commands = lagged(knots, lag, times) if lag > 0.0 else value_at(knots, times)
+    response = np.interp(times[_DELAY_COUNT:], stretch.measured_time, stretch.measured)
     return np.convolve(commands, band, "valid"), np.convolve(response, band, "valid")
 
 
@@ -151,9 +151,9 @@ def _peak_delay(correlation: Floats) -> float | None:
 
     None if this correlation is too small, or is at the first or last delay.
     """
-    top = int(np.argmax(correlation))
-    if correlation[top] < _LEAST_EXPLAINED**0.5 or top in {0, correlation.size - 1}:
+    peak = int(np.argmax(correlation))
+    if correlation[peak] < _LEAST_EXPLAINED**0.5 or peak in {0, correlation.size - 1}:
         return None
-    before, here, after = correlation[top - 1 : top + 2].tolist()
-    bend = before - 2.0 * here + after
-    return _GRID_PERIOD * (top + (0.5 * (before - after) / bend if bend < 0.0 else 0.0))
+    before, at_peak, after = correlation[peak - 1 : peak + 2].tolist()
+    curvature = before - 2.0 * at_peak + after
+    return _GRID_PERIOD * (peak + (0.5 * (before - after) / curvature if curvature < 0.0 else 0.0))

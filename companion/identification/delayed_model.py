@@ -24,11 +24,11 @@ Floats = NDArray[np.float64]
 
 
 class Model(Protocol):
-    """A linear response of gain 1 whose parameters, its shape, are searched as logarithms.
+    """A linear response of gain 1; its shape is the logarithms of its k parameters.
 
     Attributes:
-        lowest: (k,), lower bounds of the k parameters.
-        highest: (k,), upper bounds of the k parameters.
+        lowest: (k,), lower bounds of the shape.
+        highest: (k,), upper bounds of the shape.
     """
 
     lowest: Floats
@@ -112,7 +112,7 @@ class SecondOrderFit:
 
     @property
     def lag(self) -> float:
-        """2ζ/ω, s: the lag of the first order that begins like it."""
+        """2ζ/ω, s: the first-order lag that has the same delay on a ramp."""
         return 2.0 * self.damping / self.frequency
 
     @property
@@ -157,24 +157,25 @@ class DelayedModel:
     ) -> None:
         self.model, self.gain, self.thinning = model, gain, thinning
         self._dead_time_index = model.lowest.size
-        span = max(float(np.ptp(part.commanded)) for part in record)
+        span = max(float(np.ptp(stretch.commanded)) for stretch in record)
         self.commands = [
-            held_commands(part.time, part.commanded, _SAME_COMMAND_SHARE * span) for part in record
+            held_commands(stretch.time, stretch.commanded, _SAME_COMMAND_SHARE * span)
+            for stretch in record
         ]
-        self.times = [part.measured_time[::thinning] for part in record]
-        self.measured = np.concatenate([part.measured[::thinning] for part in record])
+        self.times = [stretch.measured_time[::thinning] for stretch in record]
+        self.measured = np.concatenate([stretch.measured[::thinning] for stretch in record])
         changes = [np.abs(np.diff(knots.value)).max(initial=0.0) for knots in self.commands]
         self.largest_change = float(max(changes))
-        self._slewed: tuple[float, list[Knots]] = (nan, [])
+        self._slew_cache: tuple[float, list[Knots]] = (nan, [])
 
     def projection(self, unknown: Floats) -> tuple[Floats, Floats]:
         """The best weights (gain, offset, initial states), and their residual, (m,)."""
-        moved = self.response(unknown)
+        response = self.response(unknown)
         if self.gain is None:
-            columns = np.column_stack((moved, self._offset_columns(unknown)))
+            columns = np.column_stack((response, self._offset_columns(unknown)))
             return project(columns, self.measured)
         columns = self._offset_columns(unknown)
-        weights, residual = project(columns, self.measured - self.gain * moved)
+        weights, residual = project(columns, self.measured - self.gain * response)
         return np.concatenate(([self.gain], weights)), residual
 
     def response(self, unknown: Floats) -> Floats:
@@ -206,7 +207,7 @@ class DelayedModel:
     def best_of(self, points: list[Floats]) -> Floats:
         """The point with the smallest sum of squares."""
         residuals = [self.projection(point)[1] for point in points]
-        return points[int(np.argmin([float(rest @ rest) for rest in residuals]))]
+        return points[int(np.argmin([float(residual @ residual) for residual in residuals]))]
 
     def explained(self, found: Solution) -> float:
         """R² of a fit; 0 if the measurements are constant."""
@@ -221,24 +222,24 @@ class DelayedModel:
         """
         shape = unknown[: self._dead_time_index]
         decays = [self.model.free_responses(shape, times - times[0]) for times in self.times]
-        columns = np.zeros((self.measured.size, 1 + sum(each.shape[1] for each in decays)))
+        columns = np.zeros((self.measured.size, 1 + sum(decay.shape[1] for decay in decays)))
         columns[:, 0] = 1.0
         row, column = 0, 1
-        for each in decays:
-            rows, width = each.shape
-            columns[row : row + rows, column : column + width] = each
+        for decay in decays:
+            rows, width = decay.shape
+            columns[row : row + rows, column : column + width] = decay
             row, column = row + rows, column + width
         return columns
 
-    def _per_stretch(self, unknown: Floats, of: Callable[[Knots, Floats], Floats]) -> Floats:
-        """(m,), the result of `of` for the commands of each stretch after slew limit and delay."""
+    def _per_stretch(self, unknown: Floats, compute: Callable[[Knots, Floats], Floats]) -> Floats:
+        """(m,), result of `compute` for each stretch's commands after slew limit and delay."""
         slew, delay = self.slew(unknown), self.dead_time(unknown)
         commands = self.commands if slew is None else self._slew_limited(slew)
-        each = zip(commands, self.times, strict=True)
-        return np.concatenate([of(knots, times - delay) for knots, times in each])
+        pairs = zip(commands, self.times, strict=True)
+        return np.concatenate([compute(knots, times - delay) for knots, times in pairs])
 
     def _slew_limited(self, slew: float) -> list[Knots]:
-        """The commands after the slew limit; kept, as the search often keeps this unknown."""
-        if slew != self._slewed[0]:
-            self._slewed = slew, [slewed(knots, slew) for knots in self.commands]
-        return self._slewed[1]
+        """The commands after the slew limit; cached, because the search often repeats a limit."""
+        if slew != self._slew_cache[0]:
+            self._slew_cache = slew, [slewed(knots, slew) for knots in self.commands]
+        return self._slew_cache[1]

@@ -35,8 +35,8 @@ of command takes at that limit."""
 _LAG_SHARES = (0.15, 0.4, 1.0)
 _DEAD_TIME_SHARES = (0.6, 1.0)
 """Shares of the lag and dead time found without a slew limit; the search with one starts there."""
-_CLEARLY_BETTER = 0.6
-"""A model with more unknowns is accepted if its sum of squares is below this share of the other."""
+_BETTER_SHARE = 0.6
+"""A model with more unknowns needs a sum of squares below this share of the simpler model's."""
 _TRIED_DAMPINGS = (0.4, 0.7, 1.0)
 _TRIED_DEAD_TIME_SHARES = (0.0, 0.3, 0.6)
 """Starts of the search for the dead time of a second-order model, as shares of the whole delay."""
@@ -99,31 +99,31 @@ def fit_lag(
         may_slew: whether to look for a slew limit.
     """
     record = most_excited(record)
-    samples = sum(part.measured.size for part in record)
-    if samples < _FEWEST_SAMPLES or all(np.ptp(part.commanded) == 0.0 for part in record):
+    samples = sum(stretch.measured.size for stretch in record)
+    if samples < _FEWEST_SAMPLES or all(np.ptp(stretch.commanded) == 0.0 for stretch in record):
         return None
-    fine, coarse = 1 + samples // _MOST_SAMPLES, 1 + samples // _COARSE_SAMPLES
-    data = DelayedModel(record, FirstOrder(), gain, fine)
-    first_look = DelayedModel(record, FirstOrder(), gain, coarse)
-    best = _best_without_slew(data, _grid_start(first_look))
+    fine_thinning, coarse_thinning = 1 + samples // _MOST_SAMPLES, 1 + samples // _COARSE_SAMPLES
+    data = DelayedModel(record, FirstOrder(), gain, fine_thinning)
+    coarse_data = DelayedModel(record, FirstOrder(), gain, coarse_thinning)
+    best = _best_without_slew(data, _grid_start(coarse_data))
     if may_slew:
-        best = _slewed_if_clearly(best, data, first_look)
-    found = _lag_fit(data, best)
-    freely = data
+        best = _with_slew_if_better(best, data, coarse_data)
+    fit = _lag_fit(data, best)
+    free_gain = data
     if gain is not None:
-        freely = DelayedModel(record, FirstOrder(), None, fine)
-        best = freely.search(best.unknown)
-        found = replace(found, gain=float(best.weights[0]))
-    return replace(found, second_order=_second_order(record, freely, best, coarse))
+        free_gain = DelayedModel(record, FirstOrder(), None, fine_thinning)
+        best = free_gain.search(best.unknown)
+        fit = replace(fit, gain=float(best.weights[0]))
+    return replace(fit, second_order=_second_order_fit(record, free_gain, best, coarse_thinning))
 
 
-def _slewed_if_clearly(best: Solution, data: DelayedModel, coarse: DelayedModel) -> Solution:
+def _with_slew_if_better(best: Solution, data: DelayedModel, coarse: DelayedModel) -> Solution:
     """The best fit with a slew limit, if it is clearly better than `best`, else `best`."""
     promising = coarse.search(_slewed_start(best, coarse))
-    if promising.squares > _CLEARLY_BETTER * coarse.search(best.unknown).squares:
+    if promising.squares > _BETTER_SHARE * coarse.search(best.unknown).squares:
         return best
     best_limited = data.search(promising.unknown)
-    return best_limited if best_limited.squares < _CLEARLY_BETTER * best.squares else best
+    return best_limited if best_limited.squares < _BETTER_SHARE * best.squares else best
 
 
 def _slewed_start(best: Solution, coarse: DelayedModel) -> Floats:
@@ -134,31 +134,31 @@ def _slewed_start(best: Solution, coarse: DelayedModel) -> Floats:
     lag, dead_time = exp(best.unknown[0]), float(best.unknown[1])
     return coarse.best_of(
         [
-            np.array([log(share * lag), left * dead_time, log(coarse.largest_change / ramp)])
+            np.array([log(share * lag), dead_share * dead_time, log(coarse.largest_change / ramp)])
             for ramp in _TRIED_RAMP_TIMES
             for share in _LAG_SHARES
-            for left in _DEAD_TIME_SHARES
+            for dead_share in _DEAD_TIME_SHARES
         ]
     )
 
 
-def _second_order(
-    record: list[Stretch], first: DelayedModel, found: Solution, coarse: int
+def _second_order_fit(
+    record: list[Stretch], first_data: DelayedModel, first_order: Solution, thinning: int
 ) -> SecondOrderFit | None:
     """The best second-order fit of free gain, if it is clearly better than the first-order one."""
-    lag, dead_time, *slew = found.unknown.tolist()
-    whole = exp(lag) + dead_time
+    lag, dead_time, *slew = first_order.unknown.tolist()
+    delay = exp(lag) + dead_time
     model: Model = SecondOrder()
-    start = DelayedModel(record, model, None, coarse).best_of(
+    start = DelayedModel(record, model, None, thinning).best_of(
         [
-            np.array([log((1.0 - share) * whole), log(damping), share * whole, *slew])
+            np.array([log((1.0 - share) * delay), log(damping), share * delay, *slew])
             for damping in _TRIED_DAMPINGS
             for share in _TRIED_DEAD_TIME_SHARES
         ]
     )
-    data = DelayedModel(record, model, None, first.thinning)
+    data = DelayedModel(record, model, None, first_data.thinning)
     best = data.search(start)
-    if best.squares > _CLEARLY_BETTER * found.squares:
+    if best.squares > _BETTER_SHARE * first_order.squares:
         return None
     frequency, damping = frequency_damping(best.unknown)
     quality = _quality(data, best)
@@ -208,20 +208,20 @@ def _quality(data: DelayedModel, found: Solution) -> _Quality:
     span = float(np.ptp(commands))
     excited = int((np.abs(data.response(unknown) - commands) > _EXCITED_SHARE * span).sum())
     memory = _MEMORY_DELAYS * (lag + data.dead_time(unknown))
-    step = float(np.median(np.diff(np.concatenate(data.times))))
+    sample_period = float(np.median(np.diff(np.concatenate(data.times))))
     residuals = analyse(
         found.residual,
         found.slopes,
         lambda later: data.delayed_commands(unknown, later),
         memory,
         excited,
-        correlated=1 + int(memory / max(step, 1e-4)),
+        correlated=1 + int(memory / max(sample_period, 1e-4)),
     )
-    moved = float(np.std(data.measured))
+    deviation = float(np.std(data.measured))
     return _Quality(
         span,
         excited,
-        residuals.misfit / moved if moved > 0.0 else 0.0,
+        residuals.misfit / deviation if deviation > 0.0 else 0.0,
         lag * float(residuals.errors[0]),
         float(data.dead_time(residuals.errors)),
     )
@@ -246,5 +246,5 @@ def _best_without_slew(data: DelayedModel, start: Floats) -> Solution:
 def _grid_start(data: DelayedModel) -> Floats:
     """(2,), the best start (log lag, dead time) from a coarse grid."""
     return data.best_of(
-        [np.array([log(lag), dead]) for lag in _TRIED_LAGS for dead in _TRIED_DEAD_TIMES]
+        [np.array([log(lag), dead_time]) for lag in _TRIED_LAGS for dead_time in _TRIED_DEAD_TIMES]
     )

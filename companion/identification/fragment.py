@@ -82,8 +82,8 @@ def vehicle_fragment(
     axes = {name: kept.get(name) or _fitted_values(each) for name, each in vehicle.axes.items()}
     if second_order:
         axes |= second_order_axes(vehicle)
-    mark = [f"  identified: {bounded_yaml.dump_value(flight)}"] if flight else []
-    lines += ["vehicle:", *mark, *_tilt_keys(axes["roll"], axes["pitch"])]
+    identified = [f"  identified: {bounded_yaml.dump_value(flight)}"] if flight else []
+    lines += ["vehicle:", *identified, *_tilt_keys(axes["roll"], axes["pitch"])]
     lines += _axis_keys("yaw", axes["yaw"], axes["roll"].slew)
     return "\n".join(lines) + "\n"
 
@@ -153,9 +153,9 @@ def _nearly_same(one: AxisValues, other: AxisValues) -> bool:
     )
 
 
-def _near(one: float | None, other: float | None, apart: float) -> bool:
-    """Whether both are None, or differ by at most `apart`."""
-    return one == other or (one is not None and other is not None and abs(one - other) <= apart)
+def _near(one: float | None, other: float | None, tolerance: float) -> bool:
+    """Whether both are None, or differ by at most `tolerance`."""
+    return one == other or (one is not None and other is not None and abs(one - other) <= tolerance)
 
 
 def _axis_keys(name: str, axis: AxisValues, inherited: float | None = None) -> list[str]:
@@ -175,6 +175,7 @@ def _axis_keys(name: str, axis: AxisValues, inherited: float | None = None) -> l
 
 
 def _comment(name: str, response: RateResponse, kept: Mapping[str, AxisValues]) -> str:
+    """A line on the fit of an axis, or on the reason why its configured values are kept."""
     if name in kept:
         return (
             f"# {name}: kept from the configuration: {kept[name].described()}; the fit is bad: "
@@ -182,11 +183,11 @@ def _comment(name: str, response: RateResponse, kept: Mapping[str, AxisValues]) 
         )
     fit = response.fit
     slew = "" if response.slew is None else f", slew {response.slew:.1f} rad/s²"
-    second = response.second_order
-    better = "" if second is None else f"; clearly better: {second.described}"
+    second_order = response.second_order
+    second_text = "" if second_order is None else f"; clearly better: {second_order.described}"
     return (
         f"# {name}, first order: lag {1e3 * response.lag:.1f} ± {1e3 * fit.lag_error:.1f} ms, dead "
         f"time {1e3 * response.dead_time:.1f} ± {1e3 * fit.dead_time_error:.1f} ms, gain "
         f"{response.gain:.2f}{slew}, explains {fit.explained:.1%}, misfit {fit.misfit:.0%}, "
-        f"{fit.excited} samples{better}"
+        f"{fit.excited} samples{second_text}"
     )

@@ -48,30 +48,30 @@ def held_commands(time: Floats, commanded: Floats, tolerance: float = 0.0) -> Kn
 
 def slewed(commands: Knots, slew: float) -> Knots:
     """Held commands after a slew limit `slew` (per second); the output starts at the first one."""
-    start = _values_before(commands, slew)
-    way = commands.value - start
-    arrival = commands.time + np.abs(way) / slew
-    ramps = np.column_stack((commands.time, start, np.copysign(slew, way)))
-    rests = np.column_stack((arrival, commands.value, np.zeros(way.size)))
-    moves, arrives = arrival > commands.time, arrival < np.append(commands.time[1:], np.inf)
-    # Ramps and the rests after them alternate; those of no duration are left out.
-    rows = np.stack((ramps, rests), axis=1).reshape(-1, 3)
-    return Knots(*rows[np.column_stack((moves, arrives)).ravel()].T)
+    start = _start_values(commands, slew)
+    change = commands.value - start
+    arrival = commands.time + np.abs(change) / slew
+    ramps = np.column_stack((commands.time, start, np.copysign(slew, change)))
+    holds = np.column_stack((arrival, commands.value, np.zeros(change.size)))
+    has_ramp, has_hold = arrival > commands.time, arrival < np.append(commands.time[1:], np.inf)
+    # Each ramp is followed by a hold; ramps and holds of no duration are left out.
+    rows = np.stack((ramps, holds), axis=1).reshape(-1, 3)
+    return Knots(*rows[np.column_stack((has_ramp, has_hold)).ravel()].T)
 
 
-def _values_before(commands: Knots, slew: float) -> Floats:
-    """(n,), value after the slew limit at the time of each command.
+def _start_values(commands: Knots, slew: float) -> Floats:
+    """(n,), output of the slew limit at the time of each command.
 
-    It needs a loop, because each piece starts where the one before ended.
+    This needs a loop, because each ramp starts where the ramp before it ended.
     """
     value = float(commands.value[0])
-    starts, reaches = [value], slew * np.diff(commands.time)
-    for target, reach in zip(commands.value[:-1].tolist(), reaches.tolist(), strict=True):
-        way = target - value
-        if way > reach:
-            value += reach
-        elif way < -reach:
-            value -= reach
+    starts, limits = [value], slew * np.diff(commands.time)
+    for target, limit in zip(commands.value[:-1].tolist(), limits.tolist(), strict=True):
+        change = target - value
+        if change > limit:
+            value += limit
+        elif change < -limit:
+            value -= limit
         else:
             value = target
         starts.append(value)
@@ -93,27 +93,28 @@ def complex_lagged(commands: Knots, lag: complex, at: Floats) -> Numbers:
     jumps = np.concatenate(([commands.value[0] - steady[0]], ends - steady[1:]))
     excess = _decayed_sums(commands.time / lag, jumps)
     piece = np.searchsorted(commands.time, at, side="right") - 1
-    since = at - commands.time[piece]
-    straight = steady[piece] + commands.slope[piece] * since
-    response: Numbers = straight + excess[piece] * np.exp(-since / lag)
+    elapsed = at - commands.time[piece]
+    forced = steady[piece] + commands.slope[piece] * elapsed
+    response: Numbers = forced + excess[piece] * np.exp(-elapsed / lag)
     return response
 
 
 def _decayed_sums(ages: Numbers, jumps: Numbers) -> Numbers:
     """(n,), sum of all jumps up to each age, each decayed exponentially since its own age.
 
-    It is computed by running sums, in parts short enough that no exponential overflows.
+    An age is a time divided by the lag. The sums are running sums, in parts short enough that no
+    exponential overflows.
     """
     sums = np.empty_like(jumps)
-    real = np.real(ages)
-    start, before = 0, 0.0 * jumps[0]
+    real_ages = np.real(ages)
+    start, previous = 0, 0.0 * jumps[0]
     while start < jumps.size:
-        end = int(np.searchsorted(real, real[start] + _LARGEST_EXPONENT, side="right"))
+        end = int(np.searchsorted(real_ages, real_ages[start] + _LARGEST_EXPONENT, side="right"))
         growth = np.exp(ages[start:end] - ages[start])
-        sums[start:end] = (before + np.cumsum(jumps[start:end] * growth)) / growth
+        sums[start:end] = (previous + np.cumsum(jumps[start:end] * growth)) / growth
         if end < jumps.size:
             step = ages[end] - ages[end - 1]
-            before = sums[end - 1] * np.exp(-step)
+            previous = sums[end - 1] * np.exp(-step)
         start = end
     return sums
 
@@ -151,8 +152,8 @@ def second_order_decay(since: Floats, frequency: float, damping: float) -> Float
     """(m, 2), components of the free response, `since` (m,) seconds after the start."""
     first, second = _two_lags(frequency, damping)
     if first.imag:
-        turning = np.exp(-since / first)
-        return np.column_stack((np.real(turning), np.imag(turning)))
+        oscillation = np.exp(-since / first)
+        return np.column_stack((np.real(oscillation), np.imag(oscillation)))
     slow, quick = np.exp(-since / first.real), np.exp(-since / second.real)
     # The second column is a difference, so that the two stay independent near critical damping.
     return np.column_stack((slow, (slow - quick) / (first.real - second.real)))
@@ -160,7 +161,7 @@ def second_order_decay(since: Floats, frequency: float, damping: float) -> Float
 
 def _two_lags(frequency: float, damping: float) -> tuple[complex, complex]:
     """The two first-order lags of which a second-order lag is made, s; the longer one first."""
-    apart = damping * damping - 1.0
-    apart = copysign(max(abs(apart), _NEARLY_CRITICAL), apart)
-    root = complex(0.0, sqrt(-apart)) if apart < 0.0 else complex(sqrt(apart))
+    discriminant = damping * damping - 1.0
+    discriminant = copysign(max(abs(discriminant), _NEARLY_CRITICAL), discriminant)
+    root = complex(0.0, sqrt(-discriminant)) if discriminant < 0.0 else complex(sqrt(discriminant))
     return 1.0 / (frequency * (damping - root)), 1.0 / (frequency * (damping + root))

@@ -56,26 +56,26 @@ def stretches(
     """
     t, u = _checked_series(time, commanded)
     sampled, y = _checked_series(measured_time, measured)
-    found = []
-    for part in np.split(np.arange(t.size), np.flatnonzero(np.diff(t) > _LONGEST_HOLD) + 1):
-        if part.size == 0:
+    parts = []
+    for rows in np.split(np.arange(t.size), np.flatnonzero(np.diff(t) > _LONGEST_HOLD) + 1):
+        if rows.size == 0:
             continue
-        first, last = t[part[0]], t[part[-1]]
+        first, last = t[rows[0]], t[rows[-1]]
         inside = (sampled >= first + LONGEST_DEAD_TIME) & (sampled <= last)
         if inside.any():
-            found.append(Stretch(t[part], u[part], sampled[inside], y[inside]))
-    return found
+            parts.append(Stretch(t[rows], u[rows], sampled[inside], y[inside]))
+    return parts
 
 
 def most_excited(record: list[Stretch]) -> list[Stretch]:
-    """The record, or of a long one the windows in which the commands varied most.
+    """The record; if it is long, only the windows in which the commands varied most.
 
     Half an hour of flight contains hardly more information on the response than its most excited
     half minute. Each window keeps the commands shortly before it.
     """
-    if sum(part.time.size + part.measured_time.size for part in record) <= _MOST_ROWS:
+    if sum(stretch.time.size + stretch.measured_time.size for stretch in record) <= _MOST_ROWS:
         return record
-    windows = [window for part in record for window in _windows(part)]
+    windows = [window for stretch in record for window in _windows(stretch)]
     windows.sort(key=lambda window: float(np.std(window.commanded)), reverse=True)
     kept: list[Stretch] = []
     rows = 0
@@ -87,21 +87,22 @@ def most_excited(record: list[Stretch]) -> list[Stretch]:
     return sorted(kept, key=lambda window: float(window.time[0]))
 
 
-def _windows(part: Stretch) -> list[Stretch]:
+def _windows(stretch: Stretch) -> list[Stretch]:
     """A stretch divided into windows; those without a sample are left out."""
     windows = []
-    for start in np.arange(part.measured_time[0], part.measured_time[-1], _WINDOW_DURATION):
-        first, last = np.searchsorted(part.measured_time, (start, start + _WINDOW_DURATION))
-        begin, end = np.searchsorted(part.time, (start - _WINDOW_LEAD, start + _WINDOW_DURATION))
+    for start in np.arange(stretch.measured_time[0], stretch.measured_time[-1], _WINDOW_DURATION):
+        first, last = np.searchsorted(stretch.measured_time, (start, start + _WINDOW_DURATION))
+        begin, end = np.searchsorted(stretch.time, (start - _WINDOW_LEAD, start + _WINDOW_DURATION))
         begin = max(int(begin) - 1, 0)
         if last > first:
-            commands = part.time[begin:end], part.commanded[begin:end]
-            measured = part.measured_time[first:last], part.measured[first:last]
+            commands = stretch.time[begin:end], stretch.commanded[begin:end]
+            measured = stretch.measured_time[first:last], stretch.measured[first:last]
             windows.append(Stretch(*commands, *measured))
     return windows
 
 
 def _checked_series(time: ArrayLike, values: ArrayLike) -> tuple[Floats, Floats]:
+    """Times and values without rows that are not finite, in order of time."""
     t, v = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if t.ndim != 1 or t.shape != v.shape:
         raise ValueError(

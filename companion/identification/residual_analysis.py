@@ -22,7 +22,7 @@ _SAMPLES_PER_DELAY = 8
 
 
 class Residuals(NamedTuple):
-    """What a residual says of a fit: the misfit, and the standard errors of the unknowns.
+    """Result of `analyse`: the misfit of a fit, and the standard errors of its unknowns.
 
     Attributes:
         misfit: root mean square of the part that the commands explain, in the measurements' unit.
@@ -56,12 +56,13 @@ def analyse(
     noise = residual
     if delays:
         # Negative delays too, because the fitted dead time may be too long.
-        each = np.linspace(-0.25 * memory, memory, delays)
-        columns = np.column_stack([commands(delay) for delay in each.tolist()])
+        delay_values = np.linspace(-0.25 * memory, memory, delays)
+        columns = np.column_stack([commands(delay) for delay in delay_values.tolist()])
         _, noise = project(np.column_stack((columns, np.ones(residual.size))), residual)
-    lost = excited / max(excited - delays, 1)
+    # The regression takes one degree of freedom for each delay.
+    correction = excited / max(excited - delays, 1)
     return Residuals(
-        _rms(residual - noise), _standard_errors(slopes, noise, correlated) * np.sqrt(lost)
+        _rms(residual - noise), _standard_errors(slopes, noise, correlated) * np.sqrt(correction)
     )
 
 
@@ -70,8 +71,8 @@ def _standard_errors(slopes: Floats, noise: Floats, correlated: int) -> Floats:
     scores = slopes * noise[:, np.newaxis]
     spread = scores.T @ scores
     for shift in range(1, min(correlated, noise.size)):
-        shared = scores[shift:].T @ scores[:-shift]
-        spread += (1.0 - shift / correlated) * (shared + shared.T)
+        shifted = scores[shift:].T @ scores[:-shift]
+        spread += (1.0 - shift / correlated) * (shifted + shifted.T)
     # Slopes near the smallest float have no inverse: such unknowns are not determined.
     with np.errstate(over="ignore", invalid="ignore"):
         inverse = np.linalg.pinv(slopes.T @ slopes)

@@ -68,8 +68,8 @@ class RateResponse:
     Attributes:
         dead_time: time from a sample to the first effect of its command, s; NaN if not found.
         lag: time constant, s; NaN if not found.
-        gain: steady rate per commanded rate; NaN if not found. It is fitted freely, also where lag
-            and dead time are for a given gain; by the second-order fit if there is one.
+        gain: steady rate per commanded rate; NaN if not found. It is fitted freely, even if lag and
+            dead time are for a given gain. If there is a second-order fit, it is the gain of this.
         slew: slew limit of the autopilot before the lag, rad/s²; None if none was found.
         fit: quality of the fit.
         second_order: second-order fit, if it is clearly better; else None.
@@ -84,7 +84,7 @@ class RateResponse:
 
     def reason(self, needs: FitNeeds = DEFAULT_NEEDS) -> str | None:
         """Why this fit must not be used, a sentence without full stop; None if it may be used."""
-        fit, uncertain = self.fit, max(self.fit.dead_time_error, self.fit.lag_error)
+        fit, uncertainty = self.fit, max(self.fit.dead_time_error, self.fit.lag_error)
         low, high = needs.gain
         faults = (
             (
@@ -115,8 +115,8 @@ class RateResponse:
                 f"gain {self.gain:.2f} is not near 1: the rates did not follow the commands",
             ),
             (
-                uncertain > max(needs.error, needs.relative_error * (self.lag + self.dead_time)),
-                f"lag and dead time are uncertain by {1e3 * uncertain:.1f} ms",
+                uncertainty > max(needs.error, needs.relative_error * (self.lag + self.dead_time)),
+                f"lag and dead time are uncertain by {1e3 * uncertainty:.1f} ms",
             ),
         )
         return next((text for wrong, text in faults if wrong), None)
@@ -165,17 +165,17 @@ def fit_rate_response(
     Raises:
         ValueError: a time series and its values are not one-dimensional and equally long.
     """
-    found = fit_lag(stretches(time, commanded, measured_time, measured), gain)
-    if found is None:
+    fit = fit_lag(stretches(time, commanded, measured_time, measured), gain)
+    if fit is None:
         return _NOT_FOUND
     quality = FitQuality(
-        found.explained,
-        found.misfit,
-        found.dead_time_error,
-        found.lag_error,
-        found.span,
-        found.excited,
+        fit.explained,
+        fit.misfit,
+        fit.dead_time_error,
+        fit.lag_error,
+        fit.span,
+        fit.excited,
     )
-    second_order = found.second_order
-    gain_found = found.gain if second_order is None else second_order.gain
-    return RateResponse(found.dead_time, found.lag, gain_found, found.slew, quality, second_order)
+    second_order = fit.second_order
+    fitted_gain = fit.gain if second_order is None else second_order.gain
+    return RateResponse(fit.dead_time, fit.lag, fitted_gain, fit.slew, quality, second_order)

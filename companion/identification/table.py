@@ -54,9 +54,9 @@ def _cells(response: RateResponse, second_order: SecondOrderFit | None) -> tuple
     times = (response.lag, fit.lag_error), (response.dead_time, fit.dead_time_error)
     slew, misfit = response.slew, fit.misfit
     if second_order is not None:
-        found, damping = second_order, f"{second_order.damping:.2f}"
-        times = (found.lag, found.lag_error), (found.dead_time, found.dead_time_error)
-        slew, misfit = found.slew, found.misfit
+        shown, damping = second_order, f"{second_order.damping:.2f}"
+        times = (shown.lag, shown.lag_error), (shown.dead_time, shown.dead_time_error)
+        slew, misfit = shown.slew, shown.misfit
     return (
         *(f"{1e3 * time:.1f} ± {1e3 * error:.1f}" for time, error in times),
         damping,
@@ -69,13 +69,13 @@ def _cells(response: RateResponse, second_order: SecondOrderFit | None) -> tuple
 
 def _model_line(name: str, response: RateResponse, second_order: SecondOrderFit | None) -> str:
     """Which model the row of an axis shows, and why."""
-    first, nearer = f"explains {response.fit.explained:.1%}", response.second_order
+    first, better = f"explains {response.fit.explained:.1%}", response.second_order
     if second_order is not None:
         explained = f"explains {second_order.explained:.1%}"
         return f"{name}: second order, which {explained}; first order {first}"
-    if nearer is None:
+    if better is None:
         return f"{name}: a lag of first order {first}; second order is not clearly better"
-    return f"{name}: written as first order, which {first}, though nearer: {nearer.described}"
+    return f"{name}: written as first order, which {first}, though nearer: {better.described}"
 
 
 def _thrust_line(thrust: ThrustMap | None, gravity: float) -> str:

@@ -9,6 +9,7 @@ from companion.identification.fit import fit_lag
 from companion.identification.record import Stretch, stretches
 
 _LEAST_EXPLAINED = 0.8
+"""Smallest R² of a usable map."""
 _EXCITED_SHARE = 0.2
 """A command is excited if it differs from the median by more than this share of the range."""
 _ACCEPTED_HOVER = 0.05, 0.95
@@ -72,17 +73,17 @@ def _excited_samples(record: list[Stretch]) -> list[Stretch]:
     """
     if not record:
         return []
-    thrust = np.concatenate([part.commanded for part in record])
-    usual, least_change = float(np.median(thrust)), _EXCITED_SHARE * float(np.ptp(thrust))
+    thrust = np.concatenate([stretch.commanded for stretch in record])
+    median, least_change = float(np.median(thrust)), _EXCITED_SHARE * float(np.ptp(thrust))
     excited = []
-    for part in record:
-        changed = part.time[np.abs(part.commanded - usual) > least_change]
-        latest = np.searchsorted(changed, part.measured_time, side="right")
-        since = part.measured_time - np.concatenate(([-np.inf], changed))[latest]
-        kept = since < _LARGEST_DELAY
+    for stretch in record:
+        changed = stretch.time[np.abs(stretch.commanded - median) > least_change]
+        latest = np.searchsorted(changed, stretch.measured_time, side="right")
+        elapsed = stretch.measured_time - np.concatenate(([-np.inf], changed))[latest]
+        kept = elapsed < _LARGEST_DELAY
         if kept.any():
-            measured = part.measured_time[kept], part.measured[kept]
-            excited.append(Stretch(part.time, part.commanded, *measured))
+            measured = stretch.measured_time[kept], stretch.measured[kept]
+            excited.append(Stretch(stretch.time, stretch.commanded, *measured))
     return excited
 
 
@@ -108,7 +109,7 @@ def fit_thrust_map(
         ValueError: a time series and its values are not one-dimensional and equally long.
     """
     record = _excited_samples(stretches(time, thrust, measured_time, specific_thrust))
-    found = fit_lag(record, may_slew=False)
-    if found is None:
+    fit = fit_lag(record, may_slew=False)
+    if fit is None:
         return None
-    return ThrustMap(found.gain, found.offset, found.lag, found.dead_time, found.explained)
+    return ThrustMap(fit.gain, fit.offset, fit.lag, fit.dead_time, fit.explained)

@@ -26,7 +26,7 @@ class IdentifiedVehicle:
         roll: response of the roll rate.
         pitch: response of the pitch rate.
         yaw: response of the yaw rate.
-        thrust: the thrust map, or None if thrust hardly changed or was not measured.
+        thrust: the thrust map, or None if thrust never changed or was hardly measured.
     """
 
     roll: RateResponse
@@ -62,7 +62,7 @@ def identify_vehicle(setpoints: Rows, rates: Rows, specific_thrust: Rows) -> Ide
     """
     commands, measured = _as_array(setpoints, 5), _as_array(rates, 4)
     accelerations = _as_array(specific_thrust, 2)
-    roll, pitch, yaw = (_response(commands, measured, axis) for axis in (1, 2, 3))
+    roll, pitch, yaw = (_axis_response(commands, measured, axis) for axis in (1, 2, 3))
     thrust = fit_thrust_map(
         commands[:, 0], commands[:, 4], accelerations[:, 0], accelerations[:, 1]
     )
@@ -73,6 +73,6 @@ def _as_array(rows: Rows, columns: int) -> Floats:
     return np.array(rows, dtype=np.float64).reshape(len(rows), columns)
 
 
-def _response(commands: Floats, measured: Floats, axis: int) -> RateResponse:
+def _axis_response(commands: Floats, measured: Floats, axis: int) -> RateResponse:
     record = commands[:, 0], commands[:, axis], measured[:, 0], measured[:, axis]
     return fit_rate_response(*record, gain=_ASSUMED_GAIN)

@@ -33,13 +33,13 @@ def coefficient_model(settings: Settings) -> Model:
 
     Limits: |c_d| ≤ sin(max_tilt), or ≤ |c| at the start if that is larger; the tilt rate of
     p·(c_d − c) is within W_M; the heading rate is within its own limit. Polygons inside the discs
-    make the constraints linear in the control at a given state. So the first control, which is the
-    one that is flown, satisfies them after a single iteration from any start. The dead time is not
-    part of the model: `prediction` integrates the motion to its end.
+    make the constraints linear in the control at a given state. Therefore the first control, the
+    only one that is flown, satisfies them after a single iteration from any guess. The dead time is
+    not part of the model: `prediction` integrates the motion to the end of the dead time.
     """
     symbols = Symbols(size=11, own_constants=1)
-    speed, turning = symbols.state[9:11], symbols.turning(settings)
-    longest = own_constant(symbols.constants)
+    rates, turning = symbols.state[9:11], symbols.turning(settings)
+    longest_target = own_constant(symbols.constants)
 
     def constants_of(conditions: Conditions, start: Motion) -> Floats:
         return *conditions, max(sin(settings.max_tilt), hypot(start.north, start.east))
@@ -47,10 +47,10 @@ def coefficient_model(settings: Settings) -> Model:
     return symbols.model(
         settings,
         derivative=ca.vertcat(
-            symbols.translation(settings), speed, turning[2], (turning[0:2] - speed) / settings.lag
+            symbols.translation(settings), rates, turning[2], (turning[0:2] - rates) / settings.lag
         ),
         bounded=ca.vertcat(
-            _polygon_terms(symbols.control[0:2], longest),
+            _polygon_terms(symbols.control[0:2], longest_target),
             _polygon_terms(_tilt_rate(symbols.c, turning[0:2]), settings.max_tilt_rate),
             turning[2] / settings.max_yaw_rate,
         ),
@@ -119,6 +119,7 @@ class Symbols:
 
 
 def _aim_of(node: Node) -> Floats:
+    """The values of the symbol `aim` at a node."""
     return node.heading, node.speed_north, node.speed_east, node.heading_rate
 
 
@@ -146,6 +147,6 @@ def _polygon_terms(vector: ca.SX, radius: Any) -> ca.SX:
         radius: radius of the circle through the corners, in the unit of the vector.
     """
     angles = [pi * k / _SIDE_PAIRS for k in range(_SIDE_PAIRS)]
-    across = (cos(angle) * vector[0] + sin(angle) * vector[1] for angle in angles)
-    sides: ca.SX = ca.vertcat(*across) / (cos(0.5 * pi / _SIDE_PAIRS) * radius)
-    return sides
+    components = (cos(angle) * vector[0] + sin(angle) * vector[1] for angle in angles)
+    terms: ca.SX = ca.vertcat(*components) / (cos(0.5 * pi / _SIDE_PAIRS) * radius)
+    return terms

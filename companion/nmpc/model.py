@@ -129,13 +129,13 @@ def translation(
     symbols: list[Any] = ca.vertsplit(constants)  # typed so that mypy takes symbols as numbers
     conditions = Conditions(*symbols[: len(Conditions._fields)])
     drag = Drag(conditions.linear_drag, conditions.quadratic_drag)
-    moving: list[Any] = ca.vertsplit(velocity)
-    slowed = ca.vertcat(*drag.deceleration((moving[0], moving[1], moving[2])))
+    v: list[Any] = ca.vertsplit(velocity)
+    deceleration = ca.vertcat(*drag.deceleration((v[0], v[1], v[2])))
     forward: list[Any] = [ca.cos(heading), ca.sin(heading)]
-    more = along_axes(conditions.axis_drag, forward[0], forward[1], moving[0], moving[1])
-    slowed += ca.vertcat(*more, 0.0)
+    along_body = along_axes(conditions.axis_drag, forward[0], forward[1], v[0], v[1])
+    deceleration += ca.vertcat(*along_body, 0.0)
     disturbance = ca.vertcat(conditions.w_n, conditions.w_e, conditions.w_d)
-    return ca.vertcat(velocity, lift + weight - slowed + disturbance)
+    return ca.vertcat(velocity, lift + weight - deceleration + disturbance)
 
 
 def integrator(model: Model) -> ca.Function:

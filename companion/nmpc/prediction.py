@@ -75,19 +75,19 @@ class Predictor:
         time = vehicle.time
         conditions = conditions_of(vehicle)
         constants = list(self._model.constants_of(conditions, motion))
-        acting = [one for one in inputs if self._acts_at(one) <= time][-1:] or [*inputs[:1]]
+        acting = [each for each in inputs if self._effect_time(each) <= time][-1:] or [*inputs[:1]]
         current = acting[0] if acting else self._holding_input(vehicle.time, motion)
-        for following in [one for one in inputs if time < self._acts_at(one) < until]:
-            span = self._acts_at(following) - time
+        for next_input in [each for each in inputs if time < self._effect_time(each) < until]:
+            span = self._effect_time(next_input) - time
             motion = self._integrated(motion, current, span, constants)
-            time, current = self._acts_at(following), following
+            time, current = self._effect_time(next_input), next_input
         motion = self._integrated(motion, current, until - time, constants)
         if hypot(motion.north, motion.east) > _LONGEST_COEFFICIENTS:
             raise TiltedTooFarError
         return motion
 
-    def _acts_at(self, one: Input) -> float:
-        return one.time + self._settings.dead_time
+    def _effect_time(self, command: Input) -> float:
+        return command.time + self._settings.dead_time
 
     def _holding_input(self, time: float, motion: Motion) -> Input:
         """The input that holds the attitude and the vertical speed."""
@@ -98,11 +98,12 @@ class Predictor:
     def _integrated(
         self, motion: Motion, current: Input, span: float, constants: list[float]
     ) -> Motion:
+        """The motion `span` seconds later, with the input `current` in effect."""
         heading = motion.heading + wrap_angle(current.heading - motion.heading)
         # The planner shortens a target that exceeds its tilt limit.
         length = hypot(current.north, current.east)
-        share = min(1.0, sin(self._settings.max_tilt) / max(length, 1e-9))
-        control = (share * current.north, share * current.east, heading, current.thrust)
+        scale = min(1.0, sin(self._settings.max_tilt) / max(length, 1e-9))
+        control = (scale * current.north, scale * current.east, heading, current.thrust)
         steps = int(span / _LONGEST_STEP) + 1
         for _ in range(steps):
             after = self._advance(motion, control, constants, span / steps)

@@ -55,7 +55,7 @@ def transcribe(model: Model, settings: Settings) -> Program:
     """Formulate the optimal control problem of this model over the horizon."""
     node = ca.vertcat(ca.SX.sym("p", 3), ca.SX.sym("v", 3), ca.SX.sym("T"), model.aim)
     advance = integrator(model)
-    running = ca.Function(
+    running_residual = ca.Function(
         "r", [model.state, model.control, node], [_running_residual(model, node, settings)]
     )
     bounded = ca.Function("b", [model.state, model.control, model.constants], [model.bounded])
@@ -67,7 +67,7 @@ def transcribe(model: Model, settings: Settings) -> Program:
         u = ca.SX.sym(f"u_{k}", model.control.numel())
         after = ca.SX.sym(f"x_{k + 1}", model.state.numel())
         unknown += [u, after]
-        residual.append(running(x, u, nodes[k]))
+        residual.append(running_residual(x, u, nodes[k]))
         constraints.append(advance(x, u, constants, settings.step) - after)
         constraints.append(bounded(x, u, constants))
         x = after
@@ -120,8 +120,8 @@ def _final_residual(x: ca.SX, node: ca.SX, settings: Settings) -> ca.SX:
 
 def _bounds_of_unknown(model: Model, settings: Settings) -> tuple[Floats, Floats]:
     free_state = np.full(model.state.numel(), np.inf)
-    control = np.full(model.control.numel(), np.inf)
-    lowest, highest = -control, control.copy()
+    free_control = np.full(model.control.numel(), np.inf)
+    lowest, highest = -free_control, free_control.copy()
     lowest[-1], highest[-1] = settings.min_thrust, settings.max_thrust
     lower = np.concatenate([-free_state, *[lowest, -free_state] * settings.steps])
     upper = np.concatenate([free_state, *[highest, free_state] * settings.steps])
@@ -159,7 +159,7 @@ class SqpSolver:
     """
 
     def __init__(self, model: Model, settings: Settings) -> None:
-        self._start = model.state.numel()
+        self._state_size = model.state.numel()
         self._program = transcribe(model, settings)
         self._solver = _sqp_function(self._program, settings.iterations)
 
@@ -170,9 +170,9 @@ class SqpSolver:
             guess: first guess, in the order of `Program.unknown`.
             parameters: numbers from `parameters_of`.
         """
-        program, start = self._program, self._start
-        program.lower[:start] = program.upper[:start] = guess[:start]
-        found = self._solver(
+        program, state_size = self._program, self._state_size
+        program.lower[:state_size] = program.upper[:state_size] = guess[:state_size]
+        result = self._solver(
             x0=guess,
             p=parameters,
             lbx=program.lower,
@@ -183,7 +183,7 @@ class SqpSolver:
         stats = self._solver.stats()
         converged = bool(stats["success"])
         return Solution(
-            np.asarray(found["x"], dtype=np.float64).ravel(),
+            np.asarray(result["x"], dtype=np.float64).ravel(),
             converged or stats["unified_return_status"] == _ITERATION_LIMIT,
             converged,
             int(stats["iter_count"]),
@@ -193,12 +193,12 @@ class SqpSolver:
 def _sqp_function(program: Program, iterations: int) -> ca.Function:
     """`sqpmethod` with the Gauss–Newton Hessian; a single iteration takes the whole step."""
     jacobian = ca.jacobian(program.residual, program.unknown)
-    factor = ca.SX.sym("lam_f")
+    objective_factor = ca.SX.sym("lam_f")
     multipliers = ca.SX.sym("lam_g", program.constraints.numel())
     hessian = ca.Function(
         "gauss_newton",
-        [program.unknown, program.parameters, factor, multipliers],
-        [factor * ca.mtimes(jacobian.T, jacobian)],
+        [program.unknown, program.parameters, objective_factor, multipliers],
+        [objective_factor * ca.mtimes(jacobian.T, jacobian)],
         ["x", "p", "lam_f", "lam_g"],
         ["hess_gamma_x_x"],
     )

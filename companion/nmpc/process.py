@@ -56,13 +56,13 @@ class _Pending(NamedTuple):
 
     Attributes:
         number: number of the request.
-        at: when it was sent, on the computer's monotonic clock, s.
-        longest: largest |c| that its answer may have.
+        sent_at: when it was sent, on the computer's monotonic clock, s.
+        longest_target: largest |c| that its answer may have.
     """
 
     number: int
-    at: float
-    longest: float
+    sent_at: float
+    longest_target: float
 
 
 class Solver:
@@ -133,8 +133,8 @@ class Solver:
             self._handle_exit()
         else:
             _, ax, ay = tilt_products(*request.vehicle.q)
-            longest = max(sin(self._settings.max_tilt), 2.0 * hypot(ax, ay))
-            self._pending = _Pending(request.number, monotonic(), longest)
+            longest_target = max(sin(self._settings.max_tilt), 2.0 * hypot(ax, ay))
+            self._pending = _Pending(request.number, monotonic(), longest_target)
 
     def take(self, wait: float = 0.0) -> Answer | None:
         """The answer to the last request if it has come and may be flown; it is returned once.
@@ -152,7 +152,10 @@ class Solver:
             if self._pending is not None and answer.number == self._pending.number:
                 pending, self._pending = self._pending, None
                 return self._checked(pending, answer)
-        if self._pending is not None and monotonic() - self._pending.at > self._settings.deadline:
+        if (
+            self._pending is not None
+            and monotonic() - self._pending.sent_at > self._settings.deadline
+        ):
             self._drop_pending(f"has no answer after {1e3 * self._settings.deadline:.0f} ms")
         return None
 
@@ -180,15 +183,18 @@ class Solver:
         return message
 
     def _checked(self, pending: _Pending, answer: Answer) -> Answer | None:
-        took = answer.given_at - pending.at
-        if took > self._settings.deadline:
-            self._report(Trouble.LATE, f"request {pending.number} took {1e3 * took:.1f} ms")
+        """The answer if it may be flown; otherwise None, and the trouble is reported."""
+        elapsed = answer.given_at - pending.sent_at
+        if elapsed > self._settings.deadline:
+            self._report(Trouble.LATE, f"request {pending.number} took {1e3 * elapsed:.1f} ms")
         elif answer.status is not Status.SOLVED:
             reason = answer.status.name.lower().replace("_", " ")
-            words = f"request {pending.number} was not solved: {reason}"
-            self._report(Trouble.FAILED, words)
-        elif absurd := _why_implausible(answer, pending.longest, self._settings):
-            self._report(Trouble.ABSURD, f"the answer to request {pending.number} has {absurd}")
+            message = f"request {pending.number} was not solved: {reason}"
+            self._report(Trouble.FAILED, message)
+        elif implausible := _why_implausible(answer, pending.longest_target, self._settings):
+            self._report(
+                Trouble.ABSURD, f"the answer to request {pending.number} has {implausible}"
+            )
         else:
             return answer
         return None
@@ -205,21 +211,23 @@ class Solver:
             self._process.wait(_EXIT_TIME)
         code = self._process.returncode
         self._output.seek(0)
-        words = self._output.read().decode(errors="replace").strip().splitlines()
+        output = self._output.read().decode(errors="replace").strip().splitlines()
         self.close()
         self._pending = None
-        how = f"was ended by signal {-code}" if code is not None and code < 0 else "has ended"
-        self._report(Trouble.DIED, f"the solver {how}" + (f": {words[-1]}" if words else ""))
+        exit_text = f"was ended by signal {-code}" if code is not None and code < 0 else "has ended"
+        self._report(
+            Trouble.DIED, f"the solver {exit_text}" + (f": {output[-1]}" if output else "")
+        )
 
 
-def _why_implausible(answer: Answer, longest: float, settings: Settings) -> str | None:
+def _why_implausible(answer: Answer, longest_target: float, settings: Settings) -> str | None:
     """Why an answer is implausible; None if it is plausible."""
     values = (answer.north, answer.east, answer.heading, answer.thrust, answer.time)
     if not all(isfinite(value) for value in values):
         return "a number that is not finite"
     length = hypot(answer.north, answer.east)
-    if length > (1.0 + _ANSWER_TOLERANCE) * longest:
-        return f"coefficients of length {length:.3f}, more than the limit {longest:.3f}"
+    if length > (1.0 + _ANSWER_TOLERANCE) * longest_target:
+        return f"coefficients of length {length:.3f}, more than the limit {longest_target:.3f}"
     slack = _ANSWER_TOLERANCE * settings.gravity
     if not settings.min_thrust - slack <= answer.thrust <= settings.max_thrust + slack:
         limits = f"{settings.min_thrust:.2f} to {settings.max_thrust:.2f}"

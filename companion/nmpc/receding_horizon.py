@@ -57,7 +57,7 @@ class RecedingHorizon:
         inputs = [self._model.state, self._model.control, self._model.constants]
         self._target = ca.Function("target", inputs, [self._model.target])
         self._previous: Floats | None = None
-        self._time = 0.0
+        self._previous_time = 0.0
 
     def forget(self) -> None:
         """Start the next solve from its reference."""
@@ -90,7 +90,7 @@ class RecedingHorizon:
         if not (solution.solved and np.isfinite(solution.unknown).all()):
             self.forget()
             return _NO_PLAN
-        self._previous, self._time = solution.unknown, time
+        self._previous, self._previous_time = solution.unknown, time
         control = solution.unknown[len(start) : len(start) + model.control.numel()]
         target = np.asarray(self._target(start, control, constants), dtype=np.float64).ravel()
         return Plan(
@@ -98,9 +98,10 @@ class RecedingHorizon:
         )
 
     def _guess(self, time: float, nodes: Sequence[Node]) -> Floats:
-        if self._previous is None or not time >= self._time:
+        """The first guess: the previous plan shifted to `time`, or the reference."""
+        if self._previous is None or not time >= self._previous_time:
             return plan_on_reference(self._model, nodes, self._settings)
-        steps = (time - self._time) / self._settings.step
+        steps = (time - self._previous_time) / self._settings.step
         return shifted_plan(self._model, self._previous, steps)
 
 
@@ -127,14 +128,16 @@ def plan_on_reference(model: Model, nodes: Sequence[Node], settings: Settings) -
 
 
 def _shifted(rows: Floats, steps: float) -> Floats:
-    whole = floor(steps)
+    """Rows (one for each node) shifted forward by `steps`; the last row repeats."""
+    whole_steps = floor(steps)
     last = len(rows) - 1
-    before = np.minimum(np.arange(len(rows)) + whole, last)
+    before = np.minimum(np.arange(len(rows)) + whole_steps, last)
     after = np.minimum(before + 1, last)
-    return np.asarray(rows[before] + (steps - whole) * (rows[after] - rows[before]))
+    return np.asarray(rows[before] + (steps - whole_steps) * (rows[after] - rows[before]))
 
 
 def _interleaved(states: Floats, controls: Floats) -> Floats:
+    """The plan (x_0, u_0, …, x_N) of N + 1 states and N controls."""
     return np.concatenate([np.hstack([states[:-1], controls]).ravel(), states[-1]])
 
 

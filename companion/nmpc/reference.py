@@ -59,31 +59,31 @@ def node_of(
 ) -> Node:
     """Attitude and thrust of a sample: differential flatness of a point mass with drag.
 
-    The rotors must provide f = a + d − w − g, with d the deceleration by drag; its upward part is
-    kept above a fifth of gravity. |f| is the specific thrust, the horizontal part of f/|f| the
+    The rotors must provide f = a + d − w − g, with d the deceleration by drag. The upward part of f
+    is kept above a fifth of gravity. |f| is the specific thrust, the horizontal part of f/|f| the
     coefficients, and ḟ = jerk + ḋ gives their time derivative.
 
     Args:
         sample: sample of the trajectory.
         start: start of the trajectory.
-        nearby_heading: a heading, rad; that of the node is at most π from it.
+        nearby_heading: a heading, rad; the node's heading is unwrapped to within π of it.
         drag: drag of the vehicle.
         axis_drag: coefficient of `AxisDrag`, 1/m.
         gravity: m/s².
         disturbance: w, acceleration by wind and other unmodelled forces, m/s².
     """
     velocity, acceleration, jerk = sample.velocity, sample.acceleration, sample.jerk
-    slowed, growing = drag.deceleration(velocity), drag.deceleration_rate(velocity, acceleration)
+    d, d_rate = drag.deceleration(velocity), drag.deceleration_rate(velocity, acceleration)
     heading = nearby_heading + wrap_angle(start.turned + sample.heading - nearby_heading)
-    along_axes = AxisDrag(axis_drag, heading)
-    more = *along_axes.deceleration(*velocity[:2]), 0.0
+    axes = AxisDrag(axis_drag, heading)
+    axis_d = *axes.deceleration(*velocity[:2]), 0.0
     turn = sample.heading_rate
-    growing_more = *along_axes.deceleration_rate(velocity[:2], acceleration[:2], turn), 0.0
-    f_n, f_e, f_d = (acceleration[i] + slowed[i] + more[i] - disturbance[i] for i in range(3))
+    axis_d_rate = *axes.deceleration_rate(velocity[:2], acceleration[:2], turn), 0.0
+    f_n, f_e, f_d = (acceleration[i] + d[i] + axis_d[i] - disturbance[i] for i in range(3))
     f_d = min(f_d - gravity, -_LEAST_LIFT * gravity)
-    d_n, d_e, d_d = (jerk[i] + growing[i] + growing_more[i] for i in range(3))
+    rate_n, rate_e, rate_d = (jerk[i] + d_rate[i] + axis_d_rate[i] for i in range(3))
     thrust = sqrt(f_n * f_n + f_e * f_e + f_d * f_d)
-    growth = (f_n * d_n + f_e * d_e + f_d * d_d) / thrust
+    thrust_rate = (f_n * rate_n + f_e * rate_e + f_d * rate_d) / thrust
     north, east = f_n / thrust, f_e / thrust
     p_n, p_e, p_d = (start.position[i] + sample.position[i] for i in range(3))
     return Node(
@@ -91,8 +91,8 @@ def node_of(
         velocity,
         north,
         east,
-        (d_n - north * growth) / thrust,
-        (d_e - east * growth) / thrust,
+        (rate_n - north * thrust_rate) / thrust,
+        (rate_e - east * thrust_rate) / thrust,
         thrust,
         heading,
         sample.heading_rate,

@@ -59,7 +59,7 @@ class Worker:
         self._trajectory = trajectory
         self._predictor = Predictor(settings)
         self._horizon = RecedingHorizon(settings, make_model)
-        self._ahead = settings.lead + settings.dead_time
+        self._effect_delay = settings.lead + settings.dead_time
 
     def warm_up(self) -> None:
         """Solve a few times and discard the answers."""
@@ -76,19 +76,19 @@ class Worker:
     def answer(self, request: Request) -> Answer:
         """Compute the answer to a request, for the time at which it will be used."""
         began = perf_counter()
-        use = request.vehicle.time + self._settings.lead
+        use_time = request.vehicle.time + self._settings.lead
         try:
             plan = self._plan(request)
         except (InvalidQuaternionError, TiltedTooFarError):
             self.forget()
-            return _no_answer(request, Status.TILTED_TOO_FAR, use, perf_counter() - began)
+            return _no_answer(request, Status.TILTED_TOO_FAR, use_time, perf_counter() - began)
         if not plan.solved:
-            return _no_answer(request, Status.FAILED, use, perf_counter() - began)
+            return _no_answer(request, Status.FAILED, use_time, perf_counter() - began)
         return Answer(
             request.number,
             Status.SOLVED,
             monotonic(),
-            use,
+            use_time,
             plan.north,
             plan.east,
             wrap_angle(plan.heading),
@@ -100,17 +100,17 @@ class Worker:
 
     def _plan(self, request: Request) -> Plan:
         vehicle = request.vehicle
-        until = vehicle.time + self._ahead
+        until = vehicle.time + self._effect_delay
         motion = self._predictor.predict(vehicle, request.inputs, until)
         conditions = conditions_of(vehicle)
         nodes = self._nodes(request, motion.heading)
         return self._horizon.solve(until, motion, nodes, conditions)
 
     def _nodes(self, request: Request, heading: float) -> list[Node]:
-        """The reference over the horizon; its headings do not jump from `heading` on."""
+        """The reference over the horizon; its headings are unwrapped, beginning near `heading`."""
         settings, nodes = self._settings, list[Node]()
         for k in range(settings.steps + 1):
-            sample = self._trajectory.at(request.at + self._ahead + k * settings.step)
+            sample = self._trajectory.at(request.at + self._effect_delay + k * settings.step)
             node = node_of(
                 sample,
                 request.start,
@@ -125,8 +125,10 @@ class Worker:
         return nodes
 
 
-def _no_answer(request: Request, status: Status, use: float, seconds: float) -> Answer:
-    return Answer(request.number, status, monotonic(), use, 0.0, 0.0, 0.0, 0.0, seconds, 0.0, 0)
+def _no_answer(request: Request, status: Status, use_time: float, seconds: float) -> Answer:
+    return Answer(
+        request.number, status, monotonic(), use_time, 0.0, 0.0, 0.0, 0.0, seconds, 0.0, 0
+    )
 
 
 def main() -> None:

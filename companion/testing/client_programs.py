@@ -13,7 +13,7 @@ from companion.serve.session import ServeSession
 from companion.testing.flying import Configuration, as_config, environment, in_memory
 from companion.testing.vehicle import MockVehicle
 
-_LOOK_PERIOD = 0.02
+_POLL_PERIOD = 0.02
 """Period of the checks while `serving` and `Program.hears` wait, s of vehicle time."""
 
 
@@ -45,17 +45,17 @@ async def serving(
         in_memory(as_config(config), vehicle), {"serve": {"clients": ()}}, "the test"
     )
     session = ServeSession(served_config, note, None, environment, folder)
-    running = asyncio.ensure_future(session.run())
+    session_task = asyncio.ensure_future(session.run())
     try:
         while session.network is None:
-            if running.done():
-                running.result()
+            if session_task.done():
+                session_task.result()
                 raise RuntimeError("the session ended before its network was open")
-            await asyncio.sleep(_LOOK_PERIOD)
+            await asyncio.sleep(_POLL_PERIOD)
         yield session
     finally:
         session.stop()
-        await running
+        await session_task
 
 
 class Program(Client):
@@ -116,13 +116,14 @@ class Program(Client):
         Raises:
             TimeoutError: none came within `seconds` of vehicle time.
         """
-        before = len(self.of(name))
+        count_before = len(self.of(name))
         async with asyncio.timeout(seconds):
-            while len(self.of(name)) == before:  # noqa: ASYNC110  telemetry sets no events
-                await asyncio.sleep(_LOOK_PERIOD)
-        return self.of(name)[before]
+            while len(self.of(name)) == count_before:  # noqa: ASYNC110  telemetry sets no events
+                await asyncio.sleep(_POLL_PERIOD)
+        return self.of(name)[count_before]
 
     def _flush(self) -> None:
+        """Decode everything that waits for this client."""
         while self._waiting:
             data, _ = self._dequeue(100_000)
             self.heard += self._parser.parse_buffer(data) or ()

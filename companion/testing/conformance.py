@@ -43,7 +43,7 @@ def check_planner(planner: str | Law | type[Planner], seed: int = 0) -> None:
 
     Raises:
         AssertionError: it may not fly; the message gives the attitude or target at which it began,
-            and its target.
+            and the target that it followed.
         PluginError: the plug-in cannot be loaded, or two packages give it.
         ValueError: there is no planner of that name.
     """
@@ -63,9 +63,9 @@ def check_planner(planner: str | Law | type[Planner], seed: int = 0) -> None:
             f"a yaw rate of {rates.yaw} rad/s exceeds the limit, {case}"
         )
         w, x, y, z = q
-        other = _first_rates(planner, (-w, -x, -y, -z), target)
-        apart = max(abs(a - b) for a, b in zip(rates, other, strict=True))
-        assert apart < 1e-6, f"q and −q give rates that differ by {apart} rad/s, {case}"
+        rates_at_negative_q = _first_rates(planner, (-w, -x, -y, -z), target)
+        difference = max(abs(a - b) for a, b in zip(rates, rates_at_negative_q, strict=True))
+        assert difference < 1e-6, f"q and −q give rates that differ by {difference} rad/s, {case}"
     for _ in range(_CASE_COUNT // 20):
         _check_convergence(planner, _any_target(rng), _any_target(rng))
 
@@ -90,8 +90,8 @@ def check_guidance(name: str) -> None:
         )
         summary = fly({**changes, "thrust": {"hover_thrust": hover}}, vehicle)
         assert summary.result == "ok", f"{autopilot}: {summary.result}"
-        strayed = summary.tracking()["position_max_m"]
-        assert strayed < _MAX_DISTANCE, f"{autopilot}: {strayed:.2f} m away from its reference"
+        distance = summary.tracking()["position_max_m"]
+        assert distance < _MAX_DISTANCE, f"{autopilot}: {distance:.2f} m away from its reference"
 
 
 _BOOT_S = 0.5
@@ -101,22 +101,22 @@ _SAFE_PARAMETERS = {"ardupilot": {"GUID_OPTIONS": 8, "ATC_ANGLE_BOOST": 0, "GUID
 """Parameters without which the preflight checks refuse the vehicle."""
 
 
-def _made(planner: str | Law | type[Planner]) -> Planner:
+def _make(planner: str | Law | type[Planner]) -> Planner:
     return make_planner(planner, gain=_GAIN, limits=_LIMITS)
 
 
 def _first_rates(planner: str | Law | type[Planner], q: Quaternion, target: Target) -> BodyRates:
-    made, still = _made(planner), BodyRates(0.0, 0.0, 0.0)
-    made.reset(q, still)
-    return BodyRates(*made.rates(q, target, _DT, still))
+    instance, still = _make(planner), BodyRates(0.0, 0.0, 0.0)
+    instance.reset(q, still)
+    return BodyRates(*instance.rates(q, target, _DT, still))
 
 
 def _check_convergence(planner: str | Law | type[Planner], begin: Target, end: Target) -> None:
-    made, rates = _made(planner), BodyRates(0.0, 0.0, 0.0)
+    instance, rates = _make(planner), BodyRates(0.0, 0.0, 0.0)
     q = attitude(Coefficients(begin.north, begin.east), begin.heading)
-    made.reset(q, rates)
+    instance.reset(q, rates)
     for _ in range(round(_SETTLING_TIME / _DT)):
-        rates = BodyRates(*made.rates(q, end, _DT, rates))
+        rates = BodyRates(*instance.rates(q, end, _DT, rates))
         q = after_constant_rates(q, rates, _DT)
     reached = coefficients(q)
     remaining = hypot(reached.north - end.north, reached.east - end.east)

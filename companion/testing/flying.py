@@ -38,7 +38,7 @@ def run(vehicle: MockVehicle, main: Coroutine[Any, Any, T]) -> T:
     match the vehicle.
 
     Raises:
-        KeyboardInterrupt: Ctrl-C came, also where a flight ended by it and returned.
+        KeyboardInterrupt: Ctrl-C came, even if the flight then ended and returned.
         UnseenError: a task or callback failed, and the error was not handled.
     """
     unseen: list[dict[str, Any]] = []
@@ -47,7 +47,7 @@ def run(vehicle: MockVehicle, main: Coroutine[Any, Any, T]) -> T:
         clock = VirtualClock(vehicle.time)
         return VirtualEventLoop(clock, wire_to(vehicle, clock))
 
-    with _without_collections(), asyncio.Runner(loop_factory=make_loop) as runner:
+    with _without_garbage_collection(), asyncio.Runner(loop_factory=make_loop) as runner:
         runner.get_loop().set_exception_handler(lambda _, context: unseen.append(context))
         result = runner.run(_cancelled_by_ctrl_c(main))
     if unseen:
@@ -56,10 +56,10 @@ def run(vehicle: MockVehicle, main: Coroutine[Any, Any, T]) -> T:
 
 
 async def _cancelled_by_ctrl_c(main: Coroutine[Any, Any, T]) -> T:
-    """Return what `main` returns, unless Ctrl-C has cancelled it: a flight ends and returns then.
+    """Return the result of `main`; raise CancelledError if Ctrl-C came meanwhile.
 
-    Otherwise a campaign or a test would go on with the next flight. `asyncio.Runner` turns the
-    CancelledError into KeyboardInterrupt.
+    After Ctrl-C a flight ends and returns normally. Without the error, a campaign or a test would
+    go on with the next flight. `asyncio.Runner` turns the error into KeyboardInterrupt.
     """
     result = await main
     task = asyncio.current_task()
@@ -69,14 +69,14 @@ async def _cancelled_by_ctrl_c(main: Coroutine[Any, Any, T]) -> T:
 
 
 @contextmanager
-def _without_collections() -> Iterator[None]:
+def _without_garbage_collection() -> Iterator[None]:
     """Disable the garbage collector until the end, because it costs 7 % of a flight's time."""
-    collecting = gc.isenabled()
+    was_enabled = gc.isenabled()
     gc.disable()
     try:
         yield
     finally:
-        if collecting:
+        if was_enabled:
             gc.enable()
 
 

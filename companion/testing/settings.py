@@ -48,6 +48,11 @@ def mock_with(section: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[st
 
 
 def _put(section: dict[str, Any], path: list[str], value: Any) -> None:
+    """Set a value in a nested section.
+
+    Raises:
+        ConfigError: a name on the path has a value that is not a section.
+    """
     for depth, name in enumerate(path[:-1]):
         inner = section.get(name)
         if name in section and not isinstance(inner, dict):

@@ -18,7 +18,7 @@ from sitl_mock.simulation import Simulation
 Relay = Callable[[bytes], Iterable[bytes]]
 """Takes a datagram and returns the datagrams that arrive in its place."""
 
-_STATION = 255, 190
+_GROUND_STATION = 255, 190
 """MAVLink ids of a ground station."""
 _COMMAND_PARAMETERS = 7
 
@@ -53,7 +53,7 @@ class MockVehicle:
     Attributes:
         autopilot: "px4" or "ardupilot".
         settings: the whole section `mock`, with defaults.
-        in_lockstep: whether `lockstep` was asked for.
+        in_lockstep: whether the vehicle runs in lockstep with the program.
         delay_s: delay of each datagram, s; it has no effect in lockstep.
         setpoints: setpoints that reached the autopilot, oldest first. Clear the list to save
             memory.
@@ -78,24 +78,24 @@ class MockVehicle:
     ) -> None:
         if isinstance(lockstep, bool):
             lockstep = {"enabled": lockstep}
-        own = {} if autopilot is None else {"autopilot": autopilot}
-        stepping = {"lockstep": {"enabled": True, **lockstep}}
+        autopilot_key = {} if autopilot is None else {"autopilot": autopilot}
+        lockstep_key = {"lockstep": {"enabled": True, **lockstep}}
         # Without a socket, telemetry for a ground station would be built for nobody.
-        known = load_settings(config, {**own, **settings, **stepping, "gcs_port": 0})
-        self.autopilot: str = known.autopilot
-        self.in_lockstep, self.delay_s = known.lockstep.enabled, delay_s
+        whole = load_settings(config, {**autopilot_key, **settings, **lockstep_key, "gcs_port": 0})
+        self.autopilot: str = whole.autopilot
+        self.in_lockstep, self.delay_s = whole.lockstep.enabled, delay_s
         self.setpoints: list[ReceivedSetpoint] = []
         self.after_step: list[Callable[[], None]] = []
         self.to_companion: Relay | None = None
         self.from_companion: Relay | None = None
-        self.settings = known
-        self._simulation = Simulation(known, plant=_plant(compiled))
-        self._exchange = Exchange(known, self._simulation)
+        self.settings = whole
+        self._simulation = Simulation(whole, plant=_plant(compiled))
+        self._exchange = Exchange(whole, self._simulation)
         self._exchange.on_message = self._record_setpoint
         self._arrived: list[Arrived] = []
         self._begun = False
 
-    # --- what is true
+    # --- true state
 
     @property
     def time(self) -> float:
@@ -106,7 +106,7 @@ class MockVehicle:
         """The present true state."""
         return truth(self._simulation)
 
-    # --- what happens to it
+    # --- faults, pilot and ground station
 
     def inject(self, fault: Mapping[str, Any]) -> None:
         """Inject a fault, given as an entry of `mock.faults`.
@@ -131,7 +131,7 @@ class MockVehicle:
         padded = (*parameters, *[0.0] * (_COMMAND_PARAMETERS - len(parameters)))
         self.transmit(common.MAVLink_command_long_message(1, 1, number, 0, *padded))
 
-    def transmit(self, message: Any, sender: tuple[int, int] = _STATION) -> None:
+    def transmit(self, message: Any, sender: tuple[int, int] = _GROUND_STATION) -> None:
         """Let another station (system, component) send a pymavlink message to the autopilot."""
         frame = message.pack(common.MAVLink(None, *sender))
         self.receive(bytes(frame))
@@ -143,12 +143,12 @@ class MockVehicle:
     def when(self, condition: Callable[[], bool], action: Callable[[], object]) -> None:
         """Call `action` once after the first step at which `condition` holds."""
 
-        def look() -> None:
+        def check() -> None:
             if condition():
-                self.after_step.remove(look)
+                self.after_step.remove(check)
                 action()
 
-        self.after_step.append(look)
+        self.after_step.append(check)
 
     # --- time without the program
 
@@ -179,15 +179,15 @@ class MockVehicle:
         return self._simulation.next_us / 1e6
 
     def set_clock(self, clock_ns: Callable[[], int]) -> None:
-        """Set the clock of vehicle time (ns) for TIMESYNC; it advances between two steps."""
+        """Set the clock (vehicle time, ns) for TIMESYNC; it also advances between two steps."""
         simulation = self._simulation
 
-        def vehicle_time_us() -> int:
+        def vehicle_time_ns() -> int:
             if simulation.effects.clock_frozen:
                 return simulation.state.shown_us * 1000
             return min(max(clock_ns(), simulation.time_us * 1000), simulation.next_us * 1000)
 
-        simulation.set_clock(vehicle_time_us)
+        simulation.set_clock(vehicle_time_ns)
 
     def receive(self, datagram: bytes) -> None:
         """Take a datagram of the companion link; in lockstep it waits for the next step."""
@@ -222,8 +222,8 @@ class MockVehicle:
         arrived, self._arrived = self._arrived, []
         beacon = self._exchange.step(arrived)
         datagrams = self._exchange.outgoing(self._simulation.companion, beacon)
-        for look in tuple(self.after_step):
-            look()
+        for callback in tuple(self.after_step):
+            callback()
         return self._relayed(datagrams)
 
     def take_slip(self) -> float:

@@ -20,7 +20,7 @@ class VirtualClock:
 
     def __init__(self, now: float) -> None:
         self.now = now
-        self._beacon: float | None = None
+        self._last_beacon: float | None = None
 
     def read(self) -> float:
         """The loop's time, s."""
@@ -32,9 +32,9 @@ class VirtualClock:
 
     def advance(self, vehicle_time: float) -> bool:
         """Set the time by a lockstep beacon, s; return false for a repeated one."""
-        if self._beacon is not None and vehicle_time <= self._beacon:
+        if self._last_beacon is not None and vehicle_time <= self._last_beacon:
             return False
-        self._beacon = self.now = vehicle_time
+        self._last_beacon = self.now = vehicle_time
         return True
 
 
@@ -67,9 +67,9 @@ class _VirtualSelector(SettlingSelector):
             self._world.deliver_due()
         else:
             until = float("inf") if timeout is None else self._clock.now + timeout
-            before = self.scheduled
+            count_before = self.scheduled
             # Most messages only call functions of the program, and schedule nothing.
-            while self.scheduled == before and not self.settling and self._clock.now < until:
+            while self.scheduled == count_before and not self.settling and self._clock.now < until:
                 self._world.advance(until)
         return []
 
@@ -88,8 +88,8 @@ class VirtualEventLoop(LockstepEventLoop):
 
     def __init__(self, clock: VirtualClock, world: World) -> None:
         self.clock, self.world = clock, world
-        self._virtual = _VirtualSelector(clock, world)
-        super().__init__(clock, self._virtual)
+        self._virtual_selector = _VirtualSelector(clock, world)
+        super().__init__(clock, self._virtual_selector)
 
     def time(self) -> float:
         """The clock's time, s."""
@@ -102,7 +102,7 @@ class VirtualEventLoop(LockstepEventLoop):
         context: Context | None = None,
     ) -> asyncio.Handle:
         """Schedule a callback; the vehicle waits until it has run."""
-        self._virtual.scheduled += 1
+        self._virtual_selector.scheduled += 1
         return super().call_soon(callback, *args, context=context)
 
     def call_soon_threadsafe(
@@ -112,7 +112,7 @@ class VirtualEventLoop(LockstepEventLoop):
         context: Context | None = None,
     ) -> asyncio.Handle:
         """Schedule a callback from another thread; see `call_soon`."""
-        self._virtual.scheduled += 1
+        self._virtual_selector.scheduled += 1
         return super().call_soon_threadsafe(callback, *args, context=context)
 
     def call_at(
@@ -123,5 +123,5 @@ class VirtualEventLoop(LockstepEventLoop):
         context: Context | None = None,
     ) -> asyncio.TimerHandle:
         """Schedule a timer; the vehicle advances at most to this time."""
-        self._virtual.scheduled += 1
+        self._virtual_selector.scheduled += 1
         return super().call_at(when, callback, *args, context=context)

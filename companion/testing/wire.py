@@ -90,16 +90,16 @@ class Wire:
         """Take a frame of the program."""
         self._vehicle.receive(frame)
 
-    def _deliver(self, datagram: bytes, at: float) -> None:
+    def _deliver(self, datagram: bytes, time: float) -> None:
         if self._transport is not None and self._transport.is_open:
-            self._transport.deliver(datagram, round(at * 1e9))
+            self._transport.deliver(datagram, round(time * 1e9))
 
 
 class LockstepWire(Wire):
     """In lockstep: the vehicle steps when the program has settled; a beacon moves the clock."""
 
     def deliver_due(self) -> None:
-        """Nothing arrives between two steps."""
+        """Do nothing: no datagram arrives between two steps."""
 
     def advance(self, until: float) -> None:
         """Let the vehicle make a step; the program's timers wait for it."""
@@ -117,11 +117,12 @@ class FreeWire(Wire):
         super().__init__(vehicle, clock)
         self._delay = vehicle.delay_s
         self._burst = vehicle.settings.burst_ms * 1e-3
-        # (arrival, s; whether to the program; datagram). All take the same time, so the order of
-        # sending is that of arrival.
-        self._under_way: deque[tuple[float, bool, bytes]] = deque()
-        self._slipped = clock.now - vehicle.time  # of the vehicle behind the clock, s
-        vehicle.set_clock(lambda: round((clock.now - self._slipped) * 1e9))
+        # (arrival time, s; whether the program receives it; datagram). All have the same delay, so
+        # they arrive in the order of sending.
+        self._in_transit: deque[tuple[float, bool, bytes]] = deque()
+        # Time by which vehicle time is behind the clock, s.
+        self._behind_clock = clock.now - vehicle.time
+        vehicle.set_clock(lambda: round((clock.now - self._behind_clock) * 1e9))
 
     def deliver_due(self) -> None:
         """Deliver what arrives at the present time, in the order of sending."""
@@ -129,43 +130,43 @@ class FreeWire(Wire):
 
     def advance(self, until: float) -> None:
         """Advance until something reaches the program, but at most to `until`."""
-        clock, under_way = self._clock, self._under_way
+        clock, in_transit = self._clock, self._in_transit
         step_at = self._next_step_at()
         while True:
-            arrival = under_way[0][0] if under_way else step_at
+            arrival = in_transit[0][0] if in_transit else step_at
             clock.now = max(clock.now, min(until, arrival, step_at))
-            reached = clock.now >= arrival and self._deliver_due()
+            received = clock.now >= arrival and self._deliver_due()
             if clock.now >= step_at:
                 self._send(self._vehicle.begin())
                 self._send(self._vehicle.step())
-                self._slipped += self._vehicle.take_slip()
+                self._behind_clock += self._vehicle.take_slip()
                 step_at = self._next_step_at()
-                reached = self._deliver_due() or reached
-            if reached or clock.now >= until:
+                received = self._deliver_due() or received
+            if received or clock.now >= until:
                 return
 
     def _next_step_at(self) -> float:
-        return burst_time(self._vehicle.next_step_at, self._burst) + self._slipped
+        return burst_time(self._vehicle.next_step_at, self._burst) + self._behind_clock
 
     def _deliver_due(self) -> bool:
         """Deliver what is due; return whether the program received something."""
-        under_way, now, reached = self._under_way, self._clock.now, False
-        while under_way and under_way[0][0] <= now:
-            _, to_program, datagram = under_way.popleft()
+        in_transit, now, received = self._in_transit, self._clock.now, False
+        while in_transit and in_transit[0][0] <= now:
+            _, to_program, datagram = in_transit.popleft()
             if to_program:
-                reached = True
+                received = True
                 self._deliver(datagram, now)
             else:
                 self._vehicle.receive(datagram)
                 self._send(self._vehicle.sent())
-        return reached
+        return received
 
     def _take(self, frame: bytes) -> None:
-        self._under_way.append((self._clock.now + self._delay, False, frame))
+        self._in_transit.append((self._clock.now + self._delay, False, frame))
 
     def _send(self, datagrams: list[bytes]) -> None:
-        due = self._clock.now + self._delay
-        self._under_way.extend((due, True, datagram) for datagram in datagrams)
+        arrival = self._clock.now + self._delay
+        self._in_transit.extend((arrival, True, datagram) for datagram in datagrams)
 
 
 def wire_to(vehicle: MockVehicle, clock: VirtualClock) -> LockstepWire | FreeWire:

@@ -24,7 +24,9 @@ _RESPONSE_PERIOD = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Disturbances:
-    """Disturbances of the vehicle on each horizontal axis; densities are one-sided.
+    """Disturbances of the vehicle on each horizontal axis.
+
+    Densities are one-sided amplitude spectral densities.
 
     Attributes:
         gust: standard deviation of the wind speed, m/s; drag turns it into an acceleration.
@@ -32,11 +34,11 @@ class Disturbances:
         velocity_error: standard deviation of the slow error of the estimated velocity on a path,
             m/s.
         push: standard deviation of the slow error of the predicted acceleration on a path, m/s².
-        path_time: correlation time of these two, s.
+        path_time: correlation time of `velocity_error` and `push`, s.
         wander: density of the velocity error in hover, m/s/√Hz.
         shake: density of the acceleration that tilt and drag do not explain, m/s²/√Hz.
-        position_noise: noise of a single position, m.
-        velocity_noise: noise of a single velocity, m/s.
+        position_noise: standard deviation of the noise of a single position, m.
+        velocity_noise: standard deviation of the noise of a single velocity, m/s.
         source: source of the last four values, for the user.
     """
 
@@ -59,7 +61,7 @@ class Errors(NamedTuple):
         gusts: position error due to gusts, m.
         path: position error on a path at 5 m/s, m.
         noise: position error due to the noise of the estimate, m.
-        rate: commanded roll and pitch rate due to all of them, rad/s.
+        rate: commanded roll and pitch rate due to gusts, path and noise, rad/s.
     """
 
     gusts: float
@@ -117,32 +119,38 @@ def expected_errors(loop: Loop, disturbances: Disturbances, period: float) -> Er
         period: time between two positions, s.
     """
     omega = loop.s.imag
-    push, speed = loop.by_acceleration(), loop.by_velocity_error()
-    place = loop.by_position_error()
-    gusts = ((push, _slow(omega, disturbances.gust * loop.drag, disturbances.gust_time)),)
+    push, velocity = loop.by_acceleration(), loop.by_velocity_error()
+    position = loop.by_position_error()
+    gusts = ((push, _slow_density(omega, disturbances.gust * loop.drag, disturbances.gust_time)),)
     path = (
-        (speed, _slow(omega, disturbances.velocity_error, disturbances.path_time)),
-        (push, _slow(omega, disturbances.push, disturbances.path_time)),
+        (velocity, _slow_density(omega, disturbances.velocity_error, disturbances.path_time)),
+        (push, _slow_density(omega, disturbances.push, disturbances.path_time)),
     )
     noise = (
-        (speed, disturbances.wander**2 + 2.0 * period * disturbances.velocity_noise**2),
+        (velocity, disturbances.wander**2 + 2.0 * period * disturbances.velocity_noise**2),
         (push, disturbances.shake**2),
-        (place, 2.0 * period * disturbances.position_noise**2),
+        (position, 2.0 * period * disturbances.position_noise**2),
     )
-    parts = (gusts, path, noise)
+    causes = (gusts, path, noise)
     # Both axes are disturbed independently, therefore the factor 2.
     by_gusts, on_path, by_noise = (
-        sqrt(sum(2.0 * _variance(omega, response[0], density) for response, density in part))
-        for part in parts
+        sqrt(sum(2.0 * _variance(omega, response[0], density) for response, density in terms))
+        for terms in causes
     )
     rate_variance = sum(
-        2.0 * _variance(omega, r[1], density) for part in parts for r, density in part
+        2.0 * _variance(omega, r[1], density) for terms in causes for r, density in terms
     )
     return Errors(by_gusts, on_path, by_noise, sqrt(rate_variance))
 
 
-def _slow(omega: Floats, deviation: float, time: float) -> Floats:
-    """One-sided density per Hz of first-order noise of this standard deviation."""
+def _slow_density(omega: Floats, deviation: float, time: float) -> Floats:
+    """One-sided power density (n,), per Hz, of first-order noise.
+
+    Args:
+        omega: (n,), frequencies, rad/s.
+        deviation: standard deviation of the noise.
+        time: its correlation time, s.
+    """
     density: Floats = 4.0 * deviation**2 * time / (1.0 + (omega * time) ** 2)
     return density
 
@@ -166,22 +174,22 @@ def expectation(config: Config, disturbances: Disturbances) -> Expectation:
 
 
 def _variance(omega: Floats, response: Complex, density: Floats | float) -> float:
-    """Variance of a response to noise of a one-sided density per Hz."""
+    """Variance of a response to noise of a one-sided power density, per Hz."""
     return float(np.trapezoid(np.abs(response) ** 2 * density, omega) / (2.0 * pi))
 
 
 def _after_gust(config: Config) -> tuple[float, float]:
-    """Peak (m) and settling time (s) of the position after an impulse of 1 m/s."""
-    offset = 0.1  # 1/s; the frequencies are shifted by it, as for `frequencies`
+    """Peak (m) and settling time (s) of the position after the velocity jumps by 1 m/s."""
+    offset = 0.1  # 1/s; real part of the frequencies, so that the integrators lie to their left
     omega = np.arange(0.0, 60.0, 0.05)
     s = np.asarray(offset + 1j * omega, dtype=np.complex128)
-    place, _ = control_loop(config, s).by_acceleration()
+    position, _ = control_loop(config, s).by_acceleration()
     time = np.arange(0.0, _RESPONSE_DURATION, _RESPONSE_PERIOD)
-    terms = np.real(np.exp(1j * np.outer(time, omega)) @ (place * _trapezoid(omega)))
+    terms = np.real(np.exp(1j * np.outer(time, omega)) @ (position * _trapezoid(omega)))
     response = np.abs(np.exp(offset * time) * terms / pi)
     peak = float(response.max())
-    beyond = np.flatnonzero(response > _SETTLED_SHARE * peak)
-    return peak, float(time[beyond[-1]]) + _RESPONSE_PERIOD
+    unsettled = np.flatnonzero(response > _SETTLED_SHARE * peak)
+    return peak, float(time[unsettled[-1]]) + _RESPONSE_PERIOD
 
 
 def _trapezoid(omega: Floats) -> Floats:

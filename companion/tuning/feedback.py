@@ -53,37 +53,37 @@ def guidance_feedback(
         drag: linear drag that the program assumes, 1/s.
         position_period: time between two positions, s.
     """
-    by_acceleration, by_position, by_velocity = _states(s, observer, position_period)
+    by_acceleration, by_position, by_velocity = _observer_responses(s, observer, position_period)
     age = 0.5 * position_period
-    late = np.exp(-s * age)[:, None]
-    ahead = guidance.tilt.dead_time + 0.5 * guidance.period
+    delayed = np.exp(-s * age)[:, None]
+    prediction = guidance.tilt.dead_time + 0.5 * guidance.period
     # The known acceleration is g·c − drag·v; between two positions its newest value is used.
-    sources = (
+    inputs = (
         (GRAVITY * by_acceleration, GRAVITY),
         (by_velocity - drag * by_acceleration, -drag),
         (by_position, 0.0),
     )
-    terms = []
-    for states, known in sources:
-        place, speed, disturbance = (late * states).T
-        speed_now = speed + age * (disturbance + known)
-        speed_then = speed + (age + ahead) * (disturbance + known)
-        span = age + ahead
-        place_then = place + span * speed + 0.5 * span * span * (disturbance + known)
+    responses = []
+    for observed, known in inputs:
+        position, velocity, disturbance = (delayed * observed).T
+        velocity_now = velocity + age * (disturbance + known)
+        velocity_then = velocity + (age + prediction) * (disturbance + known)
+        span = age + prediction
+        position_then = position + span * velocity + 0.5 * span * span * (disturbance + known)
         by_tilt = max(known, 0.0)  # drag acts on the observed velocity, not on the measured one
-        acceleration = by_tilt - drag * speed_now + disturbance
+        acceleration = by_tilt - drag * velocity_now + disturbance
         gains = guidance.gains
-        wanted = (
-            gains.position * place_then
-            + gains.velocity * speed_then
+        command = (
+            gains.position * position_then
+            + gains.velocity * velocity_then
             + gains.acceleration * acceleration
             + disturbance
         )
-        terms.append(wanted / GRAVITY)
-    return Feedback(*terms)
+        responses.append(command / GRAVITY)
+    return Feedback(*responses)
 
 
-def _states(
+def _observer_responses(
     s: Complex, observer: ObserverSettings, period: float
 ) -> tuple[Complex, Complex, Complex]:
     """Responses (n, 3) of the observed position, velocity and disturbance.
@@ -103,9 +103,9 @@ def _states(
             [gains.disturbance * pull, gains.disturbance],
         ]
     )
-    kept = np.eye(3) - k @ c
+    i_minus_kc = np.eye(3) - k @ c
     z = np.exp(s * period)
-    advanced = np.linalg.inv(z[:, None, None] * np.eye(3) - kept @ a) * z[:, None, None]
-    by_acceleration = (advanced @ (kept @ b)) * hold_element(s, period)[:, None]
-    by_measured = advanced @ k
-    return by_acceleration, by_measured[:, :, 0], by_measured[:, :, 1]
+    resolvent = np.linalg.inv(z[:, None, None] * np.eye(3) - i_minus_kc @ a) * z[:, None, None]
+    by_acceleration = (resolvent @ (i_minus_kc @ b)) * hold_element(s, period)[:, None]
+    by_measurement = resolvent @ k
+    return by_acceleration, by_measurement[:, :, 0], by_measurement[:, :, 1]

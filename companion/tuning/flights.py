@@ -25,8 +25,8 @@ _MAX_THRUST = 0.95
 _FENCE_SIZE = 50.0  # m
 _WIRE_S = 0.0005
 """Delay of each datagram between program and mock vehicle, s."""
-_TRUTH_EVERY = 5
-"""Steps of the mock vehicle between two true positions."""
+_STEPS_PER_TRUTH_ROW = 5
+"""Steps of the mock vehicle from one recorded true position to the next."""
 _QUICK_TAKEOFF_AND_LANDING = {
     "px4": {"MPC_TKO_RAMP_T": 0.3, "MPC_TKO_SPEED": 3.0, "MPC_LAND_SPEED": 3.0},
     "ardupilot": {"LAND_SPEED": 150.0},
@@ -67,7 +67,7 @@ class CourseResult:
         estimate: RMS of the distance between true and estimated position, m; no setting reduces it.
         rate: commanded roll and pitch rate, rad/s, RMS.
         rate_limited: share of the setpoints at the rate limit.
-        speed: largest speed of the reference, m/s; lower than the course's if it was slowed down.
+        speed: largest speed of the reference, m/s; below the course's if it was slowed down.
     """
 
     result: str
@@ -93,9 +93,9 @@ def autopilot_like(config: Config) -> str:
 def fly_course(config: Config, course: Course, autopilot: str, seed: int = 3) -> CourseResult:
     """Fly a course on the mock vehicle, with this configuration's gains and vehicle times.
 
-    Limits of tilt and tilt rate are the configured ones: a course that needs more, with what
-    feedback and wind need, is slowed down. Thrust, take-off and fence are those of the mock vehicle
-    and the course, and nothing is signed.
+    The configured limits of tilt and tilt rate apply. A course that would exceed them, with a
+    reserve for feedback and wind, is slowed down. Thrust, take-off height and fence suit the mock
+    vehicle and the course, and no message is signed.
 
     Args:
         config: the configuration.
@@ -118,7 +118,7 @@ def fly_course(config: Config, course: Course, autopilot: str, seed: int = 3) ->
         parameters={**parameters, **_QUICK_TAKEOFF_AND_LANDING[autopilot]},
     )
     flown_config = _flight_config(config, course, mock)
-    with _truth(vehicle) as rows:
+    with _recorded_truth(vehicle) as rows:
         summary = fly(flown_config, vehicle)
     if summary.result != "ok":
         return CourseResult(summary.result)
@@ -132,26 +132,26 @@ def _tracking(
 
     Args:
         tracking: rows of the flight's tracking record.
-        truth: rows of `_truth`.
+        truth: rows of `_recorded_truth`.
         vehicle: vehicle after the flight.
         flown_config: configuration of the flight.
     """
     time, reference = tracking[:, 0], tracking[:, 1:3]
     speed = np.hypot(*np.gradient(reference, time, axis=0).T)
     moving = np.flatnonzero(speed > 0.05)
-    part = slice(moving[0], moving[-1] + 1)
+    moving_rows = slice(moving[0], moving[-1] + 1)
     true = np.column_stack([np.interp(time, truth[:, 0], each) for each in truth[:, 1:].T])
-    during = [
+    tilt_rates = [
         hypot(*each.rates[:2])
         for each in vehicle.setpoints
         if time[moving[0]] <= each.time <= time[moving[-1]]
     ]
-    rates, limit = np.array(during), flown_config.limits.max_tilt_rate
+    rates, limit = np.array(tilt_rates), flown_config.limits.max_tilt_rate
     return CourseResult(
         "ok",
-        _rms(tracking[part, 4:6] - reference[part]),
-        _rms(true[part] - reference[part]),
-        _rms(true[part] - tracking[part, 4:6]),
+        _rms(tracking[moving_rows, 4:6] - reference[moving_rows]),
+        _rms(true[moving_rows] - reference[moving_rows]),
+        _rms(true[moving_rows] - tracking[moving_rows, 4:6]),
         float(np.sqrt(np.mean(rates**2))),
         float(np.mean(rates > 0.99 * limit)),
         float(speed.max()),
@@ -163,21 +163,21 @@ def _rms(offsets: _Rows) -> float:
 
 
 @contextmanager
-def _truth(vehicle: MockVehicle) -> Iterator[list[tuple[float, float, float]]]:
+def _recorded_truth(vehicle: MockVehicle) -> Iterator[list[tuple[float, float, float]]]:
     """Rows of time and true position north and east, filled while the vehicle flies."""
     rows: list[tuple[float, float, float]] = []
     steps = 0
 
-    def note() -> None:
+    def record() -> None:
         nonlocal steps
         steps += 1
-        if steps % _TRUTH_EVERY == 0:
+        if steps % _STEPS_PER_TRUTH_ROW == 0:
             north, east, _ = vehicle.state()["position"]
             rows.append((vehicle.time, north, east))
 
-    vehicle.after_step.append(note)
+    vehicle.after_step.append(record)
     yield rows
-    vehicle.after_step.remove(note)
+    vehicle.after_step.remove(record)
 
 
 def _flight_config(config: Config, course: Course, mock: Config) -> Config:
@@ -207,8 +207,8 @@ def _flight_config(config: Config, course: Course, mock: Config) -> Config:
 
 
 def _reserve(config: Config, course: Course, mock: Config) -> float:
-    """Horizontal acceleration to leave for feedback, and for holding against the wind, m/s²."""
-    strongest = course.wind.get("speed_m_s", 0.0) + _STRONG_GUST * course.wind.get("gust_m_s", 0.0)
-    against, _, _ = (mock.guidance.drag or NO_DRAG).deceleration((strongest, 0.0, 0.0))
-    most = _LARGEST_RESERVE * config.limits.largest_horizontal
-    return min(config.flight.slow_down_reserve_m_s2 + against, most)
+    """Horizontal acceleration to reserve for feedback and against the drag in the wind, m/s²."""
+    wind_peak = course.wind.get("speed_m_s", 0.0) + _STRONG_GUST * course.wind.get("gust_m_s", 0.0)
+    wind_deceleration, _, _ = (mock.guidance.drag or NO_DRAG).deceleration((wind_peak, 0.0, 0.0))
+    largest_reserve = _LARGEST_RESERVE * config.limits.largest_horizontal
+    return min(config.flight.slow_down_reserve_m_s2 + wind_deceleration, largest_reserve)

@@ -25,7 +25,7 @@ from companion.tuning.feedback import Complex, guidance_feedback, hold_element
 POSITION_LATENESS = 0.010
 """Delay of the autopilot's position that its time stamp does not show, s."""
 _USUAL_LAG, _USUAL_DEAD_TIME = 0.07, 0.05
-"""Lag and dead time of a heavy vehicle's rate loop, s, if none is identified (`hold_settings`)."""
+"""Lag and dead time, s, assumed if none is identified: a heavy vehicle's (`hold_settings`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,9 +87,9 @@ class Loop:
         tilt = self._tilt(self.velocity)
         return GRAVITY * tilt / (self.s * (self.s + self.drag)), tilt / self.rates
 
-    def _tilt(self, asked: Complex) -> Complex:
-        """Closed-loop coefficient if `asked` is subtracted from guidance's command."""
-        return -self.command * asked / (1.0 + self.whole)
+    def _tilt(self, subtracted: Complex) -> Complex:
+        """Closed-loop coefficient if `subtracted` is subtracted from guidance's command."""
+        return -self.command * subtracted / (1.0 + self.whole)
 
 
 def control_loop(config: Config, s: Complex, error: ModelError = EXACT) -> Loop:
@@ -98,7 +98,7 @@ def control_loop(config: Config, s: Complex, error: ModelError = EXACT) -> Loop:
     Args:
         config: gains, weights and the assumed vehicle.
         s: (n,), rad/s, none of them 0.
-        error: difference of the real rate loop.
+        error: difference between the real rate loop and the configured one.
 
     Raises:
         ConfigError: the model does not support the configured planner or guidance.
@@ -109,24 +109,24 @@ def control_loop(config: Config, s: Complex, error: ModelError = EXACT) -> Loop:
             "analysed; set planner.name: auto and guidance.kind: linear"
         )
     guidance, drag = linear_settings(config), drag_prior(config).drag.linear
-    forward, back = _planner(config, s)
-    axis, times = _slower_axis(config), error.time_factor
-    late = np.exp(-s * (times * axis.dead_time + error.delay))
-    rates = error.gain * late / (1.0 + times * s * (axis.lag + times * s * axis.sigma)) / s
-    held = hold_element(s, 1.0 / config.link.attitude_rate_hz)
-    measured = guidance_feedback(
+    target_gain, rate_feedback = _planner_response(config, s)
+    axis, factor = _slower_axis(config), error.time_factor
+    dead_time = np.exp(-s * (factor * axis.dead_time + error.delay))
+    rates = error.gain * dead_time / (1.0 + factor * s * (axis.lag + factor * s * axis.sigma)) / s
+    hold = hold_element(s, 1.0 / config.link.attitude_rate_hz)
+    feedback = guidance_feedback(
         s, guidance, observer_settings(config), drag, 1.0 / config.link.position_rate_hz
     )
-    command = rates * forward * hold_element(s, guidance.period)
-    attitude = rates * held * back
-    unstamped = np.exp(-s * POSITION_LATENESS)
-    velocity, position = measured.velocity * unstamped, measured.position * unstamped
+    command = rates * target_gain * hold_element(s, guidance.period)
+    attitude_path = rates * hold * rate_feedback
+    position_delay = np.exp(-s * POSITION_LATENESS)
+    velocity, position = feedback.velocity * position_delay, feedback.position * position_delay
     to_velocity = GRAVITY / (s + drag)
-    fed_back = command * (measured.tilt + to_velocity * (velocity + position / s))
+    guidance_path = command * (feedback.tilt + to_velocity * (velocity + position / s))
     return Loop(
         s=s,
-        whole=attitude + fed_back,
-        outer=fed_back / (1.0 + attitude),
+        whole=attitude_path + guidance_path,
+        outer=guidance_path / (1.0 + attitude_path),
         rates=rates,
         command=command,
         velocity=velocity,
@@ -143,7 +143,7 @@ def _slower_axis(config: Config) -> AxisResponse:
     return AxisResponse(lag, dead_time, damping=tilt_damping(config))
 
 
-def _planner(config: Config, s: Complex) -> tuple[Complex, float]:
+def _planner_response(config: Config, s: Complex) -> tuple[Complex, float]:
     """Body rate per target coefficient, and, with the opposite sign, per measured coefficient, 1/s.
 
     `model-following` sends the rates that compensate the lag of its model of the motion, and feeds
@@ -154,9 +154,9 @@ def _planner(config: Config, s: Complex) -> tuple[Complex, float]:
     if config.planner_name != MODEL_FOLLOWING:
         return np.full_like(s, gain), gain
     axis = _slower_axis(config)
-    back, slowest = feedback_gain(gain, axis), model_lag(gain, axis.lag)
-    braking = 1.0 + gain * braking_lead(gain, slowest)
-    model = gain / (s * (braking + s * (slowest + s * axis.sigma)) + gain)
-    led = s * (1.0 + s * (axis.lag + s * axis.sigma))
-    forward = (led + back * np.exp(-s * axis.dead_time)) * model
-    return forward, back
+    feedback, reference_lag = feedback_gain(gain, axis), model_lag(gain, axis.lag)
+    braking = 1.0 + gain * braking_lead(gain, reference_lag)
+    model = gain / (s * (braking + s * (reference_lag + s * axis.sigma)) + gain)
+    inverse_lag = s * (1.0 + s * (axis.lag + s * axis.sigma))
+    forward = (inverse_lag + feedback * np.exp(-s * axis.dead_time)) * model
+    return forward, feedback

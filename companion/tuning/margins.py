@@ -9,7 +9,7 @@ from companion.tuning.feedback import Complex
 
 _REAL_PART = 1e-2
 """Real part of the frequencies, 1/s, so that the integrators of the loop lie to their left."""
-_UP_TO = 150.0
+_HIGHEST_FREQUENCY = 150.0
 """Highest frequency, rad/s; guidance at 50 Hz has its Nyquist frequency at 157 rad/s."""
 _FREQUENCY_COUNT = 120
 
@@ -17,11 +17,11 @@ _FREQUENCY_COUNT = 120
 def frequencies() -> Complex:
     """Complex frequencies s (n,) for margins and errors, rad/s.
 
-    The real part is `_REAL_PART`; the imaginary part rises from 0 to `_UP_TO`, with most points
-    above 0.05 rad/s.
+    The real part is `_REAL_PART`. The imaginary part rises from 0 to `_HIGHEST_FREQUENCY`, with
+    most points above 0.05 rad/s.
     """
     low = np.geomspace(1e-3, 0.05, 12)[:-1]
-    high = np.geomspace(0.05, _UP_TO, _FREQUENCY_COUNT)
+    high = np.geomspace(0.05, _HIGHEST_FREQUENCY, _FREQUENCY_COUNT)
     s: Complex = _REAL_PART + 1j * np.concatenate([[0.0], low, high])
     return s
 
@@ -34,8 +34,8 @@ class Margins(NamedTuple):
             -180°.
         phase_deg: phase margin, degrees; infinite if the gain never crosses 1.
         delay: delay margin, s; infinite if the gain never crosses 1.
-        stable: whether the closed loop is stable; if not, the other values are no margins, but say
-            how far it is from stability.
+        stable: whether the closed loop is stable; if not, the other values say how far it is from
+            stability.
     """
 
     gain_db: float
@@ -60,24 +60,24 @@ def margins(s: Complex, loop_gain: Complex) -> Margins:
         s: (n,), result of `frequencies`.
         loop_gain: (n,), loop gain L at `s`.
     """
-    omega, size = s.imag, np.abs(loop_gain)
+    omega, gain = s.imag, np.abs(loop_gain)
     phase = np.unwrap(np.angle(loop_gain))
-    difference = np.unwrap(np.angle(1.0 + loop_gain))
-    stable = abs(difference[-1] - difference[0]) < 1.0 and loop_gain[0].real > -1.0
+    angle = np.unwrap(np.angle(1.0 + loop_gain))
+    stable = abs(angle[-1] - angle[0]) < 1.0 and loop_gain[0].real > -1.0
     gain_db, phase_margin, delay = inf, inf, inf
-    turns = (phase + np.pi) / (2.0 * np.pi)
+    turns = (phase + np.pi) / (2.0 * np.pi)  # a whole number where the phase crosses -180°
     for k in np.flatnonzero(np.floor(turns[1:]) != np.floor(turns[:-1])):
-        whole = max(np.floor(turns[k]), np.floor(turns[k + 1]))
-        share = (whole - turns[k]) / (turns[k + 1] - turns[k])
-        there = (1.0 - share) * log10(size[k]) + share * log10(size[k + 1])
-        gain_db = min(gain_db, abs(20.0 * there))
-    for k in np.flatnonzero((size[1:] > 1.0) != (size[:-1] > 1.0)):
-        share = log10(size[k]) / log10(size[k] / size[k + 1])
-        crossed = phase[k] + share * (phase[k + 1] - phase[k])
-        frequency = omega[k] + share * (omega[k + 1] - omega[k])
-        left = (crossed + np.pi) % (2.0 * np.pi)
-        delay = min(delay, left / frequency)
-        phase_margin = min(phase_margin, left, 2.0 * np.pi - left)
+        crossing = max(np.floor(turns[k]), np.floor(turns[k + 1]))
+        fraction = (crossing - turns[k]) / (turns[k + 1] - turns[k])
+        log_gain = (1.0 - fraction) * log10(gain[k]) + fraction * log10(gain[k + 1])
+        gain_db = min(gain_db, abs(20.0 * log_gain))
+    for k in np.flatnonzero((gain[1:] > 1.0) != (gain[:-1] > 1.0)):
+        fraction = log10(gain[k]) / log10(gain[k] / gain[k + 1])
+        phase_there = phase[k] + fraction * (phase[k + 1] - phase[k])
+        frequency = omega[k] + fraction * (omega[k + 1] - omega[k])
+        margin = (phase_there + np.pi) % (2.0 * np.pi)
+        delay = min(delay, margin / frequency)
+        phase_margin = min(phase_margin, margin, 2.0 * np.pi - margin)
     return Margins(gain_db, degrees(phase_margin), delay, bool(stable))
 
 

@@ -43,24 +43,24 @@ def measured_disturbances(log: Path, drag: float, usual: Disturbances) -> Distur
     motion, slopes = _telemetry(log)
     if len(motion) < 2 or len(slopes) < 2:
         return usual
-    time, place, speed = motion[:, 0], motion[:, 1:3], motion[:, 3:5]
+    time, position, velocity = motion[:, 0], motion[:, 1:3], motion[:, 3:5]
     step = np.diff(time)[:, None]
     mean_slope = np.diff(_integral(time, slopes), axis=0) / step
-    mean_speed = 0.5 * (speed[1:] + speed[:-1])
-    unexplained_speed = np.diff(place, axis=0) / step - mean_speed
+    mean_velocity = 0.5 * (velocity[1:] + velocity[:-1])
+    unexplained_velocity = np.diff(position, axis=0) / step - mean_velocity
     unexplained_acceleration = (
-        np.diff(speed, axis=0) / step - GRAVITY * mean_slope + drag * mean_speed
+        np.diff(velocity, axis=0) / step - GRAVITY * mean_slope + drag * mean_velocity
     )
-    wander, place_noise = _densities(time[1:], unexplained_speed)
-    shake, speed_noise = _densities(time[1:], unexplained_acceleration)
+    wander, position_noise = _densities(time[1:], unexplained_velocity)
+    shake, velocity_noise = _densities(time[1:], unexplained_acceleration)
     if not np.isfinite([wander, shake]).all():
         return usual
     return replace(
         usual,
         wander=wander,
         shake=shake,
-        position_noise=place_noise,
-        velocity_noise=speed_noise,
+        position_noise=position_noise,
+        velocity_noise=velocity_noise,
         source=log.parent.name or log.name,
     )
 
@@ -101,33 +101,34 @@ def _integral(time: Floats, slopes: Floats) -> Floats:
     return np.column_stack([np.interp(time, slopes[:, 0], each) for each in sums.T])
 
 
-def _densities(time: Floats, rest: Floats) -> tuple[float, float]:
-    """Density in the band per √Hz, and noise of one measurement; `rest` is a difference of two.
+def _densities(time: Floats, residual: Floats) -> tuple[float, float]:
+    """Density of a residual in the hold's band, per √Hz, and noise of a single measurement.
 
     Args:
         time: (n,), s.
-        rest: (n, 2), north and east.
+        residual: (n, 2), north and east: unexplained change of a measurement from one message to
+            the next, per second.
     """
     period = float(np.median(np.diff(time)))
     length = round(_SEGMENT_DURATION / period)
     gaps = np.flatnonzero(np.diff(time) > 3.0 * period)
-    inside, fast = [], []
-    for part in np.split(rest, gaps + 1):
-        for begin in range(0, len(part) - length + 1, max(1, length // 2)):
-            piece = part[begin : begin + length]
+    in_band, white_levels = [], []
+    for stretch in np.split(residual, gaps + 1):
+        for begin in range(0, len(stretch) - length + 1, max(1, length // 2)):
+            segment = stretch[begin : begin + length]
             window = np.hanning(length)[:, None]
-            spectrum = np.abs(np.fft.rfft((piece - piece.mean(axis=0)) * window, axis=0)) ** 2
+            spectrum = np.abs(np.fft.rfft((segment - segment.mean(axis=0)) * window, axis=0)) ** 2
             density = 2.0 * period * spectrum / np.sum(window**2)
             hertz = np.fft.rfftfreq(length, period)
-            inside.append(density[(hertz >= _HOLD_BAND[0]) & (hertz <= _HOLD_BAND[1])].mean())
+            in_band.append(density[(hertz >= _HOLD_BAND[0]) & (hertz <= _HOLD_BAND[1])].mean())
             upper = hertz >= _WHITE_NOISE_SHARE * hertz[-1]
-            # A difference of white noise over a period has this density.
+            # Noise of single messages, differenced over a period, is amplified by this.
             gain = (2.0 * np.sin(np.pi * hertz[upper] * period) / period) ** 2
-            fast.append((density[upper].mean(axis=1) / gain).mean())
-    if not inside:
+            white_levels.append((density[upper].mean(axis=1) / gain).mean())
+    if not in_band:
         return float("nan"), float("nan")
-    white = float(np.median(fast))
+    white_level = float(np.median(white_levels))
     # The noise of single messages belongs to the measurement, not to the motion.
-    middle = 0.5 * (_HOLD_BAND[0] + _HOLD_BAND[1])
-    slow = max(float(np.median(inside)) - white * (2.0 * np.pi * middle) ** 2, 0.0)
-    return float(np.sqrt(slow)), float(np.sqrt(white / (2.0 * period)))
+    band_middle = 0.5 * (_HOLD_BAND[0] + _HOLD_BAND[1])
+    motion = max(float(np.median(in_band)) - white_level * (2.0 * np.pi * band_middle) ** 2, 0.0)
+    return float(np.sqrt(motion)), float(np.sqrt(white_level / (2.0 * period)))

@@ -9,7 +9,7 @@ from companion.tuning.loop import ModelError
 from companion.tuning.margins import Margins
 from companion.tuning.search import Aims, Design, errors_to_tolerate, search
 
-_ANALYSED = ("hover",)
+_ANALYSED_MANEUVERS = ("hover",)
 """The analysis assumes a hover: a configuration for `identify` would be analysed with low gains."""
 
 
@@ -23,7 +23,7 @@ class Proposal:
         design: the proposed values.
         before: expectation of `untuned`.
         after: expectation of `tuned`.
-        with_errors: margins of `tuned` if the vehicle's times differ from the identified ones.
+        with_errors: margins of `tuned` if lag and dead time differ from the identified ones.
         disturbances: disturbances of the vehicle.
         aims: requirements of the search. The margins without model error are kept to within a
             twentieth; the others may be missed a little.
@@ -45,16 +45,16 @@ class Proposal:
         They include a known drag, because the analysis assumes its feedforward.
         """
         design, drag = self.design, self.tuned.guidance.drag
-        known = {}
+        known_drag = {}
         if drag is not None:
-            known = {"drag_per_s": drag.linear, "quadratic_drag_per_m": drag.quadratic}
+            known_drag = {"drag_per_s": drag.linear, "quadratic_drag_per_m": drag.quadratic}
         return {
             "planner": {"gain_per_s": design.gain},
             "guidance": {
                 "position_weight_per_s4": design.position,
                 "velocity_weight_per_s2": design.velocity,
                 "disturbance_bandwidth_rad_s": design.bandwidth,
-                **known,
+                **known_drag,
             },
         }
 
@@ -81,17 +81,17 @@ def propose(
             "tune with the file that it writes"
         )
     disturbances, aims = disturbances or Disturbances(), aims or Aims()
-    flight = config.flight.model_copy(update={"maneuvers": _ANALYSED})
+    flight = config.flight.model_copy(update={"maneuvers": _ANALYSED_MANEUVERS})
     untuned = config.model_copy(update={"flight": flight})
     before = expectation(untuned, disturbances)
     design = search(untuned, disturbances, aims)
     tuned = design.applied(untuned)
     after = expectation(tuned, disturbances)
-    found = after.margins
+    reached = after.margins
     # The values are rounded after the search, which costs up to a twentieth of a margin.
     if (
-        not found.stable
-        or min(found.gain_db / aims.gain_db, found.phase_deg / aims.phase_deg) < 0.95
+        not reached.stable
+        or min(reached.gain_db / aims.gain_db, reached.phase_deg / aims.phase_deg) < 0.95
     ):
         raise ConfigError(
             f"no values keep {aims.gain_db:g} dB and {aims.phase_deg:g}° of margin with this "

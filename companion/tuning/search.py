@@ -15,7 +15,7 @@ from companion.tuning.margins import Margins, frequencies, margins, smaller
 _FIRST_STEP, _LAST_STEP = 0.4, 0.08
 """First and last step of the search: changes of the natural logarithm of a value."""
 _COST_OF_MISSED_AIM = 30.0
-"""Cost of a missed aim, per unit by which it is missed (`_missed`). The expected error counts by
+"""Cost of a missed aim, per unit by which it is missed (`_shortfall`). The expected error costs
 its natural logarithm."""
 
 
@@ -28,7 +28,7 @@ class Aims:
         phase_deg: smallest phase margin, degrees.
         mismatch: factor by which real lag and dead time may be larger or smaller than configured.
         mismatch_gain_db: smallest gain margin in that case, dB. While the rate loop slews, half of
-            this and of the next one must remain.
+            it and half of `mismatch_phase_deg` are enough.
         mismatch_phase_deg: smallest phase margin in that case, degrees.
         rate_share: largest share of the rate limit that three standard deviations of the commanded
             roll and pitch rates may take.
@@ -113,11 +113,11 @@ def search(config: Config, disturbances: Disturbances, aims: Aims) -> Design:
     Raises:
         ConfigError: see `control_loop`.
     """
-    found = [_improved(config, start, disturbances, aims) for start in _starts(config)]
-    return min(found)[1].rounded()
+    best_designs = [_best_near(config, start, disturbances, aims) for start in _starts(config)]
+    return min(best_designs)[1].rounded()
 
 
-def _improved(
+def _best_near(
     config: Config, start: Design, disturbances: Disturbances, aims: Aims
 ) -> tuple[float, Design]:
     """The best design near `start`, and its cost."""
@@ -126,9 +126,9 @@ def _improved(
     cost = _cost(config, best, disturbances, aims)
     while step >= _LAST_STEP:
         for design in _neighbours(best, step, largest):
-            other = _cost(config, design, disturbances, aims, cost)
-            if other < cost:
-                best, cost = design, other
+            other_cost = _cost(config, design, disturbances, aims, cost)
+            if other_cost < cost:
+                best, cost = design, other_cost
                 break
         else:
             step *= 0.5
@@ -165,27 +165,27 @@ def _neighbours(design: Design, step: float, largest: Design) -> Iterator[Design
 
 
 def _cost(
-    config: Config, design: Design, disturbances: Disturbances, aims: Aims, most: float = inf
+    config: Config, design: Design, disturbances: Disturbances, aims: Aims, enough: float = inf
 ) -> float:
     """Logarithm of the expected error, plus a penalty for each missed aim.
 
-    If the result exceeds `most`, it is only a lower bound, because the rest is not computed.
+    From `enough` on, the computation stops: the result is then only a lower bound.
     """
-    tried = design.applied(config)
+    candidate = design.applied(config)
     s = frequencies()
-    loop = control_loop(tried, s)
+    loop = control_loop(candidate, s)
     expected = expected_errors(loop, disturbances, 1.0 / config.link.position_rate_hz)
     exact = smaller(margins(s, loop.whole), margins(s, loop.outer))
-    missed = _missed(exact, aims.gain_db, aims.phase_deg)
+    missed = _shortfall(exact, aims.gain_db, aims.phase_deg)
     missed += max(0.0, 3.0 * expected.rate / (aims.rate_share * config.limits.max_tilt_rate) - 1.0)
     cost = log(expected.position) + _COST_OF_MISSED_AIM * missed
-    for error in errors_to_tolerate(tried, aims):
-        if cost >= most:
+    for error in errors_to_tolerate(candidate, aims):
+        if cost >= enough:
             break
-        loop = control_loop(tried, s, error)
+        loop = control_loop(candidate, s, error)
         share = _SLEWING_SHARE if error.delay else 1.0
         needed = share * aims.mismatch_gain_db, share * aims.mismatch_phase_deg
-        cost += _COST_OF_MISSED_AIM * _missed(margins(s, loop.whole), *needed)
+        cost += _COST_OF_MISSED_AIM * _shortfall(margins(s, loop.whole), *needed)
     return cost
 
 
@@ -196,12 +196,12 @@ def errors_to_tolerate(config: Config, aims: Aims) -> list[ModelError]:
     return [*errors, ModelError(delay=delay)] if delay > 0.0 else errors
 
 
-def _missed(found: Margins, gain_db: float, phase_deg: float) -> float:
+def _shortfall(actual: Margins, gain_db: float, phase_deg: float) -> float:
     """How far the margins are missed, in units of 6 dB and 30°.
 
     For an unstable loop: 1 plus the found margins in these units.
     """
-    if not found.stable:
-        return 1.0 + found.gain_db / 6.0 + found.phase_deg / 30.0
-    short = max(0.0, gain_db - found.gain_db) / 6.0
-    return short + max(0.0, phase_deg - found.phase_deg) / 30.0
+    if not actual.stable:
+        return 1.0 + actual.gain_db / 6.0 + actual.phase_deg / 30.0
+    gain_shortfall = max(0.0, gain_db - actual.gain_db) / 6.0
+    return gain_shortfall + max(0.0, phase_deg - actual.phase_deg) / 30.0

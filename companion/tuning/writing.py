@@ -18,7 +18,7 @@ Flights = Mapping[str, tuple[CourseResult, CourseResult]]
 """Flights before and with the proposal, by the name of the course."""
 
 
-_WORSE_SHARE, _WORSE_BY = 1.25, 0.01
+_WORSE_FACTOR, _WORSE_BY = 1.25, 0.01
 """A course is flown worse if its true error grows beyond this factor and by more than this, m."""
 
 
@@ -32,7 +32,7 @@ def proposal_text(
         vehicle: vehicle file to include, relative to the file; or a mapping with the section
             `vehicle` itself.
         flights: flights on the mock vehicle; empty if none was flown.
-        where: source of the knowledge of the vehicle, for the reader.
+        where: where the values of the vehicle come from, for the reader.
     """
     lines = [f"# Proposed by `companion tune` for {where}.", "#"]
     lines += [f"# {line}".rstrip() for line in summary_lines(proposal, flights)]
@@ -56,17 +56,18 @@ def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
     lines = [] if warning is None else [warning]
     lines += [
         "Expected by linear analysis, before -> after:",
-        *_compared(before, after),
+        *_comparison_lines(before, after),
         f"disturbances: gusts of {proposal.disturbances.gust:g} m/s, noise: "
         f"{proposal.disturbances.source}",
         f"aims: margins of {aims.gain_db:g} dB and {aims.phase_deg:g}°, and the margins below",
     ]
     lines += [
-        f"margin {_error(error)}: {found.sentence()}" for error, found in proposal.with_errors
+        f"margin {_error_text(error)}: {reached.sentence()}"
+        for error, reached in proposal.with_errors
     ]
-    used = 3.0 * degrees(after.errors.rate)
+    used_rate = 3.0 * degrees(after.errors.rate)
     lines.append(
-        f"cost: these disturbances command up to {used:.0f}°/s (3 standard deviations) of the "
+        f"cost: these disturbances command up to {used_rate:.0f}°/s (3 standard deviations) of the "
         f"{limit:.0f}°/s that limits.max_tilt_rate_deg_s allows; before: "
         f"{3.0 * degrees(before.errors.rate):.0f}°/s"
     )
@@ -87,14 +88,14 @@ def worse_sentence(flights: Flights) -> str | None:
         if not after.ok
         else f"{name} {before.true:.3f} -> {after.true:.3f} m"
         for name, (before, after) in flights.items()
-        if not after.ok or after.true > max(_WORSE_SHARE * before.true, before.true + _WORSE_BY)
+        if not after.ok or after.true > max(_WORSE_FACTOR * before.true, before.true + _WORSE_BY)
     ]
     if not worse:
         return None
     return f"DO NOT USE IT: with the proposal the mock vehicle flew worse: {'; '.join(worse)}"
 
 
-def _compared(before: Expectation, after: Expectation) -> list[str]:
+def _comparison_lines(before: Expectation, after: Expectation) -> list[str]:
     old, new = before.errors, after.errors
     return [
         f"margins at the body rate: {before.whole.sentence()} -> {after.whole.sentence()}",
@@ -106,7 +107,7 @@ def _compared(before: Expectation, after: Expectation) -> list[str]:
     ]
 
 
-def _error(error: ModelError) -> str:
+def _error_text(error: ModelError) -> str:
     if error.delay:
         return f"with {1e3 * error.delay:.0f} ms of added delay, as while the rate loop slews"
     percent = round(100.0 * abs(error.time_factor - 1.0))
@@ -133,22 +134,22 @@ def _reasons(proposal: Proposal) -> dict[str, str]:
     slewing = slewing_delay(tuned)
     if capped:
         sensible = f"{LARGEST_GAIN_TIMES_DELAY} / (lag + dead time)"
-        why = f"the largest sensible gain, {sensible} = {limit:.2f}"
+        gain_reason = f"the largest sensible gain, {sensible} = {limit:.2f}"
         if limit < sensible_gain(tuned):
-            why = f"the largest gain that is searched, {limit:g}"
+            gain_reason = f"the largest gain that is searched, {limit:g}"
     elif slewing:
-        why = (
+        gain_reason = (
             f"below {limit:.1f}, the largest sensible gain, because the rate loop needs "
             f"{2e3 * slewing:.0f} ms to reach limits.max_tilt_rate_deg_s; tune again after "
             "a change of that limit"
         )
     else:
-        why = f"below {limit:.2f}, the largest sensible gain, for the margins"
+        gain_reason = f"below {limit:.2f}, the largest sensible gain, for the margins"
     drag = "as configured, or learned in an earlier flight of this vehicle"
     return {
         "drag_per_s": drag,
         "quadratic_drag_per_m": drag,
-        "gain_per_s": f"before {untuned.planner.gain_per_s:g}; {why}",
+        "gain_per_s": f"before {untuned.planner.gain_per_s:g}; {gain_reason}",
         "position_weight_per_s4": f"before {weights.position:.3g}; a stiffer hold tracks better, "
         "a softer one has more margin",
         "velocity_weight_per_s2": f"before {weights.velocity:.3g}; a larger one brings errors of "

@@ -146,7 +146,7 @@ def test_results_that_cannot_be_read_are_named(begun, capsys):
     assert main(["campaign", "report", str(out)]) == 2
     assert f"{path}: cannot be read: " in capsys.readouterr().err
     with pytest.raises(ConfigError, match=r"unit-00001.*cannot be read"):
-        again._row(out, campaign, SimpleNamespace(unit=1), 1)
+        again._stored_row(out, campaign, SimpleNamespace(unit=1), 1)
     pyarrow.parquet.write_table(pyarrow.table({"a": [1]}), path)
     with pytest.raises(ConfigError, match="are not of one campaign"):
         store.read(out)

@@ -92,7 +92,7 @@ def whole(tmp_path_factory):
     """A search that was not interrupted, and the number of its flights."""
     place, fleet = tmp_path_factory.mktemp("whole"), Fleet()
     found, search = searched(place, place / "search", fleet)
-    return found, [trial.user_attrs["values"] for trial in search._ended()], fleet.flown
+    return found, [trial.user_attrs["values"] for trial in search._ended_trials()], fleet.flown
 
 
 def test_it_starts_with_the_configuration_and_finds_a_better_one(whole):
@@ -113,7 +113,7 @@ def test_an_interrupted_search_goes_on_with_the_same_candidates(whole, tmp_path)
         searched(tmp_path, tmp_path / "search", Fleet(interrupted=13))
     fleet = Fleet()
     again, search = searched(tmp_path, tmp_path / "search", fleet)
-    assert [trial.user_attrs["values"] for trial in search._ended()] == tried
+    assert [trial.user_attrs["values"] for trial in search._ended_trials()] == tried
     assert again.best.values == found.best.values
     assert flights - 13 <= fleet.flown < flights - 7
 

@@ -193,11 +193,11 @@ def test_sigterm_ends_a_campaign_like_ctrl_c_and_a_second_one_is_ignored():
 
 
 def test_the_reason_of_a_lost_unit_is_a_sentence():
-    assert cluster._reason(ValueError("x")) == "ValueError: x"
+    assert cluster._failure_reason(ValueError("x")) == "ValueError: x"
     died = KilledWorker("a task", None, [])
-    assert cluster._reason(died) == "its worker died each time it was tried"
+    assert cluster._failure_reason(died) == "its worker died each time it was tried"
     with pytest.raises(ConfigError, match="bad key"):
-        cluster._reason(ConfigError("bad key"))
+        cluster._failure_reason(ConfigError("bad key"))
 
 
 class Gone:
@@ -211,10 +211,10 @@ class Gone:
 
 def test_a_lost_scheduler_is_no_lost_unit():
     with pytest.raises(ClusterError, match="the connection to the Dask scheduler is lost"):
-        cluster._ended(0, Gone())
+        cluster._ended_unit(0, Gone())
     Gone.status = "cancelled"
     with pytest.raises(ClusterError, match="the connection to the Dask scheduler is lost"):
-        cluster._ended(0, Gone())
+        cluster._ended_unit(0, Gone())
 
 
 def test_a_scheduler_that_does_not_answer_is_wrong_usage(monkeypatch):

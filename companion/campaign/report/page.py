@@ -82,12 +82,12 @@ def write_tables(table: "pa.Table", folder: Path) -> None:
         (PARQUET, pyarrow.parquet.write_table),
         (CSV, pyarrow.csv.write_csv),
     ):
-        part = folder / f".{name}.{os.getpid()}"
+        temporary = folder / f".{name}.{os.getpid()}"
         try:
-            write(table, part)
-            part.replace(folder / name)
+            write(table, temporary)
+            temporary.replace(folder / name)
         finally:
-            part.unlink(missing_ok=True)
+            temporary.unlink(missing_ok=True)
 
 
 def page_text(results: Results, campaign: Campaign) -> str:
@@ -97,33 +97,33 @@ def page_text(results: Results, campaign: Campaign) -> str:
         results: results of the campaign.
         campaign: the campaign as stored in the folder.
     """
-    found = {
+    by_outcome = {
         name: each
         for name in (results.error, RATES, "ok")
         if name == "ok" or results.measured(name)
         if (each := influences(results, name))
     }
-    order = _order(results, found)
-    shown = [
+    order = _factors_by_influence(results, by_outcome)
+    shown_plots = [
         *plots.success(results, order),
-        *plots.sensitivity(found),
+        *plots.sensitivity(by_outcome),
         *plots.pareto(results),
         *plots.distributions(results),
     ]
-    first = [tables.worst_cases(results), tables.crossed(results)]
+    first_tables = [tables.worst_cases(results), tables.crossed(results)]
     if order:
-        first.append(tables.success_by_factor(results, order))
-    if found:
-        first.append(tables.sensitivity(found))
+        first_tables.append(tables.success_by_factor(results, order))
+    if by_outcome:
+        first_tables.append(tables.sensitivity(by_outcome))
     return rendered(
         "companion.campaign.report",
         "campaign.html.j2",
         f"Campaign {results.name}",
-        shown,
+        shown_plots,
         headline=headline(results),
-        good=not results.true_cases("crashed") and bool(_judged(results).all()),
-        lines=[*missing(results), *what_to_look_at(results, found)],
-        tables=[each for each in first if each is not None],
+        good=not results.true_cases("crashed") and bool(_success(results).all()),
+        lines=[*missing(results), *what_to_look_at(results, by_outcome)],
+        tables=[each for each in first_tables if each is not None],
         last=[tables.configuration(campaign), tables.all_cases(results)],
     )
 
@@ -133,28 +133,34 @@ def headline(results: Results) -> str:
 
     Where each case has a fault, success is that the flight ended as documented for the fault.
     """
-    share = share_of(_judged(results))
-    what = "with a fault ended as documented" if results.all_faulty else "good"
-    return f"{results.name}: {share.chosen} of {share.of} {results.noun} {what}: {share}"
+    share = share_of(_success(results))
+    success = "with a fault ended as documented" if results.all_faulty else "good"
+    return f"{results.name}: {share.chosen} of {share.of} {results.noun} {success}: {share}"
 
 
-def _judged(results: Results) -> NDArray[np.bool_]:
+def _success(results: Results) -> NDArray[np.bool_]:
+    """(cases,): whether each case was a success in the sense of `headline`."""
     return results.documented if results.all_faulty else results.good
 
 
 def missing(results: Results) -> list[str]:
     """How many cases are missing, and how to go on; empty if all are flown."""
-    left = results.planned - results.count
-    if not left:
+    unflown = results.planned - results.count
+    if not unflown:
         return []
     return [
-        f"{left} of {results.planned} {results.noun} are missing. `companion campaign "
+        f"{unflown} of {results.planned} {results.noun} are missing. `companion campaign "
         f"{shlex.quote(str(results.folder))}` goes on with them."
     ]
 
 
-def what_to_look_at(results: Results, found: dict[str, list[Influence]]) -> Iterator[str]:
-    """A summary: what was flown, and which results deserve attention first."""
+def what_to_look_at(results: Results, by_outcome: dict[str, list[Influence]]) -> Iterator[str]:
+    """A summary: what was flown, and which results deserve attention first.
+
+    Args:
+        results: results of the campaign.
+        by_outcome: the influences on each outcome.
+    """
     yield f"Swept: {', '.join(results.factors) or 'nothing but noise and gusts'}."
     if crashed := results.true_cases("crashed"):
         yield f"{crashed} {results.noun} crashed; they stand first in the table of worst cases."
@@ -169,7 +175,7 @@ def what_to_look_at(results: Results, found: dict[str, list[Influence]]) -> Iter
     if reasons:
         (reason, times) = reasons.most_common(1)[0]
         yield f"Most frequent reason why a case was not good, {times} times: {reason}."
-    yield from _most_influential(results, found)
+    yield from _most_influential(results, by_outcome)
     if results.error == TRUE_ERROR:
         yield (
             "Errors are distances of the true vehicle from the reference. A flight does not know "
@@ -179,6 +185,7 @@ def what_to_look_at(results: Results, found: dict[str, list[Influence]]) -> Iter
 
 
 def _reason(results: Results, row: int) -> str:
+    """Why the case in a row was not good."""
     columns = results.columns
     result = str(columns["result"][row])
     if result != "ok":
@@ -186,9 +193,9 @@ def _reason(results: Results, row: int) -> str:
     return str(columns["failed_checks"][row] or "") or "crashed"
 
 
-def _most_influential(results: Results, found: dict[str, list[Influence]]) -> Iterator[str]:
-    if results.error in found:
-        first = found[results.error][0]
+def _most_influential(results: Results, by_outcome: dict[str, list[Influence]]) -> Iterator[str]:
+    if results.error in by_outcome:
+        first = by_outcome[results.error][0]
         error = label(results.error).partition(",")[0]
         share = f"{first.share:.0%} ± {first.confidence:.0%}"
         yield f"{first.factor} explains {share} of the variance of the {error} by itself."
@@ -212,12 +219,12 @@ def _most_influential(results: Results, found: dict[str, list[Influence]]) -> It
 
 def _few_samples(results: Results) -> Iterator[str]:
     """A warning if the sampled factors took few different values."""
-    drawn = [
+    distinct = [
         len(np.unique(column))
         for name, factor in results.factors.items()
         if factor["sampled"] and (column := results.columns[name]).dtype == float
     ]
-    largest = max(drawn, default=0)
+    largest = max(distinct, default=0)
     if _GRID_LIKE < largest < _FEW_SAMPLES:
         yield (
             f"Only {largest} different samples of the distributions were flown, so sampled factors "
@@ -225,7 +232,7 @@ def _few_samples(results: Results) -> Iterator[str]:
         )
 
 
-def _order(results: Results, found: dict[str, list[Influence]]) -> list[str]:
+def _factors_by_influence(results: Results, by_outcome: dict[str, list[Influence]]) -> list[str]:
     """The factors ordered by influence, the largest first."""
-    listed = [each.factor for name in ("ok", results.error) for each in found.get(name, ())]
+    listed = [each.factor for name in ("ok", results.error) for each in by_outcome.get(name, ())]
     return list(dict.fromkeys([*listed, *results.factors]))

@@ -34,12 +34,12 @@ _BINS = 40
 def success(results: Results, order: Sequence[str]) -> Iterator[Plot]:
     """Success rate by level: one plot for each of the most influential factors."""
     for name in order[:_MOST_FACTORS]:
-        found = levels(results.columns[name])
-        shares = [share_of(results.good[level.cases]) for level in found]
+        groups = levels(results.columns[name])
+        shares = [share_of(results.good[level.cases]) for level in groups]
         trace: dict[str, Any] = {
             "type": "scatter",
             "mode": "markers",
-            "x": [level.name for level in found],
+            "x": [level.name for level in groups],
             "y": [_percent(each.share) for each in shares],
             "error_y": {
                 "type": "data",
@@ -113,17 +113,17 @@ def pareto(results: Results) -> Iterator[Plot]:
         if part is front:
             marker["line"] = {"color": REFERENCE, "width": 2}
         if thrust:
-            marker |= _scale(goals[part, 2], goals[:, 2], shown=part is front)
+            marker |= _colour_scale(goals[part, 2], goals[:, 2], shown=part is front)
         else:
             marker["color"] = MEASURED if part is front else IDEAL
         if part.any():
             shown = [titles[k] for k in np.flatnonzero(part)]
             traces.append(_points(name, goals[part], shown, marker))
-    of = "error, rate use and thrust use" if thrust else "error and rate use"
+    criteria = "error, rate use and thrust use" if thrust else "error and rate use"
     note = (
         f"A point for each choice of the program's own keys: the medians over everything else; or "
         f"a point for single cases, if no choice was flown twice or there are very many. On the "
-        f"front no other point is better in {of} at once. Each point shows its success rate."
+        f"front no other point is better in {criteria} at once. Each point shows its success rate."
     )
     layout = axes(x=label(RATES), y=label(results.error))
     yield Plot("Pareto front", note, traces, layout, 420)
@@ -142,11 +142,12 @@ def _points(name: str, goals: Floats, titles: list[str], marker: dict[str, Any])
     }
 
 
-def _scale(values: Floats, every: Floats, *, shown: bool) -> dict[str, Any]:
+def _colour_scale(values: Floats, all_values: Floats, *, shown: bool) -> dict[str, Any]:
+    """Colours for the thrust use of some points, on one scale for all points."""
     return {
         "color": numbers(values),
-        "cmin": float(every.min()),
-        "cmax": float(every.max()),
+        "cmin": float(all_values.min()),
+        "cmax": float(all_values.max()),
         "colorscale": "Viridis",
         "showscale": shown,
         "colorbar": {"title": {"text": "thrust use", "side": "right"}, "thickness": 12},
@@ -167,8 +168,8 @@ def distributions(results: Results) -> Iterator[Plot]:
         edges = np.linspace(low, high, _BINS + 1)
         traces = []
         for good, title, colour in ((True, "good", MEASURED), (False, "not good", REFERENCE)):
-            part = values[known & (results.good == good)]
-            counts, _ = np.histogram(np.clip(part, low, high), edges)
+            selected = values[known & (results.good == good)]
+            counts, _ = np.histogram(np.clip(selected, low, high), edges)
             traces.append(
                 {
                     "type": "bar",
@@ -180,9 +181,9 @@ def distributions(results: Results) -> Iterator[Plot]:
                 }
             )
         layout = {**axes(x=label(name), y=results.noun), "barmode": "stack", "bargap": 0.0}
-        low_, median, high_ = np.quantile(values[known], (0.05, 0.5, 0.95))
+        p05, median, p95 = np.quantile(values[known], (0.05, 0.5, 0.95))
         note = (
-            f"Median {median:.3g}; nine of ten lie from {low_:.3g} to {high_:.3g}. The last bar "
+            f"Median {median:.3g}; nine of ten lie from {p05:.3g} to {p95:.3g}. The last bar "
             "holds all larger values."
         )
         yield Plot(f"Distribution: {label(name)}", note, traces, layout, 260)

@@ -86,14 +86,14 @@ class Results:
     @cached_property
     def columns(self) -> dict[str, Column]:
         """Every column, (cases,): float64 with NaN for null; any other type as objects."""
-        found = {}
+        arrays = {}
         for field in self.table.schema:
             column = self.table.column(field.name)
             if str(field.type) == "double":
-                found[field.name] = column.to_numpy()  # null becomes NaN
+                arrays[field.name] = column.to_numpy()  # null becomes NaN
             else:
-                found[field.name] = np.array(column.to_pylist(), dtype=object)
-        return found
+                arrays[field.name] = np.array(column.to_pylist(), dtype=object)
+        return arrays
 
     @property
     def count(self) -> int:
@@ -113,7 +113,7 @@ class Results:
 
     @property
     def all_faulty(self) -> bool:
-        """Whether each case has a fault: then a flight that is not good may be what was wanted."""
+        """Whether every case has a fault; a flight that is not good may then be as documented."""
         return self.documented.size == self.count > 0
 
     @property

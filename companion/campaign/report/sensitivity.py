@@ -58,12 +58,12 @@ def influences(results: Results, outcome: str) -> list[Influence]:
         "names": list(columns),
         "bounds": [[0.0, 1.0]] * len(columns),
     }
-    found = delta.analyze(
+    indices = delta.analyze(
         problem, np.column_stack(list(columns.values())), values, seed=_SEED, method="sobol"
     )
-    listed = zip(columns, found["S1"], found["S1_conf"], strict=True)
+    listed = zip(columns, indices["S1"], indices["S1_conf"], strict=True)
     return sorted(
-        (Influence(name, float(index), float(half)) for name, index, half in listed),
+        (Influence(name, float(index), float(half_width)) for name, index, half_width in listed),
         key=lambda each: -each.share,
     )
 

@@ -78,28 +78,28 @@ def levels(column: Column) -> list[Group]:
     ranges with about equally many cases each; null is then a level of its own. More words give
     `_MOST_LEVELS` levels, the last of which holds all remaining words.
     """
-    known = sorted({_key(value) for value in column})
-    if column.dtype != float or len(known) <= _MOST_LEVELS:
-        own = known if len(known) <= _MOST_LEVELS else known[: _MOST_LEVELS - 1]
-        keys = [_key(value) for value in column]
-        found = [Group(key[1], np.array([key == each for each in keys])) for key in own]
-        others = len(known) - len(own)
+    distinct = sorted({_sort_key(value) for value in column})
+    if column.dtype != float or len(distinct) <= _MOST_LEVELS:
+        shown = distinct if len(distinct) <= _MOST_LEVELS else distinct[: _MOST_LEVELS - 1]
+        keys = [_sort_key(value) for value in column]
+        groups = [Group(key[1], np.array([key == each for each in keys])) for key in shown]
+        others = len(distinct) - len(shown)
         if others:
-            found.append(Group(f"{others} others", np.array([key not in own for key in keys])))
-        return found
+            groups.append(Group(f"{others} others", np.array([key not in shown for key in keys])))
+        return groups
     edges = np.nanquantile(column, np.linspace(0.0, 1.0, _RANGE_COUNT + 1))
-    found = []
+    groups = []
     for number, (low, high) in enumerate(pairwise(edges)):
         last = number == _RANGE_COUNT - 1
         inside = (column >= low) & ((column <= high) if last else (column < high))
-        found.append(Group(f"{low:.3g} to {high:.3g}", inside))
-    unknown = np.isnan(column)
-    if unknown.any():
-        found.append(Group("null", unknown))
-    return found
+        groups.append(Group(f"{low:.3g} to {high:.3g}", inside))
+    null_cases = np.isnan(column)
+    if null_cases.any():
+        groups.append(Group("null", null_cases))
+    return groups
 
 
-def _key(value: object) -> tuple[float, str]:
+def _sort_key(value: object) -> tuple[float, str]:
     """A sort key, which puts null first, and the value as text."""
     if isinstance(value, bool):
         return float(value), str(value).lower()
@@ -135,9 +135,9 @@ def worst(results: Results, count: int) -> list[int]:
 def pareto_front(goals: Floats) -> NDArray[np.bool_]:
     """(n,): which of the (n, goals) points are Pareto-optimal; smaller is better in every goal."""
     front = np.ones(len(goals), dtype=bool)
-    for number, own in enumerate(goals):
-        as_good = np.all(goals <= own, axis=1)
-        better = np.any(goals < own, axis=1)
+    for number, point in enumerate(goals):
+        as_good = np.all(goals <= point, axis=1)
+        better = np.any(goals < point, axis=1)
         front[number] = not np.any(as_good & better)
     return front
 
@@ -151,9 +151,9 @@ def choices(results: Results) -> list[Group]:
     """
     chosen = [name for name in results.factors if not name.startswith(_NOT_CHOSEN)]
     rows = range(results.count)
-    keys = [tuple(_key(results.columns[name][row]) for name in chosen) for row in rows]
-    known = sorted(set(keys))
-    if len(known) > _MOST_CHOICES or len(known) == len(keys):
+    keys = [tuple(_sort_key(results.columns[name][row]) for name in chosen) for row in rows]
+    distinct = sorted(set(keys))
+    if len(distinct) > _MOST_CHOICES or len(distinct) == len(keys):
         step = max(1, len(keys) // _MOST_CHOICES)
         return [
             Group(f"case {results.columns['case'][row]}", np.arange(results.count) == row)
@@ -165,11 +165,11 @@ def choices(results: Results) -> list[Group]:
             or "all cases",
             np.array([key == each for each in keys]),
         )
-        for key in known
+        for key in distinct
     ]
 
 
 def median(values: Floats) -> float:
     """The median of the finite values; NaN if there are none."""
-    known = values[np.isfinite(values)]
-    return float(np.median(known)) if len(known) else np.nan
+    finite = values[np.isfinite(values)]
+    return float(np.median(finite)) if len(finite) else np.nan

@@ -30,9 +30,9 @@ def worst_cases(results: Results) -> Table:
     rows = [
         (
             str(columns["case"][row]),
-            _rerun(results, int(columns["case"][row])),
+            _rerun_command(results, int(columns["case"][row])),
             *(_cell(columns[name][row]) for name in (results.error, *shown)),
-            _values(results, row),
+            _factor_values(results, row),
         )
         for row in worst(results, _WORST_SHOWN)
     ]
@@ -40,13 +40,13 @@ def worst_cases(results: Results) -> Table:
     return Table("Worst cases", tuple(each.replace("_", " ") for each in header), rows)
 
 
-def _rerun(results: Results, case: int) -> str:
+def _rerun_command(results: Results, case: int) -> str:
     if results.kind == "batch":
         return EMPTY
     return f"companion campaign rerun {shlex.quote(str(results.folder))} {case}"
 
 
-def _values(results: Results, row: int) -> str:
+def _factor_values(results: Results, row: int) -> str:
     cells = (f"{name} = {_cell(results.columns[name][row])}" for name in results.factors)
     return ", ".join(cells)
 
@@ -60,11 +60,11 @@ def configuration(campaign: Campaign) -> Table:
         if key.section == "limits" or key.value != key.default
     ]
     mock = campaign.base.mock or {}
-    usual = flattened(complete_mock({"autopilot": mock["autopilot"]}))
+    defaults = flattened(complete_mock({"autopilot": mock["autopilot"]}))
     rows += [
-        (f"mock.{key}", value, usual.get(key, EMPTY), unit_of(key))
+        (f"mock.{key}", value, defaults.get(key, EMPTY), unit_of(key))
         for key, value in flattened(mock).items()
-        if value != usual.get(key)
+        if value != defaults.get(key)
     ]
     title = "Configuration of every case: the limits, and what is not the default"
     header = ("key", "value", "default", "unit")
@@ -73,7 +73,7 @@ def configuration(campaign: Campaign) -> Table:
 
 def success_by_factor(results: Results, order: Sequence[str]) -> Table:
     """Success rate, median error and median body rate by level of the most influential factors."""
-    rows = [row for name in order[:_MOST_FACTORS] for row in _by_level(results, name)]
+    rows = [row for name in order[:_MOST_FACTORS] for row in _level_rows(results, name)]
     documented = "as_documented" in results.columns and "fault" in results.factors
     header = ["factor", "value", results.noun, "good (95 % interval)"]
     header += ["ended as documented (95 % interval)"] if documented else []
@@ -81,7 +81,7 @@ def success_by_factor(results: Results, order: Sequence[str]) -> Table:
     return Table("Success by factor", tuple(header), rows)
 
 
-def _by_level(results: Results, name: str) -> Iterator[tuple[str, ...]]:
+def _level_rows(results: Results, name: str) -> Iterator[tuple[str, ...]]:
     columns = results.columns
     for level in levels(columns[name]):
         row = [name, level.name, str(int(level.cases.sum()))]
@@ -89,11 +89,11 @@ def _by_level(results: Results, name: str) -> Iterator[tuple[str, ...]]:
         if "as_documented" in columns and "fault" in results.factors:
             judged = [value for value in columns["as_documented"][level.cases] if value is not None]
             row.append(str(share_of(np.array(judged, dtype=bool))) if judged else EMPTY)
-        row += [_median(columns[each][level.cases]) for each in (results.error, RATES)]
+        row += [_median_text(columns[each][level.cases]) for each in (results.error, RATES)]
         yield tuple(row)
 
 
-def _median(values: Floats) -> str:
+def _median_text(values: Floats) -> str:
     middle = median(values)
     return f"{middle:.3g}" if isfinite(middle) else EMPTY
 
@@ -127,17 +127,17 @@ def crossed(results: Results) -> Table | None:
     if len(few) < 2:
         return None
     first, second = few[0], few[1]
-    across = levels(columns[second])
+    second_levels = levels(columns[second])
     rows = []
     for level in levels(columns[first]):
         cells = []
-        for other in across:
-            both = level.cases & other.cases
-            good = share_of(results.good[both]).share
-            cells.append(f"{_median(columns[results.error][both])} ({good:.0%})")
+        for other in second_levels:
+            in_both = level.cases & other.cases
+            good = share_of(results.good[in_both]).share
+            cells.append(f"{_median_text(columns[results.error][in_both])} ({good:.0%})")
         rows.append((level.name, *cells))
     title = f"Median {label(results.error)} and share of good {results.noun}: {first} × {second}"
-    return Table(title, (first, *(each.name for each in across)), rows)
+    return Table(title, (first, *(each.name for each in second_levels)), rows)
 
 
 def all_cases(results: Results) -> Table:

@@ -26,7 +26,7 @@ Values = Mapping[str, Any]
 _UNSEEN_SEED_OFFSET = 1_000_003
 """Offset of the campaign's seed for the cases that the search does not see."""
 _NEARBY_DEVIATION = 0.15
-"""Standard deviation of the candidates near a start, as a share of the (logarithmic) range."""
+"""Standard deviation of candidates around a start, as a share of the (logarithmic) range."""
 
 
 class Start(NamedTuple):
@@ -82,15 +82,15 @@ def unseen(campaign: Campaign, samples: int) -> Campaign:
 
 def suggested(trial: "Trial", search: Mapping[str, Swept]) -> dict[str, Any]:
     """The values that the search tries next; numbers are rounded to three digits."""
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for key, swept in search.items():
         if swept.choice is not None:
-            found[key] = trial.suggest_categorical(key, list(swept.choice))
+            values[key] = trial.suggest_categorical(key, list(swept.choice))
         else:
             low, high = swept.uniform or swept.loguniform or (0.0, 1.0)
             value = trial.suggest_float(key, low, high, log=swept.loguniform is not None)
-            found[key] = min(max(float(f"{value:.3g}"), low), high)
-    return found
+            values[key] = min(max(float(f"{value:.3g}"), low), high)
+    return values
 
 
 def starts(campaign: Campaign, tune: Tune, learned: Config | None = None) -> Iterator[Start]:
@@ -101,11 +101,14 @@ def starts(campaign: Campaign, tune: Tune, learned: Config | None = None) -> Ite
     Args:
         campaign: its base is the present configuration.
         tune: section `tune` of the campaign.
-        learned: the configuration with what first flights of the vehicle measured. It is also the
-            input of `companion tune`. None: that input is the present configuration.
+        learned: the configuration with the values measured in first flights of the vehicle. From it
+            `companion tune` computes its proposal. None: from the present configuration.
     """
-    yield Start("the configuration", within(_present(campaign.base, tune.search), tune.search))
-    known, present = learned or campaign.base, _present(learned or campaign.base, tune.search)
+    yield Start(
+        "the configuration", within(_present_values(campaign.base, tune.search), tune.search)
+    )
+    known = learned or campaign.base
+    present = _present_values(known, tune.search)
     if learned is not None:
         yield Start("a first flight", within(present, tune.search))
     try:
@@ -145,8 +148,8 @@ def _analysed(config: Config) -> Config:
     return config.model_copy(update={"planner": planner})
 
 
-def _present(config: Config, keys: Collection[str]) -> dict[str, Any]:
-    """The present values of keys; for null the value that the program derives, if there is one."""
+def _present_values(config: Config, keys: Collection[str]) -> dict[str, Any]:
+    """The present values of keys; for a null key the value that the program derives, if any."""
     weights, drag = hold_weights(config), drag_prior(config).drag
     derived = {
         "guidance.position_weight_per_s4": weights.position,
@@ -156,31 +159,33 @@ def _present(config: Config, keys: Collection[str]) -> dict[str, Any]:
         "guidance.quadratic_drag_per_m": drag.quadratic,
         "thrust.lag_ms": 1e3 * config.thrust.lag,
     }
-    own = set_values(config, keys)
-    return {key: value for key in keys if (value := own.get(key, derived.get(key))) is not None}
+    configured = set_values(config, keys)
+    return {
+        key: value for key in keys if (value := configured.get(key, derived.get(key))) is not None
+    }
 
 
 def set_values(config: Config, keys: Iterable[str]) -> dict[str, Any]:
     """The values of some dotted keys, without those that are null."""
-    found = {}
+    values = {}
     for key in keys:
         section, _, name = key.partition(".")
         value = getattr(getattr(config, section), name)
         if value is not None:
-            found[key] = value
-    return found
+            values[key] = value
+    return values
 
 
 def within(values: Values, search: Mapping[str, Swept]) -> dict[str, Any]:
-    """The given values of searched keys, clamped to the ranges of the search.
+    """The given values, clamped to the ranges of the search.
 
-    A value that is not among the key's choices is left out.
+    Keys that are not searched, and values that are not among the key's choices, are left out.
     """
-    found: dict[str, Any] = {}
+    clamped: dict[str, Any] = {}
     for key, value in values.items():
         swept = search.get(key)
         if swept is None or (swept.choice is not None and value not in swept.choice):
             continue
         pair = swept.uniform or swept.loguniform
-        found[key] = value if pair is None else min(max(float(value), pair[0]), pair[1])
-    return found
+        clamped[key] = value if pair is None else min(max(float(value), pair[0]), pair[1])
+    return clamped

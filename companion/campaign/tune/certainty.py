@@ -60,38 +60,44 @@ def compared(before: Score, after: Score, samples: int) -> Comparison | None:
         None if fewer than two samples were flown to their end by both.
     """
     scores = before, after
-    rows = [np.array(score.true).reshape(samples, -1) for score in scores]
-    whole = np.isfinite(np.hstack(rows)).all(axis=1)
-    count = int(whole.sum())
+    errors = [np.array(score.true).reshape(samples, -1) for score in scores]
+    complete = np.isfinite(np.hstack(errors)).all(axis=1)
+    count = int(complete.sum())
     if count < 2:
         return None
-    old, new = (each[whole] for each in rows)
+    old, new = (each[complete] for each in errors)
 
-    def same_flights(values: tuple[float, ...]) -> float:
-        return pooled(np.array(values).reshape(samples, -1)[whole])
+    def pooled_compared(values: tuple[float, ...]) -> float:
+        return pooled(np.array(values).reshape(samples, -1)[complete])
 
-    drawn = np.random.default_rng(_SEED).integers(count, size=(_RESAMPLES, count))
-    old_spread, new_spread = _resampled(old, drawn), _resampled(new, drawn)
+    draws = np.random.default_rng(_SEED).integers(count, size=(_RESAMPLES, count))
+    old_resampled, new_resampled = _resampled(old, draws), _resampled(new, draws)
     better = np.mean(np.square(new), axis=1) < np.mean(np.square(old), axis=1)
     return Comparison(
-        _interval(pooled(old), old_spread),
-        _interval(pooled(new), new_spread),
-        _interval(pooled(new) / pooled(old), new_spread / old_spread),
-        (same_flights(before.estimated), same_flights(after.estimated)),
-        (same_flights(before.estimate), same_flights(after.estimate)),
+        _interval(pooled(old), old_resampled),
+        _interval(pooled(new), new_resampled),
+        _interval(pooled(new) / pooled(old), new_resampled / old_resampled),
+        (pooled_compared(before.estimated), pooled_compared(after.estimated)),
+        (pooled_compared(before.estimate), pooled_compared(after.estimate)),
         int(better.sum()),
         count,
     )
 
 
-def _resampled(rows: Floats, drawn: "np.ndarray[tuple[int, ...], np.dtype[np.int64]]") -> Floats:
-    """(resamples,) RMS over the cases of the drawn samples."""
-    squares = np.mean(np.square(rows), axis=1)
-    found: Floats = np.sqrt(np.mean(squares[drawn], axis=1))
-    return found
+def _resampled(errors: Floats, draws: "np.ndarray[tuple[int, ...], np.dtype[np.int64]]") -> Floats:
+    """(resamples,): RMS error over the cases of the drawn samples, m.
+
+    Args:
+        errors: (samples, cases of a sample), RMS error of each case, m.
+        draws: (resamples, samples), numbers of the drawn samples.
+    """
+    squares = np.mean(np.square(errors), axis=1)
+    resampled: Floats = np.sqrt(np.mean(squares[draws], axis=1))
+    return resampled
 
 
-def _interval(value: float, spread: Floats) -> Interval:
+def _interval(value: float, resampled: Floats) -> Interval:
+    """A value with the interval between the quantiles of its (resamples,) bootstrap values."""
     tail = 0.5 * (1.0 - CONFIDENCE)
-    low, high = np.quantile(spread, (tail, 1.0 - tail))
+    low, high = np.quantile(resampled, (tail, 1.0 - tail))
     return Interval(value, float(low), float(high))

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 RESULT = "tuned.yaml"
+"""Name of the result file in the folder of the search."""
 
 
 def run(options: argparse.Namespace) -> int:
@@ -52,39 +53,39 @@ def run(options: argparse.Namespace) -> int:
     require("optuna", "campaign", "`companion campaign tune`")
     campaign = load(options.file)
     tune = section_of(campaign)
-    place: Path = options.out or folder.RUNS / f"{campaign.file.name}-tune"
+    search_folder: Path = options.out or folder.RUNS / f"{campaign.file.name}-tune"
     console = Console(highlight=False, soft_wrap=True, markup=False)
     for start in starts(campaign, tune):
         cases(campaign, start.values)  # refuses a bad value before any work
-    with folder.locked(place):
+    with folder.locked(search_folder):
         try:
-            _begin(place, campaign)
+            _begin(search_folder, campaign)
             with interruptible(), connected(options.scheduler, options.workers) as client:
                 wait_for_workers(client)
                 console.print(f"Dask's dashboard: {client.dashboard_link}")
                 fly = _fly_on(client, campaign)
                 try:
-                    search = Search(campaign, tune, place, fly)
+                    search = Search(campaign, tune, search_folder, fly)
                 except StorageError as error:  # there are no candidates to continue with
                     raise ConfigError(str(error)) from error
-                found = _searched(search, options.trials or tune.trials, console)
-                return _concluded(campaign, tune, place, fly, found, console)
+                found = _run_search(search, options.trials or tune.trials, console)
+                return _check_and_write(campaign, tune, search_folder, fly, found, console)
         except VersionError as error:
             raise ConfigError(str(error)) from error
         except (KeyboardInterrupt, ClusterError, StorageError) as error:
             why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
             command = f"companion campaign tune {shlex.quote(str(options.file))}"
-            command += f" --out {shlex.quote(str(place))}"
+            command += f" --out {shlex.quote(str(search_folder))}"
             console.print(f"{why}; the candidates so far are kept. Continue with\n  {command}")
             return FAILED
 
 
-def _begin(place: Path, campaign: Campaign) -> None:
+def _begin(search_folder: Path, campaign: Campaign) -> None:
     """Make the folder of the search, or check that it holds this search."""
-    if folder.begun(place):
-        folder.resume(place, campaign)
+    if folder.begun(search_folder):
+        folder.resume(search_folder, campaign)
     else:
-        folder.make(place, campaign, folder.describe(campaign, 1, None))
+        folder.make(search_folder, campaign, folder.describe(campaign, 1, None))
 
 
 def _fly_on(client: "Client", campaign: Campaign) -> Fly:
@@ -92,13 +93,13 @@ def _fly_on(client: "Client", campaign: Campaign) -> Fly:
     kind = campaign.file.kind
     case_s = estimate.case_time(kind, list(campaign.cases())[:1])
 
-    def fly(some: Sequence[Case]) -> Sequence[Row]:
-        return engine.run_on_cluster(client, kind, some, case_s)
+    def fly(flown: Sequence[Case]) -> Sequence[Row]:
+        return engine.run_on_cluster(client, kind, flown, case_s)
 
     return fly
 
 
-def _searched(search: Search, trials: int, console: Console) -> Found:
+def _run_search(search: Search, trials: int, console: Console) -> Found:
     """Search; if the storage fails meanwhile, show the best candidate so far and raise."""
     newest = Found()
     best_so_far = TextColumn("{task.description}")
@@ -120,8 +121,8 @@ def _searched(search: Search, trials: int, console: Console) -> Found:
     return newest
 
 
-def _concluded(
-    campaign: Campaign, tune: Tune, place: Path, fly: Fly, found: Found, console: Console
+def _check_and_write(
+    campaign: Campaign, tune: Tune, search_folder: Path, fly: Fly, found: Found, console: Console
 ) -> int:
     """Check the best candidate on unseen cases, write it, and report the outcome.
 
@@ -137,13 +138,15 @@ def _concluded(
             "inside the envelope: widen tune.search or tune.envelope_m, or raise tune.trials."
         )
         return FAILED
-    other = unseen(campaign, tune.check_samples)
-    console.print(f"checking on {other.number_of_cases} flights that the search has not seen…")
-    before = scored(fly(list(other.cases())), tune.envelope_m)
-    after = scored(fly(cases(other, found.best.values)), tune.envelope_m)
+    unseen_campaign = unseen(campaign, tune.check_samples)
+    console.print(
+        f"checking on {unseen_campaign.number_of_cases} flights that the search has not seen…"
+    )
+    before = scored(fly(list(unseen_campaign.cases())), tune.envelope_m)
+    after = scored(fly(cases(unseen_campaign, found.best.values)), tune.envelope_m)
     comparison = compared(before, after, tune.check_samples)
     result = Result(campaign, found, found.best, before, after, comparison)
-    path, text = place / RESULT, result_text(result, set_values(campaign.base, tune.search))
+    path, text = search_folder / RESULT, result_text(result, set_values(campaign.base, tune.search))
     for line in summary_lines(result):
         console.print(line)
     try:

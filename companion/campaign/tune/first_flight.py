@@ -1,4 +1,4 @@
-"""First flights of the campaign's vehicle: they measure values with which the search starts."""
+"""Two first flights of the campaign's vehicle; the search starts with the values they measure."""
 
 import tempfile
 from dataclasses import replace
@@ -21,7 +21,7 @@ from companion.mavlink.errors import LogError
 from companion.recording.learned_file import newest
 from companion.vehicle.flight_log import read_flight_log
 
-_DAMPING = "vehicle.damping"
+_DAMPING_KEY = "vehicle.damping"
 
 
 def learned(campaign: Campaign) -> Config:
@@ -36,7 +36,7 @@ def learned(campaign: Campaign) -> Config:
         ConfigError: the first case cannot be flown.
     """
     tune, case, config = campaign.file.tune, next(campaign.cases()), campaign.base
-    damped = tune is not None and _DAMPING in tune.search
+    damped = tune is not None and _DAMPING_KEY in tune.search
     return _with_drag(_identified(config, case, damped=damped), case)
 
 
@@ -67,8 +67,11 @@ def _with_drag(config: Config, case: Case) -> Config:
     with tempfile.TemporaryDirectory(prefix="companion-drag-") as place:
         # A recorded flight keeps what it learned beside its folder.
         CaseFlight(replace(case, fault=None), Path(place)).fly(Path(place) / "flight")
-        known = newest(Path(place))
-    if known is None:
+        learned_file = newest(Path(place))
+    if learned_file is None:
         return config
-    drag = {"drag_per_s": known.drag.linear, "quadratic_drag_per_m": known.drag.quadratic}
+    drag = {
+        "drag_per_s": learned_file.drag.linear,
+        "quadratic_drag_per_m": learned_file.drag.quadratic,
+    }
     return changed(config, {"guidance": drag}, "the drag that a flight learned")

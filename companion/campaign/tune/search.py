@@ -45,7 +45,8 @@ the best candidate on the same cases.
 """
 _LARGEST_ERROR = 10.0
 """Largest error of a flight as Optuna sees it, m; the error of a flight that ended early."""
-_VALUES, _SCORE, _MISSED, _WHOLE = "values", "score", "missed", "whole"
+_VALUES, _SCORE, _VIOLATION, _COMPLETE = "values", "score", "missed", "whole"
+"""Names of the attributes of a trial in Optuna's storage."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +123,7 @@ class Search:
                 sampler=self._sampler(0),
                 load_if_exists=True,
             )
-            self._begin(learning_flight)
+            self._enqueue_starts(learning_flight)
 
     def run(self, trials: int, on_trial: Callable[[Found], None] = lambda _: None) -> Found:
         """Try candidates until there are `trials` of them, including those of earlier runs.
@@ -131,23 +132,23 @@ class Search:
             StorageError: the storage cannot be used any more, perhaps because the disk is full.
         """
         with storage_errors(self.path):
-            while len(self._ended()) < trials:
+            while len(self._ended_trials()) < trials:
                 on_trial(self.found())
                 # Each trial has its own seed, so an interruption does not change the candidates.
-                self._study.sampler = self._sampler(len(self._ended()))
-                self._try(self._interrupted() or self._study.ask())
+                self._study.sampler = self._sampler(len(self._ended_trials()))
+                self._try_candidate(self._interrupted_trial() or self._study.ask())
             return self.found()
 
     def found(self) -> Found:
         """The results so far."""
-        whole = [each for each in self._ended() if each.user_attrs.get(_WHOLE)]
+        complete = [each for each in self._ended_trials() if each.user_attrs.get(_COMPLETE)]
         good = sorted(
-            (self._candidate(each) for each in whole if not self._missed(each)),
+            (self._candidate(each) for each in complete if not self._violates(each)),
             key=lambda each: each.score.rms,
         )
-        tried = len(self._ended())
+        tried = len(self._ended_trials())
         near = good[: max(3, len(good) // 10)]
-        return Found(tried, tried - len(whole), good[0] if good else None, near)
+        return Found(tried, tried - len(complete), good[0] if good else None, near)
 
     @property
     def _neighbour_count(self) -> int:
@@ -161,7 +162,7 @@ class Search:
             n_startup_trials=_STARTS + self._neighbour_count,
         )
 
-    def _begin(self, learning_flight: Callable[[Campaign], Config | None]) -> None:
+    def _enqueue_starts(self, learning_flight: Callable[[Campaign], Config | None]) -> None:
         """Enqueue the starts of a new search."""
         if not self._study.trials:
             begin = list(starts(self._campaign, self._tune, learning_flight(self._campaign)))
@@ -169,18 +170,18 @@ class Search:
             for start in (*begin, *near(begin[-1], search, self._neighbour_count, seed)):
                 self._study.enqueue_trial(dict(start.values), user_attrs={"start": start.name})
 
-    def _interrupted(self) -> "Trial | None":
+    def _interrupted_trial(self) -> "Trial | None":
         """The candidate whose flights were interrupted; it is tried again."""
         running = self._study.get_trials(states=(self._optuna.trial.TrialState.RUNNING,))
         return self._optuna.trial.Trial(self._study, running[0]._trial_id) if running else None
 
-    def _ended(self) -> "list[FrozenTrial]":
+    def _ended_trials(self) -> "list[FrozenTrial]":
         """The trials that have ended, including pruned ones."""
         states = self._optuna.trial.TrialState
         ended = states.COMPLETE, states.PRUNED
         return list(self._study.get_trials(deepcopy=False, states=ended))
 
-    def _try(self, trial: "Trial") -> None:
+    def _try_candidate(self, trial: "Trial") -> None:
         values = within(suggested(trial, self._tune.search), self._tune.search)
         trial.set_user_attr(_VALUES, values)
         try:
@@ -190,40 +191,41 @@ class Search:
             return
         count = min(len(flown), max(_FEWEST_FIRST_CASES, len(flown) // _FIRST_DIVISOR))
         score = scored(self._fly(flown[:count]), self._tune.envelope_m)
-        missed = self._missed_share(score, len(flown))
-        if count < len(flown) and (missed > 0.0 or self._hopeless(score)):
-            self._stop(trial, _finite(score), max(missed, 0.0))
+        violation = self._shortfall(score, len(flown))
+        if count < len(flown) and (violation > 0.0 or self._hopeless(score)):
+            self._stop(trial, _capped_rms(score), max(violation, 0.0))
             return
         score = score.and_then(scored(self._fly(flown[count:]), self._tune.envelope_m))
         trial.set_user_attr(_SCORE, score.as_attributes())
-        self._note_missed(trial, self._missed_share(score, len(flown)))
-        trial.set_user_attr(_WHOLE, True)
-        self._study.tell(trial, _finite(score))
+        self._set_violation(trial, self._shortfall(score, len(flown)))
+        trial.set_user_attr(_COMPLETE, True)
+        self._study.tell(trial, _capped_rms(score))
 
-    def _stop(self, trial: "Trial", error: float, missed: float) -> None:
+    def _stop(self, trial: "Trial", error: float, violation: float) -> None:
         """End a candidate before all of its cases were flown.
 
         Args:
             trial: the candidate.
             error: RMS error so far, m.
-            missed: violation of the constraint; see `_note_missed`.
+            violation: violation of the constraint; see `_set_violation`.
         """
-        self._note_missed(trial, missed)
+        self._set_violation(trial, violation)
         trial.report(error, 0)
         self._study.tell(trial, state=self._optuna.trial.TrialState.PRUNED)
 
-    def _note_missed(self, trial: "Trial", missed: float) -> None:
+    def _set_violation(self, trial: "Trial", violation: float) -> None:
         """Tell the sampler the violation of the constraint; 0 or less is no violation."""
-        trial.set_user_attr(_MISSED, missed)
-        trial.set_constraint(_MISSED, missed)
+        trial.set_user_attr(_VIOLATION, violation)
+        trial.set_constraint(_VIOLATION, violation)
 
-    def _missed_share(self, score: Score, of: int) -> float:
-        """Shortfall of the share inside the envelope, if the rest of `of` cases stay inside.
+    def _shortfall(self, score: Score, cases_count: int) -> float:
+        """The required share minus the share inside the envelope, if all cases to come stay inside.
 
-        0 or less: the required share can still be reached.
+        `score` covers the cases flown so far, `cases_count` counts all. 0 or less: the required
+        share can still be reached.
         """
         outside = sum(not each for each in score.inside)
-        return self._tune.inside_share - (of - outside) / of
+        return self._tune.inside_share - (cases_count - outside) / cases_count
 
     def _hopeless(self, score: Score) -> bool:
         best = self.found().best
@@ -232,8 +234,8 @@ class Search:
             and score.rms > _HOPELESS_FACTOR * best.score.first(len(score.true)).rms
         )
 
-    def _missed(self, trial: "FrozenTrial") -> bool:
-        return float(trial.user_attrs[_MISSED]) > 0.0
+    def _violates(self, trial: "FrozenTrial") -> bool:
+        return float(trial.user_attrs[_VIOLATION]) > 0.0
 
     def _candidate(self, trial: "FrozenTrial") -> Candidate:
         attributes = trial.user_attrs
@@ -242,6 +244,6 @@ class Search:
         )
 
 
-def _finite(score: Score) -> float:
+def _capped_rms(score: Score) -> float:
     """The RMS error for Optuna, m; no flight counts more than `_LARGEST_ERROR`."""
     return pooled(np.minimum(score.true, _LARGEST_ERROR))

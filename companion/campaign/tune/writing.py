@@ -12,7 +12,7 @@ from companion.campaign.tune.scores import Score
 from companion.campaign.tune.search import Candidate, Found
 from companion.files import bounded_yaml
 
-_AT_EDGE = 0.02
+_EDGE_SHARE = 0.02
 """A value closer to an end of its range than this share of the range counts as at the end."""
 
 
@@ -49,10 +49,10 @@ def summary_lines(result: Result) -> list[str]:
         f"{best.score.share:.1%} were.",
         f"RMS of the true horizontal error in the search: {best.score.rms:.3f} m.",
     ]
-    return [*lines, *_certainty(result)]
+    return [*lines, *_certainty_lines(result)]
 
 
-def _certainty(result: Result) -> Iterator[str]:
+def _certainty_lines(result: Result) -> Iterator[str]:
     unseen = len(result.after.true)
     early = [
         sum(not isfinite(each) for each in score.true) for score in (result.before, result.after)
@@ -76,10 +76,10 @@ def _certainty(result: Result) -> Iterator[str]:
         f"{comparison.ratio.low:.2f} to {comparison.ratio.high:.2f}; better in "
         f"{comparison.better} of {comparison.samples} samples."
     )
-    (before, after), (own_before, own_after) = comparison.estimated, comparison.estimate
+    (before, after), (estimate_before, estimate_after) = comparison.estimated, comparison.estimate
     yield (
         f"On the same flights the estimated position was {before:.3f} -> {after:.3f} m from the "
-        f"reference, and {own_before:.3f} -> {own_after:.3f} m from the true one."
+        f"reference, and {estimate_before:.3f} -> {estimate_after:.3f} m from the true one."
     )
     yield (
         "The last is the error of the position estimate, which gains and weights hardly change; "
@@ -109,10 +109,10 @@ def result_text(result: Result, present: Mapping[str, Any]) -> str:
 
 def best_so_far_text(best: Candidate) -> str:
     """The best candidate of a search that was ended early, as YAML."""
-    said = (
+    comment = (
         f"# The best candidate so far, not checked on unseen flights, RMS {best.score.rms:.3f} m:"
     )
-    return "\n".join([said, *_values_lines(best.values, {})]) + "\n"
+    return "\n".join([comment, *_values_lines(best.values, {})]) + "\n"
 
 
 def _values_lines(values: Values, reasons: Mapping[str, str]) -> Iterator[str]:
@@ -130,21 +130,21 @@ def _values_lines(values: Values, reasons: Mapping[str, str]) -> Iterator[str]:
 
 def _reason(key: str, swept: Swept, result: Result, before: Any) -> str:
     """The reason for the value of a key."""
-    was = "not set before" if before is None else f"before {_shown(before)}"
+    before_text = "not set before" if before is None else f"before {_value_text(before)}"
     near = [each.values[key] for each in result.found.near if key in each.values]
     pair = swept.uniform or swept.loguniform
     if pair is None:
         same = sum(each == result.best.values[key] for each in near)
-        return f"{was}; {same} of the best {len(near)} candidates have it"
+        return f"{before_text}; {same} of the best {len(near)} candidates have it"
     low, high = pair
-    text = f"{was}; the best {len(near)} candidates have {min(near):.3g} to {max(near):.3g}"
+    text = f"{before_text}; the best {len(near)} candidates have {min(near):.3g} to {max(near):.3g}"
     text += f" of {low:g} to {high:g}"
     value = float(result.best.values[key])
-    if min(value - low, high - value) < _AT_EDGE * (high - low):
+    if min(value - low, high - value) < _EDGE_SHARE * (high - low):
         return f"{text}; it lies at an end of its range: widen the range"
     wide = max(near) - min(near) > 0.5 * (high - low)
     return f"{text}; it matters little here" if wide else text
 
 
-def _shown(value: Any) -> str:
+def _value_text(value: Any) -> str:
     return f"{value:.3g}" if isinstance(value, float) else str(value)
