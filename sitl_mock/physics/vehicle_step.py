@@ -101,14 +101,14 @@ def advance(
             conditions,
         )
         steps += 1
-        body, position, on_ground, crashed, touchdown_speed = _settled(
+        body, position, on_ground, crashed, touchdown_speed = _move_or_rest(
             law, body, position, on_ground, crashed, touchdown_speed, load
         )
         history[steps % length] = truth_row(body, position)
     return VehicleState(steps, body, actuation, position, on_ground, crashed, touchdown_speed)
 
 
-def _settled(
+def _move_or_rest(
     law: VehicleLaw,
     body: Kinematics,
     position: Vector,
