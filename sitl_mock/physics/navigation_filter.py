@@ -201,11 +201,8 @@ class NavigationFilter:
     def _next_noise(self, noise: tuple[complex, complex], ratio: float) -> tuple[complex, complex]:
         """Return the noise of the next fix."""
         config, gauss, decay = self._config, self._random.gauss, self._decay
-        new_share = ratio * sqrt(1.0 - decay * decay)
-        sigma_p, sigma_v = (
-            config.position_noise_m * new_share,
-            config.velocity_noise_m_s * new_share,
-        )
+        scale = ratio * sqrt(1.0 - decay * decay)
+        sigma_p, sigma_v = config.position_noise_m * scale, config.velocity_noise_m_s * scale
         return (
             decay * noise[0] + complex(gauss(0.0, sigma_p), gauss(0.0, sigma_p)),
             decay * noise[1] + complex(gauss(0.0, sigma_v), gauss(0.0, sigma_v)),
