@@ -131,7 +131,8 @@ class Server:
     def _collect(self, timeout_s: float) -> None:
         """Collect datagrams until the answer comes or the timeout ends.
 
-        Polling for a moment before sleeping saves two wake-ups a step, most of a round trip's cost.
+        The server polls for a moment before it sleeps. This saves two wake-ups a step, which are
+        most of the cost of a round trip.
         """
         began = time.monotonic()
         self._collect_companion()  # frames already buffered from a byte stream do not wake select
@@ -146,7 +147,7 @@ class Server:
             self._poll(remaining_s)
 
     def _poll(self, timeout_s: float) -> None:
-        """Wait for input, at most ``timeout_s``; collect the companion's and handle the rest."""
+        """Wait at most ``timeout_s`` for input; collect the companion's datagrams, handle others."""
         for endpoint in self._connections.ready(timeout_s):
             if endpoint is self._companion:
                 self._collect_companion()

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from types import FrameType
 
-EVERY_S = 0.001
+SAMPLE_PERIOD_S = 0.001
 """Processor time between two samples, s."""
 PARTS = {
     "event loop and wire": (
@@ -67,7 +67,7 @@ def sampled() -> Iterator[Counter[str]]:
         counts[_OTHER_CODE] += 1
 
     before = signal.signal(signal.SIGPROF, take)
-    signal.setitimer(signal.ITIMER_PROF, EVERY_S, EVERY_S)
+    signal.setitimer(signal.ITIMER_PROF, SAMPLE_PERIOD_S, SAMPLE_PERIOD_S)
     try:
         yield counts
     finally:

@@ -43,7 +43,7 @@ class Sender:
         contestant: The program that answers.
         stamp: Finds the time stamp in a setpoint.
         modulus: Value at which these stamps wrap, ms.
-        beside: Messages that follow each sample, each in a datagram of its own.
+        extra_messages: Messages that follow each sample, each in a datagram of its own.
 
     Attributes:
         round_trips_ns: Times from sample to setpoint, ns.
@@ -53,9 +53,9 @@ class Sender:
     """
 
     def __init__(
-        self, contestant: Contestant, stamp: Stamp, modulus: int, beside: Sequence[Any] = ()
+        self, contestant: Contestant, stamp: Stamp, modulus: int, extra_messages: Sequence[Any] = ()
     ) -> None:
-        self._beside = beside
+        self._extra_messages = extra_messages
         self._contestant, self._stamp, self._modulus = contestant, stamp, modulus
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", 0))
@@ -152,7 +152,7 @@ class Sender:
         )
         self._sent_ns[self._time_ms % self._modulus] = time.perf_counter_ns()
         self._send(frame)
-        for message in self._beside:
+        for message in self._extra_messages:
             self._send_message(message)
 
     def _listen_until(self, due_ns: int) -> bool:

@@ -76,7 +76,7 @@ class NavigationFilter:
         )
 
     def _initial(self, ratio: float) -> TrackState:
-        """Return the state after the first fix, whose noise becomes the error."""
+        """Return the state after the first fix, whose noise (times `ratio`) becomes the error."""
         config, gauss = self._config, self._random.gauss
         sigma_p, sigma_v = ratio * config.position_noise_m, ratio * config.velocity_noise_m_s
         noise = (
@@ -199,7 +199,7 @@ class NavigationFilter:
         return decay * self.state.height_noise + self._height_random.gauss(0.0, sigma)
 
     def _next_noise(self, noise: tuple[complex, complex], ratio: float) -> tuple[complex, complex]:
-        """Return the noise of the next fix."""
+        """Return the noise of the next fix; `ratio` scales it."""
         config, gauss, decay = self._config, self._random.gauss, self._decay
         scale = ratio * sqrt(1.0 - decay * decay)
         sigma_p, sigma_v = config.position_noise_m * scale, config.velocity_noise_m_s * scale

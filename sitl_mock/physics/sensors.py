@@ -66,7 +66,7 @@ class SensorState(NamedTuple):
 
 
 def white_noise(numbers: list[float], deviations: tuple[float, ...]) -> None:
-    """Turn uniform random numbers into normal ones, in place: as `Random.gauss`, Box-Muller.
+    """Turn uniform random numbers into normal ones, in place, by Box-Muller as in `Random.gauss`.
 
     Args:
         numbers: an even number of random numbers, 0 <= x < 1; they are replaced.

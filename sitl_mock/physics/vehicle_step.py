@@ -119,8 +119,8 @@ def _move_or_rest(
 ) -> tuple[Kinematics, Vector, bool, bool, float]:
     """Return the state after one step under this load.
 
-    It is the motion, the position (m, NED), whether the vehicle is on the ground and has crashed,
-    and the sink speed of the latest touchdown, m/s.
+    The state is: motion; position, m, NED; whether the vehicle is on the ground; whether it has
+    crashed; sink speed of the latest touchdown, m/s.
     """
     multirotor, ground = law
     _, _, _, w, x, y, z, _, _, _ = body[0]

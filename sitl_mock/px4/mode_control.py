@@ -21,7 +21,7 @@ ATTITUDE_FAILS_US = 140_000
 until a restart."""
 TOUCHDOWN_THRUST_RATE = 0.4
 """After contact in LAND the thrust decreases by this per second."""
-PRESSED_DOWN: Vector = (0.0, 0.0, 100.0)
+DISARMED_ACCELERATION: Vector = (0.0, 0.0, 100.0)
 """Acceleration setpoint of PX4's own modes while disarmed, m/s^2 (recorded)."""
 _STILL = ActuatorCommand(False, 0.0, 0.0, 0.0, 0.0)
 """Command while disarmed: the rotors stand still."""
@@ -71,7 +71,7 @@ class Px4ModeControl:
             if state.mode is not Mode.OFFBOARD and state.mode not in PILOTED:
                 yaw_now = yaw(state.estimate.q)
                 state.position_target = PositionTargetEcho(
-                    True, NAN_VECTOR, NAN_VECTOR, PRESSED_DOWN, yaw_now
+                    True, NAN_VECTOR, NAN_VECTOR, DISARMED_ACCELERATION, yaw_now
                 )
             command = _STILL
         elif state.mode is Mode.OFFBOARD:
