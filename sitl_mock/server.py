@@ -147,7 +147,7 @@ class Server:
             self._poll(remaining_s)
 
     def _poll(self, timeout_s: float) -> None:
-        """Wait at most ``timeout_s`` for input; collect the companion's datagrams, handle others."""
+        """Wait at most ``timeout_s`` for input; collect the companion's, handle all other input."""
         for endpoint in self._connections.ready(timeout_s):
             if endpoint is self._companion:
                 self._collect_companion()
