@@ -1,1 +1,1 @@
-"""A mock multirotor with an autopilot that speaks MAVLink, to test programs that fly one."""
+"""A mock multirotor with a MAVLink autopilot, to test programs that fly a multirotor."""

@@ -111,7 +111,7 @@ def _run_all(servers: list[Server]) -> None:
     processes: list[BaseProcess] = [
         context.Process(target=_run_one, args=(server,), daemon=True) for server in servers
     ]
-    # A signal within `start` would leave a vehicle that nobody ends.
+    # A signal during `start` would leave a vehicle process that nothing ends.
     signal.pthread_sigmask(signal.SIG_BLOCK, _END_SIGNALS)
     for process in processes:
         process.start()

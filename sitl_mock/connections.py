@@ -61,7 +61,7 @@ class Connections:
         control_fds = [] if control is None else control.readable
         readable, _, _ = select.select([*by_descriptor, *control_fds], (), (), timeout_s)
         if control is not None and control_fds[0] in readable:
-            self._serve(control)
+            self._answer_requests(control)
         return [by_descriptor[fd] for fd in readable if fd in by_descriptor]
 
     def deliver(self, arrived: list[Arrived], endpoint: Endpoint) -> None:
@@ -75,10 +75,10 @@ class Connections:
     def flush(self, beacon: bytes | None = None) -> None:
         """Send the queued frames of every link; the beacon, if any, only to the companion."""
         for endpoint, link in self._links.items():
-            own = beacon if endpoint is self.companion else None
-            endpoint.send(self._exchange.outgoing(link, own))
+            own_beacon = beacon if endpoint is self.companion else None
+            endpoint.send(self._exchange.outgoing(link, own_beacon))
 
-    def _serve(self, control: UdpEndpoint) -> None:
+    def _answer_requests(self, control: UdpEndpoint) -> None:
         while (request := control.receive_from()) is not None:
             datagram, sender = request
             control.send_to(reply(self._simulation, datagram), sender)

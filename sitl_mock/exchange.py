@@ -1,9 +1,9 @@
 """The datagrams that one vehicle receives and sends, with the faults of its companion link.
 
-It has no sockets and no clock. `Server` joins it to sockets, `companion.testing` to a program in
-the same process. In each slot both call `step` and send `outgoing` of each link. In lockstep they
-hand the datagrams that arrived since the last slot to `step`; in real time they `deliver` each one
-as it arrives.
+`Exchange` has no sockets and no clock. `Server` joins it to sockets, `companion.testing` to a
+program in the same process. In each slot both call `step` and send `outgoing` of each link. In
+lockstep they pass the datagrams that arrived since the last slot to `step`; in real time they
+`deliver` each one as it arrives.
 """
 
 from collections.abc import Callable
@@ -20,6 +20,7 @@ Arrived = tuple[bytes, list[Message]]
 """A datagram and the messages in it."""
 
 _ANSWERS = frozenset({"SET_ATTITUDE_TARGET", "SYSTEM_TIME"})
+"""Messages that answer a lockstep beacon."""
 
 
 def burst_time(elapsed_s: float, burst_s: float) -> float:

@@ -16,8 +16,8 @@ FIRST_BEACON_PERIOD_S = 0.05
 BEACON_PERIOD_S = 0.2
 """A later beacon is sent again after this wall time without an answer, s."""
 MAX_LAG_S = 1.0
-"""Largest lag that is made up in real time, s. A busy computer delays us by tenths of a second,
-which are made up, because to the companion a lost tenth would look like a slower link.
+"""Largest lag behind real time that the server makes up, s. A busy computer causes lags of tenths
+of a second. If they were dropped, the link would seem slower to the companion.
 """
 
 SPIN_S = 0.0005
@@ -53,8 +53,8 @@ class Server:
         self._beacon = b""
         self._answered = False
         self._collected: list[Arrived] = []
-        self._base_wall = 0.0
-        self._base_us = 0
+        self._origin_wall_s = 0.0
+        self._origin_us = 0
         self._simulation.set_clock(self._clock_ns)
 
     @property
@@ -63,7 +63,7 @@ class Server:
         return self._companion.where
 
     def run(self) -> None:
-        """Run until an exception, such as that of a signal, ends it."""
+        """Run until an exception, such as `KeyboardInterrupt`, ends the run."""
         try:
             if self._settings.lockstep.enabled:
                 self._await_answer_to_first_beacon()
@@ -71,7 +71,7 @@ class Server:
                 self._await_client()
                 self._simulation.boot()
                 self._connections.flush()
-            self._rebase()
+            self._reset_origin()
             while True:
                 self._step()
         finally:
@@ -126,12 +126,13 @@ class Server:
             self._collect(BEACON_PERIOD_S)
         if not self._answered:
             self._lockstep = False
-            self._rebase()
+            self._reset_origin()
 
     def _collect(self, timeout_s: float) -> None:
         """Collect datagrams until the answer comes or the timeout ends.
 
-        Polling for a moment before sleeping saves two wake-ups a step, most of a round trip's cost.
+        The server polls for a moment before it sleeps. This saves two wake-ups a step, which are
+        most of the cost of a round trip.
         """
         began = time.monotonic()
         self._collect_companion()  # frames already buffered from a byte stream do not wake select
@@ -140,13 +141,13 @@ class Server:
             self._collect_companion()
             os.sched_yield()  # let another process use this core
         while not self._answered:
-            left = began + timeout_s - time.monotonic()
-            if left <= 0.0:
+            remaining_s = began + timeout_s - time.monotonic()
+            if remaining_s <= 0.0:
                 return
-            self._poll(left)
+            self._poll(remaining_s)
 
     def _poll(self, timeout_s: float) -> None:
-        """Wait for input, at most ``timeout_s``; collect the companion's and handle the rest."""
+        """Wait at most ``timeout_s`` for input; collect the companion's, handle all other input."""
         for endpoint in self._connections.ready(timeout_s):
             if endpoint is self._companion:
                 self._collect_companion()
@@ -170,32 +171,32 @@ class Server:
     # Real time
 
     def _await_client(self) -> None:
-        """Wait for a client where the endpoint can tell; the vehicle boots after that."""
+        """Wait until a client connects, if the endpoint can know that; the vehicle boots then."""
         while not self._companion.connected:
             self._connections.ready(BEACON_PERIOD_S)
 
-    def _rebase(self) -> None:
-        """Count real time from now on."""
-        self._base_wall = time.monotonic()
-        self._base_us = self._simulation.time_us
+    def _reset_origin(self) -> None:
+        """Make the present the origin of real time."""
+        self._origin_wall_s = time.monotonic()
+        self._origin_us = self._simulation.time_us
 
     def _wait_for_time(self) -> None:
         """Serve the sockets until the next slot is due by the wall clock.
 
         A lag above `MAX_LAG_S` is dropped, and so is the time of a ``slip_clock`` fault.
         """
-        self._base_wall += self._simulation.effects.take_slip()
+        self._origin_wall_s += self._simulation.effects.take_slip()
         speed = self._settings.speed
-        elapsed_s = (self._simulation.next_us - self._base_us) / speed / 1e6
-        due = self._base_wall + burst_time(elapsed_s, self._settings.burst_ms * 1e-3 / speed)
-        left = due - time.monotonic()
-        if left < -MAX_LAG_S:
-            self._rebase()
+        elapsed_s = (self._simulation.next_us - self._origin_us) / speed / 1e6
+        due = self._origin_wall_s + burst_time(elapsed_s, self._settings.burst_ms * 1e-3 / speed)
+        remaining_s = due - time.monotonic()
+        if remaining_s < -MAX_LAG_S:
+            self._reset_origin()
         while True:
-            for endpoint in self._connections.ready(max(0.0, left)):
+            for endpoint in self._connections.ready(max(0.0, remaining_s)):
                 self._serve(endpoint)
-            left = due - time.monotonic()
-            if left <= 0.0 or self._lockstep:
+            remaining_s = due - time.monotonic()
+            if remaining_s <= 0.0 or self._lockstep:
                 return
 
     def _serve(self, endpoint: Endpoint) -> None:
@@ -219,6 +220,6 @@ class Server:
         simulation = self._simulation
         if self._lockstep or simulation.effects.clock_frozen:
             return simulation.state.shown_us * 1000
-        wall_us = (time.monotonic() - self._base_wall) * 1e6 * self._settings.speed
-        now_us = min(self._base_us + wall_us, simulation.next_us)
+        wall_us = (time.monotonic() - self._origin_wall_s) * 1e6 * self._settings.speed
+        now_us = min(self._origin_us + wall_us, simulation.next_us)
         return round(max(now_us, simulation.time_us) * 1000)

@@ -65,8 +65,8 @@ def load_settings(path: Path | None, overrides: dict[str, Any]) -> MockSettings:
     Raises:
         ConfigError: the file cannot be read, or a key or value is invalid.
     """
-    where = "the command line" if path is None else str(path)
-    document = Document(None, None) if path is None else _document(path)
+    source = "the command line" if path is None else str(path)
+    document = Document(None, None) if path is None else _read_document(path)
     section = {} if path is None else _mock_section(document.value, path)
     lockstep = {**section.get("lockstep", {}), **overrides.get("lockstep", {})}
     merged = {**section, **overrides} | ({"lockstep": lockstep} if lockstep else {})
@@ -74,11 +74,11 @@ def load_settings(path: Path | None, overrides: dict[str, Any]) -> MockSettings:
         return MockSettings.model_validate(merged)
     except ValidationError as error:
         line = document.line(error_path(error))
-        at = where if line is None else f"{where}, line {line}"
-        raise ConfigError(f"{at}: {explain(error, MockSettings)}") from error
+        location = source if line is None else f"{source}, line {line}"
+        raise ConfigError(f"{location}: {explain(error, MockSettings)}") from error
 
 
-def _document(path: Path) -> Document:
+def _read_document(path: Path) -> Document:
     try:
         return load_yaml(path)
     except OSError as error:

@@ -37,15 +37,15 @@ class Simulation:
 
     Attributes:
         vehicle: the true vehicle.
-        state: what its autopilot estimates and does.
+        state: the estimate, modes and targets of its autopilot.
         parameters: parameters of the autopilot.
-        stream: the latest offboard setpoint that it accepted, and their number.
-        commander: its arming and modes.
+        stream: the latest offboard setpoint that the autopilot accepted, and their number.
+        commander: arming and modes of the autopilot.
         companion: link to the companion.
         gcs: link to the ground station; nothing is sent on it if ``gcs_port`` is 0.
         links: the links that are used.
         faults: schedule of the faults.
-        effects: what the present faults do.
+        effects: applies the present faults.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class Simulation:
         self._rate_hz = settings.airframe.physics_rate_hz
         self._next_commander_us = 0
         self.stream = OffboardStream()
-        self.companion, self.gcs = _links(settings, personality, system_id)
+        self.companion, self.gcs = _make_links(settings, personality, system_id)
         self.links = [self.companion] + ([self.gcs] if settings.gcs_port else [])
         signed = settings.signing is not None
         self._beacon_framer = Framer(system_id, 1, signed=signed)
@@ -180,7 +180,9 @@ class Simulation:
                     link.send(message)
 
 
-def _links(settings: MockSettings, personality: Personality, system_id: int) -> tuple[Link, Link]:
+def _make_links(
+    settings: MockSettings, personality: Personality, system_id: int
+) -> tuple[Link, Link]:
     signing = settings.signing
 
     def link(name: str) -> Link:

@@ -1,1 +1,1 @@
-"""Benchmarks: latency and processor time of this program beside others, and speed in memory."""
+"""Benchmarks: latency and processor time, compared with other programs; speed in one process."""

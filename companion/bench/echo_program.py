@@ -8,7 +8,7 @@ import sys
 
 _HEADER = bytes([0xFD, 39, 0, 0, 0, 1, 191, 82, 0, 0])  # the header of SET_ATTITUDE_TARGET
 _PAYLOAD_END = bytes(35 + 2)  # the rest of its payload, and its checksum
-_STAMP = slice(10, 14)  # bytes of time_boot_ms, in a sample and in a setpoint
+_TIME_BOOT_MS = slice(10, 14)  # bytes of time_boot_ms, in a sample and in a setpoint
 
 
 def main(port: int) -> None:
@@ -17,7 +17,7 @@ def main(port: int) -> None:
         opened.bind(("127.0.0.1", port))
         while True:
             data, sender = opened.recvfrom(2048)
-            opened.sendto(_HEADER + data[_STAMP] + _PAYLOAD_END, sender)
+            opened.sendto(_HEADER + data[_TIME_BOOT_MS] + _PAYLOAD_END, sender)
 
 
 if __name__ == "__main__":

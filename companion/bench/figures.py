@@ -1,4 +1,4 @@
-"""What the benchmarks of latency have in common: short rounds, and the figures of a sender."""
+"""Shared by the latency benchmarks: the length of a round, and the figures of a sender."""
 
 import gc
 from collections.abc import Iterator
@@ -34,15 +34,15 @@ def figures_of(sender: Sender) -> dict[str, Any]:
     if not ordered:
         raise ContestantError(f"{sender.name} answered none of {sender.sent} samples in time")
     return {
-        "p50_us": _us(ordered, 0.50),
-        "p99_us": _us(ordered, 0.99),
-        "max_us": _us(ordered, 1.0),
+        "p50_us": _quantile_us(ordered, 0.50),
+        "p99_us": _quantile_us(ordered, 0.99),
+        "max_us": _quantile_us(ordered, 1.0),
         "cpu_percent": round(100.0 * sender.cpu_ns / sender.wall_ns, 2),
         "samples": sender.sent,
         "unanswered": sender.sent - len(ordered),
     }
 
 
-def _us(ordered: list[int], quantile: float) -> float:
+def _quantile_us(ordered: list[int], quantile: float) -> float:
     index = min(len(ordered) - 1, int(quantile * len(ordered)))
     return round(ordered[index] / 1000.0, 1)

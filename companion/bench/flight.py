@@ -25,7 +25,7 @@ CLOCKS = {"lockstep": True, "free": False}
 
 _FLIGHTS = 3
 _WARM_UP_S = 0.2
-_WIRE_S = 0.0005
+_LINK_DELAY_S = 0.0005
 
 
 def run(seconds: float, as_json: bool, profile: bool = False) -> dict[str, Any]:
@@ -48,14 +48,14 @@ def run(seconds: float, as_json: bool, profile: bool = False) -> dict[str, Any]:
     figures: dict[str, Any] = {}
     for autopilot in FILES:
         figures[autopilot] = {
-            name: _measured(autopilot, CLOCKS[name], seconds, profile) for name in CLOCKS
+            name: _measure(autopilot, CLOCKS[name], seconds, profile) for name in CLOCKS
         }
     if not as_json:
         _print(figures)
     return figures
 
 
-def _measured(autopilot: str, lockstep: bool, seconds: float, profile: bool) -> dict[str, Any]:
+def _measure(autopilot: str, lockstep: bool, seconds: float, profile: bool) -> dict[str, Any]:
     _fly_once(autopilot, lockstep, _WARM_UP_S)
     best = min(
         (_fly_once(autopilot, lockstep, seconds) for _ in range(_FLIGHTS)),
@@ -71,10 +71,10 @@ def _measured(autopilot: str, lockstep: bool, seconds: float, profile: bool) -> 
 def _fly_once(autopilot: str, lockstep: bool, seconds: float) -> dict[str, Any]:
     """Figures of one flight."""
     path = shipped(FILES[autopilot])
-    config = _hovering(load(path), seconds)
+    config = _hover_config(load(path), seconds)
     compiled = can_compile()
     vehicle = MockVehicle(
-        config=path, lockstep=lockstep, delay_s=_WIRE_S, compiled=compiled, prearm_delay_s=0.2
+        config=path, lockstep=lockstep, delay_s=_LINK_DELAY_S, compiled=compiled, prearm_delay_s=0.2
     )
     began = process_time()
     summary = fly(config, vehicle)
@@ -90,7 +90,7 @@ def _fly_once(autopilot: str, lockstep: bool, seconds: float) -> dict[str, Any]:
     }
 
 
-def _hovering(config: Config, seconds: float) -> Config:
+def _hover_config(config: Config, seconds: float) -> Config:
     flight = {"arm": True, "maneuvers": ("hover",), "takeoff_height_m": 2.0}
     return changed(config, {"flight": flight, "hover": {"duration_s": seconds}}, "bench flight")
 

@@ -18,13 +18,13 @@ from companion.bench.process import Contestant
 from companion.bench.sender import Sender, Stamp, stamp_by_time, stamp_by_yaw_rate
 from companion.extras import require
 
-_NO_WRAP = 2**32
-_YAW_RATE_WRAP = 8192
-_OWN_LOOP = "companion.bench.pymavlink_program"
-_BACKEND = "companion.bench.backend_program"
+_NO_WRAP = 2**32  # as the uint32 time stamp
+_YAW_RATE_WRAP = 8192  # STAMP_MODULUS of `mavsdk_program`
+_PYMAVLINK_PROGRAM = "companion.bench.pymavlink_program"
+_BACKEND_PROGRAM = "companion.bench.backend_program"
 
 
-class _Entry(NamedTuple):
+class _Program(NamedTuple):
     """A program: its key in the result, its title, its module, and how its setpoints are matched.
 
     `stamp` and `modulus` are those of `Sender`.
@@ -37,12 +37,16 @@ class _Entry(NamedTuple):
     modulus: int
 
 
-_ENTRIES = (
-    _Entry("echo", "blocking echo", "companion.bench.echo_program", stamp_by_time, _NO_WRAP),
-    _Entry("companion", "companion", "companion.bench.companion_program", stamp_by_time, _NO_WRAP),
-    _Entry("pymavlink", "blocking pymavlink", _OWN_LOOP, stamp_by_time, _NO_WRAP),
-    _Entry("companion_mavsdk", "companion by MAVSDK", _BACKEND, stamp_by_time, _NO_WRAP),
-    _Entry("mavsdk", "MAVSDK", "companion.bench.mavsdk_program", stamp_by_yaw_rate, _YAW_RATE_WRAP),
+_PROGRAMS = (
+    _Program("echo", "blocking echo", "companion.bench.echo_program", stamp_by_time, _NO_WRAP),
+    _Program(
+        "companion", "companion", "companion.bench.companion_program", stamp_by_time, _NO_WRAP
+    ),
+    _Program("pymavlink", "blocking pymavlink", _PYMAVLINK_PROGRAM, stamp_by_time, _NO_WRAP),
+    _Program("companion_mavsdk", "companion by MAVSDK", _BACKEND_PROGRAM, stamp_by_time, _NO_WRAP),
+    _Program(
+        "mavsdk", "MAVSDK", "companion.bench.mavsdk_program", stamp_by_yaw_rate, _YAW_RATE_WRAP
+    ),
 )
 
 
@@ -68,12 +72,12 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
     require("mavsdk", "mavsdk", "this benchmark")
     rounds = ceil(seconds / ROUND_S)
     with ExitStack() as stack, no_garbage_collection():
-        senders = {entry.key: _start(stack, entry) for entry in _ENTRIES}
+        senders = {program.key: _start(stack, program) for program in _PROGRAMS}
         for sender in senders.values():
             sender.wait_ready()
         for _ in range(rounds):
-            for playing in senders.values():
-                playing.play(rate_hz, seconds / rounds)
+            for measured in senders.values():
+                measured.play(rate_hz, seconds / rounds)
                 for sender in senders.values():
                     sender.heartbeat()
         figures = {key: figures_of(sender) for key, sender in senders.items()}
@@ -86,10 +90,10 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
     return figures
 
 
-def _start(stack: ExitStack, entry: _Entry) -> Sender:
-    contestant = Contestant(entry.title, entry.module)
+def _start(stack: ExitStack, program: _Program) -> Sender:
+    contestant = Contestant(program.title, program.module)
     stack.callback(contestant.stop)
-    sender = Sender(contestant, entry.stamp, entry.modulus)
+    sender = Sender(contestant, program.stamp, program.modulus)
     stack.callback(sender.close)
     return sender
 
@@ -98,10 +102,10 @@ def _show(figures: dict[str, Any], rate_hz: float) -> None:
     table = Table(title=f"sample out → setpoint in, at {rate_hz:g} Hz")
     for heading in ("", "p50 µs", "p99 µs", "max µs", "CPU %", "unanswered"):
         table.add_column(heading, justify="right" if heading else "left")
-    for entry in _ENTRIES:
-        row = figures[entry.key]
+    for program in _PROGRAMS:
+        row = figures[program.key]
         table.add_row(
-            entry.title,
+            program.title,
             *(f"{row[key]:.0f}" for key in ("p50_us", "p99_us", "max_us")),
             f"{row['cpu_percent']:.1f}",
             f"{row['unanswered']} of {row['samples']}",

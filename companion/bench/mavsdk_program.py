@@ -17,8 +17,8 @@ from companion.attitude import Target
 from companion.config import Config
 from companion.control.inner_loop import planner as make_planner
 
-STAMP_MODULUS = 8192  # up to here a float32 in rad/s gives back the whole number of °/s
-_HOVER = 0.5
+STAMP_MODULUS = 8192  # below this, whole °/s survive the conversion to a float32 in rad/s
+_HOVER_THRUST = 0.5
 _DT = 0.004
 
 
@@ -26,7 +26,7 @@ def setpoint(roll_deg_s: float, pitch_deg_s: float, yaw_deg_s: float) -> Attitud
     """An AttitudeRate with these values; its C structure has no constructor for them."""
     rate = AttitudeRate()
     rate.roll_deg_s, rate.pitch_deg_s, rate.yaw_deg_s = roll_deg_s, pitch_deg_s, yaw_deg_s
-    rate.thrust_value = _HOVER
+    rate.thrust_value = _HOVER_THRUST
     return rate
 
 

@@ -74,7 +74,7 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
     compiled = batch.can_compile()
     cases = [*_flight_cases(), *_batch_cases(compiled), _advance_case(compiled)]
     groups = _best(cases, seconds)
-    flight, batches = groups["flight"], _by_count(groups)
+    flight, batches = groups["flight"], _batches_by_count(groups)
     step = groups["advance"]["first-order"]
     figures = {
         "compiled": compiled,
@@ -99,16 +99,16 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
 def _flight_cases() -> list[_Case]:
     """Cases of two steps: with the same target, as in most steps of a flight, and with another."""
     vehicle = _fleet(2)
-    held, other = (Target(*column) for column in vehicle.targets.T.tolist())
-    values: dict[str, Any] = {"q": tuple(vehicle.q[:, 0].tolist()), "held": held, "other": other}
+    same, other = (Target(*column) for column in vehicle.targets.T.tolist())
+    values: dict[str, Any] = {"q": tuple(vehicle.q[:, 0].tolist()), "same": same, "other": other}
     functions: dict[str, Callable[..., Any]] = {"baseline": _first_argument}
     functions |= {name: _planner(name).rates for name in LAW_NAMES}
     return [
         _Case(group, key, Timer(statement, globals={**values, "f": function}), 2)
         for key, function in functions.items()
         for group, statement in (
-            ("flight", "f(q, held, 0.004); f(q, held, 0.004)"),
-            ("new target", "f(q, held, 0.004); f(q, other, 0.004)"),
+            ("flight", "f(q, same, 0.004); f(q, same, 0.004)"),
+            ("new target", "f(q, same, 0.004); f(q, other, 0.004)"),
         )
     ]
 
@@ -170,7 +170,7 @@ def _best(cases: list[_Case], seconds: float) -> dict[str, dict[str, float]]:
             return best
 
 
-def _by_count(groups: dict[str, dict[str, float]]) -> dict[str, dict[str, float]]:
+def _batches_by_count(groups: dict[str, dict[str, float]]) -> dict[str, dict[str, float]]:
     return {str(count): groups[str(count)] for count in BATCHES}
 
 
@@ -183,9 +183,9 @@ def _ratios(group: dict[str, float]) -> dict[str, float]:
 
 
 def _show(figures: dict[str, Any]) -> None:
-    means = "compiled by numba" if figures["compiled"] else "in Python"
+    how_computed = "compiled by numba" if figures["compiled"] else "in Python"
     table = Table(
-        title=f"ns a step and × baseline, the best of many; batches {means}",
+        title=f"ns a step and × baseline, the best of many; batches {how_computed}",
         caption="baseline: a bare Python call; of a batch, a copy of its attitudes and targets",
     )
     table.add_column("", no_wrap=True)

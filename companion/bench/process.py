@@ -26,7 +26,7 @@ class Contestant:
     def __init__(self, name: str, module: str, *arguments: str) -> None:
         self.name = name
         self.port = free_port()
-        # A file instead of a pipe: nobody reads it meanwhile, and a full pipe would block.
+        # A file, not a pipe: nobody reads while the program runs, and a full pipe would block it.
         self._output = tempfile.TemporaryFile()  # noqa: SIM115  closed by stop()
         self._process = subprocess.Popen(
             [sys.executable, "-m", module, str(self.port), *arguments],
@@ -39,8 +39,8 @@ class Contestant:
         """Raise `ContestantError` with its last line of error output if the program has ended."""
         if self._process.poll() is not None:
             self._output.seek(0)
-            words = self._output.read().decode(errors="replace").strip().splitlines()
-            reason = words[-1] if words else "it printed no error"
+            error_lines = self._output.read().decode(errors="replace").strip().splitlines()
+            reason = error_lines[-1] if error_lines else "it printed no error"
             raise ContestantError(f"{self.name} ended early: {reason}")
 
     def cpu_ns(self) -> int:

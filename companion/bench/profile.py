@@ -1,4 +1,4 @@
-"""Which part of the program and of the mock vehicle uses how much processor time, by sampling."""
+"""Processor time used by each part of the program and of the mock vehicle, by sampling."""
 
 import signal
 from collections import Counter
@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from types import FrameType
 
-EVERY_S = 0.001
+SAMPLE_PERIOD_S = 0.001
 """Processor time between two samples, s."""
 PARTS = {
     "event loop and wire": (
@@ -37,7 +37,7 @@ PARTS = {
     "recording": ("companion/recording/",),
 }
 """Parts, and the files of each; a file belongs to the first part that names it."""
-_REST = "rest"
+_OTHER_CODE = "rest"
 _ROOTS = tuple(
     f"{Path(spec.origin).parents[1]}/"
     for spec in map(find_spec, ("companion", "sitl_mock"))
@@ -64,10 +64,10 @@ def sampled() -> Iterator[Counter[str]]:
                 counts[part] += 1
                 return
             frame = frame.f_back
-        counts[_REST] += 1
+        counts[_OTHER_CODE] += 1
 
     before = signal.signal(signal.SIGPROF, take)
-    signal.setitimer(signal.ITIMER_PROF, EVERY_S, EVERY_S)
+    signal.setitimer(signal.ITIMER_PROF, SAMPLE_PERIOD_S, SAMPLE_PERIOD_S)
     try:
         yield counts
     finally:

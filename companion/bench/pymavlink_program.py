@@ -13,7 +13,7 @@ from companion.config import Config
 from companion.control.inner_loop import planner
 
 _RATES_AND_THRUST = 128  # ATTITUDE_TARGET_TYPEMASK: ignore the attitude
-_HOVER = 0.5
+_HOVER_THRUST = 0.5
 
 
 def main(port: int) -> None:
@@ -28,7 +28,13 @@ def main(port: int) -> None:
                     continue
                 rates = law.rates((sample.q1, sample.q2, sample.q3, sample.q4), target, 0.004)
                 setpoint = dialect.MAVLink_set_attitude_target_message(
-                    sample.time_boot_ms, 1, 1, _RATES_AND_THRUST, [1, 0, 0, 0], *rates, _HOVER
+                    sample.time_boot_ms,
+                    1,
+                    1,
+                    _RATES_AND_THRUST,
+                    [1, 0, 0, 0],
+                    *rates,
+                    _HOVER_THRUST,
                 )
                 opened.sendto(setpoint.pack(mavlink), sender)
 

@@ -18,22 +18,22 @@ Stamp = Callable[[bytes], int]
 
 _SETPOINT_BYTES = 51
 _SETPOINT_ID = 82
-_TIME_AT, _YAW_RATE_AT = 10, 38
+_TIME_OFFSET, _YAW_RATE_OFFSET = 10, 38
 _READY_TIMEOUT_S = 30.0
 _SETTLE_SAMPLES = 25  # not counted, at the start of each round
 _PX4, _QUADROTOR, _OFFBOARD_ARMED, _OFFBOARD, _ACTIVE = 12, 2, 129, 0x00060000, 4
-_TILT = (0.99, 0.05, 0.05, 0.1197)
+_ATTITUDE = (0.99, 0.05, 0.05, 0.1197)
 
 
 def stamp_by_time(setpoint: bytes) -> int:
     """`time_boot_ms` of a SET_ATTITUDE_TARGET frame."""
-    stamp: int = struct.unpack_from("<I", setpoint, _TIME_AT)[0]
+    stamp: int = struct.unpack_from("<I", setpoint, _TIME_OFFSET)[0]
     return stamp
 
 
 def stamp_by_yaw_rate(setpoint: bytes) -> int:
     """The stamp that `mavsdk_program` puts in the yaw rate, in whole degrees per second."""
-    return round(degrees(struct.unpack_from("<f", setpoint, _YAW_RATE_AT)[0]))
+    return round(degrees(struct.unpack_from("<f", setpoint, _YAW_RATE_OFFSET)[0]))
 
 
 class Sender:
@@ -43,7 +43,7 @@ class Sender:
         contestant: The program that answers.
         stamp: Finds the time stamp in a setpoint.
         modulus: Value at which these stamps wrap, ms.
-        beside: Messages that follow each sample, each in a datagram of its own.
+        extra_messages: Messages that follow each sample, each in a datagram of its own.
 
     Attributes:
         round_trips_ns: Times from sample to setpoint, ns.
@@ -53,9 +53,9 @@ class Sender:
     """
 
     def __init__(
-        self, contestant: Contestant, stamp: Stamp, modulus: int, beside: Sequence[Any] = ()
+        self, contestant: Contestant, stamp: Stamp, modulus: int, extra_messages: Sequence[Any] = ()
     ) -> None:
-        self._beside = beside
+        self._extra_messages = extra_messages
         self._contestant, self._stamp, self._modulus = contestant, stamp, modulus
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", 0))
@@ -67,7 +67,7 @@ class Sender:
         self._parser.robust_parsing = True
         self._boot = time.perf_counter_ns()
         self._time_ms = 0
-        self._under_way: dict[int, int] = {}
+        self._sent_ns: dict[int, int] = {}  # time stamp of a sample -> time of sending
         self._recording = False
         self.round_trips_ns: list[int] = []
         self.sent = 0
@@ -98,7 +98,7 @@ class Sender:
             ContestantError: The program ended, or did not answer within 30 s.
         """
         end = time.monotonic() + _READY_TIMEOUT_S
-        beat = 0.0
+        heartbeat_due = 0.0
         answered = False
         while not answered:
             self._contestant.check_running()
@@ -106,8 +106,8 @@ class Sender:
                 raise ContestantError(
                     f"{self._contestant.name} did not answer within {_READY_TIMEOUT_S:g} s"
                 )
-            if time.monotonic() > beat:
-                beat = time.monotonic() + 0.5
+            if time.monotonic() > heartbeat_due:
+                heartbeat_due = time.monotonic() + 0.5
                 self.heartbeat()
             self._send_sample()
             answered = self._listen_until(time.perf_counter_ns() + 20_000_000)
@@ -121,7 +121,7 @@ class Sender:
         self._contestant.check_running()
         self.heartbeat()
         due = self._send_samples(_SETTLE_SAMPLES, rate_hz, time.perf_counter_ns())
-        self._under_way.clear()
+        self._sent_ns.clear()
         self._recording = True
         cpu, began = self._contestant.cpu_ns(), time.perf_counter_ns()
         count = round(rate_hz * seconds)
@@ -148,30 +148,30 @@ class Sender:
         # The stamp follows real time, and is unique because it identifies the answer.
         self._time_ms = max(self._time_ms + 1, (time.perf_counter_ns() - self._boot) // 1_000_000)
         frame = self._pack(
-            dialect.MAVLink_attitude_quaternion_message(self._time_ms, *_TILT, 0.01, 0.02, 0.03)
+            dialect.MAVLink_attitude_quaternion_message(self._time_ms, *_ATTITUDE, 0.01, 0.02, 0.03)
         )
-        self._under_way[self._time_ms % self._modulus] = time.perf_counter_ns()
+        self._sent_ns[self._time_ms % self._modulus] = time.perf_counter_ns()
         self._send(frame)
-        for message in self._beside:
+        for message in self._extra_messages:
             self._send_message(message)
 
-    def _listen_until(self, due: int) -> bool:
-        """Take answers until the time `due`, ns; return whether one belonged to a sample."""
+    def _listen_until(self, due_ns: int) -> bool:
+        """Take answers until the time `due_ns`; return whether one belonged to a sample."""
         matched = False
-        while (left := due - time.perf_counter_ns()) > 0:
+        while (remaining_ns := due_ns - time.perf_counter_ns()) > 0:
             # poll() counts whole milliseconds; the rest is slept.
-            if not self._poll.poll(left // 1_000_000):
-                time.sleep(max(0, due - time.perf_counter_ns()) * 1e-9)
+            if not self._poll.poll(remaining_ns // 1_000_000):
+                time.sleep(max(0, due_ns - time.perf_counter_ns()) * 1e-9)
             try:
                 data = self._socket.recv(2048)
             except OSError:
                 continue  # no answer yet, or the program has not started yet
             now = time.perf_counter_ns()
             if len(data) == _SETPOINT_BYTES and data[7] == _SETPOINT_ID:
-                began = self._under_way.pop(self._stamp(data) % self._modulus, None)
-                matched = matched or began is not None
-                if began is not None and self._recording:
-                    self.round_trips_ns.append(now - began)
+                sent_ns = self._sent_ns.pop(self._stamp(data) % self._modulus, None)
+                matched = matched or sent_ns is not None
+                if sent_ns is not None and self._recording:
+                    self.round_trips_ns.append(now - sent_ns)
             else:
                 self._accept_commands(data)
         return matched

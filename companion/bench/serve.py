@@ -35,8 +35,8 @@ _TELEMETRY = (
     ),
     dialect.MAVLink_servo_output_raw_message(1, 0, *[1500] * 8),
 )
-"""What a vehicle sends beside each sample."""
-_KEYS = {"alone": "no client", "with_clients": f"{_CLIENTS} clients and a stopped one"}
+"""Messages that the vehicle sends after each sample."""
+_TITLES = {"alone": "no client", "with_clients": f"{_CLIENTS} clients and a stopped one"}
 
 
 def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
@@ -58,25 +58,25 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
     """
     rounds = ceil(seconds / ROUND_S)
     with ExitStack() as stack, no_garbage_collection():
-        ports = {key: free_port() for key in _KEYS}
+        ports = {key: free_port() for key in _TITLES}
         senders = {key: _start(stack, key, port) for key, port in ports.items()}
         for sender in senders.values():
             sender.wait_ready()
-        reading = _clients(stack, ports["with_clients"], _CLIENTS)
-        stopped = _clients(stack, ports["with_clients"], 1)
+        reading = _start_clients(stack, ports["with_clients"], _CLIENTS)
+        stopped = _start_clients(stack, ports["with_clients"], 1)
         senders["with_clients"].play(rate_hz, ROUND_S)  # all four connect, and receive
         stopped.send_signal(signal.SIGSTOP)
         senders["with_clients"].forget()
         for _ in range(rounds):
-            for playing in senders.values():
-                playing.play(rate_hz, seconds / rounds)
+            for measured in senders.values():
+                measured.play(rate_hz, seconds / rounds)
                 for sender in senders.values():
                     sender.heartbeat()
         figures: dict[str, Any] = {key: figures_of(sender) for key, sender in senders.items()}
-        figures["clients"] = _counts(reading)
-    alone, beside = figures["alone"], figures["with_clients"]
+        figures["clients"] = _read_counts(reading)
+    alone, with_clients = figures["alone"], figures["with_clients"]
     figures["ratio"] = {
-        name: round(beside[f"{name}_us"] / alone[f"{name}_us"], 3) for name in ("p50", "p99")
+        name: round(with_clients[f"{name}_us"] / alone[f"{name}_us"], 3) for name in ("p50", "p99")
     }
     if not as_json:
         _show(figures, rate_hz)
@@ -84,14 +84,14 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
 
 
 def _start(stack: ExitStack, key: str, client_port: int) -> Sender:
-    contestant = Contestant(_KEYS[key], "companion.bench.serve_program", str(client_port))
+    contestant = Contestant(_TITLES[key], "companion.bench.serve_program", str(client_port))
     stack.callback(contestant.stop)
     sender = Sender(contestant, stamp_by_time, _NO_WRAP, _TELEMETRY)
     stack.callback(sender.close)
     return sender
 
 
-def _clients(stack: ExitStack, port: int, count: int) -> subprocess.Popen[str]:
+def _start_clients(stack: ExitStack, port: int, count: int) -> subprocess.Popen[str]:
     process = subprocess.Popen(
         [sys.executable, "-m", "companion.bench.client_program", str(port), str(count)],
         stdin=subprocess.PIPE,
@@ -105,7 +105,7 @@ def _clients(stack: ExitStack, port: int, count: int) -> subprocess.Popen[str]:
     return process
 
 
-def _counts(process: subprocess.Popen[str]) -> list[dict[str, int]]:
+def _read_counts(process: subprocess.Popen[str]) -> list[dict[str, int]]:
     out, _ = process.communicate()
     if process.returncode != 0:
         raise ContestantError(f"the clients of the benchmark ended with {process.returncode}")
@@ -117,7 +117,7 @@ def _show(figures: dict[str, Any], rate_hz: float) -> None:
     table = Table(title=f"sample out → setpoint in, at {rate_hz:g} Hz, forwarding full telemetry")
     for heading in ("", "p50 µs", "p99 µs", "max µs", "CPU %", "unanswered"):
         table.add_column(heading, justify="right" if heading else "left")
-    for key, title in _KEYS.items():
+    for key, title in _TITLES.items():
         row = figures[key]
         table.add_row(
             title,

@@ -73,7 +73,7 @@ def _results(case: Case, flown: Flights) -> Table:
     return Table(
         "custom",
         "The custom case; largest values over"
-        f" {_count(case.headings_deg, 'heading')}, rates as commanded.",
+        f" {_counted(case.headings_deg, 'heading')}, rates as commanded.",
         (
             "method",
             "rate, Hz",
@@ -113,13 +113,18 @@ def _samples(
 ) -> Iterator[tuple[Cell, ...]]:
     """Rows of one response: coefficients and commanded body rates of each sample."""
     time = response.step.time
-    for k, heading in enumerate(case.headings_deg):
-        paths, rates = response.at(k), response.rates[:, :, k]
-        for t, c, w in zip(time[:-1], paths[:-1], rates, strict=True):
-            yield (method.label, hz, heading, *(float(v) for v in (t, *c, *w)))
+    for index, heading in enumerate(case.headings_deg):
+        paths, rates = response.at(index), response.rates[:, :, index]
+        for instant, coefficients, body_rates in zip(time[:-1], paths[:-1], rates, strict=True):
+            yield (
+                method.label,
+                hz,
+                heading,
+                *(float(v) for v in (instant, *coefficients, *body_rates)),
+            )
 
 
-def _count(things: tuple[float, ...], word: str) -> str:
+def _counted(things: tuple[float, ...], word: str) -> str:
     return f"{len(things)} {word}" + ("s" if len(things) > 1 else "")
 
 
@@ -166,18 +171,22 @@ def _figure(case: Case, flown: Flights) -> Figure:
     hz = case.rates_hz[0]
     step, reference = case.step(hz), _reference(case, hz)
     shown = {method: response for (method, rate), response in flown.items() if rate == hz}
-    at = {m: int(cross_track(r).argmax()) for m, r in shown.items()}
-    curves = [(m, m.label, r.at(at[m])) for m, r in shown.items()]
-    figure, ((north, east), (plane, across), (away, rate)) = new_figure(3, 2, height=3.0)
+    worst_heading = {m: int(cross_track(r).argmax()) for m, r in shown.items()}
+    curves = [(m, m.label, r.at(worst_heading[m])) for m, r in shown.items()]
+    figure, ((north, east), (plane, from_straight_line), (from_reference, rate)) = new_figure(
+        3, 2, height=3.0
+    )
     draw_response(north, east, step.time, curves)
     draw_reference(north, east, step.time, reference, _reference_words(case))
     draw_plane(plane, curves, np.array([step.start, step.target]))
     for m, response in shown.items():
-        draw(across, step.time, from_line(response)[:, at[m]], m.line)
-        draw(away, step.time, deviation(response, reference)[:, at[m]], m.line)
-        draw(rate, step.time[:-1], response.tilt_rate[:, at[m]], m.line)
-    across.set(title="Distance from the line", xlabel="time, s", ylabel="to its right")
-    away.set(title="Distance from the reference", xlabel="time, s", ylabel="|c − reference|")
+        draw(from_straight_line, step.time, from_line(response)[:, worst_heading[m]], m.line)
+        draw(from_reference, step.time, deviation(response, reference)[:, worst_heading[m]], m.line)
+        draw(rate, step.time[:-1], response.tilt_rate[:, worst_heading[m]], m.line)
+    from_straight_line.set(title="Distance from the line", xlabel="time, s", ylabel="to its right")
+    from_reference.set(
+        title="Distance from the reference", xlabel="time, s", ylabel="|c − reference|"
+    )
     label_tilt_rate(rate, "Tilt rate commanded")
     limit = case.planner_limits().max_tilt_rate
     if limit is not None:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from companion.study.methods import REFERENCE, Line, Method
 from companion.study.step import Floats
 
-_MOST_POINTS = 400
+_THINNED_POINTS = 400
 """A line of at least twice as many points is thinned; with all points a page would be megabytes."""
 
 STYLE: Any = {  # Any, because matplotlib types the keys as a literal of 300 names
@@ -35,8 +35,8 @@ def new_figure(
 
 
 def draw(axes: Axes, x: Floats, y: Floats, line: Line, label: str = "") -> None:
-    """Draw a line, thinned to fewer than about two times `_MOST_POINTS` points."""
-    stride = max(1, len(x) // _MOST_POINTS)
+    """Draw a line, thinned to fewer than about two times `_THINNED_POINTS` points."""
+    stride = max(1, len(x) // _THINNED_POINTS)
     keep = np.unique(np.append(np.arange(0, len(x), stride), len(x) - 1))
     axes.plot(x[keep], y[keep], **line, label=label or None)
 
@@ -81,7 +81,7 @@ def draw_plane(axes: Axes, curves: Iterable[tuple[Method, str, Floats]], ends: F
 
 
 def say_magnified(axes: Axes, axis: str, span: float, other: str, other_span: float) -> None:
-    """Say below the title of a panel that an axis is magnified beside another one.
+    """Write below the title of a panel by how much an axis is magnified, compared with another.
 
     Args:
         axes: the panel.
@@ -90,5 +90,5 @@ def say_magnified(axes: Axes, axis: str, span: float, other: str, other_span: fl
         other: name of the axis that it is compared with.
         other_span: range of values that the other axis shows.
     """
-    share = other_span / span
-    axes.set_title(f"{axes.get_title()}\nmagnified: {axis} spans 1/{share:.0f} of {other}")
+    factor = other_span / span
+    axes.set_title(f"{axes.get_title()}\nmagnified: {axis} spans 1/{factor:.0f} of {other}")

@@ -97,12 +97,12 @@ class InnerLoop:
         if samples < 1:
             raise ValueError(f"seconds must be one sample period at least, not {seconds}")
         q = normalised(start)
-        multirotor = Multirotor(self.airframe, self.rate_loop, q, _thrust(q))
-        setpoints = self._setpoint_queue(multirotor.throttle(_thrust(q)))
-        attitudes, turning, commanded, saturated = [q], [multirotor.body_rates], [], []
+        multirotor = Multirotor(self.airframe, self.rate_loop, q, _thrust_to_hold_height(q))
+        setpoints = self._setpoint_queue(multirotor.throttle(_thrust_to_hold_height(q)))
+        attitudes, body_rates, commanded, saturated = [q], [multirotor.body_rates], [], []
         for _ in range(samples):
             rates = planner.rates(q, target, 1.0 / rate_hz, BodyRates(*multirotor.body_rates))
-            setpoint = rates, multirotor.throttle(_thrust(q))
+            setpoint = rates, multirotor.throttle(_thrust_to_hold_height(q))
             tilt_saturated = yaw_saturated = False
             for _ in range(physics_steps):
                 setpoints.append(setpoint)
@@ -111,13 +111,13 @@ class InnerLoop:
                 yaw_saturated |= multirotor.mix.yaw_saturated
             q = multirotor.q
             attitudes.append(q)
-            turning.append(multirotor.body_rates)
+            body_rates.append(multirotor.body_rates)
             commanded.append(rates)
             saturated.append((tilt_saturated, yaw_saturated))
         return InnerLoopFlight(
             np.arange(samples + 1) / rate_hz,
             np.array(attitudes),
-            np.array(turning),
+            np.array(body_rates),
             np.array(commanded),
             *np.array(saturated).T,
         )
@@ -131,7 +131,7 @@ class InnerLoop:
             ValueError: the roll rate does not reach 63 % in 2 s.
         """
         goal = ROLL_STEP.roll * (1.0 - exp(-1.0))
-        for seconds in (0.25, 2.0):  # most loops are quick, and a longer flight begins alike
+        for seconds in (0.25, 2.0):  # a flight of 0.25 s is enough for most loops
             flight = self.fly(
                 _Constant(ROLL_STEP),
                 LEVEL,
@@ -140,14 +140,14 @@ class InnerLoop:
                 rate_hz=self.airframe.physics_rate_hz,
             )
             roll = flight.body_rates[:, 0]
-            after = int(np.argmax(roll >= goal))
-            if after > 0:
+            crossing = int(np.argmax(roll >= goal))
+            if crossing > 0:
                 break
-        if after == 0:
+        if crossing == 0:
             raise ValueError(
                 f"the roll rate reaches only {roll.max():.3g} of {ROLL_STEP.roll} rad/s"
             )
-        between = slice(after - 1, after + 1)
+        between = slice(crossing - 1, crossing + 1)
         return float(np.interp(goal, roll[between], flight.time[between]))
 
     def _physics_steps(self, rate_hz: float) -> int:
@@ -175,7 +175,7 @@ def quickened(factor: int) -> InnerLoop:
     others. The physics run `factor` times as often.
     """
     airframe, rate_loop = AirframeConfig(), RateLoopConfig()
-    shrunk = {
+    scaled_airframe = {
         "physics_rate_hz": factor * airframe.physics_rate_hz,
         "inertia_kg_m2": tuple(inertia / factor for inertia in airframe.inertia_kg_m2),
         "rotor_lag_ms": airframe.rotor_lag_ms / factor,
@@ -191,7 +191,9 @@ def quickened(factor: int) -> InnerLoop:
         )
         for name, axis in rate_loop
     }
-    return InnerLoop(AirframeConfig(**{**airframe.model_dump(), **shrunk}), RateLoopConfig(**axes))
+    return InnerLoop(
+        AirframeConfig(**{**airframe.model_dump(), **scaled_airframe}), RateLoopConfig(**axes)
+    )
 
 
 class _Constant:
@@ -213,6 +215,6 @@ class _Constant:
         """Do nothing."""
 
 
-def _thrust(q: Quaternion) -> float:
+def _thrust_to_hold_height(q: Quaternion) -> float:
     """Specific thrust that holds height at this attitude, m/s²."""
     return specific_thrust(0.0, cos_tilt(q[1], q[2]))

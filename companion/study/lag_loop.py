@@ -40,21 +40,30 @@ class LagBody:
     def __init__(self, q: Quaternion, lag_ms: int, dead_time_ms: int) -> None:
         self.q = q
         self.rates = BodyRates(0.0, 0.0, 0.0)
-        self._kept = exp(-1e3 / (STEP_HZ * lag_ms))
-        self._mean = 1e-3 * lag_ms * (1.0 - self._kept) * STEP_HZ  # of the decay over a step
+        self._decay = exp(-1e3 / (STEP_HZ * lag_ms))
+        self._mean_decay = 1e-3 * lag_ms * (1.0 - self._decay) * STEP_HZ  # mean over a step
         self._delayed = deque([self.rates] * (dead_time_ms + 1))
 
     def turn(self, commanded: BodyRates, steps: int) -> None:
         """Simulate this number of steps with the body rates `commanded` (rad/s)."""
-        kept, mean, (roll, pitch, yaw) = self._kept, self._mean, self.rates
+        decay, mean_decay, (roll, pitch, yaw) = self._decay, self._mean_decay, self.rates
         for _ in range(steps):
             self._delayed.append(commanded)
             self._delayed.popleft()
-            p, r, y = self._delayed[0]
-            roll, pitch, yaw = roll - p, pitch - r, yaw - y
-            rates = (p + mean * roll, r + mean * pitch, y + mean * yaw)
+            roll_goal, pitch_goal, yaw_goal = self._delayed[0]
+            # The difference of each rate from its delayed command decays.
+            roll, pitch, yaw = roll - roll_goal, pitch - pitch_goal, yaw - yaw_goal
+            rates = (
+                roll_goal + mean_decay * roll,
+                pitch_goal + mean_decay * pitch,
+                yaw_goal + mean_decay * yaw,
+            )
             self.q = after_constant_rates(self.q, rates, 1.0 / STEP_HZ)
-            roll, pitch, yaw = p + kept * roll, r + kept * pitch, y + kept * yaw
+            roll, pitch, yaw = (
+                roll_goal + decay * roll,
+                pitch_goal + decay * pitch,
+                yaw_goal + decay * yaw,
+            )
         self.rates = BodyRates(roll, pitch, yaw)
 
 

@@ -15,16 +15,16 @@ FIT_COLUMNS = ("second order: dead time, ms", "second order: ω, rad/s", "second
 
 _THINNING = 10
 """The second-order model is fitted to every tenth sample."""
-_REST = Coefficients(0.0, 0.0)
-_LOWEST = np.array([log(0.1), log(0.01), 0.0])
-_HIGHEST = np.array([log(1000.0), log(100.0), 0.5])
+_AT_REST = Coefficients(0.0, 0.0)
+_LOWER_BOUNDS = np.array([log(0.1), log(0.01), 0.0])
+_UPPER_BOUNDS = np.array([log(1000.0), log(100.0), 0.5])
 """Bounds of log ω (rad/s), log ζ and the dead time (s) in the fit."""
 
 
 def deviation(response: Response, reference: Floats) -> Floats:
     """(samples + 1, headings) distance from a reference of shape (samples + 1, 2)."""
-    apart = response.coefficients - reference[:, :, None]
-    return np.asarray(np.hypot(apart[:, 0], apart[:, 1]))
+    difference = response.coefficients - reference[:, :, None]
+    return np.asarray(np.hypot(difference[:, 0], difference[:, 1]))
 
 
 def largest_deviation(response: Response, reference: Floats) -> Floats:
@@ -39,8 +39,8 @@ def from_line(response: Response) -> Floats:
     """
     start, target = np.array(response.step.start), np.array(response.step.target)
     north, east = (target - start) / np.hypot(*(target - start))
-    away = response.coefficients - start[:, None]
-    return np.asarray(away[:, 1] * north - away[:, 0] * east)
+    offset = response.coefficients - start[:, None]
+    return np.asarray(offset[:, 1] * north - offset[:, 0] * east)
 
 
 def cross_track(response: Response) -> Floats:
@@ -54,10 +54,10 @@ def time_to(response: Response, share: float = 0.05) -> Floats:
     In s; inf if the response ends before.
     """
     start, target = np.array(response.step.start), np.array(response.step.target)
-    left = response.coefficients - target[:, None]
-    beyond = np.hypot(left[:, 0], left[:, 1]) > share * np.hypot(*(target - start))
-    last = beyond.shape[0] - np.argmax(beyond[::-1], axis=0)  # first sample after the last beyond
-    arrived = np.where(beyond.any(axis=0), last, 0)
+    offset = response.coefficients - target[:, None]
+    beyond = np.hypot(offset[:, 0], offset[:, 1]) > share * np.hypot(*(target - start))
+    first_inside = beyond.shape[0] - np.argmax(beyond[::-1], axis=0)  # after the last sample beyond
+    arrived = np.where(beyond.any(axis=0), first_inside, 0)
     time = response.step.time
     return np.where(arrived < len(time), time[np.minimum(arrived, len(time) - 1)], np.inf)
 
@@ -103,7 +103,9 @@ class SecondOrderFit(NamedTuple):
 def second_order_path(step: Step, fit: SecondOrderFit, time: Floats) -> Floats:
     """(n, 2) coefficients of the model, from rest, at the times (n,) in s after the step."""
     moving = np.maximum(time - fit.dead_time, 0.0)
-    return np.array([fit.model.after(step.start, _REST, step.target, float(t))[0] for t in moving])
+    return np.array(
+        [fit.model.after(step.start, _AT_REST, step.target, float(t))[0] for t in moving]
+    )
 
 
 def fit_second_order(step: Step, path: Floats) -> SecondOrderFit:
@@ -116,12 +118,12 @@ def fit_second_order(step: Step, path: Floats) -> SecondOrderFit:
     time, measured = step.time[::_THINNING], path[::_THINNING]
 
     def residual(unknown: Floats) -> tuple[Floats, Floats]:
-        return np.empty(0), (measured - second_order_path(step, _fit(unknown), time)).ravel()
+        return np.empty(0), (measured - second_order_path(step, _fit_from(unknown), time)).ravel()
 
     start = np.array([log(2.0 * step.gain), 0.0, 1.0 / step.rate_hz])
-    return _fit(minimise(residual, start, _LOWEST, _HIGHEST).unknown)
+    return _fit_from(minimise(residual, start, _LOWER_BOUNDS, _UPPER_BOUNDS).unknown)
 
 
-def _fit(unknown: Floats) -> SecondOrderFit:
+def _fit_from(unknown: Floats) -> SecondOrderFit:
     frequency, damping, dead_time = (float(value) for value in unknown)
     return SecondOrderFit(SecondOrderReference(exp(frequency), exp(damping)), dead_time)

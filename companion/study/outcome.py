@@ -119,7 +119,7 @@ class Job(NamedTuple):
 
     Attributes:
         run: runs the study; calls the tick before each part.
-        parts: number of parts, and so of calls of the tick.
+        parts: number of parts; `run` calls the tick as often.
     """
 
     run: Callable[[Tick], Outcome]

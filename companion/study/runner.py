@@ -58,8 +58,8 @@ def run(
             study `nmpc` does not start (ChildProcessError).
         VehicleStoppedError: the mock vehicle of the study `track` ended before its flight did.
     """
-    jobs = {study.name: _job(study, case_file) for study in registry.chosen(name)}
-    page = _prepared(out, "study" if name == registry.ALL else name)
+    jobs = {study.name: _make_job(study, case_file) for study in registry.chosen(name)}
+    page = _prepare_folder(out, "study" if name == registry.ALL else name)
     workers = min(workers, len(jobs))
     with _progress(console) as progress:
         total = sum(job.parts for job in jobs.values()) + 1
@@ -79,9 +79,9 @@ def run(
 def _run_named(out: Path, name: str, tick: Tick) -> Outcome:
     """In a worker process, run a study that takes no case, and write its files.
 
-    The figure of the returned outcome is empty: the file has it, and it is large to pass on.
+    The returned outcome has an empty figure: the figure is in its file, and too large to pass on.
     """
-    outcome = _run(_job(registry.STUDIES[name], None), out, tick)
+    outcome = _run(_make_job(registry.STUDIES[name], None), out, tick)
     return replace(outcome, figure=Figure())
 
 
@@ -95,7 +95,7 @@ def _run(job: Job, out: Path, tick: Tick) -> Outcome:
     return outcome
 
 
-def _job(study: Study, case_file: Path | None) -> Job:
+def _make_job(study: Study, case_file: Path | None) -> Job:
     """Import a study, and give it its case if it takes one.
 
     Raises:
@@ -114,7 +114,7 @@ def _job(study: Study, case_file: Path | None) -> Job:
     return Job(module.run, module.PARTS)
 
 
-def _prepared(out: Path, name: str) -> Path:
+def _prepare_folder(out: Path, name: str) -> Path:
     """Make the folder, and check that files can be written there; return the path of the page.
 
     Raises:

@@ -65,14 +65,14 @@ def run_in_workers(
     """
     context = get_context("spawn")
     channels = _Channels(context.SimpleQueue(), context.Event())
-    pool = ProcessPoolExecutor(workers, context, _begin, (channels,))
+    pool = ProcessPoolExecutor(workers, context, _start_worker, (channels,))
     try:
         with interrupts_blocked():
             futures = {
                 name: pool.submit(_run_one, run_study, name)
                 for name in sorted(parts, key=lambda name: -parts[name])
             }
-        _follow(list(futures.values()), channels.ticks, tick)
+        _forward_ticks(list(futures.values()), channels.ticks, tick)
         return {name: futures[name].result() for name in parts}
     except BrokenProcessPool as error:
         raise OSError(
@@ -87,8 +87,8 @@ def run_in_workers(
 def interrupts_blocked() -> Iterator[None]:
     """Block SIGINT while the block runs.
 
-    Processes started in it inherit this, so that Ctrl-C does not end them. Afterwards SIGINT is not
-    blocked here.
+    Processes that the block starts inherit this, so that Ctrl-C does not end them. Afterwards this
+    process does not block SIGINT.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -97,10 +97,10 @@ def interrupts_blocked() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
 
-def _follow(
+def _forward_ticks(
     futures: Sequence[Future[Outcome]], ticks: Any, tick: Callable[[str, str], None]
 ) -> None:
-    """Pass the workers' ticks on until all studies are done or one of them failed."""
+    """Pass the workers' ticks to `tick` until all studies are done or one of them has failed."""
     pending = set(futures)
     while pending:
         done, pending = wait(pending, timeout=_POLL_S)
@@ -110,8 +110,8 @@ def _follow(
             future.result()  # raises the study's exception
 
 
-def _begin(channels: _Channels) -> None:
-    """Keep the channels of a worker process that begins."""
+def _start_worker(channels: _Channels) -> None:
+    """Store the channels when a worker process starts."""
     end_with_parent()
     _shared.append(channels)
 

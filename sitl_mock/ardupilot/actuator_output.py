@@ -14,10 +14,10 @@ from sitl_mock.physics.quaternion import Quaternion, Vector
 from sitl_mock.physics.vehicle import ActuatorCommand
 
 HOVER_LEARNING_TIME_S = 10.0
-"""MOT_THST_HOVER follows the thrust of a quiet hover with this time constant."""
-# The mock shapes rates, where ArduPilot shapes the attitudes of its own modes. The yaw response is
-# slow, and a higher yaw gain would oscillate.
-_GAINS = AttitudeGains(4.5, 4.5, 1.5, 1.0, (radians(180.0), radians(180.0), radians(45.0)))
+"""MOT_THST_HOVER follows the thrust of a steady hover with this time constant."""
+# In ArduPilot's own modes the attitude target is shaped; the mock shapes the rates instead. Its yaw
+# response is slow, so a yaw gain as high as ATC_ANG_YAW_P (4.5) would oscillate.
+_ATTITUDE_GAINS = AttitudeGains(4.5, 4.5, 1.5, 1.0, (radians(180.0), radians(180.0), radians(45.0)))
 
 
 class ActuatorOutput:
@@ -66,8 +66,8 @@ class ActuatorOutput:
     def _learn_hover(self, output: PositionOutput, dt: float) -> None:
         """Follow the thrust of a steady, level hover, if MOT_HOVER_LEARN is set."""
         state, parameters = self._state, self._parameters
-        quiet = self._hold.climb.rate == 0.0 and abs(state.estimate.velocity_ned[2]) < 0.6
-        if parameters["MOT_HOVER_LEARN"] and quiet and self.cos_tilt > cos(radians(5.0)):
+        steady = self._hold.climb.rate == 0.0 and abs(state.estimate.velocity_ned[2]) < 0.6
+        if parameters["MOT_HOVER_LEARN"] and steady and self.cos_tilt > cos(radians(5.0)):
             hover = float(parameters["MOT_THST_HOVER"])
             change = dt / HOVER_LEARNING_TIME_S * (output.thrust - hover)
             parameters.set("MOT_THST_HOVER", hover + change)
@@ -83,7 +83,7 @@ class ActuatorOutput:
 
     def rates_towards(self, target: Quaternion) -> Vector:
         """Return the body rates that turn to an attitude, rad/s."""
-        return attitude_rates(self._state.estimate.q, target, 0.0, _GAINS)
+        return attitude_rates(self._state.estimate.q, target, 0.0, _ATTITUDE_GAINS)
 
     def rates(self, rates: Vector, thrust: float) -> ActuatorCommand:
         """Return the command for rates (rad/s) and normalised thrust.

@@ -1,4 +1,4 @@
-"""ArduCopter's boot: its texts over time (recorded), and what is ready when."""
+"""ArduCopter's boot: the texts that it sends, and when each part is ready (recorded times)."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -41,6 +41,7 @@ _TEXTS = (
     (RECORDED_READY_S, "EKF3 IMU0 is using GPS"),
     (RECORDED_READY_S, "EKF3 IMU1 is using GPS"),
 )
+"""Texts that the boot sends, with their times, s."""
 _SAVED_PARAMETERS = (
     (0.16, "COMPASS_DEV_ID"),
     (1.87, "BARO1_GND_PRESS"),
@@ -75,13 +76,13 @@ class Boot:
         self._notifier = notifier
         self._scale = ready_us / (RECORDED_READY_S * 1e6)
         self._elevation = elevation
-        self._texts = list(_TEXTS)
-        self._saved = list(_SAVED_PARAMETERS)
+        self._unsent_texts = list(_TEXTS)
+        self._unsent_parameters = list(_SAVED_PARAMETERS)
         self._home_sent = False
         self._next_runtime_us = RUNTIME_PERIOD_US
 
     def reached(self, recorded_s: float) -> bool:
-        """Whether the scaled time of ``recorded_s`` in the recording is reached."""
+        """Whether the time ``recorded_s`` of the recording is reached, scaled as all times here."""
         return self._state.time_us >= recorded_s * self._scale * 1e6
 
     @property
@@ -102,10 +103,10 @@ class Boot:
     def step(self) -> None:
         """Send the texts and messages that are due."""
         notifier = self._notifier
-        while self._saved and self.reached(self._saved[0][0]):
-            notifier.send_parameter(self._saved.pop(0)[1])
-        while self._texts and self.reached(self._texts[0][0]):
-            text = self._texts.pop(0)[1]
+        while self._unsent_parameters and self.reached(self._unsent_parameters[0][0]):
+            notifier.send_parameter(self._unsent_parameters.pop(0)[1])
+        while self._unsent_texts and self.reached(self._unsent_texts[0][0]):
+            text = self._unsent_texts.pop(0)[1]
             notifier.announce.say(text.format(elevation=self._elevation), INFO)
         if self.origin_set and not self._home_sent:
             self._home_sent = True

@@ -33,7 +33,7 @@ class ArduPilotCommander:
         control: begins each mode that is entered.
         guided: the task of GUIDED.
         stream: counts the accepted setpoints.
-        notifier: sends texts and messages.
+        notifier: sends texts, the home position and changed parameters.
         boot: progress of the boot.
     """
 
@@ -50,7 +50,9 @@ class ArduPilotCommander:
     ) -> None:
         self.refusal: str | None = None
         self.pilot = False
-        self.failsafe = ArduPilotFailsafe(state, parameters, vehicle, notifier.announce, self._act)
+        self.failsafe = ArduPilotFailsafe(
+            state, parameters, vehicle, notifier.announce, self._act_on_failsafe
+        )
         self._state = state
         self._parameters = parameters
         self._control = control
@@ -76,7 +78,7 @@ class ArduPilotCommander:
         state = self._state
         if state.armed:
             return ACCEPTED
-        problem = self._find_problem()
+        problem = self._update_prearm_problem()
         if problem is not None and not (force and self._boot.initialised and not self._crashed):
             self._announce(EventKind.ARMING_DENIED, problem)
             return FAILED
@@ -92,7 +94,7 @@ class ArduPilotCommander:
 
     def announce_problem(self) -> None:
         """Announce what forbids arming now, if anything does."""
-        problem = self._find_problem()
+        problem = self._update_prearm_problem()
         if problem is not None:
             self._announce(EventKind.PREFLIGHT_FAIL, problem)
 
@@ -113,7 +115,7 @@ class ArduPilotCommander:
         if state.armed and mode in NEEDS_POSITION and not state.position_valid:
             self._announce(EventKind.MODE_DENIED, mode.name)
             return FAILED
-        self._enter(mode)
+        self._enter_mode(mode)
         return ACCEPTED
 
     def take_off(self, height: float) -> int:
@@ -146,14 +148,14 @@ class ArduPilotCommander:
         if (message.get_srcSystem(), message.get_srcComponent()) == own:
             return
         if message.get_type() == "SET_ATTITUDE_TARGET":
-            self._attitude_setpoint(message)
+            self._take_attitude_setpoint(message)
             return
         setpoint = position_setpoint(message)
         if setpoint is not None:
             self._stream.accept(setpoint, state.time_us)
             self._guided.follow_position(setpoint, state.time_us)
 
-    def _attitude_setpoint(self, message: Message) -> None:
+    def _take_attitude_setpoint(self, message: Message) -> None:
         state = self._state
         try:
             setpoint = attitude_setpoint(message)
@@ -181,7 +183,7 @@ class ArduPilotCommander:
         if state.armed and crashed:
             self._stop_motors(EventKind.DISARMED_AFTER_CRASH)
         self.failsafe.step()
-        self._find_problem()
+        self._update_prearm_problem()
         if state.armed:
             self._align_yaw()
             self._disarm_on_ground()
@@ -196,8 +198,8 @@ class ArduPilotCommander:
         for unit in (0, 1):
             self._announce.say(f"EKF3 IMU{unit} MAG0 in-flight yaw alignment complete", INFO)
 
-    def _find_problem(self) -> str | None:
-        """Return why arming is refused now, None if it is not, and note it in the state."""
+    def _update_prearm_problem(self) -> str | None:
+        """Store in the state why arming is refused now (None if it is not), and return that."""
         state = self._state
         state.prearm_problem = arming_problem(
             state,
@@ -229,8 +231,8 @@ class ArduPilotCommander:
         if self._state.mode is Mode.GUIDED:
             self._guided.hold()
 
-    def _act(self, mode: Mode) -> None:
-        """Enter a failsafe's mode, or LAND if that mode needs a position and there is none.
+    def _act_on_failsafe(self, mode: Mode) -> None:
+        """Enter the mode of a failsafe, or LAND if that mode needs a position and there is none.
 
         On the ground, disarm instead.
         """
@@ -238,10 +240,10 @@ class ArduPilotCommander:
         if state.landed:
             self._stop_motors(EventKind.DISARMED_ON_GROUND)
         elif mode in NEEDS_POSITION and not state.position_valid:
-            self._enter(Mode.LAND)
+            self._enter_mode(Mode.LAND)
         elif state.mode is not mode:
-            self._enter(mode)
+            self._enter_mode(mode)
 
-    def _enter(self, mode: Mode) -> None:
+    def _enter_mode(self, mode: Mode) -> None:
         self._state.mode = self._state.intended_mode = mode
         self._control.enter(mode)

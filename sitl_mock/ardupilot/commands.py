@@ -85,12 +85,12 @@ class ArduPilotCommands(Commands):
                 link.streams.set_interval(message_id, interval, self._state.time_us)
 
     def _set_mode(self, command: Command, _: Link) -> int:
-        base, number = command.parameters[:2]
-        if not isfinite(base) or not isfinite(number):
+        base_mode, custom_mode = command.parameters[:2]
+        if not isfinite(base_mode) or not isfinite(custom_mode):
             return DENIED
-        if not int(base) & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+        if not int(base_mode) & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
             return DENIED
-        mode = MODES_BY_NUMBER.get(int(number))
+        mode = MODES_BY_NUMBER.get(int(custom_mode))
         return FAILED if mode is None else self._commander.request_mode(mode)
 
     def _set_interval(self, command: Command, link: Link) -> int:

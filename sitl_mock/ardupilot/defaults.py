@@ -96,15 +96,16 @@ ARDUPILOT_PARAMETERS = tuple(Parameter(name, value) for name, value, _ in _PARAM
 ARDUPILOT_TYPES = {name: int(kind) for name, _, kind in _PARAMETERS}
 """MAV_PARAM_TYPE by name."""
 BURST_MS = 5.6
-"""Period of the bursts of the simulator's telemetry (measured: 5.4 to 5.8)."""
+"""Period of the bursts of the simulator's telemetry, ms (measured: 5.4 to 5.8)."""
 ROTOR_LAG_MS = 22.5
-"""Time constant of the specific thrust. It stands for what was measured: 5 ms after a dead time of
-15 ms."""
+"""Time constant of the specific thrust, ms. This one lag replaces the measured dead time of 15 ms
+and lag of 5 ms."""
 
 RATE_LAG_MS = 11.0
-"""Delay of the gyro's low pass (measured)."""
+"""Delay of the gyro's low pass, ms (measured)."""
 STAMP_SLIPS_HZ = 1.6
-"""Slips of the position's stamp (measured in circles and figure-eights: 0.3 to 2.7)."""
+"""Slips per second of the position's time stamp (measured in circles and figure-eights: 0.3 to
+2.7)."""
 
 AIRFRAME: dict[str, Any] = {
     "thrust_slope_m_s2": specific_thrust(1.0),
@@ -133,25 +134,27 @@ BATTERY: dict[str, Any] = {
 def _with_rotor_lag(gains: AxisGains, inertia: float) -> AxisGains:
     """Return gains that give the same poles and the same steady state with ROTOR_LAG_MS.
 
-    The given gains were fitted on the default airframe. With gains P, D and feed-forward F, inertia
-    J, aerodynamic damping b and rotor lag T an axis without a torque filter answers as
-    (P + F) / (J T s^2 + (J + b T + D) s + P + b). An axis with a torque filter gets a slower filter
-    instead: two lags in series respond almost as their sum.
+    The gains passed were fitted with the rotor lag of the default airframe. With gains P, D and
+    feed-forward F, inertia J, aerodynamic damping b and rotor lag T an axis without a torque filter
+    answers as (P + F) / (J T s^2 + (J + b T + D) s + P + b). An axis with a torque filter gets a
+    slower filter instead: two lags in series respond almost as their sum.
     """
-    measured_on = AirframeConfig()
-    quicker = measured_on.rotor_lag_ms - ROTOR_LAG_MS
+    default_airframe = AirframeConfig()
+    lag_reduction_ms = default_airframe.rotor_lag_ms - ROTOR_LAG_MS
     if gains.torque_filter_ms > 0.0:
-        return gains.model_copy(update={"torque_filter_ms": gains.torque_filter_ms + quicker})
-    drag = measured_on.rotational_drag_n_m_s
-    ratio = ROTOR_LAG_MS / measured_on.rotor_lag_ms
+        return gains.model_copy(
+            update={"torque_filter_ms": gains.torque_filter_ms + lag_reduction_ms}
+        )
+    drag = default_airframe.rotational_drag_n_m_s
+    lag_ratio = ROTOR_LAG_MS / default_airframe.rotor_lag_ms
     stiffness = gains.proportional_n_m_s + drag
     steady = (gains.proportional_n_m_s + gains.feed_forward_n_m_s) / stiffness
-    proportional = ratio * stiffness - drag
+    proportional = lag_ratio * stiffness - drag
     return gains.model_copy(
         update={
             "proportional_n_m_s": proportional,
-            "feed_forward_n_m_s": steady * ratio * stiffness - proportional,
-            "damping_n_m_s2": ratio * (inertia + gains.damping_n_m_s2) - inertia,
+            "feed_forward_n_m_s": steady * lag_ratio * stiffness - proportional,
+            "damping_n_m_s2": lag_ratio * (inertia + gains.damping_n_m_s2) - inertia,
         }
     )
 
@@ -171,8 +174,8 @@ RATE_LOOP = _rate_loop()
 
 def with_ardupilot_defaults(section: dict[str, Any]) -> dict[str, Any]:
     """Return the ``mock:`` section, completed by these defaults."""
-    own = {"prearm_delay_s": RECORDED_READY_S, "rate_loop": RATE_LOOP, "burst_ms": BURST_MS}
-    filled = {**own, **section}
+    top_level = {"prearm_delay_s": RECORDED_READY_S, "rate_loop": RATE_LOOP, "burst_ms": BURST_MS}
+    filled = {**top_level, **section}
     if filled["rate_loop"] == "ardupilot":
         filled["rate_loop"] = RATE_LOOP
     sensors = {"rate_lag_ms": RATE_LAG_MS, "stamp_slips_hz": STAMP_SLIPS_HZ}

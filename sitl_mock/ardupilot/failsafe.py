@@ -20,14 +20,15 @@ _PILOT_CONTINUES = 16
 class ArduPilotFailsafe:
     """Detects a lost ground station, a lost position and a low battery, and acts while armed.
 
-    Each failsafe acts once, at its start; that of the battery again when it becomes critical.
+    Each failsafe acts once, when it begins. The battery failsafe acts again when the charge becomes
+    critical.
 
     Args:
         state: the autopilot's state.
         parameters: its parameters.
         vehicle: for the battery's voltage.
         announce: sends texts.
-        act: enters a failsafe's mode, or disarms a vehicle that is on the ground.
+        act: enters the mode of a failsafe, or disarms a vehicle that is on the ground.
     """
 
     def __init__(
@@ -43,7 +44,7 @@ class ArduPilotFailsafe:
         self._vehicle = vehicle
         self._announce = announce
         self._act = act
-        self._gcs_us: int | None = None
+        self._gcs_heartbeat_us: int | None = None
         self.gcs_lost = False
         """Whether the ground station failsafe is active."""
         self._position_lost = False
@@ -52,7 +53,7 @@ class ArduPilotFailsafe:
     def receive_heartbeat(self, heartbeat: Message) -> None:
         """Record a heartbeat; the ground station has the system id MAV_GCS_SYSID."""
         if heartbeat.get_srcSystem() == self._parameters["MAV_GCS_SYSID"]:
-            self._gcs_us = self._state.time_us
+            self._gcs_heartbeat_us = self._state.time_us
 
     def step(self) -> None:
         """Check every failsafe once."""
@@ -66,27 +67,29 @@ class ArduPilotFailsafe:
     def _watch_gcs(self) -> None:
         state, parameters = self._state, self._parameters
         enabled = int(parameters["FS_GCS_ENABLE"])
-        if self._gcs_us is None:
+        if self._gcs_heartbeat_us is None:
             return
         limit = parameters["FS_GCS_TIMEOUT"] * 1e6
-        lost = bool(enabled) and state.time_us - self._gcs_us >= limit
+        lost = bool(enabled) and state.time_us - self._gcs_heartbeat_us >= limit
         if self.gcs_lost and not lost:
             self.gcs_lost = False
             self._announce(EventKind.GCS_REGAINED, "")
         elif lost and not self.gcs_lost and state.armed:
             self.gcs_lost = True
             self._announce(EventKind.GCS_LOST, "")
-            continues = int(parameters["FS_OPTIONS"]) & _PILOT_CONTINUES and state.mode in PILOTED
+            pilot_continues = (
+                int(parameters["FS_OPTIONS"]) & _PILOT_CONTINUES and state.mode in PILOTED
+            )
             mode = _GCS_ACTIONS.get(enabled)
-            if mode is not None and not continues:
+            if mode is not None and not pilot_continues:
                 self._act(mode)
 
     def _watch_battery(self) -> None:
         state, parameters = self._state, self._parameters
-        left_mah = state.battery_remaining * parameters["BATT_CAPACITY"]
-        if left_mah < parameters["BATT_CRT_MAH"] or self._voltage_below("BATT_CRT_VOLT"):
+        remaining_mah = state.battery_remaining * parameters["BATT_CAPACITY"]
+        if remaining_mah < parameters["BATT_CRT_MAH"] or self._voltage_below("BATT_CRT_VOLT"):
             warning = BatteryWarning.CRITICAL
-        elif left_mah < parameters["BATT_LOW_MAH"] or self._voltage_low():
+        elif remaining_mah < parameters["BATT_LOW_MAH"] or self._voltage_low():
             warning = BatteryWarning.LOW
         else:
             warning = BatteryWarning.OK
@@ -94,7 +97,7 @@ class ArduPilotFailsafe:
             return  # the battery failsafe never ends
         state.battery_warning = warning
         critical = warning is BatteryWarning.CRITICAL
-        used = parameters["BATT_CAPACITY"] - left_mah
+        used = parameters["BATT_CAPACITY"] - remaining_mah
         detail = f"{self._vehicle.battery.voltage_v:.2f}V used {used:.0f} mAh"
         self._announce(EventKind.BATTERY_CRITICAL if critical else EventKind.BATTERY_LOW, detail)
         action = parameters["BATT_FS_CRT_ACT" if critical else "BATT_FS_LOW_ACT"]
@@ -102,8 +105,8 @@ class ArduPilotFailsafe:
         if state.armed and mode is not None:
             self._act(mode)
 
-    def _voltage_below(self, limit: str) -> bool:
-        return self._vehicle.battery.voltage_v < self._parameters[limit]
+    def _voltage_below(self, parameter: str) -> bool:
+        return self._vehicle.battery.voltage_v < self._parameters[parameter]
 
     def _voltage_low(self) -> bool:
         """Whether the voltage has been below BATT_LOW_VOLT for BATT_LOW_TIMER."""

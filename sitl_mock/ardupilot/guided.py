@@ -25,8 +25,8 @@ class FatalSetpointError(Exception):
 def attitude_setpoint(message: Message) -> AttitudeSetpoint | None:
     """Decode a SET_ATTITUDE_TARGET by ArduCopter's type-mask rules (measured).
 
-    None makes the vehicle hold its position. This is so if the throttle or only some of the rates
-    are ignored, and if the attitude is not of unit length. Rates may be NaN or infinite.
+    None makes the vehicle hold its position: it is returned if the throttle or only some of the
+    rates are ignored, or if the attitude is not of unit length. Rates may be NaN or infinite.
 
     Raises:
         FatalSetpointError: the attitude has a NaN.
@@ -58,7 +58,7 @@ class Task(Enum):
 
 
 class Guided:
-    """The task and its setpoint. A new task replaces the last at once, even a take-off."""
+    """The task and its setpoint. A new task replaces the present one at once, even a take-off."""
 
     def __init__(self) -> None:
         self.task = Task.HOLD

@@ -21,7 +21,7 @@ ARRIVAL_DECELERATION = 0.55
 """Deceleration at the end of a take-off, m/s^2 (recorded)."""
 ARRIVAL_TOLERANCE_M = 0.1
 """A take-off ends this far below its height, m."""
-_SLOWEST_ARRIVAL = 0.1
+_MIN_CLIMB_RATE = 0.1
 """Smallest climb rate of a take-off, m/s, so that it reaches its height."""
 
 
@@ -72,10 +72,10 @@ class GuidedFlight:
         if state.landed and state.time_us - self._spooling_since_us < SPOOL_UP_US:
             self._hold.begin()
             return self._output.rates((0.0, 0.0, 0.0), 0.0)
-        left = guided.takeoff_height - state.home_ned[2] - self._hold.climb.height
+        remaining = guided.takeoff_height - state.home_ned[2] - self._hold.climb.height
         fastest = 0.01 * self._parameters["WPNAV_SPEED_UP"]
-        speed = max(_SLOWEST_ARRIVAL, approach_speed(left, ARRIVAL_DECELERATION, fastest))
-        if left < ARRIVAL_TOLERANCE_M:
+        speed = max(_MIN_CLIMB_RATE, approach_speed(remaining, ARRIVAL_DECELERATION, fastest))
+        if remaining < ARRIVAL_TOLERANCE_M:
             guided.arrive()
         return self._output.follow(self._hold.step(speed, dt), dt)
 
@@ -87,12 +87,12 @@ class GuidedFlight:
         state.position_controlled = False
         was_silent = self._silent and not began
         self._silent = self._guided.silent(state.time_us, parameters["GUID_TIMEOUT"])
-        as_thrust = bool(int(parameters["GUID_OPTIONS"]) & THRUST_AS_THRUST)
-        climbs = self._silent or not as_thrust
-        state.height_controlled = climbs
+        is_thrust = bool(int(parameters["GUID_OPTIONS"]) & THRUST_AS_THRUST)
+        is_climb_rate = self._silent or not is_thrust
+        state.height_controlled = is_climb_rate
         if self._silent and not was_silent:
             self._hold.begin()
-        if climbs:
+        if is_climb_rate:
             up = 0.01 * parameters["WPNAV_SPEED_UP"]
             down = 0.01 * parameters["WPNAV_SPEED_DN"]
             climb = 0.0 if self._silent else climb_rate_of_setpoint(setpoint.thrust, up, down)
@@ -102,7 +102,7 @@ class GuidedFlight:
             thrust = thrust_of_setpoint(setpoint.thrust)
         self._output.thrust = state.attitude_target.thrust = thrust
         # The angle boost always applies to a climb rate; to a thrust only if it is enabled.
-        if climbs or parameters["ATC_ANGLE_BOOST"]:
+        if is_climb_rate or parameters["ATC_ANGLE_BOOST"]:
             thrust = angle_boosted(thrust, self._output.cos_tilt)
         if self._silent:
             return self._output.attitude(from_yaw(self._hold.yaw), thrust)
@@ -117,9 +117,9 @@ class GuidedFlight:
     def _follow_position(self, dt: float) -> ActuatorCommand:
         guided, parameters = self._guided, self._parameters
         setpoint = guided.position
-        moves = setpoint is not None and isnan(setpoint.position[0])
+        has_no_position = setpoint is not None and isnan(setpoint.position[0])
         if setpoint is None or (
-            moves and guided.silent(self._state.time_us, parameters["GUID_TIMEOUT"])
+            has_no_position and guided.silent(self._state.time_us, parameters["GUID_TIMEOUT"])
         ):
             guided.hold()
             return self._output.follow(self._hold.step(0.0, dt), dt)

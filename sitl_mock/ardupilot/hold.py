@@ -13,8 +13,7 @@ from sitl_mock.autopilot.state import PositionTargetEcho, State
 from sitl_mock.physics.quaternion import Vector, yaw
 
 STOPPING_S = 0.65
-"""The held point lies ahead of the position by the velocity times this, s (recorded on entering
-LAND)."""
+"""The held point is the position plus the velocity times this, s (recorded on entering LAND)."""
 _HEIGHT_INTEGRAL = 1.0
 """Acceleration per climb rate error and second, 1/s^2; chosen for a steady hover, not measured."""
 _CLIMB_LIMIT = 10.0
@@ -38,8 +37,8 @@ class ClimbProfile:
 
     def step(self, climb_rate: float, acceleration: float, dt: float) -> None:
         """Advance by ``dt`` s towards a climb rate, with limited acceleration."""
-        most = acceleration * dt
-        change = max(-most, min(most, climb_rate - self.rate))
+        largest_change = acceleration * dt
+        change = max(-largest_change, min(largest_change, climb_rate - self.rate))
         self.acceleration = change / dt
         self.rate += change
         self.height += self.rate * dt

@@ -113,16 +113,16 @@ class ArduPilotModeControl:
         return self._output.follow(self._hold.step(0.0, dt, level=mode is Mode.ALT_HOLD), dt)
 
     def _return_home(self, dt: float) -> ActuatorCommand:
-        parameters, flight = self._parameters, self._return
-        flight.step()
-        if flight.leg is not Leg.CLIMB:
+        parameters, return_home = self._parameters, self._return
+        return_home.step()
+        if return_home.leg is not Leg.CLIMB:
             home = self._state.home_ned
             self._hold.point = (home[0], home[1])
-        left = flight.height - self._hold.climb.height
+        remaining = return_home.height - self._hold.climb.height
         acceleration = 0.01 * parameters["WPNAV_ACCEL_Z"]
         fastest = 0.01 * parameters["WPNAV_SPEED_UP"]
         return self._output.follow(
-            self._hold.step(approach_speed(left, acceleration, fastest), dt), dt
+            self._hold.step(approach_speed(remaining, acceleration, fastest), dt), dt
         )
 
     def _land(self, dt: float) -> ActuatorCommand:
@@ -132,10 +132,12 @@ class ArduPilotModeControl:
             self._output.thrust = max(0.0, self._output.thrust - TOUCHDOWN_THRUST_RATE * dt)
             return self._output.attitude(from_yaw(self._hold.yaw), self._output.thrust)
         slow = 0.01 * parameters["LAND_SPEED"]
-        above = state.home_ned[2] - state.estimate.position_ned[2]
-        left = above - 0.01 * parameters["LAND_ALT_LOW"]
+        height = state.home_ned[2] - state.estimate.position_ned[2]
+        remaining = height - 0.01 * parameters["LAND_ALT_LOW"]
         acceleration = 0.01 * parameters["WPNAV_ACCEL_Z"]
-        sink = max(slow, approach_speed(left, acceleration, 0.01 * parameters["WPNAV_SPEED_DN"]))
+        sink_rate = max(
+            slow, approach_speed(remaining, acceleration, 0.01 * parameters["WPNAV_SPEED_DN"])
+        )
         level = not state.position_valid
         state.position_controlled = not level
-        return self._output.follow(self._hold.step(-sink, dt, level=level), dt)
+        return self._output.follow(self._hold.step(-sink_rate, dt, level=level), dt)

@@ -6,7 +6,7 @@ from sitl_mock.autopilot.motion_telemetry import MAGNETIC_FIELD_NED, Builder, Mo
 from sitl_mock.link.framing import Message
 from sitl_mock.physics.rigid_body import GRAVITY
 
-_ALIKE = (
+_SAME_AS_PX4 = (
     dialect.MAVLINK_MSG_ID_ATTITUDE,
     dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
     dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
@@ -16,7 +16,7 @@ _ALIKE = (
     dialect.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW,
     dialect.MAVLINK_MSG_ID_VIBRATION,
 )
-"""Messages that ArduCopter builds as PX4 does; ATTITUDE_TARGET differs if rates are shaped.
+"""Messages that ArduCopter builds as PX4 does; only ATTITUDE_TARGET differs if rates are shaped.
 ArduCopter has no ODOMETRY and no ALTITUDE."""
 
 
@@ -28,7 +28,7 @@ class ArduPilotMotionTelemetry(MotionTelemetry):
     def builders(self) -> dict[int, Builder]:
         """Return message id -> builder."""
         builders = super().builders()
-        return {message_id: builders[message_id] for message_id in _ALIKE} | {
+        return {message_id: builders[message_id] for message_id in _SAME_AS_PX4} | {
             dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self.position_or_zeros,
             dialect.MAVLINK_MSG_ID_VFR_HUD: self.vfr_hud,
             dialect.MAVLINK_MSG_ID_RAW_IMU: self.raw_imu,

@@ -37,9 +37,10 @@ POSITION_TIMEOUT_US = 10_000_000
 """Time for which the position stays valid without GPS, us; not measured."""
 DEFAULT_LOOP_HZ = 400.0
 """Rate of the main loop if SCHED_LOOP_RATE is not configured."""
-_HOME = (dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, dialect.MAVLINK_MSG_ID_HOME_POSITION)
+_HOME_MESSAGES = (dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, dialect.MAVLINK_MSG_ID_HOME_POSITION)
 _BOOT_RATES = {dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0, dialect.MAVLINK_MSG_ID_TIMESYNC: 0.1}
-_SUPPORTED = frozenset(
+"""Message id -> rate from boot on, Hz."""
+_REQUESTABLE = frozenset(
     {
         *_BOOT_RATES,
         dialect.MAVLINK_MSG_ID_ATTITUDE,
@@ -99,7 +100,7 @@ class ArduPilot:
         booting_s = settings.prearm_delay_s * INITIALISED_S / RECORDED_READY_S
         return ArduPilotStreams(
             _BOOT_RATES,
-            _SUPPORTED,
+            _REQUESTABLE,
             loop_us=self.slot_us(settings),
             booting_until_us=booting_s * 1e6,
         )
@@ -117,8 +118,10 @@ class ArduPilot:
         control = ArduPilotModeControl(state, parameters, guided, parts.vehicle.throttle)
         notifier = Notifier(
             announce,
-            send_home=lambda: _send_once(commands, _HOME, links),
-            send_parameter=lambda name: protocol.send_changed(name, [x for x in links if x.heard]),
+            send_home=lambda: _send_once(commands, _HOME_MESSAGES, links),
+            send_parameter=lambda name: protocol.send_changed(
+                name, [link for link in links if link.heard]
+            ),
         )
         boot = Boot(state, notifier, ready_us=parts.ready_us, elevation=parts.origin.altitude_m)
         commander = ArduPilotCommander(

@@ -43,10 +43,10 @@ class ReturnHome:
         It is at least the present height.
         """
         state, parameters = self._state, self._parameters
-        height = -state.estimate.position_ned[2]
-        cone = parameters["RTL_CONE_SLOPE"] * self._distance()
-        wanted = min(0.01 * parameters["RTL_ALT"], cone) - state.home_ned[2]
-        self.height = max(height, wanted)
+        present_height = -state.estimate.position_ned[2]
+        cone_height = parameters["RTL_CONE_SLOPE"] * self._distance()
+        return_height = min(0.01 * parameters["RTL_ALT"], cone_height) - state.home_ned[2]
+        self.height = max(present_height, return_height)
         self.leg = Leg.CLIMB
 
     def step(self) -> None:

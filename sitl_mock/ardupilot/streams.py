@@ -1,9 +1,9 @@
 """ArduPilot's stream schedule: intervals in whole milliseconds, sent in cycles of the main loop.
 
 A link sends only HEARTBEAT and TIMESYNC until a client requests messages. An interval is truncated
-to whole milliseconds. One shorter than the main loop's period is refused, and the old one stays. A
-message is sent in the first cycle after it is due and keeps its phase: 3 ms with the 400 Hz loop
-gives four steps of 2.5 ms and one of 5 ms, 333 Hz on average.
+to whole milliseconds. An interval shorter than the main loop's period is refused, and the old one
+stays. A message is sent in the first cycle after it is due and keeps its phase: 3 ms with the
+400 Hz loop gives four steps of 2.5 ms and one of 5 ms, 333 Hz on average.
 """
 
 from collections.abc import Collection, Mapping
@@ -35,7 +35,7 @@ class ArduPilotStreams:
         self._loop_us = loop_us
         self._booting_until_us = booting_until_us
         self._intervals = dict(self._defaults)
-        self._last = dict.fromkeys(self._defaults, 0)
+        self._last_due_us = dict.fromkeys(self._defaults, 0)
 
     def set_interval(self, message_id: int, interval_us: float, now_us: int) -> str | None:
         """Set the interval of a message; 0 = the rate at boot, negative = never.
@@ -48,16 +48,16 @@ class ArduPilotStreams:
         if interval_us < 0.0:
             self._intervals.pop(message_id, None)
             return None
-        interval = 1000 * min(int(interval_us) // 1000, LONGEST_MS)
+        rounded_us = 1000 * min(int(interval_us) // 1000, LONGEST_MS)
         if interval_us == 0.0:
-            interval = self._defaults.get(message_id, 0)
-            if not interval:
+            rounded_us = self._defaults.get(message_id, 0)
+            if not rounded_us:
                 self._intervals.pop(message_id, None)
                 return None
-        if interval < self._loop_us:
+        if rounded_us < self._loop_us:
             return f"Requested rate for message ID {message_id} too fast. Increase SCHED_LOOP_RATE"
-        self._intervals[message_id] = interval
-        self._last[message_id] = now_us
+        self._intervals[message_id] = rounded_us
+        self._last_due_us[message_id] = now_us
         return None
 
     def interval(self, message_id: int) -> int:
@@ -68,12 +68,14 @@ class ArduPilotStreams:
         """Return the ids of the messages due in the slot at ``slot_us``, and count them as sent."""
         due = []
         booting = slot_us < self._booting_until_us
-        last_us = self._last
+        last_due_us = self._last_due_us
         for message_id, interval in self._intervals.items():
-            waited = slot_us - last_us[message_id]
+            waited = slot_us - last_due_us[message_id]
             if waited < interval or (booting and message_id not in self._defaults):
                 continue
             # More than one interval late, the phase restarts, so that no message is sent twice.
-            last_us[message_id] = slot_us if waited >= 2 * interval else slot_us - waited + interval
+            last_due_us[message_id] = (
+                slot_us if waited >= 2 * interval else slot_us - waited + interval
+            )
             due.append(message_id)
         return due

@@ -22,7 +22,7 @@ _SENSORS_HEALTHY = 1467063343
 _HEIGHT_CONTROL = dialect.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL
 _POSITION_CONTROL = dialect.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
 _LOGGING = dialect.MAV_SYS_STATUS_LOGGING
-_EKF_GOOD = 0x33F
+_EKF_ALL_VALID = 0x33F
 _EKF_NO_POSITION = (
     ardupilotmega.EKF_ATTITUDE
     | ardupilotmega.EKF_VELOCITY_VERT
@@ -95,10 +95,10 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
     def sys_status(self) -> Message:
         """Return SYS_STATUS."""
         state = self._state
-        working = _HEIGHT_CONTROL if state.height_controlled else 0
-        working |= _POSITION_CONTROL if state.position_controlled else 0
-        enabled = _SENSORS_ENABLED | working | (_LOGGING if state.armed else 0)
-        return self._sys_status(_SENSORS_PRESENT, enabled, _SENSORS_HEALTHY | working, 0)
+        controllers = _HEIGHT_CONTROL if state.height_controlled else 0
+        controllers |= _POSITION_CONTROL if state.position_controlled else 0
+        enabled = _SENSORS_ENABLED | controllers | (_LOGGING if state.armed else 0)
+        return self._sys_status(_SENSORS_PRESENT, enabled, _SENSORS_HEALTHY | controllers, 0)
 
     def battery_status(self) -> Message:
         """Return BATTERY_STATUS, with the charge used since boot."""
@@ -123,7 +123,7 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
         elif not self._state.position_valid:
             flags, variances = _EKF_NO_POSITION, (0.0, 0.0, 0.001, 0.03, 0.0)
         else:
-            flags, variances = _EKF_GOOD, (0.006, 0.002, 0.001, 0.028, 0.0)
+            flags, variances = _EKF_ALL_VALID, (0.006, 0.002, 0.001, 0.028, 0.0)
         return ardupilotmega.MAVLink_ekf_status_report_message(int(flags), *variances)
 
     def rc_channels(self) -> Message:

@@ -6,7 +6,8 @@ from typing import NamedTuple
 from sitl_mock.physics.quaternion import Quaternion, Vector, multiply, normalise
 
 _OPPOSITE_MARGIN = 1e-5
-"""Two axes with a cosine below -1 plus this count as opposite: no arc between them is shortest."""
+"""Two axes count as opposite if the cosine of the angle between them is below -1 plus this. Then no
+arc between them is the shortest."""
 
 
 class AttitudeGains(NamedTuple):
@@ -49,10 +50,12 @@ def attitude_rates(
     reduced = multiply(_shortest_arc(q, target), q)
     mix = multiply(conjugate(reduced), target)
     sign = copysign(1.0, mix[0])
-    half = max(-1.0, min(1.0, mix[0] * sign))
-    twist = max(-1.0, min(1.0, mix[3] * sign))
+    cos_half = max(-1.0, min(1.0, mix[0] * sign))
+    sin_half = max(-1.0, min(1.0, mix[3] * sign))
     weight = gains.yaw_weight
-    weighted = multiply(reduced, (cos(weight * acos(half)), 0.0, 0.0, sin(weight * asin(twist))))
+    weighted = multiply(
+        reduced, (cos(weight * acos(cos_half)), 0.0, 0.0, sin(weight * asin(sin_half)))
+    )
     ew, ex, ey, ez = multiply(conjugate(q), weighted)
     scale = copysign(2.0, ew)
     yaw_gain = gains.yaw / weight if weight > 0.0 else gains.yaw

@@ -17,7 +17,7 @@ FAILED = int(dialect.MAV_RESULT_FAILED)
 
 
 class Commander(Protocol):
-    """Owns ``armed``, ``mode``, ``intended_mode`` and ``failsafe`` of the state."""
+    """Decides ``armed``, ``mode``, ``intended_mode`` and ``failsafe`` of the state."""
 
     refusal: str | None
     """Reason with which a fault refuses arming, None without such a fault."""
@@ -29,7 +29,7 @@ class Commander(Protocol):
         """Whether setpoints control the vehicle now."""
 
     def arm(self, *, force: bool = False) -> int:
-        """Arm, and return a MAV_RESULT; ``force`` skips most checks, never that of a crash."""
+        """Arm, and return a MAV_RESULT; ``force`` skips most checks, but never the crash check."""
 
     def announce_problem(self) -> None:
         """Announce what forbids arming now, if anything does."""

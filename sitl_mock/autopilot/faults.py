@@ -29,10 +29,10 @@ from sitl_mock.physics.vehicle import Vehicle
 
 @dataclass
 class _Entry:
-    """A fault, the vehicle time at which it was injected (us), and whether it acts or is over."""
+    """A fault, and whether it is active or over. ``injected_us``: vehicle time of its injection."""
 
     fault: LinkFault | VehicleFault
-    given_us: int
+    injected_us: int
     active: bool = False
     over: bool = False
 
@@ -98,11 +98,11 @@ class FaultSchedule:
         if fault.after_offboard_s is not None:
             if offboard_us is None:
                 return False
-            start = max(offboard_us + fault.after_offboard_s * 1e6, entry.given_us)
+            start = max(offboard_us + fault.after_offboard_s * 1e6, entry.injected_us)
         elif fault.at_s is not None:
-            start = max(fault.at_s * 1e6, entry.given_us)
+            start = max(fault.at_s * 1e6, entry.injected_us)
         else:
-            start = entry.given_us
+            start = entry.injected_us
         if now_us < start:
             return False
         return fault.duration_s is None or now_us < start + fault.duration_s * 1e6
@@ -135,7 +135,7 @@ class FaultEffects:
         self._commander = commander
         self._control = control
         self._links = links
-        self._silences: list[StopTelemetry] = []
+        self._telemetry_stops: list[StopTelemetry] = []
         self._nan_fields: list[NanField] = []
         self._gps_lost_us = 0
         self._slipped_s = 0.0
@@ -154,11 +154,11 @@ class FaultEffects:
 
     def silenced(self, message_id: int) -> bool:
         """Whether a fault stops this message now."""
-        if not self._silences:
+        if not self._telemetry_stops:
             return False
         kind = dialect.mavlink_map.get(message_id) or ardupilotmega.mavlink_map[message_id]
         name = kind.msgname
-        return any(not fault.messages or name in fault.messages for fault in self._silences)
+        return any(not fault.messages or name in fault.messages for fault in self._telemetry_stops)
 
     def watch_position(self, converged_us: float, timeout_us: float) -> None:
         """Update ``position_valid``.
@@ -174,14 +174,14 @@ class FaultEffects:
     def _begin(self, fault: VehicleFault) -> None:
         match fault:
             case StopTelemetry():
-                self._silences.append(fault)
+                self._telemetry_stops.append(fault)
             case FreezeClock():
                 self.clock_frozen = True
             case SlipClock():
                 self._slipped_s += fault.slip_ms * 1e-3
             case NanField():
                 self._nan_fields.append(fault)
-                self._hook_links()
+                self._set_link_hooks()
             case PilotTakeover():
                 self._commander.take_over(Mode[fault.mode])
             case EstimatorReset():
@@ -199,12 +199,12 @@ class FaultEffects:
     def _end(self, fault: VehicleFault) -> None:
         match fault:
             case StopTelemetry():
-                self._silences.remove(fault)
+                self._telemetry_stops.remove(fault)
             case FreezeClock():
                 self.clock_frozen = False
             case NanField():
                 self._nan_fields.remove(fault)
-                self._hook_links()
+                self._set_link_hooks()
             case PilotTakeover():
                 self._commander.pilot = False
             case RefuseArming():
@@ -214,11 +214,11 @@ class FaultEffects:
             case EstimatorReset() | LowBattery() | SlipClock():
                 pass  # these cannot be undone
 
-    def _hook_links(self) -> None:
+    def _set_link_hooks(self) -> None:
         for link in self._links:
-            link.tamper = self._tamper if self._nan_fields else None
+            link.tamper = self._corrupt if self._nan_fields else None
 
-    def _tamper(self, message: Message) -> None:
+    def _corrupt(self, message: Message) -> None:
         for fault in self._nan_fields:
             if message.get_type() == fault.message:
                 value = getattr(message, fault.field)

@@ -1,4 +1,4 @@
-"""Land detector: landed after contact with low thrust for a time (disarmed: at once).
+"""Land detector: contact with low thrust for some time is a landing; disarmed, contact suffices.
 
 Without contact, or with more thrust, the vehicle counts as taken off at once.
 """
@@ -37,7 +37,7 @@ class LandDetector:
         self._hover_thrust = hover_thrust
         self._landed_after_us = landed_after_us
         self._climbing = climbing
-        self._quiet_since_us = 0
+        self._resting_since_us = 0
 
     def step(self, *, contact: bool) -> None:
         """Update from the ``contact`` with the ground and the commanded thrust."""
@@ -45,18 +45,18 @@ class LandDetector:
         was_landed = state.landed
         self._update(contact=contact)
         if was_landed != state.landed and state.armed:
-            landed = EventKind.LANDING_DETECTED if state.landed else EventKind.TAKEOFF_DETECTED
-            self._announce(landed, "")
+            kind = EventKind.LANDING_DETECTED if state.landed else EventKind.TAKEOFF_DETECTED
+            self._announce(kind, "")
         state.landed_state = self._landed_state()
 
     def _update(self, *, contact: bool) -> None:
         state = self._state
         state.contact = contact
         if not contact or self._thrust_is_high():
-            self._quiet_since_us = state.time_us
+            self._resting_since_us = state.time_us
             state.landed = False
             state.flown = state.flown or not contact
-        elif not state.armed or state.time_us - self._quiet_since_us >= self._landed_after_us:
+        elif not state.armed or state.time_us - self._resting_since_us >= self._landed_after_us:
             state.landed = True
 
     def _thrust_is_high(self) -> bool:

@@ -91,8 +91,8 @@ class MissionProtocol:
         link.send(dialect.MAVLink_mission_request_int_message(*upload.client, number, kind))
 
     def _clear(self, message: Message, link: Link) -> None:
-        everything = message.mission_type == dialect.MAV_MISSION_TYPE_ALL
-        cleared = _PLAN_TYPES if everything else self.plans.keys() & {message.mission_type}
+        clears_all = message.mission_type == dialect.MAV_MISSION_TYPE_ALL
+        cleared = _PLAN_TYPES if clears_all else self.plans.keys() & {message.mission_type}
         for kind in cleared:
             self.plans[kind] = []
         result = _ACCEPTED if cleared else dialect.MAV_MISSION_UNSUPPORTED

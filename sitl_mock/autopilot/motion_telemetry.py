@@ -19,14 +19,16 @@ from sitl_mock.physics.quaternion import euler, yaw
 from sitl_mock.physics.vehicle import Vehicle
 
 Builder = Callable[[], Message | None]
+"""Builds a message; returns None when it has nothing valid."""
 _SEA_LEVEL_HPA = 1013.25
 MAGNETIC_FIELD_NED = (0.21, 0.01, 0.42)  # gauss; the body is taken as level, heading north
+# Variances sent in ODOMETRY: m^2 and rad^2, (m/s)^2 and (rad/s)^2.
 _POSE_VARIANCES = (0.041, 0.041, 0.074, 3.3e-4, 3.5e-4, 5.9e-3)
 _VELOCITY_VARIANCES = (0.0095, 0.0086, 0.0052, 0.0, 0.0, 0.0)
 
 
 class MotionTelemetry:
-    """Builds messages from the estimate. A builder returns None when it has nothing valid.
+    """Builds messages from the estimate.
 
     Args:
         state: the autopilot's state.
@@ -96,14 +98,14 @@ class MotionTelemetry:
         state = self._state
         if not state.position_valid:
             return None
-        place = to_geodetic(self._origin, state.estimate.position_ned)
+        geodetic = to_geodetic(self._origin, state.estimate.position_ned)
         vx, vy, vz = state.estimate.velocity_ned
         height = state.home_ned[2] - state.estimate.position_ned[2]
         return dialect.MAVLink_global_position_int_message(
             self._boot_ms,
-            round(place.latitude_deg * 1e7),
-            round(place.longitude_deg * 1e7),
-            round(place.altitude_m * 1e3),
+            round(geodetic.latitude_deg * 1e7),
+            round(geodetic.longitude_deg * 1e7),
+            round(geodetic.altitude_m * 1e3),
             round(height * 1e3),
             clip(vx * 100, 15),
             clip(vy * 100, 15),
@@ -144,7 +146,7 @@ class MotionTelemetry:
         return dialect.MAVLink_position_target_local_ned_message(
             self._boot_ms,
             dialect.MAV_FRAME_LOCAL_NED,
-            _ignored(target),
+            _type_mask(target),
             *target.position,
             *target.velocity,
             *target.acceleration,
@@ -210,9 +212,9 @@ class MotionTelemetry:
         return degrees(yaw(self._state.estimate.q)) % 360.0
 
 
-def _ignored(target: PositionTargetEcho) -> int:
+def _type_mask(target: PositionTargetEcho) -> int:
     """Return the POSITION_TARGET_TYPEMASK of the components that are not controlled."""
-    parts = (
+    groups = (
         (POSITION_BITS, target.position),
         (VELOCITY_BITS, target.velocity),
         (ACCELERATION_BITS, target.acceleration),
@@ -220,7 +222,7 @@ def _ignored(target: PositionTargetEcho) -> int:
     )
     return sum(
         bit
-        for bits, values in parts
+        for bits, values in groups
         for bit, value in zip(bits, values, strict=True)
         if isnan(value)
     )

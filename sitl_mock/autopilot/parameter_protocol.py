@@ -17,7 +17,7 @@ from sitl_mock.link.link import Link
 HASH_NAME = "_HASH_CHECK"
 _NO_INDEX = -1
 _NO_INDEX_UNSIGNED = 65535
-_SENT_PER_TICK = 4
+_SENT_PER_SLOT = 4
 """Number of parameters of a list that are sent in one slot."""
 
 
@@ -90,7 +90,7 @@ class ParameterProtocol:
         if not self._listing:
             return
         for key, (link, index) in list(self._listing.items()):
-            end = min(index + _SENT_PER_TICK, len(self._parameters))
+            end = min(index + _SENT_PER_SLOT, len(self._parameters))
             for position in range(index, end):
                 self._send(self._parameters.name_of(position), position, link)
             if end == len(self._parameters):

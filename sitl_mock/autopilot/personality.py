@@ -45,6 +45,7 @@ class VehicleParts(NamedTuple):
     ready_us: int
     """Vehicle time of `mock.prearm_delay_s`, us, from which arming in any mode is possible."""
     slips: StampSlips
+    """Slips of the time stamp of LOCAL_POSITION_NED."""
 
 
 class Rules(NamedTuple):
@@ -72,9 +73,9 @@ class Personality(Protocol):
     system_id_parameter: str
     """Name of the parameter with the system id."""
     any_component: bool
-    """Whether it handles messages to any component of its system."""
+    """Whether the autopilot handles messages to any component of its system."""
     unsigned_links: Collection[str]
-    """Links on which it accepts unsigned frames although signing is on."""
+    """Links on which the autopilot accepts unsigned frames although signing is on."""
     parameters: tuple[Parameter, ...]
     """All parameters with their defaults."""
 

@@ -100,9 +100,9 @@ class PositionController:
     ) -> PositionOutput:
         """Return attitude and thrust of one period of ``dt`` s for the estimated motion."""
         gains = self.gains()
-        velocity_setpoint = _velocity(gains, demand, position)
+        velocity_setpoint = _velocity_setpoint(gains, demand, position)
         acceleration = self._acceleration(gains, demand, velocity_setpoint, velocity, dt)
-        return _thrust_vector(gains, acceleration, velocity_setpoint, demand.yaw)
+        return _attitude_and_thrust(gains, acceleration, velocity_setpoint, demand.yaw)
 
     def _acceleration(
         self,
@@ -120,15 +120,15 @@ class PositionController:
             total = 0.0 if isnan(feed_forward) else feed_forward
             error = velocity_setpoint[axis] - velocity[axis]
             if not isnan(error):
-                grown = self._integral[axis] + integral * error * dt
-                self._integral[axis] = max(-GRAVITY / 2, min(GRAVITY / 2, grown))
+                integrated = self._integral[axis] + integral * error * dt
+                self._integral[axis] = max(-GRAVITY / 2, min(GRAVITY / 2, integrated))
                 total += proportional * error + self._integral[axis]
             result.append(total)
         north, east, down = result
         return (north, east, down)
 
 
-def _velocity(gains: PositionGains, demand: PositionDemand, position: Vector) -> Vector:
+def _velocity_setpoint(gains: PositionGains, demand: PositionDemand, position: Vector) -> Vector:
     """Return the velocity setpoint, NED; NaN = none."""
     factors = (gains.horizontal, gains.horizontal, gains.vertical)
     velocity_setpoint = []
@@ -150,20 +150,22 @@ def _velocity(gains: PositionGains, demand: PositionDemand, position: Vector) ->
     return (north, east, down)
 
 
-def _thrust_vector(
+def _attitude_and_thrust(
     gains: PositionGains, acceleration: Vector, velocity_setpoint: Vector, yaw: float
 ) -> PositionOutput:
     """Return attitude and thrust that give an acceleration (NED, m/s^2) at a yaw, within limits."""
     north, east, down = acceleration
     lift = max(GRAVITY - down, 0.1 * GRAVITY)
-    limit = lift * tan(min(gains.max_tilt, _LARGEST_TILT))
-    side = hypot(north, east)
-    if side > limit:
-        north, east = north * limit / side, east * limit / side
-    specific = sqrt(north * north + east * east + lift * lift)
-    q = _thrust_attitude((-north / specific, -east / specific, lift / specific), yaw)
+    horizontal_limit = lift * tan(min(gains.max_tilt, _LARGEST_TILT))
+    horizontal = hypot(north, east)
+    if horizontal > horizontal_limit:
+        north, east = north * horizontal_limit / horizontal, east * horizontal_limit / horizontal
+    specific_thrust = sqrt(north * north + east * east + lift * lift)
+    q = _thrust_attitude(
+        (-north / specific_thrust, -east / specific_thrust, lift / specific_thrust), yaw
+    )
     thrust = gains.hover_thrust * max(GRAVITY - down, 0.0) / GRAVITY
-    thrust *= specific / lift
+    thrust *= specific_thrust / lift
     thrust = max(gains.min_thrust, min(gains.max_thrust, thrust))
     return PositionOutput(q, thrust, velocity_setpoint, (north, east, down))
 
@@ -171,20 +173,28 @@ def _thrust_vector(
 def _thrust_attitude(down_axis: Vector, yaw: float) -> Quaternion:
     """Return the attitude with this body down axis (unit, NED) and Euler yaw (rad)."""
     zx, zy, zz = down_axis
-    # Tilt about a level axis, then the turn about the body axis that gives the Euler yaw.
+    # Tilt about a level axis, then turn about the body's down axis to reach the Euler yaw.
     w = sqrt(max(0.5 * (1.0 + zz), 1e-9))
     tilt = (w, -zy / (2.0 * w), zx / (2.0 * w), 0.0)
-    # Body x of (tilt ⊗ turn by h) must point along yaw: solve for h on the level plane.
-    ex = (1.0 - 2.0 * tilt[2] * tilt[2], 2.0 * tilt[1] * tilt[2])
-    ey = (2.0 * tilt[1] * tilt[2], 1.0 - 2.0 * tilt[1] * tilt[1])
-    c, s = cos(yaw), sin(yaw)
-    across_x = ex[0] * s - ex[1] * c
-    across_y = ey[0] * s - ey[1] * c
+    # The body x axis after both must point along the yaw: solve for `turn` in the horizontal plane.
+    # `body_x` and `body_y` are the north and east components of the tilted body axes.
+    body_x = (1.0 - 2.0 * tilt[2] * tilt[2], 2.0 * tilt[1] * tilt[2])
+    body_y = (2.0 * tilt[1] * tilt[2], 1.0 - 2.0 * tilt[1] * tilt[1])
+    cos_yaw, sin_yaw = cos(yaw), sin(yaw)
+    across_x = body_x[0] * sin_yaw - body_x[1] * cos_yaw
+    across_y = body_y[0] * sin_yaw - body_y[1] * cos_yaw
     turn = atan2(-across_x, across_y)
-    if (ex[0] * cos(turn) + ey[0] * sin(turn)) * c + (
-        ex[1] * cos(turn) + ey[1] * sin(turn)
-    ) * s < 0:
+    if (body_x[0] * cos(turn) + body_y[0] * sin(turn)) * cos_yaw + (
+        body_x[1] * cos(turn) + body_y[1] * sin(turn)
+    ) * sin_yaw < 0:
         turn += copysign(pi, -turn)
-    cw, cz = cos(0.5 * turn), sin(0.5 * turn)
+    cos_half_turn, sin_half_turn = cos(0.5 * turn), sin(0.5 * turn)
     tw, tx, ty, _ = tilt
-    return normalise((tw * cw, tx * cw + ty * cz, ty * cw - tx * cz, tw * cz))
+    return normalise(
+        (
+            tw * cos_half_turn,
+            tx * cos_half_turn + ty * sin_half_turn,
+            ty * cos_half_turn - tx * sin_half_turn,
+            tw * sin_half_turn,
+        )
+    )

@@ -13,9 +13,9 @@ from sitl_mock.autopilot.state import State
 from sitl_mock.link.framing import Message
 from sitl_mock.link.link import Link
 
-_COMPONENT = 1
+_AUTOPILOT_COMPONENT = 1
 _BROADCAST = 0
-_PLACE_FRAMES = frozenset(
+_GLOBAL_FRAMES = frozenset(
     {
         dialect.MAV_FRAME_GLOBAL,
         dialect.MAV_FRAME_GLOBAL_INT,
@@ -31,7 +31,7 @@ class Receiver:
     Args:
         state: the autopilot's state.
         rules: the autopilot's behaviour.
-        personality: decodes custom modes, and knows which components it answers for.
+        personality: decodes custom modes, and defines which components the autopilot answers for.
         system_id: system id of this vehicle.
     """
 
@@ -63,8 +63,8 @@ class Receiver:
     def handle(self, message: Message, link: Link) -> None:
         """Handle one message.
 
-        It ignores messages that are unknown, not accepted by signing, or for another system or (on
-        PX4) another component.
+        Messages are ignored if they are unknown, not accepted by signing, or for another system or
+        (on PX4) another component.
         """
         if not link.accepts(message):
             return
@@ -77,11 +77,14 @@ class Receiver:
         system = getattr(message, "target_system", _BROADCAST)
         component = getattr(message, "target_component", _BROADCAST)
         return system in (_BROADCAST, self._system_id) and (
-            component in (_BROADCAST, _COMPONENT) or self._personality.any_component
+            component in (_BROADCAST, _AUTOPILOT_COMPONENT) or self._personality.any_component
         )
 
     def _heartbeat(self, message: Message, link: Link) -> None:
-        if message.get_srcSystem() == self._system_id and message.get_srcComponent() == _COMPONENT:
+        if (
+            message.get_srcSystem() == self._system_id
+            and message.get_srcComponent() == _AUTOPILOT_COMPONENT
+        ):
             return
         link.gcs_heard = link.gcs_heard or message.type == dialect.MAV_TYPE_GCS
         self._commander.receive_heartbeat(message)
@@ -92,7 +95,7 @@ class Receiver:
 
     def _command_int(self, message: Message, link: Link) -> None:
         x, y = float(message.x), float(message.y)
-        if message.frame in _PLACE_FRAMES:
+        if message.frame in _GLOBAL_FRAMES:
             x, y = (nan if value == 2**31 - 1 else value / 1e7 for value in (x, y))
         parameters = (
             message.param1,

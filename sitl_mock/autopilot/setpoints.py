@@ -1,4 +1,4 @@
-"""Offboard setpoints, the type masks of their messages, and the stream that they form."""
+"""Offboard setpoints, the type masks of their messages, and the stream of setpoints."""
 
 from math import isfinite, isnan, nan
 from typing import NamedTuple
@@ -14,7 +14,7 @@ YAW_RATE_IGNORED = 4
 THRUST_BODY = 32
 THROTTLE_IGNORED = 64
 ATTITUDE_IGNORED = 128
-# Bits of type_mask in SET_POSITION_TARGET_LOCAL_NED; those of axes: ignored, north first.
+# Bits of type_mask in SET_POSITION_TARGET_LOCAL_NED. A set bit ignores its axis; north first.
 POSITION_BITS = (1, 2, 4)
 VELOCITY_BITS = (8, 16, 32)
 ACCELERATION_BITS = (64, 128, 256)

@@ -16,16 +16,16 @@ class StampSlips:
         self._rate_hz = rate_hz
         self._random = Random(f"{seed}/stamps")
         self._slipped = False
-        self._next_us = self._after(0.0)
+        self._next_us = self._next_slip_us(0.0)
 
     def at(self, now_us: int) -> int:
-        """Return by how many ms the stamp is too small now, 0 or 1; call it with growing times."""
+        """Return how far the stamp is behind now, 0 or 1 ms. Call it with increasing times."""
         if now_us >= self._next_us:
             self._slipped = not self._slipped
-            self._next_us = self._after(now_us)
+            self._next_us = self._next_slip_us(now_us)
         return int(self._slipped)
 
-    def _after(self, now_us: float) -> float:
+    def _next_slip_us(self, now_us: float) -> float:
         if not self._rate_hz:
             return inf
         return now_us + 1e6 * self._random.expovariate(self._rate_hz)

@@ -55,9 +55,9 @@ class SystemTelemetry:
         return dialect.MAVLink_extended_sys_state_message(0, int(self._state.landed_state))
 
     def _sys_status(self, present: int, enabled: int, healthy: int, load: int) -> Message:
-        """Return SYS_STATUS; the health bits of what fails now are cleared. ``load`` is in 0.1 %.
+        """Return SYS_STATUS, with the health bits of failing parts cleared. ``load`` is in 0.1 %.
 
-        Clients take the pre-arm bit for whether the vehicle can be armed.
+        Clients read from the pre-arm bit whether the vehicle can be armed.
         """
         if self._state.prearm_problem is not None:
             healthy &= ~_PREARM_CHECK
@@ -76,7 +76,7 @@ class SystemTelemetry:
         )
 
     def _battery_status(self, function: int, kind: int, used_mah: int, used_hj: int) -> Message:
-        """Return BATTERY_STATUS; as in both autopilots the first cell has the voltage of all."""
+        """Return BATTERY_STATUS; as in both autopilots, cell 1 has the voltage of the pack."""
         battery = self._vehicle.battery
         return dialect.MAVLink_battery_status_message(
             0,
@@ -97,14 +97,14 @@ class SystemTelemetry:
     ) -> Message:
         """Return GPS_RAW_INT at the estimated position; arguments in the units of the message."""
         state = self._state
-        place = to_geodetic(self._origin, state.estimate.position_ned)
-        altitude_mm = round(place.altitude_m * 1e3)
+        geodetic = to_geodetic(self._origin, state.estimate.position_ned)
+        altitude_mm = round(geodetic.altitude_m * 1e3)
         vx, vy, _ = state.estimate.velocity_ned
         return dialect.MAVLink_gps_raw_int_message(
             state.shown_us,
             fix,
-            round(place.latitude_deg * 1e7),
-            round(place.longitude_deg * 1e7),
+            round(geodetic.latitude_deg * 1e7),
+            round(geodetic.longitude_deg * 1e7),
             altitude_mm,
             *dilutions,
             clip(hypot(vx, vy) * 100, 15),
@@ -120,11 +120,11 @@ class SystemTelemetry:
 
     def _home_position(self, q: Quaternion) -> Message:
         state = self._state
-        place = to_geodetic(self._origin, state.home_ned)
+        geodetic = to_geodetic(self._origin, state.home_ned)
         return dialect.MAVLink_home_position_message(
-            round(place.latitude_deg * 1e7),
-            round(place.longitude_deg * 1e7),
-            round(place.altitude_m * 1e3),
+            round(geodetic.latitude_deg * 1e7),
+            round(geodetic.longitude_deg * 1e7),
+            round(geodetic.altitude_m * 1e3),
             *state.home_ned,
             q,
             0.0,

@@ -68,7 +68,7 @@ class AirframeConfig(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _named(cls, value: object) -> object:
+    def _resolve_preset(cls, value: object) -> object:
         return preset(AIRFRAMES, value, "airframes")
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from sitl_mock.config.section import ConfigError
 
 _TCP = re.compile(r"tcpin://([^:/\s]*):(\d{1,5})/?")
-_HELP = "write udp, tcpin://127.0.0.1:5760 or serial:///tmp/vehicle"
+_EXAMPLES = "write udp, tcpin://127.0.0.1:5760 or serial:///tmp/vehicle"
 
 
 @dataclass(frozen=True)
@@ -47,10 +47,10 @@ def parse_endpoint(text: str) -> EndpointAddress:
         path = text.removeprefix("serial://")
         if not path or path.startswith("/"):
             return SerialLine(Path(path) if path else None)
-    found = _TCP.fullmatch(text)
-    if found is not None and _is_host(found[1]) and 1 <= int(found[2]) <= 65535:
-        return TcpIn(found[1] or "127.0.0.1", int(found[2]))
-    raise ValueError(f"not an endpoint; {_HELP}")
+    tcp = _TCP.fullmatch(text)
+    if tcp is not None and _is_host(tcp[1]) and 1 <= int(tcp[2]) <= 65535:
+        return TcpIn(tcp[1] or "127.0.0.1", int(tcp[2]))
+    raise ValueError(f"not an endpoint; {_EXAMPLES}")
 
 
 def _is_host(text: str) -> bool:
@@ -63,7 +63,7 @@ def _is_host(text: str) -> bool:
 
 
 def for_vehicle(text: str, index: int) -> str:
-    """The endpoint of the vehicle with this index, from 0.
+    """Return the endpoint of the vehicle with this index, which counts from 0.
 
     The index is added to a TCP port. From index 1 on, a serial path gets the suffix ``-2``, ``-3``
     ... Other texts are the same for all vehicles; `MockSettings.for_vehicle` sets the UDP ports.

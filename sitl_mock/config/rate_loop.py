@@ -111,11 +111,11 @@ class RateLoopConfig(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _named(cls, value: object) -> object:
+    def _resolve_preset(cls, value: object) -> object:
         return preset(RATE_LOOPS, value, "rate loops")
 
     @model_validator(mode="after")
-    def _shaped_whole(self) -> Self:
+    def _shape_all_axes_or_none(self) -> Self:
         shaped = [axis.shaping is not None for axis in (self.roll, self.pitch, self.yaw)]
         if any(shaped) and not all(shaped):
             raise ValueError("give shaping for all three axes or for none")

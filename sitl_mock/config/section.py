@@ -12,7 +12,7 @@ Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
-_MOST_LISTED = 20
+_MOST_WORDS_LISTED = 20
 """Largest number of known words that a message lists."""
 _NUMBER_AND_UNIT = re.compile(r"([-+]?[0-9]+(?:[.,][0-9]+)?)\s*(\D*)")
 
@@ -54,7 +54,7 @@ def suggestion(word: str, known: Iterable[str]) -> str:
     near = _nearest(word, names)
     if near:
         return f"; did you mean {near}?"
-    return f"; known are {', '.join(sorted(names))}" if len(names) <= _MOST_LISTED else ""
+    return f"; known are {', '.join(sorted(names))}" if len(names) <= _MOST_WORDS_LISTED else ""
 
 
 def _nearest(word: str, names: list[str]) -> str | None:
@@ -70,16 +70,16 @@ def explain(error: ValidationError, model: type[BaseModel]) -> str:
     where = ".".join(["mock", *path])
     if detail["type"] == "extra_forbidden":
         owner = _model_at(model, path[:-1])
-        beside = owner.model_fields if owner else ()
-        elsewhere = [place for place in _places_of(path[-1], model) if place != where]
-        if elsewhere and not any(key.startswith(f"{path[-1]}_") for key in beside):
-            return f"{where} is in the wrong section; write {' or '.join(elsewhere)}"
-        hint = suggestion(path[-1], beside) if owner else ""
+        sibling_keys = owner.model_fields if owner else ()
+        other_paths = [other for other in _valid_paths(path[-1], model) if other != where]
+        if other_paths and not any(key.startswith(f"{path[-1]}_") for key in sibling_keys):
+            return f"{where} is in the wrong section; write {' or '.join(other_paths)}"
+        hint = suggestion(path[-1], sibling_keys) if owner else ""
         return f"unknown key {where}{hint}"
     if detail["type"] in ("float_parsing", "int_parsing"):
-        return f"{where} must be a number: {_number_in(str(detail['input']))}"
-    if refused := wrong_member(detail, model):
-        return f"{where}{refused}"
+        return f"{where} must be a number: {_number_advice(str(detail['input']))}"
+    if fault := wrong_member(detail, model):
+        return f"{where}{fault}"
     if detail["type"] == "tuple_type":
         return f"{where} must be a list (got {detail['input']!r:.60})"
     message = detail["msg"].removeprefix("Value error, ")
@@ -89,14 +89,15 @@ def explain(error: ValidationError, model: type[BaseModel]) -> str:
 
 
 def wrong_member(detail: Any, annotation: Any) -> str:
-    """Return what is wrong with a member of a union told apart by ``kind``, after its place.
+    """Return the message about a wrong member of a union whose members have a ``kind``.
 
     Args:
         detail: error reported by pydantic.
         annotation: the union, or a section that has it in a key.
 
     Returns:
-        The end of the message; empty if the error is another one.
+        The message without the path of the member, which goes before it; empty if the error is
+        another one.
     """
     if detail["type"] == "model_attributes_type":
         return f" must be a mapping of keys to values (got {detail['input']!r:.60})"
@@ -119,26 +120,26 @@ def error_path(error: ValidationError) -> list[str]:
     return ["mock", *(str(part) for part in error.errors()[0]["loc"])]
 
 
-def _number_in(text: str) -> str:
-    """Return the advice to write a number without its unit, or digits, instead of this text."""
-    found = _NUMBER_AND_UNIT.fullmatch(text.strip())
-    if found is None:
+def _number_advice(text: str) -> str:
+    """Return the advice on a text that stands for a number: drop the unit, or write digits."""
+    match = _NUMBER_AND_UNIT.fullmatch(text.strip())
+    if match is None:
         return f"write digits, not {text!r:.60}"
-    number, unit = found[1].replace(",", "."), found[2].strip()
-    why = f" without {unit!r:.20}, because the key's name has the unit" if unit else ""
-    return f"write {number}{why} (got {text!r:.60})"
+    number, unit = match[1].replace(",", "."), match[2].strip()
+    without_unit = f" without {unit!r:.20}, because the key's name has the unit" if unit else ""
+    return f"write {number}{without_unit} (got {text!r:.60})"
 
 
-def _places_of(key: str, model: type[BaseModel]) -> list[str]:
-    """Return where a key of this name may stand: at the top of ``mock``, or in its sections."""
-    places = [f"mock.{key}"] if key in model.model_fields else []
+def _valid_paths(key: str, model: type[BaseModel]) -> list[str]:
+    """Return the paths at which this key is valid: at the top of ``mock``, or in its sections."""
+    paths = [f"mock.{key}"] if key in model.model_fields else []
     for section, field in model.model_fields.items():
         sections = [
             each for each in _models_of(field.annotation) if "kind" not in each.model_fields
         ]
         if any(key in each.model_fields for each in sections):
-            places.append(f"mock.{section}.{key}")
-    return places
+            paths.append(f"mock.{section}.{key}")
+    return paths
 
 
 def _model_at(model: type[BaseModel], path: list[str]) -> type[BaseModel] | None:

@@ -152,5 +152,5 @@ class SensorConfig(Section):
 
     @field_validator("ekf", mode="before")
     @classmethod
-    def _named(cls, value: object) -> object:
+    def _resolve_preset(cls, value: object) -> object:
         return preset(EKFS, value, "navigation filters")

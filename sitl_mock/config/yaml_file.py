@@ -84,7 +84,7 @@ class Document(NamedTuple):
     node: yaml.Node | None
 
     def line(self, path: Sequence[str]) -> int | None:
-        """Return the line of the deepest key of this path that the document has, from 1."""
+        """Return the line (from 1) of the deepest key of this path that the document contains."""
         node, line = self.node, None
         for part in path:
             if isinstance(node, yaml.MappingNode):

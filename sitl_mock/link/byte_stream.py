@@ -11,9 +11,9 @@ _READ_BYTES = 65536
 class ByteStream:
     """Reads and writes whole frames without blocking.
 
-    Frames are never truncated: what the kernel did not take of a partly written batch is kept and
-    written first. Until then, further frames are dropped, as an autopilot does when its transmit
-    buffer is full.
+    Frames are never truncated: if the kernel takes only a part of a batch, the rest is kept and
+    written first. Until it is written, further frames are dropped, as an autopilot does when its
+    transmit buffer is full.
 
     Attributes:
         open: False after the other side closed, or reading or writing failed.
@@ -26,7 +26,7 @@ class ByteStream:
         self.open = True
         self._descriptor = descriptor
         self._frames: deque[bytes] = deque()
-        self._rest = b""
+        self._partial_frame = b""
         self._unsent = b""
 
     def receive(self) -> bytes | None:
@@ -38,7 +38,7 @@ class ByteStream:
     def send(self, frames: list[bytes]) -> None:
         """Send the frames; drop them all if the kernel takes none of their bytes now.
 
-        While an earlier batch is not written to its end, they are dropped, too.
+        They are also dropped while an earlier batch is not completely written.
         """
         if self._unsent:
             self._unsent = self._unsent[self._write(self._unsent) :]
@@ -57,7 +57,7 @@ class ByteStream:
         if not data:
             self.open = False
             return
-        frames, self._rest = split(self._rest + data)
+        frames, self._partial_frame = split(self._partial_frame + data)
         self._frames.extend(frames)
 
     def _write(self, data: bytes) -> int:

@@ -22,8 +22,8 @@ SIGNED = 0x01
 SIGNATURE_BYTES = 13
 _OVERHEAD_V1 = 8
 _OVERHEAD_V2 = 12
-_FLAGS_AT = 2
-_PAYLOAD_AT = 10
+_FLAGS_OFFSET = 2
+_PAYLOAD_OFFSET = 10
 _UNKNOWN_LENGTH = -1
 
 _HEADER_LAYOUT = struct.Struct("<BBBBBBHB")
@@ -35,7 +35,7 @@ _decoder = dialect.MAVLink(None)
 def decode(datagram: bytes) -> list[Message]:
     """Return the valid messages of a datagram in order; other bytes are skipped.
 
-    It accepts MAVLink 1 and 2. `Link.accepts` checks signatures. A frame must not span datagrams.
+    MAVLink 1 and 2 are accepted. `Link.accepts` checks signatures. A frame must not span datagrams.
     """
     messages: list[Message] = []
     start = 0
@@ -59,11 +59,11 @@ def _message_id(frame: bytes) -> int:
 
 def _decode_known(frame: bytes, kind: Any) -> tuple[bool, Message | None]:
     """Decode a MAVLink 2 frame of a message class; return whether it is valid, and the message."""
-    end = _PAYLOAD_AT + frame[1]
-    stated = frame[end] | frame[end + 1] << 8
-    if crc16.mcrf4xx(frame[1:end] + bytes((kind.crc_extra,))) != stated:
+    end = _PAYLOAD_OFFSET + frame[1]
+    received_crc = frame[end] | frame[end + 1] << 8
+    if crc16.mcrf4xx(frame[1:end] + bytes((kind.crc_extra,))) != received_crc:
         return False, None
-    message = unpack(kind, frame[_PAYLOAD_AT:end])
+    message = unpack(kind, frame[_PAYLOAD_OFFSET:end])
     message._msgbuf = bytearray(frame)
     header = message.get_header()
     header.mlen, header.incompat_flags, header.compat_flags = frame[1:4]
@@ -102,16 +102,16 @@ def _announced_length(data: bytes, start: int) -> int:
 
     0 if no frame begins there, `_UNKNOWN_LENGTH` if the header is incomplete.
     """
-    left = len(data) - start
+    available = len(data) - start
     if data[start] == _MAGIC_V2:
-        if left < _FLAGS_AT + 1:
+        if available < _FLAGS_OFFSET + 1:
             return _UNKNOWN_LENGTH
-        flags = data[start + _FLAGS_AT]
+        flags = data[start + _FLAGS_OFFSET]
         if flags & ~SIGNED:
             return 0
         return _OVERHEAD_V2 + data[start + 1] + (SIGNATURE_BYTES if flags & SIGNED else 0)
     if data[start] == _MAGIC_V1:
-        return _UNKNOWN_LENGTH if left < _FLAGS_AT else _OVERHEAD_V1 + data[start + 1]
+        return _UNKNOWN_LENGTH if available < _FLAGS_OFFSET else _OVERHEAD_V1 + data[start + 1]
     return 0
 
 

@@ -1,7 +1,7 @@
 """Payloads of pymavlink's message classes: message to bytes and back.
 
 Field order, `struct` layout and CRC_EXTRA are pymavlink's. Its own ``pack`` and ``decode`` take
-about twice as long, because they find out at every frame what depends on the class only.
+about twice as long, because for every frame they work out again what depends only on the class.
 """
 
 from collections.abc import Callable, Iterable
@@ -46,11 +46,11 @@ def _wire_values(kind: Any) -> Callable[[Message], Iterable[Any]]:
     if not any(arrays):
         return fields
     if sum(arrays) == 1:
-        at = arrays.index(True)
+        array_index = arrays.index(True)
 
         def flat(message: Message) -> Iterable[Any]:
             values = fields(message)
-            return (*values[:at], *values[at], *values[at + 1 :])
+            return (*values[:array_index], *values[array_index], *values[array_index + 1 :])
 
         return flat
     return lambda message: chain.from_iterable(

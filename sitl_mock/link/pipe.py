@@ -18,29 +18,31 @@ class DatagramPipe:
     def __init__(self, direction: str, seed: int) -> None:
         self._direction = direction
         self._random = random.Random(seed)
-        self._late: list[tuple[float, int, bytes]] = []
+        self._delayed: list[tuple[float, int, bytes]] = []
         self._order = count()
-        self._held: bytes | None = None
+        self._held_back: bytes | None = None
 
     def is_clear(self, faults: tuple[LinkFault, ...]) -> bool:
         """Whether no fault is active and no datagram is held back."""
-        return not faults and not self._late and self._held is None
+        return not faults and not self._delayed and self._held_back is None
 
     def push(
         self, datagrams: list[bytes], faults: tuple[LinkFault, ...], now_us: int
     ) -> list[bytes]:
         """Accept datagrams; return those to deliver now, delayed ones first."""
-        mine = [fault for fault in faults if fault.direction in (self._direction, "both")]
+        active = [fault for fault in faults if fault.direction in (self._direction, "both")]
         out = []
-        while self._late and self._late[0][0] <= now_us:
-            out.append(heapq.heappop(self._late)[2])
+        while self._delayed and self._delayed[0][0] <= now_us:
+            out.append(heapq.heappop(self._delayed)[2])
         for datagram in datagrams:
             survivors = [datagram]
-            for fault in mine:
-                survivors = [out for one in survivors for out in self._apply(one, fault, now_us)]
-            if survivors and self._held is not None:
-                survivors.append(self._held)
-                self._held = None
+            for fault in active:
+                survivors = [
+                    passed for one in survivors for passed in self._apply(one, fault, now_us)
+                ]
+            if survivors and self._held_back is not None:
+                survivors.append(self._held_back)
+                self._held_back = None
             out.extend(survivors)
         return out
 
@@ -55,9 +57,9 @@ class DatagramPipe:
                 return [self._corrupted(datagram)]
             case "delay":
                 due = now_us + fault.delay_ms * 1e3
-                heapq.heappush(self._late, (due, next(self._order), datagram))
-            case "reorder" if self._held is None:
-                self._held = datagram
+                heapq.heappush(self._delayed, (due, next(self._order), datagram))
+            case "reorder" if self._held_back is None:
+                self._held_back = datagram
             case "reorder":
                 return [datagram]
             case "drop":

@@ -26,7 +26,7 @@ class SerialEndpoint:
             raise ConfigError(f"cannot open a pseudo-terminal: {error.strerror}") from error
         tty.setraw(slave)
         self._device = os.ttyname(slave)
-        # Closed here, so that the kernel reports whether anybody else has it open.
+        # Closed here, so that the kernel reports whether another process has the device open.
         os.close(slave)
         os.set_blocking(self._master, False)
         self._poll = select.poll()
@@ -36,7 +36,7 @@ class SerialEndpoint:
         self.where = self._device if path is None else f"{self._device} ({path})"
         self.heard = False
         if path is not None:
-            self._link(path)
+            self._create_link(path)
 
     @property
     def connected(self) -> bool:
@@ -46,11 +46,11 @@ class SerialEndpoint:
     @property
     def readable(self) -> list[int]:
         """Our end; none while the other end is closed, because select would always report it."""
-        return [self._master] if self._attached() else []
+        return [self._master] if self._other_end_open() else []
 
     def receive(self) -> tuple[bytes, bool] | None:
         """Return the next frame, None if there is none."""
-        if not self._attached():
+        if not self._other_end_open():
             return None
         frame = self._stream.receive()
         if frame is None:
@@ -60,7 +60,7 @@ class SerialEndpoint:
 
     def send(self, datagrams: list[bytes]) -> None:
         """Send if the other end is open."""
-        if self._attached():
+        if self._other_end_open():
             self._stream.send(datagrams)
 
     def close(self) -> None:
@@ -69,14 +69,14 @@ class SerialEndpoint:
         if self._path is not None:
             self._path.unlink(missing_ok=True)
 
-    def _attached(self) -> bool:
+    def _other_end_open(self) -> bool:
         """Whether the other end is open; a hang-up clears the stream."""
         hung_up = any(event & select.POLLHUP for _, event in self._poll.poll(0))
         if hung_up or not self._stream.open:
             self._stream = ByteStream(self._master)
         return not hung_up
 
-    def _link(self, path: Path) -> None:
+    def _create_link(self, path: Path) -> None:
         try:
             if path.is_symlink():
                 path.unlink()  # left by a mock that was killed

@@ -14,7 +14,7 @@ from sitl_mock.link.framing import SIGNED, Message
 _EPOCH_UNIX_S = 1420070400
 """Signature timestamps count 10 us since 2015-01-01 UTC."""
 _TICKS_PER_S = 100_000
-_FLAGS_AT = 2
+_FLAGS_OFFSET = 2
 _MAGIC_V2 = 0xFD
 
 
@@ -65,11 +65,11 @@ class Signing:
     its wall clock.
 
     Attributes:
-        accepted: number of frames with a valid signature, newer than all before of their stream
-            (system, component, link id).
+        accepted: number of frames with a valid signature and a newer time stamp than all earlier
+            ones of their stream (system, component, link id).
         unsigned: number of frames without a signature, whether accepted or not.
-        refused: number of frames signed with another key, replayed, or a minute older than the
-            newest time stamp on a stream not heard before.
+        refused: number of frames signed with another key, replayed, or (on a stream not heard
+            before) a minute older than the newest time stamp.
 
     Args:
         key: 32 bytes.
@@ -104,17 +104,17 @@ class Signing:
     def accepts(self, message: Message) -> bool:
         """Whether a received message is accepted; counts it."""
         frame = bytearray(message.get_msgbuf())
-        if frame[0] != _MAGIC_V2 or not frame[_FLAGS_AT] & SIGNED:
+        if frame[0] != _MAGIC_V2 or not frame[_FLAGS_OFFSET] & SIGNED:
             self.unsigned += 1
             return self._accept_unsigned
         self._update_timestamp()
-        before = dict(self._mav.signing.stream_timestamps)
+        old_timestamps = dict(self._mav.signing.stream_timestamps)
         if self._mav.check_signature(frame, message.get_srcSystem(), message.get_srcComponent()):
             self.accepted += 1
             return True
         # pymavlink stores the timestamp before it verifies the signature. We restore the old one,
         # else a forged future timestamp would lock out the true sender.
-        self._mav.signing.stream_timestamps = before
+        self._mav.signing.stream_timestamps = old_timestamps
         self.refused += 1
         return False
 

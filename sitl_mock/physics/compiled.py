@@ -34,45 +34,46 @@ from sitl_mock.physics.vehicle_step import (
 T = TypeVar("T")
 
 
-def _called_by(function: Any) -> set[FunctionType]:
-    """Return the functions that a function calls, and those that they call."""
-    known = [function.__globals__.get(name) for name in function.__code__.co_names]
-    called = {each for each in known if isinstance(each, FunctionType)}
-    return called.union(*(_called_by(each) for each in called))
+def _all_callees(function: Any) -> set[FunctionType]:
+    """Return all functions that a function calls, directly or through others."""
+    globals_used = [function.__globals__.get(name) for name in function.__code__.co_names]
+    callees = {each for each in globals_used if isinstance(each, FunctionType)}
+    return callees.union(*(_all_callees(each) for each in callees))
 
 
-_CALLED: set[Any] = {advance, outcome, estimate, white_noise}
-_CALLED |= _called_by(advance) | _called_by(estimate)
-for _function in _CALLED:
+_COMPILED_FUNCTIONS: set[Any] = {advance, outcome, estimate, white_noise}
+_COMPILED_FUNCTIONS |= _all_callees(advance) | _all_callees(estimate)
+for _function in _COMPILED_FUNCTIONS:
     register_jitable(_function)
 
 
 def _compiled(function: Callable[..., T]) -> Callable[..., T]:
     """Compile a function when it is first called, and keep the code for other processes.
 
-    numba by itself notices a change only in the file of this function. So the code of each version
-    of the source has a folder of its own.
+    numba notices a change only in the file of this function. So each version of the source has its
+    own folder for compiled code.
     """
-    files = {each.__code__.co_filename for each in _CALLED} | {__file__}
+    files = {each.__code__.co_filename for each in _COMPILED_FUNCTIONS} | {__file__}
     version = sha256(b"".join(Path(file).read_bytes() for file in sorted(files))).hexdigest()[:16]
-    user = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    chosen = numba.config.CACHE_DIR  # NUMBA_CACHE_DIR
-    folder = (Path(chosen) if chosen else user / "sitl_mock") / version
+    cache_home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    configured_folder = numba.config.CACHE_DIR  # NUMBA_CACHE_DIR
+    folder = (Path(configured_folder) if configured_folder else cache_home / "sitl_mock") / version
     try:
         folder.mkdir(parents=True, exist_ok=True)
         numba.config.CACHE_DIR = str(folder)
-        ready: Callable[..., T] = numba.njit(function, cache=os.access(folder, os.W_OK))
+        compiled: Callable[..., T] = numba.njit(function, cache=os.access(folder, os.W_OK))
     except OSError:  # each process compiles for itself
-        ready = numba.njit(function)
+        compiled = numba.njit(function)
     finally:
-        numba.config.CACHE_DIR = chosen
-    return ready
+        numba.config.CACHE_DIR = configured_folder
+    return compiled
 
 
-def _in_memory(kind: Any) -> tuple[Any, Any]:
+def _load_and_store(kind: Any) -> tuple[Any, Any]:
     """Return compiled functions that load and store a value of a numba type in an array of bytes.
 
-    To pass a law or a state between Python and compiled code costs as much as 20 steps.
+    The law and the state stay in such memory, because to pass one of them between Python and
+    compiled code costs as much as 20 steps.
     """
 
     def pointer(context: Any, builder: Any, array_type: Any, array: Any) -> Any:
@@ -95,21 +96,21 @@ def _in_memory(kind: Any) -> tuple[Any, Any]:
     return intrinsic(load), intrinsic(store)
 
 
-_EXAMPLE = Vehicle(seed=0)  # for the types
-_SENSORS = _EXAMPLE.estimator.law, _EXAMPLE.estimator.state
-_load_law, _store_law = _in_memory(numba.typeof(_EXAMPLE.plant.law))
-_load_state, _store_state = _in_memory(numba.typeof(_EXAMPLE.plant.state))
-_load_sensors, _store_sensors = _in_memory(numba.typeof(_SENSORS))
+_EXAMPLE = Vehicle(seed=0)  # its attributes have the types to compile for
+_EXAMPLE_SENSORS = _EXAMPLE.estimator.law, _EXAMPLE.estimator.state
+_load_law, _store_law = _load_and_store(numba.typeof(_EXAMPLE.plant.law))
+_load_state, _store_state = _load_and_store(numba.typeof(_EXAMPLE.plant.state))
+_load_sensors, _store_sensors = _load_and_store(numba.typeof(_EXAMPLE_SENSORS))
 
 
 @_compiled
-def _start(law_memory: Any, law: VehicleLaw, state_memory: Any, state: VehicleState) -> None:
+def _store_start(law_memory: Any, law: VehicleLaw, state_memory: Any, state: VehicleState) -> None:
     _store_law(law_memory, law)
     _store_state(state_memory, state)
 
 
 @_compiled
-def _state(state_memory: Any) -> Any:
+def _read_state(state_memory: Any) -> Any:
     return _load_state(state_memory)
 
 
@@ -144,7 +145,7 @@ def _advance(
 
 
 @_compiled
-def _keep_sensors(memory: Any, sensors: tuple[SensorLaw, SensorState]) -> None:
+def _write_sensors(memory: Any, sensors: tuple[SensorLaw, SensorState]) -> None:
     _store_sensors(memory, sensors)
 
 
@@ -161,20 +162,20 @@ class CompiledPlant:
     """A vehicle whose steps and estimates are compiled; its arguments: see `Plant`."""
 
     def __init__(self, law: VehicleLaw, state: VehicleState, history_length: int) -> None:
-        self.law, self._law, self._memory = law, _memory_for(law), _memory_for(state)
-        _start(self._law, law, self._memory, state)
+        self.law, self._law_memory, self._state_memory = law, _memory_for(law), _memory_for(state)
+        _store_start(self._law_memory, law, self._state_memory, state)
         self._arrived, self._shaped = (np.array(ring) for ring in empty_rings(law.multirotor))
         self._history = np.array([truth_row(state.body, state.position)] * history_length)
         self._state: VehicleState | None = state
         self._steps = state.steps
-        self._sensors = _memory_for(_SENSORS)
+        self._sensor_memory = _memory_for(_EXAMPLE_SENSORS)
         self._sensor_state: SensorState | None = None
 
     @property
     def state(self) -> VehicleState:
         """State after the latest step."""
         if self._state is None:
-            self._state = _state(self._memory)
+            self._state = _read_state(self._state_memory)
         return self._state
 
     def advance(self, command: ActuatorCommand, conditions: Conditions, count: int) -> Outcome:
@@ -182,8 +183,8 @@ class CompiledPlant:
         self._steps += count
         self._state = None
         return _advance(
-            self._law,
-            self._memory,
+            self._law_memory,
+            self._state_memory,
             self._arrived,
             self._shaped,
             self._history,
@@ -203,9 +204,9 @@ class CompiledPlant:
         """The autopilot's estimate now: see `sensors.estimate`."""
         if state is not self._sensor_state:
             self._sensor_state = state
-            _keep_sensors(self._sensors, (law, state))
+            _write_sensors(self._sensor_memory, (law, state))
         estimated: tuple[Estimate, Vector] = _estimate(
-            self._sensors, self._history, self._steps, time, noise
+            self._sensor_memory, self._history, self._steps, time, noise
         )
         return estimated
 

@@ -9,14 +9,14 @@ from sitl_mock.physics.quaternion import Quaternion, Vector, normalise
 
 
 class Wind:
-    """Wind with gusts: `velocity` is that of the air (NED, m/s); each `step` lasts `dt` seconds."""
+    """Wind with gusts. `velocity` is that of the air (NED, m/s); a `step` advances it by `dt` s."""
 
     def __init__(self, config: WindConfig, dt: float, seed: int) -> None:
         direction = radians(config.from_deg)
         self._mean = (-config.speed_m_s * cos(direction), -config.speed_m_s * sin(direction))
         self._decay = exp(-dt / config.gust_time_s)
-        self._kick = config.gust_m_s * sqrt(1.0 - self._decay**2)
-        self._kick_down = config.vertical_gust_m_s * sqrt(1.0 - self._decay**2)
+        self._gust_noise = config.gust_m_s * sqrt(1.0 - self._decay**2)
+        self._vertical_gust_noise = config.vertical_gust_m_s * sqrt(1.0 - self._decay**2)
         self._calm = config.gust_m_s == 0.0 and config.vertical_gust_m_s == 0.0
         # A text seed gives the same numbers on every machine, independent of the other noises.
         self._random = Random(f"{seed}/wind")
@@ -27,9 +27,9 @@ class Wind:
             gauss(0.0, config.gust_m_s),
             gauss(0.0, config.vertical_gust_m_s),
         )
-        self.velocity: Vector = self._blend()
+        self.velocity: Vector = self._mean_with_gust()
 
-    def _blend(self) -> Vector:
+    def _mean_with_gust(self) -> Vector:
         north, east, down = self._gust
         return (self._mean[0] + north, self._mean[1] + east, down)
 
@@ -40,11 +40,11 @@ class Wind:
         gauss, decay = self._random.gauss, self._decay
         north, east, down = self._gust
         self._gust = (
-            decay * north + self._kick * gauss(0.0, 1.0),
-            decay * east + self._kick * gauss(0.0, 1.0),
-            decay * down + self._kick_down * gauss(0.0, 1.0),
+            decay * north + self._gust_noise * gauss(0.0, 1.0),
+            decay * east + self._gust_noise * gauss(0.0, 1.0),
+            decay * down + self._vertical_gust_noise * gauss(0.0, 1.0),
         )
-        self.velocity = self._blend()
+        self.velocity = self._mean_with_gust()
 
 
 class GroundLaw(NamedTuple):

@@ -19,19 +19,19 @@ class Geodetic(NamedTuple):
 def to_geodetic(origin: Geodetic, position: Vector) -> Geodetic:
     """Return the geodetic position of a local NED position (m)."""
     north, east, down = position
-    parallel = EARTH_RADIUS_M * cos(radians(origin.latitude_deg))
+    parallel_radius = EARTH_RADIUS_M * cos(radians(origin.latitude_deg))
     return Geodetic(
         origin.latitude_deg + degrees(north / EARTH_RADIUS_M),
-        origin.longitude_deg + degrees(east / parallel),
+        origin.longitude_deg + degrees(east / parallel_radius),
         origin.altitude_m - down,
     )
 
 
 def to_local(origin: Geodetic, place: Geodetic) -> Vector:
     """Return the local NED position (m) of a geodetic position."""
-    parallel = EARTH_RADIUS_M * cos(radians(origin.latitude_deg))
+    parallel_radius = EARTH_RADIUS_M * cos(radians(origin.latitude_deg))
     return (
         radians(place.latitude_deg - origin.latitude_deg) * EARTH_RADIUS_M,
-        radians(place.longitude_deg - origin.longitude_deg) * parallel,
+        radians(place.longitude_deg - origin.longitude_deg) * parallel_radius,
         origin.altitude_m - place.altitude_m,
     )

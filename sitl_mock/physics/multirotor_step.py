@@ -140,14 +140,16 @@ def drive(
             are shaped, NaN holds the shaped rate, and infinity lets it grow without limit.
         throttle: collective; NaN or <= 0 stops the rotors, values above 1 mean 1.
         controlled: whether the rate loop runs; otherwise it idles.
-        conditions: battery, wind, and the error of the attitude, which only the shaping knows.
+        conditions: battery, wind, and the error of the attitude, which only the shaping uses.
     """
     mixed, thrusts, axes, shaped = actuation
     motion, _, angular_acceleration = body
     _, _, _, w, x, y, z, p, q, r = motion
     if law.shapes:
         estimated = rotated_slightly(conditions.attitude_error, (w, x, y, z))
-        setpoint, shaped = _shaped(law, rings, shaped, estimated, step, setpoint, controlled)
+        setpoint, shaped = _shape_setpoint(
+            law, rings, shaped, estimated, step, setpoint, controlled
+        )
     setpoint = delayed(rings.shaped, law.rates.delays, step, setpoint)
     if controlled:
         _, tilt_saturated, yaw_saturated = mixed
@@ -162,12 +164,12 @@ def drive(
         )
     else:
         axes = ZERO_STATE
-    mixed = _mixed(law, axes, throttle)
+    mixed = _allocate(law, axes, throttle)
     thrusts, wrench = rotor_step(law.rotors, thrusts, mixed[0], conditions.thrust_factor)
     return _load(law, wrench, conditions.wind), (mixed, thrusts, axes, shaped)
 
 
-def _shaped(
+def _shape_setpoint(
     law: MultirotorLaw,
     rings: Rings,
     shaped: Shaped,
@@ -176,14 +178,17 @@ def _shaped(
     setpoint: Vector,
     controlled: bool,
 ) -> tuple[Vector, Shaped]:
-    """Return the delayed, shaped setpoint, without control the given one; and the shaping."""
+    """Return the delayed, shaped setpoint, and the state of the shaping after the step.
+
+    If the rate loop does not run, the setpoint is returned unchanged.
+    """
     goals = delayed(rings.arrived, law.shaping.delays, step, setpoint)
     if controlled:
         return shape(law.shaping, shaped, goals, q)
     return setpoint, NOT_SHAPED
 
 
-def _mixed(law: MultirotorLaw, axes: Axes, throttle: float) -> Mix:
+def _allocate(law: MultirotorLaw, axes: Axes, throttle: float) -> Mix:
     """Allocate torques and throttle to the rotors."""
     # A NaN throttle fails this comparison, which stops the rotors.
     if throttle > 0.0:
@@ -194,7 +199,7 @@ def _mixed(law: MultirotorLaw, axes: Axes, throttle: float) -> Mix:
 
 
 def _load(law: MultirotorLaw, wrench: Four, wind: Vector) -> Load:
-    """Return the load on the body: of the rotors, and of the wind."""
+    """Return the load on the body: by the rotors and by the wind."""
     thrust, torque_x, torque_y, torque_z = wrench
     wind_n, wind_e, wind_d = wind
     return thrust / law.mass, torque_x, torque_y, torque_z, wind_n, wind_e, wind_d

@@ -12,13 +12,14 @@ from sitl_mock.physics.rigid_body import GRAVITY, Motion
 Errors = tuple[complex, complex, complex]
 """Errors of position (m), velocity (m/s), acceleration (m/s^2, from errors of roll and pitch)."""
 TruthRow = tuple[*Motion, *Vector, *Vector]
-"""The true motion after a step: motion, position (NED, m), mean acceleration (NED, m/s^2)."""
+"""The true motion after a step: 0 to 9 `Motion`, 10 to 12 position (NED, m), 13 to 15 mean
+acceleration (NED, m/s^2)."""
 TruthHistory = list[TruthRow]
 """The rows of the latest steps in a ring buffer; an array if the steps are compiled."""
 
 
 class ErrorVectors(NamedTuple):
-    """Estimate minus truth, NED: m, m/s, and a small rotation of the attitude, rad."""
+    """Estimate minus truth, NED: position (m), velocity (m/s), small rotation of attitude (rad)."""
 
     position: Vector
     velocity: Vector
@@ -65,8 +66,12 @@ class ErrorLaw(NamedTuple):
 
 def extrapolated(errors: Errors, elapsed: float) -> Errors:
     """Return the errors ``elapsed`` s later, without new disturbances."""
-    place, speed, tilt = errors
-    return place + elapsed * (speed + 0.5 * elapsed * tilt), speed + elapsed * tilt, tilt
+    position, velocity, acceleration = errors
+    return (
+        position + elapsed * (velocity + 0.5 * elapsed * acceleration),
+        velocity + elapsed * acceleration,
+        acceleration,
+    )
 
 
 def pending_share(predictor_ms: float, state: FilterState, now: float) -> float:
@@ -81,14 +86,14 @@ def propagated_horizontal(
 
     The filter integrated an acceleration that was rotated and scaled.
     """
-    place, speed, tilt = extrapolated(state.horizontal.errors, elapsed)
-    wrong = complex(law.scale, state.yaw)
-    before = state.velocity
-    way = complex(truth[10], truth[11]) - state.position
+    position, velocity, acceleration = extrapolated(state.horizontal.errors, elapsed)
+    relative_error = complex(law.scale, state.yaw)
+    fused_velocity = state.velocity
+    displacement = complex(truth[10], truth[11]) - state.position
     return (
-        place + wrong * (way - elapsed * before),
-        speed + wrong * (complex(truth[0], truth[1]) - before),
-        tilt,
+        position + relative_error * (displacement - elapsed * fused_velocity),
+        velocity + relative_error * (complex(truth[0], truth[1]) - fused_velocity),
+        acceleration,
     )
 
 
@@ -100,35 +105,35 @@ def propagated_vertical(
     The filter takes a part of the horizontal acceleration for a vertical one: tilt times
     acceleration.
     """
-    down, sink, tilt = extrapolated(state.vertical.errors, elapsed)
-    turn, before = law.tilt.conjugate(), state.velocity
-    way = complex(truth[10], truth[11]) - state.position
+    down, sink_rate, acceleration = extrapolated(state.vertical.errors, elapsed)
+    tilt_factor, fused_velocity = law.tilt.conjugate(), state.velocity
+    displacement = complex(truth[10], truth[11]) - state.position
     return (
-        down + (turn * (way - elapsed * before)).imag,
-        sink + (turn * (complex(truth[0], truth[1]) - before)).imag,
-        tilt,
+        down + (tilt_factor * (displacement - elapsed * fused_velocity)).imag,
+        sink_rate + (tilt_factor * (complex(truth[0], truth[1]) - fused_velocity)).imag,
+        acceleration,
     )
 
 
 def error_at(law: ErrorLaw, state: FilterState, truth: TruthRow, now: float) -> ErrorVectors:
     """Return the error at time ``now`` (s), when the true motion is ``truth`` (pure)."""
     elapsed = now - state.fused_at
-    unsettled = pending_share(law.predictor_ms, state, now)
-    turning = pending_share(law.heading_predictor_ms, state, now)
-    place, speed, tilt = propagated_horizontal(law, state, truth, elapsed)
+    pending_part = pending_share(law.predictor_ms, state, now)
+    yaw_pending_part = pending_share(law.heading_predictor_ms, state, now)
+    position, velocity, acceleration = propagated_horizontal(law, state, truth, elapsed)
     pending = state.horizontal.pending
-    place += law.lead * complex(truth[0], truth[1]) - unsettled * pending[0]
-    speed += law.lead * complex(truth[13], truth[14]) - unsettled * pending[1]
-    down, sink, _ = propagated_vertical(law, state, truth, elapsed)
+    position += law.lead * complex(truth[0], truth[1]) - pending_part * pending[0]
+    velocity += law.lead * complex(truth[13], truth[14]) - pending_part * pending[1]
+    down, sink_rate, _ = propagated_vertical(law, state, truth, elapsed)
     pending = state.vertical.pending
-    down += law.height_offset + state.sag - unsettled * pending[0]
+    down += law.height_offset + state.sag - pending_part * pending[0]
     return ErrorVectors(
-        (place.real, place.imag, down.real),
-        (speed.real, speed.imag, (sink - unsettled * pending[1]).real + state.sink),
+        (position.real, position.imag, down.real),
+        (velocity.real, velocity.imag, (sink_rate - pending_part * pending[1]).real + state.sink),
         # A wrong attitude rotates the thrust, which makes the acceleration wrong.
         (
-            tilt.imag / GRAVITY + law.tilt.real,
-            -tilt.real / GRAVITY + law.tilt.imag,
-            state.yaw - turning * state.yaw_pending,
+            acceleration.imag / GRAVITY + law.tilt.real,
+            -acceleration.real / GRAVITY + law.tilt.imag,
+            state.yaw - yaw_pending_part * state.yaw_pending,
         ),
     )

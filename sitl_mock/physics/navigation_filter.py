@@ -66,7 +66,7 @@ class NavigationFilter:
         self._uncertainty = _LARGEST_UNCERTAINTY
         self._random = Random(f"{seed}/navigation")
         self._height_random = Random(f"{seed}/height")
-        self._slipped = Random(f"{seed}/slip").random()
+        self._slip_phase = Random(f"{seed}/slip").random()
         yaw = self._random.gauss(0.0, radians(config.yaw_error_deg))
         horizontal, vertical = self._initial(1.0), self._initial(config.vertical_share)
         place, speed = complex(start[10], start[11]), complex(start[0], start[1])
@@ -75,13 +75,13 @@ class NavigationFilter:
             horizontal, vertical, yaw, 0.0, 0.0, noise, 0.0, noise, 0.0, 0.0, place, speed
         )
 
-    def _initial(self, share: float) -> TrackState:
-        """Return the state after the first fix, whose noise becomes the error."""
+    def _initial(self, ratio: float) -> TrackState:
+        """Return the state after the first fix, whose noise (times `ratio`) becomes the error."""
         config, gauss = self._config, self._random.gauss
-        place, speed = share * config.position_noise_m, share * config.velocity_noise_m_s
+        sigma_p, sigma_v = ratio * config.position_noise_m, ratio * config.velocity_noise_m_s
         noise = (
-            complex(gauss(0.0, place), gauss(0.0, place)),
-            complex(gauss(0.0, speed), gauss(0.0, speed)),
+            complex(gauss(0.0, sigma_p), gauss(0.0, sigma_p)),
+            complex(gauss(0.0, sigma_v), gauss(0.0, sigma_v)),
         )
         return TrackState((*noise, 0j), (0j, 0j), noise)
 
@@ -104,21 +104,21 @@ class NavigationFilter:
         acceleration = complex(delayed[13], delayed[14])
         errors = propagated_horizontal(law, state, delayed, elapsed)
         noise = self._next_noise(state.horizontal.noise, 1.0)
-        slip = config.fix_slip_ms * (0.5 - (at / config.fix_slip_time_s + self._slipped) % 1.0)
-        seen = (
+        slip = config.fix_slip_ms * (0.5 - (at / config.fix_slip_time_s + self._slip_phase) % 1.0)
+        fix_errors = (
             noise[0] - ((config.position_late_ms + slip) * 1e-3 + law.lead) * velocity,
             noise[1] - ((config.velocity_late_ms + slip) * 1e-3 + law.lead) * acceleration,
         )
-        kick = GRAVITY * radians(config.tilt_noise_deg) * sqrt(elapsed)
-        horizontal = self._corrected_state(errors, seen, noise, kick)
+        tilt_noise = GRAVITY * radians(config.tilt_noise_deg) * sqrt(elapsed)
+        horizontal = self._corrected_state(errors, fix_errors, noise, tilt_noise)
         share = config.vertical_share
         noise = self._next_noise(state.vertical.noise, share)
         errors = propagated_vertical(law, state, delayed, elapsed)
-        vertical = self._corrected_state(errors, noise, noise, share * kick)
+        vertical = self._corrected_state(errors, noise, noise, share * tilt_noise)
         noiseless_yaw = self._next_alignment(velocity, acceleration, elapsed)
         yaw = self._next_yaw_noise() + noiseless_yaw
-        turning = pending_share(law.heading_predictor_ms, state, now)
-        yaw_pending = turning * state.yaw_pending + yaw - state.yaw
+        yaw_pending_part = pending_share(law.heading_predictor_ms, state, now)
+        yaw_pending = yaw_pending_part * state.yaw_pending + yaw - state.yaw
         height_noise = self._next_height_noise(elapsed)
         sag, sink = self._next_sag(abs(acceleration), height_noise, elapsed)
         corrected = FilterState(
@@ -140,29 +140,29 @@ class NavigationFilter:
     def _without_jump(self, corrected: FilterState, present: TruthRow) -> FilterState:
         """Return the corrected state with pending corrections that keep the output as it was."""
         law, state, now = self.law, self.state, corrected.corrected_at
-        since, ago = now - state.fused_at, now - corrected.fused_at
-        unsettled = pending_share(law.predictor_ms, state, now)
-        horizontal = _settling(
+        since_last_fix, since_this_fix = now - state.fused_at, now - corrected.fused_at
+        pending_part = pending_share(law.predictor_ms, state, now)
+        horizontal = _with_pending(
             state.horizontal,
             corrected.horizontal,
-            propagated_horizontal(law, state, present, since),
-            propagated_horizontal(law, corrected, present, ago),
-            unsettled,
+            propagated_horizontal(law, state, present, since_last_fix),
+            propagated_horizontal(law, corrected, present, since_this_fix),
+            pending_part,
         )
-        vertical = _settling(
+        vertical = _with_pending(
             state.vertical,
             corrected.vertical,
-            propagated_vertical(law, state, present, since),
-            propagated_vertical(law, corrected, present, ago),
-            unsettled,
+            propagated_vertical(law, state, present, since_last_fix),
+            propagated_vertical(law, corrected, present, since_this_fix),
+            pending_part,
         )
         return corrected._replace(horizontal=horizontal, vertical=vertical)
 
     def _next_yaw_noise(self) -> float:
         """Return the slow noise of the heading at the next fix, rad."""
-        config, kept = self._config, self._yaw_decay
-        spread = radians(config.yaw_error_deg) * sqrt(1.0 - kept * kept)
-        return kept * (self.state.yaw - self.state.noiseless_yaw) + self._random.gauss(0.0, spread)
+        config, decay = self._config, self._yaw_decay
+        sigma = radians(config.yaw_error_deg) * sqrt(1.0 - decay * decay)
+        return decay * (self.state.yaw - self.state.noiseless_yaw) + self._random.gauss(0.0, sigma)
 
     def _next_alignment(self, velocity: complex, acceleration: complex, elapsed: float) -> float:
         """Return the next heading error without its noise, rad.
@@ -170,17 +170,17 @@ class NavigationFilter:
         Without acceleration the heading follows the compass. In a horizontal acceleration it
         follows the fixes, because they measure its direction. In a turn, late fixes lag behind it.
         """
-        config, slow = self._config, 1.0 / _COMPASS_TIME_S
-        across = (velocity.conjugate() * acceleration).imag
-        turn_rate = across / max(abs(velocity) ** 2, _MIN_COURSE_SPEED**2)
-        shown = self._uncertainty * abs(acceleration) ** 2
-        rate = slow + shown
-        wrong = slow * radians(config.compass_error_deg)
-        wrong -= shown * turn_rate * config.turn_yaw_ms * 1e-3
-        rest = wrong / rate
-        left = self._uncertainty / (1.0 + shown * elapsed)
-        self._uncertainty = min(left + _UNCERTAINTY_GROWTH * elapsed, _LARGEST_UNCERTAINTY)
-        return rest + (self.state.noiseless_yaw - rest) * exp(-rate * elapsed)
+        config, compass_rate = self._config, 1.0 / _COMPASS_TIME_S
+        cross_product = (velocity.conjugate() * acceleration).imag
+        turn_rate = cross_product / max(abs(velocity) ** 2, _MIN_COURSE_SPEED**2)
+        fix_rate = self._uncertainty * abs(acceleration) ** 2
+        total_rate = compass_rate + fix_rate
+        drive = compass_rate * radians(config.compass_error_deg)
+        drive -= fix_rate * turn_rate * config.turn_yaw_ms * 1e-3
+        steady_error = drive / total_rate
+        uncertainty = self._uncertainty / (1.0 + fix_rate * elapsed)
+        self._uncertainty = min(uncertainty + _UNCERTAINTY_GROWTH * elapsed, _LARGEST_UNCERTAINTY)
+        return steady_error + (self.state.noiseless_yaw - steady_error) * exp(-total_rate * elapsed)
 
     def _next_sag(
         self, acceleration: float, height_noise: float, elapsed: float
@@ -194,55 +194,56 @@ class NavigationFilter:
 
     def _next_height_noise(self, elapsed: float) -> float:
         """Return the slow noise of the height at the next fix, m."""
-        config, kept = self._config, exp(-elapsed / self._config.height_noise_time_s)
-        spread = config.height_noise_m * sqrt(1.0 - kept * kept)
-        return kept * self.state.height_noise + self._height_random.gauss(0.0, spread)
+        config, decay = self._config, exp(-elapsed / self._config.height_noise_time_s)
+        sigma = config.height_noise_m * sqrt(1.0 - decay * decay)
+        return decay * self.state.height_noise + self._height_random.gauss(0.0, sigma)
 
-    def _next_noise(self, noise: tuple[complex, complex], share: float) -> tuple[complex, complex]:
-        """Return the noise of the next fix."""
+    def _next_noise(self, noise: tuple[complex, complex], ratio: float) -> tuple[complex, complex]:
+        """Return the noise of the next fix; `ratio` scales it."""
         config, gauss, decay = self._config, self._random.gauss, self._decay
-        fresh = share * sqrt(1.0 - decay * decay)
-        place, speed = config.position_noise_m * fresh, config.velocity_noise_m_s * fresh
+        scale = ratio * sqrt(1.0 - decay * decay)
+        sigma_p, sigma_v = config.position_noise_m * scale, config.velocity_noise_m_s * scale
         return (
-            decay * noise[0] + complex(gauss(0.0, place), gauss(0.0, place)),
-            decay * noise[1] + complex(gauss(0.0, speed), gauss(0.0, speed)),
+            decay * noise[0] + complex(gauss(0.0, sigma_p), gauss(0.0, sigma_p)),
+            decay * noise[1] + complex(gauss(0.0, sigma_v), gauss(0.0, sigma_v)),
         )
 
     def _corrected_state(
         self,
         errors: Errors,
-        seen: tuple[complex, complex],
+        fix_errors: tuple[complex, complex],
         noise: tuple[complex, complex],
-        kick: float,
+        tilt_noise: float,
     ) -> TrackState:
-        """Return the errors corrected by a fix whose own errors are `seen`.
+        """Return the errors corrected by a fix whose own errors are `fix_errors`.
 
-        A random tilt error is added; `kick`, m/s^2 of acceleration, is its standard deviation.
+        A random tilt error is added; `tilt_noise` is its standard deviation, m/s^2 of acceleration.
         """
-        place, speed, tilt = errors
-        off, faster = seen[0] - place, seen[1] - speed
-        first, second, third = (
-            of_place * off + of_speed * faster for of_place, of_speed in self._gains
+        position, velocity, tilt = errors
+        innovations = fix_errors[0] - position, fix_errors[1] - velocity
+        to_position, to_velocity, to_tilt = (
+            per_position * innovations[0] + per_velocity * innovations[1]
+            for per_position, per_velocity in self._gains
         )
         gauss = self._random.gauss
-        wander = complex(gauss(0.0, kick), gauss(0.0, kick))
-        corrected = place + first, speed + second, tilt + third + wander
+        random_walk = complex(gauss(0.0, tilt_noise), gauss(0.0, tilt_noise))
+        corrected = position + to_position, velocity + to_velocity, tilt + to_tilt + random_walk
         return TrackState(corrected, (0j, 0j), noise)
 
 
-def _settling(
-    before: TrackState, corrected: TrackState, old: Errors, new: Errors, unsettled: float
+def _with_pending(
+    before: TrackState, corrected: TrackState, old: Errors, new: Errors, share: float
 ) -> TrackState:
-    """Return a corrected track whose output goes on from where it was.
+    """Return the corrected track with pending corrections that keep its output continuous.
 
     Args:
         before: the track before the fix.
         corrected: the track after it.
         old: present errors by the track before the fix.
         new: present errors by the track after it.
-        unsettled: share of the corrections of `before` that its output does not contain.
+        share: share of the corrections of `before` that its output does not contain.
     """
-    place, speed = before.pending
+    position, velocity = before.pending
     return corrected._replace(
-        pending=(unsettled * place + new[0] - old[0], unsettled * speed + new[1] - old[1])
+        pending=(share * position + new[0] - old[0], share * velocity + new[1] - old[1])
     )

@@ -66,14 +66,14 @@ def axis_step(
             its direction.
         dt: step, s.
     """
-    proportional, integral_gain, feed_forward, damping, limit, memory = law
+    proportional, integral_gain, feed_forward, damping, limit, filter_decay = law
     integral, filtered = state
     error = setpoint - rate
     if not (saturated and error * filtered > 0.0):
         integral += integral_gain * error * dt
         integral = limit if integral > limit else -limit if integral < -limit else integral
-    wanted = proportional * error + integral + feed_forward * setpoint - damping * acceleration
-    return integral, wanted + memory * (filtered - wanted)
+    unfiltered = proportional * error + integral + feed_forward * setpoint - damping * acceleration
+    return integral, unfiltered + filter_decay * (filtered - unfiltered)
 
 
 class RateLaw(NamedTuple):

@@ -122,18 +122,18 @@ def shape(law: ShapingLaw, shaped: Shaped, goals: Vector, q: Quaternion) -> tupl
     Returns:
         The setpoint of the rate loop, rad/s, FRD, and the state after the step.
     """
-    most = law.max_change
+    max_change = law.max_change
     before = shaped.rates
     rates = (
-        slew(goals[0], before[0], most[0]),
-        slew(goals[1], before[1], most[1]),
-        slew(goals[2], before[2], most[2]),
+        slew(goals[0], before[0], max_change[0]),
+        slew(goals[1], before[1], max_change[1]),
+        slew(goals[2], before[2], max_change[2]),
     )
     target = rotated(shaped.target if shaped.active else q, rates, law.dt)
     w, x, y, z = target
-    ahead = multiply((w, -x, -y, -z), q)  # the body in the frame of the attitude target
-    turn_x, turn_y, turn_z = rotation_vector(ahead)
-    roll, pitch, yaw = to_body(ahead, rates)
+    body_in_target = multiply((w, -x, -y, -z), q)  # attitude of the body in the frame of the target
+    turn_x, turn_y, turn_z = rotation_vector(body_in_target)
+    roll, pitch, yaw = to_body(body_in_target, rates)
     for_roll, for_pitch, for_yaw = law.closing
     setpoint = (
         roll - sqrt_controller(turn_x, for_roll[0], for_roll[1]),

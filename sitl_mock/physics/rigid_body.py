@@ -41,14 +41,14 @@ def body_of(airframe: AirframeConfig) -> Body:
         *airframe.inertia_kg_m2,
         drag=airframe.drag_n_s_per_m / airframe.mass_kg,
         quadratic_drag=airframe.quadratic_drag_n_s2_per_m2 / airframe.mass_kg,
-        axis_drag=_per(airframe.mass_kg, airframe.axis_drag_n_s2_per_m2),
-        momentum_drag=_per(airframe.mass_kg, airframe.momentum_drag_n_s_per_m),
+        axis_drag=_per_mass(airframe.mass_kg, airframe.axis_drag_n_s2_per_m2),
+        momentum_drag=_per_mass(airframe.mass_kg, airframe.momentum_drag_n_s_per_m),
         rotational_drag=airframe.rotational_drag_n_m_s,
         gravity=airframe.gravity_m_s2,
     )
 
 
-def _per(mass: float, along_axes: Vector) -> Vector:
+def _per_mass(mass: float, along_axes: Vector) -> Vector:
     x, y, z = along_axes
     return x / mass, y / mass, z / mass
 
@@ -78,7 +78,7 @@ def derivative(
     air_n, air_e, air_d = wind_n - vn, wind_e - ve, wind_d - vd
     if quadratic:
         drag += quadratic * sqrt(air_n * air_n + air_e * air_e + air_d * air_d)
-    push_n = push_e = push_d = 0.0
+    axis_drag_n = axis_drag_e = axis_drag_d = 0.0
     if axis != NO_AXIS_DRAG or momentum != NO_AXIS_DRAG:
         air_x, air_y, air_z = to_body((w, x, y, z), (air_n, air_e, air_d))
         inflow = sqrt(max(thrust, 0.0) / gravity)
@@ -87,11 +87,11 @@ def derivative(
             (axis[1] * abs(air_y) + momentum[1] * inflow) * air_y,
             (axis[2] * abs(air_z) + momentum[2] * inflow) * air_z,
         )
-        push_n, push_e, push_d = to_body((w, -x, -y, -z), force)
+        axis_drag_n, axis_drag_e, axis_drag_d = to_body((w, -x, -y, -z), force)
     return (
-        drag * air_n + push_n - 2.0 * thrust * (x * z + w * y),
-        drag * air_e + push_e - 2.0 * thrust * (y * z - w * x),
-        drag * air_d + push_d - thrust * (1.0 - 2.0 * (x * x + y * y)) + gravity,
+        drag * air_n + axis_drag_n - 2.0 * thrust * (x * z + w * y),
+        drag * air_e + axis_drag_e - 2.0 * thrust * (y * z - w * x),
+        drag * air_d + axis_drag_d - thrust * (1.0 - 2.0 * (x * x + y * y)) + gravity,
         -0.5 * (x * p + y * q + z * r),
         0.5 * (w * p + y * r - z * q),
         0.5 * (w * q + z * p - x * r),

@@ -43,14 +43,14 @@ def mix(throttle: float, roll: float, pitch: float, yaw: float) -> Mix:
         roll *= scale
         pitch *= scale
         demand = room
-    rest = 1.0 - demand
-    throttle = rest if rest < throttle else throttle
+    remaining = 1.0 - demand
+    throttle = remaining if remaining < throttle else throttle
     # One diagonal has pitch - roll and +yaw, the other pitch + roll and -yaw.
-    counter, clockwise = abs(pitch - roll), abs(pitch + roll)
+    largest_rise, largest_fall = abs(pitch - roll), abs(pitch + roll)
     if yaw < 0.0:
-        counter, clockwise = clockwise, counter
-    above, below = 1.0 - throttle - counter, throttle - clockwise
-    room = below if below < above else above
+        largest_rise, largest_fall = largest_fall, largest_rise
+    room_above, room_below = 1.0 - throttle - largest_rise, throttle - largest_fall
+    room = room_below if room_below < room_above else room_above
     yaw_saturated = abs(yaw) > room
     if yaw_saturated:
         room = max(room, 0.0)
@@ -124,8 +124,8 @@ def rotor_step(
         thrust_factor: factor of the battery voltage on the thrust of every rotor.
 
     Returns:
-        The thrusts after the step. Total thrust (N) and torques about body x, y, z (N m), means
-        over the step.
+        The thrusts after the step; and the means over the step of total thrust (N) and of the
+        torques about body x, y, z (N m).
     """
     t0, t1, t2, t3 = throttles
     old0, old1, old2, old3 = thrusts

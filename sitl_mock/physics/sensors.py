@@ -66,10 +66,10 @@ class SensorState(NamedTuple):
 
 
 def white_noise(numbers: list[float], deviations: tuple[float, ...]) -> None:
-    """Turn uniform random numbers into normal ones, in place: as `Random.gauss`, Box-Muller.
+    """Turn uniform random numbers into normal ones, in place, by Box-Muller as in `Random.gauss`.
 
     Args:
-        numbers: an even number of them, 0 <= x < 1.
+        numbers: an even number of random numbers, 0 <= x < 1; they are replaced.
         deviations: standard deviations of the normal numbers, which are used in turn.
     """
     period = len(deviations)
@@ -98,31 +98,31 @@ def estimate(
         time: now, s.
         noise: 15 numbers, three each for attitude, rates, position, velocity and force.
     """
-    attitude = history[(steps - law.attitude_delay) % len(history)]
-    place = history[(steps - law.position_delay) % len(history)]
+    attitude_row = history[(steps - law.attitude_delay) % len(history)]
+    position_row = history[(steps - law.position_delay) % len(history)]
     if law.filtered:
-        error = error_at(law.errors, state.filter, place, time - law.position_delay * law.dt)
+        error = error_at(law.errors, state.filter, position_row, time - law.position_delay * law.dt)
     else:
         error = NO_ERRORS
-    q = (attitude[3], attitude[4], attitude[5], attitude[6])
-    fx, fy, fz = to_body(q, (attitude[13], attitude[14], attitude[15] - law.gravity))
+    q = (attitude_row[3], attitude_row[4], attitude_row[5], attitude_row[6])
+    fx, fy, fz = to_body(q, (attitude_row[13], attitude_row[14], attitude_row[15] - law.gravity))
     tilted = multiply(state.yaw, rotated_slightly(error.rotation, q))
-    rates = history[(steps - law.rate_delay) % len(history)]
-    yaw_rate = rates[9] + law.yaw_rate_bias + noise[5]
-    gyro = (rates[7] + noise[3], rates[8] + noise[4], yaw_rate)
+    rate_row = history[(steps - law.rate_delay) % len(history)]
+    yaw_rate = rate_row[9] + law.yaw_rate_bias + noise[5]
+    gyro = (rate_row[7] + noise[3], rate_row[8] + noise[4], yaw_rate)
     position, velocity, offset = error.position, error.velocity, state.offset
     estimated = Estimate(
         normalise(multiply(tilted, (1.0, noise[0], noise[1], noise[2]))),
         gyro,
         (
-            place[10] + position[0] + offset[0] + noise[6],
-            place[11] + position[1] + offset[1] + noise[7],
-            place[12] + position[2] + offset[2] + noise[8],
+            position_row[10] + position[0] + offset[0] + noise[6],
+            position_row[11] + position[1] + offset[1] + noise[7],
+            position_row[12] + position[2] + offset[2] + noise[8],
         ),
         (
-            place[0] + velocity[0] + noise[9],
-            place[1] + velocity[1] + noise[10],
-            place[2] + velocity[2] + noise[11],
+            position_row[0] + velocity[0] + noise[9],
+            position_row[1] + velocity[1] + noise[10],
+            position_row[2] + velocity[2] + noise[11],
         ),
         (fx + noise[12], fy + noise[13], fz + noise[14]),
         gyro,
@@ -186,15 +186,15 @@ class Estimator:
             0.0 if config.ekf is None else radians(config.ekf.yaw_rate_bias_deg_s),
         )
         horizon = 0 if config.ekf is None else round(config.ekf.fix_delay_ms * 1e-3 / dt)
-        self._behind = max(horizon, self.law.position_delay)
-        self.history_length = 1 + max(self.law.rate_delay, self._behind)
+        self._fusion_delay = max(horizon, self.law.position_delay)
+        self.history_length = 1 + max(self.law.rate_delay, self._fusion_delay)
         self._filter = filter_
         first = _NO_FILTER if filter_ is None else filter_.state
         self.state = SensorState(first, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         self._random = Random(f"{seed}/sensors")
         self._make_noise = make_noise
-        self._numbers: Sequence[float] = ()
-        self._drawn = 0
+        self._noise: Sequence[float] = ()
+        self._noise_used = 0
         self.rotation: Vector = (0.0, 0.0, 0.0)
         self.reset_counter = 0
 
@@ -214,18 +214,18 @@ class Estimator:
             time: now, s.
             row_before: returns the true motion k steps ago, for k below `history_length`.
         """
-        fused = time - self._behind * self.law.dt
+        fused = time - self._fusion_delay * self.law.dt
         if self._filter is not None and self._filter.is_due(fused):
-            self._filter.advance(row_before(self._behind), fused, row_before(0), time)
+            self._filter.advance(row_before(self._fusion_delay), fused, row_before(0), time)
             self.state = self.state._replace(filter=self._filter.state)
 
     def draw(self) -> Sequence[float]:
         """Return fresh noise for one estimate, 15 numbers."""
-        count, begin = len(self._deviations), self._drawn
-        if begin == len(self._numbers):
+        count, begin = len(self._deviations), self._noise_used
+        if begin == len(self._noise):
             random = self._random.random
             uniform = [random() for _ in range(count * _ESTIMATES_PER_DRAW)]
-            self._numbers = self._make_noise(uniform, self._deviations)
+            self._noise = self._make_noise(uniform, self._deviations)
             begin = 0
-        self._drawn = begin + count
-        return self._numbers[begin : begin + count]
+        self._noise_used = begin + count
+        return self._noise[begin : begin + count]

@@ -173,11 +173,11 @@ class Vehicle:
     def step(self, command: ActuatorCommand, count: int = 1) -> None:
         """Advance by `count` physics steps of `step_s` seconds under one command."""
         while count > 0:
-            since = self.steps % self._slow_steps
-            if since == 0:
+            since_slow_step = self.steps % self._slow_steps
+            if since_slow_step == 0:
                 self._wind.step()
                 self._battery.step(self._thrust, self._slow_dt)
-            steps = min(count, self._slow_steps - since)
+            steps = min(count, self._slow_steps - since_slow_step)
             conditions = Conditions(
                 self._battery.thrust_factor, self._wind.velocity, self.estimator.rotation
             )

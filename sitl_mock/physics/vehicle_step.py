@@ -101,14 +101,14 @@ def advance(
             conditions,
         )
         steps += 1
-        body, position, on_ground, crashed, touchdown_speed = _settled(
+        body, position, on_ground, crashed, touchdown_speed = _move_or_rest(
             law, body, position, on_ground, crashed, touchdown_speed, load
         )
         history[steps % length] = truth_row(body, position)
     return VehicleState(steps, body, actuation, position, on_ground, crashed, touchdown_speed)
 
 
-def _settled(
+def _move_or_rest(
     law: VehicleLaw,
     body: Kinematics,
     position: Vector,
@@ -119,8 +119,8 @@ def _settled(
 ) -> tuple[Kinematics, Vector, bool, bool, float]:
     """Return the state after one step under this load.
 
-    It is the motion, the position (m, NED), whether the vehicle is on the ground and has crashed,
-    and the sink speed of the latest touchdown, m/s.
+    The state is: motion; position, m, NED; whether the vehicle is on the ground; whether it has
+    crashed; sink speed of the latest touchdown, m/s.
     """
     multirotor, ground = law
     _, _, _, w, x, y, z, _, _, _ = body[0]

@@ -49,7 +49,7 @@ class ArmingChecks:
         return self._stream.alive(self._state.time_us, self._parameters["COM_OF_LOSS_T"])
 
     def find_problem(self, *, gcs_alive: bool, pilot: bool, refusal: str | None) -> str | None:
-        """Return why arming is refused now, None if it is not, and note it in the state.
+        """Store in the state why arming is refused now (None if it is not), and return that.
 
         Args:
             gcs_alive: whether a ground station is connected.
@@ -68,9 +68,9 @@ class ArmingChecks:
             (state.mode in PILOTED and not pilot, "no manual control input"),
             (state.mode in NOT_ARMABLE, "mode is not suitable for arming"),
         )
-        found = next((problem for present, problem in problems if present), None)
-        state.prearm_problem = found
-        return found
+        first_problem = next((problem for present, problem in problems if present), None)
+        state.prearm_problem = first_problem
+        return first_problem
 
     def report(self, *, gcs_alive: bool, pilot: bool) -> None:
         """Send the health report if it changed and is due: see `HealthReport.step`."""
@@ -114,5 +114,5 @@ class AutoDisarm:
             limit = parameters["COM_DISARM_LAND"]
             return EventKind.DISARMED_BY_LANDING if 0 < limit * 1e6 <= waited else None
         limit = parameters["COM_DISARM_PRFLT"]
-        late = waited >= limit * 1e6 + PREFLIGHT_MARGIN_US
-        return EventKind.DISARMED_ON_GROUND if limit > 0 and late else None
+        is_overdue = waited >= limit * 1e6 + PREFLIGHT_MARGIN_US
+        return EventKind.DISARMED_ON_GROUND if limit > 0 and is_overdue else None

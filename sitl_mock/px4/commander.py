@@ -46,7 +46,7 @@ class Px4Commander:
         self.refusal: str | None = None
         self.pilot = False
         self.failsafe = Failsafe(
-            state, parameters, stream, announce, self._enter, self._stop_motors
+            state, parameters, stream, announce, self._enter_mode, self._stop_motors
         )
         self._sticks = Sticks(parameters)
         self._checks = checks
@@ -57,14 +57,14 @@ class Px4Commander:
         self._stream = stream
         self._announce = announce
         self._requested_takeoff_z: float | None = None
-        self._status: tuple[bool, Mode, Mode, bool] | None = None
+        self._published_status: tuple[bool, Mode, Mode, bool] | None = None
 
     def arm(self, *, force: bool = False) -> int:
         """Arm, and return a MAV_RESULT; ``force`` skips all checks but that of a crash."""
         state = self._state
         if state.armed:
             return ACCEPTED
-        problem = self._find_problem()
+        problem = self._update_prearm_problem()
         if problem is not None and (not force or self._checks.crashed):
             self._announce(EventKind.ARMING_DENIED, "")
             self._announce(EventKind.PREFLIGHT_FAIL, problem)
@@ -77,7 +77,7 @@ class Px4Commander:
         state.home_q = state.estimate.q
         state.home_set_at_us = state.time_us
         self._announce(EventKind.ARMED, "")
-        self._enter(state.mode)
+        self._enter_mode(state.mode)
         return ACCEPTED
 
     def disarm(self, *, force: bool = False) -> int:
@@ -112,7 +112,7 @@ class Px4Commander:
         self.failsafe.clear()
         if mode is Mode.TAKEOFF:
             self._requested_takeoff_z = takeoff_z
-        self._enter(mode, hold=hold)
+        self._enter_mode(mode, hold=hold)
         return ACCEPTED
 
     def land(self) -> int:
@@ -149,7 +149,7 @@ class Px4Commander:
 
     def announce_problem(self) -> None:
         """Announce what forbids arming now, if anything does."""
-        problem = self._find_problem()
+        problem = self._update_prearm_problem()
         if problem is not None:
             self._announce(EventKind.PREFLIGHT_FAIL, problem)
 
@@ -159,15 +159,15 @@ class Px4Commander:
         self._checks.crashed = crashed
         if state.armed and crashed:
             self._stop_motors(EventKind.DISARMED_AFTER_CRASH)
-        self._find_problem()
+        self._update_prearm_problem()
         self._checks.report(gcs_alive=self.failsafe.gcs_alive, pilot=self._pilot_present)
-        self._watch_sticks()
+        self._detect_stick_override()
         self.failsafe.step(pilot=self._pilot_present)
         if state.armed:
             if state.mode is Mode.TAKEOFF and state.flown and self._control.takeoff_reached:
                 if state.intended_mode is Mode.TAKEOFF:
                     self._set_intended(Mode.LOITER)
-                self._enter(Mode.LOITER)
+                self._enter_mode(Mode.LOITER)
             kind = self._auto_disarm.due()
             if kind is not None:
                 self._stop_motors(kind)
@@ -178,16 +178,16 @@ class Px4Commander:
         """Whether a pilot holds the sticks, by fault injection or by MANUAL_CONTROL."""
         return self.pilot or self._sticks.present(self._state.time_us)
 
-    def _find_problem(self) -> str | None:
+    def _update_prearm_problem(self) -> str | None:
         return self._checks.find_problem(
             gcs_alive=self.failsafe.gcs_alive, pilot=self._pilot_present, refusal=self.refusal
         )
 
-    def _watch_sticks(self) -> None:
+    def _detect_stick_override(self) -> None:
         """Switch to POSCTL if a pilot moves the sticks in the air in an automatic mode."""
         state = self._state
-        flies_itself = state.armed and not state.landed and state.mode not in PILOTED
-        if not flies_itself or self.failsafe.holds_before_acting:
+        in_automatic_flight = state.armed and not state.landed and state.mode not in PILOTED
+        if not in_automatic_flight or self.failsafe.holds_before_acting:
             return
         if self._sticks.override(state.time_us):
             self._announce(EventKind.PILOT_TOOK_OVER, "")
@@ -199,7 +199,7 @@ class Px4Commander:
         # Measured: a landing from OFFBOARD, by command or by failsafe, ends in OFFBOARD.
         state.intended_mode = state.after_disarming
         self.failsafe.clear()
-        self._enter(state.intended_mode)
+        self._enter_mode(state.intended_mode)
         self._announce(kind, "")
 
     def _set_intended(self, mode: Mode) -> None:
@@ -215,8 +215,8 @@ class Px4Commander:
         """Publish the status when it changed, else twice a second."""
         state = self._state
         status = (state.armed, state.mode, state.intended_mode, state.failsafe)
-        if status != self._status or state.time_us - state.status_us >= STATUS_PERIOD_US:
-            self._status, state.status_us = status, state.time_us
+        if status != self._published_status or state.time_us - state.status_us >= STATUS_PERIOD_US:
+            self._published_status, state.status_us = status, state.time_us
 
     def _can_run(self, mode: Mode) -> bool:
         if mode is Mode.OFFBOARD:
@@ -225,7 +225,7 @@ class Px4Commander:
             return False
         return self._state.position_valid or mode not in NEEDS_POSITION
 
-    def _enter(self, mode: Mode, *, hold: Vector | None = None) -> None:
+    def _enter_mode(self, mode: Mode, *, hold: Vector | None = None) -> None:
         """Enter a mode at the present estimate; the intended mode stays."""
         self._state.mode = mode
         takeoff_z = self._takeoff_z() if mode is Mode.TAKEOFF else None

@@ -79,8 +79,8 @@ class Px4Commands(Commands):
 
     def _reposition(self, command: Command, _: Link) -> int:
         flags = command.parameters[1]
-        changes = isfinite(flags) and int(flags) & _CHANGE_MODE
-        if not changes and self._state.mode is not Mode.LOITER:
+        mode_change_requested = isfinite(flags) and int(flags) & _CHANGE_MODE
+        if not mode_change_requested and self._state.mode is not Mode.LOITER:
             return TEMPORARILY_REJECTED
         return self._px4_commander.request_mode(Mode.LOITER, hold=self._position(command))
 
@@ -101,8 +101,8 @@ class Px4Commands(Commands):
         else:
             if not all(map(isfinite, command.parameters[4:])):
                 return DENIED
-            place = Geodetic(*command.parameters[4:])
-            state.home_ned = to_local(self._origin, place)
+            home = Geodetic(*command.parameters[4:])
+            state.home_ned = to_local(self._origin, home)
         state.home_q = state.estimate.q
         state.home_set_at_us = state.time_us
         return ACCEPTED

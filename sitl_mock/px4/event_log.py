@@ -23,13 +23,15 @@ _KEPT_EVENTS = 20
 """Number of events that can be requested again."""
 _SEQUENCE_PERIOD_US = 3_000_000
 """Period of CURRENT_EVENT_SEQUENCE."""
-_RESET = 1
-"""MAV_EVENT_CURRENT_SEQUENCE_FLAGS: the sequence restarts; set before the first event."""
+_SEQUENCE_RESET = 1
+"""Value of MAV_EVENT_CURRENT_SEQUENCE_FLAGS before the first event: the sequence restarts."""
 _UNAVAILABLE = 0
 """Value of MAV_EVENT_ERROR_REASON: the event is not available."""
 
 
-class _Sent(NamedTuple):
+class _SentEvent(NamedTuple):
+    """An event that was sent: its sequence number, and the payload of its EVENT."""
+
     sequence: int
     payload: bytes
 
@@ -45,8 +47,8 @@ class EventLog:
     def __init__(self, state: State, links: list[Link]) -> None:
         self._state = state
         self._links = links
-        self._sent: deque[_Sent] = deque(maxlen=_KEPT_EVENTS)
-        self._latest = 0
+        self._sent: deque[_SentEvent] = deque(maxlen=_KEPT_EVENTS)
+        self._latest_sequence = 0
         self._sequence_sent_us = 0
 
     def send(
@@ -61,34 +63,34 @@ class EventLog:
             arguments: packed arguments.
         """
         first = not self._sent
-        self._latest = (self._latest + 1) & 0xFFFF
+        self._latest_sequence = (self._latest_sequence + 1) & 0xFFFF
         if first:
-            self._send_sequence(_RESET)
+            self._send_sequence(_SEQUENCE_RESET)
         levels = (severity if internal is None else internal) << 4 | severity
         payload = EVENT.payload.pack(
-            event_id, self._state.shown_us // 1000, self._latest, 0, 0, levels, arguments
+            event_id, self._state.shown_us // 1000, self._latest_sequence, 0, 0, levels, arguments
         )
-        self._sent.append(_Sent(self._latest, payload))
+        self._sent.append(_SentEvent(self._latest_sequence, payload))
         for link in self._links:
             _send(link, EVENT, payload)
 
     def step(self) -> None:
         """Send the latest sequence number periodically, so that receivers notice lost events."""
         if self._state.time_us - self._sequence_sent_us >= _SEQUENCE_PERIOD_US:
-            self._send_sequence(0 if self._sent else _RESET)
+            self._send_sequence(0 if self._sent else _SEQUENCE_RESET)
 
     def answer_request(self, request: Message, link: Link) -> None:
-        """Answer a REQUEST_EVENT: resend each event, or send the reason why not.
+        """Answer a REQUEST_EVENT: resend each event, or refuse it with a reason.
 
-        If the range is longer than the log, one refusal covers all older events.
+        If the requested range is longer than the log, one refusal covers all older events.
         """
         first, last = request.first_sequence, request.last_sequence
-        wanted = (last - first & 0xFFFF) + 1
-        if wanted > _KEPT_EVENTS:
+        count = (last - first & 0xFFFF) + 1
+        if count > _KEPT_EVENTS:
             self._refuse(first, request, link)
             first = last - _KEPT_EVENTS + 1
         kept = {sent.sequence: sent.payload for sent in self._sent}
-        for number in range(first, first + min(wanted, _KEPT_EVENTS)):
+        for number in range(first, first + min(count, _KEPT_EVENTS)):
             sequence = number & 0xFFFF
             if sequence in kept:
                 _send(link, EVENT, kept[sequence])
@@ -96,8 +98,12 @@ class EventLog:
                 self._refuse(sequence, request, link)
 
     def _refuse(self, sequence: int, request: Message, link: Link) -> None:
-        after = (sent.sequence for sent in self._sent if sent.sequence != sequence)
-        oldest = min(after, key=lambda one: one - sequence & 0xFFFF, default=self._latest)
+        other_sequences = (sent.sequence for sent in self._sent if sent.sequence != sequence)
+        oldest = min(
+            other_sequences,
+            key=lambda other: other - sequence & 0xFFFF,
+            default=self._latest_sequence,
+        )
         payload = RESPONSE_EVENT_ERROR.payload.pack(
             sequence, oldest, request.get_srcSystem(), request.get_srcComponent(), _UNAVAILABLE
         )
@@ -105,7 +111,7 @@ class EventLog:
 
     def _send_sequence(self, flags: int) -> None:
         self._sequence_sent_us = self._state.time_us
-        payload = CURRENT_EVENT_SEQUENCE.payload.pack(self._latest, flags)
+        payload = CURRENT_EVENT_SEQUENCE.payload.pack(self._latest_sequence, flags)
         for link in self._links:
             _send(link, CURRENT_EVENT_SEQUENCE, payload)
 

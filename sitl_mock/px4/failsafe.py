@@ -20,13 +20,13 @@ from sitl_mock.px4.failsafe_actions import (
 from sitl_mock.px4.modes import NEEDS_POSITION, PILOTED, custom_mode
 
 _NO_MANUAL_CONTROL = 4
-"""COM_RC_IN_MODE without manual control."""
+"""Value of COM_RC_IN_MODE: no manual control."""
 _EXCEPT_AUTO, _EXCEPT_OFFBOARD = 2, 4
 """Bits of COM_RCL_EXCEPT and COM_DLL_EXCEPT."""
 _GCS_MARGIN_US = 2_000_000
 """The loss of the ground station is detected this long after COM_DL_LOSS_T (measured)."""
-_ACTED = -1
-"""Stands for the time of a loss whose failsafe has already acted."""
+_ACTED_ALREADY = -1
+"""Replaces the time of a loss after the failsafe for it has acted."""
 _COMPANION_MARGIN_US = 1_500_000
 """The loss of the companion is announced this long after COM_OBC_LOSS_T (measured)."""
 _WARNINGS = {
@@ -64,39 +64,39 @@ class Failsafe:
         self._announce = announce
         self._enter = enter
         self._actions = FailsafeActions(state, parameters, announce, enter, stop)
-        self._pilot = False
+        self._pilot_present = False
         self._pilot_optional = True
         self._pilot_lost_us: int | None = None
-        self._warned = False
-        self._gcs_us: int | None = None
+        self._disarmed_warning_sent = False
+        self._gcs_heartbeat_us: int | None = None
         self._gcs_lost_us: int | None = None
-        self._companion_us: int | None = None
+        self._companion_heartbeat_us: int | None = None
         self._companion_lost = False
 
     def clear(self) -> None:
         """End any failsafe: a mode was requested, or the vehicle disarmed."""
         self._actions.clear()
-        # A loss that has caused a failsafe causes the next one only after it was regained.
+        # A lost link that has caused a failsafe causes another one only after it was regained.
         if self._gcs_lost_us is not None:
-            self._gcs_lost_us = _ACTED
+            self._gcs_lost_us = _ACTED_ALREADY
         if self._pilot_lost_us is not None:
-            self._pilot_lost_us = _ACTED
+            self._pilot_lost_us = _ACTED_ALREADY
 
     def receive_heartbeat(self, heartbeat_type: int) -> None:
         """Record a heartbeat of a MAV_TYPE."""
         now = self._state.time_us
         if heartbeat_type == dialect.MAV_TYPE_GCS:
-            self._gcs_us = now
+            self._gcs_heartbeat_us = now
         elif heartbeat_type == dialect.MAV_TYPE_ONBOARD_CONTROLLER:
-            self._companion_us = now
+            self._companion_heartbeat_us = now
 
     @property
     def gcs_alive(self) -> bool:
         """Whether a ground station is connected."""
-        if self._gcs_us is None:
+        if self._gcs_heartbeat_us is None:
             return False
         limit = self._parameters["COM_DL_LOSS_T"] * 1e6 + _GCS_MARGIN_US
-        return self._state.time_us - self._gcs_us <= limit
+        return self._state.time_us - self._gcs_heartbeat_us <= limit
 
     def step(self, *, pilot: bool) -> None:
         """Check every failsafe once; ``pilot``: a pilot holds the sticks."""
@@ -114,7 +114,7 @@ class Failsafe:
         """Whether a failsafe waits in Hold for COM_FAIL_ACT_T; sticks do not end this."""
         return self._actions.holds_before_acting
 
-    def _exempt(self, parameter: str) -> bool:
+    def _is_exempt(self, parameter: str) -> bool:
         """Whether a parameter exempts the intended mode from a failsafe."""
         bits = int(self._parameters[parameter])
         mode = self._state.intended_mode
@@ -127,18 +127,18 @@ class Failsafe:
         state = self._state
         if pilot:
             self._pilot_lost_us = None
-        elif self._pilot:
+        elif self._pilot_present:
             self._announce(EventKind.PILOT_LOST, "")
-        self._pilot = pilot
+        self._pilot_present = pilot
         # A pilot who was not present at arming is optional until he appears.
         self._pilot_optional = not pilot and (self._pilot_optional or not state.armed)
         expected = int(self._parameters["COM_RC_IN_MODE"]) != _NO_MANUAL_CONTROL
-        optional = not expected or self._pilot_optional or self._exempt("COM_RCL_EXCEPT")
+        optional = not expected or self._pilot_optional or self._is_exempt("COM_RCL_EXCEPT")
         if pilot or not state.armed or (optional and state.intended_mode not in PILOTED):
             return
         if self._pilot_lost_us is None:
             self._pilot_lost_us = state.time_us
-        if self._pilot_lost_us != _ACTED or state.mode in PILOTED:
+        if self._pilot_lost_us != _ACTED_ALREADY or state.mode in PILOTED:
             self._actions.act_on_link(Cause.PILOT_LOST, "NAV_RCL_ACT", self._pilot_lost_us)
 
     def _watch_offboard(self) -> None:
@@ -148,7 +148,7 @@ class Failsafe:
         alive = self._stream.alive(state.time_us, self._parameters["COM_OF_LOSS_T"])
         if state.mode is Mode.OFFBOARD and not alive:
             action = OFFBOARD_ACTIONS.get(int(self._parameters["COM_OBL_RC_ACT"]), POSITION)
-            if action.mode in PILOTED and not self._pilot:
+            if action.mode in PILOTED and not self._pilot_present:
                 action = RETURN
             self._actions.act(Cause.OFFBOARD_LOST, action)
         elif alive and self._actions.cause is Cause.OFFBOARD_LOST:
@@ -160,14 +160,14 @@ class Failsafe:
         state = self._state
         alive = self._stream.alive(state.time_us, self._parameters["COM_OF_LOSS_T"])
         lost = not state.armed and state.mode is Mode.OFFBOARD and not alive
-        if lost and not self._warned:
+        if lost and not self._disarmed_warning_sent:
             mode = custom_mode(state.mode).to_bytes(4, "little")
             self._announce(EventKind.FAILSAFE_WARNING, "", mode)
-        self._warned = lost
+        self._disarmed_warning_sent = lost
 
     def _watch_gcs(self) -> None:
         state = self._state
-        if self._gcs_us is None:
+        if self._gcs_heartbeat_us is None:
             return
         if self.gcs_alive:
             if self._gcs_lost_us is not None:
@@ -177,15 +177,15 @@ class Failsafe:
         if self._gcs_lost_us is None:
             self._gcs_lost_us = state.time_us
             self._announce(EventKind.GCS_LOST, "")
-        ignored = state.intended_mode is Mode.LAND or self._exempt("COM_DLL_EXCEPT")
-        if state.armed and not ignored and self._gcs_lost_us != _ACTED:
+        ignored = state.intended_mode is Mode.LAND or self._is_exempt("COM_DLL_EXCEPT")
+        if state.armed and not ignored and self._gcs_lost_us != _ACTED_ALREADY:
             self._actions.act_on_link(Cause.GCS_LOST, "NAV_DLL_ACT", self._gcs_lost_us)
 
     def _watch_companion(self) -> None:
-        if self._companion_us is None:
+        if self._companion_heartbeat_us is None:
             return
         limit = self._parameters["COM_OBC_LOSS_T"] * 1e6 + _COMPANION_MARGIN_US
-        lost = self._state.time_us - self._companion_us > limit
+        lost = self._state.time_us - self._companion_heartbeat_us > limit
         if lost != self._companion_lost:
             self._companion_lost = lost
             self._announce(EventKind.COMPANION_LOST if lost else EventKind.COMPANION_REGAINED, "")

@@ -64,7 +64,8 @@ class Cause(Enum):
         return self.value[1]
 
 
-_DELAYED = frozenset({Cause.PILOT_LOST, Cause.GCS_LOST})
+_DELAYED_CAUSES = frozenset({Cause.PILOT_LOST, Cause.GCS_LOST})
+"""Causes whose failsafe may wait in Hold for COM_FAIL_ACT_T before it acts."""
 
 
 class AnnounceEvent(Protocol):
@@ -109,8 +110,12 @@ class FailsafeActions:
 
     @property
     def holds_before_acting(self) -> bool:
-        """Whether a failsafe waits in Hold for COM_FAIL_ACT_T; sticks do not end that."""
-        return self._announced is not None and self._announced[1] is HOLD and self.cause in _DELAYED
+        """Whether a failsafe waits in Hold for COM_FAIL_ACT_T; sticks do not end this."""
+        return (
+            self._announced is not None
+            and self._announced[1] is HOLD
+            and self.cause in _DELAYED_CAUSES
+        )
 
     def act(self, cause: Cause, action: Action, then: Action | None = None) -> None:
         """Execute an action unless a more severe cause is active; announce it if it is new.
@@ -142,14 +147,14 @@ class FailsafeActions:
         intended = custom_mode(self._state.intended_mode)
         if then is not None:
             delay = round(self._parameters["COM_FAIL_ACT_T"])
-            values = _ENTER_HOLD_LAYOUT.pack(intended, then.number, delay, cause.number)
-            self._announce(EventKind.FAILSAFE_HOLD, str(delay), values)
+            arguments = _ENTER_HOLD_LAYOUT.pack(intended, then.number, delay, cause.number)
+            self._announce(EventKind.FAILSAFE_HOLD, str(delay), arguments)
         elif cause.number:
-            values = _ENTER_LAYOUT.pack(intended, action.number, cause.number)
-            self._announce(EventKind.FAILSAFE, "", values)
+            arguments = _ENTER_LAYOUT.pack(intended, action.number, cause.number)
+            self._announce(EventKind.FAILSAFE, "", arguments)
         else:
-            values = _ENTER_LAYOUT.pack(intended, action.number, 0)
-            self._announce(EventKind.FAILSAFE_UNNAMED, "", values)
+            arguments = _ENTER_LAYOUT.pack(intended, action.number, 0)
+            self._announce(EventKind.FAILSAFE_UNNAMED, "", arguments)
 
     def act_on_link(self, cause: Cause, parameter: str, lost_us: int) -> None:
         """Execute the action of a parameter; before a return or landing hold for COM_FAIL_ACT_T.
@@ -162,8 +167,8 @@ class FailsafeActions:
         action = LINK_ACTIONS.get(int(self._parameters[parameter]))
         if action is None:
             return
-        waited = self._state.time_us - lost_us >= self._parameters["COM_FAIL_ACT_T"] * 1e6
-        if waited or action in (HOLD, DISARM, TERMINATE):
+        delay_over = self._state.time_us - lost_us >= self._parameters["COM_FAIL_ACT_T"] * 1e6
+        if delay_over or action in (HOLD, DISARM, TERMINATE):
             self.act(cause, action)
         else:
             self.act(cause, HOLD, then=action)

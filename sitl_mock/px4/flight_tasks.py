@@ -107,8 +107,10 @@ class FlightTasks:
             target = (x, y, self._takeoff_z)
             return PositionDemand(target, NAN_VECTOR, yaw=self.yaw, up_speed=speed)
         # On the ground the climb rate ramps up from the value at which the thrust is zero.
-        began = max(self._entered_us, state.armed_at_us + parameters["COM_SPOOLUP_TIME"] * 1e6)
-        ramp = (state.time_us - began) / (1e6 * max(parameters["MPC_TKO_RAMP_T"], 0.1))
+        ramp_begin_us = max(
+            self._entered_us, state.armed_at_us + parameters["COM_SPOOLUP_TIME"] * 1e6
+        )
+        ramp = (state.time_us - ramp_begin_us) / (1e6 * max(parameters["MPC_TKO_RAMP_T"], 0.1))
         lowest = -GRAVITY / parameters["MPC_Z_VEL_P_ACC"]
         climb = lowest + (speed - lowest) * max(0.0, min(1.0, ramp))
         return PositionDemand(
@@ -141,14 +143,16 @@ class FlightTasks:
         home = state.home_ned
         x, y, z = state.estimate.position_ned
         distance = hypot(x - home[0], y - home[1])
-        near = parameters["NAV_ACC_RAD"]
+        acceptance_radius = parameters["NAV_ACC_RAD"]
         height = home[2] - z
-        if distance > near:
+        if distance > acceptance_radius:
             cone = radians(max(1.0, min(89.0, parameters["RTL_CONE_ANG"])))
-            wanted = min(max(distance / tan(cone), 2.0 * near), parameters["RTL_RETURN_ALT"])
-            height = max(height, wanted)
+            return_height = min(
+                max(distance / tan(cone), 2.0 * acceptance_radius), parameters["RTL_RETURN_ALT"]
+            )
+            height = max(height, return_height)
         self._hold = (x, y, home[2] - height)
-        self._descending = distance <= near
+        self._descending = distance <= acceptance_radius
 
     def _return(self) -> PositionDemand:
         parameters, state = self._parameters, self._state

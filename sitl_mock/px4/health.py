@@ -12,6 +12,7 @@ from sitl_mock.px4.event_log import EventLog
 from sitl_mock.px4.events import event_id
 
 _CRITICAL, _ERROR, _WARNING, _INFO, _PROTOCOL = 2, 3, 4, 6, 8
+"""MAV_SEVERITY; 8 = for programs only."""
 
 _ALL_MODES = 0xFFFFFFFF
 _ARMABLE_MODES = 0x807F7AB0
@@ -31,6 +32,8 @@ _HEALTH_LAYOUT = struct.Struct("<BIII")
 
 
 class _Check(NamedTuple):
+    """A failing check; ``modes`` is the bit mask of the affected modes."""
+
     event_id: int
     modes: int
     component: int
@@ -85,8 +88,8 @@ class HealthReport:
             _HEADING if state.time_us < self._ready_us // 2 else None,
             None if offboard_alive else _OFFBOARD,
             _ATTITUDE if state.time_us < self._ready_us // 2 else None,
-            None if self._located else _LOCAL_POSITION,
-            None if self._located else _GLOBAL_POSITION,
+            None if self._position_ready else _LOCAL_POSITION,
+            None if self._position_ready else _GLOBAL_POSITION,
             _MISSION,
             None if pilot else _NO_PILOT,
             gcs,
@@ -102,7 +105,7 @@ class HealthReport:
             self._send(failing, present)
 
     @property
-    def _located(self) -> bool:
+    def _position_ready(self) -> bool:
         return self._state.position_valid and self._state.time_us >= self._ready_us
 
     def _send(self, failing: tuple[_Check, ...], present: int) -> None:

@@ -21,7 +21,7 @@ ATTITUDE_FAILS_US = 140_000
 until a restart."""
 TOUCHDOWN_THRUST_RATE = 0.4
 """After contact in LAND the thrust decreases by this per second."""
-PRESSED_DOWN: Vector = (0.0, 0.0, 100.0)
+DISARMED_ACCELERATION: Vector = (0.0, 0.0, 100.0)
 """Acceleration setpoint of PX4's own modes while disarmed, m/s^2 (recorded)."""
 _STILL = ActuatorCommand(False, 0.0, 0.0, 0.0, 0.0)
 """Command while disarmed: the rotors stand still."""
@@ -42,8 +42,8 @@ class Px4ModeControl:
         self._stream = stream
         self._tasks = FlightTasks(state, parameters)
         self._position = PositionController(lambda: position_gains(parameters))
-        self._thrust = 0.0
-        self._nan_since_us: int | None = None
+        self._last_thrust = 0.0
+        self._unusable_since_us: int | None = None
         self._attitude_failed = False
 
     def enter(
@@ -71,22 +71,22 @@ class Px4ModeControl:
             if state.mode is not Mode.OFFBOARD and state.mode not in PILOTED:
                 yaw_now = yaw(state.estimate.q)
                 state.position_target = PositionTargetEcho(
-                    True, NAN_VECTOR, NAN_VECTOR, PRESSED_DOWN, yaw_now
+                    True, NAN_VECTOR, NAN_VECTOR, DISARMED_ACCELERATION, yaw_now
                 )
             command = _STILL
         elif state.mode is Mode.OFFBOARD:
-            command = self._offboard(dt, fresh=fresh)
+            command = self._follow_offboard(dt, fresh=fresh)
         elif state.landed and state.mode is not Mode.TAKEOFF:
             self._position.reset()
-            command = self._rates((0.0, 0.0, 0.0), 0.0)
+            command = self._rate_command((0.0, 0.0, 0.0), 0.0)
         elif state.mode in (Mode.MANUAL, Mode.STABILIZED):
             hover = float(self._parameters["MPC_THR_HOVER"])
-            command = self._attitude(from_yaw(self._tasks.yaw), 0.0, hover)
+            command = self._attitude_command(from_yaw(self._tasks.yaw), 0.0, hover)
         else:
             if state.mode is Mode.TAKEOFF and state.contact:
                 self._position.reset()
             command = self._follow(self._tasks.demand(), dt)
-        self._thrust = command.thrust
+        self._last_thrust = command.thrust
         state.attitude_target.rates = command[1:4]
         state.attitude_target.thrust = command.thrust
         state.command = command
@@ -95,48 +95,50 @@ class Px4ModeControl:
     def _follow(self, demand: PositionDemand, dt: float) -> ActuatorCommand:
         state = self._state
         if self._tasks.landing and state.contact:
-            thrust = max(0.0, self._thrust - TOUCHDOWN_THRUST_RATE * dt)
-            return self._attitude(from_yaw(self._tasks.yaw), 0.0, thrust)
+            thrust = max(0.0, self._last_thrust - TOUCHDOWN_THRUST_RATE * dt)
+            return self._attitude_command(from_yaw(self._tasks.yaw), 0.0, thrust)
         estimate = state.estimate
         position = estimate.position_ned
         output = self._position.step(demand, position, estimate.velocity_ned, dt)
         state.position_target = PositionTargetEcho(
             True, demand.position, output.velocity, output.acceleration, demand.yaw
         )
-        return self._attitude(output.q, 0.0, output.thrust)
+        return self._attitude_command(output.q, 0.0, output.thrust)
 
-    def _offboard(self, dt: float, *, fresh: bool) -> ActuatorCommand:
+    def _follow_offboard(self, dt: float, *, fresh: bool) -> ActuatorCommand:
         setpoint = self._stream.setpoint
         if setpoint is None:
-            return self._rates((0.0, 0.0, 0.0), 0.0)
+            return self._rate_command((0.0, 0.0, 0.0), 0.0)
         if isinstance(setpoint, PositionSetpoint):
             return self._follow(self._tasks.offboard_demand(setpoint, dt), dt)
         if setpoint.q is None:
-            return self._rates(setpoint.rates or (0.0, 0.0, 0.0), setpoint.thrust)
+            return self._rate_command(setpoint.rates or (0.0, 0.0, 0.0), setpoint.thrust)
         if setpoint.rates is not None and fresh:
             # With attitude and rates, the rates apply until the next step of the attitude
             # controller, so the two compete.
-            return self._rates(setpoint.rates, setpoint.thrust)
-        return self._attitude(setpoint.q, setpoint.yaw_rate, setpoint.thrust)
+            return self._rate_command(setpoint.rates, setpoint.thrust)
+        return self._attitude_command(setpoint.q, setpoint.yaw_rate, setpoint.thrust)
 
-    def _rates(self, rates: Vector, thrust: float) -> ActuatorCommand:
+    def _rate_command(self, rates: Vector, thrust: float) -> ActuatorCommand:
         return ActuatorCommand(True, *rates, thrust)
 
-    def _attitude(self, target: Quaternion, yaw_rate: float, thrust: float) -> ActuatorCommand:
+    def _attitude_command(
+        self, target: Quaternion, yaw_rate: float, thrust: float
+    ) -> ActuatorCommand:
         now = self._state.time_us
         if is_usable(target):
-            self._nan_since_us = None
-        elif self._nan_since_us is None:
-            self._nan_since_us = now
-        elif now - self._nan_since_us > ATTITUDE_FAILS_US:
+            self._unusable_since_us = None
+        elif self._unusable_since_us is None:
+            self._unusable_since_us = now
+        elif now - self._unusable_since_us > ATTITUDE_FAILS_US:
             self._attitude_failed = True
-        if self._attitude_failed or self._nan_since_us is not None:
-            return self._rates(NAN_VECTOR, thrust)
+        if self._attitude_failed or self._unusable_since_us is not None:
+            return self._rate_command(NAN_VECTOR, thrust)
         self._state.attitude_target.q = target
         rates = attitude_rates(
             self._state.estimate.q, target, yaw_rate, attitude_gains(self._parameters)
         )
-        return self._rates(rates, thrust)
+        return self._rate_command(rates, thrust)
 
 
 def position_gains(parameters: ParameterTable) -> PositionGains:

@@ -108,8 +108,8 @@ class Px4:
         if lockstep and link == "companion":
             del rates[dialect.MAVLINK_MSG_ID_SYSTEM_TIME]  # in lockstep this message is the beacon
         exact = lockstep if settings.exact_rates is None else settings.exact_rates
-        busy = settings.inner_loop_hz == 250 and not exact
-        return Px4Streams(rates, random=Random(f"{settings.seed}/{link}") if busy else None)
+        skips_slots = settings.inner_loop_hz == 250 and not exact
+        return Px4Streams(rates, random=Random(f"{settings.seed}/{link}") if skips_slots else None)
 
     def mode_of(self, custom_mode: int) -> Mode | None:
         """Return the mode of a custom_mode, None if there is no such mode."""

@@ -33,6 +33,7 @@ class _Stream:
         self.sent_us: int | None = None
         """The latest slot in which the message was sent, us."""
         self.status_us = -1
+        """``status_us`` of `Px4Streams.due` when the message was last sent."""
 
 
 class Px4Streams:
@@ -87,7 +88,7 @@ class Px4Streams:
                 continue
             message_id = stream.message_id
             nothing_new = message_id == CURRENT_MODE and stream.status_us == status_us
-            if nothing_new or self._missed(stream, slot_us):
+            if nothing_new or self._misses_slot(stream, slot_us):
                 continue
             # Keep the phase while the stream is nearly on time, else restart it.
             on_time = 2 * late_us < stream.interval_us
@@ -98,7 +99,7 @@ class Px4Streams:
         self._slot_before_us = slot_us
         return due
 
-    def _missed(self, stream: _Stream, slot_us: int) -> bool:
+    def _misses_slot(self, stream: _Stream, slot_us: int) -> bool:
         """Whether a due message misses this slot."""
         if self._random is None:
             return False

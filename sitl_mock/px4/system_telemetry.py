@@ -45,7 +45,7 @@ class Px4SystemTelemetry(SystemTelemetry):
     ) -> None:
         super().__init__(state, origin, identity, vehicle)
         self._stream = stream
-        self._ping = 0
+        self._next_ping = 0
 
     def builders(self) -> dict[int, Builder]:
         """Return message id -> builder."""
@@ -65,7 +65,9 @@ class Px4SystemTelemetry(SystemTelemetry):
         return dialect.MAVLink_heartbeat_message(
             dialect.MAV_TYPE_QUADROTOR,
             dialect.MAV_AUTOPILOT_PX4,
-            base_mode(state.mode, armed=state.armed, attitude_controlled=self._above_rates()),
+            base_mode(
+                state.mode, armed=state.armed, attitude_controlled=self._attitude_controlled()
+            ),
             custom_mode(state.mode),
             self.system_status(),
             3,
@@ -80,7 +82,7 @@ class Px4SystemTelemetry(SystemTelemetry):
             dialect.MAV_STATE_STANDBY if state.prearm_problem is None else dialect.MAV_STATE_UNINIT
         )
 
-    def _above_rates(self) -> bool:
+    def _attitude_controlled(self) -> bool:
         setpoint = self._stream.setpoint
         if isinstance(setpoint, AttitudeSetpoint):
             return setpoint.q is not None
@@ -129,5 +131,5 @@ class Px4SystemTelemetry(SystemTelemetry):
 
     def ping(self) -> Message:
         """Return a PING request."""
-        self._ping += 1
-        return dialect.MAVLink_ping_message(self._state.shown_us, self._ping - 1, 0, 0)
+        self._next_ping += 1
+        return dialect.MAVLink_ping_message(self._state.shown_us, self._next_ping - 1, 0, 0)

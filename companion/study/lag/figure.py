@@ -15,10 +15,10 @@ from companion.study.lag.flights import (
     NO_ERROR,
     RATES_HZ,
     SHOWN_RATE_HZ,
-    Cell,
     Complete,
     Example,
     Grid,
+    GridCell,
     Score,
     TimesError,
     in_percent,
@@ -37,17 +37,17 @@ CAPTION = (
 )
 
 _ENDS = np.array([FIGURE_2.start, FIGURE_2.target])
-_ACROSS = "largest distance from the line"
-_WORSE = "#A33C00"
+_CROSS_TRACK_LABEL = "largest distance from the line"
+_WORSE_COLOUR = "#A33C00"
 """Colour of cells where another method is straighter, and of `does not hold` on the page."""
-_AT_HZ, _AT_LAG_MS, _AT_DEAD_TIME_MS = 100.0, 25, 40
+_CUT_HZ, _CUT_LAG_MS, _CUT_DEAD_TIME_MS = 100.0, 25, 40
 """Sample rate, lag and dead time of the cuts through the grid in the second row."""
 _SHADE: Line = {
     "facecolor": (FOLLOWING.colour, 0.15),
     "edgecolor": FOLLOWING.colour,
     "linewidth": 0.6,
 }
-_BY_LAG: dict[float, Line] = {
+_LAG_ERROR_STYLES: dict[float, Line] = {
     -0.5: {"linestyle": ":", "marker": "v", "markersize": 6.0},
     -0.3: {"linestyle": ":", "marker": "v", "markersize": 3.5},
     0.0: {"linestyle": "-", "marker": "o", "markersize": 3.5},
@@ -68,13 +68,13 @@ def draw_figure(grid: Grid, example: Example, complete: Complete) -> Figure:
     """Draw the figure that `CAPTION` describes."""
     figure = Figure(figsize=(9.2, 15.5), layout="constrained")
     panels: dict[str, Any] = figure.subplot_mosaic(_PANELS)
-    responses = example.free[_AT_HZ]
+    responses = example.free[_CUT_HZ]
     _draw_paths(panels["path"], responses)
     _draw_distance(panels["time"], responses)
     dead_times, lags = _grid_values(grid)
-    over_dead_time = [Cell(_AT_HZ, dead_time, _AT_LAG_MS) for dead_time in dead_times]
+    over_dead_time = [GridCell(_CUT_HZ, dead_time, _CUT_LAG_MS) for dead_time in dead_times]
     _draw_cut(panels["dead time"], grid, over_dead_time, dead_times, "dead time")
-    over_lag = [Cell(_AT_HZ, _AT_DEAD_TIME_MS, lag) for lag in lags]
+    over_lag = [GridCell(_CUT_HZ, _CUT_DEAD_TIME_MS, lag) for lag in lags]
     _draw_cut(panels["lag"], grid, over_lag, lags, "lag")
     for rate in RATES_HZ:
         _draw_ratios(panels[f"{rate:.0f}"], grid, rate)
@@ -98,24 +98,32 @@ def _draw_paths(axes: Axes, responses: dict[Method, Response]) -> None:
 
 def _draw_distance(axes: Axes, responses: dict[Method, Response]) -> None:
     for method, response in responses.items():
-        away = response.at(0)[:, 1] - FIGURE_2.target.east
-        draw(axes, response.step.time, away, method.line, method.label)
+        distance = response.at(0)[:, 1] - FIGURE_2.target.east
+        draw(axes, response.step.time, distance, method.line, method.label)
     axes.set(title="Distance from the line", xlabel="time, s", ylabel="$a_E$ + 0.5", xlim=(0, 1.5))
     axes.legend(ncols=2)
 
 
-def _draw_cut(axes: Axes, grid: Grid, cells: list[Cell], values_ms: list[int], words: str) -> None:
+def _draw_cut(
+    axes: Axes, grid: Grid, cells: list[GridCell], values_ms: list[int], quantity: str
+) -> None:
     """Draw the cross-track along one line of the grid."""
     for method in METHODS:
-        across = [grid[cell].right[method].cross_track for cell in cells]
-        axes.plot(values_ms, across, marker=".", **method.line)
-    right = [grid[cell].right[FOLLOWING].cross_track for cell in cells]
-    worst = [grid[cell].worst for cell in cells]
-    axes.fill_between(values_ms, right, worst, **_SHADE, label="model-following, times wrong")
+        cross_tracks = [grid[cell].right[method].cross_track for cell in cells]
+        axes.plot(values_ms, cross_tracks, marker=".", **method.line)
+    with_right_times = [grid[cell].right[FOLLOWING].cross_track for cell in cells]
+    with_worst_times = [grid[cell].worst for cell in cells]
+    axes.fill_between(
+        values_ms,
+        with_right_times,
+        with_worst_times,
+        **_SHADE,
+        label="model-following, times wrong",
+    )
     axes.set(
-        title=f"Cross-track by {words}, {_AT_HZ:.0f} Hz",
-        xlabel=f"{words}, ms",
-        ylabel=_ACROSS,
+        title=f"Cross-track by {quantity}, {_CUT_HZ:.0f} Hz",
+        xlabel=f"{quantity}, ms",
+        ylabel=_CROSS_TRACK_LABEL,
         yscale="log",
     )
     axes.legend(loc="center right")
@@ -125,9 +133,12 @@ def _draw_ratios(axes: Axes, grid: Grid, rate_hz: float) -> None:
     """Draw the cross-track with the worst error over that of the best other method, by cell."""
     dead_times, lags = _grid_values(grid)
     ratios = np.array(
-        [[grid[Cell(rate_hz, dead_time, lag)].ratio for dead_time in dead_times] for lag in lags]
+        [
+            [grid[GridCell(rate_hz, dead_time, lag)].ratio for dead_time in dead_times]
+            for lag in lags
+        ]
     )
-    shades = colormaps["Purples"].with_extremes(over=_WORSE)
+    shades = colormaps["Purples"].with_extremes(over=_WORSE_COLOUR)
     axes.imshow(ratios, cmap=shades, vmin=0.0, vmax=1.0, origin="lower", aspect="auto")
     for (row, column), ratio in np.ndenumerate(ratios):
         colour = "white" if ratio > 0.6 else "black"
@@ -147,39 +158,45 @@ def _draw_ratios(axes: Axes, grid: Grid, rate_hz: float) -> None:
 def _draw_errors(axes: Axes, scores: dict[TimesError, Score]) -> None:
     """Draw the cross-track over the error of the dead time, a line for each error of the lag."""
     errors = [100.0 * error for error in FINE_ERRORS]
-    for lag, style in _BY_LAG.items():
-        across = [scores[TimesError(lag, dead_time)].cross_track for dead_time in FINE_ERRORS]
+    for lag, style in _LAG_ERROR_STYLES.items():
+        cross_tracks = [scores[TimesError(lag, dead_time)].cross_track for dead_time in FINE_ERRORS]
         line = {"color": FOLLOWING.colour, "linewidth": 1.3, **style}
-        axes.plot(errors, across, label=f"lag {in_percent(lag)}", **line)
-    axes.set(xlabel="error of the assumed dead time, %", ylabel=_ACROSS, ylim=(0.0, None))
+        axes.plot(errors, cross_tracks, label=f"lag {in_percent(lag)}", **line)
+    axes.set(
+        xlabel="error of the assumed dead time, %", ylabel=_CROSS_TRACK_LABEL, ylim=(0.0, None)
+    )
     axes.legend(ncols=2)
 
 
 def _draw_inner_loop_errors(axes: Axes, complete: Complete) -> None:
-    flown = complete.by_rate[SHOWN_RATE_HZ]
-    _draw_errors(axes, flown.wrong)
-    other = flown.best_other
-    across = flown.right[other].cross_track
-    axes.axhline(across, **LIMIT)
-    axes.annotate(f"{other.label}, the best of the others", (50, across), ha="right", va="bottom")
+    comparison = complete.by_rate[SHOWN_RATE_HZ]
+    _draw_errors(axes, comparison.wrong)
+    other = comparison.best_other
+    cross_track = comparison.right[other].cross_track
+    axes.axhline(cross_track, **LIMIT)
+    axes.annotate(
+        f"{other.label}, the best of the others", (50, cross_track), ha="right", va="bottom"
+    )
     axes.set(
         title=f"Wrong times, complete inner loop, {SHOWN_RATE_HZ:.0f} Hz",
-        ylim=(0.0, 1.1 * max(across, flown.worst)),
+        ylim=(0.0, 1.1 * max(cross_track, comparison.worst)),
     )
 
 
 def _draw_rates(axes: Axes, complete: Complete) -> None:
-    rates, compared = list(complete.by_rate), complete.by_rate.values()
+    rates, comparisons = list(complete.by_rate), complete.by_rate.values()
     for method in METHODS:
-        across = [at.right[method].cross_track for at in compared]
-        axes.plot(rates, across, marker=".", **method.line)
-    right = [at.wrong[NO_ERROR].cross_track for at in compared]
-    worst = [at.worst for at in compared]
-    axes.fill_between(rates, right, worst, **_SHADE, label="model-following, times wrong")
+        cross_tracks = [comparison.right[method].cross_track for comparison in comparisons]
+        axes.plot(rates, cross_tracks, marker=".", **method.line)
+    with_right_times = [comparison.wrong[NO_ERROR].cross_track for comparison in comparisons]
+    with_worst_times = [comparison.worst for comparison in comparisons]
+    axes.fill_between(
+        rates, with_right_times, with_worst_times, **_SHADE, label="model-following, times wrong"
+    )
     axes.set(
         title="Cross-track by sample rate, complete inner loop",
         xlabel="sample rate, Hz",
-        ylabel=_ACROSS,
+        ylabel=_CROSS_TRACK_LABEL,
         xscale="log",
         xticks=rates,
         xticklabels=[f"{rate:.0f}" for rate in rates],

@@ -5,10 +5,10 @@ from companion.study.lag.flights import (
     NO_ERROR,
     OTHERS,
     SHOWN_RATE_HZ,
-    Cell,
     Complete,
     Example,
     Grid,
+    GridCell,
     TimesError,
     score,
 )
@@ -33,87 +33,95 @@ def find(
     return (
         *_on_the_example(example),
         _over_the_grid(grid),
-        _wrong_over_the_grid(grid),
+        _wrong_times_over_the_grid(grid),
         _too_long_or_too_short(grid, complete),
         *_with_the_complete_loop(complete, from_fit),
     )
 
 
 def _on_the_example(example: Example) -> tuple[Finding, Finding, Finding]:
-    across = {m: score(r).cross_track for m, r in example.free[100.0].items()}
-    best = min(OTHERS, key=lambda method: across[method])
+    cross_tracks = {m: score(r).cross_track for m, r in example.free[100.0].items()}
+    best = min(OTHERS, key=lambda method: cross_tracks[method])
     worst = max(wrong.cross_track for wrong in example.wrong.values())
     rate = max(largest_tilt_rate(response) for response in example.limited.values())
-    bent = max(score(response).cross_track for response in example.limited.values())
+    limited_cross_track = max(score(response).cross_track for response in example.limited.values())
     return (
         Finding(
             "ours",
             "Behind dead time and lag the proposed method keeps closest to the straight line.",
-            across[PROPOSED] <= across[best],
-            f"Cross-track at 100 Hz: first-order {across[PROPOSED]:.2g}, {best.label}"
-            f" {across[best]:.2g}.",
+            cross_tracks[PROPOSED] <= cross_tracks[best],
+            f"Cross-track at 100 Hz: first-order {cross_tracks[PROPOSED]:.2g}, {best.label}"
+            f" {cross_tracks[best]:.2g}.",
         ),
         Finding(
             "ours",
             "Behind dead time and lag model-following is the straightest, even with both times"
             " wrong by up to 50 %.",
-            worst < across[best],
-            f"Cross-track {across[FOLLOWING]:.2g} with the right times, at most {worst:.2g} with"
-            f" wrong ones; the best of the others has {across[best]:.2g}.",
+            worst < cross_tracks[best],
+            f"Cross-track {cross_tracks[FOLLOWING]:.2g} with the right times, at most {worst:.2g}"
+            f" with wrong ones; the best of the others has {cross_tracks[best]:.2g}.",
         ),
         Finding(
             "ours",
             "model-following keeps the limit of the tilt rate.",
             rate <= MAX_TILT_RATE * (1.0 + _ROUNDING),
             f"With W_M = {MAX_TILT_RATE:.3f} rad/s it commands at most {rate:.3f} rad/s,"
-            f" cross-track {bent:.2g}.",
+            f" cross-track {limited_cross_track:.2g}.",
         ),
     )
 
 
 def _over_the_grid(grid: Grid) -> Finding:
-    def ratio(cell: Cell) -> float:
-        place = grid[cell]
-        return place.right[FOLLOWING].cross_track / place.right[place.best_other].cross_track
+    def ratio(cell: GridCell) -> float:
+        comparison = grid[cell]
+        return (
+            comparison.right[FOLLOWING].cross_track
+            / comparison.right[comparison.best_other].cross_track
+        )
 
     closest = max(grid, key=ratio)
-    bent = max(place.right[FOLLOWING].cross_track for place in grid.values())
+    largest = max(comparison.right[FOLLOWING].cross_track for comparison in grid.values())
     return Finding(
         "ours",
         "With the right times model-following is the straightest at every dead time, lag and"
         " sample rate.",
         ratio(closest) < 1.0,
-        f"Cross-track at most {bent:.2g}, and at most {ratio(closest):.2g} of the best other"
+        f"Cross-track at most {largest:.2g}, and at most {ratio(closest):.2g} of the best other"
         f" method's, at {closest}.",
     )
 
 
-def _wrong_over_the_grid(grid: Grid) -> Finding:
-    last = max(grid, key=lambda cell: grid[cell].ratio)
-    place, other = grid[last], grid[last].best_other
-    worse = [cell for cell, at in grid.items() if at.ratio >= 1.0]
-    where = f", from {min(cell.dead_time_ms for cell in worse)} ms of dead time on" if worse else ""
+def _wrong_times_over_the_grid(grid: Grid) -> Finding:
+    worst_cell = max(grid, key=lambda cell: grid[cell].ratio)
+    comparison, other = grid[worst_cell], grid[worst_cell].best_other
+    worse_cells = [cell for cell, compared in grid.items() if compared.ratio >= 1.0]
+    where = (
+        f", from {min(cell.dead_time_ms for cell in worse_cells)} ms of dead time on"
+        if worse_cells
+        else ""
+    )
     return Finding(
         "ours",
         "Over the grid model-following is the straightest even with lag and dead time wrong by"
         " ±50 %, in every combination.",
-        not worse,
-        f"Worse than the best other method in {len(worse)} of {len(grid)} cells{where}. The largest"
-        f" ratio is at {last}, with {place.worst_error}: {place.worst:.2g} against"
-        f" {place.right[other].cross_track:.2g} of {other.label}.",
+        not worse_cells,
+        f"Worse than the best other method in {len(worse_cells)} of {len(grid)} cells{where}."
+        f" The largest ratio is at {worst_cell}, with {comparison.worst_error}:"
+        f" {comparison.worst:.2g} against {comparison.right[other].cross_track:.2g} of"
+        f" {other.label}.",
     )
 
 
 def _too_long_or_too_short(grid: Grid, complete: Complete) -> Finding:
     short, long = TimesError(-0.5, -0.5), TimesError(0.5, 0.5)
     pairs = [
-        (place.wrong[long], place.wrong[short])
-        for cell, place in grid.items()
+        (comparison.wrong[long], comparison.wrong[short])
+        for cell, comparison in grid.items()
         if cell.dead_time_ms > 0
     ]
-    too_long = max(one.cross_track for one, _ in pairs)
-    too_short = max(other.cross_track for _, other in pairs)
-    straighter = sum(one.cross_track < other.cross_track for one, other in pairs)
+    too_long = max(at_long.cross_track for at_long, _ in pairs)
+    too_short = max(at_short.cross_track for _, at_short in pairs)
+    straighter = sum(at_long.cross_track < at_short.cross_track for at_long, at_short in pairs)
     loop = complete.by_rate[SHOWN_RATE_HZ].wrong
     return Finding(
         "ours",
@@ -129,29 +137,31 @@ def _with_the_complete_loop(
     complete: Complete, from_fit: dict[Method, float]
 ) -> tuple[Finding, Finding, Finding]:
     by_rate = complete.by_rate
-    bent = {m: flown.cross_track for m, flown in by_rate[SHOWN_RATE_HZ].right.items()}
+    cross_tracks = {m: flown.cross_track for m, flown in by_rate[SHOWN_RATE_HZ].right.items()}
     nearest = min(OTHERS, key=lambda method: from_fit[method])
-    last = max(by_rate, key=lambda rate: by_rate[rate].ratio)
-    at = by_rate[last]
+    worst_rate = max(by_rate, key=lambda rate: by_rate[rate].ratio)
+    comparison = by_rate[worst_rate]
     return (
         Finding(
             "ours",
             "With the complete inner loop and transport delay model-following is the straightest"
             " at every sample rate.",
             all(
-                a.wrong[NO_ERROR].cross_track < a.right[a.best_other].cross_track
-                for a in by_rate.values()
+                each.wrong[NO_ERROR].cross_track < each.right[each.best_other].cross_track
+                for each in by_rate.values()
             ),
-            f"Cross-track at {SHOWN_RATE_HZ:.0f} Hz {bent[FOLLOWING]:.2g}; first-order"
-            f" {bent[PROPOSED]:.2g}, quaternion {bent[QUATERNION]:.2g}.",
+            f"Cross-track at {SHOWN_RATE_HZ:.0f} Hz {cross_tracks[FOLLOWING]:.2g}; first-order"
+            f" {cross_tracks[PROPOSED]:.2g}, quaternion {cross_tracks[QUATERNION]:.2g}.",
         ),
         Finding(
             "ours",
             "With the complete inner loop model-following is the straightest even with the fitted"
             " times wrong by up to ±50 %.",
-            at.ratio < 1.0,
-            f"The largest ratio is at {last:.0f} Hz, with {at.worst_error}: {at.worst:.2g} against"
-            f" {at.right[at.best_other].cross_track:.2g} of {at.best_other.label}.",
+            comparison.ratio < 1.0,
+            f"The largest ratio is at {worst_rate:.0f} Hz, with {comparison.worst_error}:"
+            f" {comparison.worst:.2g} against"
+            f" {comparison.right[comparison.best_other].cross_track:.2g} of"
+            f" {comparison.best_other.label}.",
         ),
         Finding(
             "ours",

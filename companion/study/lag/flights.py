@@ -120,7 +120,7 @@ class Comparison(NamedTuple):
         return self.worst / self.right[self.best_other].cross_track
 
 
-class Cell(NamedTuple):
+class GridCell(NamedTuple):
     """One cell of the grid: sample rate, and dead time and lag of the rate loop."""
 
     rate_hz: float
@@ -131,7 +131,7 @@ class Cell(NamedTuple):
         return f"dead time {self.dead_time_ms} ms, lag {self.lag_ms} ms, {self.rate_hz:.0f} Hz"
 
 
-Grid = dict[Cell, Comparison]
+Grid = dict[GridCell, Comparison]
 
 
 class Example(NamedTuple):
@@ -152,7 +152,7 @@ class Complete(NamedTuple):
     """The flights with the complete inner loop.
 
     Attributes:
-        by_rate: comparison at each sample rate (Hz); `wrong` there has right times as well.
+        by_rate: comparison at each sample rate (Hz); its `wrong` includes `NO_ERROR`.
         shown: responses of every method at `SHOWN_RATE_HZ`.
     """
 
@@ -188,7 +188,7 @@ def fly_grid(tick: Tick) -> Grid:
             if error != NO_ERROR and (dead_time or not error.dead_time)
         ]
         for rate in RATES_HZ:
-            grid[Cell(rate, dead_time, lag)] = Comparison(
+            grid[GridCell(rate, dead_time, lag)] = Comparison(
                 {m: score(_fly(m, times, loop, rate)) for m in METHODS},
                 _with_errors(errors, times, loop, rate),
             )

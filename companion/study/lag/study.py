@@ -14,10 +14,10 @@ from companion.study.lag.flights import (
     METHODS,
     RATES_HZ,
     SHOWN_RATE_HZ,
-    Cell,
     Complete,
     Example,
     Grid,
+    GridCell,
     Score,
     TimesError,
     fly_complete,
@@ -35,8 +35,7 @@ from companion.study.measures import (
     second_order_path,
 )
 from companion.study.methods import Method
-from companion.study.outcome import Cell as TableCell
-from companion.study.outcome import Outcome, Table, Tick
+from companion.study.outcome import Cell, Outcome, Table, Tick
 from companion.study.step import Response
 
 PARTS = len(DEAD_TIMES_MS) * len(LAGS_MS) + 1 + len(RATES_HZ)
@@ -61,7 +60,7 @@ def run(tick: Tick) -> Outcome:
     tick("the example")
     example = fly_example()
     complete = fly_complete(tick)
-    fitted = {method: _fitted(response) for method, response in complete.shown.items()}
+    fitted = {method: _fit_model(response) for method, response in complete.shown.items()}
     return Outcome(
         name="lag",
         title="Lag: behind a rate loop with dead time and lag",
@@ -101,7 +100,7 @@ def run(tick: Tick) -> Outcome:
     )
 
 
-def _fitted(response: Response) -> _Fitted:
+def _fit_model(response: Response) -> _Fitted:
     fit = fit_second_order(response.step, response.at(0))
     model = second_order_path(response.step, fit, response.step.time)
     return _Fitted(fit, float(largest_deviation(response, model)[0]))
@@ -109,7 +108,7 @@ def _fitted(response: Response) -> _Fitted:
 
 def _example_table(example: Example) -> Table:
     """Every method by sample rate, and model-following with the limit of the tilt rate."""
-    rows: list[tuple[TableCell, ...]] = []
+    rows: list[tuple[Cell, ...]] = []
     for rate, responses in example.free.items():
         flown = [(method.label, response) for method, response in responses.items()]
         flown.append(("model-following, W_M = π/2", example.limited[rate]))
@@ -144,11 +143,13 @@ def _errors_table(name: str, caption: str, scores: dict[TimesError, Score]) -> T
 def _worst_table(grid: Grid) -> Table:
     """Cross-track with the worst error, and of the best other method, by sample rate and lag."""
     dead_times = sorted({cell.dead_time_ms for cell in grid})
-    rows: list[tuple[TableCell, ...]] = []
+    rows: list[tuple[Cell, ...]] = []
     for rate, lag in product(RATES_HZ, sorted({cell.lag_ms for cell in grid})):
-        places = [grid[Cell(rate, dead_time, lag)] for dead_time in dead_times]
-        others = [place.right[place.best_other].cross_track for place in places]
-        rows.append((f"{rate:.0f} Hz, {lag} ms", *(place.worst for place in places), *others))
+        comparisons = [grid[GridCell(rate, dead_time, lag)] for dead_time in dead_times]
+        others = [comparison.right[comparison.best_other].cross_track for comparison in comparisons]
+        rows.append(
+            (f"{rate:.0f} Hz, {lag} ms", *(comparison.worst for comparison in comparisons), *others)
+        )
     return Table(
         "lag-worst-knowledge",
         "Cross-track over the grid, by rate and lag (rows) and dead time (columns): model-following"
@@ -181,10 +182,13 @@ def _fit_table(complete: Complete, fitted: dict[Method, _Fitted]) -> Table:
 def _rates_table(complete: Complete) -> Table:
     """Cross-track of every method by sample rate, and of model-following with the worst error."""
     by_rate = complete.by_rate
-    rows: list[tuple[TableCell, ...]] = [
-        (m.label, *(at.right[m].cross_track for at in by_rate.values())) for m in METHODS
+    rows: list[tuple[Cell, ...]] = [
+        (m.label, *(comparison.right[m].cross_track for comparison in by_rate.values()))
+        for m in METHODS
     ]
-    rows.append(("model-following, worst knowledge", *(at.worst for at in by_rate.values())))
+    rows.append(
+        ("model-following, worst knowledge", *(comparison.worst for comparison in by_rate.values()))
+    )
     return Table(
         "lag-inner-loop-rates",
         "Cross-track with the complete inner loop by sample rate. In the last row both times of"
@@ -196,26 +200,26 @@ def _rates_table(complete: Complete) -> Table:
 
 def _grid_series(grid: Grid) -> tuple[Table, Table]:
     """Every flight of the grid: with the right times, and with wrong ones."""
-    place = ("dead time, ms", "lag, ms", "rate, Hz")
+    cell_columns = ("dead time, ms", "lag, ms", "rate, Hz")
     return (
         Table(
             "lag-grid",
             "All methods over the grid, model-following with the right times.",
-            ("method", *place, *_SCORE_COLUMNS),
+            ("method", *cell_columns, *_SCORE_COLUMNS),
             tuple(
                 (method.label, cell.dead_time_ms, cell.lag_ms, cell.rate_hz, *flown)
-                for cell, at in grid.items()
-                for method, flown in at.right.items()
+                for cell, comparison in grid.items()
+                for method, flown in comparison.right.items()
             ),
         ),
         Table(
             "lag-grid-wrong-knowledge",
             "model-following over the grid, with wrong times.",
-            (*place, "error of the lag", "error of the dead time", *_SCORE_COLUMNS),
+            (*cell_columns, "error of the lag", "error of the dead time", *_SCORE_COLUMNS),
             tuple(
                 (cell.dead_time_ms, cell.lag_ms, cell.rate_hz, *error, *flown)
-                for cell, at in grid.items()
-                for error, flown in at.wrong.items()
+                for cell, comparison in grid.items()
+                for error, flown in comparison.wrong.items()
             ),
         ),
     )
@@ -229,7 +233,7 @@ def _complete_series(complete: Complete) -> Table:
         ("rate, Hz", "error of the lag", "error of the dead time", "cross-track"),
         tuple(
             (rate, *error, flown.cross_track)
-            for rate, at in complete.by_rate.items()
-            for error, flown in at.wrong.items()
+            for rate, comparison in complete.by_rate.items()
+            for error, flown in comparison.wrong.items()
         ),
     )

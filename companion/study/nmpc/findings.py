@@ -33,7 +33,7 @@ def find(flown: Flights, counts: ColdStarts, times: ProcessTimes) -> tuple[Findi
     return (
         _solved_faster("paper", ("euler", "quaternion"), flown),
         _solved_faster("ours", ("euler-reduced",), flown),
-        _from_cold(counts),
+        _cold_starts(counts),
         _settles("limited", flown),
         _settles("proposed", flown),
         _dead_time(flown),
@@ -44,21 +44,22 @@ def find(flown: Flights, counts: ColdStarts, times: ProcessTimes) -> tuple[Findi
 
 def _solved_faster(source: Source, others: Sequence[ModelName], flown: Flights) -> Finding:
     """Whether the proposed model is solved faster than `others`, with one and all iterations."""
-    shares = {
-        (model, most): _median_ms(model, most, flown) / _median_ms("proposed", most, flown)
+    ratios = {
+        (model, iterations): _median_ms(model, iterations, flown)
+        / _median_ms("proposed", iterations, flown)
         for model in others
-        for most in (1, MAX_ITERATIONS)
+        for iterations in (1, MAX_ITERATIONS)
     }
     medians = "; ".join(
-        f"{STYLES[model].label} takes {shares[model, 1]:.2f} × its time with one iteration,"
-        f" {shares[model, MAX_ITERATIONS]:.2f} × to the end"
+        f"{STYLES[model].label} takes {ratios[model, 1]:.2f} × its time with one iteration,"
+        f" {ratios[model, MAX_ITERATIONS]:.2f} × to the end"
         for model in others
     )
     names = " and ".join(STYLES[model].label for model in others)
     return Finding(
         source,
         f"The proposed model is solved faster than {names}.",
-        min(shares.values()) > 1.0,
+        min(ratios.values()) > 1.0,
         f"Medians: {medians}.",
     )
 
@@ -67,7 +68,7 @@ def _median_ms(model: ModelName, iterations: int, flown: Flights) -> float:
     return flown[EIGHT.name, Variant(model, iterations)].solve_ms(50)
 
 
-def _from_cold(counts: ColdStarts) -> Finding:
+def _cold_starts(counts: ColdStarts) -> Finding:
     reached = {m: sum(not isinf(count) for count in counts[m].values()) for m in MODELS}
     others = max(reached[model] for model in UNLIMITED)
     reaching = ", ".join(f"{STYLES[model].label} {reached[model]}" for model in MODELS)

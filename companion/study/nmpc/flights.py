@@ -36,10 +36,10 @@ from companion.study.step import Floats
 SECONDS = 6
 SETTLED = 4.0
 """Time from which errors count, s."""
-_INPUTS = 8
+_INPUTS_GIVEN = 8
 """Number of latest inputs given to the solver; they cover dead time plus lead."""
 _PLANNER_HZ = 250
-_STEPS = STEP_HZ // _PLANNER_HZ
+_STEPS_PER_SAMPLE = STEP_HZ // _PLANNER_HZ
 
 
 class Vehicle:
@@ -72,17 +72,17 @@ class Vehicle:
         for _ in range(round(seconds * _PLANNER_HZ)):
             before = _thrust_and_gravity(self.body.q, thrust)
             rates = self._planner.rates(self.body.q, target, dt, self.body.rates)
-            self.body.turn(rates, _STEPS)
+            self.body.turn(rates, _STEPS_PER_SAMPLE)
             after = _thrust_and_gravity(self.body.q, thrust)
             self._move(tuple(0.5 * (a + b) for a, b in zip(before, after, strict=True)), dt)
 
-    def _move(self, lift: tuple[float, ...], dt: float) -> None:
-        """Integrate `lift` (thrust and gravity, m/s²) and drag over `dt` s by the midpoint rule."""
+    def _move(self, acceleration: tuple[float, ...], dt: float) -> None:
+        """Integrate drag and `acceleration` (thrust, gravity; m/s²) over `dt` s, midpoint rule."""
         position, velocity = [], []
-        for p, v, push in zip(self.position, self.velocity, lift, strict=True):
-            middle = v + 0.5 * dt * (push - DRAG * v)
-            position.append(p + dt * middle)
-            velocity.append(v + dt * (push - DRAG * middle))
+        for p, v, a in zip(self.position, self.velocity, acceleration, strict=True):
+            midpoint_velocity = v + 0.5 * dt * (a - DRAG * v)
+            position.append(p + dt * midpoint_velocity)
+            velocity.append(v + dt * (a - DRAG * midpoint_velocity))
         self.position = (position[0], position[1], position[2])
         self.velocity = (velocity[0], velocity[1], velocity[2])
 
@@ -130,7 +130,7 @@ class Flight:
             vehicle.body.rates,
             drag=Drag(DRAG),
         )
-        at, inputs = self._task.begin + now, tuple(self._inputs[-_INPUTS:])
+        at, inputs = self._task.begin + now, tuple(self._inputs[-_INPUTS_GIVEN:])
         answer = self._solver.answer(Request(self._periods, known, at, self._start, inputs))
         self.seconds.append(answer.solving)
         self.iterations.append(answer.iterations)
@@ -144,9 +144,9 @@ class Flight:
         self._record()
 
     def _record(self) -> None:
-        there = self._task.trajectory.at(self._task.begin + self._periods / RATE_HZ).position
-        wanted = [a + b for a, b in zip(self._start.position, there, strict=True)]
-        self.errors.append(dist(wanted, self._vehicle.position))
+        reference = self._task.trajectory.at(self._task.begin + self._periods / RATE_HZ).position
+        shifted = [a + b for a, b in zip(self._start.position, reference, strict=True)]
+        self.errors.append(dist(shifted, self._vehicle.position))
         self.path.append(self._vehicle.position)
 
     @property
@@ -178,7 +178,7 @@ def fly_all(tick: Tick) -> Flights:
 
     So other load on the computer slows all of them equally. The order rotates with every period.
     """
-    flown = _all_flights()
+    flown = _new_flights()
     turns = list(flown.values())
     for second in range(SECONDS):
         tick(f"flights, second {second + 1}")
@@ -189,7 +189,7 @@ def fly_all(tick: Tick) -> Flights:
     return flown
 
 
-def _all_flights() -> Flights:
+def _new_flights() -> Flights:
     """All flights; none has begun."""
     unlimited = [
         Variant(model, knows_dead_time=known) for known in (True, False) for model in UNLIMITED

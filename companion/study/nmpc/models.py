@@ -73,10 +73,10 @@ def euler(settings: Settings) -> Model:
         target=_led_target(state, derivative, axis[0:2], heading, control[3], settings),
         state_of=lambda motion: (
             *motion[:6],
-            *_euler_near(motion.north, motion.east, motion.heading),
+            *_euler_near_heading(motion.north, motion.east, motion.heading),
         ),
         aim_of=lambda node: (
-            _euler_near(node.north, node.east, node.heading)[2],
+            _euler_near_heading(node.north, node.east, node.heading)[2],
             *_body_rates(node),
         ),
         control_of=lambda node: (*_body_rates(node), node.thrust),
@@ -110,14 +110,14 @@ def euler_reduced(settings: Settings) -> Model:
         target=_led_target(state, derivative, axis[0:2], heading, control[2], settings),
         state_of=lambda motion: (
             *motion[:6],
-            *_euler_near(motion.north, motion.east, motion.heading)[:2],
+            *_euler_near_heading(motion.north, motion.east, motion.heading)[:2],
         ),
         aim_of=_angle_rates,
         control_of=lambda node: (*_angle_rates(node), node.thrust),
         bounded=ca.SX(0, 1),
         constants_of=lambda conditions, start: (
             *conditions,
-            _euler_near(start.north, start.east, start.heading)[2],
+            _euler_near_heading(start.north, start.east, start.heading)[2],
         ),
     )
 
@@ -214,10 +214,10 @@ def _euler_rates(roll: Any, pitch: Any, x: Any, y: Any, z: Any) -> tuple[Any, An
 
 def _thrust_axis(roll: ca.SX, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
     """Coefficients and cos(tilt), (3,): body z in NED, its north and east components negated."""
-    lean = ca.sin(pitch) * ca.cos(roll)
+    pitch_part = ca.sin(pitch) * ca.cos(roll)
     return ca.vertcat(
-        -(ca.cos(yaw) * lean + ca.sin(yaw) * ca.sin(roll)),
-        ca.cos(yaw) * ca.sin(roll) - ca.sin(yaw) * lean,
+        -(ca.cos(yaw) * pitch_part + ca.sin(yaw) * ca.sin(roll)),
+        ca.cos(yaw) * ca.sin(roll) - ca.sin(yaw) * pitch_part,
         ca.cos(pitch) * ca.cos(roll),
     )
 
@@ -231,20 +231,20 @@ def _heading(roll: ca.SX, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
     )
 
 
-def _euler_near(north: float, east: float, heading: float) -> tuple[float, float, float]:
-    """Roll, pitch, and a yaw within π of the heading, which may be unwrapped; rad."""
+def _euler_near_heading(north: float, east: float, heading: float) -> tuple[float, float, float]:
+    """Roll, pitch and yaw, rad; the yaw is within π of the heading, which may exceed ±π."""
     roll, pitch, yaw = euler_angles(attitude_of(north, east, heading))
     return roll, pitch, heading + wrap_angle(yaw - heading)
 
 
 def _body_rates(node: Node) -> tuple[float, float, float]:
     """Body rates that keep a vehicle on the reference, rad/s."""
-    x, y, still = rates_along(node.north, node.east, node.speed_north, node.speed_east)
-    return (*into_body(cos(node.heading), sin(node.heading), x, y), still + node.heading_rate)
+    x, y, z = rates_along(node.north, node.east, node.speed_north, node.speed_east)
+    return (*into_body(cos(node.heading), sin(node.heading), x, y), z + node.heading_rate)
 
 
 def _angle_rates(node: Node) -> tuple[float, float]:
     """φ̇ and θ̇ that keep a vehicle on the reference, rad/s."""
-    roll, pitch, _ = _euler_near(node.north, node.east, node.heading)
+    roll, pitch, _ = _euler_near_heading(node.north, node.east, node.heading)
     roll_rate, pitch_rate, _ = _euler_rates(roll, pitch, *_body_rates(node))
     return roll_rate, pitch_rate

@@ -67,7 +67,7 @@ def run(tick: Tick) -> Outcome:
             _process_table(times),
         ),
         findings=find(flown, counts, times),
-        series=(_series(flown),),
+        series=(_flights_table(flown),),
     )
 
 
@@ -76,16 +76,16 @@ def _time_table(flown: Flights) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for model in MODELS:
         single = flown[EIGHT.name, Variant(model)]
-        whole = flown[EIGHT.name, Variant(model, MAX_ITERATIONS)]
+        to_the_end = flown[EIGHT.name, Variant(model, MAX_ITERATIONS)]
         rows.append(
             (
                 STYLES[model].label,
                 single.solve_ms(50),
                 single.solve_ms(99),
-                whole.solve_ms(50),
-                whole.solve_ms(99),
-                float(np.mean(whole.iterations)),
-                int(max(whole.iterations)),
+                to_the_end.solve_ms(50),
+                to_the_end.solve_ms(99),
+                float(np.mean(to_the_end.iterations)),
+                int(max(to_the_end.iterations)),
             )
         )
     return Table(
@@ -112,7 +112,7 @@ def _cold_start_table(counts: ColdStarts) -> Table:
         "SQP iterations to the tolerance, by the state of the vehicle while it should be on the"
         " circle at 5 m/s. The first guess is the circle.",
         ("model", *STATES),
-        tuple((STYLES[model].label, *of_model.values()) for model, of_model in counts.items()),
+        tuple((STYLES[model].label, *by_state.values()) for model, by_state in counts.items()),
     )
 
 
@@ -159,7 +159,7 @@ def _process_table(times: ProcessTimes) -> Table:
     )
 
 
-def _series(flown: Flights) -> Table:
+def _flights_table(flown: Flights) -> Table:
     """Table of every period of every flight."""
     return Table(
         "nmpc-flights",
@@ -209,10 +209,10 @@ def _draw_paths(axes: Axes, flown: Flights) -> None:
         axes.plot(east, north, **STYLES[model].line)
     begin = CIRCLE.trajectory.at(CIRCLE.begin).position
     times = CIRCLE.begin + np.linspace(0.0, 2.0 * np.pi, 100)
-    wanted = np.array([CIRCLE.trajectory.at(float(t)).position for t in times]) - begin
-    axes.plot(wanted[:, 1], wanted[:, 0], **REFERENCE)
+    reference = np.array([CIRCLE.trajectory.at(float(t)).position for t in times]) - begin
+    axes.plot(reference[:, 1], reference[:, 0], **REFERENCE)
     axes.plot(0.0, 0.0, "o", color="black", markersize=4)
-    low, high = wanted.min(axis=0) - 5.0, wanted.max(axis=0) + 5.0
+    low, high = reference.min(axis=0) - 5.0, reference.max(axis=0) + 5.0
     axes.set(
         title="Standing start into the circle (● start)",
         xlabel="east, m",

@@ -65,13 +65,13 @@ def count_iterations() -> ColdStarts:
         counts[model] = {}
         for name, state in STATES.items():
             solver.forget()
-            answer = solver.answer(_from_state(state))
+            answer = solver.answer(_request_from_state(state))
             reached = answer.status is Status.SOLVED and answer.iterations < _COLD_ITERATIONS
             counts[model][name] = answer.iterations if reached else inf
     return counts
 
 
-def _from_state(state: State) -> Request:
+def _request_from_state(state: State) -> Request:
     vehicle = Vehicle(
         0.0,
         state.offset,
@@ -105,35 +105,37 @@ def time_process() -> ProcessTimes:
         ChildProcessError: the process does not start; the message says why.
     """
     troubles: list[tuple[Trouble, str]] = []
-    answering, computing = [], []
+    answer_times, computing_times = [], []
     solver = Solver(
         Variant("limited").settings, EIGHT.trajectory, lambda *trouble: troubles.append(trouble)
     )
     try:
         _await_start(solver, troubles)
         for number in range(_REQUESTS):
-            began = monotonic()
-            solver.request(_on_the_eight(number))
+            sent_at = monotonic()
+            solver.request(_request_on_the_eight(number))
             answer = solver.take(1.0)
-            took = monotonic() - began
+            elapsed = monotonic() - sent_at
             if answer is not None:
-                answering.append(took)
-                computing.append(answer.seconds)
-            sleep(max(0.0, 1.0 / RATE_HZ - took))
+                answer_times.append(elapsed)
+                computing_times.append(answer.seconds)
+            sleep(max(0.0, 1.0 / RATE_HZ - elapsed))
     finally:
         solver.close()
-    return ProcessTimes(1e3 * np.array(answering), 1e3 * np.array(computing), len(troubles))
+    return ProcessTimes(
+        1e3 * np.array(answer_times), 1e3 * np.array(computing_times), len(troubles)
+    )
 
 
 def _await_start(solver: Solver, troubles: list[tuple[Trouble, str]]) -> None:
-    until = monotonic() + _START_TIMEOUT
+    deadline = monotonic() + _START_TIMEOUT
     while not solver.ready:
-        if troubles or monotonic() > until:
+        if troubles or monotonic() > deadline:
             raise ChildProcessError(troubles[0][1] if troubles else "the solver does not start")
         sleep(0.01)
 
 
-def _on_the_eight(number: int) -> Request:
+def _request_on_the_eight(number: int) -> Request:
     time = number / RATE_HZ
     sample = EIGHT.trajectory.at(time)
     vehicle = Vehicle(

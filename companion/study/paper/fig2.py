@@ -117,20 +117,22 @@ def _rows(label: str, response: Response, reference: Floats) -> list[tuple[Cell,
         return [(label, float(away.max()), float(across.max()), float(arrived[0]), effect)]
     rows: list[tuple[Cell, ...]] = []
     for words, index in zip(("best", "worst"), best_and_worst(away), strict=True):
-        at = f"{label}, {words} at {degrees(response.step.headings[index]):.0f}°"
-        rows.append((at, float(away[index]), float(across[index]), float(arrived[index]), effect))
+        row_label = f"{label}, {words} at {degrees(response.step.headings[index]):.0f}°"
+        rows.append(
+            (row_label, float(away[index]), float(across[index]), float(arrived[index]), effect)
+        )
     return rows
 
 
 def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
     time = FIGURE_2.time
     _, worst = best_and_worst(largest_deviation(responses[EULER], reference))
-    at = {method: worst if method is EULER else 0 for method in PAPERS}
+    shown_heading = {method: worst if method is EULER else 0 for method in PAPERS}
     curves = [
         (
             method,
             f"{method.label} (worst heading)" if method is EULER else method.label,
-            responses[method].at(at[method]),
+            responses[method].at(shown_heading[method]),
         )
         for method in PAPERS
     ]
@@ -138,7 +140,7 @@ def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
     draw_response(north, east, time, curves)
     draw_reference(north, east, time, reference)
     for method in PAPERS:
-        error = deviation(responses[method], reference)[:, at[method]]
+        error = deviation(responses[method], reference)[:, shown_heading[method]]
         draw(away, time, error, method.line)
     away.set(
         title="Distance from the reference",

@@ -14,7 +14,7 @@ from companion.study.methods import EULER, PROPOSED, planner_of
 from companion.study.outcome import Finding, Outcome, Table, Tick
 from companion.study.step import FIGURE_2, Floats, Response, fly
 
-_FOLDED = colormaps["viridis"]
+_ANGLE_COLOURS = colormaps["viridis"]
 """Colour map over the angle between the heading and the axis of the step, 0° to 90°."""
 PARTS = 2
 
@@ -28,7 +28,7 @@ def run(tick: Tick) -> Outcome:
     best, worst = best_and_worst(away)
     tick(PROPOSED.label)
     proposed = largest_deviation(fly(planner_of(PROPOSED, FIGURE_2.gain), FIGURE_2), reference)
-    at = [round(degrees(heading)) for heading in FIGURE_2.headings]
+    heading_deg = [round(degrees(heading)) for heading in FIGURE_2.headings]
     return Outcome(
         name="fig3",
         title="Figure 3: Euler angles at every heading",
@@ -43,7 +43,10 @@ def run(tick: Tick) -> Outcome:
                 "fig3",
                 "The Euler-angle method by heading.",
                 ("heading, °", "largest deviation from first order", "cross-track"),
-                tuple((at[k], float(away[k]), float(across[k])) for k in range(len(at))),
+                tuple(
+                    (heading_deg[k], float(away[k]), float(across[k]))
+                    for k in range(len(heading_deg))
+                ),
             ),
         ),
         findings=(
@@ -51,8 +54,8 @@ def run(tick: Tick) -> Outcome:
                 "ours",
                 "The Euler-angle method is much better at some headings than at others.",
                 bool(away[best] < 0.5 * away[worst]),
-                f"Largest deviation {away[best]:.2g} at the best heading, {at[best]}°, and"
-                f" {away[worst]:.2g} at the worst, {at[worst]}°. The proposed method has"
+                f"Largest deviation {away[best]:.2g} at the best heading, {heading_deg[best]}°, and"
+                f" {away[worst]:.2g} at the worst, {heading_deg[worst]}°. The proposed method has"
                 f" {proposed.max():.2g} at every heading.",
             ),
         ),
@@ -62,10 +65,10 @@ def run(tick: Tick) -> Outcome:
 def _figure(response: Response, reference: Floats) -> Figure:
     figure, ((north, east), (away, plane)) = new_figure(2, 2)
     time, headings = FIGURE_2.time, np.degrees(FIGURE_2.headings)
-    folded = np.abs((headings + 90.0) % 180.0 - 90.0)
-    key = ScalarMappable(Normalize(0.0, 100.0), _FOLDED)
-    colours = key.to_rgba(folded)
-    for k in np.argsort(-folded):
+    angle_to_step = np.abs((headings + 90.0) % 180.0 - 90.0)
+    colour_scale = ScalarMappable(Normalize(0.0, 100.0), _ANGLE_COLOURS)
+    colours = colour_scale.to_rgba(angle_to_step)
+    for k in np.argsort(-angle_to_step):
         line = {"color": colours[k], "linewidth": 0.8}
         c = response.at(k)
         draw(north, time, c[:, 0], line)
@@ -86,7 +89,9 @@ def _figure(response: Response, reference: Floats) -> Figure:
         xticks=np.arange(-180, 181, 60),
         ylim=(0.0, None),
     )
-    bar = figure.colorbar(key, ax=[east, plane], ticks=[0, 30, 60, 90], boundaries=range(91))
+    bar = figure.colorbar(
+        colour_scale, ax=[east, plane], ticks=[0, 30, 60, 90], boundaries=range(91)
+    )
     bar.set_label("angle between heading and the step's axis, °")
     north.legend(loc="lower right")
     return figure

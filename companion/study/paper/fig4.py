@@ -92,13 +92,15 @@ def _row(method: Method, response: Response, reference: Floats) -> tuple[Cell, .
 def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
     time = FIGURE_4.time
     slowest = int(time_to(responses[EULER]).argmax())
-    at = {method: slowest if method is EULER else 0 for method in _METHODS}
-    curves = [(method, method.label, responses[method].at(at[method])) for method in _METHODS]
+    shown_heading = {method: slowest if method is EULER else 0 for method in _METHODS}
+    curves = [
+        (method, method.label, responses[method].at(shown_heading[method])) for method in _METHODS
+    ]
     figure, ((north, east), (rate, plane)) = new_figure(2, 2)
     for method, label, c in curves:
         draw(north, time, c[:, 0], method.line, label)
         draw(east, time, c[:, 1], method.line)
-        draw(rate, time[:-1], responses[method].tilt_rate[:, at[method]], method.line)
+        draw(rate, time[:-1], responses[method].tilt_rate[:, shown_heading[method]], method.line)
     draw_reference(north, east, time, reference, "reference, equation 33")
     rate.axhline(MAX_TILT_RATE, **LIMIT)
     label_response(north, east)

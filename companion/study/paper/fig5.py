@@ -38,7 +38,8 @@ from companion.study.step import FIGURE_2
 __all__ = ["PARTS", "run"]
 
 _SECOND_ORDER_SHARE = 0.02
-_SECOND_ORDER = {**REFERENCE, "color": "#666666", "linestyle": (0, (4, 1.5, 1, 1.5))}
+"""Largest deviation from second order, as a share of the step, that counts as second order."""
+_SECOND_ORDER_LINE = {**REFERENCE, "color": "#666666", "linestyle": (0, (4, 1.5, 1, 1.5))}
 
 
 def run(tick: Tick) -> Outcome:
@@ -152,7 +153,7 @@ def _draw_loop(panels: tuple[Axes, Axes, Axes], loop: LoopFlights) -> None:
     step, second = loop.responses[PROPOSED].step, loop.fitted_path(PROPOSED)
     draw_response(north, east, step.time, curves)
     draw_reference(north, east, step.time, step.reference())
-    draw(north, step.time, second[:, 0], _SECOND_ORDER, "second-order reference")
+    draw(north, step.time, second[:, 0], _SECOND_ORDER_LINE, "second-order reference")
     draw_plane(plane, curves, np.array([step.start, step.target]))
     for panel in (north, east):
         panel.set(xlim=(0.0, 1.5))
@@ -163,16 +164,18 @@ def _draw_loop(panels: tuple[Axes, Axes, Axes], loop: LoopFlights) -> None:
 def _findings(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> tuple[Finding, ...]:
     """Findings on straightness, on the order of the response, and on the effect of heading."""
     others = [method for method in PAPERS if method is not PROPOSED]
-    ahead = [t for t, across in sweep.items() if across[PROPOSED] < min(across[m] for m in others)]
+    straightest_at = [
+        t for t, across in sweep.items() if across[PROPOSED] < min(across[m] for m in others)
+    ]
     return (
         _straightest("paper", "quick", quick),
         _straightest("ours", "as slow as measured", measured),
         Finding(
             "ours",
             "The proposed method is the straightest with every inner loop.",
-            len(ahead) == len(sweep),
+            len(straightest_at) == len(sweep),
             "At heading 0 it is the straightest with loops of "
-            + (", ".join(f"{1e3 * t:.0f}" for t in ahead) or "no")
+            + (", ".join(f"{1e3 * t:.0f}" for t in straightest_at) or "no")
             + " ms (63 % of a rate step). Its cross-track is "
             + ", ".join(f"{across[PROPOSED]:.2g}" for across in sweep.values())
             + " with "
@@ -192,25 +195,26 @@ def _findings(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> tuple[
     )
 
 
-def _straightest(source: Source, words: str, loop: LoopFlights) -> Finding:
-    across = {m: loop.cross_track(m) for m in (PROPOSED, QUATERNION, SO3, EULER)}
+def _straightest(source: Source, speed: str, loop: LoopFlights) -> Finding:
+    cross_tracks = {m: loop.cross_track(m) for m in (PROPOSED, QUATERNION, SO3, EULER)}
     return Finding(
         source,
-        f"With a complete inner loop that is {words} ({1e3 * loop.time_63:.0f} ms) the proposed"
+        f"With a complete inner loop that is {speed} ({1e3 * loop.time_63:.0f} ms) the proposed"
         " method still is the straightest.",
-        across[PROPOSED] < min(bent for m, bent in across.items() if m is not PROPOSED),
+        cross_tracks[PROPOSED]
+        < min(largest for m, largest in cross_tracks.items() if m is not PROPOSED),
         "Cross-track over all headings: "
-        + ", ".join(f"{method.label} {bent:.2g}" for method, bent in across.items())
+        + ", ".join(f"{method.label} {largest:.2g}" for method, largest in cross_tracks.items())
         + ".",
     )
 
 
-def _second_order(source: Source, words: str, loop: LoopFlights) -> Finding:
+def _second_order(source: Source, speed: str, loop: LoopFlights) -> Finding:
     fit, away = loop.fits[PROPOSED], loop.from_second_order(PROPOSED)
     bound = _SECOND_ORDER_SHARE * hypot(*np.subtract(FIGURE_2.target, FIGURE_2.start))
     return Finding(
         source,
-        f"With a complete inner loop that is {words} the response of the proposed method is second"
+        f"With a complete inner loop that is {speed} the response of the proposed method is second"
         " order.",
         away < bound,
         f"It stays within {away:.2g} of ω = {fit.model.frequency:.1f} rad/s,"

@@ -76,13 +76,13 @@ def fly_methods(factor: int, tick: Tick) -> LoopFlights:
 
 def fly_sweep(tick: Tick) -> Sweep:
     """Fly every method of the paper with inner loops of several speeds."""
-    step, out = replace(FIGURE_2, headings=(0.0,)), {}
+    step, sweep = replace(FIGURE_2, headings=(0.0,)), {}
     for factor in _SWEEP:
         inner_loop = quickened(factor)
         time_63 = inner_loop.rate_step_63()
         tick(f"cross-track, {1e3 * time_63:.0f} ms")
-        out[time_63] = {
+        sweep[time_63] = {
             method: float(cross_track(fly_loop(planner_of(method, STEP.gain), step, inner_loop))[0])
             for method in PAPERS
         }
-    return out
+    return sweep

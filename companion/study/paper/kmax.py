@@ -16,7 +16,7 @@ TILTS = tuple(radians(angle) for angle in (0.0, 10.0, 20.0, 30.0, 40.0, 45.0, 50
 PRINTED = {30: 1.333, 45: 2.0, 60: 4.0}
 """K_max as printed in the paper, by tilt in degrees."""
 
-_LIMIT = radians(60.0)
+_LARGEST_TILT_SHOWN = radians(60.0)
 _DIRECTIONS = 72
 PARTS = 2
 
@@ -108,19 +108,19 @@ def _findings(rows: tuple[_Row, ...], by_tilt: dict[float, Floats]) -> tuple[Fin
 
 def _figure(by_tilt: dict[float, Floats]) -> Figure:
     figure, ((disc, over_tilt),) = new_figure(1, 2, height=3.8)
-    radii = np.linspace(0.0, sin(_LIMIT), 40)
-    around = np.linspace(0.0, 2.0 * pi, 73)
+    radii = np.linspace(0.0, sin(_LARGEST_TILT_SHOWN), 40)
+    angles = np.linspace(0.0, 2.0 * pi, 73)
     k = np.array(
-        [[scaling_factor(Coefficients(r * cos(b), r * sin(b)), 0.0) for b in around] for r in radii]
+        [[scaling_factor(Coefficients(r * cos(b), r * sin(b)), 0.0) for b in angles] for r in radii]
     )
-    north, east = np.outer(radii, np.cos(around)), np.outer(radii, np.sin(around))
+    north, east = np.outer(radii, np.cos(angles)), np.outer(radii, np.sin(angles))
     levels = np.linspace(1.0, 4.0, 13)
     filled = disc.contourf(east, north, k, levels=levels, cmap="cividis")
     lines = disc.contour(east, north, k, levels=[1.333, 2.0, 3.0], colors="white", linewidths=0.8)
     disc.clabel(lines, fmt="%.3g", fontsize=7)
     figure.colorbar(filled, ax=disc, label="K", ticks=[1, 2, 3, 4])
     disc.set(title="K for a movement to the north", xlabel="$a_E$", ylabel="$a_N$", aspect="equal")
-    tilts = np.linspace(0.0, _LIMIT, 121)
+    tilts = np.linspace(0.0, _LARGEST_TILT_SHOWN, 121)
     over_tilt.plot(
         np.degrees(tilts), [bound(t) for t in tilts], label="1/(1 − 2$A_M$²)²", **REFERENCE
     )

@@ -33,7 +33,7 @@ _METHODS = (*PAPERS, EXACT, FOLLOWING)
 _NOT_LED_COLOUR = "#D55E00"
 _STILL_AIR: Line = {"linestyle": "-", "marker": "o", "markersize": 4.0, "linewidth": 1.6}
 _IN_WIND: Line = {"linestyle": ":", "marker": "s", "markersize": 4.0, "linewidth": 1.6}
-_ROUND_MM = (10, 20, 50, 100, 200, 500, 1000)
+_ERROR_TICKS_MM = (10, 20, 50, 100, 200, 500, 1000)
 _MARKERS = ("o", "s")
 """Marker of each of `GUIDANCES`."""
 
@@ -80,15 +80,15 @@ def _draw_planners(axes: Axes, errors: dict[Task, float], courses: Sequence[Cour
 def _draw_lead_and_wind(axes: Axes, errors: dict[Task, float], courses: Sequence[Course]) -> None:
     """Draw the error (mm) over speed, with and without lead, in still air and in wind."""
     for wind, style in ((CALM, _STILL_AIR), (WINDY, _IN_WIND)):
-        where = f", wind of {wind:g} m/s" if wind else ""
+        wind_label = f", wind of {wind:g} m/s" if wind else ""
         for lead, colour in ((True, FOLLOWING.colour), (False, _NOT_LED_COLOUR)):
             tasks = [Task(course, MODEL_FOLLOWING, LINEAR, wind, lead) for course in courses]
-            label = f"model-following{'' if lead else ', not led'}{where}"
+            label = f"model-following{'' if lead else ', not led'}{wind_label}"
             _draw_over_speed(axes, tasks, errors, {**style, "color": colour}, label)
     tasks = [Task(course, PROPOSED.planner, LINEAR, WINDY) for course in courses]
     line = {**_IN_WIND, "color": PROPOSED.colour}
     _draw_over_speed(axes, tasks, errors, line, f"first-order, wind of {WINDY:g} m/s")
-    axes.set(title="Led and not led, still air and wind", yscale="log", yticks=_ROUND_MM)
+    axes.set(title="Led and not led, still air and wind", yscale="log", yticks=_ERROR_TICKS_MM)
     axes.yaxis.set_major_formatter("{x:g}")
     axes.minorticks_off()
 

@@ -59,25 +59,25 @@ def _by_telemetry(tracked: Tracked) -> float:
 
 
 def _smallest(flown: Flown, statement: str, error: Error) -> Finding:
-    def of(course: Course, planner: str) -> float:
+    def error_of(course: Course, planner: str) -> float:
         return error(flown[Task(course, planner)])
 
-    ours = {course: of(course, MODEL_FOLLOWING) for course in COURSES}
-    best = {course: min(_OTHERS, key=lambda other: of(course, other)) for course in COURSES}
-    apart = {course: ours[course] - of(course, best[course]) for course in COURSES}
-    beaten = [course for course in COURSES if not apart[course] <= _EQUAL]
-    ahead = [course for course in COURSES if apart[course] < -_EQUAL]
-    listed = "; ".join(
-        f"{course}: {_in_mm(ours[course])}, {best[course]} {_in_mm(of(course, best[course]))}"
-        for course in beaten
+    ours = {course: error_of(course, MODEL_FOLLOWING) for course in COURSES}
+    best = {course: min(_OTHERS, key=lambda other: error_of(course, other)) for course in COURSES}
+    difference = {course: ours[course] - error_of(course, best[course]) for course in COURSES}
+    larger_on = [course for course in COURSES if not difference[course] <= _EQUAL]
+    smaller_on = [course for course in COURSES if difference[course] < -_EQUAL]
+    comparisons = "; ".join(
+        f"{course}: {_in_mm(ours[course])}, {best[course]} {_in_mm(error_of(course, best[course]))}"
+        for course in larger_on
     )
     return Finding(
         "ours",
         statement,
-        not beaten,
-        f"Smaller than all others by more than {1e3 * _EQUAL:g} mm on {len(ahead)} of"
-        f" {len(COURSES)} courses, larger than the best on {len(beaten)}"
-        f"{': ' if beaten else ''}{listed}.",
+        not larger_on,
+        f"Smaller than all others by more than {1e3 * _EQUAL:g} mm on {len(smaller_on)} of"
+        f" {len(COURSES)} courses, larger than the best on {len(larger_on)}"
+        f"{': ' if larger_on else ''}{comparisons}.",
     )
 
 
@@ -102,28 +102,30 @@ def _in_wind(flown: Flown) -> Finding:
 
 
 def _lead(flown: Flown, wind: float) -> Finding:
-    times = {}
+    ratios = {}
     for course in (CIRCLE_AT_5, EIGHT_AT_5):
         task = Task(course, MODEL_FOLLOWING, LINEAR, wind)
-        times[course] = _by_telemetry(flown[task._replace(lead=False)]) / _by_telemetry(flown[task])
+        ratios[course] = _by_telemetry(flown[task._replace(lead=False)]) / _by_telemetry(
+            flown[task]
+        )
     return Finding(
         "ours",
         f"At 5 m/s in {f'{wind:g} m/s of wind' if wind else 'still air'} the error without lead is"
         f" at least {_REQUIRED_RATIO:g} times the error with lead.",
-        all(ratio >= _REQUIRED_RATIO for ratio in times.values()),
-        "; ".join(f"{course}: {ratio:.1f} times" for course, ratio in times.items()) + ".",
+        all(ratio >= _REQUIRED_RATIO for ratio in ratios.values()),
+        "; ".join(f"{course}: {ratio:.1f} times" for course, ratio in ratios.items()) + ".",
     )
 
 
 def _small_enough(flown: Flown) -> Finding:
-    found = {task: _by_telemetry(flown[task]) for task in _REQUIRED}
+    measured = {task: _by_telemetry(flown[task]) for task in _REQUIRED}
     errors = (
-        f"{task}: {_in_mm(found[task])} of {_in_mm(most)}" for task, most in _REQUIRED.items()
+        f"{task}: {_in_mm(measured[task])} of {_in_mm(limit)}" for task, limit in _REQUIRED.items()
     )
     return Finding(
         "ours",
         "model-following with linear guidance has an error as small as required.",
-        all(found[task] <= most for task, most in _REQUIRED.items()),
+        all(measured[task] <= limit for task, limit in _REQUIRED.items()),
         "; ".join(errors) + ".",
     )
 

@@ -108,9 +108,9 @@ def fly_all(tasks: Sequence[Task], tick: Tick) -> Flown:
 
 
 def _await_a_free_core(flights: Sequence[Future[Tracked]], count: int) -> None:
-    flying = [flight for flight in flights if not flight.done()]
-    if len(flying) >= count:
-        wait(flying, return_when=FIRST_COMPLETED)
+    unfinished = [flight for flight in flights if not flight.done()]
+    if len(unfinished) >= count:
+        wait(unfinished, return_when=FIRST_COMPLETED)
     for flight in flights:
         if flight.done():
             flight.result()  # raises the flight's exception before more flights are started
@@ -129,9 +129,11 @@ def fly(task: Task) -> Tracked:
         wire, truth_port = demo.udp_wire(), free_port()
         shipped = load(demo.default_config())
         vehicle, course = folder / "vehicle.yaml", folder / "course.yaml"
-        vehicle.write_text(bounded_yaml.dump({"mock": _vehicle(shipped, task, truth_port)}))
+        vehicle.write_text(
+            bounded_yaml.dump({"mock": _vehicle_settings(shipped, task, truth_port)})
+        )
         course.write_text(bounded_yaml.dump(task.course.file))
-        config = _configured(shipped, task, course, wire.endpoint)
+        config = _task_config(shipped, task, course, wire.endpoint)
         truth = TruthRecorder(truth_port)
         session = Session(config, folder, truth, decline_landing)
         with demo.bundled_vehicle(vehicle, wire, folder / "vehicle.log", lockstep=True):
@@ -139,16 +141,16 @@ def fly(task: Task) -> Tracked:
     if summary.result != "ok":
         failed = PositionError(inf, inf)
         return Tracked(summary.result, failed, failed, np.empty((0, 4)))
-    return _measured(summary.trace.tracking_rows(), truth.rows())
+    return _measure(summary.trace.tracking_rows(), truth.rows())
 
 
-def _vehicle(shipped: Config, task: Task, truth_port: int) -> dict[str, Any]:
+def _vehicle_settings(shipped: Config, task: Task, truth_port: int) -> dict[str, Any]:
     """Settings of the shipped mock vehicle, with the wind of the task."""
     wind = {"speed_m_s": task.wind, "gust_m_s": GUSTS * task.wind}
     return {**(shipped.mock or {}), **_SHORT_PHASES, "control_port": truth_port, "wind": wind}
 
 
-def _configured(shipped: Config, task: Task, course: Path, endpoint: str) -> Config:
+def _task_config(shipped: Config, task: Task, course: Path, endpoint: str) -> Config:
     """The shipped configuration with the changes for the task."""
     changes: dict[str, dict[str, Any]] = {
         "link": {
@@ -187,20 +189,20 @@ class TruthRecorder(SilentObserver):
     def __init__(self, port: int) -> None:
         self._address = ("127.0.0.1", port)
         self._rows: list[tuple[float, ...]] = []
-        self._asking: asyncio.Task[None] | None = None
+        self._request_task: asyncio.Task[None] | None = None
 
     def phase(self, name: str, waits_for: str) -> None:
         """Start requests with the measured phase, and stop them with the next phase."""
         if name == _MEASURED_PHASE:
-            self._asking = asyncio.create_task(self._ask())
-        elif self._asking is not None:
-            self._asking.cancel()
+            self._request_task = asyncio.create_task(self._request_truth())
+        elif self._request_task is not None:
+            self._request_task.cancel()
 
     def rows(self) -> Floats:
         """(n, 4): vehicle time, s, and position north, east and down of home, m."""
         return np.array(self._rows).reshape(-1, 4)
 
-    async def _ask(self) -> None:
+    async def _request_truth(self) -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as channel, suppress(OSError):
             # No answer means that the vehicle is gone; the result of the flight will say so.
             channel.settimeout(_TRUTH_TIMEOUT)
@@ -212,7 +214,7 @@ class TruthRecorder(SilentObserver):
                 await asyncio.sleep(_TRUTH_PERIOD)
 
 
-def _measured(tracking: Floats, truth: Floats) -> Tracked:
+def _measure(tracking: Floats, truth: Floats) -> Tracked:
     """Measure the errors on the course: from the end of the hover to the last true position.
 
     Args:

@@ -64,7 +64,7 @@ def run(tick: Tick) -> Outcome:
         caption=CAPTION,
         tables=_tables(flown),
         findings=find(flown),
-        series=(_series(flown),),
+        series=(_flights_table(flown),),
         rows=_rows(flown),
     )
 
@@ -75,12 +75,12 @@ def _rows(flown: Flown) -> tuple[dict[str, Any], ...]:
     Errors are in m, and null if the flight failed. A row also has the errors of the same flight
     without lead, if there was one.
     """
-    listed = []
+    rows = []
     for task, tracked in flown.items():
         if not task.lead:
             continue
         not_led = flown.get(task._replace(lead=False))
-        listed.append(
+        rows.append(
             {
                 "trajectory": task.course.trajectory,
                 "speed_mps": task.course.speed,
@@ -96,7 +96,7 @@ def _rows(flown: Flown) -> tuple[dict[str, Any], ...]:
                 "result": tracked.result,
             }
         )
-    return tuple(listed)
+    return tuple(rows)
 
 
 def _tables(flown: Flown) -> tuple[Table, ...]:
@@ -121,7 +121,7 @@ def _tables(flown: Flown) -> tuple[Table, ...]:
     )
 
 
-def _series(flown: Flown) -> Table:
+def _flights_table(flown: Flown) -> Table:
     """Table of every flight."""
     return Table(
         "track-flights",

@@ -12,7 +12,7 @@ CALM, WINDY = 0.0, 3.0
 LINEAR, PREDICTIVE = "linear", "nmpc"
 GUIDANCES = (LINEAR, PREDICTIVE)
 """Values of the configuration's `guidance.kind`."""
-_IN_WIND = (MODEL_FOLLOWING, FIRST_ORDER)
+_PLANNERS_IN_WIND = (MODEL_FOLLOWING, FIRST_ORDER)
 
 
 class Course(NamedTuple):
@@ -88,7 +88,9 @@ def tasks() -> tuple[Task, ...]:
         for guidance in GUIDANCES
         for planner in planners(guidance)
     ]
-    windy = [Task(course, planner, LINEAR, WINDY) for course in COURSES for planner in _IN_WIND]
+    windy = [
+        Task(course, planner, LINEAR, WINDY) for course in COURSES for planner in _PLANNERS_IN_WIND
+    ]
     not_led = [
         Task(course, MODEL_FOLLOWING, LINEAR, wind, lead=False)
         for course in COURSES
