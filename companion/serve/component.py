@@ -22,6 +22,7 @@ _TEXT_REPEAT_PERIOD = 5.0
 """Shortest time between two equal texts to the same client, s."""
 _AUTOPILOT_INVALID, _STATE_ACTIVE, _MAVLINK_VERSION = 8, 4, 3
 _COMMAND_IDS = dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT
+_MISSION_ITEM_IDS = dialect.MAVLINK_MSG_ID_MISSION_ITEM, dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT
 
 WARNING, NOTICE = dialect.MAV_SEVERITY_WARNING, dialect.MAV_SEVERITY_NOTICE
 
@@ -75,23 +76,18 @@ class Component:
         self._network.send(self._frame(message))
 
     def acknowledge(self, client: Client, frame: Frame, result: int, sender: Address) -> None:
-        """Answer a client's command with a MAV_RESULT.
+        """Answer a client's command or mission item; other messages have no answer.
 
         Args:
-            client: sender of the command.
-            frame: COMMAND_LONG, COMMAND_INT or SET_MODE.
-            result: result of the command.
+            client: sender of the frame.
+            frame: COMMAND_LONG, COMMAND_INT, SET_MODE, MISSION_ITEM or any other frame.
+            result: MAV_RESULT of the command; a mission item is denied whatever it is.
             sender: component that answers; clients accept only an answer from the component they
                 commanded.
         """
-        command = decode(frame.message_id, frame.payload)
-        message = dialect.MAVLink_command_ack_message(
-            getattr(command, "command", MAV_CMD_DO_SET_MODE),
-            result,
-            target_system=frame.system,
-            target_component=frame.component,
-        )
-        self._network.send_to(client, self._frame(message, sender))
+        message = _acknowledgement(frame, result)
+        if message is not None:
+            self._network.send_to(client, self._frame(message, sender))
 
     def on_own_frame(self, client: Channel, frame: Frame) -> None:
         """Refuse a command to our component, which carries out none; ignore other frames."""
@@ -133,3 +129,17 @@ def _heartbeat() -> Message:
     return dialect.MAVLink_heartbeat_message(
         MAV_TYPE_ONBOARD_CONTROLLER, _AUTOPILOT_INVALID, 0, 0, _STATE_ACTIVE, _MAVLINK_VERSION
     )
+
+
+def _acknowledgement(frame: Frame, result: int) -> Message | None:
+    """COMMAND_ACK for a command, MISSION_ACK for a mission item; None for other messages."""
+    sender = {"target_system": frame.system, "target_component": frame.component}
+    if frame.message_id in _MISSION_ITEM_IDS:
+        return dialect.MAVLink_mission_ack_message(**sender, type=dialect.MAV_MISSION_DENIED)
+    if frame.message_id == dialect.MAVLINK_MSG_ID_SET_MODE:
+        command = MAV_CMD_DO_SET_MODE
+    elif frame.message_id in _COMMAND_IDS:
+        command = decode(frame.message_id, frame.payload).command
+    else:
+        return None
+    return dialect.MAVLink_command_ack_message(command, result, **sender)

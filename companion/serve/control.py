@@ -134,7 +134,7 @@ class ServedControl:
             return
         situation = self._keeper.situation()
         if situation is None:
-            self._component.answer(client, "setpoint refused: the vehicle's position is unknown")
+            self._component.answer(client, "setpoint refused: the vehicle's position or attitude is unknown")
             return
         now, owner = self._clock(), Program(client, source_of(frame))
         owner_before = self.ownership.owner
@@ -246,5 +246,5 @@ class ServedControl:
                 gc.collect()
 
     def _answer(self, client: Client, frame: Frame, result: int) -> None:
-        """Answer a command that a client addressed to the autopilot, in the autopilot's name."""
+        """Answer a client's frame to the autopilot, in the autopilot's name."""
         self._component.acknowledge(client, frame, result, self._autopilot)

@@ -178,7 +178,7 @@ def test_a_demo_opens_its_page_if_there_is_one(monkeypatch, tmp_path, page):
     if page:
         (log / "report.html").write_text("")
     monkeypatch.setattr(flying, "fly_bundled", lambda *_, **__: SimpleNamespace(log=log))
-    monkeypatch.setattr(flights, "_ended", lambda *_: 0)
+    monkeypatch.setattr(flights, "_report_result", lambda *_: 0)
     monkeypatch.setattr(flights.webbrowser, "open", opened.append)
     assert main(["demo", "--open"]) == 0
     assert opened == ([f"{(log / 'report.html').as_uri()}"] if page else [])
@@ -339,7 +339,7 @@ def test_an_option_of_fly_replaces_its_key(monkeypatch, options, told):
     flown = []
     monkeypatch.setattr(flights, "flight_folder", lambda _: None)
     monkeypatch.setattr(flights, "helper_process", lambda *_, **__: contextlib.nullcontext(None))
-    monkeypatch.setattr(flights, "_ended", lambda *_: 0)
+    monkeypatch.setattr(flights, "_report_result", lambda *_: 0)
     monkeypatch.setattr(flying, "fly", lambda config, *_: flown.append(config))
     config = shipped("px4.yaml")
     assert main(["fly", "--config", str(config), *options]) == 0

@@ -158,6 +158,12 @@ def test_a_station_wins_over_a_client_and_its_stream_is_not_obeyed_any_more(auto
             assert ground.of("COMMAND_ACK")[-1].result == REJECTED
             assert "is in control; change the mode first" in " ".join(ground.texts())
             assert session.control.in_control
+            acks = len(ground.of("COMMAND_ACK"))
+            ground.send(dialect.MAVLink_mission_item_int_message(1, 1, 0, 6, 16, 2, 1, *[0] * 7))
+            ground.send(dialect.MAVLink_request_data_stream_message(1, 1, 0, 1, 1))
+            await stream(0.5, lambda _: script.local(ALL, begin))
+            assert [ack.type for ack in ground.of("MISSION_ACK")] == [dialect.MAV_MISSION_DENIED]
+            assert len(ground.of("COMMAND_ACK")) == acks  # neither of them is a command
         ground.command(*land)
         await stream(1.5, lambda _: script.local(ALL, begin))
         session.changes.change(slower, "a test")  # nobody is in control
