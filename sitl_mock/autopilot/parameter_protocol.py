@@ -66,7 +66,7 @@ class ParameterProtocol:
         PX4's hash cannot be set; such a message is ignored.
         """
         name = message.param_id
-        if name == HASH_NAME:
+        if name == HASH_NAME and self._encoding.hashed:
             return
         if name not in self._parameters:
             self._refuse(message, link, dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST)

@@ -21,6 +21,8 @@ _GLOBAL_FRAMES = frozenset(
         dialect.MAV_FRAME_GLOBAL_INT,
         dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
         dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+        dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT,
+        dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT,
     }
 )
 

@@ -43,6 +43,8 @@ def _asked(headers, client="127.0.0.1", query="", kind="http"):
         ({"host": "127.0.0.1:8090", "origin": "http://127.0.0.1:8091"}, 403),
         ({"host": "127.0.0.1:8090", "origin": "null"}, 403),
         ({"host": "evil.example:8090", "origin": "http://evil.example:8090"}, 403),
+        ({"host": "[::1"}, 403),
+        ({"host": "127.0.0.1:8090", "origin": "http://[::1"}, 403),
         ({}, 403),
     ],
 )

@@ -47,7 +47,7 @@ def test_a_lost_ground_station_returns_after_5_s_though_setpoints_go_on():
 def test_what_else_a_lost_ground_station_may_do():
     rig = ArduRig(parameters={"FS_GCS_TIMEOUT": 1.0})
     rig.lift(3.0)
-    for enable, mode in ((0, "GUIDED"), (5, "LAND"), (7, "BRAKE")):
+    for enable, mode in ((0, "GUIDED"), (5, "LAND"), (6, "RTL"), (7, "BRAKE")):
         rig.switch(GUIDED)
         rig.simulation.parameters.set("FS_GCS_ENABLE", enable)
         rig.heartbeat()
@@ -75,8 +75,9 @@ def test_on_the_ground_a_failsafe_disarms():
     assert rig.texts()[-1] == "Arm: GCS failsafe on"
 
 
-def test_a_low_battery_does_what_its_parameters_say():
-    rig = ArduRig(parameters={"BATT_FS_LOW_ACT": 2, "BATT_FS_CRT_ACT": 1})
+@pytest.mark.parametrize(("critical", "mode"), [(1, "LAND"), (7, "BRAKE")])
+def test_a_low_battery_does_what_its_parameters_say(critical, mode):
+    rig = ArduRig(parameters={"BATT_FS_LOW_ACT": 2})
     rig.lift(3.0)
     fault(rig, "low_battery", remaining=0.15)
     rig.run(0.2)
@@ -86,9 +87,10 @@ def test_a_low_battery_does_what_its_parameters_say():
     assert (rig.state.mode.name, rig.state.failsafe) == ("RTL", True)
     assert rig.texts()[-1].startswith("Battery 1 is low 12.60V used 28")
     rig.simulation.parameters.set("BATT_CRT_MAH", 330.0)
+    rig.simulation.parameters.set("BATT_FS_CRT_ACT", critical)
     fault(rig, "low_battery", remaining=0.05)
     rig.run(0.2)
-    assert rig.state.mode.name == "LAND"
+    assert rig.state.mode.name == mode
     assert rig.texts()[-1].startswith("Battery 1 is critical")
 
 

@@ -70,6 +70,13 @@ def test_parameters_travel_as_floats_with_their_own_types(rig):
     assert rig.messages("PARAM_ERROR")[-1].error == dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST
 
 
+def test_px4s_hash_is_no_parameter_here(rig):
+    answers = len(rig.messages("PARAM_ERROR"))
+    rig.say(dialect.MAVLink_param_set_message(1, 1, b"_HASH_CHECK", 1.0, 9))
+    rig.run(0.1)
+    assert len(rig.messages("PARAM_ERROR")) == answers + 1
+
+
 def test_the_whole_list_comes_without_a_hash(rig):
     before = len(rig.messages("PARAM_VALUE"))
     rig.say(dialect.MAVLink_param_request_list_message(1, 1))

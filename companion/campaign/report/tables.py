@@ -21,6 +21,8 @@ EMPTY = "–"
 _WORST_SHOWN = 10
 _MOST_ROWS = 200
 _MOST_FACTORS = 12
+_MOST_LEVELS = 12
+"""Largest number of values of a factor in the table of two factors."""
 
 
 def worst_cases(results: Results) -> Table:
@@ -122,7 +124,7 @@ def crossed(results: Results) -> Table | None:
     few = [
         name
         for name in results.factors
-        if 1 < len({str(value) for value in columns[name]}) <= _MOST_FACTORS
+        if 1 < len({str(value) for value in columns[name]}) <= _MOST_LEVELS
     ]
     if len(few) < 2:
         return None

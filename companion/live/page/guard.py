@@ -55,7 +55,7 @@ class Guard:
         host, origin = headers.get("host", ""), headers.get("origin")
         if not _is_address_or_own_name(host):
             return f"the live page does not accept the host {host!r}; open it by its IP address"
-        if origin is not None and urlsplit(origin).netloc != host:
+        if origin is not None and _host_in(origin) != host:
             return f"another site, {origin!r}, must not use the live page"
         client = scope.get("client")
         local = client is not None and ip_address(client[0]).is_loopback
@@ -85,9 +85,20 @@ class Guard:
         return sending
 
 
+def _host_in(origin: str) -> str:
+    """The host and port in an Origin header; empty if the header is malformed."""
+    try:
+        return urlsplit(origin).netloc
+    except ValueError:
+        return ""
+
+
 def _is_address_or_own_name(host: str) -> bool:
     """Whether a Host header is an IP address, or a name of this computer that no site can take."""
-    name = urlsplit(f"//{host}").hostname or ""
+    try:
+        name = urlsplit(f"//{host}").hostname or ""
+    except ValueError:  # such as an unclosed bracket
+        return False
     try:
         ip_address(name)
     except ValueError:
