@@ -68,8 +68,7 @@ def doctor(options: argparse.Namespace) -> int:
         else:
             code = run(doctor_run.restore(undo, options.undo))
     except KeyboardInterrupt:
-        doctor_run.say("Interrupted; every parameter that was set is listed above.")
-        return EXIT_FLIGHT
+        code = doctor_run.report_interrupt()
     if options.json:
         print(json.dumps(doctor_run.result, allow_nan=False))
     return code
@@ -145,6 +144,13 @@ class _DoctorRun:
 
     def _make_link(self, notice: Notice) -> Link:
         return open_link(self._config, None, notice)
+
+    def report_interrupt(self) -> int:
+        """Report that Ctrl-C ended the run, and which parameters it had set; return exit code."""
+        self.say("Interrupted; every parameter that was set is listed above.")
+        changes = [outcome_as_dict(outcome) for outcome in self._outcomes]
+        self.result |= {"result": "interrupted", "changes": changes}
+        return EXIT_FLIGHT
 
     async def restore(self, undo: Undo, path: Path) -> int:
         """Restore the parameters that an undo file lists."""

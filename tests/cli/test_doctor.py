@@ -358,3 +358,6 @@ def test_ctrl_c_says_that_what_was_set_is_listed(capsys, tmp_path, monkeypatch):
     code, out, _ = doctor(capsys, "--config", far_away(tmp_path, free_port()))
     assert code == 1
     assert out == "Interrupted; every parameter that was set is listed above.\n"
+    code, out, _ = doctor(capsys, "--config", far_away(tmp_path, free_port()), "--json")
+    assert code == 1
+    assert json.loads(out) == {"result": "interrupted", "changes": []}
