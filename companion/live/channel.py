@@ -45,13 +45,16 @@ class Channel:
         if not self.open:
             return False
         data = json.dumps(message, default=str).encode()
+        if len(data) > _LARGEST_MESSAGE:  # the other end would receive only the beginning
+            self.dropped += 1
+            return False
         try:
             self._end.send(data, socket.MSG_DONTWAIT)
         except BlockingIOError:
             self.dropped += 1
             return False
-        except OSError:  # gone, or larger than the buffer
-            self.open = len(data) > _LARGEST_MESSAGE
+        except OSError:  # the other end is gone
+            self.open = False
             self.dropped += 1
             return False
         return True

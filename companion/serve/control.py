@@ -134,7 +134,7 @@ class ServedControl:
             return
         situation = self._keeper.situation()
         if situation is None:
-            self._component.answer(client, "setpoint refused: the vehicle's position or attitude is unknown")
+            self._component.answer(client, "setpoint refused: position or attitude is unknown")
             return
         now, owner = self._clock(), Program(client, source_of(frame))
         owner_before = self.ownership.owner

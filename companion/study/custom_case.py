@@ -98,7 +98,8 @@ class Case(Section):
 
     @model_validator(mode="after")
     def _inner_loop_makes_sense(self) -> "Case":
-        if self.inner_loop and any(abs(1000.0 / hz - round(1000.0 / hz)) > 1e-9 for hz in self.rates_hz):
+        periods_ms = [1000.0 / hz for hz in self.rates_hz]
+        if self.inner_loop and any(abs(ms - round(ms)) > 1e-9 for ms in periods_ms):
             raise ValueError("with inner_loop, each of rates_hz must divide 1000")
         for key in ("transport_delay_ms", "quickness"):
             if not self.inner_loop and getattr(self, key) != type(self).model_fields[key].default:
