@@ -61,11 +61,11 @@ two axes.
 
 
 class AxisDrag(NamedTuple):
-    """Difference between quadratic drag along the body's axes and the same drag in all directions.
+    """The part of the quadratic drag that depends on the direction of flight.
 
     Along each horizontal body axis the drag is coefficient·|v_i|·v_i, as in PX4's model of bluff
-    body drag. Its mean over all directions belongs to `Drag.quadratic`; the difference has the
-    deceleration coefficient·(|v_i| − 0.85·|v|)·v_i.
+    body drag. Its mean over all directions, 0.85·coefficient·|v|·v_i, belongs to `Drag.quadratic`;
+    the rest decelerates by coefficient·(|v_i| − 0.85·|v|)·v_i.
 
     Attributes:
         coefficient: quadratic drag along an axis per mass, 1/m; 0 for a round body.

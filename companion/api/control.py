@@ -90,7 +90,7 @@ class Control:
             heading: rad; None: the heading at which control began.
 
         Raises:
-            ValueError: a number is not finite or missing; the newest command still counts.
+            ValueError: a number is missing or not finite; the previous command stays in force.
             FlightEnded: control has ended.
         """
         self.follow(
@@ -109,7 +109,7 @@ class Control:
         """Command a reference: the position, velocity and acceleration wanted now.
 
         The vehicle follows it without lag; until the next reference comes, it is extrapolated. Far
-        from it, the vehicle turns as hard as the limits allow; to fly there, use `Vehicle.go_to`.
+        from it, the vehicle tilts as far as the limits allow; to fly there, use `Vehicle.go_to`.
 
         Args:
             reference: state that the vehicle should have now.
@@ -117,7 +117,7 @@ class Control:
                 two references.
 
         Raises:
-            ValueError: a number is not finite or missing; the newest command still counts.
+            ValueError: a number is missing or not finite; the previous command stays in force.
             FlightEnded: control has ended.
         """
         _require_valid(reference, jerk_ned or _ZERO_VECTOR)
@@ -143,7 +143,7 @@ class Control:
             heading: rad; None: the heading at which control began.
 
         Raises:
-            ValueError: a number is not finite or missing; the newest command still counts.
+            ValueError: a number is missing or not finite; the previous command stays in force.
             FlightEnded: control has ended.
         """
         self.follow(
@@ -157,7 +157,7 @@ class Control:
             body_rates: roll, pitch, yaw, rad/s.
 
         Raises:
-            ValueError: a number is not finite or missing; the newest command still counts.
+            ValueError: a number is missing or not finite; the previous command stays in force.
             FlightEnded: control has ended.
         """
         self.follow(self._open_loop_reference(None)._replace(body_rates=BodyRates(*body_rates)))

@@ -67,7 +67,7 @@ class FeedForward:
         self._heading.retune(constants)
 
     def start(self, q: Quaternion, body_rates: BodyRates | None) -> None:
-        """Begin the plan at `q`, a unit quaternion below the recovery angle.
+        """Begin the plan at `q`, a unit quaternion with a tilt below the recovery angle.
 
         `body_rates`: rates at the beginning of the plan, rad/s; None: at rest.
         """

@@ -205,7 +205,12 @@ class SampleHold:
         self._late_share = min(late / period, 1.0)
 
     def rates(self, roll: float, pitch: float) -> tuple[float, float]:
-        """Rates to send, given the mean rates of the plan's newest step, all in rad/s."""
+        """The planned rates, corrected for the lateness of this answer, rad/s.
+
+        Args:
+            roll: mean roll rate that is planned for the newest step, rad/s.
+            pitch: mean pitch rate that is planned for it, rad/s.
+        """
         self._roll = roll + self._late_share * (roll - self._roll)
         self._pitch = pitch + self._late_share * (pitch - self._pitch)
         return self._roll, self._pitch

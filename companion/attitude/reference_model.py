@@ -11,8 +11,9 @@ _LONGEST_REFERENCE = sin(1.4)
 """Longest vector of coefficients at which the reference starts. Towards length 1 (90° of tilt) the
 body rates grow without bound."""
 _LARGEST_RISE = radians(400.0)
-"""Largest change of v within τ behind a lag of second order, rad/s. PX4's motors, measured in its
-simulation, saturate in a jump of v by 270 °/s."""
+"""Largest change of the planned rate v within the lag τ, if the lag is of second order, rad/s.
+
+A jump by 270 °/s saturates PX4's motors in its simulation; spread over τ, 400 °/s does not."""
 _FOUR_ZETA_SQUARED = 2.7
 """Smallest 4·ζ² of the model, where ζ is its damping ratio."""
 _LARGEST_GAIN_TIMES_STEP = 0.1

@@ -98,19 +98,19 @@ class CaseFlight:
 
         vehicle.at(case.flight_s, end)
         summary = run(vehicle, flight.fly())
-        state_at_end = vehicle.state()
+        truth_at_end = vehicle.state()
         flight_s = vehicle.time
         vehicle.after_step.clear()
         while vehicle.state()["armed"] and vehicle.time < flight_s + _WATCHED_AFTERWARDS_S:
             vehicle.step()
-        final_state = vehicle.state()
-        return self._outcomes(summary, state_at_end, final_state, flight_s, begun=fault.begun)
+        truth_afterwards = vehicle.state()
+        return self._outcomes(summary, truth_at_end, truth_afterwards, flight_s, begun=fault.begun)
 
     def _outcomes(
         self,
         summary: Summary,
-        state_at_end: Truth,
-        final_state: Truth,
+        truth_at_end: Truth,
+        truth_afterwards: Truth,
         flight_s: float,
         *,
         begun: bool,
@@ -119,13 +119,13 @@ class CaseFlight:
 
         Args:
             summary: the program's summary.
-            state_at_end: true state of the vehicle when the program ended.
-            final_state: its true state after it disarmed, or `_WATCHED_AFTERWARDS_S` later.
+            truth_at_end: true state of the vehicle when the program ended.
+            truth_afterwards: its true state after it disarmed, or `_WATCHED_AFTERWARDS_S` later.
             flight_s: time from boot to the end of the program, s.
             begun: whether the phase of the fault was reached.
         """
         figures, setpoints = summary.as_dict(), self._vehicle.setpoints
-        crashed, fault = final_state["crashed"], self._case.fault
+        crashed, fault = truth_afterwards["crashed"], self._case.fault
         measured = {
             **outcomes.tracking(summary, np.array(self._truth).reshape(-1, 5)),
             **outcomes.response(summary),
@@ -134,7 +134,7 @@ class CaseFlight:
         }
         documented = None
         if fault is not None and begun and fault.ends:
-            documented = not crashed and _ending(state_at_end, summary.result) in fault.ends
+            documented = not crashed and _ending(truth_at_end, summary.result) in fault.ends
         result = summary.result
         if self._time_limit_reached:
             result = f"not over after {self._case.flight_s:g} s of vehicle time"
@@ -149,7 +149,7 @@ class CaseFlight:
             "as_documented": documented,
             **outcomes.without_nan(measured),
             "setpoints": len(setpoints),
-            "digest": outcomes.digest(setpoints, final_state),
+            "digest": outcomes.digest(setpoints, truth_afterwards),
         }
 
     def _record_truth(self) -> None:

@@ -20,7 +20,7 @@ AnyAction = Literal["warn", "hold", "hand_back", "land"]
 Metres = Annotated[float, Field(ge=-2000.0, le=2000.0)]
 Latitude = Annotated[float, Field(ge=-85.0, le=85.0)]
 Longitude = Annotated[float, Field(ge=-180.0, le=180.0)]
-MonitoredShare = Annotated[float, Field(ge=0.0, le=0.9)]
+AlarmShare = Annotated[float, Field(ge=0.0, le=0.9)]
 """Limit of a share; a limit of 1 could never be exceeded."""
 MOST_CORNERS = 200
 
@@ -80,15 +80,15 @@ class SafetyConfig(Section):
     """Action if the distance is larger for 1 s."""
     thrust_action: AnyAction = "hold"
     """Action if thrust stays at limits.min_thrust or limits.max_thrust for 2 s."""
-    max_loss: MonitoredShare = 0.4
+    max_loss: AlarmShare = 0.4
     """Largest share of lost frames over a second."""
     max_round_trip_ms: Annotated[float, Field(ge=1.0, le=2000.0)] = 150.0
     """Largest round-trip time of the link."""
     link_action: AnyAction = "warn"
     """Action if the loss is larger for 2 s, or the round trip for 5 s."""
-    max_missed: MonitoredShare = 0.25
+    max_missed: AlarmShare = 0.25
     """Largest share of setpoints that miss deadman.deadline_ms, over a second."""
-    max_starved: MonitoredShare = 0.5
+    max_starved: AlarmShare = 0.5
     """CPU starvation: largest share of a second by which our timer may be late."""
     computer_action: AnyAction = "hand_back"
     """Action if max_missed or max_starved is exceeded for 1.5 s."""

@@ -16,15 +16,16 @@ _HALF_LEARNED_SQUARES = 0.01
 
 
 class RateLag:
-    """Learns the lag from the rotations that the mean of two body rates does not explain.
+    """Learns the lag of the reported body rates behind the reported attitude.
 
-    Such a rotation is the lag times the change of the rates. Only roll and pitch count, because the
-    estimator's corrections of the heading are no rotations of the body.
+    Between two samples the attitude turns by more than the mean of the two rates; the difference is
+    the lag times the change of the rates. Only roll and pitch count, because the estimator's
+    corrections of the heading are no rotations of the body.
 
     All rotations count alike, so a lag that changes in flight, as when the autopilot's filter is
-    switched, is followed slowly. That matters little: 11 ms more after one maneuver of corners
-    turned the frame of later steps by 0.1° more (mock vehicles of both autopilots), and by 0.3° if
-    the lag was not followed at all. Forgetting old rotations would win back 0.05°.
+    switched, is followed slowly. That matters little: after `corners` the lag was raised by 11 ms
+    (mock vehicles of both autopilots), and the heading of later steps erred by 0.1° more, without
+    this class by 0.3°. Forgetting old rotations would save only 0.05°.
 
     Attributes:
         seconds: the lag, s; 0 before the first fast rotation.

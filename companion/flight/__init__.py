@@ -1,1 +1,1 @@
-"""One flight: its phases, the watch beside them, and its exits."""
+"""One flight: its phases, the safety watch that runs beside them, and how it ends."""

@@ -1,4 +1,4 @@
-"""The flight context: the parts of one flight that every phase and the watch use."""
+"""The flight context: the parts of one flight that every phase and the safety watch use."""
 
 import asyncio
 from collections.abc import Callable, Iterable

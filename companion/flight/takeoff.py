@@ -19,7 +19,7 @@ _MAX_OVERSHOOT = 3.0
 """A climb has failed this far above the commanded height, m; PX4 overshoots by some tenths."""
 
 _ARRIVAL_TIME = 2.0
-"""Time allowed to reach altitude after the mode shows hold, s; then the climb was stopped."""
+"""Time allowed to reach altitude after hold mode is shown, s; else something ended the climb."""
 
 
 async def takeoff(context: FlightContext) -> None:

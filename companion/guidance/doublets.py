@@ -31,7 +31,7 @@ class _Doublet(NamedTuple):
 
     @property
     def duration(self) -> float:
-        """Duration with the rest that follows a doublet of body rates, s."""
+        """Duration, s; of a doublet of body rates with the pause after it."""
         return 4.0 * self.step + (0.0 if self.body_rates is None else _REST_TIME)
 
     def at(self, time: float, hold: Reference) -> Reference:

@@ -144,7 +144,7 @@ class Corners:
         return [*spread(_HOLD_PAUSE, _HOLD_PAUSE + len(self.CORNERS) * self.step), self.duration]
 
     def at(self, time: float, start: Pose) -> Reference:
-        """The reference: a pause, open-loop coefficients at the corners, then position hold."""
+        """The reference: a pause, steps of the acceleration coefficients to each corner, a hold."""
         rest = Reference(start.position_ned, heading=start.heading)
         if time < _HOLD_PAUSE:
             return rest._replace(drifting=True)

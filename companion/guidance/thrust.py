@@ -36,18 +36,18 @@ def cos_tilt_ahead(q: Quaternion, body_rates: BodyRates, ahead: float) -> float:
     return min(max(cosine, -1.0), 1.0)
 
 
-def largest_tilt(lift: float, largest: float) -> float:
+def largest_tilt(lift: float, largest_thrust: float) -> float:
     """The largest tilt at which the share `TILT_THRUST_SHARE` of the thrust gives the lift, rad.
 
     It is 0 if the lift needs this share or more.
 
     Args:
         lift: upward component of the specific thrust, m/s².
-        largest: largest specific thrust, m/s².
+        largest_thrust: largest specific thrust, m/s².
     """
-    if lift >= TILT_THRUST_SHARE * largest:
+    if lift >= TILT_THRUST_SHARE * largest_thrust:
         return 0.0
-    return acos(max(lift, 0.0) / (TILT_THRUST_SHARE * largest))
+    return acos(max(lift, 0.0) / (TILT_THRUST_SHARE * largest_thrust))
 
 
 def height_first(wanted: Vector, smallest: float, largest: float) -> Vector:

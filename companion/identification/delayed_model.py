@@ -128,8 +128,8 @@ class SecondOrderFit:
 DEAD_TIME_RANGE = 0.0, LONGEST_DEAD_TIME - 0.01
 """Range in which the dead time is searched, s."""
 _RAMP_TIMES = 0.01, 0.5
-"""Range in which the slew limit is searched, as the time (s) that the record's largest change of
-command takes at that limit."""
+"""Shortest and longest ramp of the search for the slew limit, s: how long the largest change of the
+commands takes at that limit."""
 _SAME_COMMAND_SHARE = 0.005
 """Commands that differ by less than this share of their range count as the same."""
 

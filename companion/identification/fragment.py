@@ -89,10 +89,10 @@ def vehicle_fragment(
 
 
 def second_order_axes(vehicle: IdentifiedVehicle) -> dict[str, AxisValues]:
-    """Roll and pitch as lags of second order, as the fragment holds them.
+    """Roll and pitch as lags of second order, as the vehicle file holds them.
 
-    Empty unless both have a good fit, and second order without a slew limit is clearly better on
-    both, with a damping ratio that the configuration accepts.
+    Empty unless both have a good fit, and on both second order without a slew limit fits clearly
+    better than first order, with a damping ratio that the configuration accepts.
     """
     axes = {}
     for name in ("roll", "pitch"):

@@ -19,11 +19,11 @@ class FitQuality:
 
     Attributes:
         explained: R², share of the measurements' variance that the model explains.
-        misfit: error of the model: root mean square of the part of the residual that the commands
-            explain, as a share of the measurements' standard deviation.
-        dead_time_error: standard error of the dead time by noise, s.
-        lag_error: standard error of the lag by noise, s.
-        span: largest command minus smallest command after the slew limit, rad/s.
+        misfit: error of the model: RMS of the part of the residual that correlates with the
+            commands, so it is no noise, as a share of the measurements' standard deviation.
+        dead_time_error: standard error of the dead time due to noise, s.
+        lag_error: standard error of the lag due to noise, s.
+        span: range of the slew-limited commands: largest minus smallest, rad/s.
         excited: number of samples at which the model differs from the command by more than 2 %
             of the span; only these contain information on lag and dead time.
     """

@@ -66,8 +66,8 @@ _IN_FIELD_ORDER: dict[int, Callable[[tuple[Any, ...]], tuple[Any, ...]]] = {
     for number, kind in _CLASSES.items()
     if len(kind.orders) > 1 and set(kind.lengths) == {1} and "s" not in kind.unpacker.format
 }
-"""Functions that put the values of a payload in the order of the constructor, by message number.
-They exist for messages without arrays and texts, as most frequent messages are.
+"""By message number, functions that put a payload's values in the order of the constructor.
+They exist only for messages without arrays and texts, such as most telemetry.
 """
 
 

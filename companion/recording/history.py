@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 HEIGHTS = (1.0, 1.0, 1.0, 1.4)
 """Relative heights of the panels, from top to bottom."""
 _MARGIN_AFTER_END = 0.02
-"""Margin after the end, as a share of the flight."""
+"""Space on the time axis after the end of the flight, as a share of its duration."""
 _ROOM_FOR_NAMES = 1.5
 """Factor on the height axis, which leaves space for the names of the phases."""
 _LATEST_TIME = 1e9

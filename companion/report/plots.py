@@ -65,7 +65,7 @@ def over_time(name: str, curve: Curve, column: int, colour: str, **more: Any) ->
 
 
 def kept_indices(values: Floats) -> Any:
-    """Indices (M,) of the points to draw: the extremes of each of many equal parts, and gaps."""
+    """Indices (M,) of the points to draw: least and largest of each of many slices, and NaNs."""
     count = len(values)
     if count <= _MAX_POINTS:
         return np.arange(count)

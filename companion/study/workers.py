@@ -100,7 +100,7 @@ def interrupts_blocked() -> Iterator[None]:
 def _forward_ticks(
     futures: Sequence[Future[Outcome]], ticks: Any, tick: Callable[[str, str], None]
 ) -> None:
-    """Pass the workers' ticks to `tick` until all studies are done or one of them has failed."""
+    """Pass the workers' progress to `tick` until all studies are done or one has failed."""
     pending = set(futures)
     while pending:
         done, pending = wait(pending, timeout=_POLL_S)

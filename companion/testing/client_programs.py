@@ -24,15 +24,15 @@ async def serving(
     folder: Path | None = None,
     note: Callable[[str], None] = lambda _: None,
 ) -> AsyncGenerator[ServeSession, None]:
-    """Run `companion serve` between a mock vehicle and client programs, inside `run`.
+    """Run `companion serve` between a mock vehicle and client programs, inside `testing.run`.
 
     `serve.clients`, `link.endpoint` and `realtime` have no effect, and `link.lockstep` is set to
     match the vehicle. Clients connect by `Program(...).connect(session)`.
 
     Args:
         config: configuration of the vehicle and of `serve`.
-        vehicle: vehicle that was passed to `run`.
-        folder: folder for the folders of flights under a client's control; None: nothing is
+        vehicle: vehicle that was passed to `testing.run`.
+        folder: gets one folder for each flight under a client's control; None: nothing is
             recorded.
         note: called with events as sentences.
 

@@ -85,7 +85,7 @@ def _loop_time_ns() -> int:
 
 
 environment = Environment(open_wire, _loop_time_ns, realtime=False)
-"""Environment of a flight inside `run`; its latencies are 0, because no time passes."""
+"""Environment of a flight inside `run`; latencies are 0: time stands still while code runs."""
 
 
 def session(

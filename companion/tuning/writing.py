@@ -19,7 +19,7 @@ Flights = Mapping[str, tuple[CourseResult, CourseResult]]
 
 
 _WORSE_FACTOR, _WORSE_BY = 1.25, 0.01
-"""A course is flown worse if its true error grows beyond this factor and by more than this, m."""
+"""A course is flown worse if its true error grows both by this factor and by this distance, m."""
 
 
 def proposal_text(

@@ -28,8 +28,8 @@ _MIN_CLOCK_SETBACK = 0.5
 """A TIMESYNC time this far behind the newest stamp, s, means that the clock was set back."""
 _TIMESYNC_LAG = 0.012
 """Largest lag of TIMESYNC behind the samples' stamps in the simulators, s (measured)."""
-_UNKNOWN_AGE_DELAY = 3.0
-"""An unknown age is reported this long after the first sample, s; TIMESYNC is answered by then."""
+_TIMESYNC_WAIT = 3.0
+"""Time after the first sample before an unknown age is reported, s: TIMESYNC takes a while."""
 
 
 class VehicleClock:
@@ -161,7 +161,7 @@ class VehicleClock:
             now: Event-loop time, s.
         """
         self.delay.expire(now)
-        if now - self._began < _UNKNOWN_AGE_DELAY or self.age_known is not self._reported_unknown:
+        if now - self._began < _TIMESYNC_WAIT or self.age_known is not self._reported_unknown:
             return
         self._reported_unknown = not self.age_known
         if self._reported_unknown:
@@ -214,9 +214,9 @@ class VehicleClock:
         return True
 
     def _end_misfits(self, time_boot_ms: int, late: float) -> None:
-        """Take a sample that fits again and came `late` seconds late.
+        """Take the first sample whose stamp fits the clock again; it came `late` seconds late.
 
-        If all misfits before it repeated one stamp, the clock stood still.
+        If all samples before it that did not fit repeated one stamp, the clock stood still.
         """
         stood_still = self._misfits.stood_still(self._newest)
         lasted = self._misfits.stamps[-1].received - self._received

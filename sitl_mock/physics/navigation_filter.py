@@ -167,8 +167,9 @@ class NavigationFilter:
     def _next_alignment(self, velocity: complex, acceleration: complex, elapsed: float) -> float:
         """Return the next heading error without its noise, rad.
 
-        Without acceleration the heading follows the compass. In a horizontal acceleration it
-        follows the fixes, because they measure its direction. In a turn, late fixes lag behind it.
+        Without acceleration the heading follows the compass. With a horizontal acceleration it
+        follows the fixes, which show the direction of the acceleration. In a turn this direction
+        lags, because the fixes are late.
         """
         config, compass_rate = self._config, 1.0 / _COMPASS_TIME_S
         cross_product = (velocity.conjugate() * acceleration).imag

@@ -1,6 +1,7 @@
 """PX4's health report: events with the failing checks, and the modes that can be armed.
 
-The bytes are recorded. Names come from PX4's source where a name with the id was found.
+The bytes of the events are those that a PX4 sent. An event's id is a hash of its name; where a
+name in PX4's source has this hash, it stands here.
 """
 
 import struct

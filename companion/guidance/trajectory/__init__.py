@@ -14,7 +14,7 @@ World NED, SI units, radians; positions are relative to where the trajectory beg
 has its own page: `help(companion.guidance.trajectory.waypoints)`.
 
 A trajectory
-    Trajectory       what a trajectory is: any class with these five members
+    Trajectory       protocol: any class with its members is a trajectory
     Sample           position, velocity, acceleration, jerk, heading and heading rate at one instant
     TrajectoryError  it cannot be made or flown; its text is for the user
     Vector           (north, east, down)

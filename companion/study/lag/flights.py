@@ -244,7 +244,7 @@ def _fly(
     rate_hz: float,
     limits: Limits = Limits(),  # noqa: B008  (frozen)
 ) -> Response:
-    """Fly a method; only model-following takes the times of the rate loop."""
+    """Fly a method; only model-following uses `times`, the lag and dead time it is told."""
     options = times._asdict() if method is FOLLOWING else {}
     planner: Planner = make_planner(method.planner, FIGURE_2.gain, limits=limits, **options)
     return fly_loop(planner, step_at(rate_hz), loop)

@@ -141,7 +141,7 @@ def _errors_table(name: str, caption: str, scores: dict[TimesError, Score]) -> T
 
 
 def _worst_table(grid: Grid) -> Table:
-    """Cross-track with the worst error, and of the best other method, by sample rate and lag."""
+    """Cross-track of model-following with the worst error, and of the best other method."""
     dead_times = sorted({cell.dead_time_ms for cell in grid})
     rows: list[tuple[Cell, ...]] = []
     for rate, lag in product(RATES_HZ, sorted({cell.lag_ms for cell in grid})):

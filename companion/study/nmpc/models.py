@@ -35,10 +35,10 @@ ModelName = Literal["proposed", "limited", "euler", "euler-reduced", "quaternion
 
 
 def proposed(settings: Settings) -> Model:
-    """Equation 34: p, v, c and heading; control (c_d N, E, heading, specific thrust).
+    """Equation 34: state: position, velocity V, c, heading; control: c_d N, E, heading, thrust T.
 
-    V̇ = [T·c_N, T·c_E, g − T·√(1 − c_N² − c_E²)] − d(V) + w, ċ = p·(c_d − c), the heading likewise.
-    Only the product with the thrust, and the root, are nonlinear.
+    V̇ = [T·c_N, T·c_E, g − T·√(1 − c_N² − c_E²)] − d(V) + w, ċ = p·(c_d − c), the heading likewise;
+    w is the disturbance, d the drag. Only the product with the thrust, and the root, are nonlinear.
     """
     symbols = Symbols(size=9)
     return symbols.model(

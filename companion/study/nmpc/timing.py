@@ -28,7 +28,7 @@ class State(NamedTuple):
     Attributes:
         offset: position relative to its place on the circle, m, NED.
         velocity: m/s, NED.
-        coefficients: coefficients of its attitude.
+        coefficients: acceleration coefficients (north, east) of its attitude.
         body_rates: rad/s.
     """
 
