@@ -116,5 +116,7 @@ def check(options: argparse.Namespace) -> int:
         print(text)
     for value in suspect_values(config):
         print(f"warning: {value.sentence()}")
+    if config.flight.trajectory is not None and "trajectory" not in config.flight.maneuvers:
+        print("warning: flight.trajectory is not flown; add trajectory to flight.maneuvers")
     print(f"{options.file}: ok")
     return EXIT_OK

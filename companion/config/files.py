@@ -10,6 +10,7 @@ from typing import Any
 
 from companion.config import Config
 from companion.config.root import MOST_INCLUDED
+from companion.config.trajectory_file import is_table
 from companion.files import bounded_yaml, yaml_file
 from companion.files.bounded_yaml import Where
 from companion.files.yaml_faults import dotted_keys, shortened
@@ -36,6 +37,10 @@ def load(path: Path) -> Config:
         ConfigError: a file is missing, includes itself or too many files, is not YAML, or holds an
             unknown key or a bad value.
     """
+    if is_table(path):
+        raise ConfigError(
+            f"{path} is a table of a trajectory, not a configuration; fly it with --trajectory"
+        )
     own = _read(path)
     merged = Contents({}, {})
     _IncludeReader(merged).add_included((path,), own.keys)

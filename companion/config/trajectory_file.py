@@ -20,19 +20,25 @@ from companion.guidance.trajectory import (
     Frame,
     HeadingFrom,
     SampleOptions,
+    Table,
     Trajectory,
     TrajectoryError,
     computable,
     from_samples,
     read_csv,
 )
+from companion.guidance.trajectory.demand import Floats
 from companion.guidance.trajectory.spline_curve import SplineCurve
 from companion.guidance.trajectory.timed_curve import TimedCurve
 from companion.guidance.trajectory.waypoints import largest_detour
 
 _MOST_COLUMNS_SHOWN = 10
 _SMALLEST_DETOUR = 0.05
-"""Smallest distance of a curve from the lines between its waypoints that a note reports, m."""
+"""Smallest distance of a curve from the lines between its points that a note reports, m."""
+_SHORTEST_RAMP = 0.05
+"""Shortest extra duration by ramps that a note reports, s."""
+_MOST_ROWS_COMPARED = 2000
+"""Largest number of rows of a table that the path is compared with; more are dense anyway."""
 
 
 class _Shape(Protocol):
@@ -79,7 +85,7 @@ class CsvShape(Section):
             trajectory = from_samples(table, options, self.file.stem)
         except TrajectoryError as error:
             raise TrajectoryError(f"{path}: {error}") from error
-        return LoadedTrajectory(trajectory, _table_notes(path, frame, table.unused))
+        return LoadedTrajectory(trajectory, _table_notes(path, frame, table, trajectory))
 
     def _frame(self, table_frame: str | None, path: Path) -> Frame | None:
         """The frame that this section or the table names; None if neither does."""
@@ -115,28 +121,49 @@ _AXES = {
 }
 
 
-def _table_notes(path: Path, frame: Frame | None, unused: tuple[str, ...]) -> tuple[str, ...]:
-    """The frame of a table, with a remark if it is assumed, and the columns that are not read."""
+def _table_notes(
+    path: Path, frame: Frame | None, table: Table, trajectory: TimedCurve
+) -> tuple[str, ...]:
+    """The frame of a table, and what a user may not expect of the trajectory through it."""
     axes = f"{path.name} is read in s, m and rad with {_AXES[frame or Frame.ENU]}"
     if frame is None:
         axes += (
             ", because it names no frame; to name one, write `# frame: ned` in its first line, or "
             "csv.frame in a YAML file that names it"
         )
-    unread = f"{path.name}: these columns are not used: {', '.join(unused[:_MOST_COLUMNS_SHOWN])}"
-    return (axes, unread) if unused else (axes,)
+    notes = [axes]
+    if table.unused:
+        names = ", ".join(table.unused[:_MOST_COLUMNS_SHOWN])
+        notes.append(f"{path.name}: these columns are not used: {names}")
+    lasts = float(table.times[-1])
+    if trajectory.duration > lasts + _SHORTEST_RAMP:
+        notes.append(
+            f"{path.name} begins or ends in motion: ramps from and to rest make it last "
+            f"{trajectory.duration:.1f} s instead of {lasts:.1f} s"
+        )
+    if table.times.size <= _MOST_ROWS_COMPARED:
+        notes += _detour_notes(trajectory, table.times, "give more rows")
+    return tuple(notes)
 
 
-def _detour_notes(trajectory: Trajectory) -> tuple[str, ...]:
-    """A note on how far a curve through waypoints leaves the lines between them; may be empty."""
+def _detour_notes(
+    trajectory: Trajectory, times: Floats | None = None, remedy: str = "set waypoints.stops: true"
+) -> tuple[str, ...]:
+    """A note on how far a curve leaves the straight lines between its points; may be empty.
+
+    Args:
+        trajectory: the trajectory; only a spline has a note.
+        times: (k,), when the spline is at its points, s; None: its knots.
+        remedy: what to do to fly along the lines.
+    """
     if not (isinstance(trajectory, TimedCurve) and isinstance(trajectory.curve, SplineCurve)):
         return ()
-    detour = largest_detour(trajectory.curve.spline)
+    detour = largest_detour(trajectory.curve.spline, times)
     if detour < _SMALLEST_DETOUR:
         return ()
     return (
         f"{trajectory.name}: the curve leaves the straight lines between its points by up to "
-        f"{detour:.1f} m; to fly along the lines, set waypoints.stops: true",
+        f"{detour:.1f} m; to fly along the lines, {remedy}",
     )
 
 

@@ -215,6 +215,19 @@ def test_set_changes_keys_and_the_last_one_wins():
     assert (config.limits.max_tilt_deg, config.flight.arm) == (21.0, True)
 
 
+def test_a_path_that_is_not_flown_and_a_table_for_a_configuration_are_told(tmp_path, capsys):
+    table = tmp_path / "path.csv"
+    table.write_text("t,x,y,z\n0,0,0,0\n3,4,0,0\n6,4,4,0\n9,4,4,2\n")
+    path = tmp_path / "a.yaml"
+    path.write_text("flight: {trajectory: path.csv}\n")
+    assert main(["check-config", str(path)]) == 0
+    assert "flight.trajectory is not flown; add trajectory to" in capsys.readouterr().out
+    assert main(["check-config", str(path), "--set", "flight.maneuvers=[trajectory]"]) == 0
+    assert "not flown" not in capsys.readouterr().out
+    assert main(["check-config", str(table)]) == 2
+    assert "is a table of a trajectory, not a configuration" in capsys.readouterr().err
+
+
 def test_help_leaves_the_keyboard_interrupt_as_it_was():
     before = signal.getsignal(signal.SIGINT)
     for arguments in (["--help"], ["no-such-command"]):

@@ -244,18 +244,36 @@ def test_the_frame_of_a_table_is_said_and_changes_where_it_leads(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("\n".join(TABLE))
     assumed, notes = read(path)
-    (note,) = notes
+    note, longer = notes
     assert note.startswith(
         "a.csv is read in s, m and rad with x east, y north, z up (enu), because it"
     )
     assert "# frame: ned" in note
+    assert longer.startswith("a.csv begins or ends in motion: ramps")
     path.write_text("\n".join(["# frame: ned", *TABLE]))
     told, notes = read(path)
-    assert notes == ("a.csv is read in s, m and rad with x north, y east, z down (ned)",)
+    assert notes[0] == "a.csv is read in s, m and rad with x north, y east, z down (ned)"
     north, east, down = told.at(1.5).position
     assert assumed.at(1.5).position == pytest.approx((east, north, -down))
     (tmp_path / "b.yaml").write_text("csv: {file: a.csv, frame: ned}")
     assert read(tmp_path / "b.yaml").notes == notes
+
+
+def test_a_table_with_few_rows_says_how_its_path_and_its_duration_differ(tmp_path):
+    path = tmp_path / "square.csv"
+    corners = [(0, 0), (4, 0), (4, 4), (4, 4), (0, 4), (0, 0)]
+    path.write_text(
+        "t,x,y,z\n" + "".join(f"{3 * k},{x},{y},0\n" for k, (x, y) in enumerate(corners))
+    )
+    square, notes = read(path)
+    _, longer, detour = notes
+    assert f"make it last {square.duration:.1f} s instead of 15.0 s" in longer
+    east = [square.at(0.02 * k).position[1] for k in range(int(square.duration / 0.02))]
+    outside = max(max(east) - 4.0, -min(east))
+    assert outside > 0.5
+    told = float(detour.split("up to ")[1].split(" m")[0])
+    assert told >= round(outside, 1)
+    assert detour.endswith("to fly along the lines, give more rows")
 
 
 @pytest.mark.parametrize(

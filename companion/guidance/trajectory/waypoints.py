@@ -24,6 +24,10 @@ from companion.guidance.trajectory.timed_curve import (
 
 _SAMPLES_PER_SEGMENT = 200
 """Samples of each segment, to find its largest speed and acceleration."""
+_DETOUR_SAMPLES = 20
+"""Samples of each segment, to find its distance from a straight line."""
+_SMALLEST_SQUARE = 1e-12
+"""Smallest squared length of a segment, m²: points may coincide."""
 
 
 def waypoints(
@@ -130,9 +134,9 @@ def _stretch_factor(
     return max(float(fastest) / speed, float(np.sqrt(strongest / acceleration)))
 
 
-def _sampled(spline: SepticSpline, knots: Floats) -> Floats:
-    """The spline along evenly spaced times of each segment, and at the end."""
-    fine = np.linspace(0.0, knots.size - 1.0, _SAMPLES_PER_SEGMENT * (knots.size - 1) + 1)
+def _sampled(spline: SepticSpline, knots: Floats, count: int = _SAMPLES_PER_SEGMENT) -> Floats:
+    """The spline along `count` evenly spaced times of each segment, and at the end."""
+    fine = np.linspace(0.0, knots.size - 1.0, count * (knots.size - 1) + 1)
     return spline.along(np.interp(fine, np.arange(knots.size), knots))
 
 
@@ -149,11 +153,18 @@ def given_headings(knots: Floats, headings: Sequence[float | None]) -> SplineHea
     return SplineHeading(minimum_snap(knots, Fixed(states, _rest_to_rest_mask(given))))
 
 
-def largest_detour(spline: SepticSpline) -> float:
-    """Largest distance of a spline from the straight lines between its knots, m."""
-    path = _sampled(spline, spline.knots)[:, :, 0]
-    lines = np.diff(path[::_SAMPLES_PER_SEGMENT], axis=0)[:, None]  # (k, 1, 3)
-    ways = path[:-1].reshape(len(lines), _SAMPLES_PER_SEGMENT, 3)
+def largest_detour(spline: SepticSpline, times: Floats | None = None) -> float:
+    """Largest distance of a spline from the straight lines between its places at some times, m.
+
+    Args:
+        spline: the spline.
+        times: (k,), phases of the spline, increasing; None: its knots.
+    """
+    points = spline.knots if times is None else times
+    path = _sampled(spline, points, _DETOUR_SAMPLES)[:, :, 0]
+    lines = np.diff(path[::_DETOUR_SAMPLES], axis=0)[:, None]  # (k, 1, 3)
+    ways = path[:-1].reshape(len(lines), _DETOUR_SAMPLES, 3)
     ways = ways - ways[:, :1]
-    shares = np.clip((ways * lines).sum(axis=2) / (lines * lines).sum(axis=2), 0.0, 1.0)
+    squares = np.maximum((lines * lines).sum(axis=2), _SMALLEST_SQUARE)
+    shares = np.clip((ways * lines).sum(axis=2) / squares, 0.0, 1.0)
     return float(np.linalg.norm(ways - shares[..., None] * lines, axis=2).max())
