@@ -88,7 +88,7 @@ class Case(Section):
             raise ValueError(f"unknown method {unknown[0]!r} in methods; known: {known}")
         for key in ("methods", "rates_hz"):
             if len(set(getattr(self, key))) < len(getattr(self, key)):
-                raise ValueError(f"{key} names a value twice")
+                raise ValueError(f"{key} has the same value twice")
         if self.steps_to_fly > MOST_STEPS:
             raise ValueError(
                 f"{self.steps_to_fly:.0f} steps to fly, more than the {MOST_STEPS:.0f} that fit"
@@ -98,7 +98,9 @@ class Case(Section):
 
     @model_validator(mode="after")
     def _inner_loop_makes_sense(self) -> "Case":
-        if self.inner_loop and any(abs(1000.0 / hz - round(1000.0 / hz)) > 1e-9 for hz in self.rates_hz):
+        if self.inner_loop and any(
+            abs(1000.0 / hz - round(1000.0 / hz)) > 1e-9 for hz in self.rates_hz
+        ):
             raise ValueError("with inner_loop, each of rates_hz must divide 1000")
         for key in ("transport_delay_ms", "quickness"):
             if not self.inner_loop and getattr(self, key) != type(self).model_fields[key].default:

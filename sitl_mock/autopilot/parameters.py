@@ -162,7 +162,9 @@ class ParameterTable:
         try:
             self._values[name] = struct.unpack(layout, struct.pack(layout, value))[0]
         except (OverflowError, struct.error) as error:
-            raise ParameterRefusedError(f"{value:g} does not fit into the 32 bits of {name}") from error
+            raise ParameterRefusedError(
+                f"{value:g} does not fit into the 32 bits of {name}"
+            ) from error
 
     def hash(self) -> int:
         """Return PX4's ``_HASH_CHECK``: the CRC-32 over all names and values, in index order."""

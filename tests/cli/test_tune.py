@@ -48,7 +48,7 @@ def test_it_writes_a_file_that_a_configuration_includes(vehicle, tmp_path, capsy
     assert load(including).guidance == tuned.guidance
     code, _, error = run(capsys, vehicle, "--output", out, "--no-flights")
     assert code == 2
-    assert "exists; name another with --output" in error
+    assert "exists; choose another file with --output" in error
 
 
 def test_a_folder_gives_its_configuration_and_the_drag_that_was_learned(vehicle, tmp_path, capsys):

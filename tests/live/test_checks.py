@@ -24,7 +24,7 @@ def test_margins_are_kept():
     px4 = load(shipped("px4.yaml"))
     gain = {"planner": {"gain_per_s": 11.0}}
     with pytest.raises(
-        ConfigError, match=r"keeps margins of .* only; .* must keep 4\.0 dB and 20°"
+        ConfigError, match=r"margins of only .*; .* must leave at least 4\.0 dB and 20°"
     ):
         ChangeChecks(px4, follows=False).check(gain, "a test")
     checks = ChangeChecks(px4, follows=False)

@@ -14,7 +14,9 @@ MISTAKES = {
     "lockstep: {enable: true}": ("mock.lockstep.enable", "did you mean enabled?"),
     "parameters: {COM_OBL_RC_AC: 3}": ("COM_OBL_RC_AC", "did you mean COM_OBL_RC_ACT?"),
     "parameters: {COM_OBL_RC_ACT: 3.5}": ("COM_OBL_RC_ACT is an integer",),
-    "parameters: {MPC_XY_VEL_MAX: 1.0e+300}": ("1e+300 does not fit into the 32 bits of MPC_XY_VEL_MAX",),
+    "parameters: {MPC_XY_VEL_MAX: 1.0e+300}": (
+        "1e+300 does not fit into the 32 bits of MPC_XY_VEL_MAX",
+    ),
     "parameters: {NAV_RCL_ACT: 1.0e+12}": ("1e+12 does not fit into the 32 bits of NAV_RCL_ACT",),
     "mass_kg: 2": ("line 2: mock.mass_kg is in the wrong section; write mock.airframe.mass_kg",),
     "prearm_delay_s: 5 s": ("line 2: mock.prearm_delay_s must be a number: write 5 without 's'",),
