@@ -45,7 +45,7 @@ ENOSPC = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         (
             ZeroDivisionError("oops"),
             1,
-            "internal error: ZeroDivisionError('oops'); run again with --debug for where it "
+            "internal error: ZeroDivisionError('oops'); run again with --debug to see where it "
             "happened",
         ),
     ],

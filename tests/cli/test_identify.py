@@ -158,7 +158,7 @@ def test_a_file_that_is_no_log_is_refused_as_usage(capsys, tmp_path):
     [
         ("there.yaml", "exists; choose another file with --out"),
         ("no/v.yaml", "there is no folder"),
-        ("folder", "folder is a folder; name a file in it with --out"),
+        ("folder", "folder is a folder; choose a file in it with --out"),
         ("locked/v.yaml", "locked cannot be written"),
     ],
 )

@@ -90,7 +90,7 @@ def test_three_lines_say_what_is_flown_how_it_moves_and_how_all_is():
     first, second, third = status_lines(HOVERING)
     assert plain(first) == "maneuvers 47 s circle, 5 of 14 s"
     assert plain(second) == "height 5.0 m speed 2.0 m/s tilt 12° tracking error 0.04 m"
-    assert plain(third) == "safety no alarm 250 Hz latency 0.12 ms (3 late) battery 83 % 15.9 V"
+    assert plain(third) == "safety ok 250 Hz latency 0.12 ms (3 late) battery 83 % 15.9 V"
     assert max(map(len, (first, second, third))) < 80
 
 

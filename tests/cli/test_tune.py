@@ -97,7 +97,7 @@ def test_the_noise_of_the_flight_in_the_folder_counts(vehicle, capsys):
 def test_a_folder_is_no_file_to_write(vehicle, tmp_path, capsys):
     code, _, error = run(capsys, vehicle, "--output", tmp_path, "--no-flights")
     assert code == 2
-    assert f"{tmp_path} is a folder; name a file in it with --output" in error
+    assert f"{tmp_path} is a folder; choose a file in it with --output" in error
 
 
 def test_what_is_no_flight_folder_needs_a_vehicle_file(tmp_path, capsys):
