@@ -79,7 +79,9 @@ def _parser() -> argparse.ArgumentParser:
         "--lockstep", action="store_true", help="lockstep: wait for an answer to each step"
     )
     parser.add_argument("--count", type=int, default=1, help="number of vehicles (1..100)")
-    parser.add_argument("--headless", action="store_true", help="no live line on the terminal")
+    parser.add_argument(
+        "--headless", action="store_true", help="show no status line on the terminal"
+    )
     parser.add_argument(
         "--end-with-stdin", action="store_true", help="exit when standard input ends"
     )

@@ -166,7 +166,7 @@ async def _interrupt(session: Session, reason: str) -> bool:
 async def _end_flight(program: Program) -> None:
     """End the flight: hand back in the air; on the ground leave the vehicle as it is."""
     if program.busy:
-        program.interrupt("the program ended before what it had asked for")
+        program.interrupt("the program ended before its request was completed")
     elif not program.over:
         await program.request(_ending_phases, last=True)
 

@@ -202,4 +202,4 @@ def _require_valid(reference: Reference, jerk_ned: Vector) -> None:
         *(() if reference.thrust is None else (reference.thrust,)),
     ]
     if not all(map(isfinite, values)):
-        raise ValueError(f"a command must be finite, not {reference}")
+        raise ValueError(f"all numbers of a command must be finite; got {reference}")

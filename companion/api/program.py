@@ -108,7 +108,7 @@ class Program:
         except asyncio.CancelledError:
             if request in self._waiting:
                 self._waiting.remove(request)
-            self.interrupt("the program cancelled what it had asked for")
+            self.interrupt("the program cancelled its request")
             raise
 
     @property

@@ -185,8 +185,10 @@ def _ratios(group: dict[str, float]) -> dict[str, float]:
 def _show(figures: dict[str, Any]) -> None:
     how_computed = "compiled by numba" if figures["compiled"] else "in Python"
     table = Table(
-        title=f"ns a step and × baseline, the best of many; batches {how_computed}",
-        caption="baseline: a bare Python call; of a batch, a copy of its attitudes and targets",
+        title="Time of a planner step: ns, and multiple of the baseline (best of many repeats; "
+        f"batches {how_computed})",
+        caption="baseline: a Python call that does nothing; for batches, copying their attitudes "
+        "and targets",
     )
     table.add_column("", no_wrap=True)
     for heading in ("flight", "new target", *(f"of {count:,}" for count in BATCHES)):
@@ -199,9 +201,9 @@ def _show(figures: dict[str, Any]) -> None:
     console = Console()
     console.print(table)
     console.print(
-        f"{simulated['seconds_per_second']:.3g} simulated seconds a second on one core: "
-        f"{VEHICLES:,} vehicles at {RATE_HZ:g} Hz, first-order, {simulated['step_ns']:.3g} ns a"
-        " step with its rotation (batch.advance checks its arrays once, batch.rates at each call)",
+        f"One core simulates {simulated['seconds_per_second']:.3g} s of flight per second: "
+        f"{VEHICLES:,} vehicles at {RATE_HZ:g} Hz, first-order, {simulated['step_ns']:.3g} ns for a"
+        " step and its rotation (batch.advance checks its arrays once, batch.rates at every call).",
         highlight=False,
     )
     if not figures["compiled"]:

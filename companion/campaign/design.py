@@ -49,10 +49,10 @@ def too_few_samples(file: CampaignFile) -> str | None:
     ]
     if not names:
         return None
-    values = "a single value" if samples == 1 else f"{samples} values at most"
+    values = "only one value" if samples == 1 else f"at most {samples} values"
     return (
-        f"samples is {samples}, so {values} of {', '.join(names)} will be flown; raise samples, or "
-        "give a list, of which every value is flown"
+        f"samples: {samples} flies {values} of {', '.join(names)}; raise samples, or give a list: "
+        "all its values are flown"
     )
 
 

@@ -137,7 +137,7 @@ class CaseFlight:
             documented = not crashed and _ending(truth_at_end, summary.result) in fault.ends
         result = summary.result
         if self._time_limit_reached:
-            result = f"not over after {self._case.flight_s:g} s of vehicle time"
+            result = f"ended by limits.flight_s after {self._case.flight_s:g} s of vehicle time"
         failed = outcomes.failed_checks(figures)
         good = result == "ok" and not failed and not crashed
         return {

@@ -66,7 +66,7 @@ def rerun(campaign_folder: Path, index: int) -> Rerun:
     lines.append(
         f"It differs from the campaign's flight in {', '.join(changed)}."
         if changed
-        else f"It is the campaign's flight to the bit: digest {row['digest']}."
+        else f"It is bit-identical to the campaign's flight: digest {row['digest']}."
     )
     return Rerun(row, recording, not changed, tuple(lines))
 

@@ -196,7 +196,7 @@ class _Run:
     def _stopped(self, why: str) -> int:
         """Tell how to continue; return the exit code."""
         if not folder.begun(self._folder):
-            self._console.print(f"{why}; nothing was begun")
+            self._console.print(f"{why}; no campaign was started")
             return FAILED
         description = folder.read_description(self._folder)
         units = ranges(description.cases, description.unit)

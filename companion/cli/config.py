@@ -84,7 +84,7 @@ def init(options: argparse.Namespace) -> int:
         lines.append(included[included.index("vehicle:\n") :])
     out = Path(options.out)
     if out.exists() or out.is_symlink():
-        raise ConfigError(f"{out} exists already; name another with --out")
+        raise ConfigError(f"{out} exists already; choose another file with --out")
     try:
         write_whole(out, "".join(lines).removeprefix("#\n"))
     except OSError as error:

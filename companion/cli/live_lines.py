@@ -64,7 +64,7 @@ def _battery(status: FlightStatus) -> str:
 def _safety(status: FlightStatus) -> str:
     if status.alarms:
         return "ALARM: " + ", ".join(status.alarms)
-    return "quiet" if status.monitored else "not on"
+    return "ok" if status.monitored else "off"
 
 
 def _number(value: float | None, digits: str, unit: str) -> str:

@@ -19,14 +19,14 @@ def require_writable(output: Path, option: str, *, force: bool) -> None:
     """
     folder = output.parent
     if output.is_dir():
-        raise ConfigError(f"{output} is a folder; name a file in it with {option}")
+        raise ConfigError(f"{output} is a folder; choose a file in it with {option}")
     if output.exists() and not force:
         raise ConfigError(
-            f"{output} exists; name another with {option}, or replace it with --force"
+            f"{output} exists; choose another file with {option}, or replace it with --force"
         )
     if not folder.is_dir():
         raise ConfigError(f"{output}: there is no folder {folder}")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise ConfigError(
-            f"{output}: the folder {folder} cannot be written; name another with {option}"
+            f"{output}: the folder {folder} cannot be written; choose another file with {option}"
         )

@@ -67,7 +67,7 @@ def run(command: Command, options: argparse.Namespace) -> int:
     except Exception as error:
         if options.debug:
             traceback.print_exc()
-        _print_error(f"internal error: {error!r}; run again with --debug for where it happened")
+        _print_error(f"internal error: {error!r}; run again with --debug to see where it happened")
     lost = lost_output()
     # An error without a file may be that of standard output, which is reported below.
     if os_error is not None and (lost is None or os_error.filename is not None):

@@ -122,7 +122,7 @@ class _IncludeReader:
             raise ConfigError(f"{chain[0]}: a file must not include itself: {names}")
         if len(chain) - 1 > _MAX_DEPTH:
             raise ConfigError(
-                f"{including_file}: an include must not be deeper than {_MAX_DEPTH} files"
+                f"{including_file}: includes may be nested at most {_MAX_DEPTH} files deep"
             )
         try:
             part = _read(path)
@@ -148,7 +148,7 @@ def _check_part(included: Path, part: dict[str, Any]) -> None:
     for section, values in part.items():
         if section == "mock":
             raise ConfigError(
-                f"{included}: `mock` must not stand here: "
+                f"{included}: `mock` is not allowed in an included file: "
                 "the mock vehicle reads only the main file; move the section there"
             )
         if section == _INCLUDE:

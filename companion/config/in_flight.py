@@ -89,7 +89,8 @@ def changed_in_flight(start: Config, now: Config, values: Values, name: str) -> 
                 raise ConfigError(f"{name}: there is no key `{full}`")
             if (section, key) not in changeable():
                 raise ConfigError(
-                    f"{name}: {full} must not change in flight; it counts from the next flight on"
+                    f"{name}: {full} cannot be changed in flight; "
+                    "a change applies from the next flight on"
                 )
     wanted = changed(now, values, name)
     for section, keys in values.items():

@@ -75,7 +75,7 @@ def _model_line(name: str, response: RateResponse, second_order: SecondOrderFit 
         return f"{name}: second order, which {explained}; first order {first}"
     if better is None:
         return f"{name}: a lag of first order {first}; second order is not clearly better"
-    return f"{name}: written as first order, which {first}, though nearer: {better.described}"
+    return f"{name}: written as first order, which {first}; a better fit: {better.described}"
 
 
 def _thrust_line(thrust: ThrustMap | None, gravity: float) -> str:

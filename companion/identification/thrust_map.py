@@ -49,9 +49,12 @@ class ThrustMap:
         if not self.explained >= _LEAST_EXPLAINED:
             return f"it explains {self.explained:.0%} of the measured thrust"
         if not self.slope > 0.0:
-            return "more thrust was commanded, and less was measured"
+            return "the measured thrust falls when the commanded thrust rises"
         if not self.lag + self.dead_time < _LARGEST_DELAY:
-            return f"the rotors seem {self.lag + self.dead_time:.2f} s late"
+            return (
+                f"lag plus dead time of the rotors is {self.lag + self.dead_time:.2f} s, not less "
+                f"than {_LARGEST_DELAY:.2f} s"
+            )
         hover = self.normalised(gravity)
         if not _ACCEPTED_HOVER[0] < hover < _ACCEPTED_HOVER[1]:
             return f"it puts hover at a thrust of {hover:.2f}"

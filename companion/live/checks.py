@@ -79,7 +79,7 @@ class ChangeChecks:
             raise ConfigError(f"{name}: {error}") from error
         if self._maneuvers_error is not None:
             raise ConfigError(
-                f"{name}: the maneuvers of this flight are not known: {self._maneuvers_error}"
+                f"{name}: the maneuvers of this flight could not be loaded: {self._maneuvers_error}"
             )
         if self._maneuvers is not None:
             require_still_flyable(wanted, self._maneuvers, self._drag)
@@ -99,6 +99,7 @@ def _require_margins(start: Config, wanted: Config, name: str) -> None:
     tolerance = 1.0 - _ROUNDING
     if not (after.gain_db >= tolerance * gain_db and after.phase_deg >= tolerance * phase_deg):
         raise ConfigError(
-            f"{name}: with these values the control loop keeps margins of {after.sentence()} only; "
-            f"a change in flight must keep {gain_db:.1f} dB and {phase_deg:.0f}°"
+            f"{name}: with these values the control loop would have margins of only "
+            f"{after.sentence()}; a change in flight must leave at least {gain_db:.1f} dB and "
+            f"{phase_deg:.0f}°"
         )

@@ -50,9 +50,9 @@ class StampFile:
         except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
             reason = error.strerror if isinstance(error, OSError) else "it is damaged"
             return Stamps(), (
-                f"the time stamps of signatures in {self.path} cannot be read ({reason}), so a "
-                "recording of an earlier flight may be accepted as the vehicle; delete that file "
-                "once this computer's clock is right"
+                f"the time stamps of signatures in {self.path} cannot be read ({reason}), so "
+                "frames recorded in an earlier flight may be accepted as the vehicle's; delete "
+                "that file once this computer's clock is right"
             )
 
     def save(self, stamps: Stamps) -> None:

@@ -188,8 +188,8 @@ class StampJudge:
         if start < kept - _MINUTE and kept > _PROGRAM_DATE:
             self._remark(
                 f"this computer's clock is wrong: it says {_date(start)}, but an earlier run ended "
-                f"at {_date(kept)}, and that date is used; {SET_CLOCK}; if the clock was ahead "
-                "then, delete the file of time stamps (docs/signing.md)"
+                f"at {_date(kept)}, so the later date is used; {SET_CLOCK}; if the clock was "
+                "ahead in the earlier run, delete the file of time stamps (docs/signing.md)"
             )
         elif start < _PROGRAM_DATE:
             self._remark(

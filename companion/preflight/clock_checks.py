@@ -32,7 +32,7 @@ def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
                 INEFFECTIVE,
                 "TIMESYNC uses a different clock than time_boot_ms",
                 "the age of a sample on arrival is unknown",
-                "let the autopilot itself answer TIMESYNC, not a router between",
+                "let the autopilot itself answer TIMESYNC, not a router in between",
                 "TIMESYNC",
             )
         return
@@ -43,7 +43,7 @@ def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
         f"attitude is {1e3 * seconds:.1f} ms old when it arrives"
         + (f", more than deadman.telemetry_stale_ms = {1e3 * stale:g}" if late else ""),
         "such samples would not be answered" if late else "",
-        "find what holds the messages up: a router, a full queue, a slow link" if late else "",
+        "find what delays the messages: a router, a full queue, a slow link" if late else "",
         "TIMESYNC and ATTITUDE_QUATERNION time_boot_ms",
     )
 

@@ -157,7 +157,7 @@ def delays(config: Config, evidence: Evidence) -> Iterator[Finding]:
             INEFFECTIVE,
             "the autopilot does not answer TIMESYNC",
             "the age of a sample on arrival is unknown",
-            "check whether a router on the way blocks it",
+            "check whether a router on the way blocks TIMESYNC",
             "TIMESYNC",
         )
     elif round_trip > stale:
@@ -177,7 +177,7 @@ def delays(config: Config, evidence: Evidence) -> Iterator[Finding]:
             INEFFECTIVE if uneven else SAFE,
             f"the round trip varies by {1e3 * jitter:.1f} ms",
             "the planner assumes a constant dead time" if uneven else "",
-            "find what holds the messages up: a router, Wi-Fi, a busy computer" if uneven else "",
+            "find what delays the messages: a router, Wi-Fi, a busy computer" if uneven else "",
             "TIMESYNC",
         )
     samples = evidence.samples
@@ -188,7 +188,7 @@ def delays(config: Config, evidence: Evidence) -> Iterator[Finding]:
             f"attitude paused for {1e3 * samples.longest_pause:.0f} ms, longer than "
             f"deadman.telemetry_stale_ms = {1e3 * stale:g}",
             "setpoints pause with it",
-            "find what holds the messages up: a router, Wi-Fi, a busy computer",
+            "find what delays the messages: a router, Wi-Fi, a busy computer",
             "ATTITUDE_QUATERNION",
         )
 
@@ -218,8 +218,8 @@ def other_nodes(config: Config, evidence: Evidence) -> Iterator[Finding]:
         yield Finding(
             Key.OUR_IDS,
             UNSAFE,
-            f"somebody else speaks as system/component {ours[0]}/{ours[1]}, our own ids",
-            "each takes answers meant for the other, and both may steer",
+            f"another program uses system/component {ours[0]}/{ours[1]}, our own ids",
+            "each program receives answers to the other one, and both may send setpoints",
             "end the other program, or give each its own link.source_component",
             "frames heard",
         )

@@ -60,8 +60,8 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
     drag = evidence.known_drag.least
     worst = worst_reach(config, maneuvers, hold_time, drag, brakes=failsafe.brakes)
     reach_text = (
-        f"should our setpoints end, the last rates are held for {hold_time:g} s "
-        f"({failsafe.parameter}), and can carry the vehicle {worst.away:.0f} m away, "
+        f"if our setpoints stop, the autopilot holds the last rates for {hold_time:g} s "
+        f"({failsafe.parameter}); that can carry the vehicle {worst.away:.0f} m away, "
         f"{worst.up:.0f} m up and {worst.down:.0f} m down"
     )
     source = "worst case of docs/exits.md"

@@ -206,7 +206,8 @@ def require_disarmed(link: Link) -> None:
         )
     if heartbeat.armed:
         raise VehicleArmedError(
-            "the vehicle is armed, and its parameters are left alone; land and disarm it first"
+            "the vehicle is armed, and parameters are set only while it is disarmed; "
+            "land and disarm it first"
         )
 
 

@@ -41,7 +41,7 @@ def parameters(config: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.PARAMETERS,
             CheckResult.UNSAFE,
             "the autopilot answers no parameter request",
-            "its failsafes are unknown, and so is how it takes a setpoint",
+            "its failsafes and its handling of setpoints are unknown",
             "check that no router or signing key on the way blocks PARAM messages",
             "PARAM_REQUEST_READ",
         )

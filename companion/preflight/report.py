@@ -14,7 +14,7 @@ from companion.preflight.parameter_fixes import Outcome
 from companion.vehicle.parameter_rules import CheckResult
 
 _GROUP_TITLES = {
-    CheckResult.NOT_CONNECTED: ("NOT CONNECTED: nothing was judged", "bold red"),
+    CheckResult.NOT_CONNECTED: ("NOT CONNECTED: nothing was checked", "bold red"),
     CheckResult.UNSAFE: ("UNSAFE: somebody may be hurt or the vehicle lost", "bold red"),
     CheckResult.INEFFECTIVE: ("INEFFECTIVE: something will not work as configured", "bold yellow"),
     CheckResult.NOT_READY: ("NOT READY: the vehicle cannot be armed yet", "bold yellow"),
@@ -64,7 +64,7 @@ def _last_line(config: Config, findings: Sequence[Finding]) -> Text:
     refused, unsafe_count = not_accepted(config, findings), len(unsafe(findings))
     result = overall_result(config, findings)
     if result is CheckResult.NOT_CONNECTED:
-        return Text("not connected: nothing was judged", style="bold red")
+        return Text("not connected: nothing was checked", style="bold red")
     if refused:
         fixable = sum(finding.change is not None for finding in refused)
         fix = f"; `companion doctor --fix` fixes {fixable} of them" if fixable else ""

@@ -41,7 +41,7 @@ def battery(config: Config, state: VehicleState) -> Finding:
             UNSAFE,
             "the vehicle no longer reports its battery",
             "an empty battery would not be noticed",
-            "find what holds the messages up",
+            "find what blocks or delays the messages",
             source,
         )
     if remaining is None:
@@ -203,7 +203,7 @@ def fence(config: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.FENCE,
             NOT_READY if evidence.awaits_position else UNSAFE,
             "the vehicle does not report its latitude and longitude",
-            "whether it is inside safety.fence_polygon_deg cannot be known",
+            "it is unknown whether the vehicle is inside safety.fence_polygon_deg",
             "wait for GPS",
             source,
         )
@@ -231,7 +231,7 @@ def version(_: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.VERSION,
             INEFFECTIVE,
             f"{name} does not report its version",
-            "which behaviour to expect is unknown",
+            "the behaviour of this version is unknown",
             "update the autopilot's firmware: newer versions report theirs",
             "AUTOPILOT_VERSION",
         )

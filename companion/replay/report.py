@@ -41,8 +41,8 @@ def words(samples: Sequence[ReplayedSample], began: float, *, follows_record: bo
         )
         return lines
     lines.append(
-        f"{len(different)} of {len(samples)} samples have another answer than in the flight, the"
-        f" first {different[0].received - began:.2f} s after it began."
+        f"The answers to {len(different)} of {len(samples)} samples differ from those in the"
+        f" flight, the first {different[0].received - began:.2f} s after the flight began."
     )
     both_answered = [each for each in different if each.recorded and each.replayed]
     if both_answered:

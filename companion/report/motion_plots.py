@@ -146,20 +146,23 @@ def _height(flights: Sequence[FlightData]) -> Plot:
     layout = time_axis(flights, y="height, m")
     note = "Height above home over the whole flight."
     if any(flight.figures is None for flight in flights):
-        note += " That of a .tlog counts from the origin of its local position."
+        note += " The height in a .tlog is relative to the origin of its local frame."
     return Plot("Height", note, traces, layout)
 
 
 def _error_plot(flights: Sequence[FlightData]) -> Plot:
     traces = _lines(flights, "error", "distance from the reference") + limit_lines(flights, "error")
     layout = time_axis(flights, y="error, m")
-    note = "Distance from the reference by the autopilot's estimate. In gaps there is no reference."
+    note = (
+        "Distance from the reference by the autopilot's estimate. Where the line has a gap, there "
+        "is no reference."
+    )
     largest = _largest_error(flights)
     if largest is not None:
         layout["yaxis"]["range"] = [0.0, 1.2 * largest]
         note += (
-            " Outside of the tracked maneuvers, as on the way back from steps, it is larger: "
-            "double-click to see all of it."
+            " Outside of the tracked maneuvers, such as on the way back from steps, the error is "
+            "larger: double-click to see all of it."
         )
     return Plot("Tracking error", note, traces, layout)
 

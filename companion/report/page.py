@@ -90,7 +90,7 @@ def _explain_other_version(*paths: Path) -> Iterator[None]:
         yield
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise RecordError(
-            f"{' or '.join(map(str, paths))}: not as this version records a flight ({error!r}); "
+            f"{' or '.join(map(str, paths))}: recorded by another version, or damaged ({error!r}); "
             "rename its summary.json, and the figures are computed from flight.mcap"
         ) from error
 

@@ -68,7 +68,8 @@ def configuration(flight: FlightData) -> Table:
         (f"{key.section}.{key.name}", _value_text(key.value), _value_text(key.default), key.unit)
         for key in flight.differences or ()
     ]
-    return Table("Configuration that is not the default", ("key", "flown", "default", "unit"), rows)
+    title = "Configuration keys that differ from the default"
+    return Table(title, ("key", "flown", "default", "unit"), rows)
 
 
 def comparison_tables(flights: Sequence[FlightData]) -> list[Table]:

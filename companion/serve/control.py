@@ -37,6 +37,7 @@ from companion.vehicle.autopilot import ControlEntry, Role
 from companion.vehicle.link import Link
 
 _ENDING_TEXT = "control is ending and the vehicle is held; request control again when it has ended"
+_ON_GROUND_TEXT = "take off first: setpoints are flown only in the air"
 _RETRY_PAUSE = 2.0
 """Time after a failed takeover during which setpoints alone do not begin another takeover, s."""
 
@@ -128,11 +129,10 @@ class ServedControl:
             self._task.cancel()
 
     def _take_setpoint(self, client: Client, frame: Frame) -> None:
-        autopilot = self._link.state.autopilot
+        autopilot, situation = self._link.state.autopilot, self._keeper.situation()
         if autopilot is None:
             self._component.answer(client, "setpoint refused: no autopilot was heard yet")
             return
-        situation = self._keeper.situation()
         if situation is None:
             self._component.answer(client, "setpoint refused: position or attitude is unknown")
             return
@@ -180,7 +180,7 @@ class ServedControl:
         if state.mode is None or Role.READY not in autopilot.roles(state.mode):
             return False
         if not state.flying:
-            self._component.answer(program.client, "take off first: only then setpoints are flown")
+            self._component.answer(program.client, _ON_GROUND_TEXT)
             return False
         if not self.ownership.has_stream(program, now):
             return False

@@ -155,7 +155,7 @@ class ServedFlight:
         """Fly; return whether control had begun."""
         limited = self._changes.limited_by(change_refusal)
         with self._records.recording(self._record), limited:
-            result = "left at once"
+            result = "stopped at once"
             self._record.begin_counting(self._link.stats)
             try:
                 result = await self._fly(command)

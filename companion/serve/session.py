@@ -161,7 +161,7 @@ class ServeSession:
         try:
             await link.wait_connected(self._config.flight.connect_timeout_s)
         except LinkError as error:
-            self._note(f"{error} (still listening)")
+            self._note(f"{error} (still waiting for the vehicle; clients are served)")
 
 
 class _Gate:

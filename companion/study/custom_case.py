@@ -88,7 +88,7 @@ class Case(Section):
             raise ValueError(f"unknown method {unknown[0]!r} in methods; known: {known}")
         for key in ("methods", "rates_hz"):
             if len(set(getattr(self, key))) < len(getattr(self, key)):
-                raise ValueError(f"{key} names a value twice")
+                raise ValueError(f"{key} has the same value twice")
         if self.steps_to_fly > MOST_STEPS:
             raise ValueError(
                 f"{self.steps_to_fly:.0f} steps to fly, more than the {MOST_STEPS:.0f} that fit"

@@ -51,7 +51,7 @@ class Disturbances:
     shake: float = 0.02
     position_noise: float = 0.003
     velocity_noise: float = 0.005
-    source: str = "usual ones of a multirotor"
+    source: str = "typical of a multirotor"
 
 
 class Errors(NamedTuple):

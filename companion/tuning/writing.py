@@ -59,7 +59,8 @@ def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
         *_comparison_lines(before, after),
         f"disturbances: gusts of {proposal.disturbances.gust:g} m/s, noise: "
         f"{proposal.disturbances.source}",
-        f"aims: margins of {aims.gain_db:g} dB and {aims.phase_deg:g}°, and the margins below",
+        f"required: margins of {aims.gain_db:g} dB and {aims.phase_deg:g}°; reached with errors of "
+        "the vehicle model:",
     ]
     lines += [
         f"margin {_error_text(error)}: {reached.sentence()}"

@@ -194,7 +194,10 @@ def test_the_tables_of_a_report_are_whole_or_not_there(begun, monkeypatch, tmp_p
 def test_a_case_flown_again_is_compared_with_its_row(begun, monkeypatch):
     _, out = begun
     monkeypatch.setattr(again, "fly_case", lambda case, _: row_of(case))
-    for case, said in ((1, "flight to the bit: digest d1."), (2, "has not flown this case yet.")):
+    for case, said in (
+        (1, "bit-identical to the campaign's flight: digest d1."),
+        (2, "has not flown this case yet."),
+    ):
         found = again.rerun(out, case)
         assert found.identical
         assert found.lines[0] == f"case {case} (limits.max_tilt_deg = {20 + 5 * case}): good"

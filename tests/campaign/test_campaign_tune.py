@@ -180,7 +180,7 @@ def test_a_first_flight_teaches_a_vehicle_that_is_40_percent_off(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"sweep": {"planner.gain_per_s": [4, 5]}}, "stands in sweep and in tune.search"),
+        ({"sweep": {"planner.gain_per_s": [4, 5]}}, "is in sweep and in tune.search; remove it"),
         ({"tune": {"search": {"planner.gain": {"uniform": [1, 2]}}}}, "gain_per_s"),
         (
             {"tune": {"search": {"mock.seed": {"uniform": [1, 2]}}}},

@@ -85,7 +85,7 @@ def test_a_fault_begins_in_its_phase_and_its_ending_is_judged(tmp_path):
 def test_a_case_that_fails_is_a_row_with_its_reason(tmp_path, monkeypatch):
     (case,) = load(tmp_path, set=QUICK).cases()
     cut = flight.fly_case(replace(case, flight_s=4.0))
-    assert cut["result"] == "not over after 4 s of vehicle time"
+    assert cut["result"] == "ended by limits.flight_s after 4 s of vehicle time"
     assert not cut["ok"]
     assert cut["flight_s"] < 5.0
     # A trajectory that the limits do not allow is refused before take-off.
@@ -157,7 +157,7 @@ def test_a_campaign_is_run_resumed_and_one_case_is_flown_again(quick, threads, c
     monkeypatch.setattr(commands, "page_about", lambda place: f"Report: {place}")
     assert main(["campaign", "rerun", str(out), "2"]) == 0
     said = capsys.readouterr().out
-    assert "the campaign's flight to the bit" in said
+    assert "bit-identical to the campaign's flight" in said
     (recording,) = (out / "cases" / "case-00002").iterdir()
     assert (recording / "flight.mcap").exists()
     assert f"Report: {recording}" in said

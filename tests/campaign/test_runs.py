@@ -166,7 +166,7 @@ def test_a_run_that_ends_before_it_began_says_so(tmp_path, monkeypatch, capsys, 
     monkeypatch.setattr(running, "connected", connected)
     file = written(tmp_path, sweep=TILT)
     assert main(["campaign", str(file), "--out", str(tmp_path / "out"), "--workers", "2"]) == 1
-    assert capsys.readouterr().out == f"{said}; nothing was begun\n"
+    assert capsys.readouterr().out == f"{said}; no campaign was started\n"
 
 
 def test_a_folder_takes_no_out(tmp_path, capsys):
@@ -314,7 +314,7 @@ def test_a_new_campaign_has_a_folder_with_its_name_and_time_and_tells_of_few_sam
     (out,) = (tmp_path / "runs" / "campaigns").iterdir()
     assert re.fullmatch(r"test-\d{4}-\d\d-\d\dT\d\d-\d\d-\d\dZ", out.name)
     told = capsys.readouterr().out
-    assert "samples is 1, so a single value of mock.wind.speed_m_s will be flown" in told
+    assert "samples: 1 flies only one value of mock.wind.speed_m_s; raise samples" in told
 
 
 def test_lists_and_truths_are_columns_of_their_own_kind(tmp_path):

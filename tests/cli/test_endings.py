@@ -45,7 +45,7 @@ ENOSPC = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         (
             ZeroDivisionError("oops"),
             1,
-            "internal error: ZeroDivisionError('oops'); run again with --debug for where it "
+            "internal error: ZeroDivisionError('oops'); run again with --debug to see where it "
             "happened",
         ),
     ],
@@ -318,7 +318,7 @@ def test_serve_writes_pages_if_asked_to_and_tells_its_counters(
 def test_a_folder_that_this_user_cannot_write_is_refused_before_the_flight(monkeypatch, tmp_path):
     monkeypatch.setattr(output_file.os, "access", lambda *_: False)
     with pytest.raises(
-        ConfigError, match=r"the folder .* cannot be written; name another with --out"
+        ConfigError, match=r"the folder .* cannot be written; choose another file with --out"
     ):
         output_file.require_writable(tmp_path / "vehicle.yaml", "--out", force=False)
     monkeypatch.setattr(output_file.os, "access", lambda *_: True)

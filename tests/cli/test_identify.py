@@ -99,7 +99,7 @@ def test_a_recorded_flight_gives_the_same_again_and_nothing_is_overwritten(flown
     first = (folder / "vehicle.yaml").read_text()
     code, _, err = run(capsys, "--log", folder)
     assert code == 2
-    assert f"{folder}/vehicle.yaml exists; name another with --out" in err
+    assert f"{folder}/vehicle.yaml exists; choose another file with --out" in err
     again = tmp_path / "again.yaml"
     code, out, _ = run(capsys, "--log", folder / "flight.tlog", "--out", again)
     assert code == 0
@@ -156,9 +156,9 @@ def test_a_file_that_is_no_log_is_refused_as_usage(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("out", "words"),
     [
-        ("there.yaml", "exists; name another with --out"),
+        ("there.yaml", "exists; choose another file with --out"),
         ("no/v.yaml", "there is no folder"),
-        ("folder", "folder is a folder; name a file in it with --out"),
+        ("folder", "folder is a folder; choose a file in it with --out"),
         ("locked/v.yaml", "locked cannot be written"),
     ],
 )

@@ -96,7 +96,7 @@ def test_the_command_line_and_the_record_of_a_flight_see_the_merged_keys(files):
         ("- vehicle", "a.yaml: expected keys such as"),
         ("vehicle: {lag_ms: 1, lag_ms: 2}", "a.yaml, line 1: not valid YAML"),
         ("include: 3", "a.yaml: `include` must be a file or a list of files, not 3"),
-        ("mock: {seed: 3}", "a.yaml: `mock` must not stand here"),
+        ("mock: {seed: 3}", "a.yaml: `mock` is not allowed in an included file"),
     ],
 )
 def test_what_is_wrong_in_an_included_file_is_told_of_that_file(files, included, words):
@@ -145,7 +145,7 @@ def test_an_included_file_may_include_and_its_own_keys_win(files, tmp_path):
         ),
         (
             {"main": "include: a0.yaml"} | {f"a{n}": f"include: a{n + 1}.yaml" for n in range(9)},
-            "a3.yaml: an include must not be deeper than 4 files",
+            "a3.yaml: includes may be nested at most 4 files deep",
         ),
         ({"main": f"include: [{'a.yaml, ' * 33}]", "a": ""}, "more than 32 files are included"),
         (

@@ -90,7 +90,7 @@ def test_three_lines_say_what_is_flown_how_it_moves_and_how_all_is():
     first, second, third = status_lines(HOVERING)
     assert plain(first) == "maneuvers 47 s circle, 5 of 14 s"
     assert plain(second) == "height 5.0 m speed 2.0 m/s tilt 12° tracking error 0.04 m"
-    assert plain(third) == "safety quiet 250 Hz latency 0.12 ms (3 late) battery 83 % 15.9 V"
+    assert plain(third) == "safety ok 250 Hz latency 0.12 ms (3 late) battery 83 % 15.9 V"
     assert max(map(len, (first, second, third))) < 80
 
 
@@ -98,7 +98,7 @@ def test_what_is_unknown_is_a_dash_and_an_alarm_is_named():
     first, second, third = status_lines(WAITING)
     assert "the vehicle to be ready (2 of at most 60 s)" in first
     assert plain(second) == "height 0.0 m speed – tilt – tracking error –"
-    assert plain(third) == "safety not on no setpoints battery –"
+    assert plain(third) == "safety off no setpoints battery –"
     assert "ALARM: tilt, fence" in status_lines(HOVERING._replace(alarms=("tilt", "fence")))[2]
     endless = WAITING._replace(timeout=inf)
     assert "(2 s)" in status_lines(endless)[0]

@@ -48,7 +48,7 @@ def test_it_writes_a_file_that_a_configuration_includes(vehicle, tmp_path, capsy
     assert load(including).guidance == tuned.guidance
     code, _, error = run(capsys, vehicle, "--output", out, "--no-flights")
     assert code == 2
-    assert "exists; name another with --output" in error
+    assert "exists; choose another file with --output" in error
 
 
 def test_a_folder_gives_its_configuration_and_the_drag_that_was_learned(vehicle, tmp_path, capsys):
@@ -97,7 +97,7 @@ def test_the_noise_of_the_flight_in_the_folder_counts(vehicle, capsys):
 def test_a_folder_is_no_file_to_write(vehicle, tmp_path, capsys):
     code, _, error = run(capsys, vehicle, "--output", tmp_path, "--no-flights")
     assert code == 2
-    assert f"{tmp_path} is a folder; name a file in it with --output" in error
+    assert f"{tmp_path} is a folder; choose a file in it with --output" in error
 
 
 def test_what_is_no_flight_folder_needs_a_vehicle_file(tmp_path, capsys):

@@ -242,7 +242,7 @@ def test_the_table_tells_every_axis_within_80_columns():
     flat = " ".join(text.split())
     assert "roll: a lag of first order explains 99.0%; second order is not clearly better" in flat
     assert "yaw: written as first order" in flat
-    assert "though nearer: second order, natural frequency 5.6 rad/s" in flat
+    assert "a better fit: second order, natural frequency 5.6 rad/s" in flat
     assert "T/m = 19.55·u +0.22" in text
     assert "hovers at 0.490" in " ".join(text.split())
     assert max(map(len, text.splitlines())) <= 80

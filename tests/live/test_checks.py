@@ -24,7 +24,7 @@ def test_margins_are_kept():
     px4 = load(shipped("px4.yaml"))
     gain = {"planner": {"gain_per_s": 11.0}}
     with pytest.raises(
-        ConfigError, match=r"keeps margins of .* only; .* must keep 4\.0 dB and 20°"
+        ConfigError, match=r"margins of only .*; .* must leave at least 4\.0 dB and 20°"
     ):
         ChangeChecks(px4, follows=False).check(gain, "a test")
     checks = ChangeChecks(px4, follows=False)
@@ -42,7 +42,7 @@ def test_margins_are_kept():
 
 def test_a_loop_that_began_with_less_keeps_what_it_had():
     start = Config()  # no vehicle is identified: 14° for a heavy one
-    with pytest.raises(ConfigError, match=r"must keep 4\.0 dB and 14°"):
+    with pytest.raises(ConfigError, match=r"must leave at least 4\.0 dB and 14°"):
         _after(start, {"planner": {"gain_per_s": 5.5}})
     _after(start, {"limits": {"max_climb_m_s": 1.0}}, {"planner": {"gain_per_s": 4.0}})
 

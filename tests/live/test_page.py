@@ -65,7 +65,7 @@ def _watch_and_change(new_tab, page, folder):
     _change(tab, "limits.max_climb_m_s", "1.5", "from 2 to 1.5")
     _change(tab, "limits.max_tilt_deg", "36", "more than 35, the value checked")
     _change(tab, "limits.max_tilt_deg", "steep", "must be a number")
-    _change(tab, "limits.max_tilt_deg", "35", "no value differs")
+    _change(tab, "limits.max_tilt_deg", "35", "no value was changed")
     tab.click("save")
     tab.wait(f"{_SAID}.includes('changed.yaml')")
     assert "  max_climb_m_s: 1.5  # was 2.0\n" in (folder / "changed.yaml").read_text()

@@ -147,7 +147,7 @@ def test_without_the_token_nothing_changes_and_nothing_is_saved_on_this_computer
 def test_only_the_edited_values_are_sent_and_never_twice():
     async def use(page):
         before = page.value(CLIMB)
-        await page.click("apply", "no value differs from what is flown")
+        await page.click("apply", "nothing to apply: no value was changed")
         page.type(CLIMB, "1.5")
         await page.click("apply", "done 1")
         # At once: the value in force is known as soon as the flight has answered.

@@ -175,7 +175,9 @@ def test_a_turn_takes_no_more_than_it_may():
 def test_maneuvers_that_are_no_longer_known_forbid_a_change(tmp_path):
     trajectory = {"flight": {"maneuvers": ["trajectory"], "trajectory": str(tmp_path / "t.csv")}}
     checks = ChangeChecks(changed(Config(), trajectory, "a test"), follows=True)
-    with pytest.raises(ConfigError, match=r"maneuvers of this flight are not known: .*t\.csv"):
+    with pytest.raises(
+        ConfigError, match=r"maneuvers of this flight could not be loaded: .*t\.csv"
+    ):
         checks.check(SLOWER, "a test")
 
 

@@ -296,7 +296,8 @@ def test_answers_that_only_one_of_both_gave_are_told_by_their_reasons():
         ReplayedSample(3.0, 3.0, None, None, "stale", "stale"),
     ]
     assert words(samples, 1.5, follows_record=False) == [
-        "1 of 2 samples have another answer than in the flight, the first 0.50 s after it began.",
+        "The answers to 1 of 2 samples differ from those in the flight, the first 0.50 s after the "
+        "flight began.",
         "1 samples: answered in the flight, not in control in the replay.",
     ]
     same = words(samples[1:], 1.5, follows_record=True)

@@ -55,7 +55,8 @@ def test_a_vehicle_that_is_not_heard_is_said_once():
     link_loop.run(main())
     assert [text for text in said if text.startswith("no heartbeat")] == [
         f"no heartbeat from system 1 within 0.2 s on {settings['link']['endpoint']}; "
-        "is the vehicle running and sending to this address? (still listening)"
+        "is the vehicle running and sending to this address? "
+        "(still waiting for the vehicle; clients are served)"
     ]
 
 

@@ -221,7 +221,7 @@ async def contradictions(scene):
         scene.script.attitude(7 | 64, (1.0, 0.0, 0.0, 0.0), 0.5)  # no thrust
 
     await stream(1.0, send, 0.05)
-    scene.is_said("need velocity, too")
+    scene.is_said("also needs a velocity")
     await scene.is_flown()
     return REFUSED
 

@@ -195,7 +195,7 @@ def test_the_findings_follow_from_the_numbers():
     assert not verdicts(**{windy: 0.13})[-1]
     beaten = find(made_up(**{"circle, 3 m/s, model-following": 0.0233}))[0].evidence
     assert "circle, 3 m/s: 23.3 mm, first-order 23.0 mm" in beaten
-    assert "on 6 of 7 courses, larger than the best on 1" in beaten
+    assert "on 6 of 7 courses; on 1 another planner is better" in beaten
 
 
 def test_a_flight_that_failed_is_told_as_such_everywhere(tmp_path, monkeypatch, capsys):

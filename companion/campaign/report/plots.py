@@ -84,7 +84,8 @@ def sensitivity(influences: dict[str, list[Influence]]) -> Iterator[Plot]:
     layout = {**axes(y="share of the variance, %"), "barmode": "group"}
     note = (
         "First-order Sobol index: the share of an outcome's variance that a factor explains by "
-        "itself, with its 95 % interval. What the bars leave is noise, or two factors together."
+        "itself, with its 95 % interval. The rest up to 100 % is noise, or the joint effect of "
+        "several factors."
     )
     if traces:
         yield Plot("Sensitivity", note, traces, layout, 360)
@@ -121,9 +122,10 @@ def pareto(results: Results) -> Iterator[Plot]:
             traces.append(_points(name, goals[part], shown, marker))
     criteria = "error, rate use and thrust use" if thrust else "error and rate use"
     note = (
-        f"A point for each choice of the program's own keys: the medians over everything else; or "
-        f"a point for single cases, if no choice was flown twice or there are very many. On the "
-        f"front no other point is better in {criteria} at once. Each point shows its success rate."
+        "Each point is one choice of the program's own keys, with the medians over all other "
+        "factors. If no choice was flown twice, or there are very many, each point is a single "
+        f"case. No other point is better than one on the front in {criteria} at once. Each point "
+        "shows its success rate."
     )
     layout = axes(x=label(RATES), y=label(results.error))
     yield Plot("Pareto front", note, traces, layout, 420)

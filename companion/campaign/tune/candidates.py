@@ -54,7 +54,9 @@ def section_of(campaign: Campaign) -> Tune:
     if campaign.file.kind != "flights":
         raise ConfigError(f"{campaign.name}: tune needs kind: flights")
     for key in tune.search.keys() & campaign.file.swept_keys:
-        raise ConfigError(f"{campaign.name}: `{key}` stands in sweep and in tune.search")
+        raise ConfigError(
+            f"{campaign.name}: `{key}` is in sweep and in tune.search; remove it from one of them"
+        )
     flown = (case.config.flight.maneuvers for case in campaign.cases())
     if all(set(OPEN_LOOP).issuperset(maneuvers) for maneuvers in flown):
         raise ConfigError(

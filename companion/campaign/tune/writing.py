@@ -41,12 +41,12 @@ def summary_lines(result: Result) -> list[str]:
     found, best, tune = result.found, result.best, result.campaign.file.tune
     assert tune is not None
     cases = len(best.score.true)
-    envelope = "to its end" if tune.envelope_m is None else f"within {tune.envelope_m:g} m"
+    bound = "reach their end" if tune.envelope_m is None else f"stay within {tune.envelope_m:g} m"
     lines = [
         f"{found.tried} candidates over {cases} flights each, {found.stopped_early} of them "
         f"refused or stopped early; candidate {best.number} is the best.",
-        f"Constraint: {tune.inside_share:.1%} of the flights {envelope}; in the search "
-        f"{best.score.share:.1%} were.",
+        f"Constraint: at least {tune.inside_share:.1%} of the flights must {bound}; in the search "
+        f"{best.score.share:.1%} did.",
         f"RMS of the true horizontal error in the search: {best.score.rms:.3f} m.",
     ]
     return [*lines, *_certainty_lines(result)]
@@ -82,8 +82,8 @@ def _certainty_lines(result: Result) -> Iterator[str]:
         f"reference, and {estimate_before:.3f} -> {estimate_after:.3f} m from the true one."
     )
     yield (
-        "The last is the error of the position estimate, which gains and weights hardly change; "
-        "where the estimate is late, guidance.position_lateness_ms reduces it."
+        "Gains and weights hardly change the last distance, the error of the position estimate; "
+        "if the estimate is late, guidance.position_lateness_ms reduces it."
     )
     if comparison.ratio.high >= 1.0:
         yield "The interval holds 1: fly more samples before you believe that it is better."

@@ -61,7 +61,10 @@ class Guard:
         local = client is not None and ip_address(client[0]).is_loopback
         if local or has_token or self._has_cookie(headers):
             return None
-        return "from another computer the live page needs ?token= with the token shown at the start"
+        return (
+            "to open the live page from another computer, add ?token= and the token shown at the "
+            "start to its address"
+        )
 
     def _has_cookie(self, headers: dict[str, str]) -> bool:
         try:

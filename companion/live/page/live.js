@@ -127,7 +127,7 @@ window.live = (() => {
       latency_us: known(now.latency_us) ? `${(now.latency_us / 1000).toFixed(2)} ms` : "–",
       frames_lost: `${now.frames_lost} lost, ${fixed(now.round_trip_ms, 1, "ms")}`,
       battery_remaining: known(now.battery_remaining) ? (100 * now.battery_remaining).toFixed(0) + " %" : "–",
-      alarms: now.alarms && now.alarms.length ? "ALARM: " + now.alarms.join(", ") : now.monitored ? "quiet" : "not on",
+      alarms: now.alarms && now.alarms.length ? "ALARM: " + now.alarms.join(", ") : now.monitored ? "ok" : "off",
     };
     for (const [name, text] of Object.entries(cells)) {
       const node = document.querySelector(`[data-live="${name}"]`);

@@ -75,7 +75,7 @@ class Panel:
             if text != self._shown[section, key]:
                 values.setdefault(section, {})[key] = _parsed(text)
         if not values:
-            self._show_message("no value differs from what is flown")
+            self._show_message("nothing to apply: no value was changed")
             return
         await self._ask(self._relay.change(values, _SOURCE))
 

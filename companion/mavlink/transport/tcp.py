@@ -109,7 +109,7 @@ class TcpTransport:
                 return False
             connection_before = self._connection
             self.connection_dropped(
-                connection_before, "another client took the place of one without a valid heartbeat"
+                connection_before, "another client replaced one that sends no valid heartbeat"
             )
             connection_before.abort()
         sock = connection.get_extra_info("socket")

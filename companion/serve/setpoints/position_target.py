@@ -194,9 +194,9 @@ def _demand(
 ) -> AxisDemand:
     position, velocity, acceleration = (_complete_vector(values, axes) for values in groups)
     if position is velocity is acceleration is None:
-        raise RefusedSetpoint(f"nothing {name} is commanded: give position, velocity or accel.")
+        raise RefusedSetpoint(f"no {name} command: give a position, a velocity or an acceleration")
     if position is not None and velocity is None and acceleration is not None:
-        raise RefusedSetpoint("position and acceleration need velocity, too")
+        raise RefusedSetpoint("a position with an acceleration also needs a velocity")
     if position is not None and hypot(*position) > _MAX_POSITION:
         raise RefusedSetpoint(
             f"the position is more than {_MAX_POSITION:g} m from the local origin"

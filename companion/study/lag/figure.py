@@ -28,7 +28,7 @@ from companion.study.step import FIGURE_2, Response
 
 CAPTION = (
     "First row: paths and distance from the line in the example, at 100 Hz. Second row: cross-track"
-    " by dead time (lag 25 ms) and by lag (dead time 40 ms); the shaded area reaches up to"
+    " by dead time (lag 25 ms) and by lag (dead time 40 ms); the upper edge of the shaded area is"
     " model-following with the worst error of its times. Third row: cross-track of model-following"
     " with the worst error, divided by that of the best other method, at three sample rates; above"
     " 1 the other method is the straighter, and the cell is red. Fourth row: model-following by the"
@@ -145,7 +145,7 @@ def _draw_ratios(axes: Axes, grid: Grid, rate_hz: float) -> None:
         axes.text(column, row, f"{ratio:.2f}", ha="center", va="center", color=colour)
     axes.grid(visible=False)
     axes.set(
-        title=f"Worst / best other, {rate_hz:.0f} Hz",
+        title=f"Model-following (worst error)\n/ best other, {rate_hz:.0f} Hz",
         xlabel="dead time, ms",
         ylabel="lag, ms",
         xticks=range(len(dead_times)),

@@ -187,7 +187,10 @@ def _rates_table(complete: Complete) -> Table:
         for m in METHODS
     ]
     rows.append(
-        ("model-following, worst knowledge", *(comparison.worst for comparison in by_rate.values()))
+        (
+            "model-following, times wrong by the worst error",
+            *(comparison.worst for comparison in by_rate.values()),
+        )
     )
     return Table(
         "lag-inner-loop-rates",

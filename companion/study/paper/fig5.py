@@ -167,6 +167,7 @@ def _findings(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> tuple[
     straightest_at = [
         t for t, across in sweep.items() if across[PROPOSED] < min(across[m] for m in others)
     ]
+    times = ", ".join(f"{1e3 * t:.0f}" for t in straightest_at)
     return (
         _straightest("paper", "quick", quick),
         _straightest("ours", "as slow as measured", measured),
@@ -174,9 +175,9 @@ def _findings(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> tuple[
             "ours",
             "The proposed method is the straightest with every inner loop.",
             len(straightest_at) == len(sweep),
-            "At heading 0 it is the straightest with loops of "
-            + (", ".join(f"{1e3 * t:.0f}" for t in straightest_at) or "no")
-            + " ms (63 % of a rate step). Its cross-track is "
+            "At heading 0 it is the straightest with "
+            + (f"loops of {times} ms (63 % of a rate step)" if times else "none of the loops")
+            + ". Its cross-track is "
             + ", ".join(f"{across[PROPOSED]:.2g}" for across in sweep.values())
             + " with "
             + ", ".join(f"{1e3 * t:.0f}" for t in sweep)

@@ -75,8 +75,8 @@ def _smallest(flown: Flown, statement: str, error: Error) -> Finding:
         "ours",
         statement,
         not larger_on,
-        f"Smaller than all others by more than {1e3 * _EQUAL:g} mm on {len(smaller_on)} of"
-        f" {len(COURSES)} courses, larger than the best on {len(larger_on)}"
+        f"Its error is the smallest by more than {1e3 * _EQUAL:g} mm on {len(smaller_on)} of"
+        f" {len(COURSES)} courses; on {len(larger_on)} another planner is better by more than that"
         f"{': ' if larger_on else ''}{comparisons}.",
     )
 

@@ -57,8 +57,8 @@ def run(tick: Tick) -> Outcome:
             f" north, with gusts of {GUSTS * WINDY:g} m/s (standard deviation, north and east). All"
             " flights have the same seed, so the same noise and the same gusts; with another seed"
             " the differences between planners change by at most 0.2 mm. The error by telemetry is"
-            " that of the position that guidance receives. The true position is ahead of it by 10"
-            " ms of flight, so a planner that is late by as much has a smaller true error."
+            " that of the position that guidance receives. The true position is 10 ms of flight"
+            " ahead of it, so a planner that lags by 10 ms has a smaller true error."
         ),
         figure=draw_figure(flown),
         caption=CAPTION,
