@@ -1,7 +1,9 @@
 """The phases from the ground to control by our body rates, one coroutine each."""
 
 import asyncio
+from math import degrees, hypot
 
+from companion.attitude.kinematics import tilt_angle
 from companion.flight.commands import change_mode, command_if_ours, in_role, in_roles, require_role
 from companion.flight.context import FlightContext
 from companion.flight.preflight_phases import stream
@@ -20,6 +22,13 @@ _MAX_OVERSHOOT = 3.0
 
 _ARRIVAL_TIME = 2.0
 """Time allowed to reach altitude after hold mode is shown, s; else something ended the climb."""
+
+
+_LARGEST_HELD_SPEED = 3.0
+"""Largest horizontal speed of a vehicle that is taken over, m/s."""
+
+_BRAKING_TIME = 5.0
+"""Time allowed for the autopilot to reach this speed and a tilt below limits.max_tilt_deg, s."""
 
 
 async def takeoff(context: FlightContext) -> None:
@@ -51,12 +60,40 @@ async def offboard(context: FlightContext) -> None:
     """Check the vehicle again, take over, and settle."""
     context.detail = "the preflight checks before the takeover"
     await context.preflight.require(Stage.AIRBORNE)
+    await _wait_until_held(context)
     context.guidance_loop.hold_here()
     context.snapshot_builder.begin(asyncio.get_running_loop().time(), context.fence_centre)
     await _take_over(context)
     context.guidance_loop.hold_here()
     context.loop.offboard_active, context.loop.taking_over = True, False
     await asyncio.sleep(_SETTLE_TIME)
+
+
+async def _wait_until_held(context: FlightContext) -> None:
+    """Wait until the autopilot holds the vehicle still: it may have to brake first.
+
+    Raises:
+        FlightEnded: the vehicle is still tilted or quick, as one that the wind blows away.
+    """
+    try:
+        async with asyncio.timeout(_BRAKING_TIME):
+            await context.until(lambda: _is_held(context), "the autopilot to hold the vehicle")
+    except TimeoutError:
+        raise FlightEnded(
+            f"not taken over: waited {_BRAKING_TIME:g} s for {context.detail}; fly in less wind, "
+            "or take over a vehicle that hovers"
+        ) from None
+
+
+def _is_held(context: FlightContext) -> bool:
+    sample, position = context.loop.resets.newest, context.fresh_position()
+    if sample is None or position is None:
+        return False
+    tilt, speed = tilt_angle(sample.q[1], sample.q[2]), hypot(*position.velocity_ned[:2])
+    context.detail = (
+        f"the autopilot to hold the vehicle (tilt {degrees(tilt):.0f}°, speed {speed:.1f} m/s)"
+    )
+    return tilt <= context.config.limits.max_tilt and speed <= _LARGEST_HELD_SPEED
 
 
 class _Climb:
