@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 BY_MONITOR: Mapping[str, str] = {
     "unheard": "check cable, radio and power: the vehicle was not heard any more",
-    "silence": "find why no setpoint left: the events name the reason",
+    "silence": "mend the cause named above: the telemetry, its values, or this computer",
     "clock": "find why the autopilot restarted or its clock jumped; check its power supply",
     "disarmed": "find who disarmed the vehicle in flight: the pilot's switch or the autopilot",
     "landed": "check the autopilot's land detector, or fly higher: it reported the ground",
@@ -16,7 +16,7 @@ BY_MONITOR: Mapping[str, str] = {
     "resets": "check GPS and compass; the limits are safety.max_reset_m, max_reset_deg, max_resets",
     "tilt": "find what tilted the vehicle beyond limits.max_tilt_deg: wind, a collision, a motor",
     "body rate": "check the autopilot's rate loop; the limit is safety.max_body_rate_deg_s",
-    "fence": "make the maneuver smaller, begin it elsewhere, or widen the fence: limits.fence_*",
+    "fence": "make the maneuver smaller, fly in less wind, or widen the fence: limits.fence_*",
     "braking": "make the maneuver smaller or slower near the fence, or widen it: limits.fence_*",
     "speed": "fly slower; the limit is safety.max_speed_m_s",
     "tracking": "fly slower or in less wind; the limit is safety.max_tracking_error_m",

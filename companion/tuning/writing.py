@@ -79,6 +79,9 @@ def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
             "RMS in m, before -> after:",
         ]
         lines += [_flight_line(name, *pair) for name, pair in flights.items()]
+    if flights and warning is None:
+        percent = 100.0 * (_WORSE_FACTOR - 1.0)
+        lines.append(f"No course was flown worse by {percent:.0f} % and {_WORSE_BY:g} m.")
     return lines
 
 

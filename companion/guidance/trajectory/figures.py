@@ -1,7 +1,7 @@
 """Trajectories of a known form: hover, line, circle, eights, helix."""
 
 from dataclasses import dataclass, replace
-from math import atan2, hypot, pi, sqrt, tau
+from math import atan2, hypot, isfinite, pi, sqrt, tau
 
 from companion.guidance.trajectory.curves import (
     BernoulliEight,
@@ -70,10 +70,12 @@ def line(
         along: face along the line instead of holding the heading.
 
     Raises:
-        TrajectoryError: the line has no length, a limit is not positive, or the line is vertical
+        TrajectoryError: the line has no finite length, a limit is not positive, or it is vertical
             and `along` is set.
     """
     length = sqrt(sum(x * x for x in to))
+    if not isfinite(length):
+        raise TrajectoryError("the end point of a line must be finite")
     if length < SMALLEST_DISTANCE:
         raise TrajectoryError("a line must lead somewhere else than where it begins")
     if along and hypot(to[0], to[1]) == 0.0:

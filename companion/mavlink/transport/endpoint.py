@@ -174,7 +174,7 @@ def _remedy(text: str) -> str:
             return f"write serial://{path}:{baud}"
         return (
             f"write serial://{path}:BAUD with the baud rate of the autopilot's port, such as "
-            f"serial://{path}:57600"
+            f"serial://{path}:921600"
         )
     if address := _ADDRESS_PATTERN.fullmatch(text):
         scheme, host, port = address[1], address[2], address[3]
@@ -183,7 +183,8 @@ def _remedy(text: str) -> str:
             own_scheme = "udpin" if scheme == "udp" else scheme
             return f"write {own_scheme}://{host or '0.0.0.0'}:{port}"
         if scheme in (None, "udp"):
-            out = f", or udpout://{host}:{port} to send to {host} first" if host else ""
+            is_host_named = host and host not in _NETWORK_KINDS
+            out = f", or udpout://{host}:{port} to send to {host} first" if is_host_named else ""
             return f"write udpin://0.0.0.0:{port} to wait for the vehicle{out}"
     if text.isdigit() and 0 < int(text) <= 65535:
         return f"write udpin://0.0.0.0:{text}"
