@@ -22,6 +22,8 @@ from companion.guidance.follow import Follow
 
 def show(options: argparse.Namespace) -> int:
     """Print the configuration, in whole or in part, as YAML, or its tables or schema."""
+    if options.file and (options.schema or options.markdown or options.diff):
+        raise ConfigError("--diff, --schema and --markdown take no further FILE")
     if options.schema:
         text = json_schema()
     elif options.markdown:

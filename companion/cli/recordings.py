@@ -7,7 +7,7 @@ from pathlib import Path
 from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
 from companion.config.files import assigned, changed, load
 from companion.files.yaml_file import ConfigError
-from companion.recording.flight_record import read_flight
+from companion.recording.flight_record import FlightRecord, read_flight
 
 
 def plot(options: argparse.Namespace) -> int:
@@ -61,7 +61,17 @@ def export(options: argparse.Namespace) -> int:
         raise ConfigError(f"{into}: cannot write there: {error.strerror}") from error
     for path, rows in written.items():
         print(f"{path}  {rows:,} rows")
-    return EXIT_OK
+    return EXIT_OK if _is_whole(record) else EXIT_FLIGHT
+
+
+def _is_whole(record: FlightRecord) -> bool:
+    """Whether a recording could be read to its end; if not, print where it is damaged."""
+    if record.damage is not None:
+        print(
+            f"{record.folder}: the recording is damaged, and only the part before was read: "
+            f"{record.damage}"
+        )
+    return record.damage is None
 
 
 def replay(options: argparse.Namespace) -> int:
@@ -76,6 +86,7 @@ def replay(options: argparse.Namespace) -> int:
         config = changed(config, assigned(options.set), "--set")
     replayed = Replay(record, config)
     samples = replayed.run()
+    whole = _is_whole(record)
     if not samples:
         raise ConfigError(f"{options.folder}: no attitude sample is recorded there to replay")
     for line in words(samples, record.began, follows_record=replayed.follows_record):
@@ -86,4 +97,5 @@ def replay(options: argparse.Namespace) -> int:
         except OSError as error:
             raise ConfigError(f"{options.csv}: cannot write it: {error.strerror}") from error
         print(options.csv)
-    return EXIT_OK if not own_config or all(each.same for each in samples) else EXIT_FLIGHT
+    same = not own_config or all(each.same for each in samples)
+    return EXIT_OK if whole and same else EXIT_FLIGHT

@@ -169,8 +169,8 @@ def add_config(commands: Commands) -> None:
         help="print the configuration: every key, its default, unit, range and meaning",
         description="Print every key as commented YAML, with the values of FILE or the defaults.",
     )
+    show.add_argument("file", type=Path, nargs="?", metavar="FILE", help="configuration")
     selection = show.add_mutually_exclusive_group()
-    selection.add_argument("file", type=Path, nargs="?", metavar="FILE", help="configuration")
     selection.add_argument(
         "--diff", type=Path, metavar="FILE", help="print only the keys that FILE changes"
     )

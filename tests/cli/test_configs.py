@@ -116,6 +116,15 @@ def test_one_key_or_one_section_is_printed(capsys):
     )
 
 
+def test_one_key_of_a_file_is_printed(tmp_path, capsys):
+    own = tmp_path / "own.yaml"
+    own.write_text("limits: {max_tilt_deg: 21}\n")
+    assert main(["config", str(own), "--get", "limits.max_tilt_deg"]) == 0
+    assert "max_tilt_deg: 21.0" in capsys.readouterr().out
+    assert main(["config", str(own), "--schema"]) == 2
+    assert "take no further FILE" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("typed", "hint"),
     [

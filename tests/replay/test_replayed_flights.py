@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 import subprocess
 import sys
 from functools import cache
@@ -242,6 +243,19 @@ def test_the_command_tells_what_is_the_same_and_what_differs(good, tmp_path, cap
     rows = list(csv.DictReader(table.open()))
     assert len(rows) == len(read_flight(folder).rows("sample"))
     assert any(row["recorded_roll_rad_s"] != row["replayed_roll_rad_s"] for row in rows)
+
+
+def test_a_damaged_recording_is_told_and_its_replay_is_no_success(good, tmp_path, capsys):
+    folder = tmp_path / "damaged"
+    shutil.copytree(good[0], folder)
+    recording = folder / "flight.mcap"
+    data = bytearray(recording.read_bytes())
+    middle = len(data) // 2
+    data[middle : middle + 5000] = bytes(range(250)) * 20
+    recording.write_bytes(data)
+    assert main(["replay", str(folder)]) == 1
+    assert "the recording is damaged, and only the part before" in capsys.readouterr().out
+    assert main(["export", str(folder), "--csv"]) == 1
 
 
 def test_a_flight_is_exported_as_csv_and_parquet(good, tmp_path, capsys):

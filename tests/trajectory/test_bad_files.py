@@ -107,6 +107,14 @@ def test_so_are_other_columns(columns, values, words):
         table(lines, "given")
 
 
+def test_a_yaw_in_degrees_is_refused_and_one_that_wraps_is_not():
+    turning = [f"{row},{(0.5 * k + 3.0) % 6.2832:.4f}" for k, row in enumerate(rows())]
+    assert table(["t,x,y,z,yaw", *turning], "given").yaw is not None
+    degrees = [f"{row},{90 * (k % 2)}" for k, row in enumerate(rows())]
+    with pytest.raises(TrajectoryError, match=r"yaw changes by 90 rad .* in degrees"):
+        table(["t,x,y,z,yaw", *degrees], "given")
+
+
 def test_a_column_that_is_named_twice_is_refused():
     lines = ["t,x,y,z,x_m", *(f"{row},0" for row in rows())]
     with pytest.raises(TrajectoryError, match="names the column x more than once"):

@@ -47,6 +47,9 @@ _LARGEST_VALUES = {
 }
 """Largest magnitude of each quantity, and its unit in messages."""
 
+_LARGEST_YAW_STEP = 6.5
+"""Largest change of yaw between two rows, rad: a bit more than the jump by 2π where it wraps."""
+
 _LENGTH_ERROR = 0.1
 """Largest error of a quaternion's length. Files hold rounded numbers."""
 
@@ -128,7 +131,7 @@ def table(lines: Iterable[str], name: str) -> Table:
         times - times[0],
         data["position"],
         tuple(known),
-        _yaw(data),
+        _yaw(data, name),
         frames[0] if frames else None,
         tuple(column for column in header if column and column not in used),
     )
@@ -224,10 +227,21 @@ def _require_range(
             )
 
 
-def _yaw(data: dict[str, Floats]) -> Floats | None:
-    """Tilt-yaw heading (m,), rad, from the yaw column, else from the quaternion."""
+def _yaw(data: dict[str, Floats], name: str) -> Floats | None:
+    """Tilt-yaw heading (m,), rad, from the yaw column, else from the quaternion.
+
+    Raises:
+        TrajectoryError: the yaw jumps by more than a turn between two rows.
+    """
     if "yaw" in data:
-        return np.unwrap(data["yaw"][:, 0])
+        yaw = data["yaw"][:, 0]
+        largest_step = float(np.abs(np.diff(yaw)).max())
+        if largest_step > _LARGEST_YAW_STEP:
+            raise TrajectoryError(
+                f"{name}: yaw changes by {largest_step:.4g} rad between two rows; if the column "
+                "is in degrees, convert it to rad"
+            )
+        return np.unwrap(yaw)
     if "quaternion" in data:
         q = data["quaternion"]
         return np.unwrap(2.0 * np.arctan2(q[:, 3], q[:, 0]))
