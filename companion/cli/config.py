@@ -13,10 +13,11 @@ from companion.config.reference import ConfigKey, as_markdown, as_yaml, changed_
 from companion.config.suspect_values import suspect_values
 from companion.control.expected_response import expectations
 from companion.demo import check_mock
+from companion.extras import MissingExtraError
 from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
 from companion.flight.maneuvers import configured_maneuvers
-from companion.flight.start_checks import check_control, check_link
+from companion.flight.start_checks import check_control, check_link, require_extras
 from companion.guidance.follow import Follow
 
 
@@ -118,6 +119,10 @@ def check(options: argparse.Namespace) -> int:
         print(text)
     for value in suspect_values(config):
         print(f"warning: {value.sentence()}")
+    try:
+        require_extras(config)
+    except MissingExtraError as error:  # the computer that flies may have it
+        print(f"warning: {error}")
     if config.flight.trajectory is not None and "trajectory" not in config.flight.maneuvers:
         print("warning: flight.trajectory is not flown; add trajectory to flight.maneuvers")
     print(f"{options.file}: ok")

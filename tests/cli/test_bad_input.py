@@ -195,9 +195,13 @@ def test_a_missing_extra_is_one_sentence(capsys, monkeypatch, module, extra, arg
 )
 def test_a_key_whose_extra_is_not_installed_is_named(capsys, tmp_path, monkeypatch, text, words):
     monkeypatch.setattr(importlib.util, "find_spec", lambda *_: None)
-    code, _, err = run(capsys, "fly", "--config", config(tmp_path, text))
+    path = config(tmp_path, text)
+    code, _, err = run(capsys, "fly", "--config", path)
     assert code == 2
     assert f"{words}; install it with: {sys.executable}" in err
+    code, out, _ = run(capsys, "check-config", path)
+    assert code == 0  # the computer that flies may have it
+    assert f"warning: {words}; install it with" in out
 
 
 def test_the_command_for_an_extra_is_the_one_that_works_here(monkeypatch, tmp_path):
