@@ -186,6 +186,8 @@ class _Run:
             say(f"{times} of the {self._noun} ended by an {error}")
         results = Results.read(self._folder)
         say(f"{results.good.sum()} of {progress.flown} {self._noun} were good.")
+        for reason, times in results.failures().most_common(_MOST_SHOWN):
+            say(f"  {times} not good: {reason}")
         if results.documented.size:
             kept, faulty = results.documented.sum(), results.documented.size
             say(f"{kept} of {faulty} flights with a fault ended as documented.")

@@ -17,6 +17,7 @@ from companion.config import Config
 from companion.config.files import assigned, changed, load
 from companion.extras import MissingExtraError
 from companion.files.os_errors import reason_of
+from companion.files.yaml_file import ConfigError
 from companion.flight.maneuvers import configured_maneuvers
 from companion.flight.observer import SeveralObservers
 from companion.flight.session import Session
@@ -41,6 +42,8 @@ def with_options(config: Config, options: argparse.Namespace, planner: str | Non
         MissingExtraError: an extra that the configuration needs is not installed.
         SigningError: the signing key cannot be used.
     """
+    if options.maneuvers and options.trajectory:
+        raise ConfigError("--trajectory flies only its file; leave out --maneuvers")
     link: dict[str, Any] = {}
     flight: dict[str, Any] = {}
     if options.endpoint:
@@ -58,6 +61,8 @@ def with_options(config: Config, options: argparse.Namespace, planner: str | Non
     changes = {"link": link, "flight": flight, "planner": {"name": planner} if planner else {}}
     flown_config = changed(config, assigned(options.set), "--set")
     flown_config = changed(flown_config, changes, "the command line")
+    if options.slow_down and "trajectory" not in flown_config.flight.maneuvers:
+        raise ConfigError("--slow-down needs a trajectory; add --trajectory FILE")
     # Refuse what cannot be flown before anything starts.
     check_link(flown_config)
     configured_maneuvers(flown_config)

@@ -171,3 +171,16 @@ def test_only_sampled_factors_can_have_too_few_samples(sampled, warnings):
     factors, columns = {"a": {"sampled": sampled}}, {"a": np.arange(20.0)}
     results = SimpleNamespace(factors=factors, columns=columns)
     assert len(list(_few_samples(results))) == warnings
+
+
+def test_reasons_are_counted_whatever_numbers_are_in_them():
+    columns = {
+        "ok": [True, False, False, False],
+        "result": ["ok", "tracking error 12.4 m", "tracking error 3 m", "ok"],
+        "failed_checks": ["", "", "", "circle: too far from its path"],
+    }
+    results = Results(Path(), "c", "flights", 4, {}, pyarrow.table(columns))
+    assert results.failures() == {
+        "tracking error … m": 2,
+        "circle: too far from its path": 1,
+    }

@@ -32,6 +32,8 @@ from companion.study import runner
 
 ENOSPC = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
+FIGURE8 = shipped("trajectories/figure8.yaml")
+
 
 @pytest.mark.parametrize(
     ("error", "code", "said"),
@@ -330,7 +332,10 @@ def test_a_folder_that_this_user_cannot_write_is_refused_before_the_flight(monke
     [
         ([], {}),
         (["--lockstep"], {"link": {"lockstep": True}}),
-        (["--slow-down"], {"flight": {"slow_down": True}}),
+        (
+            ["--trajectory", str(FIGURE8), "--slow-down"],
+            {"flight": {"maneuvers": ("trajectory",), "trajectory": FIGURE8, "slow_down": True}},
+        ),
         (["--arm"], {"flight": {"arm": True}}),
         (["--endpoint", "udpin://127.0.0.1:1"], {"link": {"endpoint": "udpin://127.0.0.1:1"}}),
     ],
@@ -344,3 +349,15 @@ def test_an_option_of_fly_replaces_its_key(monkeypatch, options, told):
     config = shipped("px4.yaml")
     assert main(["fly", "--config", str(config), *options]) == 0
     assert flown == [changed(load(config), told, "a test")]
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (["--maneuvers", "hover", "--trajectory", str(FIGURE8)], "leave out --maneuvers"),
+        (["--slow-down"], "--slow-down needs a trajectory; add --trajectory FILE"),
+    ],
+)
+def test_an_option_that_would_have_no_effect_is_refused(options, told, capsys):
+    assert main(["fly", "--config", str(shipped("px4.yaml")), *options]) == 2
+    assert told in capsys.readouterr().err

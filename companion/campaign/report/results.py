@@ -1,5 +1,7 @@
 """The results of a campaign so far, as NumPy columns."""
 
+import re
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Column = NDArray[Any]
+
+_NUMBER = re.compile(r"\d+(\.\d+)?")
 
 TRUE_ERROR = "position_rms_m"
 ERRORS = (TRUE_ERROR, "model_deviation_max")
@@ -104,6 +108,17 @@ class Results:
     def good(self) -> NDArray[np.bool_]:
         """(cases,): whether each case was good."""
         return np.array(self.columns["ok"], dtype=bool)
+
+    def failures(self) -> Counter[str]:
+        """How many cases were not good for each reason; numbers in a reason are left out."""
+        results = self.columns.get("result", np.empty(0))
+        checks = self.columns.get("failed_checks", np.full(len(results), ""))
+        reasons = (
+            check if result == "ok" else result
+            for result, check, good in zip(results, checks, self.good, strict=False)
+            if not good
+        )
+        return Counter(_NUMBER.sub("…", reason) for reason in reasons if reason)
 
     @cached_property
     def documented(self) -> NDArray[np.bool_]:
