@@ -55,11 +55,20 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_flights(commands: Commands) -> None:
-    fly = commands.add_parser("fly", help="fly the vehicle that the configuration names")
+    fly = commands.add_parser(
+        "fly",
+        help="fly the vehicle that the configuration names",
+        description="Check the vehicle, wait until it is armed, take off, fly the maneuvers, and "
+        "land. Ctrl-C hands the vehicle back. The flight is recorded in a folder of its own.",
+    )
     shared_options.add_required_config(fly)
     _add_link_options(fly)
     fly.set_defaults(run="flights.fly")
-    demo = commands.add_parser("demo", help="start the bundled vehicle and fly it")
+    demo = commands.add_parser(
+        "demo",
+        help="start the bundled vehicle and fly it",
+        description="Start the bundled mock vehicle, arm it, and fly it like `companion fly`.",
+    )
     demo.add_argument(
         "--config",
         type=Path,

@@ -74,7 +74,8 @@ def init(options: argparse.Namespace) -> int:
     Raises:
         ConfigError: the file exists or cannot be written.
     """
-    text = shipped(f"{STARTING_FILES[options.name]}.yaml").read_text(encoding="utf-8")
+    name = f"{STARTING_FILES[options.name]}.yaml"
+    text = shipped(name).read_text(encoding="utf-8")
     lines = []
     for line in text.splitlines(keepends=True):
         if line.startswith("# yaml-language-server"):
@@ -89,7 +90,8 @@ def init(options: argparse.Namespace) -> int:
     if out.exists() or out.is_symlink():
         raise ConfigError(f"{out} exists already; choose another file with --out")
     try:
-        write_whole(out, "".join(lines).removeprefix("#\n"))
+        own_text = "".join(lines).removeprefix("#\n")
+        write_whole(out, own_text.replace(f"configs/{name}", str(out)))
     except OSError as error:
         raise ConfigError(f"--out: cannot write {out}: {error.strerror}") from error
     print(f"Wrote {options.out}. Check it with: companion check-config {options.out}")

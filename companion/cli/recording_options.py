@@ -15,7 +15,12 @@ def add_recordings(commands: Commands) -> None:
 
 
 def _add_plot(commands: Commands) -> None:
-    plot = commands.add_parser("plot", help="draw a recorded flight (extra `plot`)")
+    plot = commands.add_parser(
+        "plot",
+        help="draw a recorded flight (extra `plot`)",
+        description="Draw a recorded flight as a picture: its path, its steps, and error, speed, "
+        "tilt and height over time, with the place and the reason of an early end.",
+    )
     plot.add_argument("folder", type=Path, metavar="FOLDER", help="the flight's folder")
     plot.add_argument(
         "--out", type=Path, metavar="FILE", help="picture (default: FOLDER/flight.png)"
@@ -24,7 +29,11 @@ def _add_plot(commands: Commands) -> None:
 
 
 def _add_export(commands: Commands) -> None:
-    export = commands.add_parser("export", help="write a recorded flight as CSV or Parquet")
+    export = commands.add_parser(
+        "export",
+        help="write a recorded flight as CSV or Parquet",
+        description="Write the tables of a recorded flight: samples, setpoints, guidance, events.",
+    )
     export.add_argument("folder", type=Path, metavar="FOLDER", help="the flight's folder")
     kind = export.add_mutually_exclusive_group(required=True)
     kind.add_argument("--csv", action="store_true", help="one CSV file for each channel")
@@ -58,7 +67,9 @@ def _add_replay(commands: Commands) -> None:
 
 def _add_reports(commands: Commands) -> None:
     report = commands.add_parser(
-        "report", help="one HTML page about a flight, or about any .tlog (extra `report`)"
+        "report",
+        help="one HTML page about a flight, or about any .tlog (extra `report`)",
+        description="Write one HTML page, without other files, about a flight or any .tlog.",
     )
     report.add_argument(
         "flight", type=Path, metavar="FOLDER", help="the flight's folder, or a .tlog of any program"
@@ -68,7 +79,10 @@ def _add_reports(commands: Commands) -> None:
     )
     report.set_defaults(run="recordings.report")
     compare = commands.add_parser(
-        "compare", help="one HTML page that compares flights (extra `report`)"
+        "compare",
+        help="one HTML page that compares flights (extra `report`)",
+        description="Write one HTML page that shows the motions of flights, and the "
+        "configuration keys and figures in which they differ.",
     )
     compare.add_argument(
         "flights", type=Path, nargs="+", metavar="FOLDER", help="folders of flights, or .tlog files"
