@@ -96,7 +96,8 @@ def _rate_fault(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, s
         return None
     return (
         f"{name} arrives at {achieved:.0f} Hz, asked for {asked:g} Hz",
-        "raise the link's speed, or lower link.attitude_rate_hz and link.position_rate_hz",
+        "raise the link's speed, lower link.attitude_rate_hz and link.position_rate_hz, or end "
+        "other programs on this computer if it is busy",
     )
 
 

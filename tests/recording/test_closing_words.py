@@ -100,7 +100,7 @@ def test_a_good_flight_is_called_good_with_its_figures_and_limits():
 
 BEYOND = {
     "circle": (["maneuvers", 2, "level_rms_m"], 0.26, "fly it slower"),
-    "hover": (["maneuvers", 0, "level_rms_m"], 0.16, "fly it slower"),
+    "hover": (["maneuvers", 0, "level_rms_m"], 0.16, "fly in less wind"),
     "steps": (["maneuvers", 1, "height_rms_m"], 0.16, "set thrust.hover_thrust"),
     "straightness of the steps": (["response", "cross_axis_max"], 0.01, "companion identify"),
     "linearity of the steps": (

@@ -71,7 +71,7 @@ class DeadTimes:
         if not wrong:
             return None
         return (
-            f"dead time is not as configured: {', '.join(wrong)}; the link is slow, or the "
-            "configured lag is wrong, which appears as dead time: find what slows the link, or "
-            "measure both anew with `companion identify`"
+            f"dead time is not as configured: {', '.join(wrong)}; the link or this "
+            "computer is slow, or the configured lag is wrong, which appears as dead time: find "
+            "what slows them, or measure both anew with `companion identify`"
         )

@@ -78,13 +78,14 @@ def _maneuvers(figures: Figures) -> Iterator[Check]:
     for maneuver in figures["maneuvers"]:
         level, height = maneuver["level_rms_m"], maneuver["height_rms_m"]
         if level is not None:
-            limit = LEVEL_RMS + LEVEL_RMS_PER_SPEED * (maneuver["reference_speed_max_m_s"] or 0.0)
+            speed = maneuver["reference_speed_max_m_s"] or 0.0
+            limit = LEVEL_RMS + LEVEL_RMS_PER_SPEED * speed
             yield Check(
                 maneuver["name"],
                 f"{level:.2f} m RMS from its path (limit {limit:.2f} m), "
                 f"at most {maneuver['level_max_m']:.2f} m",
                 level <= limit,
-                "fly it slower; against wind and drag see guidance and `companion identify`",
+                _level_remedy(speed),
                 f"{maneuver['name']}: too far from its path",
             )
         if height is not None:
@@ -96,6 +97,12 @@ def _maneuvers(figures: Figures) -> Iterator[Check]:
                 f"{maneuver['name']}: too far from its height",
             )
         yield from _swing(maneuver)
+
+
+def _level_remedy(speed: float) -> str:
+    """The remedy for a maneuver that was too far from its path, by its largest speed, m/s."""
+    first = "fly it slower" if speed > 0.0 else "fly in less wind"
+    return f"{first}; against wind and drag see guidance and `companion identify`"
 
 
 def _height_remedy(rms: float, mean: float | None) -> str:
