@@ -10,6 +10,7 @@ from companion.mavlink.framing import Frame, build_frame
 from companion.mavlink.messages import CRC_EXTRA, Message, decode, dialect, encode
 from companion.mavlink.settings import MAV_TYPE_ONBOARD_CONTROLLER, LinkSettings
 from companion.mavlink.texts import MOST_TEXT_NUMBER, status_texts
+from companion.serve.mode_requests import MISSION_ITEMS
 from companion.serve.network.addresses import Address
 from companion.serve.network.client import Client
 from companion.serve.network.network import Network
@@ -22,7 +23,6 @@ _TEXT_REPEAT_PERIOD = 5.0
 """Shortest time between two equal texts to the same client, s."""
 _AUTOPILOT_INVALID, _STATE_ACTIVE, _MAVLINK_VERSION = 8, 4, 3
 _COMMAND_IDS = dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT
-_MISSION_ITEM_IDS = dialect.MAVLINK_MSG_ID_MISSION_ITEM, dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT
 
 WARNING, NOTICE = dialect.MAV_SEVERITY_WARNING, dialect.MAV_SEVERITY_NOTICE
 
@@ -134,7 +134,7 @@ def _heartbeat() -> Message:
 def _acknowledgement(frame: Frame, result: int) -> Message | None:
     """COMMAND_ACK for a command, MISSION_ACK for a mission item; None for other messages."""
     sender = {"target_system": frame.system, "target_component": frame.component}
-    if frame.message_id in _MISSION_ITEM_IDS:
+    if frame.message_id in MISSION_ITEMS:
         return dialect.MAVLink_mission_ack_message(**sender, type=dialect.MAV_MISSION_DENIED)
     if frame.message_id == dialect.MAVLINK_MSG_ID_SET_MODE:
         command = MAV_CMD_DO_SET_MODE

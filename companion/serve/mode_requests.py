@@ -18,7 +18,8 @@ _COMMAND_LONG = dialect.MAVLINK_MSG_ID_COMMAND_LONG
 _COMMAND_INT = dialect.MAVLINK_MSG_ID_COMMAND_INT
 _SET_MODE = dialect.MAVLINK_MSG_ID_SET_MODE
 _REQUEST_DATA_STREAM = dialect.MAVLINK_MSG_ID_REQUEST_DATA_STREAM
-_MISSION_ITEMS = dialect.MAVLINK_MSG_ID_MISSION_ITEM, dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT
+MISSION_ITEMS = dialect.MAVLINK_MSG_ID_MISSION_ITEM, dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT
+"""Ids of the messages with one mission item."""
 _GUIDED_ITEMS = 2, 3
 """Values of `current` with which ArduPilot flies to a mission item, or to its height, at once."""
 _SET_MESSAGE_INTERVAL = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
@@ -67,7 +68,7 @@ def steers_in_our_mode(frame: Frame, autopilot: Autopilot) -> bool:
     """
     if autopilot.control_entry is not ControlEntry.BY_FIRST_SETPOINT:
         return False
-    if frame.message_id in _MISSION_ITEMS:
+    if frame.message_id in MISSION_ITEMS:
         return decode(frame.message_id, frame.payload).current in _GUIDED_ITEMS
     if frame.message_id not in (_COMMAND_LONG, _COMMAND_INT):
         return False

@@ -105,7 +105,7 @@ def test_the_reason_is_the_result_then_the_checks_then_the_crash():
         "failed_checks": ["touchdown", "touchdown", ""],
     }
     found = results(told)
-    assert [page._reason(found, row) for row in range(3)] == ["fence left", "touchdown", "crashed"]
+    assert [found.reason(row) for row in range(3)] == ["fence left", "touchdown", "crashed"]
 
 
 def test_some_flights_with_a_fault_are_counted_beside_the_others():

@@ -169,9 +169,7 @@ def what_to_look_at(results: Results, by_outcome: dict[str, list[Influence]]) ->
     elif results.documented.size:
         kept, faulty = results.documented.sum(), results.documented.size
         yield f"{kept} of {faulty} flights with a fault ended as documented."
-    reasons = Counter(
-        _reason(results, row) for row in range(results.count) if not results.good[row]
-    )
+    reasons = Counter(results.reason(row) for row in range(results.count) if not results.good[row])
     if reasons:
         (reason, times) = reasons.most_common(1)[0]
         yield f"Most frequent reason why a case was not good, {times} times: {reason}."
@@ -182,15 +180,6 @@ def what_to_look_at(results: Results, by_outcome: dict[str, list[Influence]]) ->
             "its true position: its own report measures by the autopilot's estimate, which is "
             "estimated_rms_m here."
         )
-
-
-def _reason(results: Results, row: int) -> str:
-    """Why the case in a row was not good."""
-    columns = results.columns
-    result = str(columns["result"][row])
-    if result != "ok":
-        return result
-    return str(columns["failed_checks"][row] or "") or "crashed"
 
 
 def _most_influential(results: Results, by_outcome: dict[str, list[Influence]]) -> Iterator[str]:

@@ -111,14 +111,15 @@ class Results:
 
     def failures(self) -> Counter[str]:
         """How many cases were not good for each reason; numbers in a reason are left out."""
-        results = self.columns.get("result", np.empty(0))
-        checks = self.columns.get("failed_checks", np.full(len(results), ""))
-        reasons = (
-            check if result == "ok" else result
-            for result, check, good in zip(results, checks, self.good, strict=False)
-            if not good
-        )
-        return Counter(_NUMBER.sub("…", reason) for reason in reasons if reason)
+        reasons = (self.reason(row) for row in range(self.count) if not self.good[row])
+        return Counter(_NUMBER.sub("…", reason) for reason in reasons)
+
+    def reason(self, row: int) -> str:
+        """Why the case in a row was not good."""
+        result = str(self.columns["result"][row])
+        if result != "ok":
+            return result
+        return str(self.columns["failed_checks"][row] or "") or "crashed"
 
     @cached_property
     def documented(self) -> NDArray[np.bool_]:
