@@ -144,6 +144,7 @@ class Watch:
 
     def _judge_snapshot(self, now: float) -> None:
         """Give the ladder a snapshot and carry out its verdict."""
+        self._context.link.timesync.probe()
         snapshot = self._context.snapshot_builder.snapshot(now)
         self._rate_requester.check(snapshot.health)
         verdict = self._ladder.step(snapshot)
@@ -154,6 +155,8 @@ class Watch:
             return
         if verdict.mutes:
             self._context.release()
+        elif verdict.ends_stream:
+            self._context.end_stream()
         raise FlightEnded(verdict.reason, EXIT_OF_ACTION[verdict.action])
 
     def _judge_heartbeat(self) -> None:
