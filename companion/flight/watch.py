@@ -87,6 +87,8 @@ class Watch:
         self._ladder = ladder
         self._clock = clock
         self._rate_requester = rate_requester
+        # Whether setpoints were stopped while the autopilot obeyed them: it may still wait for us.
+        self._stopped_in_control = False
         self._status_at = self._heartbeat_asked_at = -inf
         self._heartbeat_request: asyncio.Task[None] | None = None
         self._mode_request: asyncio.Task[None] | None = None
@@ -153,6 +155,7 @@ class Watch:
         if verdict.action is Action.HOLD:
             self._context.guidance_loop.give_up()
             return
+        self._stopped_in_control = self._stopped_in_control or verdict.mutes or verdict.ends_stream
         if verdict.mutes:
             self._context.release()
         elif verdict.ends_stream:
@@ -161,7 +164,8 @@ class Watch:
 
     def _judge_heartbeat(self) -> None:
         state, now = self._context.link.state, self._clock()
-        exit_ = Exit.LISTEN if self._context.loop.offboard_active else Exit.RELEASE
+        in_control = self._context.loop.offboard_active or self._stopped_in_control
+        exit_ = Exit.LISTEN if in_control else Exit.RELEASE
         if now - state.mode_received > self._context.heartbeat_limit:
             raise FlightEnded(
                 "no heartbeat from the vehicle, so its mode is not known any more", exit_
