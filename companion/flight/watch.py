@@ -164,7 +164,9 @@ class Watch:
 
     def _judge_heartbeat(self) -> None:
         state, now = self._context.link.state, self._clock()
-        in_control = self._context.loop.offboard_active or self._stopped_in_control
+        loop = self._context.loop
+        # While taking over, it may obey the first setpoint although no heartbeat has told so.
+        in_control = loop.offboard_active or loop.taking_over or self._stopped_in_control
         exit_ = Exit.LISTEN if in_control else Exit.RELEASE
         if now - state.mode_received > self._context.heartbeat_limit:
             raise FlightEnded(

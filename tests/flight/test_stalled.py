@@ -8,7 +8,7 @@ import asyncio
 
 import pytest
 
-from tests.flight.fly import fly, mock_vehicle
+from tests.flight.fly import fly, mock_vehicle, run, session_for
 from tests.flight.others import When
 
 
@@ -36,3 +36,23 @@ def test_px4_that_its_failsafe_has_taken_and_landed_in_a_stall_is_not_taken_back
     assert summary.result.startswith("this program did not run for"), summary.events
     assert (truth["armed"], truth["landed"], truth["crashed"]) == (False, True, False)
     assert summary.events[-1][1].endswith("disarmed in OFFBOARD: nothing is commanded")
+
+
+def test_ardupilot_that_obeyed_the_first_setpoint_before_a_stall_is_asked_to_hold():
+    """Its heartbeat had not told yet that it obeys us."""
+    with mock_vehicle(autopilot="ardupilot", delay_s=0.015) as mock:
+        session = session_for(mock, hover={"duration_s": 9.0})
+
+        async def flown():
+            loop = asyncio.get_running_loop()
+
+            def stall():
+                loop.clock.now += 3.0
+
+            mock.when(lambda: mock.setpoints, lambda: loop.call_soon(stall))
+            return await session.fly()
+
+        summary = run(mock, flown())
+        truth = mock.state()
+    assert summary.result != "ok"
+    assert (truth["mode"], truth["armed"]) == ("BRAKE", True), summary.events
