@@ -22,10 +22,10 @@ _MAVLINK_VERSION = 3
 _QUICK_REQUESTS, _QUICK_REQUEST_PERIOD_S = 10, 0.1
 _REQUEST_PERIOD_S = 1.0
 _KEPT_REQUESTS = 16
-_PROBE_PERIOD_S = 0.2
+_PROBE_PERIOD_S = 0.1
 _PROBE_WINDOW_S = 0.7
-"""A longer delay of the link is noticed after about this time, s; a single late answer is not."""
-_MIN_PROBES = 2
+"""A longer delay of the link is noticed after about this time, s; single late answers are not."""
+_MIN_PROBES = 4
 _S_PER_NS = 1e-9
 
 
@@ -88,7 +88,7 @@ class TimeSync:
 
     @property
     def present_round_trip_s(self) -> float | None:
-        """The shortest round trip of the probes answered in the last 0.7 s; None: fewer than two.
+        """The shortest round trip of the probes answered in the last 0.7 s; None: fewer than four.
 
         A link that becomes slow lengthens it within a second, `round_trip_s` only after 16 s.
         """
@@ -101,7 +101,7 @@ class TimeSync:
         self._send_request(self._requests)
 
     def probe(self) -> None:
-        """Send a TIMESYNC request that measures only the round trip, at most five in a second."""
+        """Send a TIMESYNC request that measures only the round trip, at most ten in a second."""
         if not self._probes or self._now_ns() - self._probes[-1] >= _PROBE_PERIOD_S / _S_PER_NS:
             self._send_request(self._probes)
 
