@@ -87,6 +87,8 @@ class Watch:
         self._ladder = ladder
         self._clock = clock
         self._rate_requester = rate_requester
+        # Whether setpoints were stopped while the autopilot obeyed them: it may still wait for us.
+        self._stopped_in_control = False
         self._status_at = self._heartbeat_asked_at = -inf
         self._heartbeat_request: asyncio.Task[None] | None = None
         self._mode_request: asyncio.Task[None] | None = None
@@ -144,6 +146,7 @@ class Watch:
 
     def _judge_snapshot(self, now: float) -> None:
         """Give the ladder a snapshot and carry out its verdict."""
+        self._context.link.timesync.probe()
         snapshot = self._context.snapshot_builder.snapshot(now)
         self._rate_requester.check(snapshot.health)
         verdict = self._ladder.step(snapshot)
@@ -152,13 +155,19 @@ class Watch:
         if verdict.action is Action.HOLD:
             self._context.guidance_loop.give_up()
             return
+        self._stopped_in_control = self._stopped_in_control or verdict.mutes or verdict.ends_stream
         if verdict.mutes:
             self._context.release()
+        elif verdict.ends_stream:
+            self._context.end_stream()
         raise FlightEnded(verdict.reason, EXIT_OF_ACTION[verdict.action])
 
     def _judge_heartbeat(self) -> None:
         state, now = self._context.link.state, self._clock()
-        exit_ = Exit.LISTEN if self._context.loop.offboard_active else Exit.RELEASE
+        loop = self._context.loop
+        # While taking over, it may obey the first setpoint although no heartbeat has told so.
+        in_control = loop.offboard_active or loop.taking_over or self._stopped_in_control
+        exit_ = Exit.LISTEN if in_control else Exit.RELEASE
         if now - state.mode_received > self._context.heartbeat_limit:
             raise FlightEnded(
                 "no heartbeat from the vehicle, so its mode is not known any more", exit_

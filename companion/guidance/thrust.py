@@ -30,10 +30,13 @@ def cos_tilt_ahead(q: Quaternion, body_rates: BodyRates, ahead: float) -> float:
 
     Thrust for this tilt instead of the present one compensates the lag of the rotors while the
     vehicle tilts, to first order (T + lag·Ṫ). Source: third row of Ṙ = R·[ω]ₓ.
+
+    A quick rotation does not last for a long lag. So a tilt below 60° counts as 60° at most: beyond
+    it, the thrust would be reduced as for a vehicle that falls over.
     """
     x, y, z = down_in_body(q)
     cosine = z + ahead * (x * body_rates.pitch - y * body_rates.roll)
-    return min(max(cosine, -1.0), 1.0)
+    return min(max(cosine, _MIN_COSINE if z > _MIN_COSINE else -1.0), 1.0)
 
 
 def largest_tilt(lift: float, largest_thrust: float) -> float:

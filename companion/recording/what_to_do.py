@@ -24,6 +24,7 @@ BY_MONITOR: Mapping[str, str] = {
     "answer gaps": "find what interrupts the telemetry or this computer",
     "answer rate": "find what slows ATTITUDE_QUATERNION; the limit is link.min_attitude_rate_hz",
     "position rate": "find what slows LOCAL_POSITION_NED; the limit is link.min_position_rate_hz",
+    "late setpoints": "find what slows the link; the limit is 1.5 · deadman.telemetry_stale_ms",
     "link loss": "mend the radio link or lower its load; the limit is safety.max_loss",
     "round trip": "find what slows the link; the limit is safety.max_round_trip_ms",
     "deadlines": "end other programs on this computer, or set realtime.scheduler: fifo",

@@ -14,12 +14,13 @@ class Verdict(NamedTuple):
     Attributes:
         action: HOLD, or one that ends the flight.
         reason: description of the breach.
-        mutes: see `Monitor`.
+        mutes, ends_stream: see `Monitor`.
     """
 
     action: Action
     reason: str
     mutes: bool = False
+    ends_stream: bool = False
 
 
 class SafetyLadder:
@@ -97,4 +98,5 @@ def _severity(alarm: Alarm) -> int:
 
 
 def _verdict(alarm: Alarm, action: Action) -> Verdict:
-    return Verdict(action, alarm.reason or "", alarm.monitor.mutes)
+    monitor = alarm.monitor
+    return Verdict(action, alarm.reason or "", monitor.mutes, monitor.ends_stream)

@@ -84,6 +84,27 @@ def round_trip(most: float) -> Judge:
     return judge
 
 
+def late_setpoints(stale: float) -> Judge:
+    """Each round trip of the last 0.7 s takes longer than 1.5 times `stale`, s.
+
+    A sample may be `stale` old when it is answered. If its setpoint takes as long again, the
+    vehicle tilts in growing swings, while all telemetry still looks good.
+    """
+    most = 1.5 * stale
+
+    def judge(snapshot: Snapshot, raised: bool) -> str | None:
+        seconds = snapshot.health.present_round_trip
+        if seconds is None or seconds <= with_hysteresis(most, raised):
+            return None
+        return (
+            f"setpoints reach the vehicle too late: the link's round trip takes "
+            f"{1e3 * seconds:.0f} ms, longer than 1.5 · deadman.telemetry_stale_ms = "
+            f"{1e3 * most:.0f}"
+        )
+
+    return judge
+
+
 def deadlines(most: float) -> Judge:
     """More than the share `most` of the setpoints misses deadman.deadline_ms."""
 

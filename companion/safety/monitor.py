@@ -39,6 +39,8 @@ class Monitor:
         calm: time without the breach before the alarm ends, s.
         then: action that follows if a hold does not end the breach.
         mutes: whether setpoints stop at once, because their data cannot be trusted.
+        ends_stream: whether setpoints stop after one with zero body rates, because the later ones
+            would arrive too late.
     """
 
     name: str
@@ -48,6 +50,7 @@ class Monitor:
     calm: float = 1.0
     then: Action = Action.LAND
     mutes: bool = False
+    ends_stream: bool = False
 
 
 class Alarm:

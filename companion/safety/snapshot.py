@@ -94,6 +94,7 @@ class Health(NamedTuple):
         answer_rate: effective rate of setpoints, Hz (`IntervalSums`).
         gaps: number of gaps in the setpoints within the last 5 s.
         position_rate: rate of positions, Hz.
+        present_round_trip: shortest round trip of the last 0.7 s, s.
     """
 
     lost: float | None = None
@@ -103,6 +104,7 @@ class Health(NamedTuple):
     answer_rate: float | None = None
     gaps: int = 0
     position_rate: float | None = None
+    present_round_trip: float | None = None
 
 
 class Resets(NamedTuple):

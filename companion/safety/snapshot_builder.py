@@ -205,15 +205,19 @@ class SnapshotBuilder:
     def _health(self, now: float) -> Health:
         since = max(self._began_at, now - _GAP_COUNTING_TIME)
         gaps = sum(at > since for at in self._loop.record.gaps)
-        first, last = self._counted[0], self._counted[-1]
+        first, last, timesync = self._counted[0], self._counted[-1], self._link.timesync
         span = last.now - first.now
         if span < _FILLED_SHARE * _AVERAGING_TIME:
-            return Health(round_trip=self._link.timesync.round_trip_s, gaps=gaps)
+            return Health(
+                round_trip=timesync.round_trip_s,
+                gaps=gaps,
+                present_round_trip=timesync.present_round_trip_s,
+            )
         late = sum(counted.late for counted in self._counted) - first.late
         lost = last.lost - first.lost
         return Health(
             share_lost(last.frames - first.frames, lost),
-            self._link.timesync.round_trip_s,
+            timesync.round_trip_s,
             (last.missed - first.missed) / max(1, last.setpoints - first.setpoints)
             if self._real_time
             else None,
@@ -221,6 +225,7 @@ class SnapshotBuilder:
             last.setpoint_intervals.rate_since(first.setpoint_intervals),
             gaps,
             (last.positions - first.positions) / span,
+            timesync.present_round_trip_s,
         )
 
     def _resets(self, now: float) -> Resets:

@@ -97,12 +97,14 @@ def _link_monitors(config: Config) -> tuple[Monitor, ...]:
     trip = link_judges.round_trip(safety.max_round_trip)
     answers = link_judges.answer_rate(config.link.min_attitude_rate_hz)
     positions = link_judges.position_rate(config.link.min_position_rate_hz)
+    late = link_judges.late_setpoints(config.deadman.telemetry_stale)
     return (
         # The vehicle keeps turning at the last rate until the next setpoint. A low rate of
         # setpoints causes errors of a few degrees; a gap of 0.4 s exceeds the whole tilt limit.
         Monitor("answer gaps", link_judges.gaps(_MAX_GAPS), _HAND_BACK),
         Monitor("answer rate", answers, _HAND_BACK, lasts=1.0),
         Monitor("position rate", positions, _HAND_BACK, lasts=1.0),
+        Monitor("late setpoints", late, _HAND_BACK, ends_stream=True),
         Monitor("link loss", link_judges.loss(safety.max_loss), link, lasts=2.0, calm=2.0),
         Monitor("round trip", trip, link, lasts=5.0, calm=5.0),
         # `lasts` exceeds the averaging window of 1 s, so one stall of the computer is no breach.

@@ -97,7 +97,7 @@ class Connection:
             await asyncio.sleep(pause)
             try:
                 await self.open()
-            except EndpointError as error:
+            except Exception as error:  # whatever failed, the next try may succeed
                 _LOG.info("reconnecting failed, the next try follows: %s", error)
                 pause = min(2.0 * pause, _BACKOFF_MAX_S)
         self._stats.reconnects += 1

@@ -228,8 +228,14 @@ class Link(VehicleClient):
 
     def _start(self, work: Coroutine[Any, Any, None]) -> None:
         task = self._loop.create_task(work)
-        task.add_done_callback(_log_failure)
+        task.add_done_callback(self._report_failure)
         self._tasks.append(task)
+
+    def _report_failure(self, task: asyncio.Task[None]) -> None:
+        """Report that a task failed, which ends a flight; without it the link is not whole."""
+        error = None if task.cancelled() else task.exception()
+        if isinstance(error, Exception):
+            self._router.report(error)
 
     async def _first_beacon(self, lockstep: LockstepClient) -> None:
         # Some vehicles wait for a first message before they send (udpout, TCP).
@@ -239,8 +245,3 @@ class Link(VehicleClient):
                 await lockstep.first_beacon
         except TimeoutError:
             raise LinkTimeout(no_beacon(self.settings, self.stats)) from None
-
-
-def _log_failure(task: asyncio.Task[None]) -> None:
-    if not task.cancelled() and task.exception() is not None:
-        _LOG.error("a task of the link failed", exc_info=task.exception())

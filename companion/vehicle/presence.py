@@ -22,6 +22,10 @@ _MAVLINK_VERSION = 3
 _QUICK_REQUESTS, _QUICK_REQUEST_PERIOD_S = 10, 0.1
 _REQUEST_PERIOD_S = 1.0
 _KEPT_REQUESTS = 16
+_PROBE_PERIOD_S = 0.1
+_PROBE_WINDOW_S = 0.7
+"""A longer delay of the link is noticed after about this time, s; single late answers are not."""
+_MIN_PROBES = 4
 _S_PER_NS = 1e-9
 
 
@@ -67,6 +71,8 @@ class TimeSync:
         self._requests: deque[int] = deque(maxlen=_KEPT_REQUESTS)
         # (event-loop time of the answer, round trip), s
         self._round_trips: deque[tuple[float, float]] = deque(maxlen=_KEPT_REQUESTS)
+        self._probes: deque[int] = deque(maxlen=_KEPT_REQUESTS)
+        self._probe_trips: deque[tuple[float, float]] = deque(maxlen=_KEPT_REQUESTS)
         router.subscribe("TIMESYNC", self._on_timesync)
 
     @property
@@ -80,16 +86,34 @@ class TimeSync:
         trips = self._recent_round_trips()
         return max(trips) - min(trips) if trips else None
 
+    @property
+    def present_round_trip_s(self) -> float | None:
+        """The shortest round trip of the probes answered in the last 0.7 s; None: fewer than four.
+
+        A link that becomes slow lengthens it within a second, `round_trip_s` only after 16 s.
+        """
+        oldest = self._clock() - _PROBE_WINDOW_S
+        trips = [trip for received, trip in self._probe_trips if received >= oldest]
+        return min(trips) if len(trips) >= _MIN_PROBES else None
+
     def ask(self) -> None:
         """Send one TIMESYNC request."""
+        self._send_request(self._requests)
+
+    def probe(self) -> None:
+        """Send a TIMESYNC request that measures only the round trip, at most ten in a second."""
+        if not self._probes or self._now_ns() - self._probes[-1] >= _PROBE_PERIOD_S / _S_PER_NS:
+            self._send_request(self._probes)
+
+    def _send_request(self, requests: deque[int]) -> None:
         stamp = self._now_ns()
-        self._requests.append(stamp)
+        requests.append(stamp)
         self._outbox.send(dialect.MAVLink_timesync_message(tc1=0, ts1=stamp))
 
     def reset(self) -> None:
         """Forget all requests and answers, after a reconnect: the vehicle may have restarted."""
-        self._requests.clear()
-        self._round_trips.clear()
+        for each in (self._requests, self._round_trips, self._probes, self._probe_trips):
+            each.clear()
 
     def _on_timesync(self, message: Message) -> None:
         now = self._now_ns()
@@ -99,6 +123,8 @@ class TimeSync:
             self._requests.remove(message.ts1)
             self._round_trips.append((now * _S_PER_NS, (now - message.ts1) * _S_PER_NS))
             self._vehicle_clock.exchange(message.ts1 * _S_PER_NS, now * _S_PER_NS, message.tc1)
+        elif message.ts1 in self._probes:
+            self._probe_trips.append((now * _S_PER_NS, (now - message.ts1) * _S_PER_NS))
 
     def _recent_round_trips(self) -> list[float]:
         oldest = self._clock() - EXCHANGE_LIFETIME

@@ -182,3 +182,26 @@ def test_vertical_gusts_cost_little_height():
         summary = fly(mock, hover={"duration_s": 12.0})
     assert height_errors(summary)[1].max() < 0.25
     assert summary.tracking()["height_rms_m"] < 0.06
+
+
+def test_quick_steps_of_a_vehicle_with_a_long_thrust_lag_keep_their_height():
+    """600 ms is more than any rotor has, but it is accepted."""
+    lowest = []
+    with mock_vehicle(full_rate=True) as mock:
+
+        def note_height():
+            state = mock.state()
+            if state["mode"] == "OFFBOARD" and state["armed"]:
+                lowest.append(-state["position"][2])
+
+        mock.after_step.append(note_height)
+        summary = fly(
+            mock,
+            limits={"max_tilt_rate_deg_s": 400.0, "max_tilt_deg": 45.0},
+            planner={"gain_per_s": 8.0},
+            thrust={"lag_ms": 600.0},
+            flight={"maneuvers": ["steps"], "takeoff_height_m": 6.0},
+            steps={"coefficient": 0.6, "duration_s": 0.6},
+        )
+    assert summary.result == "ok", summary.events
+    assert min(lowest) > 5.5

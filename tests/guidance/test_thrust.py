@@ -47,7 +47,17 @@ def test_the_tilt_ahead_is_that_of_a_vehicle_which_rotates_on(start, body_rates)
 def test_the_tilt_ahead_stays_a_cosine():
     q = turned(Rotation.from_rotvec((0.5, 0.0, 0.0)))
     assert cos_tilt_ahead(q, BodyRates(-100.0, 0.0, 0.0), 0.1) == 1.0
-    assert cos_tilt_ahead(q, BodyRates(100.0, 0.0, 0.0), 0.1) == -1.0
+    fallen = turned(Rotation.from_rotvec((1.1, 0.0, 0.0)))
+    assert cos_tilt_ahead(fallen, BodyRates(100.0, 0.0, 0.0), 0.1) == -1.0
+
+
+@given(st.floats(0.0, 1.0), st.floats(0.0, 20.0), st.floats(0.0, 1.0))
+def test_a_quick_rotation_never_reduces_the_thrust_of_a_vehicle_that_tilts(tilt, rate, lag):
+    """With a long lag it seemed to fall over, and was let fall."""
+    q = turned(Rotation.from_rotvec((0.0, -tilt, 0.0)))
+    thrust = specific_thrust(0.0, cos_tilt_ahead(q, BodyRates(0.0, -rate, 0.0), lag))
+    assert thrust >= specific_thrust(0.0, math.cos(tilt)) - 1e-9
+    assert thrust <= 2.0 * GRAVITY
 
 
 def lift_lost_while_tilting(known_lag):

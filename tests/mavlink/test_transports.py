@@ -4,6 +4,7 @@ import asyncio
 import errno
 import os
 import pty
+import termios
 import time
 import tty
 from contextlib import asynccontextmanager
@@ -284,6 +285,7 @@ def test_a_device_in_use_by_another_program_is_said(run):
         (PermissionError(errno.EPERM, "Operation not permitted"), "add yourself to its group"),
         (OSError(errno.EBUSY, "Device or resource busy"), "in use by another program"),
         (OSError(errno.EIO, "Input/output error"), "at 57600 baud cannot be opened: .*Input"),
+        (termios.error(errno.EIO, "Input/output error"), "at 57600 baud cannot be .*Input"),
         (ValueError("no such rate"), "at 57600 baud cannot be opened: no such rate"),
     ],
 )

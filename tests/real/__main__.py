@@ -25,6 +25,7 @@ DISTURBED = (
     "clock went back",
     "jumped ahead",
     "setpoints paused",
+    "reach the vehicle too late",
 )
 """What a flight says that was ended by a busy computer, which stalls the simulator, too."""
 

@@ -7,7 +7,14 @@ import pytest
 from companion.config import Config
 from companion.control.loop_record import Unanswered
 from companion.guidance.fence import Fence, Place
-from companion.safety import Action, SafetyLadder, autopilot_judges, link_judges, motion_judges
+from companion.safety import (
+    Action,
+    SafetyLadder,
+    Verdict,
+    autopilot_judges,
+    link_judges,
+    motion_judges,
+)
 from companion.safety.actions import Exit, FlightEnded
 from companion.safety.link_judges import silence
 from companion.safety.monitor import Monitor
@@ -43,6 +50,10 @@ UPPER = {
     "tracking": (motion_judges.tracking, lambda v: at(motion=Motion(off_course=v))),
     "link loss": (link_judges.loss, health("lost")),
     "round trip": (link_judges.round_trip, health("round_trip")),
+    "late setpoints": (
+        lambda most: link_judges.late_setpoints(most / 1.5),
+        health("present_round_trip"),
+    ),
     "deadlines": (link_judges.deadlines, health("missed")),
     "starvation": (link_judges.starvation, health("starved")),
 }
@@ -131,6 +142,12 @@ SAID = [
         lambda: link_judges.round_trip(0.2),
         at(health=Health(round_trip=0.6)),
         "the link's round trip takes 600 ms, longer than safety.max_round_trip_ms = 200",
+    ),
+    (
+        lambda: link_judges.late_setpoints(0.1),
+        at(health=Health(present_round_trip=0.3)),
+        "setpoints reach the vehicle too late: the link's round trip takes 300 ms, longer than "
+        "1.5 · deadman.telemetry_stale_ms = 150",
     ),
     (
         lambda: link_judges.deadlines(0.2),
@@ -230,9 +247,9 @@ def test_what_holding_does_not_mend_goes_on_to_the_graver_next_rung_in_time():
     ladder = SafetyLadder([odd("a", Action.HAND_BACK), odd("b", Action.LAND)], 2.0)
     ladder.note = told.append
     both = Snapshot(0.0, good_flags=3)
-    assert ladder.step(both) == (Action.HOLD, "reason a", False)
+    assert ladder.step(both) == Verdict(Action.HOLD, "reason a")
     assert ladder.step(both._replace(now=1.75)) is None
-    assert ladder.step(both._replace(now=2.0)) == (Action.LAND, "reason b", False)
+    assert ladder.step(both._replace(now=2.0)) == Verdict(Action.LAND, "reason b")
     assert told == ["safety: a: reason a → hold", "safety: b: reason b → hold"]
 
 

@@ -118,6 +118,7 @@ BREACHES = [
     ("answer gaps", health(gaps=3), HAND_BACK, 0.0, "setpoints paused 3 times within 5 s"),
     ("answer rate", health(answer_rate=49.0), HAND_BACK, 1.0, "sent at 49 Hz, below link.min"),
     ("position rate", health(position_rate=9.0), HAND_BACK, 1.0, "come at 9 Hz, below link.min"),
+    ("late setpoints", health(present_round_trip=0.16), HAND_BACK, 0.0, "160 ms, longer than 1.5"),
     ("link loss", health(lost=0.45), WARN, 2.0, "45 % of the vehicle's frames"),
     ("round trip", health(round_trip=0.2), WARN, 5.0, "200 ms"),
     ("deadlines", health(missed=0.3), HAND_BACK, 1.5, "30 % of the setpoints"),
@@ -193,6 +194,7 @@ def test_what_the_rows_of_the_table_say_besides_action_and_time():
         row.name: calm.get(row.name, 1.0) for row in table
     }
     assert [row.name for row in table if row.mutes is True] == ["unheard", "silence", "clock"]
+    assert [row.name for row in table if row.ends_stream is True] == ["late setpoints"]
     after_hold = {row.name: row.then for row in table if row.action is HOLD}
     assert after_hold == {"braking": HAND_BACK, "speed": LAND, "tracking": LAND, "thrust": LAND}
 

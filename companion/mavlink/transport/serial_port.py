@@ -3,6 +3,7 @@
 import asyncio
 import errno
 import os
+import termios
 import time
 
 import serial
@@ -35,7 +36,8 @@ class SerialTransport:
             self._port = serial.Serial(
                 endpoint.device, endpoint.baud, timeout=0, write_timeout=0, exclusive=True
             )
-        except (OSError, ValueError) as error:  # SerialException is an OSError
+        # SerialException is an OSError; pyserial lets termios.error through.
+        except (OSError, ValueError, termios.error) as error:
             raise EndpointError(_open_error(endpoint, error)) from error
         self._fd: int = self._port.fileno()
         watch(self._loop, self._fd, self._read)
@@ -102,7 +104,7 @@ class SerialTransport:
         self._port.close()
 
 
-def _open_error(endpoint: SerialPort, error: OSError | ValueError) -> str:
+def _open_error(endpoint: SerialPort, error: Exception) -> str:
     where = f"serial {endpoint.device}"
     number = getattr(error, "errno", None)
     if number == errno.ENOENT:

@@ -1,0 +1,73 @@
+"""The round trip of the link now, by probes that do not change the estimate of the clock."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from companion.mavlink.router import Router
+from companion.mavlink.stats import LinkStats
+from companion.vehicle.presence import TimeSync
+
+
+class Bench:
+    """A TimeSync whose requests are kept; `answer` answers the newest one."""
+
+    def __init__(self):
+        self.now, self.sent, self.exchanges = 100.0, [], []
+        outbox = SimpleNamespace(send=self.sent.append)
+        clock = SimpleNamespace(exchange=lambda *seen: self.exchanges.append(seen))
+        self.timesync = TimeSync(outbox, Router(LinkStats()), lambda: self.now, clock)
+
+    def answer(self, after):
+        self.now += after
+        stamp = self.sent[-1].ts1
+        self.timesync._on_timesync(SimpleNamespace(tc1=7 * 10**9, ts1=stamp))
+
+    def probe(self, round_trip):
+        self.now += 0.1
+        self.timesync.probe()
+        self.answer(round_trip)
+
+
+def test_the_present_round_trip_is_the_shortest_of_the_last_moments_and_needs_four_answers():
+    bench = Bench()
+    for trip in (0.05, 0.03, 0.05):
+        bench.probe(trip)
+        assert bench.timesync.present_round_trip_s is None
+    bench.probe(0.05)
+    assert bench.timesync.present_round_trip_s == pytest.approx(0.03)
+    bench.now += 0.4
+    for sent in range(4):
+        bench.timesync.probe()
+        bench.now += 0.1
+        assert len(bench.sent) == 5 + sent
+    bench.now += 0.2
+    for request in bench.sent[-4:]:
+        bench.timesync._on_timesync(SimpleNamespace(tc1=7 * 10**9, ts1=request.ts1))
+    assert bench.timesync.present_round_trip_s == pytest.approx(0.3)
+    bench.now += 0.8
+    assert bench.timesync.present_round_trip_s is None
+
+
+def test_a_probe_changes_neither_the_clock_nor_the_long_round_trip():
+    bench = Bench()
+    for _ in range(4):
+        bench.probe(0.05)
+    assert bench.exchanges == []
+    assert bench.timesync.round_trip_s is None
+    bench.timesync.ask()
+    bench.answer(0.01)
+    assert len(bench.exchanges) == 1
+    assert bench.timesync.round_trip_s == pytest.approx(0.01)
+
+
+def test_probes_are_sent_ten_times_a_second_and_forgotten_after_a_reconnect():
+    bench = Bench()
+    for _ in range(50):
+        bench.timesync.probe()
+        bench.now += 0.02
+    assert len(bench.sent) in (9, 10)
+    bench.timesync.reset()
+    for request in bench.sent:
+        bench.timesync._on_timesync(SimpleNamespace(tc1=7 * 10**9, ts1=request.ts1))
+    assert bench.timesync.present_round_trip_s is None
