@@ -33,7 +33,7 @@ from companion.guidance.trajectory.timed_curve import TimedCurve
 from companion.guidance.trajectory.waypoints import largest_detour
 
 _MOST_COLUMNS_SHOWN = 10
-_SMALLEST_DETOUR = 0.05
+_SMALLEST_NOTED_DETOUR = 0.05
 """Smallest distance of a curve from the lines between its points that a note reports, m."""
 _SHORTEST_RAMP = 0.05
 """Shortest extra duration by ramps that a note reports, s."""
@@ -159,7 +159,7 @@ def _detour_notes(
     if not (isinstance(trajectory, TimedCurve) and isinstance(trajectory.curve, SplineCurve)):
         return ()
     detour = largest_detour(trajectory.curve.spline, times)
-    if detour < _SMALLEST_DETOUR:
+    if detour < _SMALLEST_NOTED_DETOUR:
         return ()
     return (
         f"{trajectory.name}: the curve leaves the straight lines between its points by up to "

@@ -91,8 +91,8 @@ class Predictive:
     ) -> LinearCommand:
         """The command of predictive control while it follows a trajectory, else `linear`.
 
-        Predictive control works in the estimator's frame, with heading resets. Its target is
-        constant for a period, which its model takes into account.
+        Predictive control works in the estimator's frame, whose heading jumps at each reset. Its
+        target is constant for a period, which its model takes into account.
 
         Args:
             linear: command of linear guidance.

@@ -68,7 +68,7 @@ def tracking(limit: float) -> Judge:
         if error is None or error <= with_hysteresis(limit, raised):
             return None
         return (
-            f"the vehicle is {error:.1f} m off its course, more than "
+            f"the vehicle is {error:.1f} m from its reference, more than "
             f"safety.max_tracking_error_m = {limit:g}"
         )
 

@@ -167,7 +167,7 @@ class VehicleClock:
         if self._reported_unknown:
             self.on_event(
                 f"the age of telemetry is not known, because {self.delay.unknown.value}; "
-                "a sample that is later than the quickest one is noticed, a delay of all is not"
+                "a sample that arrives later than the others is noticed, but not a delay of all"
             )
         else:
             self.on_event("the age of telemetry is known by TIMESYNC")

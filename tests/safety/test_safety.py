@@ -231,7 +231,7 @@ def test_a_hold_that_mends_it_ends_by_landing_with_what_it_was_for():
     climb.see(motion(off_course=6.0), 2.0)
     verdict, after = climb.see(FINE, 5.0)
     assert verdict.action is LAND
-    assert "6.0 m off its course" in verdict.reason
+    assert "6.0 m from its reference" in verdict.reason
     assert after == pytest.approx(1.0, abs=0.021)
     assert climb.told[-1] == "safety: tracking is over"
 

@@ -68,7 +68,7 @@ def yaml_of(tmp_path, text):
 @pytest.mark.parametrize(
     ("lines", "words"),
     [
-        (rows(step=1e-12), "line 3: 1e-12 s after the sample before; from 0.0001 to 10 s"),
+        (rows(step=1e-12), "line 3: 1e-12 s after the previous sample; write time in s"),
         (rows(step=3600.0), "line 3: 3.6e+03 s after the sample before"),
         (rows(step=5.0, count=1000), "lasts 4995 s, and 3600 s is the longest"),
         (rows(step=1.0, count=1000, scale=100.0), "450 s is the longest with cutoff_hz 5"),

@@ -142,7 +142,7 @@ class SecondOrderFit:
         return out
 
     def _transitions(self, seconds: Floats) -> Floats:
-        """(m, 2, 2), `SecondOrderReference.transition` over each of these times (m,)."""
+        """(m, 2, 2), `SecondOrderReference.transition` over each of these durations (m,), s."""
         decay, square = self.damping * self.frequency, self.frequency * self.frequency
         root = np.sqrt(complex(square * (1.0 - self.damping * self.damping)))
         slow = np.exp((-1j * root - decay) * seconds)  # the slower of the two: nothing overflows

@@ -51,7 +51,7 @@ class _Fitted(NamedTuple):
 
 
 def run(tick: Tick) -> Outcome:
-    """Fly the step of figure 2 over dead times, lags, sample rates and errors of the assumed delays.
+    """Fly the step of figure 2 over dead times, lags and sample rates, with true and wrong delays.
 
     Args:
         tick: called `PARTS` times.
