@@ -112,7 +112,7 @@ BREACHES = [
     ("braking", motion(offset=(0.0, 50.0, 0.0), velocity=(0.0, 6.5, 0.0)), HOLD, 0.04, "60.9 m"),
     ("braking", motion(velocity=(0.0, 0.0, 4.5), height=6.0), HOLD, 0.04, "0.6 m above home"),
     ("speed", motion(velocity=(11.0, 11.0, 0.0)), HOLD, 0.3, "15.6 m/s"),
-    ("tracking", motion(off_course=5.1), HOLD, 1.0, "5.1 m off"),
+    ("tracking", motion(off_course=5.1), HOLD, 1.0, "5.1 m from its reference"),
     ("thrust", motion(thrust=0.9), HOLD, 2.0, "limits.max_thrust"),
     ("thrust", motion(thrust=0.1), HOLD, 2.0, "limits.min_thrust"),
     ("answer gaps", health(gaps=3), HAND_BACK, 0.0, "setpoints paused 3 times within 5 s"),

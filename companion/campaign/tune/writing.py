@@ -59,9 +59,9 @@ def _certainty_lines(result: Result) -> Iterator[str]:
     ]
     if any(early):
         yield (
-            f"Of {unseen_flights} flights that the search has not seen, {early[0]} ended early with "
-            f"the configuration before the search, and {early[1]} with the result; samples with "
-            "such a flight are not compared."
+            f"Of {unseen_flights} flights that the search has not seen, {early[0]} ended early "
+            f"with the configuration before the search, and {early[1]} with the result; samples "
+            "with such a flight are not compared."
         )
     comparison = result.comparison
     if comparison is None:

@@ -51,7 +51,7 @@ def require_checkable(needed: float) -> None:
     """
     if not needed <= MOST_CHECKS:
         raise TrajectoryError(
-            f"it is too long to be checked: that takes {needed:.3g} samples, more than "
+            f"it is too long to be checked: it takes {needed:.3g} samples, more than "
             f"{MOST_CHECKS}; make it shorter, or raise its acceleration"
         )
 
