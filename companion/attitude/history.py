@@ -93,7 +93,7 @@ class History(Generic[Row]):
         return self._rows[-1]
 
     def at(self, time: float) -> Row:
-        """The plan at `time`: linear between rows and beyond them."""
+        """The plan at `time`: interpolated between two rows, extrapolated before and after all."""
         later, share = locate_time(self._times, time)
         before, after = self._rows[later - 1], self._rows[later]
         return type(before)(*[a + share * (b - a) for a, b in zip(before, after, strict=True)])
@@ -209,7 +209,7 @@ class SampleHold:
 
         Args:
             roll: mean roll rate that is planned for the newest step, rad/s.
-            pitch: mean pitch rate that is planned for it, rad/s.
+            pitch: mean pitch rate that is planned for the newest step, rad/s.
         """
         self._roll = roll + self._late_share * (roll - self._roll)
         self._pitch = pitch + self._late_share * (pitch - self._pitch)

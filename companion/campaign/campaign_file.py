@@ -40,8 +40,8 @@ class FaultScenario(Section):
     inject: Annotated[tuple[dict[str, Any], ...], Field(min_length=1, max_length=10)]
     """Entries as in `mock.faults`, without `at_s` and `after_offboard_s`. All begin together."""
     phase: FaultPhase = "maneuvers"
-    """Phase of the flight in which the faults begin. A flight without the phase stream takes arm
-    for it. The factor fault.phase replaces this key."""
+    """Phase of the flight in which the faults begin. If a flight has no phase stream, its faults
+    begin in the phase arm instead. The factor fault.phase replaces this key."""
     after_s: Annotated[float, Field(ge=0.0, le=3600.0)] | None = None
     """Time from the beginning of the phase to the faults. The factor fault.after_s replaces this
     key. null: 0 s in stream and arm, 0.8 s in takeoff, 1.3 s in offboard, 0.3 s in maneuvers and

@@ -24,7 +24,7 @@ class ServeConfig(Section):
     """
     trusted: Annotated[tuple[_Name, ...], Field(max_length=100)] = ()
     """IP addresses and serial devices that may command without signing. Clients on this computer
-    always may; all others can only read, unless they sign with the vehicle's key.
+    may always command; all others only read, unless they sign with the vehicle's key.
     """
     control: StrictBool = True
     """Fly the setpoints of clients (extra `serve`). false: pass them on as everything else."""

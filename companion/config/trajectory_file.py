@@ -124,7 +124,7 @@ _AXES = {
 def _table_notes(
     path: Path, frame: Frame | None, table: Table, trajectory: TimedCurve
 ) -> tuple[str, ...]:
-    """The frame of a table, and what a user may not expect of the trajectory through it."""
+    """Notes on a table: its frame, its unused columns, and ramps that were added."""
     axes = f"{path.name} is read in s, m and rad with {_AXES[frame or Frame.ENU]}"
     if frame is None:
         axes += (

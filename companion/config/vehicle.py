@@ -85,7 +85,7 @@ class VehicleConfig(Section):
 
     @property
     def axes(self) -> "dict[str, AxisKeys]":
-        """The known response of each axis, by name; a null of pitch or yaw means that of roll."""
+        """The known response of each axis, by name; null for pitch or yaw: the value of roll."""
         roll = AxisKeys(
             self.lag_ms, self.dead_time_ms, self.acceleration_limit_deg_s2, self.damping
         )
