@@ -24,7 +24,7 @@ _SECOND_ORDER_SHARE = 0.2
 """A second-order lag counts as longer by this share of it in the hold's delay. The hold then keeps
 the margins that it has with a first-order model of PX4's rate loop."""
 _OBSERVER_LATENESS_RANGE = 0.035, 0.06
-"""Delays between which the observer changes from quick to normal: dead time plus half the lag, s."""
+"""Delays (dead time plus half the lag) over which the observer changes from quick to normal, s."""
 _GAIN_RANGE = 5.0, 7.0
 """Gains of the planner between which the observer changes from quick to normal, 1/s."""
 _BANDWIDTH_INCREASE = 0.6
