@@ -68,7 +68,7 @@ class Control(NamedTuple):
         position_fresh: whether the newest position is fresh.
         clock_change: latest jump, stop or restart of the vehicle's clock since control began, in
             words, or None.
-        stood_still: time for which this program did not run (a stall) since the last answer, s.
+        stalled: time for which this program did not run since the last answer, s.
     """
 
     answered: float = inf
@@ -80,7 +80,7 @@ class Control(NamedTuple):
     heard: float = inf
     position_fresh: bool = True
     clock_change: str | None = None
-    stood_still: float = 0.0
+    stalled: float = 0.0
 
 
 class Health(NamedTuple):

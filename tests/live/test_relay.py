@@ -125,7 +125,7 @@ def test_what_becomes_of_an_edit_is_noted(monkeypatch, tmp_path, answer, said, a
 
     monkeypatch.setattr(helper_process, "WatchedFile", Watched)
     monkeypatch.setattr(helper_process, "_ANSWER_TIMEOUT", 0.02)
-    monkeypatch.setattr(helper_process, "_LOOK_PERIOD", 0.001)
+    monkeypatch.setattr(helper_process, "_CHECK_PERIOD_S", 0.001)
 
     async def use(relay, flight):
         flight.answer = answer

@@ -175,7 +175,7 @@ def silent(reason=None, **changes):
     [
         (silent(), "no setpoint was sent"),
         (silent(Unanswered.LATE), Unanswered.LATE.words),
-        (silent(Unanswered.LATE, stood_still=0.375), Unanswered.LATE.words),
+        (silent(Unanswered.LATE, stalled=0.375), Unanswered.LATE.words),
         (silent(Unanswered.OLD_TARGET), Unanswered.OLD_TARGET.words),
         (
             silent(sampled=NOW - 0.6, attitude_not_finite=True),

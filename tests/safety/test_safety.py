@@ -63,7 +63,7 @@ def unanswered(reason, **changes):
 OLD = NOW - 0.6
 SILENT = {"answered": OLD, "sampled": OLD}
 WARN, HOLD, HAND_BACK, LAND, LISTEN, RELEASE = Action
-STOOD_STILL = "this program did not run for 0.4 s (computer overloaded or suspended)"
+STALLED = "this program did not run for 0.4 s (computer overloaded or suspended)"
 TILTED = "the vehicle tilts by 57°, more than limits.max_tilt_deg + safety.tilt_margin_deg = 55"
 BREACHES = [
     ("unheard", control(**SILENT, heard=OLD), LISTEN, 0.0, "no attitude from the vehicle for 0.6"),
@@ -71,10 +71,10 @@ BREACHES = [
     ("silence", unanswered(Unanswered.NOT_NEWER), HAND_BACK, 0.0, "clock stands still"),
     ("silence", unanswered(Unanswered.AHEAD), HAND_BACK, 0.0, "stamped far ahead"),
     ("silence", unanswered(Unanswered.LATE), HAND_BACK, 0.0, "telemetry_stale_ms"),
-    ("silence", unanswered(Unanswered.LATE, stood_still=0.2), HAND_BACK, 0.0, "stale_ms"),
-    ("silence", unanswered(Unanswered.LATE, stood_still=0.4), HAND_BACK, 0.0, STOOD_STILL),
-    ("silence", unanswered(Unanswered.AWAITING_MODE, stood_still=0.4), HAND_BACK, 0.0, STOOD_STILL),
-    ("unheard", control(**SILENT, heard=OLD, stood_still=0.4), LISTEN, 0.0, STOOD_STILL),
+    ("silence", unanswered(Unanswered.LATE, stalled=0.2), HAND_BACK, 0.0, "stale_ms"),
+    ("silence", unanswered(Unanswered.LATE, stalled=0.4), HAND_BACK, 0.0, STALLED),
+    ("silence", unanswered(Unanswered.AWAITING_MODE, stalled=0.4), HAND_BACK, 0.0, STALLED),
+    ("unheard", control(**SILENT, heard=OLD, stalled=0.4), LISTEN, 0.0, STALLED),
     ("silence", unanswered(Unanswered.OLD_TARGET, placed=OLD), HAND_BACK, 0.0, "no position"),
     (
         "silence",
@@ -153,11 +153,11 @@ def test_a_stall_of_our_own_is_counted_from_the_last_setpoint():
     snapshot_builder = SnapshotBuilder(link, loop, None, real_time=True)
     for now in (0.0, 0.02, 0.05, 0.48, 0.5):
         snapshot_builder.listen(now)
-    assert snapshot_builder.stood_still(since=0.02) == pytest.approx(0.4)
-    assert snapshot_builder.stood_still(since=0.49) == 0.0
+    assert snapshot_builder.stall_time(since=0.02) == pytest.approx(0.4)
+    assert snapshot_builder.stall_time(since=0.49) == 0.0
     snapshot_builder.listen(3.53)
-    assert snapshot_builder.stood_still(since=0.49) == pytest.approx(3.0)
-    assert snapshot_builder.stood_still(since=3.53) == 0.0
+    assert snapshot_builder.stall_time(since=0.49) == pytest.approx(3.0)
+    assert snapshot_builder.stall_time(since=3.53) == 0.0
 
 
 @pytest.mark.parametrize(

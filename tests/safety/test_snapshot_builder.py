@@ -176,7 +176,7 @@ def test_every_stage_of_a_samples_way_has_its_time(flight):
     assert (told.answered, told.sampled, told.reason) == (9.9, 9.95, Unanswered.LATE)
     assert (told.placed, told.heard) == (9.75, 10.02)
     assert (told.position_fresh, told.clock_change) == (True, None)
-    assert told.stood_still == pytest.approx(0.17)
+    assert told.stalled == pytest.approx(0.17)
     flight.clock.changes = 3
     assert flight.snapshot().control.clock_change == "it jumped"
     assert flight.counted == [(3, now) for now in (10.0, 10.02, 10.04, 10.24)]
