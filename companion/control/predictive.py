@@ -119,7 +119,7 @@ class Predictive:
             following: the trajectory that is followed, or None.
 
         Returns:
-            Target and downward acceleration (m/s²) to fly, likewise.
+            Target, in the estimator's frame, and downward acceleration (m/s²) to fly.
         """
         chosen = linear
         if following is not None:

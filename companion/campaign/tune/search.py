@@ -35,7 +35,7 @@ STORAGE = "tune.db"
 """Optuna's storage in the folder of the search."""
 _STUDY_NAME = "tune"
 _STARTS, _FEWEST_NEAR = 3, 4
-"""Most configurations to start from; fewest candidates that are tried near the last one."""
+"""Largest number of starts, and smallest number of candidates tried near the last start."""
 _FIRST_DIVISOR = 4
 """A candidate flies the first 1/4 of its cases, at least 2, before the others."""
 _FEWEST_FIRST_CASES = 2

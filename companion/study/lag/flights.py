@@ -170,7 +170,7 @@ def score(response: Response) -> Score:
 
 
 def step_at(rate_hz: float) -> Step:
-    """The step of figure 2 at heading 0; only `euler` would respond differently at others."""
+    """The step of figure 2 at heading 0; at another heading only `euler` responds differently."""
     return replace(FIGURE_2, headings=(0.0,), rate_hz=rate_hz)
 
 
