@@ -64,7 +64,7 @@ def tracking(limit: float) -> Judge:
     """The vehicle is farther than `limit` from its reference, m."""
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
-        error = snapshot.motion.off_course
+        error = snapshot.motion.tracking_error
         if error is None or error <= with_hysteresis(limit, raised):
             return None
         return (

@@ -196,7 +196,7 @@ class SnapshotBuilder:
             offset,
             velocity,
             self._link.state.height,
-            guidance_loop.off_course,
+            guidance_loop.tracking_error,
             None if idle else loop.record.thrust,
             self._fence_place,
             guidance_loop.acceleration,

@@ -40,7 +40,7 @@ UPPER = {
         lambda v: at(motion=Motion(body_rates=(0.6 * v, 0, 0.8 * v))),
     ),
     "speed": (motion_judges.speed, lambda v: at(motion=Motion(velocity=(0.6 * v, -0.8 * v, 0.0)))),
-    "tracking": (motion_judges.tracking, lambda v: at(motion=Motion(off_course=v))),
+    "tracking": (motion_judges.tracking, lambda v: at(motion=Motion(tracking_error=v))),
     "link loss": (link_judges.loss, health("lost")),
     "round trip": (link_judges.round_trip, health("round_trip")),
     "deadlines": (link_judges.deadlines, health("missed")),

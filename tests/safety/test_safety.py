@@ -112,7 +112,7 @@ BREACHES = [
     ("braking", motion(offset=(0.0, 50.0, 0.0), velocity=(0.0, 6.5, 0.0)), HOLD, 0.04, "60.9 m"),
     ("braking", motion(velocity=(0.0, 0.0, 4.5), height=6.0), HOLD, 0.04, "0.6 m above home"),
     ("speed", motion(velocity=(11.0, 11.0, 0.0)), HOLD, 0.3, "15.6 m/s"),
-    ("tracking", motion(off_course=5.1), HOLD, 1.0, "5.1 m from its reference"),
+    ("tracking", motion(tracking_error=5.1), HOLD, 1.0, "5.1 m from its reference"),
     ("thrust", motion(thrust=0.9), HOLD, 2.0, "limits.max_thrust"),
     ("thrust", motion(thrust=0.1), HOLD, 2.0, "limits.min_thrust"),
     ("answer gaps", health(gaps=3), HAND_BACK, 0.0, "setpoints paused 3 times within 5 s"),
@@ -228,7 +228,7 @@ def test_over_the_limit_is_over_only_well_within_it():
 
 def test_a_hold_that_mends_it_ends_by_landing_with_what_it_was_for():
     climb = Climb()
-    climb.see(motion(off_course=6.0), 2.0)
+    climb.see(motion(tracking_error=6.0), 2.0)
     verdict, after = climb.see(FINE, 5.0)
     assert verdict.action is LAND
     assert "6.0 m from its reference" in verdict.reason
@@ -238,7 +238,7 @@ def test_a_hold_that_mends_it_ends_by_landing_with_what_it_was_for():
 
 def test_a_graver_breach_ends_a_hold_and_the_gravest_of_two_decides():
     climb = Climb()
-    climb.see(motion(off_course=6.0), 2.0)
+    climb.see(motion(tracking_error=6.0), 2.0)
     both = autopilot(armed=False, failsafe=True)
     verdict, after = climb.see(both, 1.0)
     assert (verdict.action, verdict.reason, after) == (

@@ -39,7 +39,7 @@ class StepRun(NamedTuple):
 
     @property
     def changes(self) -> Floats:
-        """(n, 2), targets relative to the coefficients at the beginning; in wind not the same."""
+        """(n, 2), targets minus the coefficients at the beginning, which are not 0 in wind."""
         since: Floats = self.target - self.measured[0]
         return since
 
