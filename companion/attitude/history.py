@@ -74,7 +74,7 @@ class History(Generic[Row]):
         self._rows: list[Row] = []
 
     def start(self, time: float, row: Row, motion: Row) -> None:
-        """Start again with `row` at `time`, s; earlier rows follow from its slope `motion`, per s."""
+        """Start again with `row` at `time`, s; earlier rows change by `motion` per second."""
         earlier = type(row)(*[a - self._span * b for a, b in zip(row, motion, strict=True)])
         self._times[:] = [time - self._span, time]
         self._rows[:] = [earlier, row]
