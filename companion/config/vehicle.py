@@ -47,8 +47,8 @@ class VehicleConfig(Section):
     """Response of the vehicle's rate loop, from which `model-following` plans."""
 
     identified: Annotated[str, Field(min_length=1, max_length=200)] | None = None
-    """Flight in which `companion identify` measured the keys below; it writes this key. null: lag and
-    dead time are estimated or from another vehicle, and `companion doctor` warns.
+    """Flight in which `companion identify` measured the keys below; it writes this key. null: the
+    keys are estimated or from another vehicle, and `companion doctor` warns.
     """
     lag_ms: Milliseconds | None = None
     """Time constant of the roll rate after its dead time. For a second-order response it is
