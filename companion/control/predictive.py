@@ -86,7 +86,7 @@ class Predictive:
         """End the solver's process."""
         self._solver.close()
 
-    def instead_of(
+    def replacement_for(
         self, linear: LinearCommand, turn: float, vehicle: Vehicle, following: Following | None
     ) -> LinearCommand:
         """The command of predictive control while it follows a trajectory, else `linear`.

@@ -20,7 +20,8 @@ from companion.recording.measurements.second_order import (
 _TIME_CONSTANT = (0.02, 2.0)
 """Range in which the time constant is searched, s."""
 _MIN_SHARE = 0.1
-"""Smallest share of a step along an axis that counts as a step along it; less is noise or wind."""
+"""A step counts for an axis (north or east) if its component along the axis is at least this share
+of the step; a smaller component is noise or wind."""
 
 
 @dataclass(frozen=True, slots=True)

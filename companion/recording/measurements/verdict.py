@@ -9,7 +9,7 @@ from companion.attitude.planner import MODEL_FOLLOWING
 Figures = Mapping[str, Any]
 """The figures; the result of `Summary.as_dict`."""
 
-LEVEL_RMS, LEVEL_RMS_PER_SPEED = 0.15, 0.02
+HORIZONTAL_RMS, HORIZONTAL_RMS_PER_SPEED = 0.15, 0.02
 """Largest RMS of the horizontal error of a maneuver: with the reference at rest, m; and the
 increase for each m/s of its speed, m."""
 HEIGHT_RMS = 0.15
@@ -80,7 +80,7 @@ def _maneuvers(figures: Figures) -> Iterator[Check]:
         level, height = maneuver["level_rms_m"], maneuver["height_rms_m"]
         if level is not None:
             speed = maneuver["reference_speed_max_m_s"] or 0.0
-            limit = LEVEL_RMS + LEVEL_RMS_PER_SPEED * speed
+            limit = HORIZONTAL_RMS + HORIZONTAL_RMS_PER_SPEED * speed
             yield Check(
                 maneuver["name"],
                 f"{level:.2f} m RMS from its path (limit {limit:.2f} m), "
