@@ -117,7 +117,7 @@ def test_what_becomes_of_an_edit_is_noted(monkeypatch, tmp_path, answer, said, a
         def __init__(self, *_):
             self.edits = [None, Edit({}, "w.yaml has a fault"), Edit(SLOWER)]
 
-        def look(self):
+        def newest_edit(self):
             return self.edits.pop(0) if self.edits else None
 
         def accept(self):
