@@ -69,7 +69,7 @@ class Connections:
         self._exchange.deliver(arrived, self._links[endpoint])
 
     def send_beacon(self, beacon: bytes) -> None:
-        """Send the companion a lockstep beacon, and nothing else."""
+        """Send the companion a lockstep beacon without the queued frames."""
         self.companion.send([self._simulation.companion.sign(beacon)])
 
     def flush(self, beacon: bytes | None = None) -> None:

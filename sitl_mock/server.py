@@ -12,9 +12,9 @@ from sitl_mock.settings import MockSettings
 from sitl_mock.simulation import Simulation
 
 FIRST_BEACON_PERIOD_S = 0.05
-"""The first beacon is sent again after this wall time without an answer, s."""
+"""Without an answer, the first beacon is sent again after this wall time, s."""
 BEACON_PERIOD_S = 0.2
-"""A later beacon is sent again after this wall time without an answer, s."""
+"""Without an answer, a beacon after the first is sent again after this wall time, s."""
 MAX_LAG_S = 1.0
 """Largest lag behind real time that the server makes up, s. A busy computer causes lags of tenths
 of a second. If they were dropped, the link would seem slower to the companion.

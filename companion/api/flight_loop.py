@@ -123,12 +123,12 @@ class OwnThread:
         return asyncio.wrap_future(future)
 
     def post(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
-        """Call the function soon; not after the flight has ended."""
+        """Schedule the function in the flight's loop; ignored after the flight has ended."""
         with suppress(RuntimeError):
             self._loop.call_soon_threadsafe(callback, *args)
 
     def tell(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
-        """Call the function soon; not after the program's loop has ended."""
+        """Schedule the function in the program's loop; ignored after that loop has ended."""
         with suppress(RuntimeError):
             self._program.call_soon_threadsafe(callback, *args)
 

@@ -147,7 +147,7 @@ class Vehicle:
             FlightEnded: the vehicle is not under our control.
         """
         if isinstance(trajectory, Path | str):
-            trajectory = await beside_the_loop(trajectory_file.load, Path(trajectory))
+            trajectory = await call_in_thread(trajectory_file.load, Path(trajectory))
         await self._fly(Follow(trajectory, self._context.config.limits.max_yaw_rate))
 
     @asynccontextmanager
@@ -211,7 +211,7 @@ class Vehicle:
 
     async def _fly(self, maneuver: Maneuver) -> None:
         self._held_pose()  # raises if the vehicle is not under our control
-        await beside_the_loop(self._require_followable, maneuver)
+        await call_in_thread(self._require_followable, maneuver)
         sequence = ManeuverSequence((maneuver,))
         work = partial(fly_maneuvers, sequence=sequence)
         await self._request(
@@ -238,11 +238,11 @@ class Vehicle:
         return pose
 
 
-async def beside_the_loop(function: Callable[[*Arguments], T], *arguments: *Arguments) -> T:
+async def call_in_thread(function: Callable[[*Arguments], T], *arguments: *Arguments) -> T:
     """Call a slow function in a thread, so that samples are still answered.
 
-    In lockstep and on a virtual clock the vehicle waits for us, so the function is called directly.
-    A thread would only make the order of events random.
+    In lockstep and on a virtual clock the function is called directly, because the vehicle waits
+    for us. A thread would only make the order of events random.
     """
     if isinstance(asyncio.get_running_loop(), LockstepEventLoop):
         return function(*arguments)

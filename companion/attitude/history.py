@@ -74,7 +74,7 @@ class History(Generic[Row]):
         self._rows: list[Row] = []
 
     def start(self, time: float, row: Row, motion: Row) -> None:
-        """Start again with `row` at `time`, s; before it, the plan changed by `motion` a second."""
+        """Start again with `row` at `time`, s; earlier rows change by `motion` per second."""
         earlier = type(row)(*[a - self._span * b for a, b in zip(row, motion, strict=True)])
         self._times[:] = [time - self._span, time]
         self._rows[:] = [earlier, row]
@@ -93,7 +93,7 @@ class History(Generic[Row]):
         return self._rows[-1]
 
     def at(self, time: float) -> Row:
-        """The plan at `time`: linear between rows and beyond them."""
+        """The plan at `time`: interpolated between two rows, extrapolated before and after all."""
         later, share = locate_time(self._times, time)
         before, after = self._rows[later - 1], self._rows[later]
         return type(before)(*[a + share * (b - a) for a, b in zip(before, after, strict=True)])
@@ -209,7 +209,7 @@ class SampleHold:
 
         Args:
             roll: mean roll rate that is planned for the newest step, rad/s.
-            pitch: mean pitch rate that is planned for it, rad/s.
+            pitch: mean pitch rate that is planned for the newest step, rad/s.
         """
         self._roll = roll + self._late_share * (roll - self._roll)
         self._pitch = pitch + self._late_share * (pitch - self._pitch)

@@ -154,8 +154,8 @@ class ModelFollowingPlanner:
     ) -> tuple[float, float, float]:
         """Advance the plan to when the next sample is expected; see `FeedForward.advance`.
 
-        A new target did not apply in the time by which the sample was late: there the plan follows
-        the target before it. Else the rates would make up for a motion that nobody had asked for.
+        If the sample came late, the plan first follows the previous target for the time by which it
+        was late, because the new target was not yet in force in that time.
         """
         hold, forward = self._hold, self._forward
         before, self._target = self._target, target

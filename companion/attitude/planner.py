@@ -206,7 +206,7 @@ def _like_roll(
     acceleration: float | None,
     damping: float,
 ) -> AxisResponse:
-    """An axis with these values; where one is None, with that of roll."""
+    """An axis with these values; a value that is None is taken from `roll`."""
     return AxisResponse(
         roll.lag if lag is None else lag,
         roll.dead_time if dead_time is None else dead_time,

@@ -69,8 +69,8 @@ class ReferenceModel:
     of the motion within the limits. The rates that are sent compensate the lag of the vehicle
     (τ and σ) and stay within the limits too. If the autopilot has a slew limit, v changes no faster
     than that, and stays so small that it can be slowed down in time. Behind a lag of second order,
-    a large step of v would saturate the motors, and the response would not be linear: there v
-    changes by at most `_LARGEST_RISE` within τ, if the body rates are limited at all.
+    a large step of v would saturate the motors, and the response would not be linear. In that case,
+    if the body rates are limited, v changes by at most `_LARGEST_RISE` within τ.
 
     Args:
         constants: gains and limits.

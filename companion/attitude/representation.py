@@ -91,11 +91,12 @@ def attitude(coefficients: Coefficients, heading: float) -> Quaternion:
     """The upright attitude that has these coefficients and this tilt-yaw heading (rad).
 
     Raises:
-        ValueError: the coefficients are longer than 1 or not finite, so no attitude has them.
+        ValueError: the norm of the coefficients exceeds 1 or is not finite, so no attitude has
+            them.
     """
     north, east = coefficients
     if not north * north + east * east <= 1.0:
-        raise ValueError(f"no attitude has acceleration coefficients {coefficients}: longer than 1")
+        raise ValueError(f"no attitude has the coefficients {coefficients}: their norm exceeds 1")
     return attitude_of(north, east, heading)
 
 

@@ -32,8 +32,8 @@ class StepFigures(NamedTuple):
         cross_axis_max: largest distance from the line of a step.
         rate_rms: commanded √(ω_x² + ω_y²), rad/s, RMS.
         rate_max: the largest commanded √(ω_x² + ω_y²), rad/s.
-        time_constant_north: of the first-order model that fits the north coefficient best (least
-            squares), s; NaN if there was no step north.
+        time_constant_north: time constant of the first-order model that fits the north coefficient
+            best (least squares), s; NaN if there was no step north.
         time_constant_east: the same for the east coefficient.
     """
 

@@ -77,7 +77,7 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
             sender.wait_ready()
         for _ in range(rounds):
             for measured in senders.values():
-                measured.play(rate_hz, seconds / rounds)
+                measured.send_for(rate_hz, seconds / rounds)
                 for sender in senders.values():
                     sender.heartbeat()
         figures = {key: figures_of(sender) for key, sender in senders.items()}

@@ -112,7 +112,7 @@ class Sender:
             self._send_sample()
             answered = self._listen_until(time.perf_counter_ns() + 20_000_000)
 
-    def play(self, rate_hz: float, seconds: float) -> None:
+    def send_for(self, rate_hz: float, seconds: float) -> None:
         """Send samples at `rate_hz` for `seconds`, and record the round trips.
 
         Raises:

@@ -64,12 +64,12 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
             sender.wait_ready()
         reading = _start_clients(stack, ports["with_clients"], _CLIENTS)
         stopped = _start_clients(stack, ports["with_clients"], 1)
-        senders["with_clients"].play(rate_hz, ROUND_S)  # all four connect, and receive
+        senders["with_clients"].send_for(rate_hz, ROUND_S)  # all four connect, and receive
         stopped.send_signal(signal.SIGSTOP)
         senders["with_clients"].forget()
         for _ in range(rounds):
             for measured in senders.values():
-                measured.play(rate_hz, seconds / rounds)
+                measured.send_for(rate_hz, seconds / rounds)
                 for sender in senders.values():
                     sender.heartbeat()
         figures: dict[str, Any] = {key: figures_of(sender) for key, sender in senders.items()}

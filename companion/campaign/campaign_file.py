@@ -40,8 +40,8 @@ class FaultScenario(Section):
     inject: Annotated[tuple[dict[str, Any], ...], Field(min_length=1, max_length=10)]
     """Entries as in `mock.faults`, without `at_s` and `after_offboard_s`. All begin together."""
     phase: FaultPhase = "maneuvers"
-    """Phase of the flight in which the faults begin. A flight without the phase stream takes arm
-    for it. The factor fault.phase replaces this key."""
+    """Phase of the flight in which the faults begin. If a flight has no phase stream, its faults
+    begin in the phase arm instead. The factor fault.phase replaces this key."""
     after_s: Annotated[float, Field(ge=0.0, le=3600.0)] | None = None
     """Time from the beginning of the phase to the faults. The factor fault.after_s replaces this
     key. null: 0 s in stream and arm, 0.8 s in takeoff, 1.3 s in offboard, 0.3 s in maneuvers and
@@ -108,7 +108,7 @@ class Tune(Section):
             if not (swept.uniform or swept.loguniform or swept.choice):
                 raise ValueError(f"{key}: give uniform, loguniform or choice")
             if swept.times_base or swept.keys:
-                raise ValueError(f"{key}: times_base and keys belong to `sweep`")
+                raise ValueError(f"{key}: times_base and keys work only in `sweep`")
             if key.startswith("mock."):
                 raise ValueError(
                     f"{key}: keys of the mock vehicle cannot be searched; name keys of the program"
@@ -165,9 +165,13 @@ class CampaignFile(Section):
     def _consistent(self) -> "CampaignFile":
         if self.sampling == "sobol" and self.samples & (self.samples - 1):
             power = 1 << self.samples.bit_length()
-            raise ValueError(f"sampling: sobol needs samples: {power // 2} or {power}")
+            raise ValueError(
+                f"sampling: sobol needs a power of two; set samples to {power // 2} or {power}"
+            )
         if NO_FAULT in self.faults:
-            raise ValueError(f"faults: {NO_FAULT} is the name of a flight without a fault")
+            raise ValueError(
+                f"faults: {NO_FAULT} means a flight without a fault; choose another name"
+            )
         factors: dict[str, str] = {}
         for name, swept in self.sweep.items():
             for key in swept.changed_keys(name):

@@ -18,7 +18,7 @@ from companion.files.yaml_file import ConfigError
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-DEATHS = 3
+MOST_WORKER_DEATHS = 3
 """A unit is given up when its worker dies for the third time, even if it was only queued there.
 
 An existing cluster follows its own setting, `distributed.scheduler.allowed-failures`.
@@ -28,7 +28,7 @@ _CONNECT_S = 10.0
 _CLOSE_S = 5.0
 _PACKAGES = ("dask", "distributed", "numba", "pyarrow", "scipy")
 _LOCAL_SETTINGS = {
-    "distributed.scheduler.allowed-failures": DEATHS - 1,
+    "distributed.scheduler.allowed-failures": MOST_WORKER_DEATHS - 1,
     # Dask's own profiler, which nobody reads here, uses 10 % of a worker's time.
     "distributed.worker.profile.enabled": False,
     # Dask sets the variables of BLAS and OpenMP to 1 itself.

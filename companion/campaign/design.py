@@ -51,8 +51,8 @@ def too_few_samples(file: CampaignFile) -> str | None:
         return None
     values = "only one value" if samples == 1 else f"at most {samples} values"
     return (
-        f"samples: {samples} flies {values} of {', '.join(names)}; raise samples, or give a list: "
-        "all its values are flown"
+        f"samples: {samples} gives {values} of {', '.join(names)}; raise samples, or replace "
+        "the distribution by a list, of which all values are flown"
     )
 
 
@@ -86,7 +86,7 @@ def seed_of(campaign_seed: int, number: int) -> int:
 def _probabilities(file: CampaignFile, dimensions: int) -> NDArray[np.float64]:
     """(n, dimensions): cumulative probability of each sample in each distribution.
 
-    n is `samples`; with `sampling: grid` and at least one distribution, samples**dimensions.
+    n is `samples`, except with `sampling: grid`: samples**dimensions, if there are distributions.
     """
     count = file.samples
     if dimensions == 0:

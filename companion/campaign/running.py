@@ -171,9 +171,9 @@ class _Run:
                 bar.update(task, completed=progress.flown)
 
             progress = engine.run(client, self._campaign, description, self._folder, show)
-        return self._finished(progress, description)
+        return self._report_end(progress, description)
 
-    def _finished(self, progress: engine.Progress, description: Description) -> int:
+    def _report_end(self, progress: engine.Progress, description: Description) -> int:
         """Report how the run ended; return the exit code."""
         say = self._console.print
         for sentence in progress.lost[:_MOST_SHOWN]:

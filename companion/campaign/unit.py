@@ -117,5 +117,5 @@ def size_of_units(cases: int, case_s: float, workers: int) -> int:
 
 
 def ranges(cases: int, size: int) -> list[range]:
-    """The numbers of the cases of each unit, in order."""
+    """The case numbers of each unit of work, in order."""
     return [range(first, min(first + size, cases)) for first in range(0, cases, size)]

@@ -110,7 +110,7 @@ def fly(
     flight = fly_interruptibly(session)
     if helper is not None:
         helper.changes, helper.note = session.changes, session.note
-        flight = helper.serve_beside(flight)
+        flight = helper.run_while_serving(flight)
     run: Callable[..., Summary] = lockstep.run if config.link.lockstep else link_loop.run
     with ExitStack() as stack:
         stack.callback(observer.close)

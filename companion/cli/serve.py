@@ -50,7 +50,7 @@ def serve(options: argparse.Namespace) -> int:
         serving = _until_stopped(session, pages)
         if helper is not None:
             helper.changes, helper.note = session.changes, note
-            serving = helper.serve_beside(serving)
+            serving = helper.run_while_serving(serving)
         try:
             counters = link_loop.run(serving)
         finally:

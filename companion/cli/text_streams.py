@@ -18,7 +18,10 @@ _ERROR_HANDLER = "companion.transliterated"
 
 
 def print_anything() -> None:
-    """Make standard output and error transliterate, and discard what goes to a closed one."""
+    """Make standard output and error accept any text.
+
+    Characters that the encoding lacks are transliterated. Text for a closed stream is discarded.
+    """
     codecs.register_error(_ERROR_HANDLER, _transliterated)
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # closed, as by `>&-`

@@ -152,7 +152,7 @@ def add_study(commands: Commands) -> None:
         "--workers",
         type=whole_number(1, 256),
         metavar="N",
-        help="processes that run studies of `all`; default: one for each core",
+        help="processes for `study all`; default: one for each core",
     )
     study.add_argument(
         "--json",

@@ -36,8 +36,8 @@ class FlightConfig(Section):
     slow_down: bool = False
     """Slow down a trajectory that exceeds the limits, instead of refusing it."""
     slow_down_reserve_m_s2: Annotated[float, Field(ge=0.0, le=10.0)] = 0.5
-    """Horizontal acceleration that a trajectory slowed down leaves, below what limits.max_tilt_deg
-    gives: feedback and wind need it."""
+    """Part of the horizontal acceleration at limits.max_tilt_deg that is kept for feedback and wind
+    when a trajectory is slowed down."""
     arm: StrictBool = False
     """The program arms the vehicle; so does `fly --arm`. Otherwise it waits for the pilot to
     arm."""

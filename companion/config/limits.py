@@ -101,5 +101,7 @@ class DeadmanConfig(Section):
     @model_validator(mode="after")
     def _consistent(self) -> "DeadmanConfig":
         if self.silence_limit_ms < max(self.telemetry_stale_ms, self.target_stale_ms):
-            raise ValueError("silence_limit_ms must be at least as long as the stale limits")
+            raise ValueError(
+                "silence_limit_ms must not be less than telemetry_stale_ms and target_stale_ms"
+            )
         return self

@@ -31,7 +31,7 @@ class ConfigKey(NamedTuple):
         section: name of its section.
         name: name of the key.
         value: its value, as plain data that YAML can hold.
-        default: its default, likewise.
+        default: its default, as plain data too.
         unit: unit such as °/s; empty without a unit.
         allowed: range or choices, in words; empty if the type allows any value.
         meaning: what the key means.

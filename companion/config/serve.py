@@ -24,7 +24,7 @@ class ServeConfig(Section):
     """
     trusted: Annotated[tuple[_Name, ...], Field(max_length=100)] = ()
     """IP addresses and serial devices that may command without signing. Clients on this computer
-    always may; all others can only read, unless they sign with the vehicle's key.
+    may always command; all others only read, unless they sign with the vehicle's key.
     """
     control: StrictBool = True
     """Fly the setpoints of clients (extra `serve`). false: pass them on as everything else."""
@@ -38,6 +38,6 @@ class ServeConfig(Section):
     max_acceleration_m_s2: Annotated[float, Field(ge=0.1, le=15.0)] = 3.0
     """Largest horizontal acceleration after a jump of the commanded position or velocity."""
     max_jerk_m_s3: Annotated[float, Field(ge=1.0, le=100.0)] = 8.0
-    """Largest jerk of the same motion. Divided by gravity it is the tilt rate in rad/s."""
+    """Largest jerk after such a jump. Divided by gravity it is the tilt rate in rad/s."""
 
     setpoint_timeout = Si("setpoint_timeout_ms")

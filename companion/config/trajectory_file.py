@@ -33,7 +33,7 @@ from companion.guidance.trajectory.timed_curve import TimedCurve
 from companion.guidance.trajectory.waypoints import largest_detour
 
 _MOST_COLUMNS_SHOWN = 10
-_SMALLEST_DETOUR = 0.05
+_SMALLEST_NOTED_DETOUR = 0.05
 """Smallest distance of a curve from the lines between its points that a note reports, m."""
 _SHORTEST_RAMP = 0.05
 """Shortest extra duration by ramps that a note reports, s."""
@@ -124,7 +124,7 @@ _AXES = {
 def _table_notes(
     path: Path, frame: Frame | None, table: Table, trajectory: TimedCurve
 ) -> tuple[str, ...]:
-    """The frame of a table, and what a user may not expect of the trajectory through it."""
+    """Notes on a table: its frame, its unused columns, and ramps that were added."""
     axes = f"{path.name} is read in s, m and rad with {_AXES[frame or Frame.ENU]}"
     if frame is None:
         axes += (
@@ -159,7 +159,7 @@ def _detour_notes(
     if not (isinstance(trajectory, TimedCurve) and isinstance(trajectory.curve, SplineCurve)):
         return ()
     detour = largest_detour(trajectory.curve.spline, times)
-    if detour < _SMALLEST_DETOUR:
+    if detour < _SMALLEST_NOTED_DETOUR:
         return ()
     return (
         f"{trajectory.name}: the curve leaves the straight lines between its points by up to "

@@ -47,8 +47,8 @@ class VehicleConfig(Section):
     """Response of the vehicle's rate loop, from which `model-following` plans."""
 
     identified: Annotated[str, Field(min_length=1, max_length=200)] | None = None
-    """Flight in which `companion identify` measured the times below; it writes this key. null: the
-    times are estimated or from another vehicle, and `companion doctor` warns.
+    """Flight in which `companion identify` measured the keys below; it writes this key. null: the
+    keys are estimated or from another vehicle, and `companion doctor` warns.
     """
     lag_ms: Milliseconds | None = None
     """Time constant of the roll rate after its dead time. For a second-order response it is
@@ -76,7 +76,7 @@ class VehicleConfig(Section):
     yaw_frame_lead_ms: Milliseconds | None = None
     """Time by which the axes of the commanded rates lead the body in yaw. ArduPilot applies rates
     along its attitude target, which leads the body. Used only while ATTITUDE_TARGET is missing.
-    null: derived from the times above if there is a slew limit (ArduPilot), else 0 (PX4)."""
+    null: derived from the keys above if there is a slew limit (ArduPilot), else 0 (PX4)."""
 
     @property
     def known(self) -> bool:
@@ -85,7 +85,7 @@ class VehicleConfig(Section):
 
     @property
     def axes(self) -> "dict[str, AxisKeys]":
-        """The known response of each axis, by name; a null of pitch or yaw means that of roll."""
+        """The known response of each axis, by name; null for pitch or yaw: the value of roll."""
         roll = AxisKeys(
             self.lag_ms, self.dead_time_ms, self.acceleration_limit_deg_s2, self.damping
         )

@@ -79,7 +79,7 @@ class CommandMaker:
         if self.predictive is not None:
             vehicle = self._estimate.vehicle(now, inputs)
             following = self._flown.following(now, turn)
-            linear = self.predictive.instead_of(linear, turn, vehicle, following)
+            linear = self.predictive.replacement_for(linear, turn, vehicle, following)
         target, later, down = linear
         # Open-loop steps, predictive control and `InnerResponse.target` ignore the learned limit.
         target, later = (self._learning.limit_tilt(each, down) for each in (target, later))

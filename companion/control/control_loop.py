@@ -30,11 +30,12 @@ from companion.vehicle.records import AttitudeSample
 
 SendSetpoint = Callable[[int, BodyRates, float], bool]
 """Sends the sample's time_boot_ms, body rates and thrust; False if the link does not accept it. In
-lockstep the link keeps them until the step ends, and sends only the last ones of a step."""
+lockstep the link keeps the setpoint until the step ends, and sends only the last one of a step."""
 
 _MISFIT_REASONS = {Misfit.NOT_NEWER: Unanswered.NOT_NEWER, Misfit.AHEAD: Unanswered.AHEAD}
 _END_THE_STREAM = {None, Unanswered.OLD_TARGET, Unanswered.AWAITING_MODE}
-"""Outcomes of the last sample after `end_stream`: answered (None), or no later one can be."""
+"""Outcomes of a sample that complete `end_stream`: it was answered (None), or there is a reason why
+no later sample can be answered either."""
 
 
 class ControlLoop:

@@ -45,9 +45,9 @@ class EstimatorResets:
     Attributes:
         turn: sum of the heading jumps, rad.
         shift: sum of the position jumps, m NED.
-        corrections: sum of the heading changes that body rates do not explain and that are no
-            jumps, rad; see `StepFrame`.
-        rate_lag: how late the body rates are against the attitude, as learned.
+        corrections: sum of the estimator's gradual heading corrections, rad: heading changes that
+            the body rates do not explain, without the jumps; see `StepFrame`.
+        rate_lag: learned lag of the body rates behind the attitude.
         largest_tilt_jump: largest jump of the thrust axis, rad; no reference frame compensates it.
         newest: the newest attitude, or None.
         times: when the latest resets were found, s of event-loop time.

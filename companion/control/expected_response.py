@@ -88,7 +88,7 @@ def gain_warning(config: Config) -> str | None:
 
 
 def _gain_sentence(gain: float, largest: float) -> str:
-    remedy = "; lower it, for above that the response overshoots and the hold may swing"
+    remedy = "; lower it, because a larger gain makes the response overshoot and the hold swing"
     return (
         f"planner.gain_per_s is {gain:g}, and {largest:.1f} is the largest sensible one "
         f"({LARGEST_GAIN_TIMES_DELAY} / (lag + dead time)){remedy if gain > largest else ''}"

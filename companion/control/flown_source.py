@@ -12,7 +12,7 @@ from companion.guidance.source import ManeuverSource, Source
 _REJOINED_DISTANCE = 1.0
 """Distance from the reference at which the vehicle counts as returned after open loop, m."""
 _RETURN_TIME = 10.0
-"""After this time the vehicle must have returned, s; 10 m take 4 s."""
+"""Time allowed to return to the reference after open loop, s; a return over 10 m takes 4 s."""
 
 
 class FlownSource:
@@ -102,9 +102,9 @@ class FlownSource:
     ) -> float | None:
         """Distance from the reference, m; `now` in s of event-loop time.
 
-        It is None without a pose, in open loop, while the reference drifts, and until the vehicle
-        has returned from either. It has `_RETURN_TIME` for that, from the first closed loop on;
-        open loop that begins before it has returned gives it no more time.
+        It is None without a pose, in open loop, and while the reference drifts. After these it
+        stays None until the vehicle is back at its reference, but at most for `_RETURN_TIME` from
+        the first step in closed loop. Another open loop in between does not extend this time.
         """
         distance = dist(reference.position_ned, motion.position_ned)
         since = self._returning_since

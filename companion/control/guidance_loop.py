@@ -39,7 +39,7 @@ class GuidanceLoop:
         bound_to_hold: True after `give_up`: from then on no source may be flown.
         motion: motion of the vehicle at the last step, without resets, or None.
         acceleration: its horizontal acceleration then, m/s², NED.
-        off_course: distance from the reference at the last step, m; see
+        tracking_error: distance from the reference at the last step, m; see
             `FlownSource.tracking_error`.
         estimate: estimates the motion.
         learning: learns the hover thrust.
@@ -70,7 +70,7 @@ class GuidanceLoop:
         self.bound_to_hold = False
         self.motion: VehicleMotion | None = None
         self.acceleration: Horizontal = (0.0, 0.0)
-        self.off_course: float | None = None
+        self.tracking_error: float | None = None
         self.estimate = estimate
         self.learning = HoverLearning(hover_thrust, state)
         self.maker = CommandMaker(guidance, self.flown, estimate, self.learning, period)
@@ -215,7 +215,7 @@ class GuidanceLoop:
         self.motion, self.acceleration = inputs.now, inputs.acceleration
         self.hold.begin_if_tilted(now, inputs.now, self._q, self._heading())
         reference = self._write_command(now, inputs)
-        self.off_course = self.flown.tracking_error(now, reference, inputs.now)
+        self.tracking_error = self.flown.tracking_error(now, reference, inputs.now)
         if not standing:
             self.learning.step(
                 now,
@@ -226,7 +226,7 @@ class GuidanceLoop:
         measured_at = self.estimate.vehicle_time(now, position)
         if self._loop.offboard_active:
             self.record.add(now, measured_at, reference, inputs.now)
-        return StepOutput(measured_at, self._q, inputs, reference, self.off_course)
+        return StepOutput(measured_at, self._q, inputs, reference, self.tracking_error)
 
     def _write_command(self, now: float, inputs: GuidanceInput) -> Reference:
         """Write the command for `now`, if one can be made; return the reference of this step."""

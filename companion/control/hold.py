@@ -1,4 +1,4 @@
-"""The hold that ends what is flown: the vehicle brakes, and holds the place where it stops."""
+"""Ends a maneuver or a commanded motion by a hold: the vehicle brakes, and holds where it stops."""
 
 from math import degrees, tan
 
@@ -15,7 +15,7 @@ class Hold:
     """Begins a hold when it is asked to, or when open-loop rates tilt the vehicle too far.
 
     Args:
-        flown: what is flown; the hold replaces it.
+        flown: the source of guidance that is flown; the hold replaces it.
         maker: makes the commands, and knows the motion of the vehicle.
         learning: learns the hover thrust, which limits the tilt at which the height is held.
         max_tilt: largest tilt in open loop, rad.

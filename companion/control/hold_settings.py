@@ -15,18 +15,18 @@ _CALM_WEIGHTS = Weights(position=1.0, velocity=1.5)
 _USUAL_RATE_LOOP_DELAY = 0.12
 """Lag plus dead time of a heavy vehicle's rate loop, assumed if none is identified, s."""
 _HOLD_LATENESS_RANGE = 0.065, 0.08
-"""Range over which the hold changes from stiff to normal: dead time, plus half the lag, plus half
-the time in which the rate loop slews to the largest roll-pitch rate, s."""
+"""Delays between which the hold changes from stiff to normal, s. The delay is the dead time, plus
+half the lag, plus half the time in which the rate loop slews to the largest roll-pitch rate."""
 _SHORTEST_DELAY = 0.275
 """Shortest delay for which the hold is made stiffer, s. Higher weights multiply the noise of the
 estimate so much that the autopilot's rate loop always slews, and the vehicle swings."""
 _SECOND_ORDER_SHARE = 0.2
-"""Share of a lag of second order by which it counts as longer in the hold's delay. It keeps the
-margins of the hold that flew PX4's rate loop as if it were of first order."""
+"""A second-order lag counts as longer by this share of it in the hold's delay. The hold then keeps
+the margins that it has with a first-order model of PX4's rate loop."""
 _OBSERVER_LATENESS_RANGE = 0.035, 0.06
-"""Range over which the observer changes from quick to normal: dead time plus half the lag, s."""
+"""Delays (dead time plus half the lag) over which the observer changes from quick to normal, s."""
 _GAIN_RANGE = 5.0, 7.0
-"""Range over which the observer changes from quick to normal: gain of the planner, 1/s."""
+"""Gains of the planner between which the observer changes from quick to normal, 1/s."""
 _BANDWIDTH_INCREASE = 0.6
 """Relative increase of the observer's bandwidth with a quick rate loop."""
 _CALM_BANDWIDTH = 1.0
@@ -37,8 +37,8 @@ _POSITION_PULL = 4.0, 8.0
 """Gain from the position error to the observed velocity, with a slow and a quick rate loop, 1/s. It
 is needed because the velocities of PX4 and ArduPilot are off by 0.05 m/s for seconds (measured)."""
 _TRUSTED_PULL_INCREASE = 5.0
-"""Increase of that gain with a quick rate loop and trusted positions, 1/s: recorded errors of both
-estimators then move the vehicle 5 to 25 % less."""
+"""Increase of the gain `_POSITION_PULL` with a quick rate loop and trusted positions, 1/s. With
+recorded errors of PX4's and ArduPilot's estimators the vehicle then moves 5 to 25 % less."""
 _CORRECTION_TIME_CONSTANT = 0.65
 """Time constant of the position corrections of PX4's and ArduPilot's estimators (measured), s."""
 _CORRECTION_FILTER_TIMES = 0.1, 0.04
@@ -93,7 +93,7 @@ def slewing_delay(config: Config) -> float:
 def _lateness(config: Config) -> float:
     """Dead time plus half the lag of the rate loop, s; infinite if it is not identified.
 
-    Both are those of first order: a lag of second order delays quick commands more.
+    A second-order lag is first converted to first order, because it delays quick commands more.
     """
     lag, dead_time = slower_tilt(config)
     share = FIRST_ORDER_SHARE if isfinite(tilt_damping(config)) else 1.0

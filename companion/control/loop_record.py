@@ -93,7 +93,8 @@ class LoopRecord:
         last_sample: when the newest sample arrived.
         last_vehicle_time: vehicle time of the newest usable sample, s.
         last_answer: arrival time of the newest sample that was answered.
-        gap_from: `last_answer`, or inf before the first answer and after a confirmed gap.
+        gap_from: time from which a gap without setpoints counts: `last_answer`, or inf before the
+            first answer and after a gap whose mode was confirmed.
         gaps: when the first answerable sample after each of the latest gaps arrived. A gap is a
             time longer than `Deadlines.telemetry_stale` without a setpoint, while offboard is
             active or requested.

@@ -86,13 +86,13 @@ class Predictive:
         """End the solver's process."""
         self._solver.close()
 
-    def instead_of(
+    def replacement_for(
         self, linear: LinearCommand, turn: float, vehicle: Vehicle, following: Following | None
     ) -> LinearCommand:
         """The command of predictive control while it follows a trajectory, else `linear`.
 
-        Predictive control works in the estimator's frame, with heading resets. Its target is
-        constant for a period, which its model takes into account.
+        Predictive control works in the estimator's frame, whose heading jumps at each reset. Its
+        target is constant for a period, which its model takes into account.
 
         Args:
             linear: command of linear guidance.
@@ -119,7 +119,7 @@ class Predictive:
             following: the trajectory that is followed, or None.
 
         Returns:
-            Target and downward acceleration (m/s²) to fly, likewise.
+            Target, in the estimator's frame, and downward acceleration (m/s²) to fly.
         """
         chosen = linear
         if following is not None:

@@ -22,10 +22,10 @@ class RateLag:
     the lag times the change of the rates. Only roll and pitch count, because the estimator's
     corrections of the heading are no rotations of the body.
 
-    All rotations count alike, so a lag that changes in flight, as when the autopilot's filter is
-    switched, is followed slowly. That matters little: after `corners` the lag was raised by 11 ms
-    (mock vehicles of both autopilots), and the heading of later steps erred by 0.1° more, without
-    this class by 0.3°. Forgetting old rotations would save only 0.05°.
+    All rotations have the same weight. So if the lag changes in flight, for example because a
+    filter of the autopilot is switched, it is followed slowly. That matters little: on the mock
+    vehicles, where the lag grew by 11 ms after `corners`, the heading of later steps erred by 0.1°
+    more; without this class it erred by 0.3° more. Forgetting old rotations would save only 0.05°.
 
     Attributes:
         seconds: the lag, s; 0 before the first fast rotation.
@@ -53,8 +53,8 @@ class RateLag:
         Args:
             before: body rates of the sample before, rad/s.
             now: body rates of this sample, rad/s.
-            predicted: this sample's attitude by the one before and `mean`.
-            found: its attitude.
+            predicted: attitude of this sample, predicted from the sample before by `mean`.
+            found: measured attitude of this sample.
         """
         _, x, y, _ = body_error(predicted, found)
         p, q = now[0] - before[0], now[1] - before[1]

@@ -27,7 +27,7 @@ from companion.recording.mcap_file.writer import McapWriter
 _HALF_ROOT = sqrt(0.5)
 _MAX_PATH_POINTS = 100
 """Number of points in a path: 20 s with guidance at 50 Hz."""
-_POINT_EACH, _PATHS_EACH, _BODY_EACH = 2, 5, 10
+_POINT_EVERY, _PATHS_EVERY, _BODY_EVERY = 2, 5, 10
 """With guidance at 50 Hz the thrust is drawn every 0.1 s. Every second drawing adds a point to the
 paths, every fifth sends the paths, every tenth sends the body.
 
@@ -93,17 +93,17 @@ class SceneRows:
             reference: position of the reference, m ENU.
         """
         thrust = Entity("thrust", "vehicle", follows=True, arrows=self._arrows(q))
-        scene = (thrust,) if self._count % _BODY_EACH else (_BODY_ENTITY, thrust)
+        scene = (thrust,) if self._count % _BODY_EVERY else (_BODY_ENTITY, thrust)
         writer.message("/scene", time_ns, scene_message(time_ns, scene))
         if time_ns - self._newest_ns > _GAP_NS:
             self._flown.clear()
             self._reference.clear()
         self._newest_ns = time_ns
-        if self._count % _POINT_EACH == 0:
+        if self._count % _POINT_EVERY == 0:
             self._flown.append(position)
             self._reference.append(reference)
         self._count += 1
-        if self._count % _PATHS_EACH == 0:
+        if self._count % _PATHS_EVERY == 0:
             lines = (Line(self._reference, _REFERENCE_COLOR), Line(self._flown, _FLOWN_COLOR))
             paths = (Entity("paths", "world", lines=lines),)
             writer.message("/paths", time_ns, scene_message(time_ns, paths))

@@ -22,7 +22,7 @@ from companion.attitude.rotation import clamp, down_in_body, turned_about_vertic
 from companion.guidance.reference import rotated
 
 _LARGEST_TURN = radians(3.0)
-"""Largest turn of the frame, rad: it limits what a wrong gyro can do."""
+"""Largest turn of the frame, rad. It limits the effect of a wrong gyro."""
 _DECAY_S = 2.0
 """Time constant with which the turn decays after the steps, s."""
 _FOLLOWING_S = 1.0 / 4.5

@@ -20,7 +20,7 @@ from companion.vehicle.records import AttitudeTargetThrust, Battery, LocalPositi
 _NO_VECTOR = (nan, nan, nan)
 _NO_TARGET = Target(nan, nan, nan, nan)
 _HALF_ROOT = sqrt(0.5)
-_DRAWN_EACH, _SCENE_EACH = 2, 5
+_POSE_EVERY, _SCENE_EVERY = 2, 5
 """Steps of guidance for each recorded pose, and for each drawing of the vehicle."""
 
 
@@ -119,9 +119,9 @@ class StepRows:
             )
             writer.message("/guidance", time_ns, data)
             self._count += 1
-            if self._count % _DRAWN_EACH == 0:
+            if self._count % _POSE_EVERY == 0:
                 self._draw(writer, time_ns, made)
-            if self._count % _SCENE_EACH == 0:
+            if self._count % _SCENE_EVERY == 0:
                 here = _east_north_up(made.inputs.now.position_ned)
                 there = _east_north_up(made.reference.position_ned)
                 self._scene.draw(writer, time_ns, made.q, here, there)

@@ -1,4 +1,4 @@
-"""The telemetry that guidance reads."""
+"""The interfaces of the telemetry that guidance reads."""
 
 from typing import Protocol
 

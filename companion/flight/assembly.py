@@ -180,7 +180,7 @@ def _context(
 def _vehicle_memory(
     context: FlightContext, folder: Path | None, note: Callable[[str], None], changes: Changes
 ) -> VehicleMemory:
-    """The memory of earlier flights, which gives the drag to the checks and to guidance."""
+    """Make the `VehicleMemory`, which gives the drag of earlier flights to checks and guidance."""
     remembered = None if folder is None else folder.parent
     memory = VehicleMemory(context.config, remembered, context.guidance_loop.estimate.drag, note)
     memory.on_known = changes.on_drag

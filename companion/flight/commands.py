@@ -18,7 +18,7 @@ _MAX_TRIES = 4
 _EFFECT_TIMEOUT = 3.0
 """Longest time from a command to its effect, s; a take-off takes longer than a mode change."""
 _MODE_REPORT_TIMEOUT = 1.0
-"""An accepted mode that is not reported within this time was left again, s."""
+"""If an accepted mode is not reported within this time, s, the autopilot has left it again."""
 _OFFBOARD_ONLY = frozenset({Role.OFFBOARD})
 
 Done = Callable[[], bool]

@@ -1,4 +1,4 @@
-"""The course of a finished flight for its report: phases, early end, advice on keys."""
+"""What happened in a finished flight, for its report: phases, early end, advice on keys."""
 
 import asyncio
 from collections.abc import Sequence

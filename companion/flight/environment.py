@@ -10,9 +10,10 @@ from companion.recording.mcap_file.batch import SendBatch
 
 @dataclass(frozen=True, slots=True)
 class Environment:
-    """The surroundings of a flight. The defaults are the real ones.
+    """What a flight takes from its computer: sockets, clock, settings of the operating system.
 
-    `companion.testing` replaces all of them: its flights use no sockets and no wall clock.
+    The defaults are those of a real flight. `companion.testing` replaces all of them: its flights
+    use no sockets and no wall clock.
 
     Attributes:
         open_transport: opens the link's transport.

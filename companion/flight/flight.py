@@ -219,7 +219,7 @@ class Flight:
             self._asking = False
 
     async def _guarded(self, work: Callable[[], Awaitable[None]]) -> None:
-        """Run a task beside the phases again and again; an exception in it ends the flight."""
+        """Run a task repeatedly while the phases run; an exception in it ends the flight."""
         while True:
             try:
                 await work()

@@ -44,7 +44,7 @@ def require_flyable(config: Config, part: Maneuver, drag: KnownDrag) -> None:
     Raises:
         ConfigError: the maneuver cannot be flown within the limits and the fence.
     """
-    with named_if_impossible(part.name):
+    with naming_trajectory_errors(part.name):
         motions = list(_predicted_motions(part, drag.least))
         _require_motions_inside(config, part, motions, None)
     if isinstance(part, HeldFigure):
@@ -92,7 +92,7 @@ def require_followable(config: Config, maneuver: Maneuver, begin: Vector, drag: 
         return check(replace(motion, position=motion.position + np.array(begin)))
 
     if isinstance(maneuver, Follow | HeldFigure):
-        with named_if_impossible(maneuver.name):
+        with naming_trajectory_errors(maneuver.name):
             broken = violations(maneuver.trajectory, replace(envelope, fence=fence))
         if broken:
             raise ConfigError(f"{maneuver.name}: {broken[0]}; {broken[0].remedy}")
@@ -116,7 +116,7 @@ def require_still_flyable(config: Config, flown: ManeuverSequence, drag: KnownDr
         if not isinstance(part, Follow):
             require_flyable(config, part, drag)
             continue
-        with named_if_impossible(part.name):
+        with naming_trajectory_errors(part.name):
             broken = violations(part.trajectory, envelope_of(config, drag))
         if broken:
             raise ConfigError(
@@ -126,7 +126,7 @@ def require_still_flyable(config: Config, flown: ManeuverSequence, drag: KnownDr
 
 
 @contextmanager
-def named_if_impossible(name: str | Path) -> Iterator[None]:
+def naming_trajectory_errors(name: str | Path) -> Iterator[None]:
     """Name the maneuver or file in the error of a trajectory that cannot be computed.
 
     Raises:

@@ -8,7 +8,7 @@ from companion.config.known_drag import KnownDrag, before_connecting
 from companion.files.yaml_file import ConfigError
 from companion.flight.maneuver_checks import (
     envelope_of,
-    named_if_impossible,
+    naming_trajectory_errors,
     require_flyable,
     with_reserve,
 )
@@ -93,7 +93,7 @@ def _follow(config: Config, drag: KnownDrag) -> Follow:
     loaded, envelope = trajectory_file.read(path), envelope_of(config, drag)
     trajectory = loaded.trajectory
     notes = loaded.notes
-    with named_if_impossible(path):
+    with naming_trajectory_errors(path):
         if config.flight.slow_down:
             slower = slow_down(trajectory, with_reserve(config, envelope))
             notes = (*notes, *slowing(trajectory, slower, config.flight.slow_down_reserve_m_s2))

@@ -120,7 +120,7 @@ def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, .
 def takeover_phases(config: FlightConfig) -> tuple[Phase, ...]:
     """The phases that take over a vehicle which its autopilot holds in the air."""
     checks = _checks_phase(config, "to be taken over", takeover.check_airborne, _TAKEOFF_ROLES)
-    return checks, _held_takeover_phase()
+    return checks, _takeover_from_hold_phase()
 
 
 def takeoff_for_client_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, ...]:
@@ -131,7 +131,7 @@ def takeoff_for_client_phases(config: FlightConfig, autopilot: Autopilot) -> tup
     (takeoff_phase,) = (
         phase for phase in takeoff_phases(config, autopilot) if phase.name == "takeoff"
     )
-    return checks, takeoff_phase, _held_takeover_phase()
+    return checks, takeoff_phase, _takeover_from_hold_phase()
 
 
 def _checks_phase(config: FlightConfig, ready: str, work: Work, modes: frozenset[Role]) -> Phase:
@@ -140,7 +140,7 @@ def _checks_phase(config: FlightConfig, ready: str, work: Work, modes: frozenset
     )
 
 
-def _held_takeover_phase() -> Phase:
+def _takeover_from_hold_phase() -> Phase:
     """The takeover of a vehicle that holds in the air; if it fails, the autopilot keeps holding."""
     return Phase(
         "offboard",

@@ -210,4 +210,4 @@ class StatusReporter:
 
     def _error(self) -> float | None:
         loop = self._context.loop
-        return self._context.guidance_loop.off_course if loop.offboard_active else None
+        return self._context.guidance_loop.tracking_error if loop.offboard_active else None

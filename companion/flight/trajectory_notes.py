@@ -22,7 +22,7 @@ def overview(trajectory: Trajectory) -> str:
 
 
 def slowing(before: Trajectory, slow_down: SlowDown, reserve: float) -> tuple[str, ...]:
-    """Messages: what was slowed down, where, for which limit, and what remains; may be empty.
+    """Messages for the user: where the trajectory was slowed down, and for which limit; or none.
 
     Args:
         before: the trajectory before it was slowed down.

@@ -27,9 +27,9 @@ _AXIS_DRAG_DEVIATION, _LARGEST_AXIS_DRAG = 0.03, 0.1
 estimate, 1/m."""
 _CERTAIN_DEVIATION = 0.1
 """The drag counts as known if its standard deviation at the top speed is below this, 1/s."""
-_GUSTY_SURPRISE = 2.0
-"""Above this mean surprise (squared innovation by its variance) the drag does not count as known:
-gusts change quicker than the filter assumes, and move the vehicle, so they are taken for drag."""
+_GUSTY_INNOVATION = 2.0
+"""Above this mean of innovation²/variance the drag does not count as known: gusts that change
+quicker than the filter assumes also move the vehicle, and the filter takes them for drag."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ class DragEstimate:
             _WIND_DEVIATION,
         )
         self._covariance = np.diag([*(each**2 for each in deviations), _AXIS_DRAG_DEVIATION**2])
-        self._surprise_sum, self._measurements = 0.0, 0
+        self._innovation_sum, self._measurements = 0.0, 0
         self._forget_window()
 
     @property
@@ -90,7 +90,7 @@ class DragEstimate:
     @property
     def certain(self) -> bool:
         """Whether the vehicle has moved enough for a certain estimate, in calm enough air."""
-        if self._surprise_sum > _GUSTY_SURPRISE * self._measurements:
+        if self._innovation_sum > _GUSTY_INNOVATION * self._measurements:
             return False
         speed, p = self.top_speed, self._covariance
         variance = p[0, 0] + 2.0 * speed * p[0, 1] + speed * speed * p[1, 1]
@@ -138,7 +138,7 @@ class DragEstimate:
                 _CLAMP_DEVIATIONS * sqrt(variance),
             )
             gain, innovation = spread / variance, min(max(innovation, -most), most)
-            self._surprise_sum += innovation * innovation / variance
+            self._innovation_sum += innovation * innovation / variance
             self._measurements += 1
             self._state = self._state + gain * innovation
             self._covariance = self._covariance - np.outer(gain, spread)

@@ -24,8 +24,8 @@ class ThrustSettings:
 
     Attributes:
         hover: normalised thrust at hover, 0..1.
-        correction_limit: largest correction: the learned share of full thrust is at most
-            1 + correction_limit times that of `hover`, and at least 1/(1 + correction_limit) of it.
+        correction_limit: limit of learning. The learned hover thrust in N is that of `hover` times
+            a factor between 1/(1 + correction_limit) and 1 + correction_limit.
         correction_time: time constant with which the learned hover thrust follows a change, s.
         lowest: smallest normalised thrust that is sent, 0..1.
         highest: largest normalised thrust that is sent, 0..1.

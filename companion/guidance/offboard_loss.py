@@ -86,7 +86,7 @@ class _HeldResult(NamedTuple):
     """The vehicle when the autopilot stops holding the rates.
 
     Attributes:
-        way: Displacement without feedback, m NED.
+        displacement: Displacement without feedback, m NED.
         velocity: Velocity without feedback, m/s NED.
         feedback_displacement: Displacement that feedback adds in the worst direction, m.
         feedback_speed: Speed that feedback adds in the worst direction, m/s.
@@ -94,7 +94,7 @@ class _HeldResult(NamedTuple):
         tilt: Largest possible tilt, rad.
     """
 
-    way: Vector
+    displacement: Vector
     velocity: Vector
     feedback_displacement: float
     feedback_speed: float
@@ -112,8 +112,8 @@ def reach(at_loss: MotionAtLoss, loss: LossFailsafe) -> Reach:
         _stopping_distance(value, held.tilt, specific_thrust, loss) for value in (speed, widest)
     )
     north, east = (
-        way + (stop * component / speed if speed > 0.0 else 0.0)
-        for way, component in zip(held.way[:2], held.velocity[:2], strict=True)
+        displacement + (stop * component / speed if speed > 0.0 else 0.0)
+        for displacement, component in zip(held.displacement[:2], held.velocity[:2], strict=True)
     )
     up_speed = max(0.0, held.feedback_speed - held.velocity[2])
     up = (
@@ -142,20 +142,22 @@ def _held_motion(at_loss: MotionAtLoss, loss: LossFailsafe) -> _HeldResult:
     ahead = _scaled(across, 1.0 / (rate * specific_thrust)) if rate > 0.0 else (0.0, 0.0, 0.0)
     rate = min(rate, loss.max_tilt_rate)
     feedback = min(_FEEDBACK_RATE, loss.max_tilt_rate)
-    way, velocity, thrust = (0.0, 0.0, 0.0), at_loss.velocity, axis
+    displacement, velocity, thrust = (0.0, 0.0, 0.0), at_loss.velocity, axis
     feedback_displacement = feedback_speed = highest = 0.0
     for index in range(_INTEGRATION_STEPS):
         angle = rate * (index + 0.5) * step
         thrust = _plus_scaled(_scaled(axis, cos(angle)), ahead, sin(angle))
         velocity = _plus_scaled(_slowed(velocity, loss.drag, step), thrust, specific_thrust * step)
         velocity = (velocity[0], velocity[1], velocity[2] + GRAVITY * step)
-        way = _plus_scaled(way, velocity, step)
+        displacement = _plus_scaled(displacement, velocity, step)
         stray = 2.0 * specific_thrust * sin(0.5 * min(pi, feedback * (index + 0.5) * step))
         feedback_speed += (stray - loss.drag.linear * feedback_speed) * step
         feedback_displacement += feedback_speed * step
-        highest = max(highest, -way[2])
+        highest = max(highest, -displacement[2])
     tilt = acos(max(-1.0, min(1.0, -thrust[2]))) + feedback * duration
-    return _HeldResult(way, velocity, feedback_displacement, feedback_speed, highest, min(pi, tilt))
+    return _HeldResult(
+        displacement, velocity, feedback_displacement, feedback_speed, highest, min(pi, tilt)
+    )
 
 
 def _stopping_distance(
@@ -174,7 +176,7 @@ def _fall_distance(held: _HeldResult, specific_thrust: float) -> float:
     duration = _level_time(held.tilt)
     mean_cosine = sin(held.tilt) / held.tilt if held.tilt > 0.0 else 1.0  # while it levels
     speed = held.velocity[2] + held.feedback_speed
-    fall = held.way[2] + held.feedback_displacement
+    fall = held.displacement[2] + held.feedback_displacement
     gain = max(0.0, GRAVITY - specific_thrust * mean_cosine)
     fall += max(0.0, speed) * duration + 0.5 * gain * duration * duration
     return max(0.0, fall + _braking_distance(max(0.0, speed) + gain * duration))

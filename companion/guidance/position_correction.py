@@ -8,16 +8,17 @@ from companion.guidance.reference import Horizontal, VehicleMotion, limited
 _LONGEST_GAP = 0.5
 """Longest time between two positions from which a correction is computed, s."""
 _LONGEST_WINDOW = 0.1
-"""Longest time constant of each low-pass filter in motion, s; noisy positions need it."""
+"""Time constant of each low-pass filter for noisy positions while the vehicle moves, s; smooth
+positions need a shorter one (`CorrectionSettings.window`)."""
 _WINDOW_PER_NOISE = 0.1
-"""Growth of that time constant with the noise of r (see `PositionCorrection`), s per m/s."""
+"""Growth of this time constant with the noise of r (see `PositionCorrection`), s per m/s."""
 _SMOOTH_BELOW, _NOISY_ABOVE = 0.2, 0.6
 """Noise of r below which positions count as smooth, and above which as noisy, m/s. It is at most
 0.1 m/s on PX4 and ArduPilot; white noise of 3 mm at 50 Hz makes 0.5 m/s."""
 _LARGEST_CHANGE = 0.08
-"""Largest difference of r from the filtered r that enters the filters, m/s. ArduPilot stamps its
-position in whole milliseconds: at 5 m/s a stamp that is off by 1 ms changes one r by 0.25 m/s. What
-its estimator corrects changes r by 0.02 m/s, with peaks of 0.1 m/s (measured)."""
+"""Before r is filtered, it is limited to this distance from the filtered r, m/s. ArduPilot stamps
+its position in whole milliseconds: at 5 m/s a stamp that is off by 1 ms changes one r by 0.25 m/s.
+Real corrections of its estimator change r by 0.02 m/s, with peaks of 0.1 m/s (measured)."""
 _NOISE_TIME = 1.0
 """Time constant with which the noise of r is estimated, s."""
 _MOVING_SPEED = 2.0

@@ -14,7 +14,8 @@ _GATE_DEVIATIONS = 3.0
 """An innovation above this number of standard deviations is rejected (PX4: HTE_ACC_GATE)."""
 
 _USUAL_NOISE = 0.2
-"""Usual variance of a measured specific thrust, (m/s²)²; `time_constant` holds at this value."""
+"""Usual variance of a measured specific thrust, (m/s²)². With this variance the filter has the
+configured `time_constant`."""
 
 _FIRST_NOISE, _SMALLEST_NOISE, _LARGEST_NOISE = 1.0, 0.05, 100.0
 """Initial variance of a measured specific thrust and its bounds, (m/s²)².

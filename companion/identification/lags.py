@@ -87,7 +87,10 @@ def lagged(commands: Knots, lag: float, at: Floats) -> Floats:
 
 
 def complex_lagged(commands: Knots, lag: complex, at: Floats) -> Numbers:
-    """`lagged` for a complex lag (s): one of the conjugate pair of an oscillating second order."""
+    """`lagged` for a complex lag, s.
+
+    An underdamped second-order response is the sum of two of these, with conjugate lags.
+    """
     steady = commands.value - commands.slope * lag
     ends = steady[:-1] + commands.slope[:-1] * np.diff(commands.time)
     jumps = np.concatenate(([commands.value[0] - steady[0]], ends - steady[1:]))

@@ -80,7 +80,7 @@ class Helper:
         """Number of messages (not records for the stream) that could not be sent to the process."""
         return self._channel.dropped
 
-    async def serve_beside(self, work: Coroutine[Any, Any, T]) -> T:
+    async def run_while_serving(self, work: Coroutine[Any, Any, T]) -> T:
         """Run `work`, and serve the process at the same time."""
         loop = asyncio.get_running_loop()
         self.changes.on_change, self.changes.on_drag = self._tell_change, self._tell_drag

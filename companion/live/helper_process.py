@@ -17,7 +17,7 @@ from companion.live.channel import Channel, Message, NoAnswerError
 from companion.live.checks import ChangeChecks
 from companion.live.watched_file import WatchedFile
 
-_LOOK_PERIOD = 0.06
+_CHECK_PERIOD_S = 0.06
 """Period of checks of the watched file, s; an edit needs three of them."""
 _ANSWER_TIMEOUT = 3.0
 """Time allowed for the flight to answer, s."""
@@ -134,7 +134,7 @@ async def watch(relay: Relay, path: Path) -> None:
     watched = WatchedFile(path, read, relay.checks.check)
     relay.note(f"edits of {path.name} are applied from now on")
     while not relay.over.is_set():
-        edit = await asyncio.to_thread(watched.look)
+        edit = await asyncio.to_thread(watched.newest_edit)
         if edit is not None and edit.refusal is not None:
             relay.note(edit.refusal)
         elif edit is not None:
@@ -146,7 +146,7 @@ async def watch(relay: Relay, path: Path) -> None:
             except NoAnswerError as error:
                 relay.note(f"{path.name}: {error}")
                 watched.accept()  # so that an edit back to the old values is sent
-        await asyncio.sleep(_LOOK_PERIOD)
+        await asyncio.sleep(_CHECK_PERIOD_S)
 
 
 async def _serve(descriptor: int, listening: int, feed: int) -> None:

@@ -49,15 +49,15 @@ class WatchedFile:
         self._files = files_of(path)
         self._seen = self._signature()
         self._last_judged: Signature | None = None
-        self._unchanged_looks = 0
+        self._unchanged_checks = 0
 
-    def look(self) -> Edit | None:
+    def newest_edit(self) -> Edit | None:
         """The newest edit; None: there is none, or the file is being written."""
         signature = self._signature()
         if signature != self._seen:
-            self._seen, self._unchanged_looks = signature, 0
-        self._unchanged_looks += 1
-        if self._unchanged_looks < _UNCHANGED_CHECKS or signature == self._last_judged:
+            self._seen, self._unchanged_checks = signature, 0
+        self._unchanged_checks += 1
+        if self._unchanged_checks < _UNCHANGED_CHECKS or signature == self._last_judged:
             return None
         self._files = files_of(self._path)
         self._seen = self._last_judged = self._signature()

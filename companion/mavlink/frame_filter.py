@@ -49,7 +49,7 @@ class FrameFilter:
         return (frame.system, frame.component) == self._source
 
     def admits_source(self, frame: Frame) -> bool:
-        """`is_vehicle`, which also counts each frame of another source."""
+        """Whether a frame comes from the vehicle; a frame of another source is counted."""
         if self.is_vehicle(frame):
             return True
         self._stats.ignored_foreign += 1

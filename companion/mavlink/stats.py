@@ -97,7 +97,7 @@ class FrameCounter:
         stats.by_message[message_id] = stats.by_message.get(message_id, 0) + 1
 
     def reset(self) -> None:
-        """Count no gap before the next frame, after a reconnect."""
+        """Forget the last sequence number after a reconnect, so that no gap is counted."""
         self._last_sequence = None
 
     def _missing(self, sequence: int) -> int:

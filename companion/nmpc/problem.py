@@ -164,7 +164,7 @@ class SqpSolver:
         self._solver = _sqp_function(self._program, settings.iterations)
 
     def solve(self, guess: Floats, parameters: Floats) -> Solution:
-        """Solve from a guess; its first state is the start of the plan and stays.
+        """Solve from a guess, whose first state is the fixed start of the plan.
 
         Args:
             guess: first guess, in the order of `Program.unknown`.

@@ -18,7 +18,7 @@ CHECKED_ONCE: tuple[Check, ...] = (
     configuration_checks.dead_time,
     configuration_checks.doubtful_values,
     configuration_checks.tilt_compensation,
-    configuration_checks.accept_entries,
+    configuration_checks.unknown_accept_entries,
 )
 """Checks that a flight runs only once, because the vehicle's state does not change their result."""
 

@@ -93,7 +93,7 @@ def tilt_compensation(config: Config, evidence: Evidence) -> Iterator[Finding]:
         )
 
 
-def accept_entries(config: Config, _: Evidence) -> Iterator[Finding]:
+def unknown_accept_entries(config: Config, _: Evidence) -> Iterator[Finding]:
     """Whether each entry of `flight.accept` names a check that exists."""
     streams = {
         f"{Key.STREAMS}.{name}" for autopilot in AUTOPILOTS for name in autopilot.wanted_rates

@@ -104,7 +104,7 @@ def _checked_rows(record: FlightRecord, name: str, series: Series) -> Floats | N
     # NaN means that there is no value.
     if np.abs(rows[~np.isnan(rows)]).max(initial=0.0) > _LARGEST_VALID:
         raise RecordError(
-            f"{record.folder}: {name}: not as a flight records it: a number is above "
+            f"{record.folder}: {name}: not a valid record of a flight: a number is above "
             f"{_LARGEST_VALID:g}"
         )
     return rows if len(rows) else None
@@ -117,7 +117,7 @@ def _gain(record: FlightRecord) -> float:
             raise ValueError(f"gain_per_s is {gain:g}")
         return gain
     except (ValueError, KeyError) as error:
-        raise RecordError(f"{record.folder}: not as a flight records it: {error}") from error
+        raise RecordError(f"{record.folder}: not a valid record of a flight: {error}") from error
 
 
 def _marks(record: FlightRecord) -> Marks:
@@ -127,7 +127,7 @@ def _marks(record: FlightRecord) -> Marks:
         return marks_of(summary)
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
         path = record.folder / "summary.json"
-        raise RecordError(f"{path}: not as a flight writes it: {error}") from error
+        raise RecordError(f"{path}: not a valid summary of a flight: {error}") from error
 
 
 def _draw_steps(axes: "Axes", runs: list[StepRun], gain: float) -> None:

@@ -53,7 +53,7 @@ def as_recorded(folder: Path) -> Iterator[None]:
     try:
         yield
     except (ValueError, IndexError, OverflowError, TypeError) as error:
-        raise RecordError(f"{folder / FILE}: not as a flight records it: {error}") from error
+        raise RecordError(f"{folder / FILE}: not a valid record of a flight: {error}") from error
 
 
 @dataclass(frozen=True)

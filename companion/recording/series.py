@@ -154,7 +154,7 @@ class Series:
         """Record one row; its length is not checked."""
         self._chunk.fromlist(row)  # takes half as long as `extend`
         if len(self._chunk) == self._full:
-            self._put_away()
+            self._spool_chunk()
 
     def rows(self, since: int = 0) -> NDArray[np.float64]:
         """(N, columns), the rows from number `since` on; lost rows are left out.
@@ -177,7 +177,7 @@ class Series:
             numbers = np.concatenate(parts)
         return numbers[max(0, len(numbers) - wanted) :].reshape(-1, len(self.columns))
 
-    def _put_away(self) -> None:
+    def _spool_chunk(self) -> None:
         chunk, self._chunk = self._chunk, array("d")
         self._put_count += _CHUNK_ROWS
         self._recent.append(chunk)

@@ -4,11 +4,11 @@ from collections.abc import Mapping
 
 BY_MONITOR: Mapping[str, str] = {
     "unheard": "check cable, radio and power: the vehicle was not heard any more",
-    "silence": "mend the cause named above: the telemetry, its values, or this computer",
+    "silence": "fix the cause named above: the telemetry, its values, or this computer",
     "clock": "find why the autopilot restarted or its clock jumped; check its power supply",
     "disarmed": "find who disarmed the vehicle in flight: the pilot's switch or the autopilot",
     "landed": "check the autopilot's land detector, or fly higher: it reported the ground",
-    "failsafe": "mend what the autopilot's failsafe names in the events",
+    "failsafe": "fix what the autopilot's failsafe names in the events",
     "battery": "charge the battery; the limit is limits.min_battery_percent",
     "gps": "wait for a better GPS fix, or fly where more of the sky is seen",
     "estimator": "let the autopilot's estimator settle; check its sensors and calibration",
@@ -25,7 +25,7 @@ BY_MONITOR: Mapping[str, str] = {
     "answer rate": "find what slows ATTITUDE_QUATERNION; the limit is link.min_attitude_rate_hz",
     "position rate": "find what slows LOCAL_POSITION_NED; the limit is link.min_position_rate_hz",
     "late setpoints": "find what slows the link; the limit is 1.5 · deadman.telemetry_stale_ms",
-    "link loss": "mend the radio link or lower its load; the limit is safety.max_loss",
+    "link loss": "improve the radio link or lower its load; the limit is safety.max_loss",
     "round trip": "find what slows the link; the limit is safety.max_round_trip_ms",
     "deadlines": "end other programs on this computer, or set realtime.scheduler: fifo",
     "starvation": "end other programs on this computer, or set realtime.scheduler: fifo",
@@ -34,11 +34,11 @@ BY_MONITOR: Mapping[str, str] = {
 
 BY_PHASE: Mapping[str, str] = {
     "connect": "check power, cable and link.endpoint; nothing else may use the same port",
-    "checks": "mend what the message names; `companion doctor` explains each check",
+    "checks": "fix what the message names; `companion doctor` explains each check",
     "stream": "check the link: the autopilot sent too little telemetry to answer",
-    "arm": "mend what the autopilot names in the events; --arm lets the program arm",
-    "takeoff": "read the autopilot's words in the events; the pilot may have taken over",
-    "offboard": "mend what the message names; the autopilot must accept our setpoints",
+    "arm": "fix what the autopilot names in the events; --arm lets the program arm",
+    "takeoff": "read the autopilot's messages in the events; the pilot may have taken over",
+    "offboard": "fix what the message names; the autopilot must accept our setpoints",
     "maneuvers": "read the events before the end; if the pilot took over, nothing needs fixing",
     "hand back": "read the events before the end; the pilot may have taken over",
     "listen": BY_MONITOR["unheard"],

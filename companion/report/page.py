@@ -81,7 +81,7 @@ def write_comparison(paths: Sequence[Path], out: Path) -> Path:
 
 @contextmanager
 def _explain_other_version(*paths: Path) -> Iterator[None]:
-    """Turn errors caused by figures of another version into an error for the user.
+    """Turn errors caused by a summary of another version into a `RecordError` for the user.
 
     Raises:
         RecordError: a figure is missing or of another type.

@@ -25,9 +25,9 @@ def silence(limit: float, *, heard: bool) -> Judge:
 
 
 def _silence_cause(now: float, control: Control, limit: float) -> str:
-    if control.stood_still > _STALL_SHARE * (now - control.answered):
+    if control.stalled > _STALL_SHARE * (now - control.answered):
         # Data that came during the stall were read late, so they only seem old.
-        still = control.stood_still
+        still = control.stalled
         return f"this program did not run for {still:.1f} s (computer overloaded or suspended)"
     if now - control.sampled > limit:
         if control.attitude_not_finite:

@@ -13,17 +13,17 @@ judges with a limit then use `with_hysteresis`, so that the alarm does not toggl
 
 HYSTERESIS = 0.9
 """A raised alarm ends only below this share of an upper limit, or above a lower limit divided by
-it.
+this share.
 """
 
 
 def with_hysteresis(limit: float, raised: bool) -> float:
-    """An upper `limit` of a value; while the alarm is raised, 90 % of it."""
+    """The upper limit to use: `limit`, or 90 % of it while the alarm is raised."""
     return HYSTERESIS * limit if raised else limit
 
 
 def minimum_with_hysteresis(limit: float, raised: bool) -> float:
-    """A lower `limit` of a value; while the alarm is raised, the limit / 0.9."""
+    """The lower limit to use: `limit`, or `limit` / 0.9 while the alarm is raised."""
     return limit * (1.0 / HYSTERESIS) if raised else limit
 
 

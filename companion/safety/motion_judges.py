@@ -64,11 +64,11 @@ def tracking(limit: float) -> Judge:
     """The vehicle is farther than `limit` from its reference, m."""
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
-        error = snapshot.motion.off_course
+        error = snapshot.motion.tracking_error
         if error is None or error <= with_hysteresis(limit, raised):
             return None
         return (
-            f"the vehicle is {error:.1f} m off its course, more than "
+            f"the vehicle is {error:.1f} m from its reference, more than "
             f"safety.max_tracking_error_m = {limit:g}"
         )
 

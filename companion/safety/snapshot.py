@@ -35,7 +35,7 @@ class Motion(NamedTuple):
             None.
         velocity: m/s.
         height: height above home, m, or None; in the autopilot's frame, with estimator resets.
-        off_course: distance from the reference, m; None without a reference.
+        tracking_error: distance from the reference, m; None without a reference.
         thrust: thrust last sent, 0..1, or None.
         origin: latitude and longitude of the fence's centre, or None if they are unknown.
         acceleration: horizontal acceleration, m/s², NED.
@@ -46,7 +46,7 @@ class Motion(NamedTuple):
     offset: Vector | None = None
     velocity: Vector = (0.0, 0.0, 0.0)
     height: float | None = None
-    off_course: float | None = None
+    tracking_error: float | None = None
     thrust: float | None = None
     origin: Place | None = None
     acceleration: Horizontal = (0.0, 0.0)
@@ -68,7 +68,7 @@ class Control(NamedTuple):
         position_fresh: whether the newest position is fresh.
         clock_change: latest jump, stop or restart of the vehicle's clock since control began, in
             words, or None.
-        stood_still: time for which this program did not run (a stall) since the last answer, s.
+        stalled: time for which this program did not run since the last answer, s.
     """
 
     answered: float = inf
@@ -80,7 +80,7 @@ class Control(NamedTuple):
     heard: float = inf
     position_fresh: bool = True
     clock_change: str | None = None
-    stood_still: float = 0.0
+    stalled: float = 0.0
 
 
 class Health(NamedTuple):

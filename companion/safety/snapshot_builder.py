@@ -167,7 +167,7 @@ class SnapshotBuilder:
                 self._heard_at,
                 self._guidance_loop.fresh_position() is not None,
                 None if clock.changes == self._clock_changes else clock.last_change,
-                self.stood_still(since=record.last_answer),
+                self.stall_time(since=record.last_answer),
             ),
             self._health(now),
             self._resets(now),
@@ -175,7 +175,7 @@ class SnapshotBuilder:
             self._good_flags,
         )
 
-    def stood_still(self, since: float) -> float:
+    def stall_time(self, since: float) -> float:
         """Total time, s, of the stalls that ended after `since`, s of event-loop time.
 
         Only stalls of the last second count, and the latest one.
@@ -196,7 +196,7 @@ class SnapshotBuilder:
             offset,
             velocity,
             self._link.state.height,
-            guidance_loop.off_course,
+            guidance_loop.tracking_error,
             None if idle else loop.record.thrust,
             self._fence_place,
             guidance_loop.acceleration,

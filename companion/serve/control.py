@@ -231,7 +231,7 @@ class ServedControl:
         task.add_done_callback(self._unfinished.discard)
 
     async def _fly(self, flight: ServedFlight, command: ControlRequest | None) -> None:
-        """Fly; complete the record while the next flight may already begin."""
+        """Fly, release control, and then complete the record; the next flight need not wait."""
         begun = False
         try:
             begun = await flight.run(command)

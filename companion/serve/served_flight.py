@@ -132,7 +132,7 @@ class ServedFlight:
     @property
     def tracking_error(self) -> float | None:
         """Distance from the reference, m; None: unknown."""
-        return self._assembled.context.guidance_loop.off_course
+        return self._assembled.context.guidance_loop.tracking_error
 
     def give(self, request: Request) -> None:
         """Fly a request, at once if control has begun.

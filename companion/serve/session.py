@@ -138,7 +138,7 @@ class ServeSession:
                 self.changes,
             )
             background.append(keeper.keep_telemetry(lambda: wanted_rates(self._config, link)))
-        gate = _Gate(
+        gate = _FrameInterceptor(
             permission, component, self.control, network.routing, link.settings.target_system
         )
         network.routing.on_own_frame = gate.on_own_frame
@@ -164,7 +164,7 @@ class ServeSession:
             self._note(f"{error} (still waiting for the vehicle; clients are served)")
 
 
-class _Gate:
+class _FrameInterceptor:
     """Refuses frames that a client may not send, and passes its setpoints to control."""
 
     def __init__(

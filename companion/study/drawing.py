@@ -80,7 +80,7 @@ def draw_plane(axes: Axes, curves: Iterable[tuple[Method, str, Floats]], ends: F
     axes.set(title="Path (● start, ★ target)", xlabel="$a_E$", ylabel="$a_N$")
 
 
-def say_magnified(axes: Axes, axis: str, span: float, other: str, other_span: float) -> None:
+def note_magnification(axes: Axes, axis: str, span: float, other: str, other_span: float) -> None:
     """Write below the title of a panel by how much an axis is magnified, compared with another.
 
     Args:

@@ -48,7 +48,7 @@ class Step:
         return np.arange(self.samples + 1) / self.rate_hz
 
     def reference(self, model: FirstOrderReference | None = None) -> Floats:
-        """(samples + 1, 2) coefficients of `model`; by default it has `gain` and no limit."""
+        """(samples + 1, 2) coefficients of `model`; None: first order with the step's `gain`."""
         model = model or FirstOrderReference(self.gain)
         return np.array([model.after(self.start, self.target, float(t)) for t in self.time])
 

@@ -20,7 +20,7 @@ A proposal
 
 The analysis
     expectation    margins, errors, rates and settling of a configuration: an `Expectation`
-    stability      the margins only, also with errors of the vehicle's times: `ModelError`
+    stability      the margins only, also with errors of lag and dead time: `ModelError`
     Disturbances   what disturbs the vehicle
     control_loop   frequency responses of the whole loop: a `Loop`
 """

@@ -33,10 +33,12 @@ class Disturbances:
         gust_time: correlation time of the gusts, s.
         velocity_error: standard deviation of the slow error of the estimated velocity on a path,
             m/s.
-        push: standard deviation of the slow error of the predicted acceleration on a path, m/s².
-        path_time: correlation time of `velocity_error` and `push`, s.
-        wander: density of the velocity error in hover, m/s/√Hz.
-        shake: density of the acceleration that tilt and drag do not explain, m/s²/√Hz.
+        acceleration_error: standard deviation of the slow error of the predicted acceleration on a
+            path, m/s².
+        path_time: correlation time of `velocity_error` and `acceleration_error`, s.
+        velocity_density: density of the velocity error in hover, m/s/√Hz.
+        acceleration_density: density of the acceleration that tilt and drag do not explain,
+            m/s²/√Hz.
         position_noise: standard deviation of the noise of a single position, m.
         velocity_noise: standard deviation of the noise of a single velocity, m/s.
         source: source of the last four values, for the user.
@@ -45,10 +47,10 @@ class Disturbances:
     gust: float = 0.5
     gust_time: float = 2.0
     velocity_error: float = 0.03
-    push: float = 0.1
+    acceleration_error: float = 0.1
     path_time: float = 1.0
-    wander: float = 0.01
-    shake: float = 0.02
+    velocity_density: float = 0.01
+    acceleration_density: float = 0.02
     position_noise: float = 0.003
     velocity_noise: float = 0.005
     source: str = "typical of a multirotor"
@@ -119,16 +121,27 @@ def expected_errors(loop: Loop, disturbances: Disturbances, period: float) -> Er
         period: time between two positions, s.
     """
     omega = loop.s.imag
-    push, velocity = loop.by_acceleration(), loop.by_velocity_error()
+    by_acceleration, by_velocity = loop.by_acceleration(), loop.by_velocity_error()
     position = loop.by_position_error()
-    gusts = ((push, _slow_density(omega, disturbances.gust * loop.drag, disturbances.gust_time)),)
+    gusts = (
+        (
+            by_acceleration,
+            _slow_density(omega, disturbances.gust * loop.drag, disturbances.gust_time),
+        ),
+    )
     path = (
-        (velocity, _slow_density(omega, disturbances.velocity_error, disturbances.path_time)),
-        (push, _slow_density(omega, disturbances.push, disturbances.path_time)),
+        (by_velocity, _slow_density(omega, disturbances.velocity_error, disturbances.path_time)),
+        (
+            by_acceleration,
+            _slow_density(omega, disturbances.acceleration_error, disturbances.path_time),
+        ),
     )
     noise = (
-        (velocity, disturbances.wander**2 + 2.0 * period * disturbances.velocity_noise**2),
-        (push, disturbances.shake**2),
+        (
+            by_velocity,
+            disturbances.velocity_density**2 + 2.0 * period * disturbances.velocity_noise**2,
+        ),
+        (by_acceleration, disturbances.acceleration_density**2),
         (position, 2.0 * period * disturbances.position_noise**2),
     )
     causes = (gusts, path, noise)

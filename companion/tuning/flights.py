@@ -91,7 +91,7 @@ def autopilot_like(config: Config) -> str:
 
 
 def fly_course(config: Config, course: Course, autopilot: str, seed: int = 3) -> CourseResult:
-    """Fly a course on the mock vehicle, with this configuration's gains and vehicle times.
+    """Fly a course on the mock vehicle, with this configuration's gains, lag and dead time.
 
     The configured limits of tilt and tilt rate apply. A course that would exceed them, with a
     reserve for feedback and wind, is slowed down. Thrust, take-off height and fence suit the mock

@@ -121,8 +121,8 @@ def control_loop(config: Config, s: Complex, error: ModelError = EXACT) -> Loop:
     attitude_path = rates * hold * rate_feedback
     position_delay = np.exp(-s * POSITION_LATENESS)
     velocity, position = feedback.velocity * position_delay, feedback.position * position_delay
-    to_velocity = GRAVITY / (s + drag)
-    guidance_path = command * (feedback.tilt + to_velocity * (velocity + position / s))
+    velocity_per_tilt = GRAVITY / (s + drag)
+    guidance_path = command * (feedback.tilt + velocity_per_tilt * (velocity + position / s))
     return Loop(
         s=s,
         whole=attitude_path + guidance_path,

@@ -28,8 +28,9 @@ _AUTOPILOTS = {autopilot.mav_autopilot for autopilot in AUTOPILOTS}
 def measured_disturbances(log: Path, drag: float, usual: Disturbances) -> Disturbances:
     """The disturbances in the air in a `.tlog`.
 
-    `wander` is the change of the position that the velocity does not explain. `shake` is the change
-    of the velocity that tilt and drag do not explain, including gusts.
+    `velocity_density` is the change of the position that the velocity does not explain.
+    `acceleration_density` is the change of the velocity that tilt and drag do not explain,
+    including gusts.
 
     Args:
         log: a `.tlog` of this or another program.
@@ -51,14 +52,14 @@ def measured_disturbances(log: Path, drag: float, usual: Disturbances) -> Distur
     unexplained_acceleration = (
         np.diff(velocity, axis=0) / step - GRAVITY * mean_slope + drag * mean_velocity
     )
-    wander, position_noise = _densities(time[1:], unexplained_velocity)
-    shake, velocity_noise = _densities(time[1:], unexplained_acceleration)
-    if not np.isfinite([wander, shake]).all():
+    velocity_density, position_noise = _densities(time[1:], unexplained_velocity)
+    acceleration_density, velocity_noise = _densities(time[1:], unexplained_acceleration)
+    if not np.isfinite([velocity_density, acceleration_density]).all():
         return usual
     return replace(
         usual,
-        wander=wander,
-        shake=shake,
+        velocity_density=velocity_density,
+        acceleration_density=acceleration_density,
         position_noise=position_noise,
         velocity_noise=velocity_noise,
         source=log.parent.name or log.name,

@@ -84,9 +84,9 @@ On the mock vehicle, 14 rad/s gave errors that were an eighth larger in still ai
 gusts.
 """
 _SLEWING_SHARE = 0.5
-"""Share of the margins for wrong times that must remain while the rate loop slews.
+"""Share of the margins for wrong lag and dead time that must remain while the rate loop slews.
 
-Without any, a figure-eight in gusts could swing by more than 1 m on the mock vehicle.
+Without any margin left, a figure-eight in gusts could swing by more than 1 m on the mock vehicle.
 """
 
 
@@ -190,7 +190,7 @@ def _cost(
 
 
 def errors_to_tolerate(config: Config, aims: Aims) -> list[ModelError]:
-    """Errors of the vehicle's times for which the loop must keep margins; see `Aims`."""
+    """Errors of lag and dead time for which the loop must keep margins; see `Aims`."""
     errors = [ModelError(time_factor=each) for each in (aims.mismatch, 1.0 / aims.mismatch)]
     delay = slewing_delay(config)
     return [*errors, ModelError(delay=delay)] if delay > 0.0 else errors

@@ -86,7 +86,7 @@ def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
 
 
 def worse_sentence(flights: Flights) -> str | None:
-    """A warning if a course failed or was flown worse with the proposal; None: none was."""
+    """A warning if a test course failed or was flown worse with the proposal; else None."""
     worse = [
         f"{name} {after.result}"
         if not after.ok

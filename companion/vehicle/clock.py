@@ -167,7 +167,7 @@ class VehicleClock:
         if self._reported_unknown:
             self.on_event(
                 f"the age of telemetry is not known, because {self.delay.unknown.value}; "
-                "a sample that is later than the quickest one is noticed, a delay of all is not"
+                "a sample that arrives later than the others is noticed, but not a delay of all"
             )
         else:
             self.on_event("the age of telemetry is known by TIMESYNC")
@@ -218,10 +218,10 @@ class VehicleClock:
 
         If all samples before it that did not fit repeated one stamp, the clock stood still.
         """
-        stood_still = self._misfits.stood_still(self._newest)
+        clock_stopped = self._misfits.clock_stopped(self._newest)
         lasted = self._misfits.stamps[-1].received - self._received
         self._drop_misfits()
-        if stood_still and min(lasted, late) >= SMALLEST_JUMP:
+        if clock_stopped and min(lasted, late) >= SMALLEST_JUMP:
             self._accept_jump(-late, time_boot_ms, restarted=False)
 
     def _drop_misfits(self) -> None:

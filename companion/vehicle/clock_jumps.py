@@ -87,7 +87,7 @@ class MisfitRun:
         """The largest offset of the misfits (vehicle time minus event-loop time), s."""
         return max(stamp.ahead for stamp in self.stamps)
 
-    def stood_still(self, newest: float) -> bool:
+    def clock_stopped(self, newest: float) -> bool:
         """Whether all misfits repeat `newest`, the stamp of the last sample that fitted, s."""
         return self.stamps[0].time == self.stamps[-1].time == newest
 

@@ -71,7 +71,7 @@ def read_flight_log(path: Path) -> FlightLog:
     # Both attitude messages carry the same rates, so only one of them is used.
     return FlightLog(
         reader.obeyed,
-        max(reader.quaternion, reader.euler, key=len),
+        max(reader.rates_with_quaternion, reader.rates_with_euler, key=len),
         reader.specific_thrust,
     )
 
@@ -83,15 +83,15 @@ class _Reader:
     Attributes:
         vehicle: system and component of the autopilot, from its first heartbeat.
         obeyed: setpoints that the autopilot obeyed.
-        quaternion: rates from ATTITUDE_QUATERNION.
-        euler: rates from ATTITUDE.
+        rates_with_quaternion: body rates from ATTITUDE_QUATERNION.
+        rates_with_euler: body rates from ATTITUDE.
         specific_thrust: from the accelerometer.
     """
 
     vehicle: tuple[int, int] | None = None
     obeyed: list[Row] = field(default_factory=list)
-    quaternion: list[Row] = field(default_factory=list)
-    euler: list[Row] = field(default_factory=list)
+    rates_with_quaternion: list[Row] = field(default_factory=list)
+    rates_with_euler: list[Row] = field(default_factory=list)
     specific_thrust: list[Row] = field(default_factory=list)
     _autopilot: Autopilot | None = None
     _obeying: bool = False
@@ -143,7 +143,8 @@ class _Reader:
             milli_g = -message.zacc
             self._accelerometer(1e-3 * message.time_boot_ms, 1e-3 * _STANDARD_GRAVITY * milli_g)
         else:
-            rows = self.quaternion if kind == "ATTITUDE_QUATERNION" else self.euler
+            of_quaternion = kind == "ATTITUDE_QUATERNION"
+            rows = self.rates_with_quaternion if of_quaternion else self.rates_with_euler
             time = 1e-3 * message.time_boot_ms
             rows.append((time, message.rollspeed, message.pitchspeed, message.yawspeed))
             self._stamps_ms.append(message.time_boot_ms)

@@ -143,7 +143,7 @@ class Battery(NamedTuple):
     charge_received: float | None = None
 
     def replaced_by(self, newer: "Battery") -> "Battery":
-        """`newer`; but if only this battery knows the charge, it stays, with the newer voltage.
+        """The newer record; a charge that it lacks is taken from this one.
 
         Some vehicles send the charge in one of the two messages only. It is kept for
         `_MAX_CHARGE_AGE`.

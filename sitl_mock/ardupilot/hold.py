@@ -68,7 +68,7 @@ class PositionHold:
         """Held heading, rad."""
 
     def begin(self) -> None:
-        """Start a hold: stop ahead, at the present heading, from the present climb rate."""
+        """Start a hold at the point where the vehicle can stop, with its present heading."""
         estimate = self._state.estimate
         x, y, z = estimate.position_ned
         vx, vy, vz = estimate.velocity_ned

@@ -81,8 +81,9 @@ class VehicleSettings(Section):
     simulate.
     """
     exact_rates: bool | None = None
-    """Whether a stream at the full rate is sent in every slot. If not, PX4's 250 Hz loop skips
-    some; ArduPilot and the other inner loop rates skip none anyway. Null: only in lockstep."""
+    """Whether a stream at the full rate is sent in every slot. false: PX4's 250 Hz loop skips some
+    slots, as measured; PX4's other inner loop rates and ArduPilot never skip. Null: true in
+    lockstep, else false."""
     burst_ms: NonNegative = 0.0
     """In real time the vehicle runs in bursts with this period of vehicle time, as ArduPilot's
     simulator does; 0 = no bursts. The default for ArduPilot is 5.6."""

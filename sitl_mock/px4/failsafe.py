@@ -26,7 +26,7 @@ _EXCEPT_AUTO, _EXCEPT_OFFBOARD = 2, 4
 _GCS_MARGIN_US = 2_000_000
 """The loss of the ground station is detected this long after COM_DL_LOSS_T (measured)."""
 _ACTED_ALREADY = -1
-"""Replaces the time of a loss after the failsafe for it has acted."""
+"""Value that replaces the time of a loss once its failsafe has acted, so that it acts only once."""
 _COMPANION_MARGIN_US = 1_500_000
 """The loss of the companion is announced this long after COM_OBC_LOSS_T (measured)."""
 _WARNINGS = {

@@ -30,7 +30,7 @@ def test_every_sample_is_answered_and_its_time_taken(module):
     sender = Sender(contestant, stamp_by_time, 2**32)
     try:
         sender.wait_ready()
-        sender.play(100.0, 0.5)
+        sender.send_for(100.0, 0.5)
         assert sender.sent == 50
         assert 0 < len(sender.round_trips_ns) <= 50
         assert min(sender.round_trips_ns) > 0

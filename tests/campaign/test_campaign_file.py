@@ -179,10 +179,10 @@ def test_too_few_samples_are_said(tmp_path):
         return too_few_samples(load(tmp_path, samples=samples, sweep=sweep).file)
 
     assert said(1, {**wind, **laws}).startswith(
-        "samples: 1 flies only one value of mock.wind.speed_m_s, planner.name; raise samples"
+        "samples: 1 gives only one value of mock.wind.speed_m_s, planner.name; raise samples"
     )
     assert said(2, {**wind, **laws}).startswith(
-        "samples: 2 flies at most 2 values of planner.name; raise samples"
+        "samples: 2 gives at most 2 values of planner.name; raise samples"
     )
     assert said(3, {**wind, **laws}) is None
     assert said(1, {"limits.max_tilt_deg": [20, 30]}) is None

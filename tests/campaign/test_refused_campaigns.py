@@ -71,7 +71,7 @@ def test_a_key_that_two_factors_change(tmp_path):
 
 def test_a_fault_cannot_be_called_none_nor_be_in_a_batch(tmp_path):
     said = refusal(tmp_path, faults={"none": SILENCE})
-    assert "faults: none is the name of a flight without a fault" in said
+    assert "faults: none means a flight without a fault; choose another name" in said
     steps = {"flight.maneuvers": ["corners"]}
     for told in ({"faults": {"lost": SILENCE}}, {"sweep": {"fault": ["none", "x"]}}):
         assert "faults need kind: flights" in refusal(tmp_path, kind="batch", set=steps, **told)

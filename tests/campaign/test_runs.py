@@ -314,7 +314,7 @@ def test_a_new_campaign_has_a_folder_with_its_name_and_time_and_tells_of_few_sam
     (out,) = (tmp_path / "runs" / "campaigns").iterdir()
     assert re.fullmatch(r"test-\d{4}-\d\d-\d\dT\d\d-\d\d-\d\dZ", out.name)
     told = capsys.readouterr().out
-    assert "samples: 1 flies only one value of mock.wind.speed_m_s; raise samples" in told
+    assert "samples: 1 gives only one value of mock.wind.speed_m_s; raise samples" in told
 
 
 def test_lists_and_truths_are_columns_of_their_own_kind(tmp_path):

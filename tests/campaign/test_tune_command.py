@@ -99,7 +99,7 @@ def test_a_campaign_that_cannot_be_searched_is_refused(tmp_path, monkeypatch):
     with pytest.raises(ConfigError, match="tune needs kind: flights"):
         section_of(campaign(tmp_path, **batch))
     several = {"a": {"uniform": [1, 2], "keys": ["planner.gain_per_s"]}}
-    with pytest.raises(ConfigError, match="times_base and keys belong to `sweep`"):
+    with pytest.raises(ConfigError, match="times_base and keys work only in `sweep`"):
         section_of(campaign(tmp_path, tune={"search": several}))
     monkeypatch.delitem(FILE, "tune")
     with pytest.raises(ConfigError, match="there is no section `tune`"):

@@ -44,7 +44,7 @@ def config(tmp_path, text):
         ("flight: {maneuvers: []}", "`flight.maneuvers`"),
         ("steps: {settle_s: .inf}", "`steps.settle_s`"),
         ("deadman: {silence_limit_ms: 10000}", "`deadman.silence_limit_ms`"),
-        ("deadman: {silence_limit_ms: 90}", "at least as long as the stale limits"),
+        ("deadman: {silence_limit_ms: 90}", "must not be less than telemetry_stale_ms"),
         ("deadman: {target_stale_ms: 30}", "two periods of guidance.rate_hz"),
         (
             "link: {attitude_rate_hz: 100}\ndeadman: {telemetry_stale_ms: 10}",

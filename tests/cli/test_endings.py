@@ -269,7 +269,7 @@ class Beside:
 
     feed = None
 
-    def serve_beside(self, work):
+    def run_while_serving(self, work):
         return "beside", work
 
 

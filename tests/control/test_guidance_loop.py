@@ -116,11 +116,11 @@ def test_a_doublet_that_tilts_too_far_is_given_up_for_good():
 def test_on_the_way_back_from_a_doublet_the_vehicle_is_not_off_its_course():
     bench = Bench()
     bench.fly(IN_FIRST_DOUBLET, position=(9.0, 4.0, -5.0))
-    assert bench.guidance_loop.off_course is None
+    assert bench.guidance_loop.tracking_error is None
     bench.fly(IN_HOLD - 0.3, position=(9.0, 4.0, -5.0))
-    assert bench.guidance_loop.off_course is None
+    assert bench.guidance_loop.tracking_error is None
     bench.fly(IN_HOLD + 0.3)  # so much later that it is no jump of the estimate
-    assert bench.guidance_loop.off_course < 1.0
+    assert bench.guidance_loop.tracking_error < 1.0
 
 
 def test_a_vehicle_that_never_comes_back_from_open_loop_is_off_its_course():
@@ -132,11 +132,11 @@ def test_a_vehicle_that_never_comes_back_from_open_loop_is_off_its_course():
     held_from = IN_FIRST_DOUBLET + 0.02
     for step in range(24):
         bench.fly(held_from + 0.4 * step, position=away)
-        assert bench.guidance_loop.off_course is None
+        assert bench.guidance_loop.tracking_error is None
     bench.fly(held_from + 10.1, position=away)
-    assert bench.guidance_loop.off_course > 5.0
+    assert bench.guidance_loop.tracking_error > 5.0
     bench.fly(held_from + 13.0)  # so much later that it is no jump of the estimate
-    assert bench.guidance_loop.off_course < 1.0
+    assert bench.guidance_loop.tracking_error < 1.0
 
 
 def test_jumps_on_the_ground_are_corrections_and_are_not_kept_out():
@@ -246,7 +246,7 @@ def test_a_guidance_loop_knows_nothing_before_its_first_step():
     guidance = Bench(begun=False).guidance_loop
     with pytest.raises(RuntimeError, match="before any position came"):
         guidance.hold_here()
-    assert (guidance.motion, guidance.off_course, guidance.hold.given_up) == (None, None, None)
+    assert (guidance.motion, guidance.tracking_error, guidance.hold.given_up) == (None, None, None)
     assert guidance.attitude() == (1.0, 0.0, 0.0, 0.0)
 
 

@@ -94,7 +94,7 @@ def test_a_line_that_ends_inside_but_could_not_stop_there_is_refused(tmp_path):
     ],
 )
 @pytest.mark.parametrize("slow", [False, True])
-def test_where_slowness_does_not_help_it_is_not_advised(tmp_path, text, limits, words, slow):
+def test_slowing_down_is_not_advised_where_it_does_not_help(tmp_path, text, limits, words, slow):
     way = merged(following(tmp_path, text), {"flight": {"slow_down": slow}})
     told = refusal(way, limits={"fence_radius_m": 8.0, **limits})
     assert words in told

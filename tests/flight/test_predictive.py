@@ -145,14 +145,14 @@ def test_it_works_in_the_estimators_frame_with_the_heading_resets():
     later = Target(0.15, 0.25, 0.35)
     linear = LinearCommand(LINEAR[0], later, LINEAR[1])
     following = where(0.0)._replace(turn=0.5)
-    assert predictive.instead_of(linear, 0.5, vehicle(10.0), following) is linear
+    assert predictive.replacement_for(linear, 0.5, vehicle(10.0), following) is linear
     (asked,) = solver.requests
     assert (asked.vehicle, asked.start) == (vehicle(10.0), Start((0.0, 0.0, -5.0), 0.9))
     thrust = (GRAVITY + 0.5) / (1.0 - 0.1**2 - 0.2**2) ** 0.5
     (flown,) = asked.inputs
     assert flown == (10.0, 0.1, 0.2, pytest.approx(0.8), pytest.approx(thrust))
     solver.answer = answer(1, 10.02)
-    command = predictive.instead_of(linear, 0.5, vehicle(10.02), following)
+    command = predictive.replacement_for(linear, 0.5, vehicle(10.02), following)
     assert command.target == command.later == Target(0.3, 0.0, pytest.approx(-0.4))
     assert command.down == pytest.approx(GRAVITY - 12.0 * (1.0 - 0.3**2) ** 0.5)
 

@@ -67,7 +67,7 @@ def test_a_step_that_the_tilt_limit_cuts_is_named_and_take_off_is_no_speed_of_ou
     assert "limits.max_tilt_deg: 35" in cut["found"]
     assert not cut["good"]
     assert figures["response"]["step_size"] == pytest.approx(0.25, abs=0.02)
-    assert "cut step" in checks["straightness of the steps"]["remedy"]
+    assert "limits.max_tilt_deg" in checks["straightness of the steps"]["remedy"]
     motion, marks = summary.trace.motion.rows(), summary.trace.maneuvers
     ours = (motion[:, 1] >= marks[0].vehicle_time) & (motion[:, 1] < marks[-1].vehicle_time)
     assert figures["extent"]["maneuver_speed_max_m_s"] == motion[ours, 3].max()

@@ -81,7 +81,7 @@ def _flight(seconds: float, *, page: bool) -> tuple[list[float], list[float]]:
         flight = session.fly()
         if helper is not None:
             helper.changes, helper.note = session.changes, session.note
-            flight = helper.serve_beside(flight)
+            flight = helper.run_while_serving(flight)
         sizes: list[float] = []
         over = threading.Event()
         threading.Thread(target=_measure, args=(sizes, over), daemon=True).start()

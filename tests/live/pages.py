@@ -86,7 +86,7 @@ class Page:
         self.helper.close("the flight is over")
 
     async def _serve(self):
-        await self.helper.serve_beside(self._tell())
+        await self.helper.run_while_serving(self._tell())
 
     async def _tell(self):
         loop = asyncio.get_running_loop()

@@ -60,7 +60,7 @@ def test_edits_of_the_file_reach_the_flight(tmp_path):
         path.write_text("planner: {gain_per_s: 4.0}\n")
         await until("planner.gain_per_s from 5 to 4")
 
-    asyncio.run(helper.serve_beside(edit()))
+    asyncio.run(helper.run_while_serving(edit()))
     assert [str(change) for change in helper.changes.made] == [
         "changed by flown.yaml: planner.gain_per_s from 5 to 4"
     ]

@@ -102,7 +102,7 @@ def noted(helper, work=lambda: None):
         work()
         return await notes.get()
 
-    return asyncio.run(asyncio.wait_for(helper.serve_beside(until()), 30.0))
+    return asyncio.run(asyncio.wait_for(helper.run_while_serving(until()), 30.0))
 
 
 def test_a_process_that_is_killed_is_noted_once_and_the_flight_goes_on(tmp_path):
@@ -130,7 +130,7 @@ def test_a_killed_process_is_also_noted_by_the_next_message():
         helper.phase("hover", "the maneuver to end")
     assert notes == ["the file watcher has ended by itself; the flight goes on without it"]
     assert helper.dropped == 1
-    asyncio.run(helper.serve_beside(asyncio.sleep(0.05)))
+    asyncio.run(helper.run_while_serving(asyncio.sleep(0.05)))
     assert len(notes) == 1
     helper.close("the flight is over")
 

@@ -117,7 +117,7 @@ def test_what_becomes_of_an_edit_is_noted(monkeypatch, tmp_path, answer, said, a
         def __init__(self, *_):
             self.edits = [None, Edit({}, "w.yaml has a fault"), Edit(SLOWER)]
 
-        def look(self):
+        def newest_edit(self):
             return self.edits.pop(0) if self.edits else None
 
         def accept(self):
@@ -125,7 +125,7 @@ def test_what_becomes_of_an_edit_is_noted(monkeypatch, tmp_path, answer, said, a
 
     monkeypatch.setattr(helper_process, "WatchedFile", Watched)
     monkeypatch.setattr(helper_process, "_ANSWER_TIMEOUT", 0.02)
-    monkeypatch.setattr(helper_process, "_LOOK_PERIOD", 0.001)
+    monkeypatch.setattr(helper_process, "_CHECK_PERIOD_S", 0.001)
 
     async def use(relay, flight):
         flight.answer = answer

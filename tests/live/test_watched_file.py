@@ -92,7 +92,7 @@ def watched(tmp_path: Path):
 
 def _looked(watch):
     """The first edit of the next looks."""
-    return next(filter(None, (watch.look() for _ in range(4))), None)
+    return next(filter(None, (watch.newest_edit() for _ in range(4))), None)
 
 
 @pytest.mark.parametrize("edit", BAD.values(), ids=BAD)
@@ -131,7 +131,7 @@ def test_a_file_that_is_being_written_is_left_alone(watched):
     path, watch, _ = watched
     for size in range(0, len(GOOD), 9):
         path.write_text(GOOD[:size])
-        assert watch.look() is None
+        assert watch.newest_edit() is None
     path.write_text(GOOD)
     assert _looked(watch) is None
 

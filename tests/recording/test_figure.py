@@ -61,10 +61,10 @@ def record(folder, *, steps=False, motion=False, gain="5.0", largest=2.0, summar
 @pytest.mark.parametrize(
     ("broken", "words"),
     [
-        ({"largest": 1e300}, "motion: not as a flight records it: a number is above 1e+09"),
+        ({"largest": 1e300}, "motion: not a valid record of a flight: a number is above 1e+09"),
         ({"gain": "0"}, "gain_per_s is 0"),
         ({"gain": "x"}, "could not convert"),
-        ({"summary": {**WHOLE, "phases": 3}}, "summary.json: not as a flight writes it"),
+        ({"summary": {**WHOLE, "phases": 3}}, "summary.json: not a valid summary of a flight"),
     ],
 )
 def test_files_that_no_flight_writes_are_refused(tmp_path, broken, words):

@@ -160,7 +160,7 @@ def row(channel, number, code):
     ],
 )
 def test_a_message_that_no_flight_records_is_an_error_with_the_place(tmp_path, topic, data, read):
-    with pytest.raises(RecordError, match=r"flight\.mcap: not as a flight records it: "):
+    with pytest.raises(RecordError, match=r"flight\.mcap: not a valid record of a flight: "):
         read(write_one(tmp_path, topic, data))
 
 

@@ -399,5 +399,5 @@ def test_maneuvers_are_made_with_the_drag_of_that_time_not_with_what_was_learned
     flight["assumed_drag_per_s"] = "0.7"
     Replay(record, config)
     flight["assumed_drag_per_s"] = "much"
-    with pytest.raises(RecordError, match="not as a flight records it"):
+    with pytest.raises(RecordError, match="not a valid record of a flight"):
         Replay(record, config)

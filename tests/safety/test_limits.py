@@ -47,7 +47,7 @@ UPPER = {
         lambda v: at(motion=Motion(body_rates=(0.6 * v, 0, 0.8 * v))),
     ),
     "speed": (motion_judges.speed, lambda v: at(motion=Motion(velocity=(0.6 * v, -0.8 * v, 0.0)))),
-    "tracking": (motion_judges.tracking, lambda v: at(motion=Motion(off_course=v))),
+    "tracking": (motion_judges.tracking, lambda v: at(motion=Motion(tracking_error=v))),
     "link loss": (link_judges.loss, health("lost")),
     "round trip": (link_judges.round_trip, health("round_trip")),
     "late setpoints": (
@@ -192,7 +192,7 @@ def silent(reason=None, **changes):
     [
         (silent(), "no setpoint was sent"),
         (silent(Unanswered.LATE), Unanswered.LATE.words),
-        (silent(Unanswered.LATE, stood_still=0.375), Unanswered.LATE.words),
+        (silent(Unanswered.LATE, stalled=0.375), Unanswered.LATE.words),
         (silent(Unanswered.OLD_TARGET), Unanswered.OLD_TARGET.words),
         (
             silent(sampled=NOW - 0.6, attitude_not_finite=True),

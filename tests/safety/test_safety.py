@@ -63,7 +63,7 @@ def unanswered(reason, **changes):
 OLD = NOW - 0.6
 SILENT = {"answered": OLD, "sampled": OLD}
 WARN, HOLD, HAND_BACK, LAND, LISTEN, RELEASE = Action
-STOOD_STILL = "this program did not run for 0.4 s (computer overloaded or suspended)"
+STALLED = "this program did not run for 0.4 s (computer overloaded or suspended)"
 TILTED = "the vehicle tilts by 57°, more than limits.max_tilt_deg + safety.tilt_margin_deg = 55"
 BREACHES = [
     ("unheard", control(**SILENT, heard=OLD), LISTEN, 0.0, "no attitude from the vehicle for 0.6"),
@@ -71,10 +71,10 @@ BREACHES = [
     ("silence", unanswered(Unanswered.NOT_NEWER), HAND_BACK, 0.0, "clock stands still"),
     ("silence", unanswered(Unanswered.AHEAD), HAND_BACK, 0.0, "stamped far ahead"),
     ("silence", unanswered(Unanswered.LATE), HAND_BACK, 0.0, "telemetry_stale_ms"),
-    ("silence", unanswered(Unanswered.LATE, stood_still=0.2), HAND_BACK, 0.0, "stale_ms"),
-    ("silence", unanswered(Unanswered.LATE, stood_still=0.4), HAND_BACK, 0.0, STOOD_STILL),
-    ("silence", unanswered(Unanswered.AWAITING_MODE, stood_still=0.4), HAND_BACK, 0.0, STOOD_STILL),
-    ("unheard", control(**SILENT, heard=OLD, stood_still=0.4), LISTEN, 0.0, STOOD_STILL),
+    ("silence", unanswered(Unanswered.LATE, stalled=0.2), HAND_BACK, 0.0, "stale_ms"),
+    ("silence", unanswered(Unanswered.LATE, stalled=0.4), HAND_BACK, 0.0, STALLED),
+    ("silence", unanswered(Unanswered.AWAITING_MODE, stalled=0.4), HAND_BACK, 0.0, STALLED),
+    ("unheard", control(**SILENT, heard=OLD, stalled=0.4), LISTEN, 0.0, STALLED),
     ("silence", unanswered(Unanswered.OLD_TARGET, placed=OLD), HAND_BACK, 0.0, "no position"),
     (
         "silence",
@@ -112,7 +112,7 @@ BREACHES = [
     ("braking", motion(offset=(0.0, 50.0, 0.0), velocity=(0.0, 6.5, 0.0)), HOLD, 0.04, "60.9 m"),
     ("braking", motion(velocity=(0.0, 0.0, 4.5), height=6.0), HOLD, 0.04, "0.6 m above home"),
     ("speed", motion(velocity=(11.0, 11.0, 0.0)), HOLD, 0.3, "15.6 m/s"),
-    ("tracking", motion(off_course=5.1), HOLD, 1.0, "5.1 m off"),
+    ("tracking", motion(tracking_error=5.1), HOLD, 1.0, "5.1 m from its reference"),
     ("thrust", motion(thrust=0.9), HOLD, 2.0, "limits.max_thrust"),
     ("thrust", motion(thrust=0.1), HOLD, 2.0, "limits.min_thrust"),
     ("answer gaps", health(gaps=3), HAND_BACK, 0.0, "setpoints paused 3 times within 5 s"),
@@ -154,11 +154,11 @@ def test_a_stall_of_our_own_is_counted_from_the_last_setpoint():
     snapshot_builder = SnapshotBuilder(link, loop, None, real_time=True)
     for now in (0.0, 0.02, 0.05, 0.48, 0.5):
         snapshot_builder.listen(now)
-    assert snapshot_builder.stood_still(since=0.02) == pytest.approx(0.4)
-    assert snapshot_builder.stood_still(since=0.49) == 0.0
+    assert snapshot_builder.stall_time(since=0.02) == pytest.approx(0.4)
+    assert snapshot_builder.stall_time(since=0.49) == 0.0
     snapshot_builder.listen(3.53)
-    assert snapshot_builder.stood_still(since=0.49) == pytest.approx(3.0)
-    assert snapshot_builder.stood_still(since=3.53) == 0.0
+    assert snapshot_builder.stall_time(since=0.49) == pytest.approx(3.0)
+    assert snapshot_builder.stall_time(since=3.53) == 0.0
 
 
 @pytest.mark.parametrize(
@@ -230,17 +230,17 @@ def test_over_the_limit_is_over_only_well_within_it():
 
 def test_a_hold_that_mends_it_ends_by_landing_with_what_it_was_for():
     climb = Climb()
-    climb.see(motion(off_course=6.0), 2.0)
+    climb.see(motion(tracking_error=6.0), 2.0)
     verdict, after = climb.see(FINE, 5.0)
     assert verdict.action is LAND
-    assert "6.0 m off its course" in verdict.reason
+    assert "6.0 m from its reference" in verdict.reason
     assert after == pytest.approx(1.0, abs=0.021)
     assert climb.told[-1] == "safety: tracking is over"
 
 
 def test_a_graver_breach_ends_a_hold_and_the_gravest_of_two_decides():
     climb = Climb()
-    climb.see(motion(off_course=6.0), 2.0)
+    climb.see(motion(tracking_error=6.0), 2.0)
     both = autopilot(armed=False, failsafe=True)
     verdict, after = climb.see(both, 1.0)
     assert (verdict.action, verdict.reason, after) == (

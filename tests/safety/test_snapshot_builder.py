@@ -55,7 +55,7 @@ class Flight:
         self.guidance = SimpleNamespace(
             motion=Motions(self.course.position_ned, self.course.velocity),
             acceleration=(0.0, 0.0),
-            off_course=0.9,
+            tracking_error=0.9,
             fresh_position=lambda: "fresh",
         )
         self.builder = SnapshotBuilder(
@@ -109,7 +109,7 @@ def test_motion_is_seen_from_where_control_began(flight):
         offset=(2.0, -3.0, 4.0),
         velocity=(1.0, 2.0, 0.5),
         height=12.5,
-        off_course=0.9,
+        tracking_error=0.9,
         thrust=0.45,
         origin=Place(47.0, 8.0),
         acceleration=(0.3, -0.4),
@@ -127,7 +127,7 @@ def test_what_is_not_known_is_none(command):
     flight.loop.command = command
     flight.guidance.fresh_position = lambda: None
     told = flight.snapshot()
-    assert told.motion == Motion(height=12.5, off_course=0.9)
+    assert told.motion == Motion(height=12.5, tracking_error=0.9)
     assert (told.control.placed, told.control.position_fresh) == (-inf, False)
     flight.guidance.motion = Motions((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
     assert flight.snapshot().motion[2:4] == (None, (4.0, 5.0, 6.0))
@@ -176,7 +176,7 @@ def test_every_stage_of_a_samples_way_has_its_time(flight):
     assert (told.answered, told.sampled, told.reason) == (9.9, 9.95, Unanswered.LATE)
     assert (told.placed, told.heard) == (9.75, 10.02)
     assert (told.position_fresh, told.clock_change) == (True, None)
-    assert told.stood_still == pytest.approx(0.17)
+    assert told.stalled == pytest.approx(0.17)
     flight.clock.changes = 3
     assert flight.snapshot().control.clock_change == "it jumped"
     assert flight.counted == [(3, now) for now in (10.0, 10.02, 10.04, 10.24)]

@@ -160,13 +160,13 @@ def test_with_the_complete_inner_loop_it_is_straightest_at_every_rate(out, hz):
     assert table["model-following"] < 0.25 * best
     assert (
         table["model-following"]
-        < table["model-following, times wrong by the worst error"]
+        < table["model-following, lag and dead time wrong by the worst error"]
         < 0.8 * best
     )
     beliefs = rows(out, "lag-inner-loop-beliefs")
     flown = [across(row) for row in beliefs if float(row["rate, Hz"]) == float(hz.split()[0])]
     assert len(flown) == 25
-    assert max(flown) == table["model-following, times wrong by the worst error"]
+    assert max(flown) == table["model-following, lag and dead time wrong by the worst error"]
 
 
 def test_the_page_says_where_wrong_knowledge_is_worse_than_another_method(out, right, wrong):

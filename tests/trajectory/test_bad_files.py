@@ -68,8 +68,8 @@ def yaml_of(tmp_path, text):
 @pytest.mark.parametrize(
     ("lines", "words"),
     [
-        (rows(step=1e-12), "line 3: 1e-12 s after the sample before; from 0.0001 to 10 s"),
-        (rows(step=3600.0), "line 3: 3.6e+03 s after the sample before"),
+        (rows(step=1e-12), "line 3: 1e-12 s after the previous sample; write time in s"),
+        (rows(step=3600.0), "line 3: 3.6e+03 s after the previous sample"),
         (rows(step=5.0, count=1000), "lasts 4995 s, and 3600 s is the longest"),
         (rows(step=1.0, count=1000, scale=100.0), "450 s is the longest with cutoff_hz 5"),
         (rows(count=5, step=2e-4), "lasts less than 0.1 s"),
@@ -217,7 +217,7 @@ def refused_table(tmp_path, name):
         ("circle: {radius_m: 3, speed_m_s: 2, laps: 1.0e-300}", "`circle.laps`"),
         ("circle: {radius_m: 3, speed_m_s: 2, acceleration_m_s2: 1.0e-300}", "acceleration_m_s2"),
         ("hover: {duration_s: 1.0e-300}", "`hover.duration_s`"),
-        ("line: {to_m: [1.0e-300, 0, 0], speed_m_s: 1}", "must lead somewhere"),
+        ("line: {to_m: [1.0e-300, 0, 0], speed_m_s: 1}", "must end at another point"),
         ("line: {to_m: [1.0e+300, 0, 0], speed_m_s: 1}", "`line.to_m.0`"),
         ("line: {to_m: [9000, 0, 0], speed_m_s: 0.01}", "3600 s is the longest"),
         ("line: {to_m: [1, 0, 0], speed_m_s: 1, jerk_m_s3: 1.0e-300}", "`line.jerk_m_s3`"),

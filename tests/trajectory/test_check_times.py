@@ -113,7 +113,10 @@ def test_the_last_lap_of_a_helix_is_looked_at():
     ("trajectory", "words"),
     [
         (circle(3.0, Laps(2.0, 1000.0)), "it lasts 9426 s, and 3600 s is the longest"),
-        (circle(0.5, Laps(2.0, 1000.0, acceleration=0.003)), "it takes .* samples, and 80000 are"),
+        (
+            circle(0.5, Laps(2.0, 1000.0, acceleration=0.003)),
+            "it takes .* samples, more than 80000",
+        ),
         (line((1.0, 0.0, 0.0), 1e-4, 1.0, 1.0), "it lasts 1e.04 s"),
         (line((9e4, 0.0, 0.0), 100.0, 9.0, 9.0), "too long to be checked"),
         (evenly_slowed(circle(3.0, Laps(2.0, 1000.0)), 2.0), "3600 s is the longest"),

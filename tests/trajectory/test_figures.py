@@ -181,7 +181,7 @@ def test_hover_stays():
 @pytest.mark.parametrize(
     ("make", "text"),
     [
-        (lambda: line((0.0, 0.0, 0.0), 1.0, 1.0, 1.0), "lead somewhere"),
+        (lambda: line((0.0, 0.0, 0.0), 1.0, 1.0, 1.0), "end at another point"),
         (lambda: line((0.0, 0.0, 1.0), 1.0, 1.0, 1.0, along=True), "vertical line"),
         (lambda: line((1.0, 0.0, 0.0), 1.0, 0.0, 1.0), "must be positive"),
         (lambda: circle(0.0, Laps(1.0)), "size, speed, laps and acceleration of a circle"),

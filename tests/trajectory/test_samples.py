@@ -169,7 +169,7 @@ def test_facing_along_a_path_that_stands_still_for_a_while():
         n, e = (8.0 * s**3 * (10.0 - 15.0 * s + 6.0 * s * s) for s in (u, w))
         noise = rng.normal(0.0, 1e-3, 2)
         lines.append(f"{t:.3f},{n + noise[0]:.4f},{e + noise[1]:.4f},0")
-    found = from_samples(table(lines, "x"), NED._replace(heading=HeadingFrom.ALONG))
+    found = from_samples(table(lines, "x"), NED._replace(heading=HeadingFrom.ALONG_PATH))
     assert found.at(2.0).heading == pytest.approx(0.0, abs=0.02)
     assert found.at(9.0).heading == pytest.approx(pi / 2.0, abs=0.02)
     rates = [abs(found.at(t).heading_rate) for t in np.linspace(0.0, found.duration, 500)]

@@ -229,7 +229,7 @@ def test_an_even_slowing_names_the_limit_that_asks_for_most():
     assert whole.time == pytest.approx(broken.time, rel=0.02)
 
 
-def test_what_slowness_does_not_mend_is_told_at_its_own_time():
+def test_a_limit_that_slowing_down_cannot_keep_is_reported_at_its_own_time():
     wall = Violation("limits.fence_radius_m", 1.0, 2.0, "it leaves", "shrink it", False)
     with pytest.raises(TrajectoryError, match=r"gerono eight: it leaves; shrink it"):
         slow_down(EIGHT, Envelope(max_tilt=0.3, fence=lambda _: wall))

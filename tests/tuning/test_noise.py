@@ -68,7 +68,7 @@ def test_the_noise_of_single_messages_is_found_and_is_no_wander(log):
     found = measured_disturbances(log.closed(), 0.0, USUAL)
     assert found.position_noise == pytest.approx(0.01, rel=0.15)
     assert found.velocity_noise == pytest.approx(0.02, rel=0.15)
-    assert found.wander < 0.01
+    assert found.velocity_density < 0.01
     assert found.source == log.path.parent.name
 
 
@@ -79,8 +79,8 @@ def test_a_position_that_moves_by_itself_wanders(log):
     log.heartbeat()
     flown(log, lambda count: np.cumsum(steps(count), axis=0) / RATE, still)
     found = measured_disturbances(log.closed(), 0.0, USUAL)
-    assert found.wander == pytest.approx(density, rel=0.2)
-    assert found.shake == pytest.approx(0.0, abs=1e-6)
+    assert found.velocity_density == pytest.approx(density, rel=0.2)
+    assert found.acceleration_density == pytest.approx(0.0, abs=1e-6)
 
 
 def test_pushes_that_the_tilt_does_not_explain_shake(log):
@@ -93,7 +93,9 @@ def test_pushes_that_the_tilt_does_not_explain_shake(log):
 
     log.heartbeat()
     flown(log, lambda count: np.cumsum(speed(count), axis=0) / RATE, speed)
-    assert measured_disturbances(log.closed(), 0.0, USUAL).shake == pytest.approx(density, rel=0.2)
+    assert measured_disturbances(log.closed(), 0.0, USUAL).acceleration_density == pytest.approx(
+        density, rel=0.2
+    )
 
 
 @pytest.mark.parametrize(

@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 PARQUET, CSV = "results.parquet", "results.csv"
 _DONE = 0
 _GRID_LIKE, _FEW_SAMPLES = 12, 60
-"""If the largest number of different values of a sampled factor lies between these, there are too
-few values to separate the influence of the factors.
+"""A factor with at most the first number of values counts as a grid. A sampled factor needs the
+second number of values, so that its influence can be separated from that of other factors.
 """
 
 

@@ -75,8 +75,8 @@ def levels(column: Column) -> list[Group]:
     """The cases grouped by the levels of a factor: its values, or ranges of them.
 
     Up to `_MOST_LEVELS` different values give one level each. More numbers give `_RANGE_COUNT`
-    ranges with about equally many cases each; null is then a level of its own. More words give
-    `_MOST_LEVELS` levels, the last of which holds all remaining words.
+    ranges with about equally many cases each; null is then a level of its own. With more words, one
+    level holds all words beyond the first `_MOST_LEVELS` − 1.
     """
     distinct = sorted({_sort_key(value) for value in column})
     if column.dtype != float or len(distinct) <= _MOST_LEVELS:

@@ -49,7 +49,7 @@ class Score(NamedTuple):
             self.true[:count], self.estimated[:count], self.estimate[:count], self.inside[:count]
         )
 
-    def and_then(self, rest: "Score") -> "Score":
+    def combined_with(self, rest: "Score") -> "Score":
         """The score on these cases and those of `rest` together."""
         return Score(
             self.true + rest.true,

@@ -35,7 +35,7 @@ STORAGE = "tune.db"
 """Optuna's storage in the folder of the search."""
 _STUDY_NAME = "tune"
 _STARTS, _FEWEST_NEAR = 3, 4
-"""Most configurations to start from; fewest candidates that are tried near the last one."""
+"""Largest number of starts, and smallest number of candidates tried near the last start."""
 _FIRST_DIVISOR = 4
 """A candidate flies the first 1/4 of its cases, at least 2, before the others."""
 _FEWEST_FIRST_CASES = 2
@@ -195,7 +195,7 @@ class Search:
         if count < len(flown) and (violation > 0.0 or self._hopeless(score)):
             self._stop(trial, _capped_rms(score), max(violation, 0.0))
             return
-        score = score.and_then(scored(self._fly(flown[count:]), self._tune.envelope_m))
+        score = score.combined_with(scored(self._fly(flown[count:]), self._tune.envelope_m))
         trial.set_user_attr(_SCORE, score.as_attributes())
         self._set_violation(trial, self._shortfall(score, len(flown)))
         trial.set_user_attr(_COMPLETE, True)
@@ -219,10 +219,10 @@ class Search:
         trial.set_constraint(_VIOLATION, violation)
 
     def _shortfall(self, score: Score, cases_count: int) -> float:
-        """The required share minus the share inside the envelope, if all cases to come stay inside.
+        """The required share minus the largest share inside the envelope that is still possible.
 
-        `score` covers the cases flown so far, `cases_count` counts all. 0 or less: the required
-        share can still be reached.
+        At most 0: the required share can still be reached. `score` covers the cases flown so far;
+        `cases_count` is the number of all cases.
         """
         outside = sum(not each for each in score.inside)
         return self._tune.inside_share - (cases_count - outside) / cases_count

@@ -53,15 +53,15 @@ def summary_lines(result: Result) -> list[str]:
 
 
 def _certainty_lines(result: Result) -> Iterator[str]:
-    unseen = len(result.after.true)
+    unseen_flights = len(result.after.true)
     early = [
         sum(not isfinite(each) for each in score.true) for score in (result.before, result.after)
     ]
     if any(early):
         yield (
-            f"Of {unseen} flights that the search has not seen, {early[0]} ended early with the "
-            f"configuration before the search, and {early[1]} with the result; samples with such a "
-            "flight are not compared."
+            f"Of {unseen_flights} flights that the search has not seen, {early[0]} ended early "
+            f"with the configuration before the search, and {early[1]} with the result; samples "
+            "with such a flight are not compared."
         )
     comparison = result.comparison
     if comparison is None:

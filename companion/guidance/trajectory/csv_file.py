@@ -193,13 +193,11 @@ def _require_steps(times: Floats, lines: Sequence[int], name: str) -> None:
                 f"{name}, line {line}: time does not increase; leave this sample out"
             )
         raise TrajectoryError(
-            f"{name}, line {line}: {step:.3g} s after the sample before; from {_SHORTEST_STEP:g} "
-            f"to {_LONGEST_STEP:g} s can be used, and time is read in s"
+            f"{name}, line {line}: {step:.3g} s after the previous sample; write time in s, with "
+            f"steps from {_SHORTEST_STEP:g} to {_LONGEST_STEP:g} s"
         )
     if times[-1] - times[0] < _SHORTEST_DURATION:
-        raise TrajectoryError(
-            f"{name}: lasts less than {_SHORTEST_DURATION:g} s; time is read in s"
-        )
+        raise TrajectoryError(f"{name}: lasts less than {_SHORTEST_DURATION:g} s; write time in s")
 
 
 def _require_range(

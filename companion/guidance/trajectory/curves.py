@@ -51,8 +51,8 @@ def require_checkable(needed: float) -> None:
     """
     if not needed <= MOST_CHECKS:
         raise TrajectoryError(
-            f"it is too long to be checked: it takes {needed:.3g} samples, and {MOST_CHECKS} are "
-            "the most; make it shorter, or let it gather speed more quickly"
+            f"it is too long to be checked: it takes {needed:.3g} samples, more than "
+            f"{MOST_CHECKS}; make it shorter, or raise its acceleration"
         )
 
 

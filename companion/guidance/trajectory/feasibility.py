@@ -55,8 +55,8 @@ class Envelope:
         max_yaw_rate: largest heading rate, rad/s.
         min_thrust: smallest specific thrust, m/s².
         max_thrust: largest specific thrust, m/s².
-        full_thrust: specific thrust at a normalised thrust of 1, m/s². With it messages also give
-            the thrust limits as normalised thrust, like their keys.
+        full_thrust: specific thrust at a normalised thrust of 1, m/s². If it is given, messages
+            show limits.min_thrust and limits.max_thrust as in the configuration (0..1) and in m/s².
         max_climb: largest upward speed, m/s.
         max_descent: largest downward speed, m/s.
         max_speed: largest speed, m/s.

@@ -77,7 +77,7 @@ def line(
     if not isfinite(length):
         raise TrajectoryError("the end point of a line must be finite")
     if length < SMALLEST_DISTANCE:
-        raise TrajectoryError("a line must lead somewhere else than where it begins")
+        raise TrajectoryError("a line must end at another point than its start")
     if along and hypot(to[0], to[1]) == 0.0:
         raise TrajectoryError("a vertical line has no heading to face along")
     north, east, down = (x / length for x in to)

@@ -92,7 +92,7 @@ class HeadingFrom(Enum):
 
     FIXED = "fixed"
     """Hold the heading at the start."""
-    ALONG = "along"
+    ALONG_PATH = "along"
     """Face along the path."""
     FILE = "file"
     """Follow the samples' yaw; hold the heading if they have none."""
@@ -190,7 +190,7 @@ def _root_mean_square(values: Floats) -> float:
 def _heading(
     spline: SepticSpline, table: Table, options: SampleOptions, resting: tuple[bool, bool]
 ) -> Heading:
-    if options.heading is HeadingFrom.ALONG:
+    if options.heading is HeadingFrom.ALONG_PATH:
         return tangent_heading(spline, resting)
     if options.heading is HeadingFrom.FIXED or table.yaw is None:
         return HeldHeading()

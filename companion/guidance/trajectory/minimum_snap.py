@@ -160,8 +160,8 @@ def _solve_block_tridiagonal(diagonal: Floats, upper: Floats, right: Floats) -> 
     reduced = np.empty_like(upper)
     pivot = diagonal[0]
     for k in range(len(upper)):
-        both = np.linalg.solve(pivot, np.concatenate((upper[k], right[k]), axis=1))
-        reduced[k], right[k] = both[:, :STATE_SIZE], both[:, STATE_SIZE:]
+        solved = np.linalg.solve(pivot, np.concatenate((upper[k], right[k]), axis=1))
+        reduced[k], right[k] = solved[:, :STATE_SIZE], solved[:, STATE_SIZE:]
         pivot = diagonal[k + 1] - upper[k].T @ reduced[k]
         right[k + 1] -= upper[k].T @ right[k]
     if np.linalg.eigvalsh(pivot)[0] < _SMALLEST_EIGENVALUE:

@@ -18,7 +18,7 @@ Number = Any
 
 
 class _Piece(NamedTuple):
-    """One piece of the slowness w as a polynomial in u, 0..1: a + b·u + c·u² + d·u³."""
+    """One piece of the stretch factor w as a polynomial in u, 0..1: a + b·u + c·u² + d·u³."""
 
     a: Number
     b: Number
@@ -26,7 +26,7 @@ class _Piece(NamedTuple):
     d: Number
 
     def factor(self, u: Number) -> Number:
-        """The slowness w at u: the factor by which time is stretched."""
+        """The factor w by which time is stretched, at u."""
         return self.a + u * (self.b + u * (self.c + u * self.d))
 
     def slope(self, u: Number) -> Number:
@@ -56,9 +56,9 @@ def _spline_piece(p: Number, q: Number, r: Number, s: Number) -> _Piece:
 class SlowerTime:
     """The original time σ of a trajectory over the stretched time t: dt/dσ = w(σ).
 
-    The slowness w is a uniform cubic B-spline. Its second derivative is continuous, so the slowed
-    trajectory has a continuous jerk if the original one has. In each piece, w lies between the
-    smallest and the largest of the piece's four coefficients.
+    The stretch factor w is a uniform cubic B-spline. Its second derivative is continuous, so the
+    slowed trajectory has a continuous jerk if the original one has. In each piece, w lies between
+    the smallest and the largest of the piece's four coefficients.
 
     Attributes:
         length: duration of the original trajectory, s.
@@ -77,7 +77,8 @@ class SlowerTime:
 
     def _pieces(self) -> list[_Piece]:
         c = self.coefficients
-        return [_spline_piece(*four) for four in zip(c, c[1:], c[2:], c[3:], strict=False)]
+        neighbours = zip(c, c[1:], c[2:], c[3:], strict=False)
+        return [_spline_piece(*coefficients) for coefficients in neighbours]
 
     @property
     def _piece_duration(self) -> float:

@@ -5,10 +5,10 @@ checked.
 
 1. For each moment, find the factor by which the whole trajectory would have to be slowed down for
    this moment to keep all limits except the fence.
-2. Find a smooth slowness (`SlowerTime`) that is nowhere below that factor. It brakes before a slow
-   part and speeds up after it.
-3. Braking needs acceleration, so check the limits again, and raise the slowness where they are
-   broken.
+2. Find a smooth function of time, the stretch factor (`SlowerTime`), that is nowhere below that
+   factor. With it the vehicle brakes before a slow part and speeds up after it.
+3. Braking needs acceleration, so check the limits again, and raise the stretch factor where a limit
+   is broken.
 
 If slowing down evenly is as quick, the whole trajectory is slowed down by one factor.
 """
@@ -31,11 +31,11 @@ _FACTOR_PRECISION = 1e-3
 _BISECTIONS = 16
 """Number of bisection steps in the search for the factor of one moment."""
 _WIDTHS, _FEWEST_PIECES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2), 4
-"""Widths of the slowness' pieces to try, s, and the fewest pieces: a ramp takes at least these."""
+"""Durations of one piece of the stretch factor to try, s, and the fewest pieces, as in a ramp."""
 _MOST_ROUNDS = 60
-"""Largest number of times that the slowness is raised before the search gives up."""
+"""Largest number of times that the stretch factor is raised before the search gives up."""
 _LEAST_RAISE, _LARGEST_RAISE = 0.004, 0.1
-"""Bounds of the relative increase of the slowness in one round."""
+"""Smallest and largest relative increase of the stretch factor in one round."""
 _MOST_MOMENTS = 20_000
 """Largest number of moments for slowing down in parts. The search then takes some seconds."""
 _EVEN_MOMENTS = 8000
@@ -43,7 +43,7 @@ _EVEN_MOMENTS = 8000
 _SHORTEST_STEP = 0.006
 """Shortest step between evenly spaced moments, s."""
 _MOMENTS_A_PIECE = 8.0
-"""Fewest moments in each piece of the slowness; fewer could miss the extreme of a ramp."""
+"""Fewest moments in each piece of the stretch factor; fewer could miss the extreme of a ramp."""
 _LONG_GAP_FACTOR = 3.0
 """A gap between check times is filled if it is this many times as long as the median gap."""
 _WORTHWHILE_SHARE = 0.98
@@ -158,7 +158,7 @@ def _moment_step(length: float) -> float:
 
 
 def _best_law(motion: Motion, length: float, envelope: Envelope) -> SlowerTime | None:
-    """The quickest slowness among the widths to try; None if none keeps the limits."""
+    """The stretch factor among `_WIDTHS` with the shortest flight; None: none keeps the limits."""
     needed = _needed_factors(motion, envelope)
     least = _MOMENTS_A_PIECE * _moment_step(length)
     widths = [w for w in _WIDTHS if w >= least and length / w >= _FEWEST_PIECES]
@@ -187,7 +187,7 @@ def _largest_excess(motion: Motion, envelope: Envelope) -> Floats:
 def _law_of_width(
     motion: Motion, needed: Floats, length: float, width: float, envelope: Envelope
 ) -> SlowerTime | None:
-    """The slowness with pieces of `width` s, raised until all limits are kept; None if that fails.
+    """The stretch factor with pieces of `width` s that keeps all limits; None if none is found.
 
     `needed` is the factor of each moment, (m,); `length` is the duration of the trajectory, s.
     """
@@ -222,7 +222,7 @@ def _largest_of_four(values: Floats, beyond: float) -> Floats:
 
 
 def _parts(motion: Motion, law: SlowerTime, envelope: Envelope) -> Iterator[SlowedPart]:
-    """The parts that a slowness slows down, each with the limit that requires it."""
+    """The parts that a stretch factor slows down, each with the limit that requires it."""
     times, progress = law.stretched(motion.times)
     factors = 1.0 / np.asarray(progress.first)
     slow = np.concatenate(([False], factors > _NOTICEABLE_FACTOR, [False]))

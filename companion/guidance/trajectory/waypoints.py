@@ -102,9 +102,9 @@ def _distance_fault(distances: Floats) -> str:
 
 def _trapezoid_durations(distances: Floats, speed: float, acceleration: float) -> Floats:
     """Duration of a trapezoidal speed profile from rest to rest over each distance, s."""
-    full = distances / speed + speed / acceleration
-    short = 2.0 * np.sqrt(distances / acceleration)
-    return np.where(distances < speed**2 / acceleration, short, full)
+    with_cruise = distances / speed + speed / acceleration
+    without_cruise = 2.0 * np.sqrt(distances / acceleration)
+    return np.where(distances < speed**2 / acceleration, without_cruise, with_cruise)
 
 
 def _spline_through(knots: Floats, places: Floats) -> SepticSpline:

@@ -66,8 +66,8 @@ class TcpTransport:
     """A TCP client or server with at most one connection at a time.
 
     A server goes on listening when the vehicle's connection drops, so the link need not open it
-    again. While a client is connected, another one is refused, unless the first made no valid claim
-    (`PeerRule`) within 5 s of connecting, or its claim has lapsed. Then the other takes its place.
+    again. While a client is connected, a second client is refused. The second one replaces the
+    first only if the first made no valid claim (`PeerRule`) within 5 s, or its claim has lapsed.
 
     Attributes:
         local: (host, port) of a listening server; `None` for a client.

@@ -95,7 +95,7 @@ def _take(
 def changed_topic(content: McapContent) -> str | None:
     """A topic whose messages have other columns than this version writes, or None.
 
-    This version may know more names of codes than the recorded schema.
+    Names of codes that this version has added since the recording do not count as a change.
     """
     ours = {topic.name: _columns(topic.schema) for topic in TOPICS}
     for topic, schema in content.schemas.items():

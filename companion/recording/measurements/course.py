@@ -1,4 +1,4 @@
-"""The course of a flight: phases, end, and the circumstances that the verdict considers."""
+"""What happened in a flight: phases, end, and the circumstances that the verdict considers."""
 
 from dataclasses import dataclass, field
 from math import degrees
@@ -40,7 +40,7 @@ class EarlyEnd:
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """The course of a flight besides its figures. Times in s since the flight began.
+    """What happened in a flight, besides its figures. Times in s since the flight began.
 
     Attributes:
         began: beginning of the flight, s on our clock.

@@ -20,7 +20,8 @@ from companion.recording.measurements.second_order import (
 _TIME_CONSTANT = (0.02, 2.0)
 """Range in which the time constant is searched, s."""
 _MIN_SHARE = 0.1
-"""Smallest share of a step along an axis that counts as a step along it; less is noise or wind."""
+"""A step counts for an axis (north or east) if its component along the axis is at least this share
+of the step; a smaller component is noise or wind."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +32,8 @@ class StepResponse:
         time_constant_north_s: time constant of the first-order model that fits a_N best (least
             squares), s; NaN: no step goes north or south.
         time_constant_east_s: the same for a_E, east or west.
-        step_size: largest change of the coefficients that steps commanded, from the beginning of
-            their run; in wind that is not level.
+        step_size: largest commanded change of the coefficients, relative to those at the beginning
+            of the run; in wind the vehicle is not level there.
         asked_tilt: largest tilt of a target, rad, before the tilt limit of the planner.
         cross_axis_max: straightness: largest distance from the line of a step.
         model_deviation_max: largest distance from the ideal model ċ = p·(c_d − c).

@@ -39,7 +39,7 @@ class StepRun(NamedTuple):
 
     @property
     def changes(self) -> Floats:
-        """(n, 2), targets relative to the coefficients at the beginning; in wind not the same."""
+        """(n, 2), targets minus the coefficients at the beginning, which are not 0 in wind."""
         since: Floats = self.target - self.measured[0]
         return since
 
@@ -142,7 +142,7 @@ class SecondOrderFit:
         return out
 
     def _transitions(self, seconds: Floats) -> Floats:
-        """(m, 2, 2), `SecondOrderReference.transition` over each of these times (m,)."""
+        """(m, 2, 2), `SecondOrderReference.transition` over each of these durations (m,), s."""
         decay, square = self.damping * self.frequency, self.frequency * self.frequency
         root = np.sqrt(complex(square * (1.0 - self.damping * self.damping)))
         slow = np.exp((-1j * root - decay) * seconds)  # the slower of the two: nothing overflows

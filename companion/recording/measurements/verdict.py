@@ -9,7 +9,7 @@ from companion.attitude.planner import MODEL_FOLLOWING
 Figures = Mapping[str, Any]
 """The figures; the result of `Summary.as_dict`."""
 
-LEVEL_RMS, LEVEL_RMS_PER_SPEED = 0.15, 0.02
+HORIZONTAL_RMS, HORIZONTAL_RMS_PER_SPEED = 0.15, 0.02
 """Largest RMS of the horizontal error of a maneuver: with the reference at rest, m; and the
 increase for each m/s of its speed, m."""
 HEIGHT_RMS = 0.15
@@ -44,7 +44,8 @@ class Check(NamedTuple):
         found: the figure and its limit, in words.
         good: whether it is within the limit.
         remedy: what to do if it is not within the limit.
-        fault: what is wrong if it is not within the limit, without figures, to count such flights.
+        fault: what is wrong if it is not within the limit; without figures, so that a campaign can
+            count the flights with this fault.
     """
 
     what: str
@@ -79,7 +80,7 @@ def _maneuvers(figures: Figures) -> Iterator[Check]:
         level, height = maneuver["level_rms_m"], maneuver["height_rms_m"]
         if level is not None:
             speed = maneuver["reference_speed_max_m_s"] or 0.0
-            limit = LEVEL_RMS + LEVEL_RMS_PER_SPEED * speed
+            limit = HORIZONTAL_RMS + HORIZONTAL_RMS_PER_SPEED * speed
             yield Check(
                 maneuver["name"],
                 f"{level:.2f} m RMS from its path (limit {limit:.2f} m), "
@@ -153,7 +154,7 @@ def _steps(figures: Figures) -> Iterator[Check]:
         "linearity of the steps",
         f"{deviation:.3f} from the nearest second-order model (limit {deviation_limit:.3f})",
         deviation <= deviation_limit,
-        "mend the cut step first: it distorts the response"
+        "first let the steps keep limits.max_tilt_deg: a step cut by it distorts the response"
         if cut
         else "a rate limit distorts large steps: lower steps.coefficient or raise "
         "limits.max_tilt_rate_deg_s",
@@ -185,7 +186,7 @@ def cut_steps(figures: Figures) -> list[Check]:
 
 def _straightness_remedy(planner: str, *, cut: bool) -> str:
     if cut:
-        return "mend the cut step first: it bends the line"
+        return "first let the steps keep limits.max_tilt_deg: a step cut by it bends the line"
     if planner == MODEL_FOLLOWING:
         return (
             "measure vehicle.lag_ms and vehicle.dead_time_ms anew with `companion identify`, lower "
@@ -213,7 +214,7 @@ def _answers(figures: Figures) -> Iterator[Check]:
             "link",
             f"{lost} of {frames + lost} frames lost (limit {100.0 * LOST_FRAMES:g} %)",
             lost <= LOST_FRAMES * (frames + lost),
-            "raise the baud rate, lower the rates of other streams, or mend the radio link",
+            "raise the baud rate, lower the rates of other streams, or improve the radio link",
             "too many frames lost",
         )
 

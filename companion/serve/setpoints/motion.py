@@ -21,7 +21,7 @@ _YAW_ACCELERATION, _YAW_JERK = 2.0, 10.0
 """Largest yaw acceleration, rad/s², and jerk, rad/s³, after a jump of the yaw; yaw responds slowly.
 """
 _MAX_STREAM_PERIOD = 0.25
-"""Longest time between yaw setpoints of a stream, s. Of a stream the yaw rate is estimated."""
+"""Longest time between yaw setpoints of a stream, s; the yaw rate of a stream is estimated."""
 
 
 class MotionLimits(NamedTuple):

@@ -1,4 +1,4 @@
-"""The figure of the study `lag`: example, grid, wrong times, complete inner loop."""
+"""The figure of the study `lag`: example, grid, wrong lag and dead time, complete inner loop."""
 
 from typing import Any
 
@@ -16,11 +16,11 @@ from companion.study.lag.flights import (
     RATES_HZ,
     SHOWN_RATE_HZ,
     Complete,
+    DelayError,
     Example,
     Grid,
     GridCell,
     Score,
-    TimesError,
     in_percent,
 )
 from companion.study.methods import FOLLOWING, LIMIT, Line, Method
@@ -29,11 +29,12 @@ from companion.study.step import FIGURE_2, Response
 CAPTION = (
     "First row: paths and distance from the line in the example, at 100 Hz. Second row: cross-track"
     " by dead time (lag 25 ms) and by lag (dead time 40 ms); the upper edge of the shaded area is"
-    " model-following with the worst error of its times. Third row: cross-track of model-following"
-    " with the worst error, divided by that of the best other method, at three sample rates; above"
-    " 1 the other method is the straighter, and the cell is red. Fourth row: model-following by the"
-    " error of its times, in the example and with the complete inner loop. Last row: paths with the"
-    " complete inner loop, and cross-track there by sample rate."
+    " model-following with the worst error of its assumed lag and dead time. Third row: cross-track"
+    " of model-following with the worst error, divided by that of the best other method, at three"
+    " sample rates; above 1 the other method is the straighter, and the cell is red. Fourth row:"
+    " model-following by the error of its assumed lag and dead time, in the example and with the"
+    " complete inner loop. Last row: paths with the complete inner loop, and cross-track there by"
+    " sample rate."
 )
 
 _ENDS = np.array([FIGURE_2.start, FIGURE_2.target])
@@ -78,8 +79,10 @@ def draw_figure(grid: Grid, example: Example, complete: Complete) -> Figure:
     _draw_cut(panels["lag"], grid, over_lag, lags, "lag")
     for rate in RATES_HZ:
         _draw_ratios(panels[f"{rate:.0f}"], grid, rate)
-    _draw_errors(panels["example errors"], example.wrong)
-    panels["example errors"].set_title(f"Wrong times, the example, {EXAMPLE_ERRORS_HZ:.0f} Hz")
+    _draw_errors(panels["example errors"], example.by_error)
+    panels["example errors"].set_title(
+        f"Wrong lag and dead time, the example, {EXAMPLE_ERRORS_HZ:.0f} Hz"
+    )
     _draw_inner_loop_errors(panels["loop errors"], complete)
     _draw_paths(panels["loop path"], complete.shown)
     panels["loop path"].set_title(f"Path, complete inner loop, {SHOWN_RATE_HZ:.0f} Hz")
@@ -109,16 +112,16 @@ def _draw_cut(
 ) -> None:
     """Draw the cross-track along one line of the grid."""
     for method in METHODS:
-        cross_tracks = [grid[cell].right[method].cross_track for cell in cells]
+        cross_tracks = [grid[cell].by_method[method].cross_track for cell in cells]
         axes.plot(values_ms, cross_tracks, marker=".", **method.line)
-    with_right_times = [grid[cell].right[FOLLOWING].cross_track for cell in cells]
-    with_worst_times = [grid[cell].worst for cell in cells]
+    with_true_delays = [grid[cell].by_method[FOLLOWING].cross_track for cell in cells]
+    with_worst_delays = [grid[cell].worst for cell in cells]
     axes.fill_between(
         values_ms,
-        with_right_times,
-        with_worst_times,
+        with_true_delays,
+        with_worst_delays,
         **_SHADE,
-        label="model-following, times wrong",
+        label="model-following, wrong lag and dead time",
     )
     axes.set(
         title=f"Cross-track by {quantity}, {_CUT_HZ:.0f} Hz",
@@ -155,11 +158,11 @@ def _draw_ratios(axes: Axes, grid: Grid, rate_hz: float) -> None:
     )
 
 
-def _draw_errors(axes: Axes, scores: dict[TimesError, Score]) -> None:
+def _draw_errors(axes: Axes, scores: dict[DelayError, Score]) -> None:
     """Draw the cross-track over the error of the dead time, a line for each error of the lag."""
     errors = [100.0 * error for error in FINE_ERRORS]
     for lag, style in _LAG_ERROR_STYLES.items():
-        cross_tracks = [scores[TimesError(lag, dead_time)].cross_track for dead_time in FINE_ERRORS]
+        cross_tracks = [scores[DelayError(lag, dead_time)].cross_track for dead_time in FINE_ERRORS]
         line = {"color": FOLLOWING.colour, "linewidth": 1.3, **style}
         axes.plot(errors, cross_tracks, label=f"lag {in_percent(lag)}", **line)
     axes.set(
@@ -170,15 +173,15 @@ def _draw_errors(axes: Axes, scores: dict[TimesError, Score]) -> None:
 
 def _draw_inner_loop_errors(axes: Axes, complete: Complete) -> None:
     comparison = complete.by_rate[SHOWN_RATE_HZ]
-    _draw_errors(axes, comparison.wrong)
+    _draw_errors(axes, comparison.by_error)
     other = comparison.best_other
-    cross_track = comparison.right[other].cross_track
+    cross_track = comparison.by_method[other].cross_track
     axes.axhline(cross_track, **LIMIT)
     axes.annotate(
         f"{other.label}, the best of the others", (50, cross_track), ha="right", va="bottom"
     )
     axes.set(
-        title=f"Wrong times, complete inner loop, {SHOWN_RATE_HZ:.0f} Hz",
+        title=f"Wrong lag and dead time, complete inner loop, {SHOWN_RATE_HZ:.0f} Hz",
         ylim=(0.0, 1.1 * max(cross_track, comparison.worst)),
     )
 
@@ -186,12 +189,16 @@ def _draw_inner_loop_errors(axes: Axes, complete: Complete) -> None:
 def _draw_rates(axes: Axes, complete: Complete) -> None:
     rates, comparisons = list(complete.by_rate), complete.by_rate.values()
     for method in METHODS:
-        cross_tracks = [comparison.right[method].cross_track for comparison in comparisons]
+        cross_tracks = [comparison.by_method[method].cross_track for comparison in comparisons]
         axes.plot(rates, cross_tracks, marker=".", **method.line)
-    with_right_times = [comparison.wrong[NO_ERROR].cross_track for comparison in comparisons]
-    with_worst_times = [comparison.worst for comparison in comparisons]
+    with_true_delays = [comparison.by_error[NO_ERROR].cross_track for comparison in comparisons]
+    with_worst_delays = [comparison.worst for comparison in comparisons]
     axes.fill_between(
-        rates, with_right_times, with_worst_times, **_SHADE, label="model-following, times wrong"
+        rates,
+        with_true_delays,
+        with_worst_delays,
+        **_SHADE,
+        label="model-following, wrong lag and dead time",
     )
     axes.set(
         title="Cross-track by sample rate, complete inner loop",

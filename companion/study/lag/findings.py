@@ -6,10 +6,10 @@ from companion.study.lag.flights import (
     OTHERS,
     SHOWN_RATE_HZ,
     Complete,
+    DelayError,
     Example,
     Grid,
     GridCell,
-    TimesError,
     score,
 )
 from companion.study.measures import largest_tilt_rate
@@ -33,7 +33,7 @@ def find(
     return (
         *_on_the_example(example),
         _over_the_grid(grid),
-        _wrong_times_over_the_grid(grid),
+        _wrong_delays_over_the_grid(grid),
         _too_long_or_too_short(grid, complete),
         *_with_the_complete_loop(complete, from_fit),
     )
@@ -42,7 +42,7 @@ def find(
 def _on_the_example(example: Example) -> tuple[Finding, Finding, Finding]:
     cross_tracks = {m: score(r).cross_track for m, r in example.free[100.0].items()}
     best = min(OTHERS, key=lambda method: cross_tracks[method])
-    worst = max(wrong.cross_track for wrong in example.wrong.values())
+    worst = max(wrong.cross_track for wrong in example.by_error.values())
     rate = max(largest_tilt_rate(response) for response in example.limited.values())
     limited_cross_track = max(score(response).cross_track for response in example.limited.values())
     return (
@@ -55,11 +55,11 @@ def _on_the_example(example: Example) -> tuple[Finding, Finding, Finding]:
         ),
         Finding(
             "ours",
-            "Behind dead time and lag model-following is the straightest, even with both times"
-            " wrong by up to 50 %.",
+            "Behind dead time and lag model-following is the straightest, even with an"
+            " assumed lag and dead time wrong by up to 50 %.",
             worst < cross_tracks[best],
-            f"Cross-track {cross_tracks[FOLLOWING]:.2g} with the right times, at most {worst:.2g}"
-            f" with wrong ones; the best of the others has {cross_tracks[best]:.2g}.",
+            f"Cross-track {cross_tracks[FOLLOWING]:.2g} with the true lag and dead time, at most"
+            f" {worst:.2g} with wrong ones; the best of the others has {cross_tracks[best]:.2g}.",
         ),
         Finding(
             "ours",
@@ -75,23 +75,22 @@ def _over_the_grid(grid: Grid) -> Finding:
     def ratio(cell: GridCell) -> float:
         comparison = grid[cell]
         return (
-            comparison.right[FOLLOWING].cross_track
-            / comparison.right[comparison.best_other].cross_track
+            comparison.by_method[FOLLOWING].cross_track
+            / comparison.by_method[comparison.best_other].cross_track
         )
 
     closest = max(grid, key=ratio)
-    largest = max(comparison.right[FOLLOWING].cross_track for comparison in grid.values())
+    largest = max(comparison.by_method[FOLLOWING].cross_track for comparison in grid.values())
     return Finding(
         "ours",
-        "With the right times model-following is the straightest at every dead time, lag and"
-        " sample rate.",
+        "With the true lag and dead time model-following is the straightest over the whole grid.",
         ratio(closest) < 1.0,
         f"Cross-track at most {largest:.2g}, and at most {ratio(closest):.2g} of the best other"
         f" method's, at {closest}.",
     )
 
 
-def _wrong_times_over_the_grid(grid: Grid) -> Finding:
+def _wrong_delays_over_the_grid(grid: Grid) -> Finding:
     worst_cell = max(grid, key=lambda cell: grid[cell].ratio)
     comparison, other = grid[worst_cell], grid[worst_cell].best_other
     worse_cells = [cell for cell, compared in grid.items() if compared.ratio >= 1.0]
@@ -107,25 +106,25 @@ def _wrong_times_over_the_grid(grid: Grid) -> Finding:
         not worse_cells,
         f"Worse than the best other method in {len(worse_cells)} of {len(grid)} cells{where}."
         f" The largest ratio is at {worst_cell}, with {comparison.worst_error}:"
-        f" {comparison.worst:.2g} against {comparison.right[other].cross_track:.2g} of"
+        f" {comparison.worst:.2g} against {comparison.by_method[other].cross_track:.2g} of"
         f" {other.label}.",
     )
 
 
 def _too_long_or_too_short(grid: Grid, complete: Complete) -> Finding:
-    short, long = TimesError(-0.5, -0.5), TimesError(0.5, 0.5)
+    short, long = DelayError(-0.5, -0.5), DelayError(0.5, 0.5)
     pairs = [
-        (comparison.wrong[long], comparison.wrong[short])
+        (comparison.by_error[long], comparison.by_error[short])
         for cell, comparison in grid.items()
         if cell.dead_time_ms > 0
     ]
     too_long = max(at_long.cross_track for at_long, _ in pairs)
     too_short = max(at_short.cross_track for _, at_short in pairs)
     straighter = sum(at_long.cross_track < at_short.cross_track for at_long, at_short in pairs)
-    loop = complete.by_rate[SHOWN_RATE_HZ].wrong
+    loop = complete.by_rate[SHOWN_RATE_HZ].by_error
     return Finding(
         "ours",
-        "Both times 50 % too long are better than both 50 % too short.",
+        "A lag and dead time 50 % too long are better than both 50 % too short.",
         too_long < too_short and loop[long].cross_track < loop[short].cross_track,
         f"Largest cross-track {too_long:.2g} against {too_short:.2g}, with the complete inner loop"
         f" {loop[long].cross_track:.2g} against {loop[short].cross_track:.2g}. Too long is the"
@@ -137,7 +136,7 @@ def _with_the_complete_loop(
     complete: Complete, from_fit: dict[Method, float]
 ) -> tuple[Finding, Finding, Finding]:
     by_rate = complete.by_rate
-    cross_tracks = {m: flown.cross_track for m, flown in by_rate[SHOWN_RATE_HZ].right.items()}
+    cross_tracks = {m: flown.cross_track for m, flown in by_rate[SHOWN_RATE_HZ].by_method.items()}
     nearest = min(OTHERS, key=lambda method: from_fit[method])
     worst_rate = max(by_rate, key=lambda rate: by_rate[rate].ratio)
     comparison = by_rate[worst_rate]
@@ -147,7 +146,7 @@ def _with_the_complete_loop(
             "With the complete inner loop and transport delay model-following is the straightest"
             " at every sample rate.",
             all(
-                each.wrong[NO_ERROR].cross_track < each.right[each.best_other].cross_track
+                each.by_error[NO_ERROR].cross_track < each.by_method[each.best_other].cross_track
                 for each in by_rate.values()
             ),
             f"Cross-track at {SHOWN_RATE_HZ:.0f} Hz {cross_tracks[FOLLOWING]:.2g}; first-order"
@@ -156,11 +155,11 @@ def _with_the_complete_loop(
         Finding(
             "ours",
             "With the complete inner loop model-following is the straightest even with the fitted"
-            " times wrong by up to ±50 %.",
+            " lag and dead time wrong by up to ±50 %.",
             comparison.ratio < 1.0,
             f"The largest ratio is at {worst_rate:.0f} Hz, with {comparison.worst_error}:"
             f" {comparison.worst:.2g} against"
-            f" {comparison.right[comparison.best_other].cross_track:.2g} of"
+            f" {comparison.by_method[comparison.best_other].cross_track:.2g} of"
             f" {comparison.best_other.label}.",
         ),
         Finding(

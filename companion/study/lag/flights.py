@@ -1,4 +1,4 @@
-"""The flights: every planner with a slow rate loop, model-following also with wrong times."""
+"""Flies every planner with a slow rate loop, of which model-following assumes lag and dead time."""
 
 from dataclasses import replace
 from itertools import product
@@ -15,11 +15,10 @@ from companion.study.step import FIGURE_2, Loop, Response, Step, fly_loop
 
 METHODS = (*PAPERS, EXACT, FOLLOWING)
 OTHERS = tuple(method for method in METHODS if method is not FOLLOWING)
-"""The methods that do not use the times of the rate loop."""
+"""The methods that do not use lag and dead time of the rate loop."""
 RATES_HZ = (50.0, 100.0, 250.0)
 DEAD_TIMES_MS = (0, 20, 40, 60, 80)
 LAGS_MS = (10, 25, 40, 60)
-
 EXAMPLE_LOOP = LagLoop(lag_ms=25, dead_time_ms=45)
 """The lag is between ArduPilot's (22 ms) and PX4's (47 ms), the dead time above PX4's (40 ms)."""
 EXAMPLE_RATES_HZ = (100.0, 250.0)
@@ -32,8 +31,8 @@ SHOWN_RATE_HZ = 250.0
 """The sample rate at which the complete inner loop is shown."""
 
 
-class TimesError(NamedTuple):
-    """Relative errors of the times that model-following assumes; 0.5 is 50 % too long."""
+class DelayError(NamedTuple):
+    """Relative errors of the lag and dead time that model-following assumes; 0.5: 50 % too long."""
 
     lag: float
     dead_time: float
@@ -42,13 +41,13 @@ class TimesError(NamedTuple):
         return f"lag {in_percent(self.lag)} and dead time {in_percent(self.dead_time)}"
 
 
-NO_ERROR = TimesError(0.0, 0.0)
+NO_ERROR = DelayError(0.0, 0.0)
 GRID_ERRORS = (-0.5, 0.0, 0.5)
 FINE_ERRORS = (-0.5, -0.3, 0.0, 0.3, 0.5)
 """Errors tried in the example and with the complete inner loop."""
 
 
-class Times(NamedTuple):
+class RateLoopDelays(NamedTuple):
     """Lag and dead time of a rate loop by axis, s, under the planner's own option names."""
 
     lag: float
@@ -56,10 +55,10 @@ class Times(NamedTuple):
     yaw_lag: float
     yaw_dead_time: float
 
-    def with_error(self, error: TimesError) -> "Times":
-        """These times, all lags and all dead times scaled by their errors."""
+    def with_error(self, error: DelayError) -> "RateLoopDelays":
+        """Lags and dead times that are wrong by these relative errors."""
         lag, dead_time = 1.0 + error.lag, 1.0 + error.dead_time
-        return Times(
+        return RateLoopDelays(
             lag * self.lag,
             dead_time * self.dead_time,
             lag * self.yaw_lag,
@@ -67,7 +66,7 @@ class Times(NamedTuple):
         )
 
 
-COMPLETE_TIMES = Times(
+COMPLETE_DELAYS = RateLoopDelays(
     lag=0.047,
     dead_time=0.040 + COMPLETE_LOOP.transport_delay,
     yaw_lag=0.37,
@@ -80,7 +79,7 @@ class Score(NamedTuple):
     """How straight and how fast a response is.
 
     Attributes:
-        cross_track: largest distance from the straight line, in coefficients.
+        cross_track: largest distance of the coefficients (a/T, no unit) from the straight line.
         time: time from which the distance to the target stays within 5 % of the step, s; or inf.
     """
 
@@ -92,32 +91,32 @@ class Comparison(NamedTuple):
     """All methods with one rate loop at one sample rate.
 
     Attributes:
-        right: score of every method; model-following has the right times.
-        wrong: score of model-following by the error of its times.
+        by_method: score of every method; model-following knows the true lag and dead time.
+        by_error: score of model-following by the error of the lag and dead time it assumes.
     """
 
-    right: dict[Method, Score]
-    wrong: dict[TimesError, Score]
+    by_method: dict[Method, Score]
+    by_error: dict[DelayError, Score]
 
     @property
     def best_other(self) -> Method:
         """The straightest of `OTHERS`."""
-        return min(OTHERS, key=lambda method: self.right[method].cross_track)
+        return min(OTHERS, key=lambda method: self.by_method[method].cross_track)
 
     @property
-    def worst_error(self) -> TimesError:
-        """The error of the times with the largest cross-track."""
-        return max(self.wrong, key=lambda error: self.wrong[error].cross_track)
+    def worst_error(self) -> DelayError:
+        """The error of lag and dead time with the largest cross-track."""
+        return max(self.by_error, key=lambda error: self.by_error[error].cross_track)
 
     @property
     def worst(self) -> float:
         """Cross-track of model-following with `worst_error`."""
-        return self.wrong[self.worst_error].cross_track
+        return self.by_error[self.worst_error].cross_track
 
     @property
     def ratio(self) -> float:
         """`worst` over the cross-track of `best_other`; below 1 model-following is better."""
-        return self.worst / self.right[self.best_other].cross_track
+        return self.worst / self.by_method[self.best_other].cross_track
 
 
 class GridCell(NamedTuple):
@@ -140,19 +139,19 @@ class Example(NamedTuple):
     Attributes:
         free: responses of every method by sample rate (Hz), without limits.
         limited: responses of model-following with the limit W_M, by sample rate (Hz).
-        wrong: score of model-following at 100 Hz by the error of its times, including no error.
+        by_error: as in `Comparison`, at 100 Hz, including no error.
     """
 
     free: dict[float, dict[Method, Response]]
     limited: dict[float, Response]
-    wrong: dict[TimesError, Score]
+    by_error: dict[DelayError, Score]
 
 
 class Complete(NamedTuple):
     """The flights with the complete inner loop.
 
     Attributes:
-        by_rate: comparison at each sample rate (Hz); its `wrong` includes `NO_ERROR`.
+        by_rate: comparison at each sample rate (Hz); its `by_error` includes `NO_ERROR`.
         shown: responses of every method at `SHOWN_RATE_HZ`.
     """
 
@@ -171,17 +170,17 @@ def score(response: Response) -> Score:
 
 
 def step_at(rate_hz: float) -> Step:
-    """The step of figure 2 at heading 0; only `euler` would respond differently at others."""
+    """The step of figure 2 at heading 0; at another heading only `euler` responds differently."""
     return replace(FIGURE_2, headings=(0.0,), rate_hz=rate_hz)
 
 
 def fly_grid(tick: Tick) -> Grid:
-    """Fly every method in every cell, model-following also with times wrong by 50 %."""
+    """Fly every method in every cell, model-following also with lag and dead time wrong by 50 %."""
     grid = {}
     for dead_time, lag in product(DEAD_TIMES_MS, LAGS_MS):
         tick(f"dead time {dead_time} ms, lag {lag} ms")
         loop = LagLoop(lag, dead_time)
-        times = _times_of(loop)
+        delays = _delays_of(loop)
         errors = [
             error
             for error in _combined(GRID_ERRORS)
@@ -189,62 +188,63 @@ def fly_grid(tick: Tick) -> Grid:
         ]
         for rate in RATES_HZ:
             grid[GridCell(rate, dead_time, lag)] = Comparison(
-                {m: score(_fly(m, times, loop, rate)) for m in METHODS},
-                _with_errors(errors, times, loop, rate),
+                {m: score(_fly(m, delays, loop, rate)) for m in METHODS},
+                _with_errors(errors, delays, loop, rate),
             )
     return grid
 
 
 def fly_example() -> Example:
-    """Fly the example with every method, with the rate limit, and with wrong times."""
-    loop, times, limits = EXAMPLE_LOOP, _times_of(EXAMPLE_LOOP), Limits(max_tilt_rate=MAX_TILT_RATE)
+    """Fly the example with every method, with the rate limit, and with wrong lag and dead time."""
+    loop, limits = EXAMPLE_LOOP, Limits(max_tilt_rate=MAX_TILT_RATE)
+    delays = _delays_of(loop)
     return Example(
-        {hz: {m: _fly(m, times, loop, hz) for m in METHODS} for hz in EXAMPLE_RATES_HZ},
-        {hz: _fly(FOLLOWING, times, loop, hz, limits) for hz in EXAMPLE_RATES_HZ},
-        _with_errors(_combined(FINE_ERRORS), times, loop, EXAMPLE_ERRORS_HZ),
+        {hz: {m: _fly(m, delays, loop, hz) for m in METHODS} for hz in EXAMPLE_RATES_HZ},
+        {hz: _fly(FOLLOWING, delays, loop, hz, limits) for hz in EXAMPLE_RATES_HZ},
+        _with_errors(_combined(FINE_ERRORS), delays, loop, EXAMPLE_ERRORS_HZ),
     )
 
 
 def fly_complete(tick: Tick) -> Complete:
-    """Fly every method at every rate, model-following also with wrong times."""
+    """Fly every method at every rate, model-following also with wrong lag and dead time."""
     flown, by_rate = {}, {}
     for rate in RATES_HZ:
         tick(f"complete inner loop at {rate:.0f} Hz")
-        flown[rate] = {m: _fly(m, COMPLETE_TIMES, COMPLETE_LOOP, rate) for m in METHODS}
+        flown[rate] = {m: _fly(m, COMPLETE_DELAYS, COMPLETE_LOOP, rate) for m in METHODS}
         by_rate[rate] = Comparison(
             {method: score(response) for method, response in flown[rate].items()},
-            _with_errors(_combined(FINE_ERRORS), COMPLETE_TIMES, COMPLETE_LOOP, rate),
+            _with_errors(_combined(FINE_ERRORS), COMPLETE_DELAYS, COMPLETE_LOOP, rate),
         )
     return Complete(by_rate, flown[SHOWN_RATE_HZ])
 
 
-def _combined(errors: tuple[float, ...]) -> list[TimesError]:
+def _combined(errors: tuple[float, ...]) -> list[DelayError]:
     """Every combination of these errors of lag and dead time."""
-    return [TimesError(*pair) for pair in product(errors, repeat=2)]
+    return [DelayError(*pair) for pair in product(errors, repeat=2)]
 
 
-def _times_of(loop: LagLoop) -> Times:
-    """The true times of a loop that is the same on every axis."""
+def _delays_of(loop: LagLoop) -> RateLoopDelays:
+    """The true lag and dead time of a loop that is the same on every axis."""
     lag, dead_time = 1e-3 * loop.lag_ms, 1e-3 * loop.dead_time_ms
-    return Times(lag, dead_time, lag, dead_time)
+    return RateLoopDelays(lag, dead_time, lag, dead_time)
 
 
 def _with_errors(
-    errors: list[TimesError], times: Times, loop: Loop, rate_hz: float
-) -> dict[TimesError, Score]:
+    errors: list[DelayError], delays: RateLoopDelays, loop: Loop, rate_hz: float
+) -> dict[DelayError, Score]:
     return {
-        error: score(_fly(FOLLOWING, times.with_error(error), loop, rate_hz)) for error in errors
+        error: score(_fly(FOLLOWING, delays.with_error(error), loop, rate_hz)) for error in errors
     }
 
 
 def _fly(
     method: Method,
-    times: Times,
+    delays: RateLoopDelays,
     loop: Loop,
     rate_hz: float,
     limits: Limits = Limits(),  # noqa: B008  (frozen)
 ) -> Response:
-    """Fly a method; only model-following uses `times`, the lag and dead time it is told."""
-    options = times._asdict() if method is FOLLOWING else {}
+    """Fly a method; only model-following uses `delays`, the lag and dead time that it assumes."""
+    options = delays._asdict() if method is FOLLOWING else {}
     planner: Planner = make_planner(method.planner, FIGURE_2.gain, limits=limits, **options)
     return fly_loop(planner, step_at(rate_hz), loop)

@@ -15,11 +15,11 @@ from companion.study.lag.flights import (
     RATES_HZ,
     SHOWN_RATE_HZ,
     Complete,
+    DelayError,
     Example,
     Grid,
     GridCell,
     Score,
-    TimesError,
     fly_complete,
     fly_example,
     fly_grid,
@@ -51,7 +51,7 @@ class _Fitted(NamedTuple):
 
 
 def run(tick: Tick) -> Outcome:
-    """Fly the step of figure 2 over dead times, lags and sample rates, with right and wrong times.
+    """Fly the step of figure 2 over dead times, lags and sample rates, with true and wrong delays.
 
     Args:
         tick: called `PARTS` times.
@@ -68,9 +68,9 @@ def run(tick: Tick) -> Outcome:
             "The step of figure 2, p = 5 s⁻¹, through a rate loop with a dead time of 0 to 80 ms"
             " and a first-order lag of 10 to 60 ms, planners at 50 to 250 Hz. The example has a"
             f" dead time of {EXAMPLE_LOOP.dead_time_ms} ms and a lag of {EXAMPLE_LOOP.lag_ms} ms."
-            " model-following is given both times, either right or with the errors stated. Further"
-            " below is the complete inner loop of figure 5 with 20 ms of transport delay; there"
-            " model-following is given a first-order fit."
+            " model-following is given lag and dead time, either the true ones or with the errors"
+            " stated. Further below is the complete inner loop of figure 5 with 20 ms of transport"
+            " delay; there model-following is given a first-order fit."
         ),
         figure=draw_figure(grid, example, complete),
         caption=CAPTION,
@@ -80,7 +80,7 @@ def run(tick: Tick) -> Outcome:
                 "lag-wrong-knowledge",
                 f"Cross-track of model-following at {EXAMPLE_ERRORS_HZ:.0f} Hz in the example, by"
                 " the error of the assumed lag (rows) and dead time (columns).",
-                example.wrong,
+                example.by_error,
             ),
             _worst_table(grid),
             _fit_table(complete, fitted),
@@ -90,7 +90,7 @@ def run(tick: Tick) -> Outcome:
                 "Cross-track of model-following with the complete inner loop at"
                 f" {SHOWN_RATE_HZ:.0f} Hz, by the error of its lags (rows) and dead times (columns)"
                 " against those fitted to the inner loop.",
-                complete.by_rate[SHOWN_RATE_HZ].wrong,
+                complete.by_rate[SHOWN_RATE_HZ].by_error,
             ),
         ),
         findings=find(
@@ -124,7 +124,7 @@ def _example_table(example: Example) -> Table:
     )
 
 
-def _errors_table(name: str, caption: str, scores: dict[TimesError, Score]) -> Table:
+def _errors_table(name: str, caption: str, scores: dict[DelayError, Score]) -> Table:
     """Cross-track by the error of the lag (rows) and of the dead time (columns)."""
     return Table(
         name,
@@ -133,7 +133,7 @@ def _errors_table(name: str, caption: str, scores: dict[TimesError, Score]) -> T
         tuple(
             (
                 in_percent(lag),
-                *(scores[TimesError(lag, dead_time)].cross_track for dead_time in FINE_ERRORS),
+                *(scores[DelayError(lag, dead_time)].cross_track for dead_time in FINE_ERRORS),
             )
             for lag in FINE_ERRORS
         ),
@@ -146,7 +146,9 @@ def _worst_table(grid: Grid) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for rate, lag in product(RATES_HZ, sorted({cell.lag_ms for cell in grid})):
         comparisons = [grid[GridCell(rate, dead_time, lag)] for dead_time in dead_times]
-        others = [comparison.right[comparison.best_other].cross_track for comparison in comparisons]
+        others = [
+            comparison.by_method[comparison.best_other].cross_track for comparison in comparisons
+        ]
         rows.append(
             (f"{rate:.0f} Hz, {lag} ms", *(comparison.worst for comparison in comparisons), *others)
         )
@@ -166,7 +168,7 @@ def _worst_table(grid: Grid) -> Table:
 
 def _fit_table(complete: Complete, fitted: dict[Method, _Fitted]) -> Table:
     """Score and fitted model of every method at `SHOWN_RATE_HZ`."""
-    scores = complete.by_rate[SHOWN_RATE_HZ].right
+    scores = complete.by_rate[SHOWN_RATE_HZ].by_method
     return Table(
         "lag-inner-loop",
         f"The complete inner loop with 20 ms of transport delay, {SHOWN_RATE_HZ:.0f} Hz, heading 0,"
@@ -183,46 +185,46 @@ def _rates_table(complete: Complete) -> Table:
     """Cross-track of every method by sample rate, and of model-following with the worst error."""
     by_rate = complete.by_rate
     rows: list[tuple[Cell, ...]] = [
-        (m.label, *(comparison.right[m].cross_track for comparison in by_rate.values()))
+        (m.label, *(comparison.by_method[m].cross_track for comparison in by_rate.values()))
         for m in METHODS
     ]
     rows.append(
         (
-            "model-following, times wrong by the worst error",
+            "model-following, lag and dead time wrong by the worst error",
             *(comparison.worst for comparison in by_rate.values()),
         )
     )
     return Table(
         "lag-inner-loop-rates",
-        "Cross-track with the complete inner loop by sample rate. In the last row both times of"
-        " model-following are wrong by up to ±50 %; the worst combination is shown.",
+        "Cross-track with the complete inner loop by sample rate. In the last row the lag and"
+        " dead time of model-following are wrong by up to ±50 %; the worst combination is shown.",
         ("method", *(f"{rate:.0f} Hz" for rate in by_rate)),
         tuple(rows),
     )
 
 
 def _grid_series(grid: Grid) -> tuple[Table, Table]:
-    """Every flight of the grid: with the right times, and with wrong ones."""
+    """Every flight of the grid: with the true lag and dead time, and with wrong ones."""
     cell_columns = ("dead time, ms", "lag, ms", "rate, Hz")
     return (
         Table(
             "lag-grid",
-            "All methods over the grid, model-following with the right times.",
+            "All methods over the grid, model-following with the true lag and dead time.",
             ("method", *cell_columns, *_SCORE_COLUMNS),
             tuple(
                 (method.label, cell.dead_time_ms, cell.lag_ms, cell.rate_hz, *flown)
                 for cell, comparison in grid.items()
-                for method, flown in comparison.right.items()
+                for method, flown in comparison.by_method.items()
             ),
         ),
         Table(
             "lag-grid-wrong-knowledge",
-            "model-following over the grid, with wrong times.",
+            "model-following over the grid, with a wrong lag and dead time.",
             (*cell_columns, "error of the lag", "error of the dead time", *_SCORE_COLUMNS),
             tuple(
                 (cell.dead_time_ms, cell.lag_ms, cell.rate_hz, *error, *flown)
                 for cell, comparison in grid.items()
-                for error, flown in comparison.wrong.items()
+                for error, flown in comparison.by_error.items()
             ),
         ),
     )
@@ -237,6 +239,6 @@ def _complete_series(complete: Complete) -> Table:
         tuple(
             (rate, *error, flown.cross_track)
             for rate, comparison in complete.by_rate.items()
-            for error, flown in comparison.wrong.items()
+            for error, flown in comparison.by_error.items()
         ),
     )

@@ -14,7 +14,7 @@ from companion.study.drawing import (
     draw_reference,
     draw_response,
     new_figure,
-    say_magnified,
+    note_magnification,
 )
 from companion.study.measures import (
     best_and_worst,
@@ -151,9 +151,9 @@ def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
     )
     draw_plane(plane, curves, np.array([FIGURE_2.start, FIGURE_2.target]))
     north_span, east_span = _span(north.get_ylim()), _span(east.get_ylim())
-    say_magnified(east, "this axis", east_span, "that of north", north_span)
+    note_magnification(east, "this axis", east_span, "that of north", north_span)
     east_span, north_span = _span(plane.get_xlim()), _span(plane.get_ylim())
-    say_magnified(plane, "the $a_E$ axis", east_span, "the $a_N$ axis", north_span)
+    note_magnification(plane, "the $a_E$ axis", east_span, "the $a_N$ axis", north_span)
     north.legend(loc="lower right")
     return figure
 
