@@ -94,7 +94,8 @@ def test_the_six_planners_answer_alike() -> None:
     """Level and asked to the north, each pitches the nose down."""
     assert set(attitude.PLANNER_NAMES) == set(SIX)
     for name in SIX:
-        planner = make_planner(name, gain=5.0, yaw_gain=2.0, limits=Limits(max_tilt=0.6))
+        times = {"lag": 0.0, "dead_time": 0.0} if name == "model-following" else {}
+        planner = make_planner(name, gain=5.0, yaw_gain=2.0, limits=Limits(max_tilt=0.6), **times)
         planner.reset(LEVEL, body_rates=None)
         rates = planner.rates(LEVEL, Target(0.2, 0.0, 0.0), 0.004, BodyRates(0.0, 0.0, 0.0))
         assert isinstance(rates, BodyRates)

@@ -8,6 +8,7 @@ from companion.attitude.types import (
     BodyRates,
     Coefficients,
     InvalidBodyRatesError,
+    InvalidPeriodError,
     InvalidQuaternionError,
     InvalidTargetError,
     Quaternion,
@@ -101,6 +102,16 @@ def attitude(coefficients: Coefficients, heading: float) -> Quaternion:
 
 LARGEST_HEADING_RATE = 1e9
 """Largest heading rate of a target, rad/s; with more, the rates to send might not be finite."""
+
+
+def require_period(dt: float) -> None:
+    """Refuse a sample period that is not positive and finite.
+
+    Raises:
+        InvalidPeriodError: the period `dt` is 0 s, negative, infinite or NaN.
+    """
+    if not 0.0 < dt < inf:
+        raise InvalidPeriodError(f"the sample period dt must be positive and finite, not {dt} s")
 
 
 def limited_target(target: Target, longest: float) -> Target:

@@ -204,7 +204,7 @@ def test_a_plug_in_that_cannot_be_loaded_is_one_sentence():
     ("text", "why"),
     [
         ("planner: {name: nothing}", r"the planner returned \(nan"),
-        ("planner: {name: pair}", "expected 3, got 2"),
+        ("planner: {name: pair}", r"returned \(0.0, 0.0\), not three"),
         ("planner: {name: raising}", r"failed: RuntimeError\('no'\); `companion.testing.check_pl"),
         ("planner: {name: number}", "unknown planner 5"),
         ("guidance: {kind: number}", "guidance.kind: number cannot be made: TypeError"),
@@ -247,6 +247,16 @@ def test_good_planners_conform(name):
 def test_bad_planners_do_not(name, why):
     with pytest.raises(AssertionError, match=why):
         check_planner(name)
+
+
+def test_a_planner_that_raises_does_not_conform():
+    def fails(q, target, dt, constants):
+        if q != (1.0, 0.0, 0.0, 0.0):
+            raise RuntimeError("not at this attitude")
+        return 0.0, 0.0, 0.0
+
+    with pytest.raises(AssertionError, match=r"it raised RuntimeError.* at q = "):
+        check_planner(fails)
 
 
 @pytest.mark.usefixtures("quick")
