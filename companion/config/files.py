@@ -187,7 +187,13 @@ def changed(config: Config, changes: Mapping[str, Mapping[str, Any]], name: str)
     """
     data = config.model_dump()
     for section, values in changes.items():
-        data[section].update(values)
+        known = data.get(section)
+        if isinstance(known, dict) and isinstance(values, Mapping):
+            known.update(values)
+        elif section == "include":
+            raise ConfigError(f"{name}: `include` belongs in a file; load that file instead")
+        else:  # is refused below, with the key that was probably meant
+            data[section] = values
     return yaml_file.validated(data, name, Config)
 
 

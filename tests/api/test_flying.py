@@ -286,7 +286,7 @@ def test_what_the_limits_do_not_allow_is_refused_and_the_vehicle_holds_on(tmp_pa
         with pytest.raises(ConfigError, match="is the longest"):
             await vehicle.follow(line((1e4, 0.0, 0.0), 2.9, 1e-3, 1e-3))
         for seconds in (-1.0, float("nan")):
-            with pytest.raises(ValueError, match="0 s or more|finite number"):
+            with pytest.raises(ValueError, match=r"0 s or more|finite number"):
                 await vehicle.hold(seconds)
         await vehicle.hold(2.0)
         assert dist(here, vehicle.state.position_ned) < 0.1
