@@ -92,11 +92,13 @@ def attitude(coefficients: Coefficients, heading: float) -> Quaternion:
     """The upright attitude that has these coefficients and this tilt-yaw heading (rad).
 
     Raises:
-        ValueError: the coefficients are longer than 1 or not finite, so no attitude has them.
+        ValueError: the coefficients are longer than 1, or a number is not finite.
     """
     north, east = coefficients
     if not north * north + east * east <= 1.0:
         raise ValueError(f"no attitude has acceleration coefficients {coefficients}: longer than 1")
+    if not -inf < heading < inf:
+        raise ValueError(f"a heading must be finite, not {heading} rad")
     return attitude_of(north, east, heading)
 
 
