@@ -38,3 +38,8 @@ def __getattr__(name: str) -> object:
     from companion import api  # noqa: PLC0415  takes a quarter of a second
 
     return getattr(api, name)
+
+
+def __dir__() -> list[str]:
+    """The public names too, so that an interactive Python completes them before their import."""
+    return sorted({*globals(), *__all__})

@@ -5,6 +5,8 @@ import importlib
 import inspect
 import pydoc
 import re
+import subprocess
+import sys
 from types import ModuleType
 
 import numpy as np
@@ -156,3 +158,9 @@ def test_the_coefficients_of_a_batch_are_those_of_each_attitude() -> None:
         for vehicle in range(5):
             alone = coefficients(tuple(q[moment, :, vehicle]))
             assert together[moment, :, vehicle] == pytest.approx(alone, abs=1e-15)
+
+
+def test_an_interactive_python_completes_the_names_before_their_import() -> None:
+    script = "import companion; print(set(companion.__all__) <= set(dir(companion)))"
+    found = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True)
+    assert found.stdout.strip() == b"True"

@@ -91,7 +91,7 @@ environment = Environment(open_wire, _loop_time_ns, realtime=False)
 def session(
     config: Configuration,
     vehicle: MockVehicle,
-    folder: Path | None = None,
+    folder: Path | str | None = None,
     observer: Observer | None = None,
     ask_landing: AskLanding | None = None,
 ) -> Session:
@@ -104,11 +104,12 @@ def session(
         ConfigError: the configuration is wrong.
     """
     flown_config = in_memory(as_config(config), vehicle)
-    if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)
+    records = None if folder is None else Path(folder)
+    if records is not None:
+        records.mkdir(parents=True, exist_ok=True)
     return Session(
         flown_config,
-        folder,
+        records,
         observer or SilentObserver(),
         ask_landing or decline_landing,
         environment=environment,
@@ -118,7 +119,7 @@ def session(
 def fly(
     config: Configuration,
     vehicle: MockVehicle,
-    folder: Path | None = None,
+    folder: Path | str | None = None,
     observer: Observer | None = None,
     ask_landing: AskLanding | None = None,
 ) -> Summary:
@@ -147,7 +148,7 @@ def fly(
 async def connect(
     config: Configuration,
     vehicle: MockVehicle,
-    folder: Path | None = None,
+    folder: Path | str | None = None,
     observer: Observer | None = None,
 ) -> AsyncGenerator[Vehicle, None]:
     """Like `companion.connect`, for a mock vehicle in memory, inside `run`.
@@ -168,7 +169,8 @@ async def connect(
             "connect flies on the vehicle's clock: call it inside run(vehicle, main())"
         )
     flown_config = in_memory(as_config(config), vehicle)
-    async with flying(flown_config, folder, observer, environment) as connected:
+    records = None if folder is None else Path(folder)
+    async with flying(flown_config, records, observer, environment) as connected:
         yield connected
 
 

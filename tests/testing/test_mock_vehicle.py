@@ -13,6 +13,7 @@ from companion.files.yaml_file import ConfigError
 from companion.flight.observer import SilentObserver
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.settings import LinkSettings
+from companion.recording.flight_record import read_flight
 from companion.serve.session import ServeSession
 from companion.testing import (
     MockVehicle,
@@ -28,6 +29,7 @@ from companion.testing import (
 )
 from companion.testing.settings import mock_with
 from companion.testing.virtual_loop import VirtualClock
+from companion.vehicle.flight_log import read_flight_log
 from companion.vehicle.link import Link
 from sitl_mock.config.section import ConfigError as MockConfigError
 from tests.flight.fly import (
@@ -347,3 +349,14 @@ def test_a_link_that_cannot_be_opened_is_told_once():
             gc.collect()
 
     run(mock, main())  # raises UnseenError if nobody took it
+
+
+def test_paths_may_be_text_and_a_channel_that_there_is_not_is_named_with_all(tmp_path):
+    mock = QuickVehicle()
+    assert fly(config(mock), mock, folder=str(tmp_path / "one")).result == "ok"
+    record = read_flight(str(tmp_path / "one"))
+    assert len(record.rows("setpoint")) > 0
+    with pytest.raises(KeyError, match=r"no channel 'setpiont'; there are .*setpoint"):
+        record.rows("setpiont")
+    log = read_flight_log(str(tmp_path / "one" / "flight.tlog"))
+    assert len(log.setpoints) > 0
