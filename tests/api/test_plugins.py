@@ -77,6 +77,18 @@ class Drifting(LinearGuidance):
             return reference._replace(position_ned=(north + 3.0, east, down))
         return super().command(aside, time, inputs)
 
+class Half:
+    def __init__(self, settings):
+        pass
+
+class Empty(LinearGuidance):
+    def command(self, reference_at, time, inputs):
+        return None
+
+class Nowhere(LinearGuidance):
+    def command(self, reference_at, time, inputs):
+        return super().command(reference_at, time, inputs)._replace(down=float("nan"))
+
 class Broken(LinearGuidance):
     def command(self, reference_at, time, inputs):
         target, later, down = super().command(reference_at, time, inputs)
@@ -103,6 +115,9 @@ calm = theirs:Calm
 drifting = theirs:Drifting
 number = theirs:number
 broken = theirs:Broken
+half = theirs:Half
+empty = theirs:Empty
+nowhere = theirs:Nowhere
 """
 
 
@@ -208,6 +223,9 @@ def test_a_plug_in_that_cannot_be_loaded_is_one_sentence():
         ("planner: {name: raising}", r"failed: RuntimeError\('no'\); `companion.testing.check_pl"),
         ("planner: {name: number}", "unknown planner 5"),
         ("guidance: {kind: number}", "guidance.kind: number cannot be made: TypeError"),
+        ("guidance: {kind: half}", "half cannot be flown: AttributeError.*linear.Guidance"),
+        ("guidance: {kind: empty}", "empty cannot be flown: TypeError.*NoneType.*linear.Guidance"),
+        ("guidance: {kind: nowhere}", "nowhere cannot be flown: at rest it returned .*down=nan"),
     ],
 )
 def test_what_cannot_fly_is_found_before_the_vehicle_is_asked(text, why, tmp_path, capsys):
