@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.drag import NO_DRAG, Drag
-from companion.guidance.trajectory.demand import Floats, Motion, demand, sampled
+from companion.guidance.trajectory.demand import Floats, Motion, demand, require_finite, sampled
 from companion.guidance.trajectory.sample import Trajectory, computable
 
 _ROUNDING = 1e-9
@@ -154,9 +154,10 @@ def judge(motion: Motion, envelope: Envelope) -> tuple[Violation, ...]:
     """All limits that a motion breaks, in order of time.
 
     Raises:
-        TrajectoryError: a numerical error; see `computable`.
+        TrajectoryError: a numerical error, a number that is not finite, or unequal lengths.
     """
     with computable():
+        require_finite(motion)
         return broken_limits(motion, envelope)
 
 
