@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator
-from math import inf
+from math import inf, isnan
 
 from companion.api.commanded import copied, vector
 from companion.api.flight_loop import FlightLoop
@@ -60,7 +60,10 @@ class Control:
 
         Raises:
             FlightEnded: control has ended.
+            ValueError: `seconds` is NaN.
         """
+        if isnan(seconds):  # it would end the iteration before it begins
+            raise ValueError("seconds must be a number, not nan")
         new_state = asyncio.Event()
 
         def wake(_: object) -> None:

@@ -5,7 +5,7 @@ from collections.abc import AsyncGenerator, Callable, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import replace
 from functools import partial
-from math import hypot
+from math import hypot, tau
 from pathlib import Path
 
 from companion.api.beside_the_loop import beside_the_loop
@@ -126,11 +126,14 @@ class Vehicle:
             ConfigError: the configured limits or the fence do not allow it; nothing was flown.
             FlightEnded: the vehicle is not under our control.
             TrajectoryError: a limit given here is not positive.
-            ValueError: the position is not three finite numbers, or another argument is not finite.
+            ValueError: the position is not three finite numbers, another argument is not finite, or
+                the heading is more than two turns, as 90 for 90° is.
         """
         to = minus(vector("position_ned", position_ned), self._held_pose().position_ned)
         limits = number("speed", speed), number("acceleration", acceleration), number("jerk", jerk)
         facing = None if heading is None else number("heading", heading)
+        if facing is not None and abs(facing) > 2.0 * tau:
+            raise ValueError(f"heading is in rad, and {facing:g} rad are more than two turns")
         if hypot(*to) < SMALLEST_DISTANCE:
             await self.follow(Hover(0.0, heading=facing))
         elif facing is None:

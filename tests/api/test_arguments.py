@@ -107,6 +107,7 @@ def test_arguments_that_cannot_be_flown_are_refused_and_the_vehicle_holds_on():
             "a word": lambda: vehicle.go_to("abc"),
             "speed": lambda: vehicle.go_to(there, speed=nan),
             "heading": lambda: vehicle.go_to(there, heading="north"),
+            "degrees": lambda: vehicle.go_to(there, heading=90.0),
             "forever": lambda: vehicle.hold(nan),
             "a number": lambda: vehicle.follow(5),
             "elsewhere": lambda: vehicle.follow(Elsewhere()),
@@ -129,6 +130,7 @@ def test_arguments_that_cannot_be_flown_are_refused_and_the_vehicle_holds_on():
         "a word": "position_ned must be three finite numbers",
         "speed": "speed must be a finite number, not nan",
         "heading": "heading must be a finite number, not 'north'",
+        "degrees": "heading is in rad, and 90 rad are more than two turns",
         "forever": "seconds must be a finite number",
         "a number": "int is no trajectory: it has no `name`",
         "elsewhere": "mine: it begins 3.00 m from (0, 0, 0)",
@@ -137,6 +139,22 @@ def test_arguments_that_cannot_be_flown_are_refused_and_the_vehicle_holds_on():
     assert refused.keys() == words.keys()
     for name, text in words.items():
         assert text in refused[name]
+
+
+def test_states_for_a_time_that_is_no_number_are_refused():
+    """The loop ended before it began, without a word."""
+
+    async def program(vehicle):
+        await vehicle.take_off()
+        async with vehicle.control() as control:
+            with pytest.raises(ValueError, match="seconds must be a number"):
+                async for _ in control.states(seconds=nan):
+                    pass
+            control.accelerate(REST)
+        await vehicle.land()
+
+    summary, _ = flown(program, QuickVehicle())
+    assert summary.result == "ok"
 
 
 def test_to_go_where_the_vehicle_is_turns_it_or_does_nothing():
