@@ -28,7 +28,7 @@ _MAX_DEPTH = 4
 """Largest depth of nested includes."""
 
 
-def load(path: Path) -> Config:
+def load(path: Path | str) -> Config:
     """Read and check a configuration file and the files that it includes.
 
     Keys of a file override those of its includes; a later include overrides an earlier one.
@@ -37,6 +37,7 @@ def load(path: Path) -> Config:
         ConfigError: a file is missing, includes itself or too many files, is not YAML, or holds an
             unknown key or a bad value.
     """
+    path = Path(path)
     if is_table(path):
         raise ConfigError(
             f"{path} is a table of a trajectory, not a configuration; fly it with --trajectory"

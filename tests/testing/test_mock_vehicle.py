@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from pymavlink.dialects.v20 import common as dialect
 
+from companion.config.files import load
 from companion.files.yaml_file import ConfigError
 from companion.flight.observer import SilentObserver
 from companion.mavlink.errors import EndpointError
@@ -358,5 +359,6 @@ def test_paths_may_be_text_and_a_channel_that_there_is_not_is_named_with_all(tmp
     assert len(record.rows("setpoint")) > 0
     with pytest.raises(KeyError, match=r"no channel 'setpiont'; there are .*setpoint"):
         record.rows("setpiont")
+    assert load(str(CONFIG)) == load(CONFIG)
     log = read_flight_log(str(tmp_path / "one" / "flight.tlog"))
     assert len(log.setpoints) > 0
