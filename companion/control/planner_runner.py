@@ -123,7 +123,7 @@ class PlannerRunner:
         self._note_attitude_target(sample)
         self.asked = q, target
         # A vehicle's clock that stood still or went back must not keep the sample unanswered.
-        rates = self._planner.rates(q, target, max(period, SHORTEST_PERIOD), sample.body_rates)
+        rates = self._planner.rates(q, target, max(SHORTEST_PERIOD, period), sample.body_rates)
         return rates if self._passed_target is None else self._frame.rates(q, rates)
 
     def _note_attitude_target(self, sample: AttitudeSample) -> None:
