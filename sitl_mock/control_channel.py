@@ -75,6 +75,8 @@ def add_fault(simulation: Simulation, fault: Mapping[str, Any]) -> None:
         ConfigError: the fault has an unknown kind, an unknown key or an invalid value; the message
             names the key.
     """
+    if not isinstance(fault, Mapping):
+        raise ConfigError(f"a fault is written as {{'kind': 'gps_loss'}}, not as {fault!r}")
     try:
         valid = fault_adapter.validate_python(dict(fault))
     except ValidationError as error:

@@ -55,17 +55,20 @@ def _with_ekf(section: dict[str, Any]) -> object:
     return filled if filled["ekf"] in (None, "none") else {**SENSORS_WITH_FILTER, **filled}
 
 
-def load_settings(path: Path | None, overrides: dict[str, Any]) -> MockSettings:
+def load_settings(
+    path: Path | None, overrides: dict[str, Any], origin: str = "the command line"
+) -> MockSettings:
     """Read the ``mock:`` section of a YAML file; without a file, the defaults.
 
     Args:
         path: the file; its other sections are ignored.
-        overrides: values of top-level keys (and of ``lockstep``) from the command line.
+        overrides: values of top-level keys (and of ``lockstep``), which replace those of the file.
+        origin: where the overrides come from, for messages.
 
     Raises:
         ConfigError: the file cannot be read, or a key or value is invalid.
     """
-    source = "the command line" if path is None else str(path)
+    source = origin if path is None else str(path)
     document = Document(None, None) if path is None else _read_document(path)
     section = {} if path is None else _mock_section(document.value, path)
     lockstep = {**section.get("lockstep", {}), **overrides.get("lockstep", {})}

@@ -5,11 +5,15 @@ import importlib
 import inspect
 import pydoc
 import re
+import subprocess
+import sys
 from types import ModuleType
 
 import numpy as np
 import pytest
 
+import companion
+import companion.api
 from companion import attitude, batch
 from companion.attitude import (
     BodyRates,
@@ -94,7 +98,8 @@ def test_the_six_planners_answer_alike() -> None:
     """Level and asked to the north, each pitches the nose down."""
     assert set(attitude.PLANNER_NAMES) == set(SIX)
     for name in SIX:
-        planner = make_planner(name, gain=5.0, yaw_gain=2.0, limits=Limits(max_tilt=0.6))
+        times = {"lag": 0.0, "dead_time": 0.0} if name == "model-following" else {}
+        planner = make_planner(name, gain=5.0, yaw_gain=2.0, limits=Limits(max_tilt=0.6), **times)
         planner.reset(LEVEL, body_rates=None)
         rates = planner.rates(LEVEL, Target(0.2, 0.0, 0.0), 0.004, BodyRates(0.0, 0.0, 0.0))
         assert isinstance(rates, BodyRates)
@@ -155,3 +160,17 @@ def test_the_coefficients_of_a_batch_are_those_of_each_attitude() -> None:
         for vehicle in range(5):
             alone = coefficients(tuple(q[moment, :, vehicle]))
             assert together[moment, :, vehicle] == pytest.approx(alone, abs=1e-15)
+
+
+def test_help_of_the_program_is_one_page_with_its_names() -> None:
+    page = pydoc.plain(pydoc.render_doc(companion))
+    assert len(page.splitlines()) <= MOST_LINES
+    listed = re.findall(r"^    (\w+)  ", companion.__doc__ or "", re.MULTILINE)
+    assert set(listed) == set(companion._NAMES) == public_names(companion.api)
+    assert all(getattr(companion, name).__doc__ for name in companion._NAMES)
+
+
+def test_an_interactive_python_completes_the_names_before_their_import() -> None:
+    script = "import companion; print('connect' in dir(companion))"
+    found = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True)
+    assert found.stdout.strip() == b"True"

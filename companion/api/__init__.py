@@ -12,24 +12,16 @@
 
     companion.run(main())
 
-The same checks, limits, fence and safety monitors hold as in `companion fly`.
+The same checks, limits, fence and safety monitors hold as in `companion fly`. The names stand in
+`help(companion)`.
 """
 
-from companion.api.connection import connect, run
-from companion.api.control import Control
-from companion.api.state import State
-from companion.api.vehicle import Vehicle
-from companion.attitude import Coefficients
-from companion.guidance.reference import Reference
-from companion.safety.actions import FlightEnded
-
-__all__ = [
-    "Coefficients",
-    "Control",
-    "FlightEnded",
-    "Reference",
-    "State",
-    "Vehicle",
-    "connect",
-    "run",
-]
+# Without `__all__`: see `companion.attitude`.
+from companion.api.connection import connect as connect
+from companion.api.connection import run as run
+from companion.api.control import Control as Control
+from companion.api.state import State as State
+from companion.api.vehicle import Vehicle as Vehicle
+from companion.attitude import Coefficients as Coefficients
+from companion.guidance.reference import Reference as Reference
+from companion.safety.actions import FlightEnded as FlightEnded

@@ -25,15 +25,18 @@ from companion.safety.actions import FlightEnded
 
 T = TypeVar("T")
 
+Configuration = Config | Path | str | Mapping[str, Mapping[str, Any]]
+"""A configuration, its file, or the keys by section that differ from the defaults."""
+
 
 @asynccontextmanager
 async def connect(
-    config: Config | Path | str,
+    config: Configuration,
     *,
     endpoint: str | None = None,
     arm: bool | None = None,
     changes: Mapping[str, Mapping[str, Any]] | None = None,
-    folder: Path | None = None,
+    folder: Path | str | None = None,
     observer: Observer | None = None,
 ) -> AsyncGenerator[Vehicle, None]:
     """Connect, run the preflight checks, and yield the vehicle; the flight is recorded meanwhile.
@@ -42,7 +45,8 @@ async def connect(
     block ends in the air, the vehicle is handed back: the autopilot holds it.
 
     Args:
-        config: configuration of the flight, or the path of its file.
+        config: configuration of the flight, the path of its file, or the keys by section that
+            differ from the defaults.
         endpoint: replaces `link.endpoint`.
         arm: replaces `flight.arm`. True: `Vehicle.take_off` arms. False: the pilot arms.
         changes: other keys to change, by section, such as `{"limits": {"max_tilt_deg": 20}}`.
@@ -56,17 +60,32 @@ async def connect(
         OSError: the folder cannot be written; nothing was sent.
         RealtimeError: the system refused a required `realtime` setting; nothing was sent.
     """
-    flown_config = load(Path(config)) if isinstance(config, Path | str) else config
+    flown_config = as_config(config)
     overrides: dict[str, dict[str, Any]] = {"link": {}, "flight": {}}
     if endpoint is not None:
         overrides["link"]["endpoint"] = endpoint
     if arm is not None:
         overrides["flight"]["arm"] = arm
     flown_config = changed(changed(flown_config, changes or {}, "changes"), overrides, "connect")
-    async with flying(
-        flown_config, folder or flight_folder(flown_config.recording.directory), observer
-    ) as vehicle:
+    records = flight_folder(flown_config.recording.directory) if folder is None else Path(folder)
+    async with flying(flown_config, records, observer) as vehicle:
         yield vehicle
+
+
+def as_config(config: Configuration) -> Config:
+    """The configuration, complete.
+
+    Raises:
+        ConfigError: the configuration is wrong.
+        TypeError: it is none.
+    """
+    if isinstance(config, Config):
+        return config
+    if isinstance(config, Mapping):
+        return changed(Config(), config, "the configuration")
+    if not isinstance(config, Path | str):
+        raise TypeError(f"a configuration is a Config, a path or keys by section, not {config!r}")
+    return load(Path(config))
 
 
 @asynccontextmanager
@@ -90,6 +109,8 @@ async def flying(
             wait_cancelled = True  # stays true if the wait is cancelled
             await asyncio.wait({flight})
             wait_cancelled = False
+            if not flight.cancelled():
+                flight.exception()  # no warning of asyncio: the program gets it from its own call
         flight.result()
     finally:
         loop.close(wait=not wait_cancelled)

@@ -2,9 +2,9 @@
 
 import asyncio
 from collections.abc import AsyncIterator
-from itertools import chain
-from math import inf, isfinite
+from math import inf, isnan
 
+from companion.api.commanded import copied, vector
 from companion.api.flight_loop import FlightLoop
 from companion.api.program import Program
 from companion.api.state import NewestState, State
@@ -15,7 +15,6 @@ from companion.guidance.source import CommandedSource
 from companion.safety.actions import FlightEnded
 
 _ZERO_VECTOR = (0.0, 0.0, 0.0)
-_VECTOR_LENGTH = 3
 
 
 class Control:
@@ -61,7 +60,10 @@ class Control:
 
         Raises:
             FlightEnded: control has ended.
+            ValueError: `seconds` is NaN.
         """
+        if isnan(seconds):  # it would end the iteration before it begins
+            raise ValueError("seconds must be a number, not nan")
         new_state = asyncio.Event()
 
         def wake(_: object) -> None:
@@ -117,10 +119,13 @@ class Control:
                 two references.
 
         Raises:
+            TypeError: the reference is no `Reference`.
             ValueError: a number is missing or not finite; the previous command stays in force.
             FlightEnded: control has ended.
         """
-        _require_valid(reference, jerk_ned or _ZERO_VECTOR)
+        # A program may write into its arrays after this call, so both are copied.
+        reference = copied(reference)
+        jerk_ned = None if jerk_ned is None else vector("jerk_ned", jerk_ned)
         self._require_control()
         self._command = reference, self._loop.time(), jerk_ned
         if not self._posted:  # else the callback posted before will take this command
@@ -160,7 +165,7 @@ class Control:
             ValueError: a number is missing or not finite; the previous command stays in force.
             FlightEnded: control has ended.
         """
-        self.follow(self._open_loop_reference(None)._replace(body_rates=BodyRates(*body_rates)))
+        self.follow(self._open_loop_reference(None)._replace(body_rates=body_rates))
 
     def _open_loop_reference(self, heading: float | None) -> Reference:
         north, east, _ = self.state.position_ned
@@ -177,29 +182,3 @@ class Control:
         if self._control_end.done():
             self._control_end.result()
             raise FlightEnded("the program has ended its control")
-
-
-def _require_valid(reference: Reference, jerk_ned: Vector) -> None:
-    """Check that vectors have three components, and that all numbers are finite.
-
-    Raises:
-        ValueError: a vector has another length, or a number is not finite.
-    """
-    vectors = [
-        reference.position_ned,
-        reference.velocity_ned,
-        reference.acceleration_ned,
-        reference.body_rates or _ZERO_VECTOR,
-        jerk_ned,
-    ]
-    if any(len(vector) != _VECTOR_LENGTH for vector in vectors):
-        raise ValueError(f"each vector must have three components; got {reference}")
-    values = [
-        *chain.from_iterable(vectors),
-        reference.heading,
-        reference.heading_rate,
-        *(reference.coefficients or ()),
-        *(() if reference.thrust is None else (reference.thrust,)),
-    ]
-    if not all(map(isfinite, values)):
-        raise ValueError(f"all numbers of a command must be finite; got {reference}")

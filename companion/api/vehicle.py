@@ -5,17 +5,19 @@ from collections.abc import AsyncGenerator, Callable, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import replace
 from functools import partial
+from math import hypot, tau
 from pathlib import Path
-from typing import TypeVar, TypeVarTuple
 
+from companion.api.commanded import number, vector
 from companion.api.control import Control
 from companion.api.flight_loop import FlightLoop
+from companion.api.in_thread import call_in_thread
 from companion.api.program import Program
 from companion.api.state import NewestState, State
 from companion.config import trajectory_file
 from companion.flight.context import FlightContext
 from companion.flight.control_phases import fly_commanded, fly_maneuvers
-from companion.flight.maneuver_checks import require_followable
+from companion.flight.maneuver_checks import naming_trajectory_errors, require_followable
 from companion.flight.phases import (
     Phase,
     hand_back_phase,
@@ -25,16 +27,13 @@ from companion.flight.phases import (
 )
 from companion.guidance import Maneuver, ManeuverSequence, Pose
 from companion.guidance.follow import Follow, HeldFigure, hover
-from companion.guidance.reference import Vector
+from companion.guidance.reference import Vector, minus
 from companion.guidance.source import CommandedSource
-from companion.guidance.trajectory import Trajectory, line
+from companion.guidance.trajectory import Hover, Trajectory, line, require_trajectory
+from companion.guidance.trajectory.sample import SMALLEST_DISTANCE
 from companion.guidance.trajectory.timed_curve import FixedHeading
-from companion.mavlink.lockstep import LockstepEventLoop
 from companion.recording.measurements.summary import Summary
 from companion.safety.actions import Exit, FlightEnded
-
-T = TypeVar("T")
-Arguments = TypeVarTuple("Arguments")
 
 _START_TIMEOUT = 1.0
 """Longest time from the beginning of control to the first command, s."""
@@ -96,11 +95,11 @@ class Vehicle:
 
         Raises:
             FlightEnded: the vehicle is not under our control.
-            ValueError: the time is negative or not a number; nothing was flown.
+            ValueError: the time is negative or not finite; nothing was flown.
         """
-        if not seconds >= 0.0:
+        if not number("seconds", seconds) >= 0.0:
             raise ValueError(f"the time to hold must be 0 s or more, not {seconds:g}")
-        await self._fly(hover(seconds))
+        await self._fly(hover(float(seconds)))
 
     async def go_to(
         self,
@@ -113,6 +112,8 @@ class Vehicle:
     ) -> None:
         """Fly a straight line to a position, from rest to rest, within the limits given here.
 
+        Where the vehicle is there already, it only turns to the heading.
+
         Args:
             position_ned: m, in the frame of `State.position_ned`.
             heading: heading of the flight, rad; None: the present one. The vehicle turns to it
@@ -124,15 +125,21 @@ class Vehicle:
         Raises:
             ConfigError: the configured limits or the fence do not allow it; nothing was flown.
             FlightEnded: the vehicle is not under our control.
-            TrajectoryError: a limit given here is not positive, or the vehicle is there already.
+            TrajectoryError: a limit given here is not positive.
+            ValueError: the position is not three finite numbers, another argument is not finite, or
+                the heading is more than two turns, as 90 for 90° is.
         """
-        start = self._held_pose().position_ned
-        north, east, down = (goal - begin for goal, begin in zip(position_ned, start, strict=True))
-        path = line((north, east, down), speed, acceleration, jerk)
-        if heading is None:
-            await self._fly(HeldFigure(path))
+        to = minus(vector("position_ned", position_ned), self._held_pose().position_ned)
+        limits = number("speed", speed), number("acceleration", acceleration), number("jerk", jerk)
+        facing = None if heading is None else number("heading", heading)
+        if facing is not None and abs(facing) > 2.0 * tau:
+            raise ValueError(f"heading is in rad, and {facing:g} rad are more than two turns")
+        if hypot(*to) < SMALLEST_DISTANCE:
+            await self.follow(Hover(0.0, heading=facing))
+        elif facing is None:
+            await self._fly(HeldFigure(line(to, *limits)))
         else:
-            await self.follow(replace(path, heading=FixedHeading(heading)))
+            await self.follow(replace(line(to, *limits), heading=FixedHeading(facing)))
 
     async def follow(self, trajectory: Trajectory | Path | str) -> None:
         """Follow a trajectory from the present position.
@@ -144,10 +151,15 @@ class Vehicle:
 
         Raises:
             ConfigError: the trajectory cannot be read or computed, or breaks a limit or the fence.
+                An object also if `companion.guidance.trajectory.require_trajectory` refuses it.
             FlightEnded: the vehicle is not under our control.
+            TypeError: the object is no trajectory.
         """
         if isinstance(trajectory, Path | str):
             trajectory = await call_in_thread(trajectory_file.load, Path(trajectory))
+        else:
+            with naming_trajectory_errors(str(getattr(trajectory, "name", ""))):
+                await call_in_thread(require_trajectory, trajectory)
         await self._fly(Follow(trajectory, self._context.config.limits.max_yaw_rate))
 
     @asynccontextmanager
@@ -236,14 +248,3 @@ class Vehicle:
         if pose is None or not self._context.loop.offboard_active:
             raise FlightEnded("the vehicle is not under our control: take off first", Exit.LEAVE)
         return pose
-
-
-async def call_in_thread(function: Callable[[*Arguments], T], *arguments: *Arguments) -> T:
-    """Call a slow function in a thread, so that samples are still answered.
-
-    In lockstep and on a virtual clock the function is called directly, because the vehicle waits
-    for us. A thread would only make the order of events random.
-    """
-    if isinstance(asyncio.get_running_loop(), LockstepEventLoop):
-        return function(*arguments)
-    return await asyncio.to_thread(function, *arguments)

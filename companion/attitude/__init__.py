@@ -35,7 +35,7 @@ Functions
     wrap_angle      an angle in (−π, π]
 
 Errors, all of them `AttitudeError` (a `ValueError`)
-    InvalidQuaternionError, InvalidTargetError, InvalidBodyRatesError
+    InvalidQuaternionError, InvalidTargetError, InvalidBodyRatesError, InvalidPeriodError
 
 The law is that of Xu & Pei, *Attitude Controller for UAV First-Order Acceleration Coefficients
 Tracking*, Sensors 2026, 26(9), 2727; equation numbers in this package are that paper's.
@@ -62,6 +62,7 @@ from companion.attitude.types import AttitudeError as AttitudeError
 from companion.attitude.types import BodyRates as BodyRates
 from companion.attitude.types import Coefficients as Coefficients
 from companion.attitude.types import InvalidBodyRatesError as InvalidBodyRatesError
+from companion.attitude.types import InvalidPeriodError as InvalidPeriodError
 from companion.attitude.types import InvalidQuaternionError as InvalidQuaternionError
 from companion.attitude.types import InvalidTargetError as InvalidTargetError
 from companion.attitude.types import Quaternion as Quaternion

@@ -37,7 +37,8 @@ def exact(
     limits allow. The heading error has shrunk by the factor e^(−k·dt), and the turn of the target
     at its heading rate is added. The vehicle moves there by the shortest rotation, so at the
     samples the response is exact at any sample rate. Beyond the recovery angle the law is faded
-    into a rotation towards level, as in `first-order`. Rates are in rad/s.
+    into a rotation towards level, as in `first-order`. Rates are in rad/s; more than 1 s count as
+    1 s.
     """
     gain, yaw_gain, max_rate, max_yaw_rate, max_speed, _, _, _, cos_recovery, slope = constants
     dt = dt if dt > SHORTEST_PERIOD else SHORTEST_PERIOD

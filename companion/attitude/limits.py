@@ -103,8 +103,11 @@ def make_constants(
             `limits.max_tilt`.
 
     Raises:
+        TypeError: `limits` are no `Limits`.
         ValueError: a gain or the recovery angle is out of range.
     """
+    if not isinstance(limits, Limits):
+        raise TypeError(f"limits must be a companion.attitude.Limits, not {limits!r}")
     if not 0.0 < gain < inf:
         raise ValueError(f"gain must be positive and finite, not {gain}")
     if not 0.0 <= yaw_gain < inf:

@@ -18,6 +18,7 @@ from companion.attitude.representation import (
     limited_target,
     normalised,
     plausible_rates,
+    require_period,
     wrap_angle,
 )
 from companion.attitude.rotation import limit_rates
@@ -107,13 +108,16 @@ class ModelFollowingPlanner:
     ) -> BodyRates:
         """Body rates to send at attitude `q`, rad/s; `dt` is the time since the last sample, s.
 
+        More than 0.2 s count as 0.2 s: reset the planner after a gap.
         `body_rates` are the measured ones, rad/s; None or implausible: they count as predicted.
 
         Raises:
             InvalidQuaternionError: `q` is not a unit quaternion.
             InvalidTargetError: `target` is not three or four finite numbers of usable size.
             InvalidBodyRatesError: `body_rates` are not three numbers.
+            InvalidPeriodError: `dt` is not positive and finite.
         """
+        require_period(dt)
         constants, forward = self._constants, self._forward
         w, x, y, z = q = normalised(q)
         target = limited_target(target, constants.longest_target)
@@ -127,7 +131,7 @@ class ModelFollowingPlanner:
         if not self._started:
             self._start(q, plausible)
             self._started = True
-        dt = min(max(SHORTEST_PERIOD, dt), LONGEST_PERIOD)  # in this order NaN is short, too
+        dt = min(max(SHORTEST_PERIOD, dt), LONGEST_PERIOD)
         north, east, heading = -2.0 * ay, 2.0 * ax, heading_of(sqrt(square), w, z)
         self._hold.take(dt)
         tilt_plan, yaw_plan = forward.plans.in_effect(self._hold.late)

@@ -8,10 +8,9 @@ from companion.attitude.body_error import quaternion, so3
 from companion.attitude.euler import euler
 from companion.attitude.exact import exact
 from companion.attitude.first_order import first_order
-from companion.attitude.limits import Constants, Limits, make_constants
-from companion.attitude.model_following import ModelFollowingPlanner
-from companion.attitude.rate_response import AxisResponse, RateResponse
-from companion.attitude.representation import limited_target, normalised
+from companion.attitude.limits import Constants, Limits
+from companion.attitude.planner_options import constants_of, make_model_following
+from companion.attitude.representation import limited_target, normalised, require_period
 from companion.attitude.types import BodyRates, Quaternion, Target
 
 Law = Callable[[Quaternion, Target, float, Constants], tuple[float, float, float]]
@@ -32,7 +31,7 @@ class Planner(Protocol):
         Args:
             q: measured attitude.
             target: target of guidance.
-            dt: sample period, s.
+            dt: sample period, s; positive and finite.
             body_rates: measured rates, rad/s; None: unknown.
 
         Raises:
@@ -56,6 +55,10 @@ class Planner(Protocol):
         ...
 
 
+_NO_TARGET = object()
+"""Marks that no target is remembered; None will not do, because a caller may pass it."""
+
+
 class LawPlanner:
     """A planner without memory: checks its input, and applies one law.
 
@@ -69,7 +72,7 @@ class LawPlanner:
     def __init__(self, law: Law, constants: Constants) -> None:
         self.law = law
         self.constants = constants
-        self._last_target: Target | None = None
+        self._last_target: object = _NO_TARGET
         self._limited_target = Target(0.0, 0.0, 0.0)
 
     def rates(
@@ -78,19 +81,22 @@ class LawPlanner:
         """Body rates of the law, rad/s; `dt` is the sample period in s.
 
         Raises:
+            InvalidPeriodError: `dt` is not positive and finite.
             InvalidQuaternionError: `q` is not a unit quaternion.
             InvalidTargetError: `target` is not three or four finite numbers of usable size.
         """
+        if not 0.0 < dt < inf:  # the check of `require_period`, without the cost of a call
+            require_period(dt)
         if target is not self._last_target:  # one target serves many samples; a tuple cannot change
             self._limited_target = limited_target(target, self.constants.longest_target)
-            self._last_target = target if isinstance(target, tuple) else None
+            self._last_target = target if isinstance(target, tuple) else _NO_TARGET
         rates = self.law(normalised(q), self._limited_target, dt, self.constants)
         return _make_body_rates(BodyRates, rates)
 
     def retune(self, constants: Constants) -> None:
         """Use other gains and limits from the next sample on."""
         self.constants = constants
-        self._last_target = None  # was limited by the constants before
+        self._last_target = _NO_TARGET  # was limited by the constants before
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
         """Do nothing: the law sends rates along the axes of the body."""
@@ -140,76 +146,61 @@ def make_planner(
             heading too, as the paper does.
         limits: bounds on tilt and rates.
         options: further options of that planner. Every planner takes `recovery_angle`, rad; without
-            `limits.max_tilt` it is also the largest tilt of a target. `model-following` also takes
-            the response of the rate loop (`RateResponse`): `lag` and `dead_time`, s (default 0),
-            `damping` (default None: first order), `acceleration`, rad/s² (default None: no limit),
-            each also with the prefix `pitch_` or `yaw_` (default None: as roll), and `frame_lead`,
-            s. There is no `yaw_damping`. With `pitch_lag` and no `pitch_damping`, pitch is of first
-            order.
+            `limits.max_tilt` it is also the largest tilt of a target. `model-following` also needs
+            the response of the rate loop (`RateResponse`): `lag` and `dead_time`, s (0.0 for an
+            immediate one). It takes `damping` (default None: first order), `acceleration`, rad/s²
+            (default None: no limit), each of the four also with the prefix `pitch_` or `yaw_`
+            (default None: as roll), and `frame_lead`, s. There is no `yaw_damping`. With
+            `pitch_lag` and no `pitch_damping`, pitch is of first order.
 
     Raises:
-        TypeError: the planner does not take an option.
-        ValueError: unknown name, or a value out of range.
+        TypeError: the planner does not take an option, the law does not return three numbers, or
+            the class has not the methods of a planner.
+        ValueError: unknown name, a value out of range, or `model-following` without `lag` or
+            `dead_time`.
     """
     if isinstance(name, type):
-        made: PlannerFactory = name
-        return made(make_constants(gain, yaw_gain, limits, **options))
+        return _made_planner(name, constants_of(name.__name__, gain, yaw_gain, limits, options))
     if callable(name):
-        return LawPlanner(name, make_constants(gain, yaw_gain, limits, **options))
+        label = getattr(name, "__name__", repr(name))
+        planner = LawPlanner(name, constants_of(label, gain, yaw_gain, limits, options))
+        _require_three_rates(label, planner)
+        return planner
     if name == MODEL_FOLLOWING:
-        return _model_following(gain, yaw_gain, limits, **options)
+        return make_model_following(gain, yaw_gain, limits, **options)
     if name not in _LAWS:
         raise ValueError(f"unknown planner {name!r}; known: {', '.join(PLANNER_NAMES)}")
-    return LawPlanner(_LAWS[name], make_constants(gain, yaw_gain, limits, **options))
+    return LawPlanner(_LAWS[name], constants_of(name, gain, yaw_gain, limits, options))
 
 
-def _model_following(
-    gain: float,
-    yaw_gain: float,
-    limits: Limits,
-    *,
-    lag: float = 0.0,
-    dead_time: float = 0.0,
-    damping: float | None = None,
-    acceleration: float | None = None,
-    pitch_lag: float | None = None,
-    pitch_dead_time: float | None = None,
-    pitch_damping: float | None = None,
-    pitch_acceleration: float | None = None,
-    yaw_lag: float | None = None,
-    yaw_dead_time: float | None = None,
-    yaw_acceleration: float | None = None,
-    frame_lead: float | None = None,
-    **options: Any,
-) -> Planner:
-    roll = AxisResponse(
-        lag,
-        dead_time,
-        inf if acceleration is None else acceleration,
-        inf if damping is None else damping,
-    )
-    if pitch_damping is None:
-        pitch_damping = roll.damping if pitch_lag is None else inf
-    response = RateResponse(
-        roll,
-        _like_roll(roll, pitch_lag, pitch_dead_time, pitch_acceleration, pitch_damping),
-        _like_roll(roll, yaw_lag, yaw_dead_time, yaw_acceleration, inf),
-        frame_lead,
-    )
-    return ModelFollowingPlanner(make_constants(gain, yaw_gain, limits, **options), response)
+def _made_planner(factory: PlannerFactory, constants: Constants) -> Planner:
+    """A planner of a user's class.
+
+    Raises:
+        TypeError: it has not the methods of a planner.
+    """
+    planner = factory(constants)
+    for method in ("rates", "reset", "note_attitude_target"):
+        if not callable(getattr(planner, method, None)):
+            raise TypeError(f"{type(planner).__name__} is no planner: it has no method {method}()")
+    return planner
 
 
-def _like_roll(
-    roll: AxisResponse,
-    lag: float | None,
-    dead_time: float | None,
-    acceleration: float | None,
-    damping: float,
-) -> AxisResponse:
-    """An axis with these values; a value that is None is taken from `roll`."""
-    return AxisResponse(
-        roll.lag if lag is None else lag,
-        roll.dead_time if dead_time is None else dead_time,
-        roll.acceleration if acceleration is None else acceleration,
-        damping,
-    )
+def _require_three_rates(name: str, planner: LawPlanner) -> None:
+    """Ask a user's law once, at level; a law that raises will raise where it is used.
+
+    Raises:
+        TypeError: it does not return three numbers.
+    """
+    level, target = (1.0, 0.0, 0.0, 0.0), Target(0.0, 0.0, 0.0)
+    try:
+        rates: Any = planner.law(level, target, 0.01, planner.constants)
+    except (Exception, SystemExit):
+        return
+    try:
+        roll, pitch, yaw = rates
+        float(roll), float(pitch), float(yaw)
+    except (TypeError, ValueError):
+        raise TypeError(
+            f"the law {name!r} returned {rates!r}, not three numbers: roll, pitch and yaw, rad/s"
+        ) from None

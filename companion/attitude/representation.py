@@ -8,6 +8,7 @@ from companion.attitude.types import (
     BodyRates,
     Coefficients,
     InvalidBodyRatesError,
+    InvalidPeriodError,
     InvalidQuaternionError,
     InvalidTargetError,
     Quaternion,
@@ -91,17 +92,29 @@ def attitude(coefficients: Coefficients, heading: float) -> Quaternion:
     """The upright attitude that has these coefficients and this tilt-yaw heading (rad).
 
     Raises:
-        ValueError: the norm of the coefficients exceeds 1 or is not finite, so no attitude has
-            them.
+        ValueError: the norm of the coefficients exceeds 1, so no attitude has them, or a number is
+            not finite.
     """
     north, east = coefficients
     if not north * north + east * east <= 1.0:
         raise ValueError(f"no attitude has the coefficients {coefficients}: their norm exceeds 1")
+    if not -inf < heading < inf:
+        raise ValueError(f"a heading must be finite, not {heading} rad")
     return attitude_of(north, east, heading)
 
 
 LARGEST_HEADING_RATE = 1e9
 """Largest heading rate of a target, rad/s; with more, the rates to send might not be finite."""
+
+
+def require_period(dt: float) -> None:
+    """Refuse a sample period that is not positive and finite.
+
+    Raises:
+        InvalidPeriodError: the period `dt` is 0 s, negative, infinite or NaN.
+    """
+    if not 0.0 < dt < inf:
+        raise InvalidPeriodError(f"the sample period dt must be positive and finite, not {dt} s")
 
 
 def limited_target(target: Target, longest: float) -> Target:

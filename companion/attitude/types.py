@@ -61,3 +61,7 @@ class InvalidTargetError(AttitudeError):
 
 class InvalidBodyRatesError(AttitudeError):
     """Body rates are not three numbers."""
+
+
+class InvalidPeriodError(AttitudeError):
+    """A sample period is not positive and finite."""

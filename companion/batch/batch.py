@@ -2,13 +2,16 @@
 
 import importlib.util
 from math import ceil
+from operator import index
+from types import FunctionType
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from companion.attitude.kinematics import tilt_products
-from companion.attitude.planner import LAW_NAMES, LawPlanner
+from companion.attitude.planner import LAW_NAMES, Law, LawPlanner, Planner
+from companion.attitude.representation import require_period
 from companion.batch.checks import as_rows, compiled_check, limited_targets, unit_quaternions
 from companion.batch.loops import Array, Loops, compiled_loops, plain_loops
 from companion.extras import require
@@ -19,6 +22,9 @@ COMPILE_FROM = 600_000
 Compiling costs 2 to 3 s once in a process, including the import of numba. A step in Python costs
 about 4 µs.
 """
+
+_COMPONENTS = 4
+"""Components of a quaternion."""
 
 _BLOCK_SIZE = 336
 """Vehicles advanced together; the data of a step then fits the first-level cache."""
@@ -42,7 +48,7 @@ def can_compile() -> bool:
 
 
 def rates(
-    planner: LawPlanner,
+    planner: Planner,
     q: ArrayLike,
     targets: ArrayLike,
     dt: float,
@@ -51,32 +57,34 @@ def rates(
     """Body rates of many vehicles: for each vehicle the result of `planner.rates`.
 
     Args:
-        planner: gives the law and its constants.
+        planner: gives the law and its constants; one without memory.
         q: (4, n) attitudes w, x, y, z, body → world.
         targets: (4, n) coefficients north and east, heading in rad, heading rate in rad/s.
-        dt: the sample period, s.
+        dt: the sample period, s; positive and finite.
         compiled: True: numba. False: Python. None: numba, if installed, from `COMPILE_FROM` steps
-            on.
+            on, for a law that is a function at the top of a module.
 
     Returns:
         (3, n) roll, pitch, yaw in rad/s, body FRD. The results of numba and Python differ by about
         1e-15 rad/s; with the law `exact`, the angles of one sample (rate · dt) by 1e-15 rad.
 
     Raises:
+        InvalidPeriodError: `dt` is not positive and finite.
         InvalidQuaternionError: an attitude is not a unit quaternion.
         InvalidTargetError: a value of a target is not finite or far too large.
         MissingExtraError: `compiled` is True and numba is not installed.
-        TypeError: the planner keeps state between samples; a batch needs one without memory.
+        TypeError: the planner keeps state between samples, or its law is no plain function and is
+            to be compiled.
         ValueError: the shapes of `q` and `targets` are wrong or differ.
     """
-    q, targets, loops = _prepared(planner, q, targets, 1, compiled)
+    planner, q, targets, loops = _prepared(planner, q, targets, dt, 1, compiled)
     out = np.empty((3, q.shape[1]))
     loops.apply(q, targets, out, dt, planner.constants)
     return out
 
 
 def advance(
-    planner: LawPlanner,
+    planner: Planner,
     q: ArrayLike,
     targets: ArrayLike,
     dt: float,
@@ -85,9 +93,10 @@ def advance(
 ) -> Array:
     """Attitudes (4, n) after `steps` samples, each with constant body rates.
 
-    Arguments and errors are those of `rates`; a negative `steps` raises ValueError.
+    Arguments and errors are those of `rates`; `steps` that are negative raise ValueError, and
+    `steps` that are no integer TypeError.
     """
-    q, targets, loops = _prepared(planner, q, targets, steps, compiled)
+    planner, q, targets, loops = _prepared(planner, q, targets, dt, steps, compiled)
     after = _advanced(loops, planner, q, targets, dt, steps)
     if _turned_too_far(loops, after):
         loops = compiled_loops(planner.law, any_angle=True)
@@ -96,7 +105,7 @@ def advance(
 
 
 def simulate(
-    planner: LawPlanner,
+    planner: Planner,
     q: ArrayLike,
     targets: ArrayLike,
     dt: float,
@@ -104,7 +113,7 @@ def simulate(
     compiled: bool | None = None,
 ) -> History:
     """As `advance`, but returns the attitudes and body rates of all samples."""
-    q, targets, loops = _prepared(planner, q, targets, steps, compiled)
+    planner, q, targets, loops = _prepared(planner, q, targets, dt, steps, compiled)
     history = History(np.empty((steps + 1, *q.shape)), np.empty((steps, 3, q.shape[1])))
     history.q[0] = q
     loops.record(history.q, targets, history.rates, dt, planner.constants)
@@ -124,37 +133,71 @@ def coefficients(q: ArrayLike) -> Array:
 
     Returns:
         (..., 2, n) north, east.
+
+    Raises:
+        ValueError: the last dimension but one has not four components.
     """
-    _, ax, ay = tilt_products(*np.moveaxis(np.asarray(q, dtype=np.float64), -2, 0))
+    rows = np.asarray(q, dtype=np.float64)
+    if rows.ndim < 2 or rows.shape[-2] != _COMPONENTS:
+        raise ValueError(f"q must have the shape (..., 4, n), not {rows.shape}")
+    _, ax, ay = tilt_products(*np.moveaxis(rows, -2, 0))
     return np.stack([-2.0 * np.asarray(ay), 2.0 * np.asarray(ax)], axis=-2)
 
 
 def _prepared(
-    planner: LawPlanner, q: ArrayLike, targets: ArrayLike, steps: int, compiled: bool | None
-) -> tuple[Array, Array, Loops]:
-    """The attitudes normalised, the targets limited, and the loops to use."""
+    planner: Planner,
+    q: ArrayLike,
+    targets: ArrayLike,
+    dt: float,
+    steps: int,
+    compiled: bool | None,
+) -> tuple[LawPlanner, Array, Array, Loops]:
+    """The planner, the attitudes normalised, the targets limited, and the loops to use."""
     if not isinstance(planner, LawPlanner):
         raise TypeError(
-            f"a batch maps planners without memory ({', '.join(LAW_NAMES)}), and "
-            f"{type(planner).__name__} remembers its plan; make one planner for each vehicle, and "
-            "call its rates() for each sample"
+            f"a batch maps planners without memory ({', '.join(LAW_NAMES)}, or a law of your own, "
+            f"each made by make_planner), not {type(planner).__name__}; make one planner for each "
+            "vehicle, and call its rates() for each sample"
         )
     q, targets = as_rows(q, "q"), as_rows(targets, "targets")
     if q.shape != targets.shape:
         raise ValueError(f"{q.shape[1]} attitudes, but {targets.shape[1]} targets")
-    if steps < 0:
+    require_period(dt)
+    if index(steps) < 0:
         raise ValueError(f"steps must not be negative, not {steps}")
     if compiled is None:
-        compiled = q.shape[1] * steps >= COMPILE_FROM and can_compile()
+        worth_it = q.shape[1] * steps >= COMPILE_FROM
+        compiled = worth_it and can_compile() and _is_plain_function(planner.law)
     longest_target = planner.constants.longest_target
     if compiled:
         require("numba", "study", "a compiled batch")
+        _require_plain_function(planner.law)
         loops = compiled_loops(planner.law)
         if compiled_check()(q, targets, longest_target):
-            return q, targets, loops
+            return planner, q, targets, loops
     else:
         loops = plain_loops(planner.law)
-    return unit_quaternions(q), limited_targets(targets, longest_target), loops
+    return planner, unit_quaternions(q), limited_targets(targets, longest_target), loops
+
+
+def _is_plain_function(law: Law) -> bool:
+    """Whether a law can be compiled: no object with __call__, no function in a function."""
+    return isinstance(law, FunctionType) and not (law.__closure__ or law.__defaults__)
+
+
+def _require_plain_function(law: Law) -> None:
+    """Refuse a law that cannot be compiled.
+
+    Raises:
+        TypeError: the law is no function, has default arguments, or uses variables of the function
+            around it.
+    """
+    if not _is_plain_function(law):
+        raise TypeError(
+            f"the law {getattr(law, '__name__', law)!r} cannot be compiled: write it as a function "
+            "at the top of a module, without default arguments and without variables of a function "
+            "around it, or pass compiled=False"
+        )
 
 
 def _turned_too_far(loops: Loops, q: Array) -> bool:

@@ -28,7 +28,7 @@ _MAX_DEPTH = 4
 """Largest depth of nested includes."""
 
 
-def load(path: Path) -> Config:
+def load(path: Path | str) -> Config:
     """Read and check a configuration file and the files that it includes.
 
     Keys of a file override those of its includes; a later include overrides an earlier one.
@@ -37,6 +37,7 @@ def load(path: Path) -> Config:
         ConfigError: a file is missing, includes itself or too many files, is not YAML, or holds an
             unknown key or a bad value.
     """
+    path = Path(path)
     if is_table(path):
         raise ConfigError(
             f"{path} is a table of a trajectory, not a configuration; fly it with --trajectory"
@@ -187,7 +188,13 @@ def changed(config: Config, changes: Mapping[str, Mapping[str, Any]], name: str)
     """
     data = config.model_dump()
     for section, values in changes.items():
-        data[section].update(values)
+        known = data.get(section)
+        if isinstance(known, dict) and isinstance(values, Mapping):
+            known.update(values)
+        elif section == "include":
+            raise ConfigError(f"{name}: `include` belongs in a file; load that file instead")
+        else:  # is refused below, with the key that was probably meant
+            data[section] = values
     return yaml_file.validated(data, name, Config)
 
 

@@ -204,13 +204,13 @@ def is_table(path: Path) -> bool:
     return path.suffix.lower() == ".csv"
 
 
-def load(path: Path) -> Trajectory:
+def load(path: Path | str) -> Trajectory:
     """Load the trajectory of a file; see `read`.
 
     Raises:
         ConfigError: see `read`.
     """
-    return read(path).trajectory
+    return read(Path(path)).trajectory
 
 
 def read(path: Path) -> LoadedTrajectory:

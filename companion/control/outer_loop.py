@@ -1,6 +1,8 @@
 """Builds the outer loop from the configuration: guidance, motion estimate, predictive control."""
 
 from collections.abc import Callable
+from math import isfinite
+from typing import cast
 
 from companion import plugins
 from companion.attitude.reference_model import model_lag
@@ -17,14 +19,18 @@ from companion.control.inner_loop import (
 )
 from companion.control.motion_estimate import MotionEstimate
 from companion.control.predictive import Predictive
+from companion.drag import NO_DRAG
 from companion.files.yaml_file import ConfigError
 from companion.guidance import (
     IMMEDIATE,
     DragEstimate,
+    GuidanceInput,
     HeightGains,
     LinearGuidance,
     LinearSettings,
     MotionObserver,
+    Reference,
+    VehicleMotion,
 )
 from companion.guidance.follow import Follow
 from companion.guidance.linear import Guidance
@@ -39,8 +45,8 @@ def make_guidance(config: Config) -> Guidance:
     """Linear guidance, or the guidance of another package that `guidance.kind` names.
 
     Raises:
-        ConfigError: the guidance of another package cannot be loaded or made, or the gains of the
-            position hold cannot be computed.
+        ConfigError: the guidance of another package cannot be loaded or made, or fails a trial; or
+            the gains of the position hold cannot be computed.
     """
     kind = config.guidance.kind
     try:
@@ -54,10 +60,42 @@ def make_guidance(config: Config) -> Guidance:
         return LinearGuidance(settings)
     factory = plugin("guidance.kind", plugins.GUIDANCE, kind)
     try:
-        made: Guidance = factory(settings)
+        # Guidance may remember the trial, so the one that flies is another.
+        tried, flown = factory(settings), factory(settings)
     except Exception as error:
         raise ConfigError(f"guidance.kind: {kind} cannot be made: {error!r}") from error
-    return made
+    _require_command(kind, tried, thrust_limits(config))
+    return cast(Guidance, flown)
+
+
+def _require_command(kind: str, guidance: Guidance, thrust: tuple[float, float]) -> None:
+    """Ask guidance of another package once, to hold a vehicle that is at rest.
+
+    Args:
+        kind: its name in `guidance.kind`.
+        guidance: the guidance.
+        thrust: smallest and largest specific thrust, m/s².
+
+    Raises:
+        ConfigError: it raises, or does not return a `LinearCommand` of finite numbers.
+    """
+    rest = VehicleMotion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    inputs = GuidanceInput(rest, rest, (0.0, 0.0), (0.0, 0.0), NO_DRAG, thrust)
+    try:
+        command = guidance.command(lambda _: Reference(rest.position_ned), 0.0, inputs)
+        target, later, down = command
+        numbers = (guidance.acts_after, *target, *later, down)
+        finite = all(map(isfinite, numbers))
+    except (Exception, SystemExit) as error:
+        raise ConfigError(
+            f"guidance.kind: {kind} cannot be flown: {error!r}; guidance is a class as "
+            "companion.guidance.linear.Guidance"
+        ) from error
+    if not finite:
+        raise ConfigError(
+            f"guidance.kind: {kind} cannot be flown: at rest it returned {command} and acts after "
+            f"{guidance.acts_after} s"
+        )
 
 
 def linear_settings(config: Config) -> LinearSettings:

@@ -13,7 +13,7 @@ from companion.attitude import (
     Target,
 )
 from companion.attitude.history import PlannedTilt
-from companion.attitude.model_following import ModelFollowingPlanner
+from companion.attitude.model_following import SHORTEST_PERIOD, ModelFollowingPlanner
 from companion.attitude.rotation import limit_rates
 from companion.control.estimator_resets import EstimatorResets
 from companion.control.guidance_command import GuidanceCommand
@@ -122,7 +122,8 @@ class PlannerRunner:
         self._planned_at = sample.vehicle_time
         self._note_attitude_target(sample)
         self.asked = q, target
-        rates = self._planner.rates(q, target, period, sample.body_rates)
+        # A vehicle's clock that stood still or went back must not keep the sample unanswered.
+        rates = self._planner.rates(q, target, max(SHORTEST_PERIOD, period), sample.body_rates)
         return rates if self._passed_target is None else self._frame.rates(q, rates)
 
     def _note_attitude_target(self, sample: AttitudeSample) -> None:

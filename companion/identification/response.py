@@ -1,6 +1,7 @@
 """Response of one axis to body rates: the fit, its quality, and when it must not be used."""
 
 from dataclasses import dataclass
+from math import isnan
 
 from numpy.typing import ArrayLike
 
@@ -87,6 +88,11 @@ class RateResponse:
         fit, uncertainty = self.fit, max(self.fit.dead_time_error, self.fit.lag_error)
         low, high = needs.gain
         faults = (
+            (
+                isnan(self.dead_time) and fit.span == 0.0,
+                "too little excitation: no command changed while rates were measured; both need "
+                "times in s on one clock, and a command at least every 0.5 s",
+            ),
             (
                 fit.span < needs.span,
                 f"too little excitation: the commands span {fit.span:.2f} rad/s, "

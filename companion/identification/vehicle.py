@@ -1,15 +1,13 @@
 """Identifies a whole vehicle from the rows of one flight."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from companion.identification.response import RateResponse, fit_rate_response
 from companion.identification.thrust_map import ThrustMap, fit_thrust_map
 
-Rows = Sequence[Sequence[float]]
 Floats = NDArray[np.float64]
 
 _ASSUMED_GAIN = 1.0
@@ -45,7 +43,9 @@ class IdentifiedVehicle:
         return {name: reason for name, reason in reasons.items() if reason is not None}
 
 
-def identify_vehicle(setpoints: Rows, rates: Rows, specific_thrust: Rows) -> IdentifiedVehicle:
+def identify_vehicle(
+    setpoints: ArrayLike, rates: ArrayLike, specific_thrust: ArrayLike
+) -> IdentifiedVehicle:
     """Fit each axis and the thrust map.
 
     Lag and dead time are fitted for a first-order rate loop of gain 1, as planners assume it. For
@@ -60,8 +60,8 @@ def identify_vehicle(setpoints: Rows, rates: Rows, specific_thrust: Rows) -> Ide
     Raises:
         ValueError: rows have another number of columns.
     """
-    commands, measured = _as_array(setpoints, 5), _as_array(rates, 4)
-    accelerations = _as_array(specific_thrust, 2)
+    commands, measured = _rows("setpoints", setpoints, 5), _rows("rates", rates, 4)
+    accelerations = _rows("specific_thrust", specific_thrust, 2)
     roll, pitch, yaw = (_axis_response(commands, measured, axis) for axis in (1, 2, 3))
     thrust = fit_thrust_map(
         commands[:, 0], commands[:, 4], accelerations[:, 0], accelerations[:, 1]
@@ -69,8 +69,18 @@ def identify_vehicle(setpoints: Rows, rates: Rows, specific_thrust: Rows) -> Ide
     return IdentifiedVehicle(roll, pitch, yaw, thrust)
 
 
-def _as_array(rows: Rows, columns: int) -> Floats:
-    return np.array(rows, dtype=np.float64).reshape(len(rows), columns)
+def _rows(name: str, rows: ArrayLike, columns: int) -> Floats:
+    """The rows as an array (n, columns); an empty list has no rows.
+
+    Raises:
+        ValueError: it has another shape; `name` is the argument in the message.
+    """
+    array = np.asarray(rows, dtype=np.float64)
+    if array.size == 0:
+        return np.empty((0, columns))
+    if array.ndim != 2 or array.shape[1] != columns:
+        raise ValueError(f"{name} must have the shape (n, {columns}), not {array.shape}")
+    return array
 
 
 def _axis_response(commands: Floats, measured: Floats, axis: int) -> RateResponse:

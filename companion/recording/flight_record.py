@@ -83,9 +83,11 @@ class FlightRecord:
         """All rows of a channel of numbers, such as "sample" or "guidance", in the file's order.
 
         Raises:
-            KeyError: there is no such channel.
+            KeyError: there is no such channel; the message names all.
             RecordError: a message is not valid.
         """
+        if name not in _BY_NAME:
+            raise KeyError(f"no channel {name!r}; there are {', '.join(_BY_NAME)}")
         if name not in self._rows:
             channel = _BY_NAME[name]
             with as_recorded(self.folder):
@@ -175,7 +177,7 @@ class FlightRecord:
             return [cdr.fields_of(data, numbers, texts) for _, data in messages]
 
 
-def read_flight(folder: Path) -> FlightRecord:
+def read_flight(folder: Path | str) -> FlightRecord:
     """Read the record in the folder of a flight.
 
     The record is empty if the flight was killed before it recorded anything.
@@ -184,6 +186,7 @@ def read_flight(folder: Path) -> FlightRecord:
         RecordError: there is no record, it cannot be read, or another version wrote it with other
             columns.
     """
+    folder = Path(folder)
     if folder.is_file():
         raise RecordError(f"{folder} is a file; name the folder of the flight: {folder.parent}")
     path = folder / FILE

@@ -5,12 +5,13 @@ from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 
+from companion.api.connection import Configuration, as_config
 from companion.config.files import changed
 from companion.mavlink.framing import FrameScanner
 from companion.mavlink.messages import CRC_EXTRA, Message, dialect
 from companion.serve.network.client import Client
 from companion.serve.session import ServeSession
-from companion.testing.flying import Configuration, as_config, environment, in_memory
+from companion.testing.flying import environment, in_memory
 from companion.testing.vehicle import MockVehicle
 
 _POLL_PERIOD = 0.02

@@ -18,6 +18,7 @@ from companion.attitude import (
     coefficients,
     make_planner,
 )
+from companion.attitude.planner import MODEL_FOLLOWING
 from companion.attitude.rotation import after_constant_rates
 from companion.testing.flying import fly
 from companion.testing.vehicle import MockVehicle
@@ -45,6 +46,8 @@ def check_planner(planner: str | Law | type[Planner], seed: int = 0) -> None:
         AssertionError: it may not fly; the message gives the attitude or target at which it began,
             and the target that it followed.
         PluginError: the plug-in cannot be loaded, or two packages give it.
+        TypeError: it is no planner: the law does not return three numbers, or the class has not
+            the methods of a planner.
         ValueError: there is no planner of that name.
     """
     if isinstance(planner, str) and planner in plugins.names(plugins.PLANNERS):
@@ -102,13 +105,27 @@ _SAFE_PARAMETERS = {"ardupilot": {"GUID_OPTIONS": 8, "ATC_ANGLE_BOOST": 0, "GUID
 
 
 def _make(planner: str | Law | type[Planner]) -> Planner:
-    return make_planner(planner, gain=_GAIN, limits=_LIMITS)
+    # The attitudes here follow the rates at once, so that is what the planner is told.
+    times = {"lag": 0.0, "dead_time": 0.0} if planner == MODEL_FOLLOWING else {}
+    return make_planner(planner, gain=_GAIN, limits=_LIMITS, **times)
+
+
+def _rates(planner: Planner, q: Quaternion, target: Target, body_rates: BodyRates) -> BodyRates:
+    """The planner's body rates.
+
+    Raises:
+        AssertionError: it raised an error, or did not return three numbers.
+    """
+    try:
+        return BodyRates(*map(float, planner.rates(q, target, _DT, body_rates)))
+    except Exception as error:
+        raise AssertionError(f"it raised {error!r}, at q = {q} towards {target}") from error
 
 
 def _first_rates(planner: str | Law | type[Planner], q: Quaternion, target: Target) -> BodyRates:
     instance, still = _make(planner), BodyRates(0.0, 0.0, 0.0)
     instance.reset(q, still)
-    return BodyRates(*instance.rates(q, target, _DT, still))
+    return _rates(instance, q, target, still)
 
 
 def _check_convergence(planner: str | Law | type[Planner], begin: Target, end: Target) -> None:
@@ -116,7 +133,7 @@ def _check_convergence(planner: str | Law | type[Planner], begin: Target, end: T
     q = attitude(Coefficients(begin.north, begin.east), begin.heading)
     instance.reset(q, rates)
     for _ in range(round(_SETTLING_TIME / _DT)):
-        rates = BodyRates(*instance.rates(q, end, _DT, rates))
+        rates = _rates(instance, q, end, rates)
         q = after_constant_rates(q, rates, _DT)
     reached = coefficients(q)
     remaining = hypot(reached.north - end.north, reached.east - end.east)

@@ -2,15 +2,15 @@
 
 import asyncio
 import gc
-from collections.abc import AsyncGenerator, Coroutine, Iterator, Mapping
+from collections.abc import AsyncGenerator, Coroutine, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
-from companion.api.connection import flying
+from companion.api.connection import Configuration, as_config, flying
 from companion.api.vehicle import Vehicle
 from companion.config import Config
-from companion.config.files import changed, load
+from companion.config.files import changed
 from companion.files.yaml_file import ConfigError
 from companion.flight.environment import Environment
 from companion.flight.flight import AskLanding
@@ -22,9 +22,6 @@ from companion.testing.virtual_loop import VirtualClock, VirtualEventLoop
 from companion.testing.wire import open_wire, wire_to
 
 T = TypeVar("T")
-
-Configuration = Config | Path | str | Mapping[str, Mapping[str, Any]]
-"""A configuration, its file, or the keys by section that differ from the defaults."""
 
 
 class UnseenError(RuntimeError):
@@ -40,6 +37,7 @@ def run(vehicle: MockVehicle, main: Coroutine[Any, Any, T]) -> T:
     Raises:
         KeyboardInterrupt: Ctrl-C came, even if the flight then ended and returned.
         UnseenError: a task or callback failed, and the error was not handled.
+        ValueError: `main` is no coroutine.
     """
     unseen: list[dict[str, Any]] = []
 
@@ -47,6 +45,8 @@ def run(vehicle: MockVehicle, main: Coroutine[Any, Any, T]) -> T:
         clock = VirtualClock(vehicle.time)
         return VirtualEventLoop(clock, wire_to(vehicle, clock))
 
+    if not asyncio.iscoroutine(main):
+        raise ValueError(f"a coroutine was expected, as in run(vehicle, main()), not {main!r}")
     with _without_garbage_collection(), asyncio.Runner(loop_factory=make_loop) as runner:
         runner.get_loop().set_exception_handler(lambda _, context: unseen.append(context))
         result = runner.run(_cancelled_by_ctrl_c(main))
@@ -91,7 +91,7 @@ environment = Environment(open_wire, _loop_time_ns, realtime=False)
 def session(
     config: Configuration,
     vehicle: MockVehicle,
-    folder: Path | None = None,
+    folder: Path | str | None = None,
     observer: Observer | None = None,
     ask_landing: AskLanding | None = None,
 ) -> Session:
@@ -104,11 +104,12 @@ def session(
         ConfigError: the configuration is wrong.
     """
     flown_config = in_memory(as_config(config), vehicle)
-    if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)
+    records = None if folder is None else Path(folder)
+    if records is not None:
+        records.mkdir(parents=True, exist_ok=True)
     return Session(
         flown_config,
-        folder,
+        records,
         observer or SilentObserver(),
         ask_landing or decline_landing,
         environment=environment,
@@ -118,7 +119,7 @@ def session(
 def fly(
     config: Configuration,
     vehicle: MockVehicle,
-    folder: Path | None = None,
+    folder: Path | str | None = None,
     observer: Observer | None = None,
     ask_landing: AskLanding | None = None,
 ) -> Summary:
@@ -147,7 +148,7 @@ def fly(
 async def connect(
     config: Configuration,
     vehicle: MockVehicle,
-    folder: Path | None = None,
+    folder: Path | str | None = None,
     observer: Observer | None = None,
 ) -> AsyncGenerator[Vehicle, None]:
     """Like `companion.connect`, for a mock vehicle in memory, inside `run`.
@@ -161,9 +162,15 @@ async def connect(
     Raises:
         ConfigError: the configuration is wrong.
         FlightEnded, LinkError, OSError: see `companion.connect`.
+        RuntimeError: it was called outside `run`.
     """
+    if not isinstance(asyncio.get_running_loop(), VirtualEventLoop):
+        raise RuntimeError(
+            "connect flies on the vehicle's clock: call it inside run(vehicle, main())"
+        )
     flown_config = in_memory(as_config(config), vehicle)
-    async with flying(flown_config, folder, observer, environment) as connected:
+    records = None if folder is None else Path(folder)
+    async with flying(flown_config, records, observer, environment) as connected:
         yield connected
 
 
@@ -178,16 +185,3 @@ def in_memory(config: Config, vehicle: MockVehicle) -> Config:
     if config.link.lockstep != vehicle.in_lockstep:
         return changed(config, {"link": {"lockstep": vehicle.in_lockstep}}, "the vehicle")
     return config
-
-
-def as_config(config: Configuration) -> Config:
-    """The configuration, complete.
-
-    Raises:
-        ConfigError: the configuration is wrong.
-    """
-    if isinstance(config, Config):
-        return config
-    if isinstance(config, Mapping):
-        return changed(Config(), config, "the configuration")
-    return load(Path(config))

@@ -81,7 +81,8 @@ class MockVehicle:
         autopilot_key = {} if autopilot is None else {"autopilot": autopilot}
         lockstep_key = {"lockstep": {"enabled": True, **lockstep}}
         # Without a socket, telemetry for a ground station would be built for nobody.
-        whole = load_settings(config, {**autopilot_key, **settings, **lockstep_key, "gcs_port": 0})
+        overrides = {**autopilot_key, **settings, **lockstep_key, "gcs_port": 0}
+        whole = load_settings(config, overrides, "MockVehicle")
         self.autopilot: str = whole.autopilot
         self.in_lockstep, self.delay_s = whole.lockstep.enabled, delay_s
         self.setpoints: list[ReceivedSetpoint] = []

@@ -47,7 +47,7 @@ class FlightLog:
     specific_thrust: list[Row]
 
 
-def read_flight_log(path: Path) -> FlightLog:
+def read_flight_log(path: Path | str) -> FlightLog:
     """Read a `.tlog` of this or another program.
 
     A setpoint of this program carries the time stamp of the sample to which it responds. A setpoint
@@ -58,7 +58,7 @@ def read_flight_log(path: Path) -> FlightLog:
         LogError: the file cannot be read, is damaged, is not a `.tlog`, or has no heartbeat of a
             supported autopilot, or no setpoint that the autopilot obeyed.
     """
-    reader = _Reader()
+    path, reader = Path(path), _Reader()
     for frame, message in messages(path, _MESSAGE_NAMES):
         reader.take((frame.system, frame.component), message)
     if reader.vehicle is None:

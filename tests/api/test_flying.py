@@ -210,10 +210,10 @@ async def returns_infinity(control):
         ("ardupilot", stops, companion.FlightEnded, "the program gave no new command for"),
         ("px4", raises, ZeroDivisionError, "the program raised ZeroDivisionError('mine')"),
         ("ardupilot", raises, ZeroDivisionError, "the program raised ZeroDivisionError('mine')"),
-        ("px4", returns_nan, ValueError, "a command must be finite"),
-        ("ardupilot", returns_nan, ValueError, "a command must be finite"),
-        ("ardupilot", forgets_an_axis, ValueError, "each vector must have three components"),
-        ("px4", returns_infinity, ValueError, "a command must be finite"),
+        ("px4", returns_nan, ValueError, "acceleration_ned must be three finite numbers"),
+        ("ardupilot", returns_nan, ValueError, "acceleration_ned must be three finite numbers"),
+        ("ardupilot", forgets_an_axis, ValueError, "acceleration_ned must be three finite numbers"),
+        ("px4", returns_infinity, ValueError, "body_rates must be three finite numbers"),
     ],
 )
 def test_a_program_that_fails_leaves_the_vehicle_held_and_handed_back(
@@ -286,7 +286,7 @@ def test_what_the_limits_do_not_allow_is_refused_and_the_vehicle_holds_on(tmp_pa
         with pytest.raises(ConfigError, match="is the longest"):
             await vehicle.follow(line((1e4, 0.0, 0.0), 2.9, 1e-3, 1e-3))
         for seconds in (-1.0, float("nan")):
-            with pytest.raises(ValueError, match="0 s or more"):
+            with pytest.raises(ValueError, match=r"0 s or more|finite number"):
                 await vehicle.hold(seconds)
         await vehicle.hold(2.0)
         assert dist(here, vehicle.state.position_ned) < 0.1

@@ -77,6 +77,18 @@ class Drifting(LinearGuidance):
             return reference._replace(position_ned=(north + 3.0, east, down))
         return super().command(aside, time, inputs)
 
+class Half:
+    def __init__(self, settings):
+        pass
+
+class Empty(LinearGuidance):
+    def command(self, reference_at, time, inputs):
+        return None
+
+class Nowhere(LinearGuidance):
+    def command(self, reference_at, time, inputs):
+        return super().command(reference_at, time, inputs)._replace(down=float("nan"))
+
 class Broken(LinearGuidance):
     def command(self, reference_at, time, inputs):
         target, later, down = super().command(reference_at, time, inputs)
@@ -103,6 +115,9 @@ calm = theirs:Calm
 drifting = theirs:Drifting
 number = theirs:number
 broken = theirs:Broken
+half = theirs:Half
+empty = theirs:Empty
+nowhere = theirs:Nowhere
 """
 
 
@@ -204,10 +219,13 @@ def test_a_plug_in_that_cannot_be_loaded_is_one_sentence():
     ("text", "why"),
     [
         ("planner: {name: nothing}", r"the planner returned \(nan"),
-        ("planner: {name: pair}", "expected 3, got 2"),
+        ("planner: {name: pair}", r"returned \(0.0, 0.0\), not three"),
         ("planner: {name: raising}", r"failed: RuntimeError\('no'\); `companion.testing.check_pl"),
         ("planner: {name: number}", "unknown planner 5"),
         ("guidance: {kind: number}", "guidance.kind: number cannot be made: TypeError"),
+        ("guidance: {kind: half}", "half cannot be flown: AttributeError.*linear.Guidance"),
+        ("guidance: {kind: empty}", "empty cannot be flown: TypeError.*NoneType.*linear.Guidance"),
+        ("guidance: {kind: nowhere}", "nowhere cannot be flown: at rest it returned .*down=nan"),
     ],
 )
 def test_what_cannot_fly_is_found_before_the_vehicle_is_asked(text, why, tmp_path, capsys):
@@ -247,6 +265,16 @@ def test_good_planners_conform(name):
 def test_bad_planners_do_not(name, why):
     with pytest.raises(AssertionError, match=why):
         check_planner(name)
+
+
+def test_a_planner_that_raises_does_not_conform():
+    def fails(q, target, dt, constants):
+        if q != (1.0, 0.0, 0.0, 0.0):
+            raise RuntimeError("not at this attitude")
+        return 0.0, 0.0, 0.0
+
+    with pytest.raises(AssertionError, match=r"it raised RuntimeError.* at q = "):
+        check_planner(fails)
 
 
 @pytest.mark.usefixtures("quick")

@@ -80,7 +80,7 @@ class LedByTarget:
 def cross_track(turn, tell=lambda planner, plant, n: None, **options):
     limits = Limits(max_yaw_rate=1.0)
     planner = make_planner(
-        "model-following", 5.0, limits=limits, lag=LAG, yaw_lag=YAW_LAG, **options
+        "model-following", 5.0, limits=limits, lag=LAG, dead_time=0.0, yaw_lag=YAW_LAG, **options
     )
     plant, off = LedByTarget(attitudes(START, HEADING)[0]), []
     for n in range(375):

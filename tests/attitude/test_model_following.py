@@ -342,7 +342,7 @@ quaternions = (
 samples_of = st.tuples(
     quaternions,
     st.builds(Target, st.floats(-2, 2), st.floats(-2, 2), st.floats(-9, 9), st.floats(-3, 3)),
-    st.sampled_from([-1.0, 0.0, 1e-9, 0.003, 0.01, 0.1, 5.0, math.inf, math.nan]),
+    st.sampled_from([1e-300, 1e-9, 0.003, 0.01, 0.1, 5.0, 1e9]),
     st.one_of(st.none(), st.builds(BodyRates, *[st.floats(-30, 30)] * 3)),
 )
 delays = st.sampled_from([0.0, 0.004, 0.05, 0.4])

@@ -10,6 +10,7 @@ from companion.attitude import (
     LAW_NAMES,
     BodyRates,
     Coefficients,
+    InvalidPeriodError,
     InvalidQuaternionError,
     InvalidTargetError,
     Limits,
@@ -234,7 +235,66 @@ def test_each_axis_of_model_following_has_its_own_response(axis):
 
 
 def test_the_yaw_rate_of_model_following_stays_within_its_limit():
-    planner = make_planner("model-following", 5.0, 4.0, Limits(max_yaw_rate=0.3), lag=0.05)
+    planner = make_planner(
+        "model-following", 5.0, 4.0, Limits(max_yaw_rate=0.3), lag=0.05, dead_time=0.0
+    )
     planner.reset(LEVEL)
     found = [planner.rates(LEVEL, Target(0.0, 0.0, 2.0), 0.01).yaw for _ in range(50)]
     assert max(found) == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize("dt", [0.0, -0.01, math.nan, math.inf])
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [*((name, {}) for name in LAW_NAMES), ("model-following", {"lag": 0.05, "dead_time": 0.04})],
+)
+def test_a_period_that_is_not_positive_and_finite_is_refused(name, options, dt):
+    planner = make_planner(name, **options)
+    with pytest.raises(InvalidPeriodError, match="dt must be positive"):
+        planner.rates(LEVEL, Target(0.2, 0.0, 0.0), dt)
+
+
+@every_planner
+def test_none_is_no_target_from_the_first_sample_on(name):
+    planner = make_planner(name)
+    for _ in range(2):
+        with pytest.raises(InvalidTargetError, match="three or four numbers"):
+            planner.rates(LEVEL, None, 0.01)
+
+
+@pytest.mark.parametrize("options", [{}, {"lag": 0.05}, {"dead_time": 0.04}])
+def test_model_following_needs_the_times_of_the_rate_loop(options):
+    with pytest.raises(ValueError, match="needs lag and dead_time"):
+        make_planner("model-following", **options)
+
+
+@pytest.mark.parametrize("returned", [(1.0, 2.0), None, 3.0, ("a", "b", "c"), (1.0, 2.0, None)])
+def test_a_law_that_does_not_return_three_numbers_is_refused_when_it_is_made(returned):
+    def mine(q, target, dt, constants):
+        return returned
+
+    with pytest.raises(TypeError, match=r"the law 'mine' returned .* three numbers"):
+        make_planner(mine)
+
+
+def test_a_class_without_a_method_of_a_planner_is_refused():
+    class Halfway:
+        def __init__(self, constants):
+            self.constants = constants
+
+        def rates(self, q, target, dt, body_rates=None):
+            return 0.0, 0.0, 0.0
+
+    with pytest.raises(TypeError, match=r"Halfway is no planner: it has no method reset\(\)"):
+        make_planner(Halfway)
+
+
+def test_an_option_of_another_planner_is_named_with_the_planner():
+    with pytest.raises(TypeError, match="'exact' does not take the option 'lag'"):
+        make_planner("exact", lag=0.05)
+
+
+@pytest.mark.parametrize("limits", [None, {"max_tilt": 0.5}])
+def test_limits_are_limits(limits):
+    with pytest.raises(TypeError, match=r"companion\.attitude\.Limits"):
+        make_planner("exact", limits=limits)

@@ -113,3 +113,9 @@ def test_wrap_angle(angle):
 
 def test_coefficients_of_length_one_lie_on_the_horizon():
     assert coefficients(attitude(Coefficients(0.0, -1.0), 0.4)) == pytest.approx((0.0, -1.0))
+
+
+@pytest.mark.parametrize("angle", [math.nan, math.inf])
+def test_an_attitude_has_a_finite_heading(angle):
+    with pytest.raises(ValueError, match="a heading must be finite"):
+        attitude(Coefficients(0.2, 0.0), angle)

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from companion import batch
 from companion.attitude import (
     LAW_NAMES,
+    InvalidPeriodError,
     InvalidQuaternionError,
     InvalidTargetError,
     Limits,
@@ -217,3 +218,55 @@ def test_a_planner_with_memory_is_refused_in_a_sentence():
         batch.advance(planner, level, ahead, DT, 3)
     with pytest.raises(TypeError, match=words):
         batch.simulate(planner, level, ahead, DT, 3)
+
+
+@pytest.mark.parametrize("dt", [0.0, -0.004, math.nan, math.inf])
+@pytest.mark.parametrize("call", [batch.rates, batch.advance, batch.simulate])
+def test_a_period_that_is_not_positive_and_finite_is_refused(call, dt):
+    steps = () if call is batch.rates else (3,)
+    planner = make_planner("first-order")
+    with pytest.raises(InvalidPeriodError, match="dt must be positive"):
+        call(planner, [[1.0], [0.0], [0.0], [0.0]], np.zeros((4, 1)), dt, *steps)
+
+
+@pytest.mark.parametrize("steps", [2.0, "2", None])
+def test_steps_are_an_integer(steps):
+    planner = make_planner("first-order")
+    with pytest.raises(TypeError, match="integer"):
+        batch.advance(planner, [[1.0], [0.0], [0.0], [0.0]], np.zeros((4, 1)), 0.01, steps)
+
+
+@pytest.mark.parametrize("shape", [(4,), (7, 4), (3, 7), (2, 3, 7)])
+def test_coefficients_of_another_shape_are_refused(shape):
+    with pytest.raises(ValueError, match=r"shape \(\.\.\., 4, n\), not"):
+        batch.coefficients(np.zeros(shape))
+
+
+def law_with_a_closure(factor):
+    def law(q, target, dt, constants):
+        return factor, 0.0, 0.0
+
+    return law
+
+
+class CallableLaw:
+    def __call__(self, q, target, dt, constants):
+        return 1.0, 0.0, 0.0
+
+
+def law_with_a_default(q, target, dt, constants, factor=1.0):
+    return factor, 0.0, 0.0
+
+
+@pytest.mark.parametrize("law", [law_with_a_closure(1.0), CallableLaw(), law_with_a_default])
+def test_a_law_that_cannot_be_compiled_is_named_and_is_mapped_in_python(law):
+    q, planner = [[1.0], [0.0], [0.0], [0.0]], make_planner(law)
+    assert batch.rates(planner, q, np.zeros((4, 1)), 0.01, compiled=False)[0] == 1.0
+    with pytest.raises(TypeError, match=r"cannot be compiled.*compiled=False"):
+        batch.rates(planner, q, np.zeros((4, 1)), 0.01, compiled=True)
+
+
+def test_a_large_batch_maps_a_law_that_cannot_be_compiled_in_python(monkeypatch):
+    monkeypatch.setattr("companion.batch.batch.COMPILE_FROM", 1)
+    planner = make_planner(law_with_a_closure(1.0))
+    assert batch.rates(planner, [[1.0], [0.0], [0.0], [0.0]], np.zeros((4, 1)), 0.01)[0] == 1.0

@@ -8,8 +8,10 @@ import pytest
 
 from companion.attitude import BodyRates, Limits, Target, make_planner
 from companion.control.control_loop import ControlLoop
+from companion.control.estimator_resets import EstimatorResets
 from companion.control.guidance_command import GuidanceCommand
 from companion.control.loop_record import Deadlines, Unanswered
+from companion.control.planner_runner import PlannerRunner
 from companion.guidance import HoverThrust, ThrustSettings
 from companion.mavlink.codec import SetpointEncoder
 from companion.mavlink.errors import InvalidSetpoint
@@ -523,3 +525,17 @@ def test_an_unusable_sample_leaves_the_last_answer_to_the_next_one():
     assert len(bench.sent) == 10
     bench.run(3)
     assert [turning(rates) for _, rates, _ in bench.sent[10:]] == [False]
+
+
+@pytest.mark.parametrize("later", [0.0, -0.05])
+def test_a_sample_no_later_than_the_one_before_is_asked_with_a_positive_period(later):
+    """No planner takes a period of 0 s; the sample need not stay unanswered for that."""
+    planner = CountingPlanner()
+    runner = PlannerRunner(planner, EstimatorResets(), LIMITS)
+    command = GuidanceCommand(Target(0.1, 0.0, 0.0), 0.0, 10.0)
+    for vehicle_time in (3.0, 3.0 + later):
+        sample = AttitudeSample(
+            3000, vehicle_time, 10.0, 0, LEVEL, BodyRates(0.0, 0.0, 0.0), 0.0, 0.0
+        )
+        runner.rates(sample, command, 0.004)
+    assert planner.periods == [0.004, 1e-4]

@@ -290,7 +290,7 @@ def test_a_vehicle_is_identified_axis_by_axis_for_a_gain_of_one():
 def test_rows_with_another_number_of_columns_are_refused(wrong):
     columns = [5, 4, 2]
     columns[wrong] += 1
-    with pytest.raises(ValueError, match="reshape"):
+    with pytest.raises(ValueError, match=r"must have the shape \(n, \d\), not"):
         identify_vehicle(*(np.zeros((20, count)).tolist() for count in columns))
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from companion.identification import FitNeeds, fit_rate_response
+from companion.identification import FitNeeds, fit_rate_response, identify_vehicle
 
 from .vehicles import RATE_NOISE, Doublets, irregular, lag_with_dead_time, mock_axis, regular
 
@@ -168,3 +168,30 @@ def test_too_few_samples_and_too_much_doubt_are_refused():
 def test_times_without_their_values_are_an_error():
     with pytest.raises(ValueError, match="equally long"):
         fit_rate_response([0.0, 0.1], [0.0], [0.0], [0.0])
+
+
+def test_times_that_do_not_meet_are_named_as_the_reason():
+    """It said that the commands span 0.00 rad/s, of commands that span 2 rad/s."""
+    time = np.arange(0.0, 10.0, 0.004)
+    commanded = np.sign(np.sin(2.0 * time))
+    for scale, shift in ((1.0, 1000.0), (1000.0, 0.0)):  # another clock; ms
+        found = fit_rate_response(scale * time, commanded, scale * time + shift, commanded)
+        assert "both need times in s on one clock" in found.reason()
+
+
+@pytest.mark.parametrize(
+    ("name", "shapes"),
+    [
+        ("setpoints", ((9, 4), (9, 4), (0, 2))),
+        ("setpoints", ((5, 10), (9, 4), (0, 2))),
+        ("rates", ((9, 5), (4, 9), (0, 2))),
+        ("specific_thrust", ((9, 5), (9, 4), (9,))),
+    ],
+)
+def test_rows_of_another_shape_are_named(name, shapes):
+    with pytest.raises(ValueError, match=rf"{name} must have the shape \(n, \d\), not \("):
+        identify_vehicle(*map(np.zeros, shapes))
+
+
+def test_no_rows_are_no_thrust_map():
+    assert identify_vehicle([], [], []).thrust is None

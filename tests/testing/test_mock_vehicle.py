@@ -9,15 +9,18 @@ from pathlib import Path
 import pytest
 from pymavlink.dialects.v20 import common as dialect
 
+from companion.config.files import load
 from companion.files.yaml_file import ConfigError
 from companion.flight.observer import SilentObserver
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.settings import LinkSettings
+from companion.recording.flight_record import read_flight
 from companion.serve.session import ServeSession
 from companion.testing import (
     MockVehicle,
     Program,
     UnseenError,
+    connect,
     environment,
     fly,
     open_wire,
@@ -27,9 +30,16 @@ from companion.testing import (
 )
 from companion.testing.settings import mock_with
 from companion.testing.virtual_loop import VirtualClock
+from companion.vehicle.flight_log import read_flight_log
 from companion.vehicle.link import Link
 from sitl_mock.config.section import ConfigError as MockConfigError
-from tests.flight.fly import QUICK_PARAMETERS, QuickVehicle, attitude_rate_hz, quick_flight
+from tests.flight.fly import (
+    QUICK_FLIGHT,
+    QUICK_PARAMETERS,
+    QuickVehicle,
+    attitude_rate_hz,
+    quick_flight,
+)
 
 CONFIG = Path(__file__).parents[2] / "configs" / "mock-px4.yaml"
 BOTH_WAYS = pytest.mark.parametrize("lockstep", [True, False], ids=["lockstep", "free"])
@@ -299,3 +309,56 @@ def test_a_lockstep_clock_goes_only_forward():
     assert not clock.advance(5.0)
     assert not clock.advance(4.0)
     assert (clock.read(), clock.read_ns()) == (5.0, 5_000_000_000)
+
+
+def test_what_is_no_program_no_configuration_or_no_fault_is_refused_in_a_sentence():
+    mock = QuickVehicle()
+
+    async def main(config):
+        async with connect(config, mock):
+            pass
+
+    with pytest.raises(ValueError, match=r"coroutine was expected, as in run\(vehicle, main\(\)\)"):
+        run(mock, main)
+    with pytest.raises(TypeError, match="a configuration is a Config, a path or keys by section"):
+        run(mock, main(5))
+    with pytest.raises(ConfigError, match="`limit` is not a known key; did you mean `limits`"):
+        run(mock, main({"limit": {"max_tilt_deg": 20.0}}))
+    with pytest.raises(ConfigError, match="`flight` is a section"):
+        run(mock, main({"flight": 5}))
+    with pytest.raises(ConfigError, match="`include` belongs in a file"):
+        run(mock, main({"include": "px4.yaml"}))
+    with pytest.raises(RuntimeError, match=r"call it inside run\(vehicle, main\(\)\)"):
+        asyncio.run(main({}))
+    with pytest.raises(MockConfigError, match="a fault is written as"):
+        mock.inject("gps_loss")
+    with pytest.raises(
+        MockConfigError, match=r"MockVehicle: unknown key mock\.wnd; did you mean wind"
+    ):
+        MockVehicle("px4", wnd={})
+
+
+def test_a_link_that_cannot_be_opened_is_told_once():
+    """The flight's own error was told a second time, as one that nobody took."""
+    mock = QuickVehicle()
+
+    async def main():
+        async with connect(QUICK_FLIGHT, mock):
+            with pytest.raises(EndpointError, match="open already"):
+                async with connect(QUICK_FLIGHT, mock):
+                    pass
+            gc.collect()
+
+    run(mock, main())  # raises UnseenError if nobody took it
+
+
+def test_paths_may_be_text_and_a_channel_that_there_is_not_is_named_with_all(tmp_path):
+    mock = QuickVehicle()
+    assert fly(config(mock), mock, folder=str(tmp_path / "one")).result == "ok"
+    record = read_flight(str(tmp_path / "one"))
+    assert len(record.rows("setpoint")) > 0
+    with pytest.raises(KeyError, match=r"no channel 'setpiont'; there are .*setpoint"):
+        record.rows("setpiont")
+    assert load(str(CONFIG)) == load(CONFIG)
+    log = read_flight_log(str(tmp_path / "one" / "flight.tlog"))
+    assert len(log.setpoints) > 0

@@ -114,11 +114,11 @@ def test_a_limit_that_is_just_met_is_kept():
 
 
 def test_all_broken_limits_are_told_in_the_order_of_time():
-    broken = violations(EIGHT, Envelope(max_speed=4.0, max_tilt=0.3, max_yaw_rate=-1.0))
+    broken = violations(EIGHT, Envelope(max_speed=4.0, max_tilt=0.3, max_tilt_rate=0.1))
     assert {one.limit for one in broken} == {
         "safety.max_speed_m_s",
         "limits.max_tilt_deg",
-        "limits.max_yaw_rate_deg_s",
+        "limits.max_tilt_rate_deg_s",
     }
     assert [one.begins for one in broken] == sorted(one.begins for one in broken)
 

@@ -37,6 +37,7 @@ Made from a table
     Frame, HeadingFrom
 
 Checked
+    require_trajectory  whether a class of your own is a trajectory that fits itself
     Envelope         limits; None is no limit
     violations       the limits that a trajectory breaks: each a `Violation`
     slow_down        slows a trajectory down until it keeps the limits: a `SlowDown`
@@ -76,6 +77,7 @@ from companion.guidance.trajectory.from_samples import Frame as Frame
 from companion.guidance.trajectory.from_samples import HeadingFrom as HeadingFrom
 from companion.guidance.trajectory.from_samples import SampleOptions as SampleOptions
 from companion.guidance.trajectory.from_samples import from_samples as from_samples
+from companion.guidance.trajectory.own_trajectory import require_trajectory as require_trajectory
 from companion.guidance.trajectory.sample import FARTHEST as FARTHEST
 from companion.guidance.trajectory.sample import FASTEST as FASTEST
 from companion.guidance.trajectory.sample import LONGEST as LONGEST

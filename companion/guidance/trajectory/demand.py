@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.drag import Drag
-from companion.guidance.trajectory.sample import Trajectory
+from companion.guidance.trajectory.sample import Trajectory, TrajectoryError
 from companion.guidance.trajectory.time_laws import Progress, derivatives
 
 Floats = NDArray[np.float64]
@@ -58,12 +58,31 @@ def sampled(trajectory: Trajectory, times: Sequence[float] | None = None) -> Mot
     position, velocity, acceleration, jerk, heading, heading_rate = (
         np.array(column) for column in zip(*samples, strict=True)
     )
+    if not np.isfinite(heading).all():
+        raise FloatingPointError("not a finite number")
     motion = Motion(np.array(times), position, velocity, acceleration, jerk, heading_rate)
-    # A comparison with a limit is false for what is not a number.
-    for column in (position, velocity, acceleration, jerk, heading, heading_rate):
+    require_finite(motion)
+    return motion
+
+
+def require_finite(motion: Motion) -> None:
+    """Refuse a motion that no limit could refuse: a comparison with NaN is false.
+
+    Raises:
+        FloatingPointError: a value is not finite; see `computable`.
+        TrajectoryError: an array has not as many rows as there are times.
+    """
+    count = len(motion.times)
+    vectors = (motion.position, motion.velocity, motion.acceleration, motion.jerk)
+    shapes = [np.shape(vector) for vector in vectors]
+    if any(shape != (count, 3) for shape in shapes) or np.shape(motion.heading_rate) != (count,):
+        raise TrajectoryError(
+            f"a motion at {count} times has vectors of the shape ({count}, 3) and {count} heading "
+            f"rates, not {shapes} and {np.shape(motion.heading_rate)}"
+        )
+    for column in (*vectors, motion.heading_rate):
         if not np.isfinite(column).all():
             raise FloatingPointError("not a finite number")
-    return motion
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,11 +1,11 @@
 """Trajectories made from others: flown more slowly, or preceded by a turn on the spot."""
 
 from dataclasses import dataclass
-from math import remainder, tau
+from math import inf, remainder, tau
 
 import numpy as np
 
-from companion.guidance.trajectory.sample import Sample, Trajectory
+from companion.guidance.trajectory.sample import Sample, Trajectory, TrajectoryError
 from companion.guidance.trajectory.slower_time import SlowerTime
 from companion.guidance.trajectory.time_laws import Cruise, derivatives
 from companion.guidance.trajectory.timed_curve import require_duration
@@ -63,7 +63,13 @@ class Slowed:
 
 
 def evenly_slowed(trajectory: Trajectory, factor: float) -> Slowed:
-    """The trajectory stretched in time by `factor`."""
+    """The trajectory stretched in time by `factor`: 2.0 makes it last twice as long.
+
+    Raises:
+        TrajectoryError: the factor is not positive and finite.
+    """
+    if not 0.0 < factor < inf:
+        raise TrajectoryError(f"a trajectory is slowed by a positive factor, not {factor:g}")
     return Slowed(trajectory, SlowerTime(trajectory.duration, (factor,) * 4))
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.drag import NO_DRAG, Drag
-from companion.guidance.trajectory.demand import Floats, Motion, demand, sampled
+from companion.guidance.trajectory.demand import Floats, Motion, demand, require_finite, sampled
 from companion.guidance.trajectory.sample import Trajectory, computable
 
 _ROUNDING = 1e-9
@@ -45,6 +45,19 @@ class Violation(NamedTuple):
         return self.text
 
 
+_NOT_NEGATIVE = (
+    "max_tilt_rate",
+    "max_yaw_rate",
+    "min_thrust",
+    "max_thrust",
+    "full_thrust",
+    "max_climb",
+    "max_descent",
+    "max_speed",
+    "gravity",
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Envelope:
     """Limits of a trajectory; `None` is no limit. Positions are relative to the start.
@@ -63,6 +76,10 @@ class Envelope:
         fence: fence for the positions and for the places where the vehicle would stop.
         drag: drag in still air.
         gravity: gravity, m/s².
+
+    Raises:
+        ValueError: a limit is negative or not a number, or `max_tilt` is not in (0, π/2): it may be
+            in degrees.
     """
 
     max_tilt: float | None = None
@@ -77,6 +94,16 @@ class Envelope:
     fence: Callable[[Motion], Violation | None] | None = None
     drag: Drag = NO_DRAG
     gravity: float = 9.80665
+
+    def __post_init__(self) -> None:
+        if self.max_tilt is not None and not 0.0 < self.max_tilt < pi / 2.0:
+            raise ValueError(f"max_tilt must be in (0, π/2) rad, not {self.max_tilt:g}")
+        for name in _NOT_NEGATIVE:
+            limit = getattr(self, name)
+            if (
+                limit is not None and not limit >= 0.0
+            ):  # not true for NaN, which nothing would break
+                raise ValueError(f"{name} must be 0 or more, or None for no limit, not {limit:g}")
 
 
 class _Need(NamedTuple):
@@ -127,9 +154,10 @@ def judge(motion: Motion, envelope: Envelope) -> tuple[Violation, ...]:
     """All limits that a motion breaks, in order of time.
 
     Raises:
-        TrajectoryError: a numerical error; see `computable`.
+        TrajectoryError: a numerical error, a number that is not finite, or unequal lengths.
     """
     with computable():
+        require_finite(motion)
         return broken_limits(motion, envelope)
 
 

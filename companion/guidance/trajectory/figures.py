@@ -1,7 +1,7 @@
 """Trajectories of a known form: hover, line, circle, eights, helix."""
 
 from dataclasses import dataclass, replace
-from math import atan2, hypot, isfinite, pi, sqrt, tau
+from math import atan2, hypot, inf, isfinite, pi, sqrt, tau
 
 from companion.guidance.trajectory.curves import (
     BernoulliEight,
@@ -38,15 +38,24 @@ class Hover:
 
     Attributes:
         duration: how long it lasts, s.
+        heading: heading of the vehicle, rad; None: the heading at the start is kept.
+
+    Raises:
+        TrajectoryError: the duration is negative or not a number.
     """
 
     duration: float
     name: str = "hover"
+    heading: float | None = None
+
+    def __post_init__(self) -> None:
+        if not self.duration >= 0.0:
+            raise TrajectoryError(f"a hover must last 0 s or more, not {self.duration:g}")
 
     @property
     def holds_heading(self) -> bool:
-        """True: the heading at the start is kept."""
-        return True
+        """Whether the heading at the start is kept."""
+        return self.heading is None
 
     def check_times(self) -> list[float]:
         """The beginning and the end, s."""
@@ -54,7 +63,7 @@ class Hover:
 
     def at(self, time: float) -> Sample:
         """The sample at rest at the start."""
-        return Sample(_REST, _REST, _REST, _REST, 0.0, 0.0)
+        return Sample(_REST, _REST, _REST, _REST, self.heading or 0.0, 0.0)
 
 
 def line(
@@ -136,8 +145,10 @@ def helix(radius: float, rise: float, laps: Laps) -> TimedCurve:
     """A circle that climbs by `rise` metres in each lap, or sinks if `rise` is negative.
 
     Raises:
-        TrajectoryError: see `circle`.
+        TrajectoryError: see `circle`; also if `rise` is not finite.
     """
+    if not isfinite(rise):
+        raise TrajectoryError("the rise of a helix must be finite")
     return _flown_laps("helix", radius, Helix(radius, rise), laps, TangentHeading(pi / 2.0, -1.0))
 
 
@@ -171,7 +182,7 @@ def _eight(name: str, half_width: float, curve: Figure, laps: Laps) -> TimedCurv
 def _flown_laps(
     name: str, size: float, curve: Figure, laps: Laps, tangent: TangentHeading
 ) -> TimedCurve:
-    if min(size, laps.speed, laps.laps, laps.acceleration) <= 0.0:
+    if not all(0.0 < value < inf for value in (size, laps.speed, laps.laps, laps.acceleration)):
         raise TrajectoryError(f"size, speed, laps and acceleration of a {name} must be positive")
     length, rate = tau * laps.laps, laps.speed / curve.path_per_phase
     ramp = min(SEPTIC_SLOPE * laps.speed / laps.acceleration, _LONGEST_RAMP_SHARE * length / rate)

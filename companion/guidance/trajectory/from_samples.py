@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from companion.guidance.trajectory.checked_table import checked_table
 from companion.guidance.trajectory.csv_file import Table
 from companion.guidance.trajectory.sample import TrajectoryError
 from companion.guidance.trajectory.septic_spline import Floats, SepticSpline
@@ -123,9 +124,13 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
 
     Raises:
         TrajectoryError: velocity or acceleration is not the derivative of the position, the samples
-            last too long, or they never move horizontally and have no heading along the path.
+            last too long, or they never move horizontally and have no heading along the path; the
+            table names another frame than the options, has other shapes than `Table` says, or a
+            number that is not finite; an option is out of range.
         ArithmeticError, numpy.linalg.LinAlgError: numerical errors; see `computable`.
     """
+    table = checked_table(table)
+    _require_options(table, options)
     _require_short(table, options.cutoff)
     to_ned = _TO_NED[options.frame]
     position = (table.position - table.position[0]) @ to_ned.rotation.T
@@ -145,6 +150,24 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
     heading = _heading(spline, table, options, resting)
     step = inf if isinstance(heading, HeldHeading) else HEADING_CHECK_STEP
     return TimedCurve(name, SplineCurve(spline, _CHECKS_PER_PIECE, step), law, heading)
+
+
+def _require_options(table: Table, options: SampleOptions) -> None:
+    """Check options that a program chose; those of files are checked as they are read."""
+    if not isinstance(options.frame, Frame):
+        raise TrajectoryError(
+            f"the frame of samples is a Frame, as Frame.NED, not {options.frame!r}"
+        )
+    if table.frame not in (None, options.frame.value):
+        raise TrajectoryError(
+            f"the table is in the frame {table.frame}, and the options say {options.frame.value}; "
+            f"pass SampleOptions(frame=Frame.{str(table.frame).upper()})"
+        )
+    if not (0.0 < options.cutoff < inf and 0.0 < options.acceleration < inf):
+        raise TrajectoryError(
+            f"cutoff and acceleration of samples must be positive, not {options.cutoff} Hz and "
+            f"{options.acceleration} m/s²"
+        )
 
 
 def _require_short(table: Table, cutoff: float) -> None:

@@ -189,7 +189,7 @@ class LimitedJerk:
         Raises:
             TrajectoryError: a value is not positive.
         """
-        if min(length, speed, acceleration, jerk) <= 0.0:
+        if not all(value > 0.0 for value in (length, speed, acceleration, jerk)):  # nor NaN
             raise TrajectoryError("length, speed, acceleration and jerk of a line must be positive")
         jerk_time = min(acceleration / jerk, sqrt(speed / jerk))
         ramp = jerk_time + speed / (jerk * jerk_time)

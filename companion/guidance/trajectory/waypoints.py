@@ -1,6 +1,7 @@
 """Waypoints joined by minimum snap, as fast as a speed and an acceleration allow."""
 
 from collections.abc import Sequence
+from math import inf, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,7 +56,7 @@ def waypoints(
             positive, the number of headings is wrong, `along` and `headings` are both given, all
             points are above each other and `along` is set, or the trajectory lasts too long.
     """
-    if min(speed, acceleration) <= 0.0:
+    if not (0.0 < speed < inf and 0.0 < acceleration < inf):
         raise TrajectoryError("speed and acceleration of waypoints must be positive")
     if along and headings:
         raise TrajectoryError("waypoints have either their own headings or one along the path")
@@ -78,18 +79,33 @@ def places_of(points: Sequence[Vector], headings: Sequence[float | None]) -> tup
     """The start and the points, (k + 1, 3), and the distances between them, (k,), m.
 
     Raises:
-        TrajectoryError: there are no points, two consecutive points are equal, or there are
-            headings, but not one for each point.
+        TrajectoryError: there are no points, two consecutive points are equal, a point is not three
+            finite numbers, or there are headings, but not one for each point.
     """
     if headings and len(headings) != len(points):
         raise TrajectoryError(
             f"there are {len(headings)} headings for {len(points)} waypoints; give one for each"
         )
-    places = np.array([(0.0, 0.0, 0.0), *points])
+    places = np.array([(0.0, 0.0, 0.0), *map(_place, points)])
     distances = np.linalg.norm(np.diff(places, axis=0), axis=1)
-    if not points or distances.min() < SMALLEST_DISTANCE:
+    if not distances.size or distances.min() < SMALLEST_DISTANCE:
         raise TrajectoryError(_distance_fault(distances))
     return places, distances
+
+
+def _place(point: Vector) -> Vector:
+    """A waypoint as three finite numbers.
+
+    Raises:
+        TrajectoryError: it is something else.
+    """
+    try:
+        north, east, down = map(float, point)
+    except (TypeError, ValueError):
+        north = east = down = inf
+    if not all(map(isfinite, (north, east, down))):
+        raise TrajectoryError(f"each waypoint must be three finite numbers, not {point!r}")
+    return north, east, down
 
 
 def _distance_fault(distances: Floats) -> str:

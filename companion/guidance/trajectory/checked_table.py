@@ -1,0 +1,55 @@
+"""Checks a table of samples that a program made; tables of files are checked as they are read."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from companion.guidance.trajectory.csv_file import Table
+from companion.guidance.trajectory.sample import TrajectoryError
+from companion.guidance.trajectory.septic_spline import Floats
+
+_FEWEST = 4
+"""Fewest samples through which a smooth curve is laid."""
+
+
+def checked_table(table: Table) -> Table:
+    """The table with float arrays.
+
+    Raises:
+        TrajectoryError: there are fewer than four samples, the times do not increase from 0, a
+            number is not finite, or an array has another shape than the times ask for.
+    """
+    times = _array("times", table.times, None)
+    count = times.shape[0]
+    if count < _FEWEST:
+        raise TrajectoryError(f"a table needs at least {_FEWEST} samples, not {count}")
+    if times[0] != 0.0 or not (np.diff(times) > 0.0).all():
+        raise TrajectoryError("the times of a table must increase from 0 s; subtract the first one")
+    return replace(
+        table,
+        times=times,
+        position=_array("position", table.position, (count, 3)),
+        derivatives=tuple(
+            _array(name, values, (count, 3))
+            for name, values in zip(("velocity", "acceleration"), table.derivatives, strict=False)
+        ),
+        yaw=None if table.yaw is None else _array("yaw", table.yaw, (count,)),
+    )
+
+
+def _array(name: str, values: ArrayLike, shape: tuple[int, ...] | None) -> Floats:
+    """Finite numbers as an array of this shape; None: of any length.
+
+    Raises:
+        TrajectoryError: it is something else.
+    """
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise TrajectoryError(f"{name} must be an array of numbers: {error}") from error
+    if array.ndim != 1 if shape is None else array.shape != shape:
+        raise TrajectoryError(f"{name} must have the shape {shape or '(m,)'}, not {array.shape}")
+    if not np.isfinite(array).all():
+        raise TrajectoryError(f"{name} has a number that is not finite")
+    return array

@@ -1,0 +1,113 @@
+"""Whether an object of a program is a trajectory, and whether its samples fit each other."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from math import inf, isfinite
+
+import numpy as np
+
+from companion.guidance.trajectory.sample import Sample, Trajectory, TrajectoryError
+
+_MEMBERS = ("name", "duration", "holds_heading", "at", "check_times")
+_VECTORS = ("position", "velocity", "acceleration", "jerk")
+_SMALLEST_OFFSET = 1e-3  # m
+_SMALLEST_SPEED = 0.01  # m/s
+
+_PLACES = 24
+"""Number of times at which derivatives are compared."""
+_GOLDEN = 0.6180339887498949
+"""Multiples of it, modulo 1, spread evenly and miss the round times at which pieces are joined."""
+_STEP = 1e-3
+"""Half the span of a difference quotient, s."""
+_FLOOR, _SHARE = 0.1, 0.02
+"""Largest error of a derivative: m/s or m/s², and as a share of it."""
+
+
+def require_trajectory(trajectory: Trajectory) -> None:
+    """Check an object of your own: its members, its ends at rest, and its derivatives.
+
+    Velocity and acceleration are compared with difference quotients at 24 times. Limits are checked
+    by `violations`.
+
+    Raises:
+        TypeError: it lacks a member of `Trajectory`, or `at` returns no `Sample`.
+        TrajectoryError: it does not begin at (0, 0, 0) or not at rest, does not end at rest, has a
+            number that is not finite, a duration that is negative, check times that do not ascend
+            from 0 to the duration, or a derivative that does not fit.
+    """
+    for member in _MEMBERS:
+        if not hasattr(trajectory, member):
+            raise TypeError(
+                f"{type(trajectory).__name__} is no trajectory: it has no `{member}`; see "
+                "companion.guidance.trajectory.Trajectory"
+            )
+    duration = trajectory.duration
+    if not 0.0 <= duration < inf:
+        raise TrajectoryError(f"its duration must be a time of 0 s or more, not {duration} s")
+    _require_rest(_sample(trajectory, 0.0), _sample(trajectory, duration))
+    _require_times(trajectory.check_times(), duration)
+    if duration > 4.0 * _STEP:
+        _require_derivatives(trajectory, "position", "velocity", "m/s")
+        _require_derivatives(trajectory, "velocity", "acceleration", "m/s²")
+
+
+def _sample(trajectory: Trajectory, time: float) -> Sample:
+    """The sample at a time.
+
+    Raises:
+        TypeError: it is no `Sample`.
+        TrajectoryError: a number is not finite.
+    """
+    sample = trajectory.at(time)
+    try:
+        made = Sample(*sample)
+        numbers = [float(x) for name in _VECTORS for x in getattr(made, name)]
+        numbers += [float(made.heading), float(made.heading_rate)]
+    except (TypeError, ValueError):
+        numbers = []
+    if len(numbers) != 3 * len(_VECTORS) + 2:
+        raise TypeError(f"at({time:g}) returned {sample!r}, which is no Sample")
+    if not all(map(isfinite, numbers)):
+        raise TrajectoryError(f"at {time:.2f} s a number is not finite: {made}")
+    return made
+
+
+def _require_rest(begin: Sample, end: Sample) -> None:
+    offset = float(np.linalg.norm(begin.position))
+    if offset > _SMALLEST_OFFSET:
+        raise TrajectoryError(
+            f"it begins {offset:.2f} m from (0, 0, 0); positions count from where the vehicle is"
+        )
+    for sample, does in ((begin, "begins"), (end, "ends")):
+        speed = float(np.linalg.norm(sample.velocity))
+        if speed > _SMALLEST_SPEED:
+            raise TrajectoryError(f"it {does} at {speed:.2f} m/s; it must begin and end at rest")
+
+
+def _require_times(times: Sequence[float], duration: float) -> None:
+    tolerance = 1e-6 * max(1.0, duration)
+    ascend = all(a <= b for a, b in pairwise(times))
+    if not (
+        len(times) > 0
+        and ascend
+        and abs(times[0]) <= tolerance
+        and abs(times[-1] - duration) <= tolerance
+    ):
+        raise TrajectoryError(
+            f"its check_times() must ascend from 0 to its duration, {duration:g} s, as times at "
+            "which limits and fence are checked"
+        )
+
+
+def _require_derivatives(trajectory: Trajectory, quantity: str, derivative: str, unit: str) -> None:
+    for k in range(_PLACES):
+        time = max(trajectory.duration * (k * _GOLDEN % 1.0), _STEP)
+        before, now, after = (_sample(trajectory, time + by) for by in (-_STEP, 0.0, _STEP))
+        change = np.subtract(getattr(after, quantity), getattr(before, quantity)) / (2.0 * _STEP)
+        told = np.asarray(getattr(now, derivative), dtype=float)
+        size = float(np.linalg.norm(change))
+        if np.linalg.norm(change - told) > _FLOOR + _SHARE * size:
+            raise TrajectoryError(
+                f"at {time:.2f} s its {quantity} changes by {size:.2f} {unit}, but its {derivative}"
+                f" is {np.linalg.norm(told):.2f} {unit}: they must fit in size and direction"
+            )

@@ -1,0 +1,182 @@
+"""What a program passes to a vehicle: it is copied, or refused in a sentence."""
+
+import asyncio
+from math import dist, hypot, inf, nan
+
+import numpy as np
+import pytest
+
+from companion import Reference
+from companion.api.commanded import copied
+from companion.attitude import Coefficients
+from companion.files.yaml_file import ConfigError
+from companion.guidance.trajectory import Hover, Sample
+from tests.api.test_flying import flown
+from tests.flight.fly import QuickVehicle
+
+REST = (0.0, 0.0, 0.0)
+
+
+class Own:
+    """A trajectory of 4 s along a straight line, with what a test makes wrong."""
+
+    name = "mine"
+    holds_heading = True
+    duration = 4.0
+
+    def at(self, time):
+        return Sample(REST, REST, REST, REST, 0.0, 0.0)
+
+    def check_times(self):
+        return [0.0, 2.0, 4.0]
+
+
+class Elsewhere(Own):
+    def at(self, time):
+        return Sample((3.0, 0.0, 0.0), REST, REST, REST, 0.0, 0.0)
+
+
+class NoEnd(Own):
+    duration = nan
+
+
+def test_references_are_copied_so_that_a_program_may_reuse_its_arrays():
+    """A program wrote into the array that it had passed, and guidance flew what stood there."""
+    off = []
+
+    async def program(vehicle):
+        await vehicle.take_off()
+        start = vehicle.state.position_ned
+        place, still = np.array(start), np.zeros(3)
+        async with vehicle.control() as control:
+            for _ in range(30):
+                control.follow(Reference(place, still, still), jerk_ned=still)
+                place += (5.0, 0.0, 0.0)  # the next place, which is not commanded yet
+                still += 5.0
+                await asyncio.sleep(0.06)
+                off.append(dist(vehicle.state.position_ned, start))
+                place[:], still[:] = start, 0.0
+        await vehicle.land()
+
+    flown(program, QuickVehicle())
+    assert max(off) < 0.2
+
+
+def test_a_copied_reference_holds_plain_numbers():
+    arrays = Reference(np.ones(3), [1, 2, 3], np.zeros(3, np.float32), np.float64(1.0))
+    for reference in (arrays, arrays._replace(coefficients=np.zeros(2))):
+        made = copied(reference)
+        assert made.position_ned == (1.0, 1.0, 1.0)
+        assert made.velocity_ned == (1.0, 2.0, 3.0)
+        assert type(made.heading) is type(made.acceleration_ned[0]) is float
+    assert isinstance(copied(arrays._replace(coefficients=(0, 0))).coefficients, Coefficients)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("position_ned", (0.0, 0.0)),
+        ("velocity_ned", "abc"),
+        ("acceleration_ned", None),
+        ("heading", "north"),
+        ("heading_rate", nan),
+        ("body_rates", (0.0, 0.0)),
+        ("thrust", inf),
+    ],
+)
+def test_what_is_wrong_in_a_reference_is_named(field, value):
+    with pytest.raises(ValueError, match=f"{field} must be"):
+        copied(Reference(REST)._replace(**{field: value}))
+
+
+@pytest.mark.parametrize("what", [None, REST, "hover"])
+def test_a_reference_is_a_reference(what):
+    with pytest.raises(TypeError, match=r"a reference is a companion\.Reference"):
+        copied(what)
+
+
+def test_arguments_that_cannot_be_flown_are_refused_and_the_vehicle_holds_on():
+    refused = {}
+
+    async def program(vehicle):
+        await vehicle.take_off()
+        north, east, down = vehicle.state.position_ned
+        there = (north + 1.0, east, down)
+        calls = {
+            "two numbers": lambda: vehicle.go_to((north, east)),
+            "a word": lambda: vehicle.go_to("abc"),
+            "speed": lambda: vehicle.go_to(there, speed=nan),
+            "heading": lambda: vehicle.go_to(there, heading="north"),
+            "degrees": lambda: vehicle.go_to(there, heading=90.0),
+            "forever": lambda: vehicle.hold(nan),
+            "a number": lambda: vehicle.follow(5),
+            "elsewhere": lambda: vehicle.follow(Elsewhere()),
+            "no end": lambda: vehicle.follow(NoEnd()),
+        }
+        for name, call in calls.items():
+            try:
+                await call()
+            except (ConfigError, TypeError, ValueError) as error:
+                refused[name] = str(error)
+        await vehicle.follow(Own())
+        refused["moved"] = dist(vehicle.state.position_ned, (north, east, down)) > 0.3
+        await vehicle.land()
+
+    summary, _ = flown(program, QuickVehicle())
+    assert summary.result == "ok"
+    assert refused.pop("moved") is False
+    words = {
+        "two numbers": "position_ned must be three finite numbers",
+        "a word": "position_ned must be three finite numbers",
+        "speed": "speed must be a finite number, not nan",
+        "heading": "heading must be a finite number, not 'north'",
+        "degrees": "heading is in rad, and 90 rad are more than two turns",
+        "forever": "seconds must be a finite number",
+        "a number": "int is no trajectory: it has no `name`",
+        "elsewhere": "mine: it begins 3.00 m from (0, 0, 0)",
+        "no end": "mine: its duration must be a time of 0 s or more, not nan",
+    }
+    assert refused.keys() == words.keys()
+    for name, text in words.items():
+        assert text in refused[name]
+
+
+def test_states_for_a_time_that_is_no_number_are_refused():
+    """The loop ended before it began, without a word."""
+
+    async def program(vehicle):
+        await vehicle.take_off()
+        async with vehicle.control() as control:
+            with pytest.raises(ValueError, match="seconds must be a number"):
+                async for _ in control.states(seconds=nan):
+                    pass
+            control.accelerate(REST)
+        await vehicle.land()
+
+    summary, _ = flown(program, QuickVehicle())
+    assert summary.result == "ok"
+
+
+def test_to_go_where_the_vehicle_is_turns_it_or_does_nothing():
+    found = []
+
+    async def program(vehicle):
+        await vehicle.take_off()
+        place = vehicle.state.position_ned
+        await vehicle.go_to(place)
+        await vehicle.go_to(place)
+        await vehicle.go_to(place, heading=1.0)
+        found.append((dist(vehicle.state.position_ned, place), vehicle.state.heading))
+        await vehicle.land()
+
+    summary, _ = flown(program, QuickVehicle())
+    assert summary.result == "ok"
+    ((off, heading),) = found
+    assert off < 0.2
+    assert heading == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_hover_may_face_a_heading():
+    assert not Hover(1.0, heading=0.5).holds_heading
+    assert Hover(1.0, heading=0.5).at(0.5).heading == 0.5
+    assert hypot(*Hover(1.0).at(0.5).position) == 0.0
