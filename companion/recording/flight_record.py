@@ -106,7 +106,7 @@ class FlightRecord:
     def fault(self) -> str | None:
         """Why not all of the flight was read, as a sentence; None: the record has no such fault.
 
-        A record that was only cut off at its end, because the flight was killed, has none.
+        A record that was cut off with its flight, which then has no summary, has no fault.
         """
         if self.damage is not None:
             return (
@@ -115,6 +115,11 @@ class FlightRecord:
             )
         if not self.content.order:
             return f"{self.folder / FILE} is missing or empty: no sample and no event was recorded"
+        if not self.complete and (self.folder / "summary.json").is_file():
+            return (
+                f"{self.folder / FILE} ends at {self.duration:.1f} s, before its flight did: "
+                "it was cut off, or the disk was full"
+            )
         return None
 
     @cached_property
