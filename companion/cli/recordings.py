@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
+from companion.cli.output_file import require_writable
 from companion.config.files import assigned, changed, load
 from companion.files.yaml_file import ConfigError
 from companion.recording.flight_record import FlightRecord, read_flight
@@ -84,6 +85,8 @@ def replay(options: argparse.Namespace) -> int:
     from companion.replay.replay import Replay  # noqa: PLC0415  no other command needs it
     from companion.replay.report import words, write_csv  # noqa: PLC0415
 
+    if options.csv is not None:  # a long flight takes a minute to replay
+        require_writable(options.csv, "--csv", force=True)
     record = read_flight(options.folder)
     own_config = options.config is None and not options.set
     config = load(options.config or options.folder / "config.yaml")
