@@ -4,6 +4,7 @@ import argparse
 import difflib
 import sys
 from pathlib import Path
+from shlex import quote
 
 from companion.cli.exit_codes import EXIT_OK
 from companion.cli.tool_options import STARTING_FILES
@@ -94,7 +95,8 @@ def init(options: argparse.Namespace) -> int:
         write_whole(out, own_text.replace(f"configs/{name}", str(out)))
     except OSError as error:
         raise ConfigError(f"--out: cannot write {out}: {error.strerror}") from error
-    print(f"Wrote {options.out}. Check it with: companion check-config {options.out}")
+    out_words = quote(str(out))  # it may have a space
+    print(f"Wrote {out}. Check it with: companion check-config {out_words}")
     return EXIT_OK
 
 
@@ -127,5 +129,7 @@ def check(options: argparse.Namespace) -> int:
         print(f"warning: {error}")
     if config.flight.trajectory is not None and "trajectory" not in config.flight.maneuvers:
         print("warning: flight.trajectory is not flown; add trajectory to flight.maneuvers")
+    if config.mock is None and not list(changed_keys(config)):
+        print(f"warning: {options.file} changes no default; is it the file that you meant?")
     print(f"{options.file}: ok")
     return EXIT_OK

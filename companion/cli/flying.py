@@ -126,8 +126,10 @@ def fly(
         console.print(f"Recorded in {folder}", soft_wrap=True)
         words = closing_words(summary.as_dict(), invocation)
         console.print(words_text(words), soft_wrap=True)
-        if config.recording.report:
-            console.print(page_about(folder), soft_wrap=True)
+    if config.recording.report:  # also where nobody reads the console, as after `| head`
+        page = page_about(folder)
+        with suppress(OSError):
+            console.print(page, soft_wrap=True)
     return summary
 
 

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
+from companion.cli.output_file import require_writable
 from companion.config.files import assigned, changed, load
 from companion.files.yaml_file import ConfigError
 from companion.recording.flight_record import FlightRecord, read_flight
@@ -16,35 +17,43 @@ def plot(options: argparse.Namespace) -> int:
 
     out = options.out or options.folder / "flight.png"
     try:
-        draw_flight(options.folder, out)
+        fault = draw_flight(options.folder, out)
     except OSError as error:
         raise ConfigError(f"{out}: cannot write it: {error.strerror}") from error
+    if fault is not None:
+        print(fault)
     print(out)
-    return EXIT_OK
+    return EXIT_OK if fault is None else EXIT_FLIGHT
 
 
 def report(options: argparse.Namespace) -> int:
     """Write the page about a flight."""
     from companion.report.page import write_report  # noqa: PLC0415  no other command needs it
 
-    return _write_page(lambda: write_report(options.flight, options.out))
+    return _write_page(lambda on_fault: write_report(options.flight, options.out, on_fault))
 
 
 def compare(options: argparse.Namespace) -> int:
     """Write a page that compares flights."""
     from companion.report.page import write_comparison  # noqa: PLC0415  no other command needs it
 
-    return _write_page(lambda: write_comparison(options.flights, options.out))
+    return _write_page(lambda on_fault: write_comparison(options.flights, options.out, on_fault))
 
 
-def _write_page(make: Callable[[], Path]) -> int:
-    """Call `make`, and print the path of the page that it has written."""
+def _write_page(make: Callable[[Callable[[str], None]], Path]) -> int:
+    """Write a page by `make`, and print its path and the faults of the records that it shows.
+
+    The exit code is 1 if a record has one: a page with gaps must not pass for a whole one.
+    """
+    faults: list[str] = []
     try:
-        page = make()
+        page = make(faults.append)
     except OSError as error:
         raise ConfigError(f"{error.filename}: cannot write there: {error.strerror}") from error
+    for fault in faults:
+        print(fault)
     print(page)
-    return EXIT_OK
+    return EXIT_FLIGHT if faults else EXIT_OK
 
 
 def export(options: argparse.Namespace) -> int:
@@ -65,13 +74,10 @@ def export(options: argparse.Namespace) -> int:
 
 
 def _is_whole(record: FlightRecord) -> bool:
-    """Whether a recording could be read to its end; if not, print where it is damaged."""
-    if record.damage is not None:
-        print(
-            f"{record.folder}: the recording is damaged, and only the part before was read: "
-            f"{record.damage}"
-        )
-    return record.damage is None
+    """Whether a recording could be read to its end and is not empty; if not, print why."""
+    if record.fault is not None:
+        print(record.fault)
+    return record.fault is None
 
 
 def replay(options: argparse.Namespace) -> int:
@@ -79,6 +85,8 @@ def replay(options: argparse.Namespace) -> int:
     from companion.replay.replay import Replay  # noqa: PLC0415  no other command needs it
     from companion.replay.report import words, write_csv  # noqa: PLC0415
 
+    if options.csv is not None:  # a long flight takes a minute to replay
+        require_writable(options.csv, "--csv", force=True)
     record = read_flight(options.folder)
     own_config = options.config is None and not options.set
     config = load(options.config or options.folder / "config.yaml")

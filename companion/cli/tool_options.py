@@ -65,7 +65,9 @@ def add_tune(commands: Commands) -> None:
         help="configuration to tune (default: that of the flight, or the defaults)",
     )
     tune.add_argument(
-        "--output",
+        "--out",
+        "--output",  # its name until all commands had --out
+        dest="output",
         type=Path,
         metavar="FILE",
         help="result (default: tuned.yaml beside the vehicle file)",

@@ -35,8 +35,8 @@ def tune(options: argparse.Namespace) -> int:
     source: Path = options.vehicle
     vehicle = source / _VEHICLE if source.is_dir() else source
     output = options.output or vehicle.with_name(_OUTPUT_NAME)
-    require_writable(output, "--output", force=options.force)
     config, included = _configuration(source, vehicle, options.config)
+    require_writable(output, "--out", force=options.force)
     config = _with_learned_drag(config, source)
     log = source / _LOG
     disturbances = Disturbances()

@@ -216,7 +216,8 @@ def assigned(texts: Sequence[str]) -> dict[str, dict[str, Any]]:
             raise ConfigError(f"--set {text}: there is no section `{section}`")
         if section == "mock":
             raise ConfigError(
-                f"--set {text}: the mock vehicle reads its section from the file; write it there"
+                f"--set {text}: the mock vehicle reads its section from the file; write it there, "
+                "or into a file of your own: `companion init mock` writes one for --config"
             )
         try:
             changes.setdefault(section, {})[name] = bounded_yaml.parse(value)

@@ -9,6 +9,7 @@ from companion.attitude import PLANNER_NAMES
 from companion.config.markers import ANY
 from companion.config.units import Si
 from companion.drag import Drag
+from companion.files.yaml_faults import name_hint
 from companion.files.yaml_file import Section
 
 AUTO = "auto"
@@ -19,7 +20,10 @@ GUIDANCE_NAMES = (LINEAR, "nmpc")
 def _require_known(kind: str, name: str, our_names: tuple[str, ...], group: str) -> None:
     """Raise `ValueError` unless the name is ours or that of an installed plug-in."""
     if name not in our_names and name not in (installed := plugins.names(group)):
-        raise ValueError(f"unknown {kind} {name!r}; known: {', '.join((*our_names, *installed))}")
+        known = (*our_names, *installed)
+        raise ValueError(
+            f"unknown {kind} {name!r}; known: {', '.join(known)}{name_hint(name, known)}"
+        )
 
 
 class PlannerConfig(Section):

@@ -24,6 +24,8 @@ _MISTAKEN_UNITS: tuple[tuple[str, str, Callable[[float], float]], ...] = (
     ("_deg", "rad", degrees),
     ("_rad_s", "°/s", radians),
     ("_ms", "s", lambda value: 1000.0 * value),
+    ("_m_s", "km/h", lambda value: value / 3.6),
+    ("_per_s", "%", lambda value: 0.01 * value),
     ("_s", "ms", lambda value: 0.001 * value),
     ("_percent", "parts of 1", lambda value: 100.0 * value),
     ("", "%", lambda value: 0.01 * value),
@@ -102,7 +104,16 @@ def explained(detail: Any, model: type[BaseModel], former: Mapping[str, str]) ->
     if detail["type"] == "path_type":
         message = "must name a file or a folder"
     got = "" if isinstance(value, dict) else f" (got {shortened(value)})"
-    return f"`{where}`: {message[:1].lower()}{message[1:]}{got}{_unit_hint(detail, where)}"
+    hint = _unit_hint(detail, where)
+    if detail["type"] == "literal_error":
+        hint = name_hint(value, re.findall(r"'([^']*)'", detail["ctx"]["expected"]))
+    return f"`{where}`: {message[:1].lower()}{message[1:]}{got}{hint}"
+
+
+def name_hint(written: Any, known: Iterable[str]) -> str:
+    """The end of a message that refuses a name: which one was probably meant; else empty."""
+    near = _nearest(written, known, _MIN_SIMILARITY_ELSEWHERE) if isinstance(written, str) else None
+    return f"; did you mean {near}?" if near else ""
 
 
 def _remedy(detail: Any, key: str) -> str | None:
@@ -200,6 +211,7 @@ def _either(places: list[str]) -> str:
 
 def _similarity(written: str, known: str) -> float:
     """Similarity from 0 to 1; nearly 1 if the known key begins or ends with the written one."""
+    written = written.lower()
     if known.startswith(f"{written}_"):
         return 0.99
     if known.endswith(f"_{written}"):

@@ -57,6 +57,11 @@ class Breach(NamedTuple):
         return f"{self.where}, {self.relation} {self.limit}"
 
 
+def height_in_words(height: float) -> str:
+    """A height above home (m), which may be negative, in words."""
+    return f"{abs(height):.1f} m {'below' if height < -0.05 else 'above'} home"
+
+
 @dataclass(frozen=True, slots=True)
 class Fence:
     """A cylinder between a floor and a ceiling, and an optional polygon; both must be kept.
@@ -113,7 +118,7 @@ class Fence:
             where = f"{0.0 - down:.1f} m above where control began"
             return Breach("limits.fence_ceiling_m", "above", where, -down - self.ceiling)
         if height is not None and height < self.floor + margin:
-            where = f"{height:.1f} m above home"
+            where = height_in_words(height)
             return Breach("limits.fence_floor_m", "below", where, self.floor - height)
         return None
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from companion.config import Config
-from companion.guidance.fence import Place, inside, local_polygon
+from companion.guidance.fence import Place, height_in_words, inside, local_polygon
 from companion.mavlink.messages import dialect
 from companion.preflight.evidence import Evidence, Stage
 from companion.preflight.finding import Finding, Key
@@ -157,7 +157,7 @@ def ground(_: Config, evidence: Evidence) -> Iterator[Finding]:
         yield Finding(
             Key.HOME,
             UNSAFE,
-            f"the vehicle reports that it stands {height:.1f} m above home",
+            f"the vehicle reports that it stands {height_in_words(height)}",
             "flight.takeoff_height_m and limits.fence_floor_m would be wrong",
             "have the autopilot set home here",
             source,

@@ -106,7 +106,9 @@ def _by_subject(good: Sequence[Check]) -> list[str]:
 
 def _extent_line(figures: Figures) -> str:
     extent = figures["extent"]
-    parts = [f"{extent['under_control_s']:.0f} s under our control"]
+    # After a full disk the figures count only what was recorded.
+    least = "at least " if any(LOST_ROWS in text for text in figures["advice"]) else ""
+    parts = [f"{least}{extent['under_control_s']:.0f} s under our control"]
     for key, words in (
         ("height_max_m", "up to {:.1f} m high"),
         ("maneuver_speed_max_m_s", "{:.1f} m/s fast"),

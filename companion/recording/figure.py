@@ -37,10 +37,11 @@ class FigureError(Exception):
     """The picture cannot be drawn; the message says why and what to do."""
 
 
-def draw_flight(folder: Path, out: Path) -> None:
+def draw_flight(folder: Path, out: Path) -> str | None:
     """Draw the flight recorded in `folder` into the file `out`.
 
-    The suffix of `out` selects the format; without one it is PNG.
+    The suffix of `out` selects the format; without one it is PNG. Returns why not all of the flight
+    is drawn, as a sentence; None: all of it is.
 
     Raises:
         MissingExtraError: matplotlib is missing.
@@ -78,6 +79,7 @@ def draw_flight(folder: Path, out: Path) -> None:
         raise FigureError(f"{out}: {error}") from error
     finally:
         plt.close(figure)
+    return record.fault
 
 
 def _panels(record: FlightRecord, trace: FlightTrace) -> "list[Callable[[Axes], None]]":

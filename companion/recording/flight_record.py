@@ -104,6 +104,26 @@ class FlightRecord:
         """Convert times on our clock (s) to s since the flight began."""
         return times - self.began
 
+    @property
+    def fault(self) -> str | None:
+        """Why not all of the flight was read, as a sentence; None: the record has no such fault.
+
+        A record that was cut off with its flight, which then has no summary, has no fault.
+        """
+        if self.damage is not None:
+            return (
+                f"{self.folder}: the recording is damaged, and only the part before was read: "
+                f"{self.damage}"
+            )
+        if not self.content.order:
+            return f"{self.folder / FILE} is missing or empty: no sample and no event was recorded"
+        if not self.complete and (self.folder / "summary.json").is_file():
+            return (
+                f"{self.folder / FILE} ends at {self.duration:.1f} s, before its flight did: "
+                "it was cut off, or the disk was full"
+            )
+        return None
+
     @cached_property
     def duration(self) -> float:
         """Time from the beginning of the flight to the last row or event, s."""
@@ -195,9 +215,7 @@ def read_flight(folder: Path | str) -> FlightRecord:
         content = read_mcap(path)
     except OSError as error:
         if not (killed_at_start and isinstance(error, FileNotFoundError)):
-            raise RecordError(
-                f"{path}: {error.strerror}; is this the folder of a flight?"
-            ) from error
+            raise RecordError(_not_a_flight(path, error)) from error
         content = McapContent()
     flight = content.metadata.setdefault("flight", {})
     if not flight and killed_at_start and content.damage is None:
@@ -216,3 +234,14 @@ def read_flight(folder: Path | str) -> FlightRecord:
     return FlightRecord(
         folder, content, content.complete, content.damage, began, epoch, content.metadata
     )
+
+
+def _not_a_flight(path: Path, error: OSError) -> str:
+    """Why the record at `path` cannot be opened, and which folder was probably meant."""
+    flights = sorted(path.parent.glob(f"*/{FILE}"))
+    if isinstance(error, FileNotFoundError) and flights:
+        return (
+            f"{path.parent} holds the folders of flights; name one of them, such as "
+            f"{flights[-1].parent}"
+        )
+    return f"{path}: {error.strerror}; is this the folder of a flight?"

@@ -1,7 +1,7 @@
 """Panels of a flight over time: error, speed, tilt and height, with maneuvers and phases marked."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -100,6 +100,7 @@ def draw_history(panels: Sequence["Axes"], motion: Floats, marks: Marks) -> None
     """Draw the rows (N, 6) of `FlightTrace.motion` into panels, one below the other."""
     time = motion[:, 0]
     length = max(float(time[-1] - time[0]), 1.0)
+    marks = _marks_until(float(time[-1]), marks)
     for axes, (name, unit, column) in zip(panels, _COLUMNS, strict=True):
         for number, span in enumerate(marks.maneuvers):
             axes.axvspan(span.begin, span.end, color=_SHADES[number % 2], linewidth=0)
@@ -118,6 +119,18 @@ def draw_history(panels: Sequence["Axes"], motion: Floats, marks: Marks) -> None
         axes.tick_params(labelbottom=False)
     _name_maneuvers(panels[0], marks)
     _name_phases(panels[-1], marks, length)
+
+
+def _marks_until(last: float, marks: Marks) -> Marks:
+    """The marks of the time that was recorded; a damaged record ends before its flight did.
+
+    The layout has no room for names beside the axes.
+    """
+    maneuvers = [
+        span._replace(end=min(span.end, last)) for span in marks.maneuvers if span.begin < last
+    ]
+    phases = [phase for phase in marks.phases if phase[0] <= last]
+    return replace(marks, phases=phases, maneuvers=maneuvers)
 
 
 def _name_maneuvers(axes: "Axes", marks: Marks) -> None:

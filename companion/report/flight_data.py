@@ -49,6 +49,7 @@ class FlightData:
             "latency": from a sample's arrival to its setpoint, ms.
         figures: the content of `summary.json`, or derived from the record; None for a `.tlog`.
         provisional: whether the flight wrote no summary, so that the figures come from its record.
+        fault: why not all of the record was read, as a sentence; None: it has no such fault.
         phases: the phases, in order; empty for a `.tlog`.
         modes: the autopilot's modes, in order, for a `.tlog`.
         maneuvers: the maneuvers, in order.
@@ -63,6 +64,7 @@ class FlightData:
     curves: Mapping[str, Curve]
     figures: Mapping[str, Any] | None = None
     provisional: bool = False
+    fault: str | None = None
     phases: tuple[Span, ...] = ()
     modes: tuple[Span, ...] = ()
     maneuvers: tuple[Span, ...] = ()
@@ -94,6 +96,7 @@ def recorded(folder: Path) -> FlightData:
         curves={name: curve for name, curve in _curves(record).items() if len(curve.time)},
         figures=figures,
         provisional=provisional,
+        fault=record.fault,
         phases=phases,
         maneuvers=_maneuvers(record, phases),
         events=tuple(each for each in record.events if each.source != "phase"),

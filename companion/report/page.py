@@ -1,6 +1,6 @@
 """Makes the page of one flight or of several: one HTML file that needs no network."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -37,13 +37,16 @@ def read(path: Path) -> FlightData:
     return logged(path) if is_log else recorded(path)
 
 
-def write_report(path: Path, out: Path | None = None) -> Path:
+def write_report(
+    path: Path, out: Path | None = None, on_fault: Callable[[str], object] | None = None
+) -> Path:
     """Write the page about one flight; return its path.
 
     Args:
         path: folder of the flight, or a `.tlog`.
         out: the page; None: `report.html` in the folder, or beside the log, with its name and the
             suffix `.html`.
+        on_fault: called with a sentence if the flight's record is empty or damaged.
 
     Raises:
         MissingExtraError: the extra `report` is missing.
@@ -51,7 +54,7 @@ def write_report(path: Path, out: Path | None = None) -> Path:
         OSError: the page cannot be written.
     """
     require_extra()
-    flight = read(path)
+    flight = _read_all([path], on_fault)[0]
     if out is None:
         out = path.with_suffix(".html") if path.is_file() else path / PAGE
     with _explain_other_version(path):
@@ -63,20 +66,31 @@ def write_report(path: Path, out: Path | None = None) -> Path:
     return out
 
 
-def write_comparison(paths: Sequence[Path], out: Path) -> Path:
-    """Write a page that compares several flights; return its path.
+def write_comparison(
+    paths: Sequence[Path], out: Path, on_fault: Callable[[str], object] | None = None
+) -> Path:
+    """Write a page that compares several flights; return its path. `on_fault`: see `write_report`.
 
     Raises:
         MissingExtraError, RecordError, LogError, OSError: see `write_report`.
     """
     require_extra()
-    flights = [read(path) for path in paths]
+    flights = _read_all(paths, on_fault)
     title = " and ".join(flight.name for flight in flights)
     with _explain_other_version(*paths):
         plots = [*compared_steps(flights), *motion_plots(flights)]
         page = _page(title, None, flights, comparison_tables(flights), plots, None)
     write_whole(out, page)
     return out
+
+
+def _read_all(paths: Sequence[Path], on_fault: Callable[[str], object] | None) -> list[FlightData]:
+    """The flights; `on_fault` is called for each whose record is empty or damaged."""
+    flights = [read(path) for path in paths]
+    for flight in flights:
+        if flight.fault is not None and on_fault is not None:
+            on_fault(flight.fault)
+    return flights
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import shlex
 import signal
 from pathlib import Path
 
@@ -200,6 +201,33 @@ def test_a_file_that_changes_nothing_says_so(tmp_path, capsys):
     assert capsys.readouterr().out == f"# {path} changes no default\n"
 
 
+def test_a_file_that_changes_nothing_is_told_when_it_is_checked(tmp_path, capsys):
+    """An editor that had not saved left an empty file, which was called ok."""
+    path = tmp_path / "c.yaml"
+    told = f"warning: {path} changes no default; is it the file that you meant?"
+    for text, warned in (("", True), ("# nothing yet\n", True), ("link: {lockstep: true}", False)):
+        path.write_text(text)
+        assert main(["check-config", str(path)]) == 0
+        assert (told in capsys.readouterr().out.splitlines()) == warned
+
+
+def test_a_command_to_copy_has_its_path_in_quotes(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "px4", "--out", "my drone.yaml"]) == 0
+    command = capsys.readouterr().out.partition("Check it with: companion ")[2]
+    assert main(shlex.split(command)) == 0
+
+
+def test_a_refused_path_names_the_key_that_every_command_takes(tmp_path, capsys):
+    """`replay` has no --slow-down, but takes --set flight.slow_down=true."""
+    (tmp_path / "path.csv").write_text("t,x,y,z\n0,0,0,0\n1,4,0,0\n2,4,4,0\n3,4,4,2\n")
+    path = tmp_path / "a.yaml"
+    path.write_text("flight: {trajectory: path.csv, maneuvers: [trajectory]}\n")
+    assert main(["check-config", str(path)]) == 2
+    assert "(--slow-down, or flight.slow_down: true, finds how" in capsys.readouterr().err
+    assert main(["check-config", str(path), "--set", "flight.slow_down=true"]) == 0
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -207,7 +235,7 @@ def test_a_file_that_changes_nothing_says_so(tmp_path, capsys):
         ("steepness=20", "write SECTION.KEY=VALUE"),
         ("limits.max_tilt_deg", "write SECTION.KEY=VALUE"),
         ("limit.max_tilt_deg=20", "there is no section `limit`"),
-        ("mock.wind.speed_m_s=5", "the mock vehicle reads its section from the file"),
+        ("mock.wind.speed_m_s=5", "of your own: `companion init mock` writes one for --config"),
         ("limits.max_tild_deg=20", "did you mean `max_tilt_deg`?"),
         ("limits.max_tilt_deg=[", "not valid YAML"),
         ("limits.max_tilt_deg=99", "less than or equal to 60"),

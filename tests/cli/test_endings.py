@@ -172,6 +172,28 @@ def test_a_page_that_cannot_be_written_does_not_fail_the_flight(monkeypatch, err
     assert page_about("f") == said
 
 
+def test_a_flight_whose_console_is_closed_gets_its_page(monkeypatch, tmp_path):
+    """`companion demo | head -1` left a flight without report.html."""
+
+    class Closed:
+        def print(self, *_, **__):
+            raise BrokenPipeError
+
+    written = []
+    monkeypatch.setattr(
+        flying, "TerminalObserver", lambda _: SimpleNamespace(ask_landing=None, close=lambda: None)
+    )
+    monkeypatch.setattr(flying, "Session", lambda *_, **__: None)
+    monkeypatch.setattr(flying, "fly_interruptibly", lambda _: None)
+    monkeypatch.setattr(flying.link_loop, "run", lambda _: SimpleNamespace())
+    monkeypatch.setattr(flying, "flight_table", lambda _: "")
+    monkeypatch.setattr("companion.report.page.write_report", written.append)
+    flying.fly(Config(), tmp_path, Closed())
+    assert written == [tmp_path]
+    flying.fly(changed(Config(), {"recording": {"report": False}}, ""), tmp_path, Closed())
+    assert written == [tmp_path]
+
+
 @pytest.mark.parametrize("page", [True, False])
 def test_a_demo_opens_its_page_if_there_is_one(monkeypatch, tmp_path, page):
     opened = []

@@ -31,9 +31,7 @@ def test_it_writes_a_file_that_a_configuration_includes(vehicle, tmp_path, capsy
     config = tmp_path / "my.yaml"
     config.write_text("guidance: {drag_per_s: 1.0}\nplanner: {gain_per_s: 4.0}\n")
     out = tmp_path / "tuned.yaml"
-    code, told, _ = run(
-        capsys, vehicle, "--config", config, "--output", out, "--no-flights", "--json"
-    )
+    code, told, _ = run(capsys, vehicle, "--config", config, "--out", out, "--no-flights", "--json")
     assert code == 0
     figures = json.loads(told.splitlines()[-1])
     tuned = load(out)
@@ -48,7 +46,7 @@ def test_it_writes_a_file_that_a_configuration_includes(vehicle, tmp_path, capsy
     assert load(including).guidance == tuned.guidance
     code, _, error = run(capsys, vehicle, "--output", out, "--no-flights")
     assert code == 2
-    assert "exists; choose another file with --output" in error
+    assert "exists; choose another file with --out," in error
 
 
 def test_a_folder_gives_its_configuration_and_the_drag_that_was_learned(vehicle, tmp_path, capsys):
@@ -97,7 +95,7 @@ def test_the_noise_of_the_flight_in_the_folder_counts(vehicle, capsys):
 def test_a_folder_is_no_file_to_write(vehicle, tmp_path, capsys):
     code, _, error = run(capsys, vehicle, "--output", tmp_path, "--no-flights")
     assert code == 2
-    assert f"{tmp_path} is a folder; choose a file in it with --output" in error
+    assert f"{tmp_path} is a folder; choose a file in it with --out" in error
 
 
 def test_what_is_no_flight_folder_needs_a_vehicle_file(tmp_path, capsys):
@@ -108,6 +106,8 @@ def test_what_is_no_flight_folder_needs_a_vehicle_file(tmp_path, capsys):
             assert "lag_ms: 74.8" in (tmp_path / "tuned.yaml").read_text()
             (tmp_path / "tuned.yaml").unlink()
         else:
+            (tmp_path / "tuned.yaml").touch()  # an output that exists is not told before
+            code, _, error = run(capsys, source, "--config", shipped("px4.yaml"), "--no-flights")
             assert code == 2
             assert "does not exist; name the file or the flight folder" in error
     (tmp_path / "empty").mkdir()

@@ -366,7 +366,7 @@ def test_a_vehicle_whose_home_is_elsewhere_is_not_taken_off_with(tmp_path, monke
     with mock_vehicle(tmp_path) as mock:
         summary = fly(mock, tmp_path / "log")
         state = mock.state()
-    assert "stands -12.0 m above home" in summary.result
+    assert "stands 12.0 m below home" in summary.result
     assert (state["armed"], state["on_ground"]) == (False, True)
     assert TAKEOFF not in [command for _, command, _ in commands(summary)]
 

@@ -52,6 +52,12 @@ def test_the_limits_themselves_are_allowed():
             "0.5 m above home, below limits.fence_floor_m",
             1.5,
         ),
+        (
+            {"height": -4.6},
+            "limits.fence_floor_m",
+            "4.6 m below home, below limits.fence_floor_m",
+            6.6,
+        ),
     ],
 )
 def test_a_breach_tells_its_limit_and_how_far_outside_it_is(place, limit, words, by):

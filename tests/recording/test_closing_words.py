@@ -228,6 +228,8 @@ def test_a_full_disk_is_not_blamed_on_the_configuration():
         "The flight was good, as far as it could be recorded: hover, steps and circle."
     )
     assert (told.good, told.lines[0]) == (False, f"! {sentence}")
+    assert told.lines[-1].startswith("  at least 38 s under our control"), "the rest was lost"
+    assert words(GOOD)[0].lines[-1].startswith("  38 s under our control")
 
 
 def test_a_flight_that_ended_early_says_when_why_and_what_to_do():

@@ -1,6 +1,7 @@
 """What `companion plot` draws, and what it refuses in one sentence, without a traceback."""
 
 import json
+import warnings
 from dataclasses import replace
 from importlib.util import find_spec
 from math import nan
@@ -11,7 +12,7 @@ import pytest
 from companion.cli.main import main
 from companion.extras import MissingExtraError
 from companion.recording.figure import FigureError, draw_flight
-from companion.recording.flight_record import RecordError
+from companion.recording.flight_record import RecordError, read_flight
 from companion.recording.history import HEIGHTS, Marks, Span, draw_history, marks_of
 from companion.recording.mcap_file.channels import MOTION
 from companion.recording.mcap_file.fields import CDR
@@ -114,6 +115,22 @@ def test_each_panel_has_its_curve_its_unit_and_all_marks():
         assert phases == ["connect, checks", "takeoff", "maneuvers"]
     finally:
         pyplot.close(figure)
+
+
+def test_a_damaged_record_is_drawn_without_the_names_of_what_it_lost(tmp_path, capsys, monkeypatch):
+    """Names far outside of the axes left the layout no room, and matplotlib printed a warning."""
+    late = {"begin_s": 500.0, "duration_s": 9.0, "name": "circle", "open_loop": False}
+    long = {"begin_s": 9.0, "duration_s": 900.0, "name": "hover", "open_loop": False}
+    phases = [*SUMMARY["phases"], {"time_s": 600.0, "name": "land"}]
+    record(tmp_path, motion=True, summary={**WHOLE, "maneuvers": [long, late], "phases": phases})
+    damaged = replace(read_flight(tmp_path), damage="bad checksum")
+    monkeypatch.setattr("companion.recording.figure.read_flight", lambda _: damaged)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert main(["plot", str(tmp_path)]) == 1
+    told, written = capsys.readouterr().out.splitlines()
+    assert "the recording is damaged, and only the part before was read" in told
+    assert written == str(tmp_path / "flight.png")
 
 
 @pytest.mark.parametrize("kept", [("motion",), ("steps",), ("motion", "steps")])

@@ -11,7 +11,7 @@ from zstandard import ZstdError
 from companion.cli.main import main
 from companion.control.loop_record import Unanswered
 from companion.files.yaml_file import ConfigError
-from companion.recording.flight_record import RecordError, read_flight
+from companion.recording.flight_record import FILE, RecordError, read_flight
 from companion.recording.folder import flight_folder
 from companion.recording.mcap_file import cdr, reader, writer
 from companion.recording.mcap_file.batch import _FULL_BATCH, Batch, messages_of
@@ -125,6 +125,33 @@ def test_another_file_is_refused_with_its_name(tmp_path, content):
     (tmp_path / "flight.mcap").write_bytes(content)
     with pytest.raises(RecordError, match=r"flight\.mcap: not the record of a flight"):
         read_flight(tmp_path)
+
+
+@pytest.mark.parametrize("command", ["report", "plot", "replay", "export --csv", "compare"])
+def test_the_folder_above_the_flights_is_answered_with_the_newest(tmp_path, command, capsys):
+    for name in ("2026-11-22T10-54-16Z", "2026-11-26T12-45-09Z"):
+        (tmp_path / name).mkdir()
+        write(tmp_path / name)
+    assert main([*command.split(), str(tmp_path)]) == 2
+    newest = tmp_path / "2026-11-26T12-45-09Z"
+    assert capsys.readouterr().err == (
+        f"companion: {tmp_path} holds the folders of flights; name one of them, such as {newest}\n"
+    )
+
+
+@pytest.mark.parametrize("found", ["empty", "missing"])
+def test_a_flight_without_its_record_is_no_success(tmp_path, found, capsys):
+    """A full disk or a bad copy left `summary.json` alone; its page looked whole."""
+    (tmp_path / "config.yaml").write_text("")
+    if found == "empty":
+        (tmp_path / FILE).touch()
+    told = f"{tmp_path / FILE} is missing or empty: no sample and no event was recorded"
+    for command in ("report", "export --csv", "compare"):
+        out = [] if "export" in command else ["--out", str(tmp_path / "page.html")]
+        assert main([*command.split(), str(tmp_path), *out]) == 1, command
+        assert told in capsys.readouterr().out.splitlines()
+        if out:
+            assert f'<p class="bad">{told}</p>' in (tmp_path / "page.html").read_text("utf-8")
 
 
 def test_a_folder_without_record_is_refused(tmp_path):

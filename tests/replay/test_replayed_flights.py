@@ -245,6 +245,13 @@ def test_the_command_tells_what_is_the_same_and_what_differs(good, tmp_path, cap
     assert any(row["recorded_roll_rad_s"] != row["replayed_roll_rad_s"] for row in rows)
 
 
+def test_a_table_that_cannot_be_written_is_told_before_the_replay(good, tmp_path, capsys):
+    for csv_file, why in ((tmp_path / "no" / "x", "there is no folder"), (tmp_path, "a folder")):
+        assert main(["replay", str(good[0]), "--csv", str(csv_file)]) == 2
+        told = capsys.readouterr()
+        assert (told.out, why in told.err) == ("", True)
+
+
 def test_a_damaged_recording_is_told_and_its_replay_is_no_success(good, tmp_path, capsys):
     folder = tmp_path / "damaged"
     shutil.copytree(good[0], folder)
@@ -297,7 +304,7 @@ def test_a_place_that_cannot_be_written_is_named(good, tmp_path, capsys, monkeyp
         assert main(command) == 2
         told = capsys.readouterr().err
         assert told.startswith(f"companion: {below}")
-        assert "Not a directory" in told
+        assert ("there is no folder" if command[0] == "replay" else "Not a directory") in told
     monkeypatch.setattr(Replay, "run", lambda _: [])
     assert main(["replay", str(folder)]) == 2
     assert "no attitude sample is recorded there to replay" in capsys.readouterr().err

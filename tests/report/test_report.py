@@ -101,6 +101,19 @@ def test_the_page_says_first_whether_the_flight_was_good_and_shows_all_of_it(fol
     ]
 
 
+def test_a_record_that_was_copied_in_part_is_no_success(copied, capsys):
+    """Half of a record, beside the summary of the whole flight, was called identical in replay."""
+    record = copied / "flight.mcap"
+    record.write_bytes(record.read_bytes()[: record.stat().st_size // 2])
+    told = f"{record} ends at {read_flight(copied).duration:.1f} s, before its flight did: "
+    for command in ("report", "replay", "export --csv", "plot"):
+        assert main([*command.split(), str(copied)]) == 1, command
+        assert told in capsys.readouterr().out, command
+    assert f'<p class="bad">{told}' in body(copied / PAGE)
+    (copied / "summary.json").unlink()  # a flight that was killed recorded all that it could
+    assert main(["replay", str(copied)]) == 0
+
+
 def test_the_page_holds_plotly_packed(folder):
     """A page had 5.8 MB with Plotly as it is."""
     path = page.write_report(folder)

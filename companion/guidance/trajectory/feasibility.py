@@ -18,7 +18,10 @@ _TO_DEGREES = 180.0 / pi
 
 TILT_LIMIT = "limits.max_tilt_deg"
 """Configuration key of the tilt limit."""
-SLOWER_REMEDY = "fly it more slowly (--slow-down finds how much), or change the limit"
+SLOWER_REMEDY = (
+    "fly it more slowly (--slow-down, or flight.slow_down: true, finds how much), or change the "
+    "limit"
+)
 """The remedy if a slower motion would keep the limit."""
 
 

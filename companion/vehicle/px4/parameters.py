@@ -26,7 +26,8 @@ from companion.vehicle.parameter_rules import CompanionSettings, ParameterRule, 
 _REFERENCE = "PX4 parameter reference"
 _MEASURED = "measured on PX4 main, 2026"
 _STOPS_MOTORS = "the motors stop in the air"
-_LINK_LOSS_ACTIONS = (0.0, 1.0, 2.0, 3.0)  # none, hold, return, land
+_LINK_LOSS_ACTIONS = (0.0, 1.0, 2.0, 3.0)
+_ACTIONS = "(0 nothing, 1 hold, 2 return, 3 land)"
 _STICKS_DO_NOTHING = "moving the sticks does not end offboard; only the mode switch does"
 _INTEGRATION_RATES = (100.0, 200.0, 250.0, 400.0)
 _TERMINATION_OFF = 121212
@@ -108,9 +109,9 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ),
     ParameterRule(
         ("COM_OBL_RC_ACT",),
-        "what PX4 does when setpoints stop",
+        "what PX4 does when setpoints stop (0 position, 1 altitude, 3 return, 4 land, 5 hold)",
         action(
-            (0.0, 1.0, 3.0, 4.0, 5.0),  # position, altitude, return, land, hold
+            (0.0, 1.0, 3.0, 4.0, 5.0),
             {
                 2.0: "PX4 goes to manual flight, and falls or drifts unless a pilot acts at once",
                 6.0: _STOPS_MOTORS,
@@ -156,14 +157,14 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ),
     ParameterRule(
         ("NAV_DLL_ACT",),
-        "what PX4 does when the ground station's heartbeat stops, even if setpoints continue",
+        f"what PX4 does without a ground station's heartbeat, even with setpoints {_ACTIONS}",
         action(_LINK_LOSS_ACTIONS, {5.0: _STOPS_MOTORS, 6.0: _STOPS_MOTORS}, set_to=2.0),
         f"{_REFERENCE}; {_MEASURED}",
         universal=True,
     ),
     ParameterRule(
         ("NAV_RCL_ACT",),
-        "what PX4 does when the pilot's transmitter is lost",
+        f"what PX4 does when the pilot's transmitter is lost {_ACTIONS}",
         action(_LINK_LOSS_ACTIONS, {5.0: _STOPS_MOTORS, 6.0: _STOPS_MOTORS}, set_to=2.0),
         _REFERENCE,
         universal=True,
@@ -210,14 +211,14 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ),
     ParameterRule(
         ("GF_ACTION",),
-        "what PX4 does at its own geofence",
+        "what PX4 does at its own geofence (0 nothing, 1 warn, 2 hold, 3 return, 5 land)",
         action((0.0, 1.0, 2.0, 3.0, 5.0), {4.0: _STOPS_MOTORS}, set_to=2.0),
         _REFERENCE,
         universal=True,
     ),
     ParameterRule(
         ("COM_LOW_BAT_ACT",),
-        "what PX4 does about an empty battery",
+        "what PX4 does about an empty battery (0 warn, 2 land, 3 return or land)",
         forbidden(
             INEFFECTIVE,
             {0.0: "PX4 only warns; if companion has ended, nothing lands the vehicle"},
