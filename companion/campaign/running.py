@@ -110,7 +110,7 @@ class _Run:
                 if not number_of_workers(client):
                     self._console.print("waiting for the cluster's first worker…")
                     wait_for_workers(client)
-                workers = number_of_workers(client)
+                workers = max(1, number_of_workers(client))  # the first may have left already
                 with folder.locked(self._folder):
                     description = self._open_folder(case_s, workers)
                     self._console.print(f"Dask's dashboard: {client.dashboard_link}")

@@ -109,10 +109,10 @@ def size_of_units(cases: int, case_s: float, workers: int) -> int:
     Args:
         cases: number of cases of the campaign.
         case_s: time that a case takes, s.
-        workers: number of workers.
+        workers: number of workers; none at present counts as one, for which the cluster waits.
     """
     by_time = int(SECONDS / max(case_s, 1e-6))
-    by_share = -(-cases // (_UNITS_PER_WORKER * workers))
+    by_share = -(-cases // (_UNITS_PER_WORKER * max(1, workers)))
     return max(1, min(by_time, by_share))
 
 

@@ -28,6 +28,16 @@ def forbidden(result: CheckResult, bad: Mapping[float, str], set_to: float | Non
     return check
 
 
+def first_problem(*checks: Check) -> Check:
+    """A check that reports the first problem that any of the checks finds."""
+
+    def check(value: float, values: Values, settings: CompanionSettings) -> Problem | None:
+        found = (each(value, values, settings) for each in checks)
+        return next((problem for problem in found if problem is not None), None)
+
+    return check
+
+
 def action(good: Iterable[float], bad: Mapping[float, str], set_to: float) -> Check:
     """A check of what the autopilot does in an emergency: only the actions in `good` are safe.
 

@@ -223,6 +223,7 @@ def test_units_take_seconds_and_leave_work_for_all():
     assert size_of_units(500, 1.25, 2) == 2
     assert size_of_units(500, 60.0, 2) == 1
     assert size_of_units(20, 0.1, 2) == 3
+    assert size_of_units(20, 0.1, 0) == size_of_units(20, 0.1, 1) == 5
     assert [list(each) for each in ranges(5, 2)] == [[0, 1], [2, 3], [4]]
 
 

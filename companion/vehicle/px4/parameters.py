@@ -3,8 +3,6 @@
 Sources: PX4's parameter reference and `commander`; "measured": PX4 main in simulation, 2026.
 """
 
-from math import degrees
-
 from companion.vehicle.parameter_checks import (
     INEFFECTIVE,
     UNSAFE,
@@ -13,6 +11,7 @@ from companion.vehicle.parameter_checks import (
     battery_scaling,
     bit_clear,
     bit_set,
+    first_problem,
     forbidden,
     hover_thrust,
     positive,
@@ -21,7 +20,13 @@ from companion.vehicle.parameter_checks import (
     system_id,
     thrust_curve,
 )
-from companion.vehicle.parameter_rules import CompanionSettings, ParameterRule, Problem, Values
+from companion.vehicle.parameter_rules import ParameterRule
+from companion.vehicle.px4.parameter_checks import (
+    attitude_rate,
+    failure_tilt,
+    signing,
+    termination_tilt,
+)
 
 _REFERENCE = "PX4 parameter reference"
 _MEASURED = "measured on PX4 main, 2026"
@@ -29,75 +34,6 @@ _STOPS_MOTORS = "the motors stop in the air"
 _LINK_LOSS_ACTIONS = (0.0, 1.0, 2.0, 3.0)
 _ACTIONS = "(0 nothing, 1 hold, 2 return, 3 land)"
 _STICKS_DO_NOTHING = "moving the sticks does not end offboard; only the mode switch does"
-_INTEGRATION_RATES = (100.0, 200.0, 250.0, 400.0)
-_TERMINATION_OFF = 121212
-_FAILURE_ANGLES = ("FD_FAIL_R", "FD_FAIL_P")
-_NAMED_ANGLES = ", ".join(_FAILURE_ANGLES)
-_DEFAULT_FAILURE_ANGLE = 60.0
-_TILT_OVERSHOOT = 15.0
-"""Tilt beyond the limit that a gust or a step may cause, degrees."""
-
-
-def _attitude_rate(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
-    wanted = settings.attitude_rate_hz
-    if value >= min(wanted, _INTEGRATION_RATES[-1]):
-        return None
-    enough = [rate for rate in _INTEGRATION_RATES if rate >= wanted]
-    return Problem(
-        INEFFECTIVE,
-        f"attitude is estimated no faster than that, so link.attitude_rate_hz {wanted:g} is not "
-        "reached",
-        enough[0] if enough else _INTEGRATION_RATES[-1],
-    )
-
-
-def _termination_tilt(value: float, values: Values, settings: CompanionSettings) -> Problem | None:
-    """Check that the largest tilt of a flight cannot trigger flight termination."""
-    if value == _TERMINATION_OFF:
-        return None
-    if not all(name in values for name in _FAILURE_ANGLES):
-        return Problem(
-            UNSAFE,
-            f"the tilt at which the motors stop ({_NAMED_ANGLES}) is not known, because these "
-            "parameters were not received; check again on a link that loses less",
-        )
-    angles = [values[name] for name in _FAILURE_ANGLES if values[name] > 0.0]
-    if not angles or min(angles) > degrees(settings.max_tilt) + _TILT_OVERSHOOT:
-        return None
-    return Problem(
-        UNSAFE,
-        f"a tilt of {min(angles):g}° ({_NAMED_ANGLES}) stops the motors, and "
-        f"limits.max_tilt_deg is {degrees(settings.max_tilt):g}; lower limits.max_tilt_deg to "
-        f"{_TILT_OVERSHOOT:g}° below that angle, for gusts and steps",
-    )
-
-
-def _failure_tilt(value: float, values: Values, settings: CompanionSettings) -> Problem | None:
-    """Check that the failure detector's angle is larger than the largest tilt of a flight."""
-    if value == 0.0 or value > degrees(settings.max_tilt):
-        return None
-    raised = degrees(settings.max_tilt) < _DEFAULT_FAILURE_ANGLE
-    return Problem(
-        INEFFECTIVE,
-        f"PX4 reports a failure at a tilt that limits.max_tilt_deg {degrees(settings.max_tilt):g} "
-        "allows" + ("" if raised else f"; lower limits.max_tilt_deg below {value:g}"),
-        # The detector is never weakened beyond PX4's default angle.
-        _DEFAULT_FAILURE_ANGLE if raised else None,
-    )
-
-
-def _signing(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
-    """Check that `companion` signs if PX4 requires it.
-
-    The reverse needs no rule: with signing, unsigned frames of the vehicle are refused anyway.
-    """
-    if not value or settings.signs:
-        return None
-    return Problem(
-        INEFFECTIVE,
-        "PX4 obeys only signed frames, and companion does not sign; set link.signing_key_file",
-    )
-
 
 PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
@@ -198,14 +134,14 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
         ("MAV_SIGN_CFG",),
         "whether PX4 obeys only signed frames",
-        _signing,
+        signing,
         _REFERENCE,
         reboot=True,
     ),
     ParameterRule(
         ("IMU_INTEG_RATE",),
         "how often attitude is estimated, Hz",
-        _attitude_rate,
+        attitude_rate,
         _MEASURED,
         reboot=True,
     ),
@@ -219,12 +155,16 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
         ("COM_LOW_BAT_ACT",),
         "what PX4 does about an empty battery (0 warn, 2 land, 3 return or land)",
-        forbidden(
-            INEFFECTIVE,
-            {0.0: "PX4 only warns; if companion has ended, nothing lands the vehicle"},
-            set_to=3.0,
+        first_problem(
+            forbidden(UNSAFE, {4.0: f"when the battery is nearly empty, {_STOPS_MOTORS}"}, 3.0),
+            forbidden(
+                INEFFECTIVE,
+                {0.0: "PX4 only warns; if companion has ended, nothing lands the vehicle"},
+                set_to=3.0,
+            ),
         ),
         _REFERENCE,
+        universal=True,
     ),
     ParameterRule(
         ("CBRK_SUPPLY_CHK",),
@@ -236,15 +176,15 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
         ("CBRK_FLIGHTTERM",),
         "whether the failure detector stops motors",
-        _termination_tilt,
+        termination_tilt,
         _REFERENCE,
         universal=True,
         reboot=True,
     ),
     ParameterRule(
-        ("FD_FAIL_R",), "beyond which roll PX4 reports a failure", _failure_tilt, _REFERENCE
+        ("FD_FAIL_R",), "beyond which roll PX4 reports a failure", failure_tilt, _REFERENCE
     ),
     ParameterRule(
-        ("FD_FAIL_P",), "beyond which pitch PX4 reports a failure", _failure_tilt, _REFERENCE
+        ("FD_FAIL_P",), "beyond which pitch PX4 reports a failure", failure_tilt, _REFERENCE
     ),
 )
