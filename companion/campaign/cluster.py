@@ -164,9 +164,7 @@ def wait_for_workers(client: "Client") -> None:
 
 
 def number_of_workers(client: "Client") -> int:
-    """The number of workers that the cluster has now; 0 if the last one has just left."""
-    # Not `scheduler_info`: the client refreshes what that returns in the background, with few of
-    # the workers or none.
+    """The number of workers that the cluster has now; `scheduler_info` lags behind, and may say 0."""
     return len(client.nthreads())
 
 
