@@ -164,7 +164,7 @@ def wait_for_workers(client: "Client") -> None:
 
 
 def number_of_workers(client: "Client") -> int:
-    """The number of workers that the cluster has now; `scheduler_info` lags behind, and may say 0."""
+    """The number of workers that the cluster has now; `scheduler_info` may lack some."""
     return len(client.nthreads())
 
 
