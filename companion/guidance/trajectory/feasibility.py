@@ -103,9 +103,8 @@ class Envelope:
             raise ValueError(f"max_tilt must be in (0, π/2) rad, not {self.max_tilt:g}")
         for name in _NOT_NEGATIVE:
             limit = getattr(self, name)
-            if (
-                limit is not None and not limit >= 0.0
-            ):  # not true for NaN, which nothing would break
+            # In this form it refuses NaN, too, which no motion would break.
+            if limit is not None and not limit >= 0.0:
                 raise ValueError(f"{name} must be 0 or more, or None for no limit, not {limit:g}")
 
 
