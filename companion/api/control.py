@@ -4,12 +4,13 @@ import asyncio
 from collections.abc import AsyncIterator
 from math import inf, isnan
 
-from companion.api.commanded import copied, vector
+from companion.api.commanded import copied
 from companion.api.flight_loop import FlightLoop
 from companion.api.program import Program
 from companion.api.state import NewestState, State
 from companion.attitude import BodyRates, Coefficients
 from companion.flight.context import FlightContext
+from companion.guidance.finite import finite_vector
 from companion.guidance.reference import Reference, Vector
 from companion.guidance.source import CommandedSource
 from companion.safety.actions import FlightEnded
@@ -125,7 +126,7 @@ class Control:
         """
         # A program may write into its arrays after this call, so both are copied.
         reference = copied(reference)
-        jerk_ned = None if jerk_ned is None else vector("jerk_ned", jerk_ned)
+        jerk_ned = None if jerk_ned is None else finite_vector("jerk_ned", jerk_ned)
         self._require_control()
         self._command = reference, self._loop.time(), jerk_ned
         if not self._posted:  # else the callback posted before will take this command

@@ -8,7 +8,6 @@ from functools import partial
 from math import hypot, tau
 from pathlib import Path
 
-from companion.api.commanded import number, vector
 from companion.api.control import Control
 from companion.api.flight_loop import FlightLoop
 from companion.api.in_thread import call_in_thread
@@ -26,6 +25,7 @@ from companion.flight.phases import (
     takeoff_phases,
 )
 from companion.guidance import Maneuver, ManeuverSequence, Pose
+from companion.guidance.finite import finite_number, finite_vector
 from companion.guidance.follow import Follow, HeldFigure, hover
 from companion.guidance.reference import Vector, minus
 from companion.guidance.source import CommandedSource
@@ -97,7 +97,7 @@ class Vehicle:
             FlightEnded: the vehicle is not under our control.
             ValueError: the time is negative or not finite; nothing was flown.
         """
-        if not number("seconds", seconds) >= 0.0:
+        if not finite_number("seconds", seconds) >= 0.0:
             raise ValueError(f"the time to hold must be 0 s or more, not {seconds:g}")
         await self._fly(hover(float(seconds)))
 
@@ -116,8 +116,7 @@ class Vehicle:
 
         Args:
             position_ned: m, in the frame of `State.position_ned`.
-            heading: heading of the flight, rad; None: the present one. The vehicle turns to it
-                before it leaves.
+            heading: heading, rad, to which the vehicle turns before it leaves; None: the present.
             speed: largest speed, m/s.
             acceleration: largest acceleration, m/s².
             jerk: largest jerk, m/s³.
@@ -126,20 +125,21 @@ class Vehicle:
             ConfigError: the configured limits or the fence do not allow it; nothing was flown.
             FlightEnded: the vehicle is not under our control.
             TrajectoryError: a limit given here is not positive.
-            ValueError: the position is not three finite numbers, another argument is not finite, or
-                the heading is more than two turns, as 90 for 90° is.
+            ValueError: an argument is not finite, or the heading is above two turns (90 for 90°).
         """
-        to = minus(vector("position_ned", position_ned), self._held_pose().position_ned)
-        limits = number("speed", speed), number("acceleration", acceleration), number("jerk", jerk)
-        facing = None if heading is None else number("heading", heading)
+        to = minus(finite_vector("position_ned", position_ned), self._held_pose().position_ned)
+        names = "speed", "acceleration", "jerk"
+        speed, acceleration, jerk = map(finite_number, names, (speed, acceleration, jerk))
+        facing = None if heading is None else finite_number("heading", heading)
         if facing is not None and abs(facing) > 2.0 * tau:
             raise ValueError(f"heading is in rad, and {facing:g} rad are more than two turns")
         if hypot(*to) < SMALLEST_DISTANCE:
             await self.follow(Hover(0.0, heading=facing))
         elif facing is None:
-            await self._fly(HeldFigure(line(to, *limits)))
+            await self._fly(HeldFigure(line(to, speed, acceleration, jerk)))
         else:
-            await self.follow(replace(line(to, *limits), heading=FixedHeading(facing)))
+            path = line(to, speed, acceleration, jerk)
+            await self.follow(replace(path, heading=FixedHeading(facing)))
 
     async def follow(self, trajectory: Trajectory | Path | str) -> None:
         """Follow a trajectory from the present position.

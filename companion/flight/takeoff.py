@@ -23,7 +23,6 @@ _MAX_OVERSHOOT = 3.0
 _ARRIVAL_TIME = 2.0
 """Time allowed to reach altitude after hold mode is shown, s; else something ended the climb."""
 
-
 _LARGEST_HELD_SPEED = 3.0
 """Largest horizontal speed of a vehicle that is taken over, m/s."""
 

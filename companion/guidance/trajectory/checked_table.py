@@ -5,12 +5,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from companion.guidance.trajectory.csv_file import Table
+from companion.guidance.trajectory.csv_file import FEWEST_SAMPLES, Table
 from companion.guidance.trajectory.sample import TrajectoryError
 from companion.guidance.trajectory.septic_spline import Floats
-
-_FEWEST = 4
-"""Fewest samples through which a smooth curve is laid."""
 
 
 def checked_table(table: Table) -> Table:
@@ -22,8 +19,8 @@ def checked_table(table: Table) -> Table:
     """
     times = _array("times", table.times, None)
     count = times.shape[0]
-    if count < _FEWEST:
-        raise TrajectoryError(f"a table needs at least {_FEWEST} samples, not {count}")
+    if count < FEWEST_SAMPLES:
+        raise TrajectoryError(f"a table needs at least {FEWEST_SAMPLES} samples, not {count}")
     if times[0] != 0.0 or not (np.diff(times) > 0.0).all():
         raise TrajectoryError("the times of a table must increase from 0 s; subtract the first one")
     return replace(

@@ -22,7 +22,7 @@ from companion.guidance.trajectory.csv_header import columns_of, rows_of, shown,
 from companion.guidance.trajectory.sample import FARTHEST, FASTEST, TrajectoryError
 from companion.guidance.trajectory.septic_spline import Floats
 
-_FEWEST_SAMPLES = 4
+FEWEST_SAMPLES = 4
 """Smallest number of samples of a table. Fewer do not determine a smooth curve."""
 
 _MOST_SAMPLES = 50_000
@@ -107,7 +107,7 @@ def table(lines: Iterable[str], name: str) -> Table:
     """
     frames: list[str] = []
     rows = list(itertools.islice(rows_of(csv.reader(lines), frames), _MOST_SAMPLES + 2))
-    fewest = f"{name}: needs a header and at least {_FEWEST_SAMPLES} samples"
+    fewest = f"{name}: needs a header and at least {FEWEST_SAMPLES} samples"
     if not rows:
         raise TrajectoryError(fewest)
     if len(rows) > _MOST_SAMPLES + 1:
@@ -115,7 +115,7 @@ def table(lines: Iterable[str], name: str) -> Table:
     named = [column.strip().lower() for column in rows[0][1]]
     header = [without_unit(column) for column in named]
     groups = columns_of(header, named, name)
-    if len(rows) <= _FEWEST_SAMPLES:
+    if len(rows) <= FEWEST_SAMPLES:
         raise TrajectoryError(fewest)
     _require_no_more_values(rows, name)
     data = {group: _numbers(rows[1:], header, names, name) for group, names in groups.items()}

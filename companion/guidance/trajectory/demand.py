@@ -58,10 +58,9 @@ def sampled(trajectory: Trajectory, times: Sequence[float] | None = None) -> Mot
     position, velocity, acceleration, jerk, heading, heading_rate = (
         np.array(column) for column in zip(*samples, strict=True)
     )
-    if not np.isfinite(heading).all():
-        raise FloatingPointError("not a finite number")
     motion = Motion(np.array(times), position, velocity, acceleration, jerk, heading_rate)
     require_finite(motion)
+    _require_all_finite(heading)
     return motion
 
 
@@ -80,7 +79,11 @@ def require_finite(motion: Motion) -> None:
             f"a motion at {count} times has vectors of the shape ({count}, 3) and {count} heading "
             f"rates, not {shapes} and {np.shape(motion.heading_rate)}"
         )
-    for column in (*vectors, motion.heading_rate):
+    _require_all_finite(*vectors, motion.heading_rate)
+
+
+def _require_all_finite(*columns: Floats) -> None:
+    for column in columns:
         if not np.isfinite(column).all():
             raise FloatingPointError("not a finite number")
 

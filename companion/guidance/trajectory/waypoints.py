@@ -1,11 +1,12 @@
 """Waypoints joined by minimum snap, as fast as a speed and an acceleration allow."""
 
 from collections.abc import Sequence
-from math import inf, isfinite
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.guidance.finite import finite_vector
 from companion.guidance.trajectory.minimum_snap import Fixed, minimum_snap
 from companion.guidance.trajectory.sample import SMALLEST_DISTANCE, TrajectoryError, Vector
 from companion.guidance.trajectory.septic_spline import STATE_SIZE, Floats, SepticSpline
@@ -100,12 +101,9 @@ def _place(point: Vector) -> Vector:
         TrajectoryError: it is something else.
     """
     try:
-        north, east, down = map(float, point)
-    except (TypeError, ValueError):
-        north = east = down = inf
-    if not all(map(isfinite, (north, east, down))):
-        raise TrajectoryError(f"each waypoint must be three finite numbers, not {point!r}")
-    return north, east, down
+        return finite_vector("each waypoint", point)
+    except ValueError as error:
+        raise TrajectoryError(str(error)) from None
 
 
 def _distance_fault(distances: Floats) -> str:

@@ -86,7 +86,7 @@ def _maneuvers(figures: Figures) -> Iterator[Check]:
                 f"{level:.2f} m RMS from its path (limit {limit:.2f} m), "
                 f"at most {maneuver['level_max_m']:.2f} m",
                 level <= limit,
-                _level_remedy(speed),
+                _horizontal_remedy(speed),
                 f"{maneuver['name']}: too far from its path",
             )
         if height is not None:
@@ -100,7 +100,7 @@ def _maneuvers(figures: Figures) -> Iterator[Check]:
         yield from _swing(maneuver)
 
 
-def _level_remedy(speed: float) -> str:
+def _horizontal_remedy(speed: float) -> str:
     """The remedy for a maneuver that was too far from its path, by its largest speed, m/s."""
     first = "fly it slower" if speed > 0.0 else "fly in less wind"
     return f"{first}; against wind and drag see guidance and `companion identify`"
