@@ -10,7 +10,7 @@ from companion.flight.context import FlightContext
 from companion.flight.phases import Phase
 from companion.mavlink.errors import LinkError
 from companion.safety import SafetyLadder
-from companion.safety.actions import EXIT_OF_ACTION, Action, Exit, FlightEnded
+from companion.safety.actions import EXIT_OF_ACTION, Action, Exit, FlightEnded, Stream
 from companion.safety.snapshot import Health
 from companion.vehicle.autopilot import Role
 from companion.vehicle.link import Link
@@ -155,11 +155,11 @@ class Watch:
         if verdict.action is Action.HOLD:
             self._context.guidance_loop.give_up()
             return
-        self._stopped_in_control = self._stopped_in_control or verdict.mutes or verdict.ends_stream
-        if verdict.mutes:
+        if verdict.stream is Stream.STOPS:
             self._context.release()
-        elif verdict.ends_stream:
+        elif verdict.stream is Stream.ENDS:
             self._context.end_stream()
+        self._stopped_in_control |= verdict.stream is not Stream.CONTINUES
         raise FlightEnded(verdict.reason, EXIT_OF_ACTION[verdict.action])
 
     def _judge_heartbeat(self) -> None:

@@ -52,6 +52,17 @@ class Exit(Enum):
         return self not in (Exit.LISTEN, Exit.RELEASE)
 
 
+class Stream(Enum):
+    """What a breach that ends control does to the stream of setpoints, before its exit begins."""
+
+    CONTINUES = "continues"
+    """The exit ends it, once the autopilot obeys."""
+    ENDS = "ends"
+    """It ends with a setpoint of zero body rates: later ones would not arrive in time."""
+    STOPS = "stops"
+    """It stops at once: the data for another setpoint cannot be trusted."""
+
+
 EXIT_OF_ACTION = {
     Action.HAND_BACK: Exit.HOLD,
     Action.LAND: Exit.LAND,

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from companion.safety.actions import Action
+from companion.safety.actions import Action, Stream
 from companion.safety.monitor import Alarm, Monitor
 from companion.safety.snapshot import Snapshot
 
@@ -14,13 +14,12 @@ class Verdict(NamedTuple):
     Attributes:
         action: HOLD, or one that ends the flight.
         reason: description of the breach.
-        mutes, ends_stream: see `Monitor`.
+        stream: what becomes of the setpoints if `action` ends control.
     """
 
     action: Action
     reason: str
-    mutes: bool = False
-    ends_stream: bool = False
+    stream: Stream = Stream.CONTINUES
 
 
 class SafetyLadder:
@@ -99,4 +98,4 @@ def _severity(alarm: Alarm) -> int:
 
 def _verdict(alarm: Alarm, action: Action) -> Verdict:
     monitor = alarm.monitor
-    return Verdict(action, alarm.reason or "", monitor.mutes, monitor.ends_stream)
+    return Verdict(action, alarm.reason or "", monitor.stream)

@@ -93,13 +93,31 @@ def late_setpoints(stale: float) -> Judge:
     most = 1.5 * stale
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
-        seconds = snapshot.health.present_round_trip
+        seconds = snapshot.health.uplink.round_trip
         if seconds is None or seconds <= with_hysteresis(most, raised):
             return None
         return (
             f"setpoints reach the vehicle too late: the link's round trip takes "
             f"{1e3 * seconds:.0f} ms, longer than 1.5 · deadman.telemetry_stale_ms = "
             f"{1e3 * most:.0f}"
+        )
+
+    return judge
+
+
+def lost_setpoints(most: int) -> Judge:
+    """More than `most` TIMESYNC probes in a row were sent and not answered.
+
+    The telemetry still comes, otherwise `silence` has ended control before.
+    """
+
+    def judge(snapshot: Snapshot, _: bool) -> str | None:
+        unanswered = snapshot.health.uplink.unanswered
+        if unanswered is None or unanswered <= most:
+            return None
+        return (
+            f"setpoints do not reach the vehicle: the last {unanswered} TIMESYNC requests, ten a "
+            "second, were not answered"
         )
 
     return judge

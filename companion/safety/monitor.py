@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from companion.safety.actions import Action
+from companion.safety.actions import Action, Stream
 from companion.safety.snapshot import Snapshot
 
 Judge = Callable[[Snapshot, bool], str | None]
@@ -38,9 +38,7 @@ class Monitor:
         lasts: time that a breach must last before the alarm is raised, s.
         calm: time without the breach before the alarm ends, s.
         then: action that follows if a hold does not end the breach.
-        mutes: whether setpoints stop at once, because their data cannot be trusted.
-        ends_stream: whether setpoints stop after one with zero body rates, because the later ones
-            would arrive too late.
+        stream: what becomes of the setpoints if the breach ends control.
     """
 
     name: str
@@ -49,8 +47,7 @@ class Monitor:
     lasts: float = 0.0
     calm: float = 1.0
     then: Action = Action.LAND
-    mutes: bool = False
-    ends_stream: bool = False
+    stream: Stream = Stream.CONTINUES
 
 
 class Alarm:

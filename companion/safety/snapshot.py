@@ -8,6 +8,7 @@ from companion.control.loop_record import Unanswered
 from companion.guidance.fence import Place
 from companion.guidance.reference import Horizontal, Vector
 from companion.vehicle.records import Battery, Estimator, Gps
+from companion.vehicle.uplink import Uplink
 
 UNHEARD_S = 0.3
 """Time without a frame, s, after which the vehicle counts as not heard: a takeover would not be
@@ -94,7 +95,7 @@ class Health(NamedTuple):
         answer_rate: effective rate of setpoints, Hz (`IntervalSums`).
         gaps: number of gaps in the setpoints within the last 5 s.
         position_rate: rate of positions, Hz.
-        present_round_trip: shortest round trip of the last 0.7 s, s.
+        uplink: the way to the vehicle, over the last moments.
     """
 
     lost: float | None = None
@@ -104,7 +105,7 @@ class Health(NamedTuple):
     answer_rate: float | None = None
     gaps: int = 0
     position_rate: float | None = None
-    present_round_trip: float | None = None
+    uplink: Uplink = Uplink()
 
 
 class Resets(NamedTuple):

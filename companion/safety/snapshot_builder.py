@@ -211,7 +211,7 @@ class SnapshotBuilder:
             return Health(
                 round_trip=timesync.round_trip_s,
                 gaps=gaps,
-                present_round_trip=timesync.present_round_trip_s,
+                uplink=timesync.uplink,
             )
         late = sum(counted.late for counted in self._counted) - first.late
         lost = last.lost - first.lost
@@ -225,7 +225,7 @@ class SnapshotBuilder:
             last.setpoint_intervals.rate_since(first.setpoint_intervals),
             gaps,
             (last.positions - first.positions) / span,
-            timesync.present_round_trip_s,
+            timesync.uplink,
         )
 
     def _resets(self, now: float) -> Resets:

@@ -9,13 +9,17 @@ from dataclasses import replace
 from companion.config import Config
 from companion.guidance.fence import Fence
 from companion.safety import autopilot_judges, link_judges, motion_judges
-from companion.safety.actions import Action
+from companion.safety.actions import Action, Stream
 from companion.safety.monitor import Monitor
 
 _BACKLOG_TIME = 0.2
 """Time after a stall in which queued telemetry is read, s; until then it looks old."""
 _MAX_GAPS = 2
 """Largest number of gaps in the setpoints within 5 s."""
+_MAX_UNANSWERED = 7
+"""Largest number of TIMESYNC probes in a row that the vehicle may leave unanswered; they are sent
+every 0.1 s. If single ones are lost at random, eight in a row are lost once in 50 s at a loss of
+50 %, in 36 min at 30 %, in 13 h at 20 %."""
 _ESTIMATE_DELAY = 0.08
 """Time by which the estimated horizontal motion is behind the vehicle, s. Measured on accelerating
 mock vehicles: ArduPilot's position 0.055 s and velocity up to 0.09 s, PX4's 0.02 s."""
@@ -42,9 +46,9 @@ def _fixed_monitors(config: Config) -> tuple[Monitor, ...]:
     unheard = link_judges.silence(limit, heard=False)
     silence = link_judges.silence(limit, heard=True)
     return (
-        Monitor("unheard", unheard, Action.LISTEN, mutes=True),
-        Monitor("silence", silence, _HAND_BACK, mutes=True),
-        Monitor("clock", link_judges.clock_changed, _HAND_BACK, mutes=True),
+        Monitor("unheard", unheard, Action.LISTEN, stream=Stream.STOPS),
+        Monitor("silence", silence, _HAND_BACK, stream=Stream.STOPS),
+        Monitor("clock", link_judges.clock_changed, _HAND_BACK, stream=Stream.STOPS),
         Monitor("disarmed", autopilot_judges.disarmed, _RELEASE),
         Monitor("landed", autopilot_judges.landed, _LAND),
         # This is for failsafes that do not change the mode: a change of mode is a takeover.
@@ -98,13 +102,15 @@ def _link_monitors(config: Config) -> tuple[Monitor, ...]:
     answers = link_judges.answer_rate(config.link.min_attitude_rate_hz)
     positions = link_judges.position_rate(config.link.min_position_rate_hz)
     late = link_judges.late_setpoints(config.deadman.telemetry_stale)
+    lost = link_judges.lost_setpoints(_MAX_UNANSWERED)
     return (
         # The vehicle keeps turning at the last rate until the next setpoint. A low rate of
         # setpoints causes errors of a few degrees; a gap of 0.4 s exceeds the whole tilt limit.
         Monitor("answer gaps", link_judges.gaps(_MAX_GAPS), _HAND_BACK),
         Monitor("answer rate", answers, _HAND_BACK, lasts=1.0),
         Monitor("position rate", positions, _HAND_BACK, lasts=1.0),
-        Monitor("late setpoints", late, _HAND_BACK, ends_stream=True),
+        Monitor("late setpoints", late, _HAND_BACK, stream=Stream.ENDS),
+        Monitor("lost setpoints", lost, _HAND_BACK, stream=Stream.ENDS),
         Monitor("link loss", link_judges.loss(safety.max_loss), link, lasts=2.0, calm=2.0),
         Monitor("round trip", trip, link, lasts=5.0, calm=5.0),
         # `lasts` exceeds the averaging window of 1 s, so one stall of the computer is no breach.

@@ -14,6 +14,7 @@ from companion.mavlink.settings import LinkSettings
 from companion.mavlink.stats import LinkStats
 from companion.vehicle.clock import VehicleClock
 from companion.vehicle.clock_estimates import EXCHANGE_LIFETIME
+from companion.vehicle.uplink import Uplink, UplinkProbes
 
 _MAV_AUTOPILOT_INVALID = 8
 _MAV_STATE_ACTIVE = 4
@@ -22,10 +23,6 @@ _MAVLINK_VERSION = 3
 _QUICK_REQUESTS, _QUICK_REQUEST_PERIOD_S = 10, 0.1
 _REQUEST_PERIOD_S = 1.0
 _KEPT_REQUESTS = 16
-_PROBE_PERIOD_S = 0.1
-_PROBE_WINDOW_S = 0.7
-"""A longer delay of the link is noticed after about this time, s; single late answers are not."""
-_MIN_PROBES = 4
 _S_PER_NS = 1e-9
 
 
@@ -71,8 +68,7 @@ class TimeSync:
         self._requests: deque[int] = deque(maxlen=_KEPT_REQUESTS)
         # (event-loop time of the answer, round trip), s
         self._round_trips: deque[tuple[float, float]] = deque(maxlen=_KEPT_REQUESTS)
-        self._probes: deque[int] = deque(maxlen=_KEPT_REQUESTS)
-        self._probe_trips: deque[tuple[float, float]] = deque(maxlen=_KEPT_REQUESTS)
+        self._probes = UplinkProbes()
         router.subscribe("TIMESYNC", self._on_timesync)
 
     @property
@@ -87,44 +83,48 @@ class TimeSync:
         return max(trips) - min(trips) if trips else None
 
     @property
-    def present_round_trip_s(self) -> float | None:
-        """The shortest round trip of the probes answered in the last 0.7 s; None: fewer than four.
+    def uplink(self) -> Uplink:
+        """The way to the vehicle, by the probes of the last moments.
 
-        A link that becomes slow lengthens it within a second, `round_trip_s` only after 16 s.
+        A link that becomes slow lengthens its round trip within a second, `round_trip_s` only
+        after 16 s.
         """
-        oldest = self._clock() - _PROBE_WINDOW_S
-        trips = [trip for received, trip in self._probe_trips if received >= oldest]
-        return min(trips) if len(trips) >= _MIN_PROBES else None
+        return self._probes.uplink(self._now_ns())
 
     def ask(self) -> None:
         """Send one TIMESYNC request."""
-        self._send_request(self._requests)
+        stamp = self._now_ns()
+        self._requests.append(stamp)
+        self._send_request(stamp)
 
     def probe(self) -> None:
-        """Send a TIMESYNC request that measures only the round trip, at most ten in a second."""
-        if not self._probes or self._now_ns() - self._probes[-1] >= _PROBE_PERIOD_S / _S_PER_NS:
-            self._send_request(self._probes)
-
-    def _send_request(self, requests: deque[int]) -> None:
+        """Send a TIMESYNC request that measures only the way to the vehicle, if one is due."""
         stamp = self._now_ns()
-        requests.append(stamp)
+        if self._probes.due(stamp):
+            self._probes.note_sent(stamp)
+            self._send_request(stamp)
+
+    def _send_request(self, stamp: int) -> None:
         self._outbox.send(dialect.MAVLink_timesync_message(tc1=0, ts1=stamp))
 
     def reset(self) -> None:
         """Forget all requests and answers, after a reconnect: the vehicle may have restarted."""
-        for each in (self._requests, self._round_trips, self._probes, self._probe_trips):
-            each.clear()
+        self._requests.clear()
+        self._round_trips.clear()
+        self._probes = UplinkProbes()
 
     def _on_timesync(self, message: Message) -> None:
         now = self._now_ns()
         if message.tc1 == 0:
             self._outbox.send(dialect.MAVLink_timesync_message(tc1=now, ts1=message.ts1))
-        elif message.ts1 in self._requests:  # otherwise it answers another station
+            return
+        if message.ts1 in self._requests:
             self._requests.remove(message.ts1)
             self._round_trips.append((now * _S_PER_NS, (now - message.ts1) * _S_PER_NS))
             self._vehicle_clock.exchange(message.ts1 * _S_PER_NS, now * _S_PER_NS, message.tc1)
-        elif message.ts1 in self._probes:
-            self._probe_trips.append((now * _S_PER_NS, (now - message.ts1) * _S_PER_NS))
+        elif message.ts1 not in self._probes:  # it answers another station
+            return
+        self._probes.take_answer(message.ts1, now)
 
     def _recent_round_trips(self) -> list[float]:
         oldest = self._clock() - EXCHANGE_LIFETIME

@@ -1,4 +1,4 @@
-"""The way to the vehicle becomes slow in flight, while all telemetry still comes in time."""
+"""The way to the vehicle becomes slow or lossy in flight, while all telemetry comes in time."""
 
 from math import acos, degrees, hypot
 
@@ -29,24 +29,23 @@ class Extent:
         self.lowest = min(self.lowest, -state["position"][2])
 
 
-def flown(autopilot, delay_ms, **fault):
-    """A hover in wind whose uplink is slow from its first second on."""
+def flown(autopilot, kind, **fault):
+    """A hover in wind whose uplink has the fault from its first second on."""
     with mock_vehicle(autopilot=autopilot, wind=WIND) as mock:
         extent = Extent(mock)
-        late = {"kind": "delay", "direction": "from_companion", "delay_ms": delay_ms, **fault}
 
-        def slow_down():
+        def begin():
             extent.begin()
-            mock.inject(late)
+            mock.inject({"kind": kind, "direction": "from_companion", **fault})
 
-        summary = fly(mock, None, When("maneuvers", slow_down, after=1.0), **HOVER)
+        summary = fly(mock, None, When("maneuvers", begin, after=1.0), **HOVER)
         return summary, mock.state(), extent
 
 
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 @pytest.mark.parametrize("delay_ms", [200.0, 300.0])
 def test_setpoints_that_become_late_end_control_before_the_vehicle_swings_far(autopilot, delay_ms):
-    summary, truth, extent = flown(autopilot, delay_ms)
+    summary, truth, extent = flown(autopilot, "delay", delay_ms=delay_ms)
     assert "setpoints reach the vehicle too late" in summary.result, summary.events
     assert (truth["mode"], truth["crashed"]) == (HELD[autopilot], False)
     assert extent.tilt < 55.0  # the limit and its margin
@@ -54,7 +53,31 @@ def test_setpoints_that_become_late_end_control_before_the_vehicle_swings_far(au
 
 
 def test_a_hiccup_of_the_uplink_is_flown_on():
-    summary, _, _ = flown("px4", 300.0, duration_s=0.4)
+    summary, _, _ = flown("px4", "delay", delay_ms=300.0, duration_s=0.4)
+    assert summary.result == "ok", summary.events
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+@pytest.mark.parametrize(
+    "fault",
+    [
+        {"kind": "delay", "delay_ms": 1500.0},
+        {"kind": "delay", "delay_ms": 3000.0},
+        {"kind": "drop", "probability": 0.9},
+        {"kind": "drop", "probability": 0.95},
+    ],
+    ids=["late by 1.5 s", "late by 3 s", "nine of ten lost", "95 % lost"],
+)
+def test_setpoints_that_do_not_reach_the_vehicle_end_control(autopilot, fault):
+    summary, truth, extent = flown(autopilot, **fault)
+    assert "setpoints do not reach the vehicle" in summary.result, summary.events
+    assert not truth["crashed"]
+    assert extent.lowest > 2.0
+    assert truth["mode"] in (HELD[autopilot], "RTL")  # RTL is PX4's answer to lost setpoints
+
+
+def test_a_way_that_loses_three_of_ten_setpoints_is_flown_on():
+    summary, _, _ = flown("ardupilot", "drop", probability=0.3)
     assert summary.result == "ok", summary.events
 
 

@@ -15,13 +15,14 @@ from companion.safety import (
     link_judges,
     motion_judges,
 )
-from companion.safety.actions import Exit, FlightEnded
+from companion.safety.actions import Exit, FlightEnded, Stream
 from companion.safety.link_judges import silence
 from companion.safety.monitor import Monitor
 from companion.safety.motion_judges import braking
 from companion.safety.snapshot import Autopilot, Control, Health, Motion, Resets, Snapshot
 from companion.safety.table import monitors
 from companion.vehicle.records import Battery, Estimator
+from companion.vehicle.uplink import Uplink
 
 NOW = 100.0
 OLD = NOW - 6.0
@@ -52,7 +53,7 @@ UPPER = {
     "round trip": (link_judges.round_trip, health("round_trip")),
     "late setpoints": (
         lambda most: link_judges.late_setpoints(most / 1.5),
-        health("present_round_trip"),
+        lambda v: at(health=Health(uplink=Uplink(v))),
     ),
     "deadlines": (link_judges.deadlines, health("missed")),
     "starvation": (link_judges.starvation, health("starved")),
@@ -145,9 +146,15 @@ SAID = [
     ),
     (
         lambda: link_judges.late_setpoints(0.1),
-        at(health=Health(present_round_trip=0.3)),
+        at(health=Health(uplink=Uplink(0.3))),
         "setpoints reach the vehicle too late: the link's round trip takes 300 ms, longer than "
         "1.5 · deadman.telemetry_stale_ms = 150",
+    ),
+    (
+        lambda: link_judges.lost_setpoints(7),
+        at(health=Health(uplink=Uplink(None, 10))),
+        "setpoints do not reach the vehicle: the last 10 TIMESYNC requests, ten a second, were not "
+        "answered",
     ),
     (
         lambda: link_judges.deadlines(0.2),
@@ -221,7 +228,7 @@ def test_exactly_the_limit_of_silence_is_none_and_a_vehicle_not_heard_cannot_be_
     at_the_limit = Snapshot(0.3, control=Control(answered=-1.0, heard=0.0))
     assert silence(0.5, heard=False)(at_the_limit, False)
     verdict = SafetyLadder(monitors(Config()), 1.0).step(unheard)
-    assert (verdict.action, verdict.mutes) == (Action.LISTEN, True)
+    assert (verdict.action, verdict.stream) == (Action.LISTEN, Stream.STOPS)
 
 
 def test_it_brakes_in_time_before_a_fence_on_the_map():

@@ -9,10 +9,12 @@ from companion.config import Config
 from companion.control.loop_record import LoopRecord, Unanswered
 from companion.guidance.fence import Place, inside, local_polygon
 from companion.safety import Action, SafetyLadder, monitors
+from companion.safety.actions import Stream
 from companion.safety.monitor import Alarm, Monitor
 from companion.safety.snapshot import Autopilot, Control, Health, Motion, Resets, Snapshot
 from companion.safety.snapshot_builder import SnapshotBuilder
 from companion.vehicle.records import Battery, Estimator, Gps
+from companion.vehicle.uplink import Uplink
 
 CONFIG = Config.model_validate({"limits": {"fence_radius_m": 60.0}})
 NOW = 100.0
@@ -118,7 +120,8 @@ BREACHES = [
     ("answer gaps", health(gaps=3), HAND_BACK, 0.0, "setpoints paused 3 times within 5 s"),
     ("answer rate", health(answer_rate=49.0), HAND_BACK, 1.0, "sent at 49 Hz, below link.min"),
     ("position rate", health(position_rate=9.0), HAND_BACK, 1.0, "come at 9 Hz, below link.min"),
-    ("late setpoints", health(present_round_trip=0.16), HAND_BACK, 0.0, "160 ms, longer than 1.5"),
+    ("late setpoints", health(uplink=Uplink(0.16)), HAND_BACK, 0.0, "160 ms, longer than 1.5"),
+    ("lost setpoints", health(uplink=Uplink(0.01, 8)), HAND_BACK, 0.0, "the last 8 TIMESYNC"),
     ("link loss", health(lost=0.45), WARN, 2.0, "45 % of the vehicle's frames"),
     ("round trip", health(round_trip=0.2), WARN, 5.0, "200 ms"),
     ("deadlines", health(missed=0.3), HAND_BACK, 1.5, "30 % of the setpoints"),
@@ -193,8 +196,15 @@ def test_what_the_rows_of_the_table_say_besides_action_and_time():
     assert {row.name: row.calm for row in table} == {
         row.name: calm.get(row.name, 1.0) for row in table
     }
-    assert [row.name for row in table if row.mutes is True] == ["unheard", "silence", "clock"]
-    assert [row.name for row in table if row.ends_stream is True] == ["late setpoints"]
+    assert [row.name for row in table if row.stream is Stream.STOPS] == [
+        "unheard",
+        "silence",
+        "clock",
+    ]
+    assert [row.name for row in table if row.stream is Stream.ENDS] == [
+        "late setpoints",
+        "lost setpoints",
+    ]
     after_hold = {row.name: row.then for row in table if row.action is HOLD}
     assert after_hold == {"braking": HAND_BACK, "speed": LAND, "tracking": LAND, "thrust": LAND}
 
@@ -268,9 +278,9 @@ def test_an_action_can_be_set_but_not_everywhere_to_a_warning():
 
 def test_in_silence_nothing_is_sent_any_more():
     verdict, _ = Climb().see(control(**SILENT), 0.0)
-    assert verdict.mutes
+    assert verdict.stream is Stream.STOPS
     verdict, _ = Climb().see(autopilot(landed=True), 0.0)
-    assert not verdict.mutes
+    assert verdict.stream is Stream.CONTINUES
 
 
 L_SHAPE = ((-10.0, -10.0), (-10.0, 10.0), (10.0, 10.0), (10.0, -1.0), (1.0, -1.0), (1.0, -10.0))

@@ -9,6 +9,7 @@ from companion.control.loop_record import LoopRecord, Unanswered
 from companion.guidance.fence import Place
 from companion.safety.snapshot import Autopilot, Health, Motion, Resets
 from companion.safety.snapshot_builder import SnapshotBuilder
+from companion.vehicle.uplink import Uplink
 
 Q = (0.6, 0.0, 0.8, 0.0)
 
@@ -38,7 +39,7 @@ class Flight:
             state=self.state,
             clock=self.clock,
             stats=self.stats,
-            timesync=SimpleNamespace(round_trip_s=0.04, present_round_trip_s=0.05),
+            timesync=SimpleNamespace(round_trip_s=0.04, uplink=Uplink(0.05, 1)),
         )
         self.resets = SimpleNamespace(
             newest=SimpleNamespace(q=Q, body_rates=(0.1, 0.2, 0.3)),
@@ -200,7 +201,7 @@ def test_shares_and_rates_are_those_of_the_last_second(flight):
     assert told.answer_rate == pytest.approx(200.0)
     assert told.position_rate == pytest.approx(10.0, rel=0.03)
     assert (told.starved, told.round_trip, told.gaps) == (0.0, 0.04, 0)
-    assert told.present_round_trip == 0.05
+    assert told.uplink == Uplink(0.05, 1)
     flight.listen(13.28)  # 0.25 s too late, and the second looked at began at 12.26 s
     starved = flight.snapshot(13.28).health.starved
     assert starved == pytest.approx(0.25 / 1.02)
@@ -208,11 +209,11 @@ def test_shares_and_rates_are_those_of_the_last_second(flight):
 
 
 def test_shares_are_not_known_before_most_of_a_second_is_seen(flight):
-    assert run_for(flight, 0.88).health == Health(round_trip=0.04, present_round_trip=0.05)
+    assert run_for(flight, 0.88).health == Health(round_trip=0.04, uplink=Uplink(0.05, 1))
     assert run_for(flight, 0.92).health.lost is not None
     flight.builder.begin(11.0)
     flight.listen(11.0)
-    assert flight.snapshot(11.0).health == Health(round_trip=0.04, present_round_trip=0.05)
+    assert flight.snapshot(11.0).health == Health(round_trip=0.04, uplink=Uplink(0.05, 1))
 
 
 def test_rates_of_three_looks_far_apart_are_those_since_the_second_one():

@@ -1,4 +1,4 @@
-"""The round trip of the link now, by probes that do not change the estimate of the clock."""
+"""The way to the vehicle, by probes that do not change the estimate of the clock."""
 
 from types import SimpleNamespace
 
@@ -33,9 +33,9 @@ def test_the_present_round_trip_is_the_shortest_of_the_last_moments_and_needs_fo
     bench = Bench()
     for trip in (0.05, 0.03, 0.05):
         bench.probe(trip)
-        assert bench.timesync.present_round_trip_s is None
+        assert bench.timesync.uplink.round_trip is None
     bench.probe(0.05)
-    assert bench.timesync.present_round_trip_s == pytest.approx(0.03)
+    assert bench.timesync.uplink.round_trip == pytest.approx(0.03)
     bench.now += 0.4
     for sent in range(4):
         bench.timesync.probe()
@@ -44,9 +44,9 @@ def test_the_present_round_trip_is_the_shortest_of_the_last_moments_and_needs_fo
     bench.now += 0.2
     for request in bench.sent[-4:]:
         bench.timesync._on_timesync(SimpleNamespace(tc1=7 * 10**9, ts1=request.ts1))
-    assert bench.timesync.present_round_trip_s == pytest.approx(0.3)
+    assert bench.timesync.uplink.round_trip == pytest.approx(0.3)
     bench.now += 0.8
-    assert bench.timesync.present_round_trip_s is None
+    assert bench.timesync.uplink.round_trip is None
 
 
 def test_a_probe_changes_neither_the_clock_nor_the_long_round_trip():
@@ -70,4 +70,47 @@ def test_probes_are_sent_ten_times_a_second_and_forgotten_after_a_reconnect():
     bench.timesync.reset()
     for request in bench.sent:
         bench.timesync._on_timesync(SimpleNamespace(tc1=7 * 10**9, ts1=request.ts1))
-    assert bench.timesync.present_round_trip_s is None
+    assert bench.timesync.uplink.round_trip is None
+
+
+def test_unanswered_probes_are_counted_once_the_vehicle_has_answered_any_request():
+    bench = Bench()
+    for _ in range(5):
+        bench.timesync.probe()
+        bench.now += 0.1
+    assert bench.timesync.uplink.unanswered is None
+    bench.answer(0.01)
+    assert bench.timesync.uplink.unanswered == 0
+    for sent in range(1, 31):
+        bench.now += 0.1
+        bench.timesync.probe()
+        assert bench.timesync.uplink.unanswered == sent
+
+
+def test_an_answer_leaves_the_probes_sent_after_its_request_unanswered():
+    bench = Bench()
+    bench.timesync.ask()
+    bench.answer(0.01)
+    for _ in range(6):
+        bench.now += 0.1
+        bench.timesync.probe()
+    probes = [request.ts1 for request in bench.sent[1:]]
+
+    def unanswered_after(stamp):
+        bench.timesync._on_timesync(SimpleNamespace(tc1=7 * 10**9, ts1=stamp))
+        return bench.timesync.uplink.unanswered
+
+    assert unanswered_after(probes[3]) == 2
+    assert unanswered_after(probes[1]) == 2  # overtaken on the way
+    assert unanswered_after(probes[3] + 1) == 2  # an answer to another station
+    bench.timesync.ask()
+    assert unanswered_after(bench.sent[-1].ts1) == 0
+
+
+def test_after_a_reconnect_the_vehicle_must_answer_again_before_probes_count():
+    bench = Bench()
+    bench.probe(0.01)
+    bench.timesync.reset()
+    bench.now += 0.1
+    bench.timesync.probe()
+    assert bench.timesync.uplink.unanswered is None
