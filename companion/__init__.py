@@ -18,7 +18,7 @@ Fly from Python
     State         time, position, velocity, attitude, body rates, heading, height
     Reference     position, velocity and acceleration that are wanted now
     Coefficients  north, east: horizontal acceleration per specific thrust
-    FlightEnded   raised once the vehicle is in other hands
+    FlightEnded   raised when the flight, and with it the program's control, has ended
 
 Packages
     companion.attitude, companion.batch, companion.guidance.trajectory, companion.identification,

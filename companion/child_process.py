@@ -1,4 +1,4 @@
-"""Processes that a command starts for its work end with it, however it ends."""
+"""Ends the worker processes of a command with the command, even if it is killed."""
 
 import ctypes
 import signal

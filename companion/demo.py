@@ -105,14 +105,14 @@ def _run_check(command: list[str]) -> None:
 def bundled_vehicle(config: Path, wire: Wire, log: Path, *, lockstep: bool) -> Iterator[None]:
     """Run the mock vehicle while the block runs; its output goes to `log`.
 
-    It has its own session, so Ctrl-C reaches only this program, which can then hand the vehicle
-    back. Its standard input is a pipe. The pipe closes when this program ends, even by kill -9,
-    and then the vehicle ends too.
+    The vehicle's process has its own session, so Ctrl-C reaches only this program, which can then
+    hand the vehicle back. The standard input of the process is a pipe. The pipe closes when this
+    program ends, even by kill -9, and then the process ends too.
 
     Raises:
         OSError: `log` cannot be written.
-        VehicleStoppedError: it stopped by itself (the message has its last line of output), or was
-            not ready within `_START_TIMEOUT`.
+        VehicleStoppedError: the vehicle stopped by itself (the message has its last line of
+            output), or was not ready within `_START_TIMEOUT`.
     """
     command = [sys.executable, "-m", "sitl_mock", "--headless", "--config", str(config)]
     command += ["--end-with-stdin"]
@@ -130,10 +130,10 @@ def bundled_vehicle(config: Path, wire: Wire, log: Path, *, lockstep: bool) -> I
 
 
 def _end(process: "subprocess.Popen[bytes]", log: Path) -> None:
-    """End the vehicle.
+    """End the vehicle's process.
 
     Raises:
-        VehicleStoppedError: it had ended before.
+        VehicleStoppedError: the process had ended before.
     """
     try:
         _check_running(process, log)

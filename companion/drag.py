@@ -31,7 +31,7 @@ class Drag(NamedTuple):
     def deceleration(
         self, velocity: tuple[Number, Number, Number]
     ) -> tuple[Number, Number, Number]:
-        """Deceleration in m/s², along a velocity in m/s."""
+        """Deceleration, m/s², at the airspeed vector `velocity`, m/s; drag accelerates by −this."""
         north, east, down = velocity
         share = self.linear + self.quadratic * _smooth_speed(velocity)
         return share * north, share * east, share * down
@@ -55,8 +55,8 @@ class Drag(NamedTuple):
 NO_DRAG = Drag()
 
 _MEAN_SHARE = 8.0 / (3.0 * pi)
-"""Mean over all directions of |cos|³ + |sin|³: component along the velocity of quadratic drag along
-two axes.
+"""Mean of |cos φ|³ + |sin φ|³ over all directions φ of flight. That sum is the component along the
+velocity of quadratic drag along two axes, per coefficient·|v|².
 """
 
 
@@ -92,7 +92,7 @@ class AxisDrag(NamedTuple):
         Args:
             velocity: north, east, m/s.
             acceleration: north, east, m/s².
-            heading_rate: rad/s.
+            heading_rate: rate of change of `heading`, rad/s.
         """
         if self.coefficient == 0.0:
             return 0.0, 0.0
@@ -116,7 +116,10 @@ class AxisDrag(NamedTuple):
 def along_axes(
     coefficient: Number, cosine: Number, sine: Number, north: Number, east: Number
 ) -> tuple[Number, Number]:
-    """The deceleration of `AxisDrag` with this cosine and sine of its heading, m/s²."""
+    """Deceleration of `AxisDrag` north and east, m/s², by the cosine and sine of its heading.
+
+    `north` and `east` are the horizontal velocity, m/s.
+    """
     forward, right = _in_axes(cosine, sine, north, east)
     mean = _MEAN_SHARE * _smooth_speed((forward, right, 0.0 * right))
     forward = coefficient * forward * (abs(forward) - mean)

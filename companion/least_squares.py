@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Projection = Callable[[Floats], tuple[Floats, Floats]]
-"""Computes the best linear unknowns, the weights (c,), and the residual (m,), from the nonlinear
-unknowns (k,)."""
+"""Takes the nonlinear unknowns (k,); returns the best weights (c,) and the residual (m,)."""
 
 _DIFFERENCE_STEP = 1e-4
 """Step of the central differences."""
 _SMALLEST_REDUCTION = 1e-9
-"""The search ends when a step reduces the sum of squares by less than this share, or changes no
-unknown by 1e-7."""
+"""The search ends when a step reduces the sum of squares by less than this share. It also ends
+when a step changes no unknown by 1e-7 or more."""
 _MOST_STEPS = 60
 
 
@@ -30,8 +29,8 @@ class Solution(NamedTuple):
         unknown: (k,), the nonlinear unknowns.
         weights: (c,), the linear unknowns.
         residual: (m,), measured − modelled.
-        slopes: (m, k), derivatives of the residual with respect to `unknown`, with the best weights
-            at each point.
+        slopes: (m, k), Jacobian of the residual with respect to `unknown`; the weights are
+            the best ones at each point.
     """
 
     unknown: Floats
@@ -63,7 +62,7 @@ def minimise(projection: Projection, start: Floats, lowest: Floats, highest: Flo
     The minimum may be a local one. The search ends after 60 steps at the latest.
 
     Args:
-        projection: eliminates the linear unknowns. It is called up to 1e-4 beyond the bounds, too.
+        projection: eliminates the linear unknowns. It is also called up to 1e-4 outside the bounds.
         start: (k,), scaled so that a change of 1e-4 is small but has an effect.
         lowest: (k,), lower bounds.
         highest: (k,), upper bounds.
@@ -90,7 +89,7 @@ def minimise(projection: Projection, start: Floats, lowest: Floats, highest: Flo
 
 
 def _slopes(projection: Projection, unknown: Floats) -> Floats:
-    """(m, k), derivatives of the projected residual by central differences."""
+    """(m, k), Jacobian of the residual of `projection`, by central differences."""
     steps = _DIFFERENCE_STEP * np.eye(unknown.size)
     return np.stack(
         [

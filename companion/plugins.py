@@ -31,7 +31,7 @@ def load(group: str, name: str) -> Any:
     """
     found = tuple(entry_points(group=group, name=name))
     if len(found) != 1:
-        raise PluginError(_not_one(group, name, found))
+        raise PluginError(_not_one_message(group, name, found))
     try:
         return found[0].load()
     except Exception as error:
@@ -40,7 +40,7 @@ def load(group: str, name: str) -> Any:
         ) from error
 
 
-def _not_one(group: str, name: str, found: Sequence[EntryPoint]) -> str:
+def _not_one_message(group: str, name: str, found: Sequence[EntryPoint]) -> str:
     if found:
         return f"{' and '.join(map(_origin, found))} both give a plug-in {name!r}; uninstall one"
     return f"no plug-in {name!r} in {group}; installed: {', '.join(names(group)) or 'none'}"

@@ -31,12 +31,12 @@ def schedule_as_usual(pid: int) -> None:
 
 
 class _Frozen:
-    """What is known of frozen objects.
+    """State of `frozen_objects` in this process.
 
     Attributes:
         blocks: number of `frozen_objects` blocks that are running.
-        by_caller: the caller froze objects of its own. To count them takes 10 ms for each 100 000,
-            so they are not counted again.
+        by_caller: whether the caller has frozen objects of its own. Once true it is not checked
+            again, because counting frozen objects takes 10 ms for each 100 000.
     """
 
     blocks = 0
@@ -45,10 +45,10 @@ class _Frozen:
 
 @contextmanager
 def frozen_objects() -> Iterator[None]:
-    """Keep the garbage collector from walking through the objects that exist now.
+    """Keep the garbage collector from walking through the objects that exist now (`gc.freeze`).
 
-    They are mostly modules and live as long as the program. If the caller has frozen objects of its
-    own (`gc.freeze`), all stay frozen at the end: Python cannot unfreeze only some.
+    They are mostly modules and live as long as the program. If the caller had frozen objects
+    before, all stay frozen after the block: Python cannot unfreeze only some.
     """
     outermost = not _Frozen.blocks
     if outermost and not _Frozen.by_caller:

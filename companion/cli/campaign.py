@@ -5,8 +5,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
-from companion.cli.flying import page_about
+from companion.cli.exit_codes import EXIT_FAILURE, EXIT_OK
+from companion.cli.flying import write_flight_page
 
 
 def run(options: argparse.Namespace) -> int:
@@ -36,6 +36,10 @@ def rerun(options: argparse.Namespace) -> int:
 
     console = Console(highlight=False, soft_wrap=True, markup=False)
     again = fly_again(options.folder, options.case)
-    for text in (*again.lines, f"Recorded in {again.folder}", page_about(Path(again.folder))):
+    for text in (
+        *again.lines,
+        f"Recorded in {again.folder}",
+        write_flight_page(Path(again.folder)),
+    ):
         console.print(text)
-    return EXIT_OK if again.identical else EXIT_FLIGHT
+    return EXIT_OK if again.identical else EXIT_FAILURE

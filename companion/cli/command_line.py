@@ -21,7 +21,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         arguments: arguments of the command line; None: those of this process.
 
     Returns:
-        The options; `typed` holds the arguments themselves.
+        The options; their attribute `typed` holds the arguments as typed.
     """
     typed = sys.argv[1:] if arguments is None else list(arguments)
     options = _parser().parse_args(with_campaign_command(typed))

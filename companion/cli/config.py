@@ -23,7 +23,7 @@ from companion.guidance.follow import Follow
 
 
 def show(options: argparse.Namespace) -> int:
-    """Print the configuration, in whole or in part, as YAML, or its tables or schema."""
+    """Print the configuration or some keys as YAML, or the tables or schema of all keys."""
     if options.file and (options.schema or options.markdown or options.diff):
         raise ConfigError("--diff, --schema and --markdown take no further FILE")
     if options.schema:

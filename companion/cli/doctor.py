@@ -11,7 +11,7 @@ from typing import Any
 from rich.console import Console
 
 from companion.attitude import PLANNER_NAMES
-from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
+from companion.cli.exit_codes import EXIT_FAILURE, EXIT_OK
 from companion.cli.terminal import read_line
 from companion.config import Config
 from companion.config.files import assigned, changed, load
@@ -150,7 +150,7 @@ class _DoctorRun:
         self.say("Interrupted; every parameter that was set is listed above.")
         changes = [outcome_as_dict(outcome) for outcome in self._outcomes]
         self.result |= {"result": "interrupted", "changes": changes}
-        return EXIT_FLIGHT
+        return EXIT_FAILURE
 
     async def restore(self, undo: Undo, path: Path) -> int:
         """Restore the parameters that an undo file lists."""
@@ -167,7 +167,7 @@ class _DoctorRun:
                 )
             await restore(link, undo, self._note)
         self.result = {"changes": [outcome_as_dict(outcome) for outcome in self._outcomes]}
-        return EXIT_FLIGHT if any(outcome.refusal for outcome in self._outcomes) else EXIT_OK
+        return EXIT_FAILURE if any(outcome.refusal for outcome in self._outcomes) else EXIT_OK
 
     async def _fix(
         self,
@@ -184,7 +184,7 @@ class _DoctorRun:
                 self.say("`--fix` has no parameter to set.")
                 return EXIT_OK
             self.say("`--fix` has no parameter to set: the findings need other remedies.")
-            return EXIT_FLIGHT
+            return EXIT_FAILURE
         require_disarmed(link)
         undo = UndoFile(config.recording.directory, link, evidence.identity)
         try:
@@ -221,7 +221,7 @@ class _DoctorRun:
     def _report(self, findings: list[Finding]) -> int:
         self._console.print(lists(self._config, findings))
         self.result = as_dict(self._config, findings)
-        return EXIT_OK if self.result["result"] == "ok" else EXIT_FLIGHT
+        return EXIT_OK if self.result["result"] == "ok" else EXIT_FAILURE
 
     def _note(self, outcome: Outcome) -> None:
         self._outcomes.append(outcome)

@@ -4,7 +4,7 @@ import argparse
 import webbrowser
 
 from companion.cli import flying
-from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
+from companion.cli.exit_codes import EXIT_FAILURE, EXIT_OK
 from companion.cli.helper_process import helper_process
 from companion.cli.terminal import FlightConsole
 from companion.config.files import load
@@ -21,7 +21,7 @@ def fly(options: argparse.Namespace) -> int:
     invocation = flying.invocation(options)
     console = _console(options)
     with helper_process(
-        options, config, options.config, config_as_read, folder, console, follows=True
+        options, config, options.config, config_as_read, folder, console, flies_maneuvers=True
     ) as helper:
         summary = flying.fly(config, folder, console, invocation, helper)
     return _report_result(summary, options)
@@ -45,4 +45,4 @@ def _report_result(summary: Summary, options: argparse.Namespace) -> int:
     """Print the summary for `--json`; return the exit code."""
     if options.json:
         print(summary.as_json())
-    return EXIT_OK if summary.result == "ok" else EXIT_FLIGHT
+    return EXIT_OK if summary.result == "ok" else EXIT_FAILURE

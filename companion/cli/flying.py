@@ -1,4 +1,4 @@
-"""What all flying commands share: options into configuration, the flight, and its report."""
+"""Shared by all commands that fly: the options, the flight, and its report."""
 
 import argparse
 import shutil
@@ -34,7 +34,7 @@ from companion.recording.summary_tables import flight_table, words_text
 
 
 def with_options(config: Config, options: argparse.Namespace, planner: str | None = None) -> Config:
-    """The configuration as changed by the options of the command line.
+    """The configuration as changed by the options of the command line, and by `planner`, its name.
 
     Raises:
         ConfigError: options and configuration contradict each other, or the trajectory, or a
@@ -127,14 +127,14 @@ def fly(
         words = closing_words(summary.as_dict(), invocation)
         console.print(words_text(words), soft_wrap=True)
     if config.recording.report:  # also where nobody reads the console, as after `| head`
-        page = page_about(folder)
+        page = write_flight_page(folder)
         with suppress(OSError):
             console.print(page, soft_wrap=True)
     return summary
 
 
-def page_about(folder: Path) -> str:
-    """Write the page about a flight; return a sentence that says where it is, or why it failed."""
+def write_flight_page(folder: Path) -> str:
+    """Write the page about a flight; return where the page is, or why there is none, in words."""
     from companion.report.page import write_report  # noqa: PLC0415  after the flight only
 
     try:
@@ -157,12 +157,12 @@ def fly_bundled(
     planner: str | None = None,
     invocation: Invocation | None = None,
 ) -> Summary:
-    """Start the bundled vehicle of a configuration (None: the shipped one), and fly it.
+    """Start the bundled vehicle with the configuration in `path` (None: the shipped one); fly it.
 
-    `link.endpoint` selects UDP, TCP or a serial line between them; the ports are free ones.
+    `link.endpoint` selects UDP, TCP or a serial line to the vehicle; free ports are used.
 
     Raises:
-        ConfigError: the configuration, or the vehicle's own section of it, is wrong.
+        ConfigError: the configuration, or its section `mock`, is wrong.
         VehicleStoppedError: the vehicle ended before the flight did.
     """
     path = path or demo.default_config()
@@ -175,7 +175,7 @@ def fly_bundled(
         in_lockstep = config.link.lockstep
         with (
             helper_process(
-                options, config, path, config_as_read, folder, console, follows=True
+                options, config, path, config_as_read, folder, console, flies_maneuvers=True
             ) as helper,
             demo.bundled_vehicle(path, wire, folder / "mock.log", lockstep=in_lockstep),
         ):

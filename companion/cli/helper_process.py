@@ -24,7 +24,7 @@ def helper_process(
     folder: Path | None,
     console: Console,
     *,
-    follows: bool,
+    flies_maneuvers: bool,
 ) -> Iterator[Helper | None]:
     """Run the helper process that the options ask for, if any, while the block runs.
 
@@ -35,7 +35,7 @@ def helper_process(
         config_as_read: the configuration as it was read from this file.
         folder: folder of the flight, or None.
         console: shows where the live page and the live stream are.
-        follows: whether the flight flies the maneuvers of its configuration.
+        flies_maneuvers: whether the flight flies the maneuvers of its configuration.
 
     Raises:
         ConfigError: the page or the stream cannot be served at this address.
@@ -53,11 +53,11 @@ def helper_process(
         page = open_page_socket(options.live)
     if options.foxglove is not None:  # after the page, so that a port given to both is refused
         stream = stream_address(options.foxglove)
-    for each in (page, stream):
-        if each is not None:
-            console.print(each.words(), highlight=False, soft_wrap=True)
+    for each in filter(None, (page, stream)):
+        console.print(each.address_text(), highlight=False, soft_wrap=True)
     watched = path if options.watch else None
-    helper = Helper(HelperTasks(watched, config_as_read, page, stream, follows, folder), config)
+    tasks = HelperTasks(watched, config_as_read, page, stream, flies_maneuvers, folder)
+    helper = Helper(tasks, config)
     if page is not None:
         page.listening.close()  # the helper process has its own copy
     reason = "the program has ended"

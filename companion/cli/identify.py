@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.cli import flying
-from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
+from companion.cli.exit_codes import EXIT_FAILURE, EXIT_OK
 from companion.cli.output_file import require_writable
 from companion.cli.terminal import FlightConsole
 from companion.config.files import load
@@ -32,7 +32,7 @@ from companion.recording.measurements.summary import Summary
 from companion.vehicle.flight_log import read_flight_log
 
 SHIPPED = Path()
-"""Stands for the shipped configuration if `--bundled` names none."""
+"""Value of `--bundled` without a file: the shipped configuration."""
 _MANEUVER = "identify"
 _PLANNER = "first-order"
 """Planner for the flight: it needs no knowledge of the vehicle's response."""
@@ -54,7 +54,7 @@ def identify(options: argparse.Namespace) -> int:
     summary = _fly_doublets(options, console)
     if summary.result != "ok" or summary.log is None:
         _print_json(options, {"result": summary.result, "log": str(summary.log)})
-        return EXIT_FLIGHT
+        return EXIT_FAILURE
     log = summary.log / _LOG
     out = options.out or log.with_name(_FRAGMENT)
     try:
@@ -67,7 +67,7 @@ def identify(options: argparse.Namespace) -> int:
         with suppress(OSError):
             console.print(reason, soft_wrap=True)
         _print_json(options, {"result": reason, "log": str(log)})
-        return EXIT_FLIGHT
+        return EXIT_FAILURE
 
 
 def _fly_doublets(options: argparse.Namespace, console: FlightConsole) -> Summary:
@@ -95,7 +95,7 @@ def _fit(log: Path, out: Path, options: argparse.Namespace, console: FlightConso
             for axis, reason in vehicle.faults().items():
                 console.print(f"  {axis}: {reason}", soft_wrap=True)
         _print_json(options, {"result": str(error), "log": str(log), **_figures(vehicle)})
-        return EXIT_FLIGHT
+        return EXIT_FAILURE
     _write_fit(out, text, flown_folder=None if options.log is not None else log.parent)
     kept = {
         axis: f"kept from the configuration ({keys.described()}): {vehicle.axes[axis].reason()}"

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import signal
 
-from companion.cli.exit_codes import EXIT_FLIGHT
+from companion.cli.exit_codes import EXIT_FAILURE
 
 TYPE_CHECKING = False  # type checkers take it for typing's, whose import would cost 5 ms
 if TYPE_CHECKING:
@@ -26,7 +26,10 @@ _DEFAULT_HANDLERS: dict[signal.Signals, Handler] = {
 
 
 def unhandled() -> list[signal.Signals]:
-    """The signals that still have their default handler; with `nohup`, SIGHUP is ignored."""
+    """Those of the three signals that still have their default handler.
+
+    With `nohup`, SIGHUP is not among them, because it is ignored.
+    """
     return [
         number
         for number, handler in _DEFAULT_HANDLERS.items()
@@ -61,11 +64,11 @@ def restore(numbers: list[signal.Signals]) -> None:
 
 def _leave(_number: int, _frame: FrameType | None) -> NoReturn:
     os.write(2, b"companion: interrupted before anything was sent\n")
-    os._exit(EXIT_FLIGHT)
+    os._exit(EXIT_FAILURE)
 
 
 def _interrupt(_number: int, _frame: FrameType | None) -> NoReturn:
-    """Raise KeyboardInterrupt; a second signal does not disturb what the first one began."""
+    """Raise KeyboardInterrupt; further SIGTERM and SIGHUP are ignored while the command ends."""
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: None)  # programs we start would inherit SIG_IGN
     raise KeyboardInterrupt

@@ -10,7 +10,7 @@ import signal
 import sys
 
 from companion.cli import interrupts
-from companion.cli.exit_codes import EXIT_FLIGHT
+from companion.cli.exit_codes import EXIT_FAILURE
 
 TYPE_CHECKING = False  # type checkers take it for typing's, whose import would cost 5 ms
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return run()
     except KeyboardInterrupt:
         sys.stderr.write("companion: interrupted\n")
-        return EXIT_FLIGHT
+        return EXIT_FAILURE
     finally:
         interrupts.restore(our_signals)
         if arguments is None and signal.SIGINT in our_signals:  # Ctrl-C may end Python's shutdown

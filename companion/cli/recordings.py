@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 
-from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
+from companion.cli.exit_codes import EXIT_FAILURE, EXIT_OK
 from companion.cli.output_file import require_writable
 from companion.config.files import assigned, changed, load
 from companion.files.yaml_file import ConfigError
@@ -23,7 +23,7 @@ def plot(options: argparse.Namespace) -> int:
     if fault is not None:
         print(fault)
     print(out)
-    return EXIT_OK if fault is None else EXIT_FLIGHT
+    return EXIT_OK if fault is None else EXIT_FAILURE
 
 
 def report(options: argparse.Namespace) -> int:
@@ -41,9 +41,9 @@ def compare(options: argparse.Namespace) -> int:
 
 
 def _write_page(make: Callable[[Callable[[str], None]], Path]) -> int:
-    """Write a page by `make`, and print its path and the faults of the records that it shows.
+    """Write a page by calling `make`; print its path, and the faults of the records on the page.
 
-    The exit code is 1 if a record has one: a page with gaps must not pass for a whole one.
+    The exit code is 1 if a record has a fault, because the page then has gaps.
     """
     faults: list[str] = []
     try:
@@ -53,7 +53,7 @@ def _write_page(make: Callable[[Callable[[str], None]], Path]) -> int:
     for fault in faults:
         print(fault)
     print(page)
-    return EXIT_FLIGHT if faults else EXIT_OK
+    return EXIT_FAILURE if faults else EXIT_OK
 
 
 def export(options: argparse.Namespace) -> int:
@@ -70,7 +70,7 @@ def export(options: argparse.Namespace) -> int:
         raise ConfigError(f"{into}: cannot write there: {error.strerror}") from error
     for path, rows in written.items():
         print(f"{path}  {rows:,} rows")
-    return EXIT_OK if _is_whole(record) else EXIT_FLIGHT
+    return EXIT_OK if _is_whole(record) else EXIT_FAILURE
 
 
 def _is_whole(record: FlightRecord) -> bool:
@@ -81,7 +81,7 @@ def _is_whole(record: FlightRecord) -> bool:
 
 
 def replay(options: argparse.Namespace) -> int:
-    """Replay a recorded flight; fail if its own configuration gives different setpoints."""
+    """Replay a recorded flight; fail if the setpoints differ although its configuration is used."""
     from companion.replay.replay import Replay  # noqa: PLC0415  no other command needs it
     from companion.replay.report import words, write_csv  # noqa: PLC0415
 
@@ -106,4 +106,4 @@ def replay(options: argparse.Namespace) -> int:
             raise ConfigError(f"{options.csv}: cannot write it: {error.strerror}") from error
         print(options.csv)
     same = not own_config or all(each.same for each in samples)
-    return EXIT_OK if whole and same else EXIT_FLIGHT
+    return EXIT_OK if whole and same else EXIT_FAILURE

@@ -8,7 +8,7 @@ from importlib import import_module
 
 from rich.console import Console
 
-from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_USAGE
+from companion.cli.exit_codes import EXIT_FAILURE, EXIT_USAGE
 from companion.cli.text_streams import lost_output
 from companion.demo import VehicleStoppedError
 from companion.extras import MissingExtraError
@@ -49,7 +49,7 @@ def run(command: Command, options: argparse.Namespace) -> int:
     Raises:
         KeyboardInterrupt: Ctrl-C where no flight handles it.
     """
-    code = EXIT_FLIGHT
+    code = EXIT_FAILURE
     os_error: OSError | None = None
     try:
         code = command(options)
@@ -74,7 +74,7 @@ def run(command: Command, options: argparse.Namespace) -> int:
         _print_error(_os_error_text(os_error))
     if lost:
         _print_error(f"standard output cannot be written: {lost}")
-        return code or EXIT_FLIGHT
+        return code or EXIT_FAILURE
     return code
 
 

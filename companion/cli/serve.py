@@ -38,7 +38,7 @@ def serve(options: argparse.Namespace) -> int:
         observers.event(time.monotonic() - began, text)
 
     with helper_process(
-        options, config, options.config, config_as_read, None, console, follows=False
+        options, config, options.config, config_as_read, None, console, flies_maneuvers=False
     ) as helper:
         observers = observer if helper is None else SeveralObservers(observer, helper)
         session = ServeSession(

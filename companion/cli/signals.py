@@ -9,7 +9,7 @@ from companion.flight.session import Session
 from companion.recording.measurements.summary import Summary
 
 SECOND_CTRL_C_AFTER = 1.0
-"""Shortest time between two Ctrl-C for the second one to leave, s; a key may bounce."""
+"""A second Ctrl-C leaves the flight only if it comes this long after the first, s: keys bounce."""
 
 HOW_TO_LEAVE = (
     f"Ctrl-C again, {SECOND_CTRL_C_AFTER:g} s later or more, stops the setpoints at once: then the "

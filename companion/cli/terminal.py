@@ -24,7 +24,7 @@ _QUEUE_LENGTH = 1000
 """Most lines queued for a stalled terminal; further lines are dropped."""
 
 _CLOSE_TIMEOUT = 2.0
-"""Time allowed at close for room in the queue, and again for printing the queued lines, s."""
+"""Longest wait at close for a place in the full queue, and then for the queued lines, s."""
 
 
 class _PrintThread:

@@ -11,7 +11,7 @@ from companion.study import registry
 
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 STARTING_FILES = {"px4": "px4", "ardupilot": "ardupilot", "mock": "mock-px4"}
-"""The shipped file from which `init` makes a new one, by the name that the user gives."""
+"""Name that the user gives to `init` -> shipped file from which `init` makes a new one."""
 
 
 def add_serve(commands: Commands) -> None:

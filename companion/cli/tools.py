@@ -5,7 +5,7 @@ import json
 
 from rich.console import Console
 
-from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
+from companion.cli.exit_codes import EXIT_FAILURE, EXIT_OK
 from companion.files.yaml_file import ConfigError
 from companion.study import registry
 
@@ -67,7 +67,7 @@ def study(options: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         message = f"Interrupted: in {options.out} only the files of finished studies are complete."
         console.print(f"{message} Run the command again.", highlight=False)
-        return EXIT_FLIGHT
+        return EXIT_FAILURE
     console.print(f"Open {page}", soft_wrap=True, highlight=False)
     if options.json:
         print(json.dumps(rows, allow_nan=False))

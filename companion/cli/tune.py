@@ -10,7 +10,7 @@ from typing import Any
 
 from rich.console import Console
 
-from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
+from companion.cli.exit_codes import EXIT_FAILURE, EXIT_OK
 from companion.cli.output_file import require_writable
 from companion.config import Config
 from companion.config.files import changed, load
@@ -57,7 +57,7 @@ def tune(options: argparse.Namespace) -> int:
     )
     if options.json:
         print(json.dumps(_figures(proposal, flights, output), allow_nan=False))
-    return EXIT_OK if worse_sentence(flights) is None else EXIT_FLIGHT
+    return EXIT_OK if worse_sentence(flights) is None else EXIT_FAILURE
 
 
 def _configuration(source: Path, vehicle: Path, base: Path | None) -> tuple[Config, bool]:
@@ -96,7 +96,7 @@ def _with_learned_drag(config: Config, source: Path) -> Config:
 
 
 def _flyable(config: Config) -> Config:
-    """The configuration with planner `auto` and maneuver `hover`; `identify` flew with others."""
+    """The configuration with planner `auto` and maneuver `hover`, not those of `identify`."""
     return changed(
         config, {"planner": {"name": "auto"}, "flight": {"maneuvers": ("hover",)}}, "tune"
     )

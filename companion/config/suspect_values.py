@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from companion.config.reference import keys
 from companion.config.root import Config
-from companion.files.yaml_faults import other_unit
+from companion.files.yaml_faults import mistaken_unit
 
 BODY_RATE = "safety.max_body_rate_deg_s"
 _USUAL_VALUES = {"_deg_s2": 1000.0, "_ms": 50.0}
@@ -74,7 +74,7 @@ def _units(config: Config) -> Iterator[SuspectValue]:
             usual = next((v for end, v in _USUAL_VALUES.items() if key.name.endswith(end)), None)
         if key.value == key.default or not isinstance(usual, int | float) or not usual:
             continue
-        unit, meant = other_unit(key.name, key.value)
+        unit, meant = mistaken_unit(key.name, key.value)
         if (
             meant > key.value
             and key.value < usual * _MAX_SUSPECT_SHARE

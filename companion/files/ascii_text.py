@@ -51,7 +51,7 @@ def ascii_for(text: str) -> str:
 
 
 def _ascii_for_char(char: str) -> str:
-    """ASCII for one non-ASCII character."""
+    """ASCII for one non-ASCII character: a replacement, else its base letter or `_ascii_name`."""
     if char in _REPLACEMENTS:
         return _REPLACEMENTS[char]
     parts = [
@@ -63,7 +63,7 @@ def _ascii_for_char(char: str) -> str:
 
 
 def _ascii_name(char: str) -> str:
-    """ASCII text for a character.
+    """ASCII for a character without a replacement, by its Unicode name.
 
     A Greek letter becomes its name, a box-drawing character `+`, a Braille pattern `*`, and
     anything else `?`.

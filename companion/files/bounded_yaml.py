@@ -38,7 +38,7 @@ _CONTROL_CHARACTER = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff]")
 
 
 class YamlError(Exception):
-    """A text cannot be read.
+    """A YAML text cannot be read.
 
     Args:
         problem: what is wrong.
@@ -51,7 +51,7 @@ class YamlError(Exception):
 
 
 Where = tuple[str | int, ...]
-"""Path to a value: keys, and positions in lists."""
+"""Path to a value from the root of the document: keys, and positions in lists."""
 
 
 class Document(NamedTuple):
@@ -79,7 +79,8 @@ def read(text: str) -> Document:
     """Read the single document in a YAML text: dicts with texts as keys, lists and scalars.
 
     Raises:
-        YamlError: it is not valid YAML, holds a key twice, an alias or a tag, or is out of bounds.
+        YamlError: it is not valid YAML, holds a key twice, an alias or a tag, or exceeds a limit of
+            this module.
     """
     builder = _Builder()
     try:

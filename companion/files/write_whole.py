@@ -1,4 +1,4 @@
-"""Atomic writing of a file: at any time a reader finds either the old or the new content."""
+"""Atomic writing of files: at any time a reader finds either the old or the new content."""
 
 import errno
 import os
@@ -12,18 +12,18 @@ from pathlib import Path
 from companion.files.os_errors import DISK_HANGS, DISK_TIMEOUT, reason_of
 
 
-class ReservedRoom:
+class ReservedSpace:
     """Disk space reserved for a file that is written later, when the disk may be full.
 
     An unnamed file holds the space, so the system frees it even if the process is killed.
 
     Attributes:
-        free: releases the space; the deletion of this object does so, too.
+        free: releases the space, as does the deletion of this object.
 
     Args:
         folder: folder of the later file. If the disk is full, or the file system cannot reserve
             space, nothing is reserved.
-        size: bytes.
+        size: space to reserve, bytes.
     """
 
     def __init__(self, folder: Path, size: int) -> None:
@@ -34,8 +34,8 @@ class ReservedRoom:
             os.posix_fallocate(file.fileno(), 0, size)
 
 
-def write_in_time(path: Path, text: str) -> str | None:
-    """Write a file like `write_whole`, but wait at most 5 s for the disk.
+def write_with_timeout(path: Path, text: str) -> str | None:
+    """Write a file like `write_whole`, but wait at most `DISK_TIMEOUT` for the disk.
 
     Returns:
         None if the file is on the disk; else the reason why not, in words.

@@ -10,11 +10,11 @@ from typing import Any, get_args
 from pydantic import BaseModel
 
 _LONGEST_SHOWN = 60
-_MOST_PLACES = 3
+_MOST_SUGGESTIONS = 3
 _MIN_SIMILARITY = 0.5
-"""Smallest similarity to an unknown key at which a key of the same section is suggested."""
+"""Smallest `_similarity` to an unknown key at which a key of the same section is suggested."""
 _MIN_SIMILARITY_ELSEWHERE = 0.75
-"""Smallest similarity at which a key of another section is suggested."""
+"""Smallest `_similarity` at which a key of another section is suggested."""
 
 _NUMBER_AND_UNIT = re.compile(r"([-+]?[0-9]+(?:[.,][0-9]+)?(?:[eE][-+]?[0-9]+)?)\s*(\D*)")
 
@@ -30,8 +30,8 @@ _MISTAKEN_UNITS: tuple[tuple[str, str, Callable[[float], float]], ...] = (
     ("_percent", "parts of 1", lambda value: 100.0 * value),
     ("", "%", lambda value: 0.01 * value),
 )
-"""Suffix of a key, the unit often mistaken for its unit, and the conversion; the first suffix that
-fits is used.
+"""Suffix of a key, the unit often mistaken for the key's unit, and the conversion from the mistaken
+unit to the key's unit. The first suffix that fits is used.
 """
 _BOUNDS: dict[str, Callable[[float, float], bool]] = {
     "ge": lambda value, bound: value >= bound,
@@ -48,7 +48,7 @@ def shortened(value: Any) -> str:
 
 
 def kinds_in(annotation: Any) -> frozenset[Any]:
-    """A type and the types inside it, for unions and annotated types."""
+    """A type and its type arguments, at any depth, as of unions and annotated types."""
     return _kinds_in(annotation)
 
 
@@ -70,8 +70,8 @@ def without_consequences(details: list[Any]) -> list[Any]:
     ]
 
 
-def other_unit(key: str, value: float) -> tuple[str, float]:
-    """The unit that is often confused with this key's unit, and the value converted from it."""
+def mistaken_unit(key: str, value: float) -> tuple[str, float]:
+    """The unit often mistaken for the key's unit; the value converted from it to the key's unit."""
     unit, convert = next(
         (unit, convert) for end, unit, convert in _MISTAKEN_UNITS if key.endswith(end)
     )
@@ -79,10 +79,10 @@ def other_unit(key: str, value: float) -> tuple[str, float]:
 
 
 def explained(detail: Any, model: type[BaseModel], former: Mapping[str, str]) -> str:
-    """The error message, as one sentence.
+    """The message about an error that pydantic reports, as one sentence.
 
     Args:
-        detail: error reported by pydantic.
+        detail: the error.
         model: model of the file's top level.
         former: renamed or removed key -> what replaces it.
     """
@@ -117,7 +117,7 @@ def name_hint(written: Any, known: Iterable[str]) -> str:
 
 
 def _remedy(detail: Any, key: str) -> str | None:
-    """A suggestion to replace a value of the wrong type."""
+    """What to write instead of a value of the wrong type; None for other errors."""
     kind, value = detail["type"], detail["input"]
     message = detail["msg"].removeprefix("Value error, ")
     if kind == "value_error" and message.startswith("must be a number") and isinstance(value, str):
@@ -137,7 +137,7 @@ def _remedy(detail: Any, key: str) -> str | None:
 
 
 def _length_fault(detail: Any) -> str | None:
-    """How many values a list has, and how many it may have."""
+    """How many values a list has and how many it may have; None if the number is not the error."""
     bounds = detail.get("ctx", {})
     if detail["type"] == "too_short":
         return f"has {len(detail['input'])} values; it needs at least {bounds['min_length']}"
@@ -147,12 +147,12 @@ def _length_fault(detail: Any) -> str | None:
 
 
 def _number_advice(key: str, text: str) -> str:
-    """A suggestion to replace a text by a number."""
+    """What to write instead of a text where a number is needed."""
     match = _NUMBER_AND_UNIT.fullmatch(text.strip())
     if match is None:
         return "write digits, with a point for decimals"
     number, unit = match[1].replace(",", "."), match[2].strip()
-    confused_unit, converted = other_unit(key, float(number))
+    confused_unit, converted = mistaken_unit(key, float(number))
     if unit == confused_unit:
         return f"write {converted:.4g}"
     if unit:
@@ -163,12 +163,12 @@ def _number_advice(key: str, text: str) -> str:
 
 
 def _unit_hint(detail: Any, where: str) -> str:
-    """A hint if the value, converted from the unit often confused with the key's, is in range."""
+    """A hint if the value is in range once converted from the unit often mistaken for the key's."""
     bound = detail.get("ctx", {})
     value = detail["input"]
     if not isinstance(value, int | float) or not value:
         return ""
-    unit, converted = other_unit(where, value)
+    unit, converted = mistaken_unit(where, value)
     if unit == "%" and bound.get("le", bound.get("lt", inf)) > 1.0:
         return ""  # only a share of 1 is confused with a percentage
     in_range = [
@@ -200,13 +200,13 @@ def _unknown_key(location: tuple[int | str, ...], value: Any, model: type[BaseMo
 
 
 def dotted_keys(name: str, model: type[BaseModel]) -> str:
-    """Up to three dotted keys with this name, as alternatives; empty if no section has one."""
+    """Up to three dotted keys with this name, joined by "or"; empty if no section has the key."""
     return _either([".".join((*place, key)) for place, key in _keys(model) if key == name])
 
 
 def _either(places: list[str]) -> str:
-    """The first three dotted keys, joined as alternatives."""
-    return " or ".join(f"`{place}`" for place in places[:_MOST_PLACES])
+    """The first three of some dotted keys, joined by "or"."""
+    return " or ".join(f"`{place}`" for place in places[:_MOST_SUGGESTIONS])
 
 
 def _similarity(written: str, known: str) -> float:
@@ -234,7 +234,7 @@ def _keys(model: type[BaseModel]) -> Iterator[tuple[tuple[str, ...], str]]:
 
 
 def _model_at(location: tuple[int | str, ...], model: type[BaseModel]) -> type[BaseModel]:
-    """The model that refused the last key of a location."""
+    """The model of the section that holds the last key of a location."""
     for part in location[:-1]:
         if str(part) not in model.model_fields:
             continue  # a name that the user gave, or a position in a list

@@ -68,7 +68,7 @@ class Section(BaseModel):
     @field_validator("*", mode="before")
     @classmethod
     def _path(cls, value: Any, field: ValidationInfo) -> Any:
-        """Refuse paths that are empty (the folder itself), too long, or hold a null character."""
+        """Refuse paths that name nothing, are too long, or hold a null character; expand `~`."""
         kinds = kinds_in(cls.model_fields[str(field.field_name)].annotation)
         if not isinstance(value, str) or Path not in kinds:
             return value
@@ -86,7 +86,7 @@ class UnreadableFileError(ConfigError):
 
 
 class Place(NamedTuple):
-    """The place of a key.
+    """Where a key stands: file and line.
 
     Attributes:
         file: name of the file.
@@ -207,6 +207,9 @@ def validated(
 
 
 def place_of(where: Where, places: Mapping[Where, Place], name: str) -> Place:
-    """The place of a key or of the part that holds it; without a line if neither is known."""
+    """The place of a key, else of the innermost section or list around it that has a place.
+
+    If none has one: the file `name` without a line.
+    """
     ends = range(len(where), 0, -1)
     return next((places[where[:end]] for end in ends if where[:end] in places), Place(name))

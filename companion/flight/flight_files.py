@@ -9,7 +9,7 @@ from pathlib import Path
 
 from companion import realtime
 from companion.config import Config
-from companion.files.write_whole import ReservedRoom, write_in_time
+from companion.files.write_whole import ReservedSpace, write_with_timeout
 from companion.flight import flown_config
 from companion.flight.assembled import Assembled
 from companion.flight.course import advice, course_of
@@ -65,7 +65,7 @@ class FlightFiles:
         self.mcap: FlightRecorder | None = None
         if folder is not None:
             flown_config.record(config, folder, follows=follows)
-            self._room = ReservedRoom(folder, _SUMMARY_RESERVE)
+            self._room = ReservedSpace(folder, _SUMMARY_RESERVE)
             loop = asyncio.get_running_loop()
             in_vehicle_time = config.link.lockstep or not environment.realtime
             epoch = 0.0 if in_vehicle_time else time.time() - loop.time()
@@ -194,7 +194,7 @@ class FlightFiles:
             return whole
         text = whole.as_json() + "\n"
         self._room.free()
-        failure = write_in_time(folder / "summary.json", text)
+        failure = write_with_timeout(folder / "summary.json", text)
         if failure is not None:
             self._note(f"{folder}: summary.json was not written: {failure}")
         return whole

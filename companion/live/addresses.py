@@ -13,13 +13,13 @@ PORT = 8090
 STREAM_PORT = 8765
 """Port of the live stream; Foxglove and Lichtblick propose this one."""
 _ANSWER_TIMEOUT = 0.5
-"""Time allowed for the process of a flight that has just ended to answer, s."""
+"""Time allowed for the helper process of an ended flight to answer `ask_to_leave`, s."""
 _RELEASE_TIMEOUT = 8.0
-"""Time allowed for the process of an ended flight to release its port, s."""
+"""Time allowed for the helper process of an ended flight to release its port, s."""
 
 
 class PageSocket(NamedTuple):
-    """A listening socket, and the token that admits users.
+    """The listening socket of the live page, and the token that admits users.
 
     Attributes:
         host: IP address of the socket.
@@ -33,8 +33,8 @@ class PageSocket(NamedTuple):
     token: str
     listening: socket.socket
 
-    def words(self) -> str:
-        """Address of the page, for the user."""
+    def address_text(self) -> str:
+        """A line for the user: address of the page, and the token."""
         shown = _displayed(self.host)
         if ip_address(self.host).is_loopback:
             return (
@@ -55,8 +55,8 @@ class StreamAddress(NamedTuple):
     host: str
     port: int
 
-    def words(self) -> str:
-        """Address of the stream, for the user."""
+    def address_text(self) -> str:
+        """A line for the user: address of the stream, and how to open it."""
         return (
             f"Live stream: ws://{_displayed(self.host)}:{self.port}/  in Foxglove or Lichtblick: "
             "open connection, Foxglove WebSocket"

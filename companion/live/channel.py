@@ -16,8 +16,8 @@ class Channel:
     """One end of the channel. Messages that the other end does not read in time are dropped.
 
     Attributes:
-        dropped: messages that were not sent: the buffer was full, the message too large, or the
-            other end found to be gone. Later messages to an end that is gone do not count.
+        dropped: number of messages that could not be sent. The buffer was full, the message was too
+            large, or the other end was found to be closed; messages after that are not counted.
         open: whether the other end existed at the last attempt.
 
     Args:
@@ -77,13 +77,13 @@ class Channel:
         message = json.loads(data)
         return message if isinstance(message, dict) else {}
 
-    def waiting(self, most: float = inf) -> Iterator[Message | None]:
-        """Yield at most `most` messages that have arrived, and None if the other end is closed.
+    def arrived(self, max_count: float = inf) -> Iterator[Message | None]:
+        """Yield up to `max_count` arrived messages, and None if the other end is closed.
 
-        The socket must not block.
+        The socket must be non-blocking.
         """
         taken = 0
-        while taken < most:
+        while taken < max_count:
             taken += 1
             try:
                 message = self.receive()
@@ -103,7 +103,7 @@ class Feed:
     """Sends records of the flight to the helper process. Its methods may run in any thread.
 
     Attributes:
-        dropped: datagrams that were not sent: the buffer was full, or the process gone.
+        dropped: number of datagrams that were not sent: the buffer was full, or the process gone.
 
     Args:
         end: a SEQPACKET socket.

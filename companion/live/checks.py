@@ -16,13 +16,15 @@ from companion.guidance import ManeuverSequence
 from companion.tuning import stability
 
 _LEAST_GAIN_DB, _LEAST_PHASE_DEG = 4.0, 20.0
-"""Smallest stability margins after a change; a loop that began with less keeps at least those."""
+"""Smallest gain and phase margin that a change may leave. If the loop had less when the flight
+began, a change must not reduce that margin.
+"""
 _ROUNDING = 1e-3
 """Relative error of computed margins that is ignored."""
 
 
 class ChangeChecks:
-    """Holds the configuration of the flight, and checks requested changes.
+    """Checks requested changes against the configuration of the flight.
 
     Attributes:
         start: the configuration with which the flight began.
@@ -30,16 +32,16 @@ class ChangeChecks:
 
     Args:
         start: configuration with which the flight began.
-        follows: whether the flight flies the maneuvers of its configuration.
+        flies_maneuvers: whether the flight flies the maneuvers of its configuration.
     """
 
-    def __init__(self, start: Config, *, follows: bool) -> None:
+    def __init__(self, start: Config, *, flies_maneuvers: bool) -> None:
         self.start = self.now = start
         self._drag = before_connecting(start)
         self._maneuvers: ManeuverSequence | None = None
         self._maneuvers_error: ConfigError | None = None
         try:
-            self._maneuvers = configured_maneuvers(start, self._drag) if follows else None
+            self._maneuvers = configured_maneuvers(start, self._drag) if flies_maneuvers else None
         except ConfigError as error:  # a file has changed since the flight read it
             self._maneuvers_error = error
 
@@ -47,26 +49,25 @@ class ChangeChecks:
     def of(message: dict[str, Any]) -> "ChangeChecks":
         """Make the checks from the first message of the flight."""
         start = Config.model_validate(message["config"])
-        return ChangeChecks(start, follows=bool(message["follows"]))
+        return ChangeChecks(start, flies_maneuvers=bool(message["follows"]))
 
     def note(self, message: dict[str, Any]) -> None:
-        """Take a message that holds the changed configuration."""
+        """Note the changed configuration, from a message of the flight."""
         self.now = Config.model_validate(message["config"])
 
     def note_drag(self, message: dict[str, Any]) -> None:
-        """Take this vehicle's drag; until it comes, that of the last vehicle is assumed."""
+        """Note the drag of the flown vehicle; until then, that of the last vehicle is assumed."""
         drag, source = message["drag"], message["source"]
         self._drag = KnownDrag(
             None if drag is None else Drag(*drag), None if source is None else Path(source)
         )
 
     def check(self, values: Values, name: str) -> None:
-        """Check new values: the rules between keys, their size, stability, and the maneuvers.
+        """Check new values: valid, not too large a change, stable, and the maneuvers still flyable.
 
         Raises:
-            ConfigError: this planner or guidance, or a key, must not change in flight, a value is
-                not valid, the change is too large, the control loop would lose its margins, or the
-                maneuvers cannot be flown or are not known.
+            ConfigError: one of these does not hold; or a key, or anything with this planner or
+                guidance, must not change in flight; or the maneuvers could not be loaded.
         """
         wanted = changed_in_flight(self.start, self.now, values, name)
         fixed = fixed_because(self.start)
@@ -86,10 +87,10 @@ class ChangeChecks:
 
 
 def _require_margins(start: Config, wanted: Config, name: str) -> None:
-    """Check the stability margins of the control loop, computed for the configured vehicle.
+    """Check the stability margins of the wanted control loop, computed for the configured vehicle.
 
     Raises:
-        ConfigError: the loop is unstable, or its margin is too small.
+        ConfigError: the loop would be unstable, or a margin too small.
     """
     before, after = stability(start), stability(wanted)
     if not after.stable:

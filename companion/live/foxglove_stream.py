@@ -78,12 +78,12 @@ class Stream:
         self._dropped = 0
 
     def take(self, datagram: bytes) -> None:
-        """Pass messages on to the clients."""
+        """Pass the messages in a datagram of `Feed` on to the clients."""
         for number, time_ns, data in messages_of(datagram):
             self._channels[number].log(data, log_time=time_ns)
 
     def note(self, message: Message) -> None:
-        """Take a message of the flight; tell clients about losses, and how the flight ended."""
+        """Tell clients about messages that the flight dropped, and about its end."""
         dropped = message.get("stream_dropped", 0)
         if dropped > self._dropped:
             self._dropped = dropped

@@ -27,19 +27,19 @@ class HelperTasks(NamedTuple):
     """The tasks of the helper process.
 
     Attributes:
-        watch: file whose edits are applied, or None.
-        read: configuration that was read from this file for the flight.
+        watch: configuration file whose edits are applied in flight, or None.
+        config_as_read: configuration as read from its file for the flight, before options.
         page: listening socket of the live page, or None.
         stream: address of the live stream, or None.
-        follows: whether the flight flies the maneuvers of its configuration.
+        flies_maneuvers: whether the flight flies the maneuvers of its configuration.
         folder: folder of the flight, for `live.log` and saved values; None: there is none.
     """
 
     watch: Path | None
-    read: Config
+    config_as_read: Config
     page: PageSocket | None
     stream: StreamAddress | None
-    follows: bool
+    flies_maneuvers: bool
     folder: Path | None
 
 
@@ -51,8 +51,9 @@ class Helper:
         config: configuration of the flight.
 
     Attributes:
-        changes: makes the changes that the process requests; set before the flight begins.
-        note: called with messages of the process.
+        changes: makes the changes that the process requests. Replace it by the session's `changes`
+            before the flight begins.
+        note: called with sentences of the process for the user.
         feed: sends the records for the live stream; None: there is none.
 
     Raises:
@@ -81,7 +82,7 @@ class Helper:
         return self._channel.dropped
 
     async def run_while_serving(self, work: Coroutine[Any, Any, T]) -> T:
-        """Run `work`, and serve the process at the same time."""
+        """Run `work`, and handle the requests of the process at the same time."""
         loop = asyncio.get_running_loop()
         self.changes.on_change, self.changes.on_drag = self._tell_change, self._tell_drag
         loop.add_reader(self._channel.fileno(), self._on_readable)
@@ -90,9 +91,9 @@ class Helper:
         finally:
             loop.remove_reader(self._channel.fileno())
 
-    def close(self, words: str) -> None:
-        """Tell the process that the flight has ended; page and stream may stay (`until_unused`)."""
-        self._send("end", text=words)
+    def close(self, reason: str) -> None:
+        """Tell the process that, and why, the flight has ended; see `until_unused` for the page."""
+        self._send("end", text=reason)
         self._has_ended = True
         self._channel.close()
         if self.feed is not None:
@@ -161,7 +162,7 @@ class Helper:
 
     def _on_readable(self) -> None:
         """Handle the requests of the process."""
-        for message in self._channel.waiting(_MOST_PER_TURN):
+        for message in self._channel.arrived(_MOST_PER_TURN):
             if message is None:
                 asyncio.get_running_loop().remove_reader(self._channel.fileno())
                 self._note_ended()
@@ -185,7 +186,7 @@ class Helper:
 
 
 def _helper_name(tasks: HelperTasks) -> str:
-    """Name of the helper process in messages: the part that the user sees."""
+    """Name of the helper process in messages to the user: that of its page, stream or watcher."""
     if tasks.page is not None:
         return "the live page"
     return "the file watcher" if tasks.stream is None else "the live stream"
@@ -194,7 +195,7 @@ def _helper_name(tasks: HelperTasks) -> str:
 def _start_process(
     sockets: tuple[socket.socket | None, ...], folder: Path | None
 ) -> "subprocess.Popen[bytes]":
-    """Start the process. It survives Ctrl-C, and outlives the flight if page or stream is open."""
+    """Start the process. It survives Ctrl-C, and the flight's end while page or stream is open."""
     descriptors = [-1 if each is None else each.fileno() for each in sockets]
     command = [sys.executable, "-m", "companion.live.helper_process", *map(str, descriptors)]
     log = Path("/dev/null") if folder is None else folder / "live.log"
@@ -215,8 +216,8 @@ def _first_message(tasks: HelperTasks, config: Config) -> Message:
     page, stream = tasks.page, tasks.stream
     return {
         "config": _as_json(config),
-        "read": _as_json(tasks.read),
-        "follows": tasks.follows,
+        "read": _as_json(tasks.config_as_read),
+        "follows": tasks.flies_maneuvers,
         "watch": None if tasks.watch is None else str(tasks.watch.absolute()),
         "folder": None if tasks.folder is None else str(tasks.folder.absolute()),
         "token": None if page is None else page.token,

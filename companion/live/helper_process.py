@@ -18,7 +18,7 @@ from companion.live.checks import ChangeChecks
 from companion.live.watched_file import WatchedFile
 
 _CHECK_PERIOD_S = 0.06
-"""Period of checks of the watched file, s; an edit needs three of them."""
+"""Period of checks of the watched file, s; an edit is found by the third check after it."""
 _ANSWER_TIMEOUT = 3.0
 """Time allowed for the flight to answer, s."""
 _NICENESS = 5
@@ -29,8 +29,8 @@ class Relay:
     """The helper process's end of the channel to the flight: requests changes, takes messages.
 
     Attributes:
-        first: the first message of the flight.
-        checks: checks of changes.
+        first: the first message of the flight: configuration and tasks (`HelperTasks`).
+        checks: checks requested changes.
         over: set when the flight has ended.
 
     Args:
@@ -105,11 +105,11 @@ class Relay:
         return str(reply.get("text"))
 
     def note(self, text: str) -> None:
-        """Let the flight record and show a sentence."""
+        """Have the flight record a sentence and show it to the user."""
         self._channel.send({"kind": "note", "text": text})
 
     def _on_readable(self) -> None:
-        for message in self._channel.waiting():
+        for message in self._channel.arrived():
             if message is None:
                 asyncio.get_running_loop().remove_reader(self._channel.fileno())
                 self.over.set()
@@ -150,12 +150,13 @@ async def watch(relay: Relay, path: Path) -> None:
 
 
 async def _serve(descriptor: int, listening: int, feed: int) -> None:
-    """Do the requested tasks; the arguments are file descriptors of sockets, −1: none.
+    """Do the tasks in the flight's first message.
 
     Args:
-        descriptor: channel to the flight.
-        listening: listening socket of the live page.
-        feed: socket on which the flight sends its records for the live stream.
+        descriptor: file descriptor of the channel to the flight.
+        listening: file descriptor of the live page's listening socket; −1: no live page.
+        feed: file descriptor of the socket on which the flight sends its records for the live
+            stream; −1: no live stream.
     """
     channel = Channel(socket.socket(fileno=descriptor))
     first = channel.receive()
@@ -176,7 +177,7 @@ async def _serve(descriptor: int, listening: int, feed: int) -> None:
 
 
 async def _watch_until_over(relay: Relay) -> None:
-    """Watch the file, if there is one to watch, until the flight ends."""
+    """Wait for the end of the flight; until then watch the file, if there is one to watch."""
     path = relay.first["watch"]
     watching = None if path is None else asyncio.create_task(watch(relay, Path(path)))
     await relay.over.wait()

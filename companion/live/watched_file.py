@@ -19,11 +19,11 @@ Signature = tuple[tuple[int, int, int] | None, ...]
 
 
 class Edit:
-    """The result of an edit.
+    """What an edit of the file changes, or why it is refused.
 
     Attributes:
-        values: the changed values.
-        refusal: why the edit cannot be used, one sentence; None: it can.
+        values: the changed values, by section and key.
+        refusal: why the edit cannot be used, one sentence; None: the edit can be used.
     """
 
     def __init__(self, values: Values, refusal: str | None = None) -> None:
@@ -37,22 +37,24 @@ class WatchedFile:
 
     Args:
         path: path of the file.
-        read: configuration that was read from this file for the flight. A later change of the file
-            is its first edit.
+        config_as_read: configuration as read from this file for the flight. If the file has changed
+            since, that is its first edit.
         check: called with changed values and the name of the file; raises ConfigError if they
             cannot be used.
     """
 
-    def __init__(self, path: Path, read: Config, check: Callable[[Values, str], None]) -> None:
+    def __init__(
+        self, path: Path, config_as_read: Config, check: Callable[[Values, str], None]
+    ) -> None:
         self._path, self._check = path, check
-        self._accepted = self._newest_loaded = read
+        self._accepted = self._newest_loaded = config_as_read
         self._files = files_of(path)
         self._seen = self._signature()
         self._last_judged: Signature | None = None
         self._unchanged_checks = 0
 
     def newest_edit(self) -> Edit | None:
-        """The newest edit; None: there is none, or the file is being written."""
+        """The newest edit; None: no new edit, or the file is still being written."""
         signature = self._signature()
         if signature != self._seen:
             self._seen, self._unchanged_checks = signature, 0
@@ -86,7 +88,7 @@ class WatchedFile:
 
 
 def _values(before: Config, after: Config) -> dict[str, dict[str, Any]]:
-    """The values that differ, by section and key; the structure of includes does not matter."""
+    """The values after the edit that differ, by section and key, without those of `include`."""
     values: dict[str, dict[str, Any]] = {}
     for each in differences(before, after):
         if each.section != "include":

@@ -32,7 +32,7 @@ def control_plots(flight: FlightData) -> Iterator[Plot]:
 
 
 def compared_steps(flights: Sequence[FlightData]) -> Iterator[Plot]:
-    """The first doublet of each flight and its best linear model; empty without steps."""
+    """The first doublet of each flight and its nearest linear model; empty without doublets."""
     traces = []
     for number, flight in enumerate(flights):
         if flight.runs:
@@ -51,7 +51,7 @@ def compared_steps(flights: Sequence[FlightData]) -> Iterator[Plot]:
 
 
 def _step_response(flight: FlightData) -> Plot:
-    """The first doublet along its own direction, with the ideal and the best linear model."""
+    """The first doublet along its own direction, with the ideal and the nearest linear model."""
     if not flight.runs:
         return Plot("", "", [])
     run, model = flight.runs[0], nearest_second_order(flight.runs)
@@ -73,7 +73,7 @@ def _step_response(flight: FlightData) -> Plot:
 
 
 def _step_paths(flight: FlightData) -> Plot:
-    """The first doublets as paths in the plane of the acceleration coefficients."""
+    """The first doublets as paths in the plane of the coefficients, east and north."""
     traces = []
     for number, run in enumerate(flight.runs[:_STEPS_SHOWN]):
         colour = FLIGHTS[number % len(FLIGHTS)]

@@ -24,7 +24,8 @@ class CrossedLimit:
         curve: name of the curve that the limit bounds: "speed", "tilt", "error", "rate", "thrust",
             "latency", "height" or "track".
         key: configuration key of the limit.
-        levels: values that the curve must not cross, in its unit; "latency" may, but not often.
+        levels: values of the limit, in the curve's unit. The curve must not cross them, except
+            "latency", which must not do so often.
         outline: fence around the track, (N, 2) north and east, m; empty for other curves.
     """
 
@@ -75,7 +76,7 @@ def early_end(
 
 
 def _constant_limits(config: Config) -> dict[str, CrossedLimit]:
-    """The limits that are constant over the flight, by monitor."""
+    """The limits that are constant over the flight, by the monitor's name."""
     limits, safety = config.limits, config.safety
     tilt, rate = limits.max_tilt_deg + safety.tilt_margin_deg, safety.max_body_rate_deg_s
     return {

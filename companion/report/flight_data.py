@@ -49,13 +49,13 @@ class FlightData:
             "latency": from a sample's arrival to its setpoint, ms.
         figures: the content of `summary.json`, or derived from the record; None for a `.tlog`.
         provisional: whether the flight wrote no summary, so that the figures come from its record.
-        fault: why not all of the record was read, as a sentence; None: it has no such fault.
+        fault: why not all of the record could be read, as a sentence; None: all was read.
         phases: the phases, in order; empty for a `.tlog`.
         modes: the autopilot's modes, in order, for a `.tlog`.
         maneuvers: the maneuvers, in order.
         events: the events, in order.
         differences: keys of the configuration that are not the default; None: unknown.
-        runs: the open-loop steps, in vehicle time.
+        runs: the doublets in open loop, in vehicle time.
         gain: p of the planner, 1/s; NaN: unknown.
         end: the early end of the flight; None: none, or unknown.
     """
@@ -75,8 +75,8 @@ class FlightData:
     end: EndMark | None = None
 
     @property
-    def last(self) -> float | None:
-        """Time at which the phases or modes end, s since the flight began; None: there are none."""
+    def end_time(self) -> float | None:
+        """End of the last phase or mode, s since the flight began; None: there are none."""
         sections = self.phases or self.modes
         return sections[-1].end if sections else None
 

@@ -113,7 +113,7 @@ def _track_in_space(flights: Sequence[FlightData]) -> Plot:
 
 
 def _cube_ranges(traces: Sequence[Mapping[str, Any]]) -> dict[str, tuple[float, float]]:
-    """Range of each axis around the tracks, m; at least half as long as the longest axis."""
+    """Range of each axis around the tracks, m; each at least half as long as the longest range."""
     shown = {
         axis: [value for trace in traces for value in trace[axis] if value is not None]
         for axis in "xyz"
@@ -168,10 +168,10 @@ def _error_plot(flights: Sequence[FlightData]) -> Plot:
 
 
 def _largest_error(flights: Sequence[FlightData]) -> float | None:
-    """The largest error in the maneuvers that have a reference throughout, m.
+    """The largest error in the maneuvers that have a reference throughout, m, to scale the plot.
 
-    None if the plot should show all errors: for several flights, after an early end, and if no
-    error elsewhere is larger.
+    None: the plot shows all errors. It does so for several flights, after an early end, if there is
+    no such maneuver, and if the errors elsewhere are not larger.
     """
     flight = flights[0]
     if len(flights) > 1 or flight.end is not None or "error" not in flight.curves:

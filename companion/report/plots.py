@@ -65,7 +65,7 @@ def over_time(name: str, curve: Curve, column: int, colour: str, **more: Any) ->
 
 
 def kept_indices(values: Floats) -> Any:
-    """Indices (M,) of the points to draw: least and largest of each of many slices, and NaNs."""
+    """Indices (M,) of the points to draw: the extremes of each of many slices, and their gaps."""
     count = len(values)
     if count <= _MAX_POINTS:
         return np.arange(count)
@@ -105,7 +105,7 @@ def time_axis(flights: Sequence[FlightData], **titles: str) -> dict[str, Any]:
     marked.
     """
     layout = axes(x="time, s", **titles)
-    ends = [flight.last for flight in flights if flight.last is not None]
+    ends = [flight.end_time for flight in flights if flight.end_time is not None]
     if ends:
         layout["xaxis"]["range"] = [0.0, max(ends)]
     if len(flights) > 1:
@@ -121,7 +121,7 @@ def time_axis(flights: Sequence[FlightData], **titles: str) -> dict[str, Any]:
 
 
 def end_mark(end: EndMark, *, above: bool = False) -> dict[str, list[dict[str, Any]]]:
-    """A line and a label at an early end, for a layout; the label is at the bottom or above."""
+    """A line and a label at an early end, for a layout; the label is at the bottom, or `above`."""
     label = {**_end_label(end), "y": 1.0 if above else 0.0}
     return {"shapes": [_vertical_line(end.time)], "annotations": [label]}
 
@@ -131,7 +131,7 @@ def limit_lines(flights: Sequence[FlightData], curve: str, **more: Any) -> list[
     end = flights[0].end if len(flights) == 1 else None
     if end is None or end.limit is None or end.limit.curve != curve:
         return []
-    limit, last = end.limit, end.time if flights[0].last is None else flights[0].last
+    limit, last = end.limit, end.time if flights[0].end_time is None else flights[0].end_time
     if limit.outline:
         north, east = np.array(limit.outline).T
         return [line(f"limit: {limit.key}", east, north, CROSSED, dash="dash", **more)]

@@ -51,7 +51,7 @@ def events_at_end(flight: FlightData) -> list[Table]:
 def extremes(flight: FlightData) -> str:
     """Duration, largest height, speed and tilt of a flight, in words; empty without positions."""
     motion = flight.curves.get("motion")
-    if motion is None or flight.last is None:
+    if motion is None or flight.end_time is None:
         return ""
     texts = "{:.1f} m high", "{:.1f} m/s fast", "{:.0f}° tilted"
     largest = [
@@ -59,7 +59,7 @@ def extremes(flight: FlightData) -> str:
         for text, values in zip(texts, motion.values.T, strict=True)
         if not np.isnan(values).all()
     ]
-    return f"{flight.last:.0f} s" + (f", up to {', '.join(largest)}" if largest else "")
+    return f"{flight.end_time:.0f} s" + (f", up to {', '.join(largest)}" if largest else "")
 
 
 def configuration(flight: FlightData) -> Table:
@@ -110,7 +110,7 @@ def comparison_tables(flights: Sequence[FlightData]) -> list[Table]:
 
 
 def _compared(key: ConfigKey) -> tuple[str, str]:
-    """Value and default of a key; endpoints without the port, because `demo` varies it."""
+    """Value and default of a key as texts; endpoints without the port, because `demo` varies it."""
     value, default = _value_text(key.value), _value_text(key.default)
     if key.name != "endpoint":
         return value, default

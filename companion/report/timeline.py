@@ -15,7 +15,7 @@ _LANES = ("events", "maneuvers", "phases", "modes")
 
 def timeline(flight: FlightData) -> Iterator[Plot]:
     """The timeline of a flight; empty without phases and modes."""
-    if flight.last is None:
+    if flight.end_time is None:
         return
     lanes = {"modes": flight.modes, "phases": flight.phases, "maneuvers": flight.maneuvers}
     traces = [_bars(lane, spans) for lane, spans in lanes.items() if spans]

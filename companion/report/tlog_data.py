@@ -21,9 +21,9 @@ _MESSAGE_NAMES = frozenset(
     {"ATTITUDE_QUATERNION", "ATTITUDE", "LOCAL_POSITION_NED", "HEARTBEAT", "STATUSTEXT"}
 )
 _INFORMATION, _WARNING, _ERROR = 2, 3, 4
-"""Levels of `Event`."""
+"""Values of `Event.level`."""
 _MAV_ERROR, _MAV_WARNING = 3, 4
-"""Levels of MAV_SEVERITY."""
+"""Values of MAV_SEVERITY: ERROR and WARNING."""
 
 
 def logged(path: Path) -> FlightData:

@@ -30,9 +30,9 @@ _CASE_COUNT = 200
 _SETTLING_TIME = 3.0
 """Time allowed for a step, s: 15 time constants of `_GAIN`."""
 _MAX_REMAINING_ERROR = 0.02
-"""Largest error of the coefficients that remains after a step."""
+"""Largest distance of the coefficients from their target after `_SETTLING_TIME`."""
 _MAX_DISTANCE = 1.5
-"""Largest distance from the reference of a hover and a circle, m."""
+"""Largest distance of the vehicle from its reference in a hover and a circle, m."""
 
 
 def check_planner(planner: str | Law | type[Planner], seed: int = 0) -> None:
@@ -43,11 +43,11 @@ def check_planner(planner: str | Law | type[Planner], seed: int = 0) -> None:
         seed: seed of the attitudes and targets.
 
     Raises:
-        AssertionError: it may not fly; the message gives the attitude or target at which it began,
-            and the target that it followed.
+        AssertionError: the planner may not fly; the message gives the attitude or target at which
+            it began, and the target that it was to reach.
         PluginError: the plug-in cannot be loaded, or two packages give it.
-        TypeError: it is no planner: the law does not return three numbers, or the class has not
-            the methods of a planner.
+        TypeError: `planner` is no planner: the law does not return three numbers, or the class has
+            not the methods of a planner.
         ValueError: there is no planner of that name.
     """
     if isinstance(planner, str) and planner in plugins.names(plugins.PLANNERS):
@@ -101,7 +101,7 @@ _BOOT_S = 0.5
 """Boot time of the mock autopilots here, s; real ones need 4 to 42 s, which does not matter here.
 """
 _SAFE_PARAMETERS = {"ardupilot": {"GUID_OPTIONS": 8, "ATC_ANGLE_BOOST": 0, "GUID_TIMEOUT": 1.0}}
-"""Parameters without which the preflight checks refuse the vehicle."""
+"""Autopilot -> parameters with which the vehicle passes the preflight checks."""
 
 
 def _make(planner: str | Law | type[Planner]) -> Planner:
@@ -111,10 +111,10 @@ def _make(planner: str | Law | type[Planner]) -> Planner:
 
 
 def _rates(planner: Planner, q: Quaternion, target: Target, body_rates: BodyRates) -> BodyRates:
-    """The planner's body rates.
+    """The planner's body rates, rad/s.
 
     Raises:
-        AssertionError: it raised an error, or did not return three numbers.
+        AssertionError: the planner raised an error, or did not return three numbers.
     """
     try:
         return BodyRates(*map(float, planner.rates(q, target, _DT, body_rates)))

@@ -16,7 +16,7 @@ from sitl_mock.settings import load_settings
 from sitl_mock.simulation import Simulation
 
 Relay = Callable[[bytes], Iterable[bytes]]
-"""Takes a datagram and returns the datagrams that arrive in its place."""
+"""Takes a datagram that was sent; returns the datagrams that arrive in its place."""
 
 _GROUND_STATION = 255, 190
 """MAVLink ids of a ground station."""
@@ -228,7 +228,7 @@ class MockVehicle:
         return self._relayed(datagrams)
 
     def take_slip(self) -> float:
-        """Time that a fault has taken from the vehicle's clock since the last call, s."""
+        """Time that `slip_clock` faults took from the vehicle's clock since the last call, s."""
         return self._simulation.effects.take_slip()
 
     def _relayed(self, datagrams: list[bytes]) -> list[bytes]:

@@ -39,7 +39,7 @@ class VirtualClock:
 
 
 class World(Protocol):
-    """Moves the clock when the program has nothing left to do."""
+    """What is outside the program: delivers datagrams, and moves the clock while it is idle."""
 
     def deliver_due(self) -> None:
         """Deliver the datagrams that arrive at the present time."""

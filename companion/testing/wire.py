@@ -102,7 +102,7 @@ class LockstepWire(Wire):
         """Do nothing: no datagram arrives between two steps."""
 
     def advance(self, until: float) -> None:
-        """Let the vehicle make a step; the program's timers wait for it."""
+        """Let the vehicle make one whole step; timers due within the step run after it."""
         datagrams = self._vehicle.begin() or self._vehicle.step()
         for datagram in datagrams:  # the beacon comes last, and moves the clock to this time
             self._deliver(datagram, self._vehicle.time)

@@ -154,7 +154,7 @@ def test_a_campaign_is_run_resumed_and_one_case_is_flown_again(quick, threads, c
     assert {
         path.name: path.read_bytes() for path in (out / "results").glob("unit*.parquet")
     } == whole
-    monkeypatch.setattr(commands, "page_about", lambda place: f"Report: {place}")
+    monkeypatch.setattr(commands, "write_flight_page", lambda place: f"Report: {place}")
     assert main(["campaign", "rerun", str(out), "2"]) == 0
     said = capsys.readouterr().out
     assert "bit-identical to the campaign's flight" in said

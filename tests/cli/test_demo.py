@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from companion import demo
-from companion.cli.flying import page_about
+from companion.cli.flying import write_flight_page
 from companion.cli.main import main
 from companion.mavlink.transport.free_port import free_port
 from tests.flight.fly import LOOP_HZ, QUICK_MOCK, QUICK_PARAMETERS, merged
@@ -91,7 +91,7 @@ def test_a_page_that_is_not_written_is_said_with_the_reason(tmp_path, monkeypatc
         raise error
 
     monkeypatch.setattr("companion.report.page.write_report", fails)
-    assert page_about(tmp_path).startswith(f"No report: {words}; `companion report ")
+    assert write_flight_page(tmp_path).startswith(f"No report: {words}; `companion report ")
 
 
 def test_a_mock_vehicle_without_a_word_points_at_the_disk(tmp_path):

@@ -18,7 +18,7 @@ from companion.bench import serve as bench_serve
 from companion.cli import flights, flying, output_file
 from companion.cli import main as entry
 from companion.cli import serve as serving
-from companion.cli.flying import page_about
+from companion.cli.flying import write_flight_page
 from companion.cli.main import main
 from companion.cli.run import run
 from companion.cli.text_streams import _transliterated
@@ -169,7 +169,7 @@ def test_a_page_that_cannot_be_written_does_not_fail_the_flight(monkeypatch, err
         raise error
 
     monkeypatch.setattr("companion.report.page.write_report", write)
-    assert page_about("f") == said
+    assert write_flight_page("f") == said
 
 
 def test_a_flight_whose_console_is_closed_gets_its_page(monkeypatch, tmp_path):

@@ -12,7 +12,7 @@ import pytest
 
 from companion.files import write_whole as module
 from companion.files.os_errors import DISK_HANGS
-from companion.files.write_whole import ReservedRoom, write_whole
+from companion.files.write_whole import ReservedSpace, write_whole
 from companion.flight import flight_files
 from companion.flight.observer import SilentObserver
 from companion.testing import fly
@@ -74,16 +74,18 @@ def test_a_disk_that_hangs_is_not_waited_for(tmp_path, monkeypatch):
     answers = threading.Event()
     monkeypatch.setattr(os, "fsync", lambda _: answers.wait(10.0))
     began = time.monotonic()
-    why = module.write_in_time(tmp_path / "summary.json", "{}")
+    why = module.write_with_timeout(tmp_path / "summary.json", "{}")
     assert time.monotonic() - began < 1.0
     assert why == DISK_HANGS
     answers.set()
 
 
 def test_in_time_it_writes_or_says_why_not(tmp_path):
-    assert module.write_in_time(tmp_path / "summary.json", "{}") is None
+    assert module.write_with_timeout(tmp_path / "summary.json", "{}") is None
     assert (tmp_path / "summary.json").read_text() == "{}"
-    assert module.write_in_time(tmp_path / "no folder" / "summary.json", "{}").startswith("No such")
+    assert module.write_with_timeout(tmp_path / "no folder" / "summary.json", "{}").startswith(
+        "No such"
+    )
 
 
 def test_an_error_names_the_file_and_not_the_temporary_one(tmp_path, monkeypatch):
@@ -124,13 +126,13 @@ def reserved(folder):
 
 
 def test_room_is_kept_without_a_name_and_freed(tmp_path):
-    room = ReservedRoom(tmp_path, 1 << 16)
+    room = ReservedSpace(tmp_path, 1 << 16)
     assert reserved(tmp_path) >= 1 << 16
     assert not list(tmp_path.iterdir())
     room.free()
     room.free()
     assert reserved(tmp_path) == 0
-    forgotten = ReservedRoom(tmp_path, 1 << 16)
+    forgotten = ReservedSpace(tmp_path, 1 << 16)
     del forgotten
     assert reserved(tmp_path) == 0
 
@@ -139,13 +141,13 @@ def test_a_disk_that_cannot_keep_room_is_no_error(tmp_path, monkeypatch):
     def full(*_):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    ReservedRoom(tmp_path / "missing", 1).free()
+    ReservedSpace(tmp_path / "missing", 1).free()
     monkeypatch.setattr(os, "posix_fallocate", full)
-    ReservedRoom(tmp_path, 1).free()
+    ReservedSpace(tmp_path, 1).free()
 
 
 def test_a_flight_keeps_room_for_its_summary_until_it_writes_it(tmp_path, monkeypatch):
-    held, written = [], flight_files.write_in_time
+    held, written = [], flight_files.write_with_timeout
 
     class Watching(SilentObserver):
         def phase(self, name, waits_for):
@@ -155,7 +157,7 @@ def test_a_flight_keeps_room_for_its_summary_until_it_writes_it(tmp_path, monkey
         held.append(reserved(tmp_path))
         return written(path, text)
 
-    monkeypatch.setattr(flight_files, "write_in_time", write)
+    monkeypatch.setattr(flight_files, "write_with_timeout", write)
     summary = fly(merged(QUICK_FLIGHT, {}), QuickVehicle(), tmp_path, Watching())
     assert summary.result == "ok"
     *flying, writing = held

@@ -13,7 +13,7 @@ from companion.serve.motion_settings import change_refusal
 
 def _after(start, *values):
     """Checks of a flight in which these changes were made."""
-    checks = ChangeChecks(start, follows=False)
+    checks = ChangeChecks(start, flies_maneuvers=False)
     for each in values:
         checks.check(each, "a test")
         checks.now = changed(checks.now, each, "a test")
@@ -26,14 +26,14 @@ def test_margins_are_kept():
     with pytest.raises(
         ConfigError, match=r"margins of only .*; .* must leave at least 4\.0 dB and 20°"
     ):
-        ChangeChecks(px4, follows=False).check(gain, "a test")
-    checks = ChangeChecks(px4, follows=False)
+        ChangeChecks(px4, flies_maneuvers=False).check(gain, "a test")
+    checks = ChangeChecks(px4, flies_maneuvers=False)
     stiff, stiffer = ({"guidance": {"position_weight_per_s4": w}} for w in (4000.0, 10000.0))
     checks.now = changed(px4, stiff, "a test")
     with pytest.raises(ConfigError, match="the control loop is unstable"):
         checks.check(stiffer, "a test")
     with pytest.raises(ConfigError, match=r"position_weight_per_s4 .* more than a factor of 3"):
-        ChangeChecks(px4, follows=False).check(
+        ChangeChecks(px4, flies_maneuvers=False).check(
             {"guidance": {"position_weight_per_s4": 10000.0}}, "a test"
         )
     small = {"planner": {"gain_per_s": 4.5}}, {"planner": {"gain_per_s": 3.5}}
@@ -61,7 +61,7 @@ def test_a_slowed_trajectory_is_judged_as_it_is_flown(tmp_path):
         },
         "a test",
     )
-    checks = ChangeChecks(start, follows=True)
+    checks = ChangeChecks(start, flies_maneuvers=True)
     path.unlink()  # it is not read again
     checks.check({"limits": {"max_climb_m_s": 1.0}}, "a test")
     with pytest.raises(ConfigError, match="not slowed down again in flight"):
@@ -76,7 +76,7 @@ def test_the_flown_vehicles_drag_replaces_that_of_the_vehicle_that_flew_last(tmp
         "recording": {"directory": tmp_path},
     }
     LearnedFile(tmp_path, "aa").save(Drag(0.2), 5.0)  # 28° are enough
-    checks = ChangeChecks(changed(Config(), circle, "a test"), follows=True)
+    checks = ChangeChecks(changed(Config(), circle, "a test"), flies_maneuvers=True)
     less_tilt = {"limits": {"max_tilt_deg": 30.0}}
     checks.check(less_tilt, "a test")
     checks.note_drag({"drag": None, "source": None})

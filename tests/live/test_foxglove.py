@@ -329,7 +329,7 @@ def test_an_address_that_cannot_be_used_is_one_sentence():
     with pytest.raises(ConfigError, match="--foxglove nowhere: write an IP address, a port"):
         stream_address("nowhere")
     assert stream_address(":0").host == "127.0.0.1"
-    assert "ws://[::1]:" in stream_address("[::1]:0").words()
+    assert "ws://[::1]:" in stream_address("[::1]:0").address_text()
 
 
 def test_a_port_in_use_and_a_missing_extra_are_usage_errors(monkeypatch, capsys):

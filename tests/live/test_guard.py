@@ -95,15 +95,18 @@ def test_the_door_is_of_this_computer_and_has_a_new_token_each_time():
     assert first.host == second.host == "127.0.0.1"
     assert first.token != second.token
     assert len(first.token) >= 12
-    assert f"127.0.0.1:{first.port}" in first.words()
+    assert f"127.0.0.1:{first.port}" in first.address_text()
     for page_socket in (first, second):
         page_socket.listening.close()
 
 
 def test_a_door_for_other_computers_is_told_with_its_name_and_token():
-    told = PageSocket("0.0.0.0", 8090, "secret", None).words()
+    told = PageSocket("0.0.0.0", 8090, "secret", None).address_text()
     assert told == f"Live page: http://{socket.gethostname()}:8090/?token=secret"
-    assert "http://[2001:db8::1]:8090/?token=" in PageSocket("2001:db8::1", 8090, "s", None).words()
+    assert (
+        "http://[2001:db8::1]:8090/?token="
+        in PageSocket("2001:db8::1", 8090, "s", None).address_text()
+    )
 
 
 def test_a_cookie_that_cannot_be_read_admits_nobody():

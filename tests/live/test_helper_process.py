@@ -35,7 +35,7 @@ def started(console=None, folder=None, path=None, **options):
     read = Config() if path is None else load(path)
     shown = console or Console(file=io.StringIO())
     return helper_process(
-        argparse.Namespace(**asked), read, path, read, folder, shown, follows=True
+        argparse.Namespace(**asked), read, path, read, folder, shown, flies_maneuvers=True
     )
 
 
@@ -82,7 +82,7 @@ def test_a_stream_that_lost_its_port_is_noted_and_the_flight_goes_on(monkeypatch
         taken = other.getsockname()
         monkeypatch.setattr(
             "companion.cli.helper_process.stream_address", lambda _: argparse.Namespace(
-                host=taken[0], port=taken[1], words=lambda: "there"
+                host=taken[0], port=taken[1], address_text=lambda: "there"
             )
         )  # fmt: skip
         with started(foxglove="127.0.0.1:0") as helper:

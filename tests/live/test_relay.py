@@ -27,7 +27,7 @@ class Flight:
         self.end, self.answer, self.told = end, {"text": "done"}, []
 
     def serve(self):
-        for message in self.end.waiting():
+        for message in self.end.arrived():
             if message is None:
                 return
             self.told.append(message)
@@ -154,7 +154,7 @@ def test_an_end_that_broke_counts_as_closed():
             raise ConnectionResetError
 
     channel = Channel(Broken())
-    assert list(channel.waiting()) == [None]
+    assert list(channel.arrived()) == [None]
     assert not channel.open
     assert list(datagrams(Broken(), 1)) == [b""]
 
@@ -165,7 +165,7 @@ def test_a_turn_takes_no_more_than_it_may():
     for number in range(3):
         channel.send({"number": number})
     told = Channel(theirs)
-    assert [message["number"] for message in told.waiting(2)] == [0, 1]
+    assert [message["number"] for message in told.arrived(2)] == [0, 1]
     assert len(list(datagrams(theirs, 0))) == 0
     assert len(list(datagrams(theirs, 5))) == 1
     channel.close()
@@ -174,7 +174,7 @@ def test_a_turn_takes_no_more_than_it_may():
 
 def test_maneuvers_that_are_no_longer_known_forbid_a_change(tmp_path):
     trajectory = {"flight": {"maneuvers": ["trajectory"], "trajectory": str(tmp_path / "t.csv")}}
-    checks = ChangeChecks(changed(Config(), trajectory, "a test"), follows=True)
+    checks = ChangeChecks(changed(Config(), trajectory, "a test"), flies_maneuvers=True)
     with pytest.raises(
         ConfigError, match=r"maneuvers of this flight could not be loaded: .*t\.csv"
     ):
@@ -183,7 +183,7 @@ def test_maneuvers_that_are_no_longer_known_forbid_a_change(tmp_path):
 
 def test_guidance_whose_values_are_fixed_forbids_a_change():
     told = {"guidance": {"kind": "nmpc"}, "vehicle": {"lag_ms": 40.0, "dead_time_ms": 40.0}}
-    checks = ChangeChecks(changed(Config(), told, "a test"), follows=False)
+    checks = ChangeChecks(changed(Config(), told, "a test"), flies_maneuvers=False)
     with pytest.raises(ConfigError, match=r"^a test: guidance.kind nmpc keeps the values"):
         checks.check(SLOWER, "a test")
 

@@ -19,18 +19,18 @@ def status(time, **more):
 def test_the_last_30_seconds_are_kept_and_only_new_states_are_given_out(store):
     for tenths in range(0, 400, 2):
         store.take(status(tenths / 10.0))
-    assert [store.frames[0]["time_s"], store.frames[-1]["time_s"]] == pytest.approx([9.8, 39.8])
-    assert "kind" not in store.frames[0]
-    assert store.count == 200
+    assert [store.states[0]["time_s"], store.states[-1]["time_s"]] == pytest.approx([9.8, 39.8])
+    assert "kind" not in store.states[0]
+    assert store.state_count == 200
     assert [each["time_s"] for each in store.since(198)] == pytest.approx([39.6, 39.8])
-    assert store.since(store.count) == []
-    assert store.since(0) == list(store.frames)
+    assert store.since(store.state_count) == []
+    assert store.since(0) == list(store.states)
 
 
 def test_a_second_flight_begins_with_an_empty_plot(store):
     store.take(status(20.0))
     store.take(status(1.0))
-    assert [each["time_s"] for each in store.frames] == [1.0]
+    assert [each["time_s"] for each in store.states] == [1.0]
     assert store.since(1) == [{"time_s": 1.0}]
 
 
@@ -50,7 +50,7 @@ def test_a_phase_is_an_event_at_the_newest_state(store):
 
 def test_a_message_of_another_kind_changes_nothing(store):
     store.take({"kind": "answer", "id": 1, "refusal": None})
-    assert (store.count, store.event_count, store.over) == (0, 0, None)
+    assert (store.state_count, store.event_count, store.over) == (0, 0, None)
 
 
 def test_the_words_of_the_flight_about_its_end_are_kept(store):

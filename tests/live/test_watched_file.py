@@ -86,7 +86,7 @@ def watched(tmp_path: Path):
     path = tmp_path / "watched.yaml"
     (tmp_path / "base.yaml").write_text(BASE)
     path.write_text(GOOD)
-    checks = ChangeChecks(load(path), follows=True)
+    checks = ChangeChecks(load(path), flies_maneuvers=True)
     return path, WatchedFile(path, load(path), checks.check), checks
 
 

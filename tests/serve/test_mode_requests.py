@@ -165,7 +165,7 @@ def test_what_is_to_be_told_of_a_record_is_told_in_the_event_loop(tmp_path, monk
         record = records.new(Config())
         with records.recording(record):
             pass
-        monkeypatch.setattr(flight_files, "write_in_time", lambda *_: "the disk is full")
+        monkeypatch.setattr(flight_files, "write_with_timeout", lambda *_: "the disk is full")
         await records.keep(record, Summary("ok", "", "", 1.0, LoopCounts(), {}, FlightTrace()))
         await asyncio.sleep(0.01)
 

@@ -1,4 +1,4 @@
-"""Access to the live page: other web sites have none; other computers need the token or cookie."""
+"""Access to the live page: other web sites are refused; other computers need token or cookie."""
 
 import hmac
 import socket
@@ -97,7 +97,10 @@ def _host_in(origin: str) -> str:
 
 
 def _is_address_or_own_name(host: str) -> bool:
-    """Whether a Host header is an IP address, or a name of this computer that no site can take."""
+    """Whether a Host header names an IP address, localhost, or this computer.
+
+    Other names are refused: a web site could let its own name point to this computer.
+    """
     try:
         name = urlsplit(f"//{host}").hostname or ""
     except ValueError:  # such as an unclosed bracket

@@ -48,7 +48,7 @@ def add_page(relay: Relay, store: Store, guard: Guard) -> None:
         _add_drawings()
         Panel(relay, store, guard, unlocked=guard.knows(token))
         state = {"fence": store.fence(), "frames": store.since(0), "events": store.events_since(0)}
-        sent[client.id] = store.count, store.event_count
+        sent[client.id] = store.state_count, store.event_count
         client.run_javascript(f"live.begin({json.dumps(state)})")
 
     async def push() -> None:
@@ -62,7 +62,7 @@ def add_page(relay: Relay, store: Store, guard: Guard) -> None:
                 "fence": store.fence(),
                 "over": store.over,
             }
-            sent[client.id] = store.count, store.event_count
+            sent[client.id] = store.state_count, store.event_count
             client.run_javascript(f"live.push({json.dumps(new)})")
         for gone in sent.keys() - Client.instances.keys():
             del sent[gone]

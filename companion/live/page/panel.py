@@ -112,7 +112,7 @@ class Panel:
             self._show_message(f"saved as {path}")
 
     def _refresh(self) -> None:
-        """Show values changed elsewhere, except in edited fields; enable or disable the undo."""
+        """Show values changed elsewhere, except in edited fields; enable or disable Undo."""
         for key in self._store.values():
             name, value = (key.section, key.name), shown(key.value)
             field = self._inputs[name]
@@ -127,7 +127,7 @@ class Panel:
 
 
 def _range(allowed: str) -> str:
-    """The range of a key, without the words that all ranges share."""
+    """The range of a key as a hint; the words "changeable in flight" are removed."""
     return (
         allowed.replace("changeable in flight within its range", "")
         .strip(", ")
@@ -136,7 +136,7 @@ def _range(allowed: str) -> str:
 
 
 def _parsed(text: str) -> Any:
-    """A number, or null for an empty field; other texts stay unchanged and are then refused."""
+    """The number in a field, or None if it is empty. Another text is returned, to be refused."""
     if text in ("", "null"):
         return None
     try:

@@ -11,29 +11,29 @@ from companion.live.channel import Message
 
 SHOWN_S = 30.0
 """Time shown in the plots, s."""
-_MOST_FRAMES, _MOST_EVENTS = 400, 200
+_MOST_STATES, _MOST_EVENTS = 400, 200
 
 
 class Store:
-    """Keeps the messages of the flight.
+    """Keeps what the page shows, from the messages of the flight.
 
     Attributes:
-        frames: states of the last `SHOWN_S` seconds, oldest first.
-        count: number of states so far.
+        states: messages `status` of the last `SHOWN_S` seconds, oldest first.
+        state_count: number of states since the page began.
         events: the newest events, newest last, each {"time_s", "text"}.
-        event_count: number of events so far.
+        event_count: number of events since the page began.
         config: the configuration after the newest change.
         start: the configuration with which the flight began.
         can_undo: whether a change can be undone.
-        over: how the flight ended; None: it has not.
+        over: how the flight ended; None: it has not ended.
 
     Args:
         config: configuration of the flight.
     """
 
     def __init__(self, config: Config) -> None:
-        self.frames: deque[Message] = deque(maxlen=_MOST_FRAMES)
-        self.count = 0
+        self.states: deque[Message] = deque(maxlen=_MOST_STATES)
+        self.state_count = 0
         self.events: deque[dict[str, Any]] = deque(maxlen=_MOST_EVENTS)
         self.event_count = 0
         self.config = self.start = config
@@ -48,7 +48,7 @@ class Store:
             case "event":
                 self._add_event(message["time_s"], message["text"])
             case "phase":
-                newest = self.frames[-1]["time_s"] if self.frames else 0.0
+                newest = self.states[-1]["time_s"] if self.states else 0.0
                 self._add_event(newest, f"phase: {message['name']}")
             case "config":
                 self.config = Config.model_validate(message["config"])
@@ -61,12 +61,12 @@ class Store:
         self.over = self.over or "the program that flew has ended"
 
     def since(self, count: int) -> list[Message]:
-        """The states after the first `count` states, as far as they are kept."""
-        new = min(self.count - count, len(self.frames))
-        return list(self.frames)[len(self.frames) - new :]
+        """The kept states after the first `count` states."""
+        new = min(self.state_count - count, len(self.states))
+        return list(self.states)[len(self.states) - new :]
 
     def events_since(self, count: int) -> list[dict[str, Any]]:
-        """The events after the first `count` events, as far as they are kept."""
+        """The kept events after the first `count` events."""
         new = min(self.event_count - count, len(self.events))
         return list(self.events)[len(self.events) - new :]
 
@@ -96,12 +96,12 @@ class Store:
 
     def _take_state(self, message: Message) -> None:
         state = {key: value for key, value in message.items() if key != "kind"}
-        if self.frames and state["time_s"] < self.frames[-1]["time_s"]:
-            self.frames.clear()  # the time begins again with the next flight of `serve`
-        self.frames.append(state)
-        self.count += 1
-        while state["time_s"] - self.frames[0]["time_s"] > SHOWN_S:
-            self.frames.popleft()
+        if self.states and state["time_s"] < self.states[-1]["time_s"]:
+            self.states.clear()  # the time begins again with the next flight of `serve`
+        self.states.append(state)
+        self.state_count += 1
+        while state["time_s"] - self.states[0]["time_s"] > SHOWN_S:
+            self.states.popleft()
 
     def _add_event(self, time: float, text: str) -> None:
         self.events.append({"time_s": time, "text": text})
