@@ -44,17 +44,17 @@ def helper_process(
     if not options.watch and options.live is None and options.foxglove is None:
         yield None
         return
-    page = stream = None
+    stream = None
     if options.live is not None:
         require("nicegui", "live", "--live")
     if options.foxglove is not None:
         require("foxglove", "foxglove", "--foxglove")
-    if options.live is not None:
-        page = open_page_socket(options.live)
+    page = None if options.live is None else open_page_socket(options.live)
     if options.foxglove is not None:  # after the page, so that a port given to both is refused
         stream = stream_address(options.foxglove)
-    for each in filter(None, (page, stream)):
-        console.print(each.address_text(), highlight=False, soft_wrap=True)
+    for each in (page, stream):
+        if each is not None:
+            console.print(each.address_text(), highlight=False, soft_wrap=True)
     watched = path if options.watch else None
     tasks = HelperTasks(watched, config_as_read, page, stream, flies_maneuvers, folder)
     helper = Helper(tasks, config)
