@@ -82,7 +82,7 @@ class Boot:
         self._next_runtime_us = RUNTIME_PERIOD_US
 
     def reached(self, recorded_s: float) -> bool:
-        """Whether the time ``recorded_s`` of the recording is reached, scaled as all times here."""
+        """Whether the boot has come as far as the recorded boot was after ``recorded_s`` s."""
         return self._state.time_us >= recorded_s * self._scale * 1e6
 
     @property

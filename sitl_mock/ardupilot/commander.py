@@ -199,7 +199,7 @@ class ArduPilotCommander:
             self._announce.say(f"EKF3 IMU{unit} MAG0 in-flight yaw alignment complete", INFO)
 
     def _update_prearm_problem(self) -> str | None:
-        """Store in the state why arming is refused now (None if it is not), and return that."""
+        """Store in the state why arming is refused now, None if it is allowed; return the same."""
         state = self._state
         state.prearm_problem = arming_problem(
             state,

@@ -98,14 +98,14 @@ ARDUPILOT_TYPES = {name: int(kind) for name, _, kind in _PARAMETERS}
 BURST_MS = 5.6
 """Period of the bursts of the simulator's telemetry, ms (measured: 5.4 to 5.8)."""
 ROTOR_LAG_MS = 22.5
-"""Time constant of the specific thrust, ms. This one lag replaces the measured dead time of 15 ms
-and lag of 5 ms."""
+"""Time constant of the specific thrust, ms. It replaces the measured dead time of 15 ms and lag of
+5 ms together."""
 
 RATE_LAG_MS = 11.0
 """Delay of the gyro's low pass, ms (measured)."""
 STAMP_SLIPS_HZ = 1.6
-"""Slips per second of the position's time stamp (measured in circles and figure-eights: 0.3 to
-2.7)."""
+"""How often the time stamp of LOCAL_POSITION_NED slips by 1 ms, per second (measured in circles and
+figure-eights: 0.3 to 2.7); see `StampSlips`."""
 
 AIRFRAME: dict[str, Any] = {
     "thrust_slope_m_s2": specific_thrust(1.0),

@@ -26,7 +26,7 @@ _BATTERY_ACTIONS = {
     6: Mode.RTL,
     7: Mode.BRAKE,
 }
-"""The same for BATT_FS_LOW_ACT and BATT_FS_CRT_ACT. Termination (5) is not simulated."""
+"""Mode for each value of BATT_FS_LOW_ACT and BATT_FS_CRT_ACT. Termination (5) is not simulated."""
 _PILOT_CONTINUES = 16
 """Bit of FS_OPTIONS: the loss of the ground station has no effect in a pilot's mode."""
 

@@ -25,8 +25,8 @@ class FatalSetpointError(Exception):
 def attitude_setpoint(message: Message) -> AttitudeSetpoint | None:
     """Decode a SET_ATTITUDE_TARGET by ArduCopter's type-mask rules (measured).
 
-    None makes the vehicle hold its position: it is returned if the throttle or only some of the
-    rates are ignored, or if the attitude is not of unit length. Rates may be NaN or infinite.
+    Return None, on which the vehicle holds its position, if the mask ignores the throttle or only
+    some of the rates, or if the attitude is not of unit length. Rates may be NaN or infinite.
 
     Raises:
         FatalSetpointError: the attitude has a NaN.

@@ -16,7 +16,7 @@ from sitl_mock.physics.vehicle import ActuatorCommand
 THRUST_AS_THRUST = 8
 """Bit of GUID_OPTIONS: a setpoint's thrust is thrust, not a climb rate."""
 SPOOL_UP_US = 2_000_000
-"""Spool-up of the rotors after NAV_TAKEOFF (recorded: it lifts off after 2.3 s)."""
+"""Spool-up of the rotors after NAV_TAKEOFF, us (recorded: the vehicle lifts off after 2.3 s)."""
 ARRIVAL_DECELERATION = 0.55
 """Deceleration at the end of a take-off, m/s^2 (recorded)."""
 ARRIVAL_TOLERANCE_M = 0.1

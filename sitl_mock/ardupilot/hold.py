@@ -36,7 +36,7 @@ class ClimbProfile:
         self.acceleration = 0.0
 
     def step(self, climb_rate: float, acceleration: float, dt: float) -> None:
-        """Advance by ``dt`` s towards a climb rate, with limited acceleration."""
+        """Advance by ``dt`` s towards a climb rate, with at most this ``acceleration``."""
         largest_change = acceleration * dt
         change = max(-largest_change, min(largest_change, climb_rate - self.rate))
         self.acceleration = change / dt
@@ -107,7 +107,7 @@ class PositionHold:
         return self.follow(demand, dt)
 
     def follow(self, demand: PositionDemand, dt: float) -> PositionOutput:
-        """Return attitude and thrust of one period for any demand."""
+        """Return attitude and thrust of one period of ``dt`` s for a demand, not for the hold."""
         state = self._state
         estimate = state.estimate
         output = self._controller.step(demand, estimate.position_ned, estimate.velocity_ned, dt)

@@ -14,7 +14,8 @@ from sitl_mock.physics.quaternion import Vector, from_yaw
 from sitl_mock.physics.vehicle import ActuatorCommand
 
 TOUCHDOWN_THRUST_RATE = 0.43
-"""After contact in LAND the thrust decreases by this per second (recorded: landed after 1.6 s)."""
+"""After contact in LAND the normalised thrust decreases by this per second (recorded: landed after
+1.6 s)."""
 _STILL = ActuatorCommand(False, 0.0, 0.0, 0.0, 0.0)
 """Command while disarmed: the rotors stand still."""
 

@@ -57,7 +57,7 @@ def arming_problem(
     gcs_failsafe: bool,
     refusal: str | None,
 ) -> str | None:
-    """Return why arming is refused now, in ArduCopter's words; None if it is not.
+    """Return why arming is refused now, in ArduCopter's words; None if it is allowed.
 
     Args:
         state: the autopilot's state.

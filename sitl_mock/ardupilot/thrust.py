@@ -9,7 +9,7 @@ from math import isnan
 from sitl_mock.physics.rigid_body import GRAVITY
 
 HOVER_THRUST = 0.364
-"""Thrust that hovers."""
+"""Normalised thrust that hovers, 0..1."""
 
 _CURVE = (
     (0.0, 0.045),
@@ -17,10 +17,10 @@ _CURVE = (
     (HOVER_THRUST, 1.0),
     (1.0, 2.745),
 )
-"""Points of the curve: (normalised thrust, specific thrust in g). Above `HOVER_THRUST` they lie on
-a line through the origin, and almost so from 0.1 on. Between 0.3 and 0.6 this line agrees with the
-simulator's truth of circles, figure-eights and steps within 0.03 m/s^2. Climbs at a constant thrust
-accelerate less, because their drag grows quickly.
+"""Points of the curve: (normalised thrust, specific thrust in g). From `HOVER_THRUST` on, the curve
+is a straight line through the origin; from 0.1 on, almost. In circles, figure-eights and steps
+between 0.3 and 0.6, this line is within 0.03 m/s^2 of the simulator's truth. Climbs at a constant
+thrust accelerate less, because their drag grows quickly.
 """
 
 
@@ -43,7 +43,7 @@ def angle_boosted(thrust: float, cos_tilt: float) -> float:
 
 
 def thrust_of_setpoint(thrust: float) -> float:
-    """Return the thrust of a setpoint's field: NaN means 0, infinity means 1 (measured)."""
+    """Return the thrust that a setpoint's thrust field means: 0 for NaN, else limited to 0..1."""
     return 0.0 if isnan(thrust) else max(0.0, min(1.0, thrust))
 
 
@@ -51,7 +51,7 @@ def climb_rate_of_setpoint(thrust: float, fastest_up: float, fastest_down: float
     """Return the climb rate of a setpoint's thrust field, m/s: 0 for 0.5 and for NaN.
 
     Args:
-        thrust: the field.
+        thrust: the thrust field, 0..1.
         fastest_up: climb rate at 1, m/s.
         fastest_down: sink rate at 0, m/s.
     """

@@ -38,7 +38,8 @@ def attitude_rates(
     """Return the body rates (rad/s, FRD) that turn ``q`` to ``target``.
 
     As PX4's AttitudeControl: the rotation of the thrust axis along the shortest arc has priority.
-    The remaining rotation about this axis is scaled by ``yaw_weight``, its gain by the inverse.
+    The angle of the remaining rotation about this axis is multiplied by ``yaw_weight``, and the yaw
+    gain is divided by it.
 
     Args:
         q: present attitude.

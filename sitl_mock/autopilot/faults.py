@@ -148,7 +148,7 @@ class FaultEffects:
             self._end(fault)
 
     def take_slip(self) -> float:
-        """Return the wall time that `SlipClock` faults took since the last call, s."""
+        """Return the wall time that the clock has lost by `SlipClock` since the last call, s."""
         slipped, self._slipped_s = self._slipped_s, 0.0
         return slipped
 
@@ -161,7 +161,7 @@ class FaultEffects:
         return any(not fault.messages or name in fault.messages for fault in self._telemetry_stops)
 
     def watch_position(self, converged_us: float, timeout_us: float) -> None:
-        """Update ``position_valid``.
+        """Update ``position_valid`` of the autopilot's state.
 
         Args:
             converged_us: vehicle time from which on the position is valid.

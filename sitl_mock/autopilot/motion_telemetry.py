@@ -34,7 +34,7 @@ class MotionTelemetry:
         state: the autopilot's state.
         vehicle: the vehicle, for rotors, reset counter and ArduPilot's shaped attitude target.
         origin: origin of the local frame.
-        slips: slips of the stamp of LOCAL_POSITION_NED.
+        slips: how far the time stamp of LOCAL_POSITION_NED is behind the true time.
     """
 
     def __init__(self, state: State, vehicle: Vehicle, origin: Geodetic, slips: StampSlips) -> None:

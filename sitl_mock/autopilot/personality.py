@@ -43,9 +43,10 @@ class VehicleParts(NamedTuple):
     origin: Geodetic
     links: list[Link]
     ready_us: int
-    """Vehicle time of `mock.prearm_delay_s`, us, from which arming in any mode is possible."""
+    """Vehicle time at which the boot ends (`mock.prearm_delay_s`), us; before it, arming is refused
+    in modes that need a position, on PX4 in all modes."""
     slips: StampSlips
-    """Slips of the time stamp of LOCAL_POSITION_NED."""
+    """How far the time stamp of LOCAL_POSITION_NED is behind the true time."""
 
 
 class Rules(NamedTuple):

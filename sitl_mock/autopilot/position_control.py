@@ -17,17 +17,17 @@ _LARGEST_TILT = radians(80.0)
 class PositionDemand(NamedTuple):
     """Setpoint: position, velocity, acceleration (NED, SI; NaN = not controlled) and yaw (rad).
 
-    The yaw must be finite. ``speed`` limits the horizontal velocity setpoint, ``up_speed`` and
-    ``down_speed`` the vertical one, m/s.
+    The yaw must be finite. ``max_speed`` limits the horizontal velocity setpoint, ``max_up_speed``
+    and ``max_down_speed`` the vertical one, m/s.
     """
 
     position: Vector
     velocity: Vector
     acceleration: Vector = NAN_VECTOR
     yaw: float = nan
-    speed: float = 12.0
-    up_speed: float = 3.0
-    down_speed: float = 1.5
+    max_speed: float = 12.0
+    max_up_speed: float = 3.0
+    max_down_speed: float = 1.5
 
 
 def setpoint_demand(
@@ -36,8 +36,8 @@ def setpoint_demand(
     """Return the demand of an offboard setpoint for the next ``dt`` s.
 
     Args:
-        setpoint: its yaw rate turns the yaw, unless it has a yaw.
-        q: present attitude, for a setpoint along the heading.
+        setpoint: the setpoint. If it has no yaw, its yaw rate changes ``yaw``.
+        q: present attitude, for a setpoint relative to the heading (``in_body_heading``).
         yaw: yaw of the demand before this one, rad.
         speeds: limits of the speed: horizontal, up, down, m/s.
         dt: the period, s.
@@ -64,10 +64,10 @@ class PositionOutput(NamedTuple):
 class PositionGains(NamedTuple):
     """Gains and limits; thrusts are normalised, 0..1."""
 
-    horizontal: float  # velocity per position error, 1/s
-    vertical: float
-    horizontal_speed: float  # acceleration per velocity error, 1/s
-    vertical_speed: float
+    horizontal_position: float  # velocity per position error, 1/s
+    vertical_position: float
+    horizontal_velocity: float  # acceleration per velocity error, 1/s
+    vertical_velocity: float
     horizontal_integral: float  # acceleration per velocity error and second, 1/s^2
     vertical_integral: float
     max_tilt: float  # rad
@@ -112,8 +112,8 @@ class PositionController:
         velocity: Vector,
         dt: float,
     ) -> Vector:
-        xy = (gains.horizontal_speed, gains.horizontal_integral)
-        z = (gains.vertical_speed, gains.vertical_integral)
+        xy = (gains.horizontal_velocity, gains.horizontal_integral)
+        z = (gains.vertical_velocity, gains.vertical_integral)
         result = []
         for axis, (proportional, integral) in enumerate((xy, xy, z)):
             feed_forward = demand.acceleration[axis]
@@ -130,7 +130,7 @@ class PositionController:
 
 def _velocity_setpoint(gains: PositionGains, demand: PositionDemand, position: Vector) -> Vector:
     """Return the velocity setpoint, NED; NaN = none."""
-    factors = (gains.horizontal, gains.horizontal, gains.vertical)
+    factors = (gains.horizontal_position, gains.horizontal_position, gains.vertical_position)
     velocity_setpoint = []
     for axis in range(3):
         error = demand.position[axis] - position[axis]
@@ -143,10 +143,10 @@ def _velocity_setpoint(gains: PositionGains, demand: PositionDemand, position: V
             )
     north, east, down = velocity_setpoint
     speed = hypot(north, east)
-    if speed > demand.speed:
-        north, east = north * demand.speed / speed, east * demand.speed / speed
+    if speed > demand.max_speed:
+        north, east = north * demand.max_speed / speed, east * demand.max_speed / speed
     if not isnan(down):
-        down = max(-demand.up_speed, min(demand.down_speed, down))
+        down = max(-demand.max_up_speed, min(demand.max_down_speed, down))
     return (north, east, down)
 
 

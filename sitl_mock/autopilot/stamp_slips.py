@@ -5,11 +5,11 @@ from random import Random
 
 
 class StampSlips:
-    """A time stamp that slips by 1 ms at random times, alternately back and forth.
+    """How far a time stamp is behind the true time: 0 or 1 ms, which changes at random times.
 
     Args:
-        rate_hz: slips per second, on average; 0 = none.
-        seed: seed of their times.
+        rate_hz: mean number of changes (slips) per second; 0 = none.
+        seed: seed of the times of the slips.
     """
 
     def __init__(self, rate_hz: float, seed: int) -> None:
@@ -19,7 +19,7 @@ class StampSlips:
         self._next_us = self._next_slip_us(0.0)
 
     def at(self, now_us: int) -> int:
-        """Return how far the stamp is behind now, 0 or 1 ms. Call it with increasing times."""
+        """Return how far the stamp is behind `now_us`, 0 or 1 ms. Times must not decrease."""
         if now_us >= self._next_us:
             self._slipped = not self._slipped
             self._next_us = self._next_slip_us(now_us)

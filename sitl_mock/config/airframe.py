@@ -42,8 +42,8 @@ class AirframeConfig(Section):
     axis_drag_n_s2_per_m2: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
     """Quadratic drag along body x, y, z, as of a bluff body: N per (m/s)^2 of that component."""
     momentum_drag_n_s_per_m: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
-    """Linear drag along body x, y, z of the air that the rotors accelerate, at hover thrust: force
-    in N per m/s. It grows with the square root of the thrust.
+    """Momentum drag of the rotors along body x, y, z, at hover thrust: force in N per m/s of
+    airspeed. It grows with the square root of the thrust.
     """
     rotational_drag_n_m_s: NonNegative = 0.025
     """Aerodynamic damping torque in N m per rad/s, equal about all axes."""

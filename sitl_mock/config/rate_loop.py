@@ -14,8 +14,8 @@ class AxisShaping(Section):
     acceleration_limit_rad_s2: Positive
     """Limit on the change of the shaped rate."""
     attitude_gain_1_s: NonNegative = 4.5
-    """Body rate per angle between attitude and attitude target, for small angles. Larger angles
-    close at the rate that half the acceleration limit can stop."""
+    """Body rate per angle between attitude and attitude target, for small angles. For larger ones
+    the rate is that which half the acceleration limit brings to zero at the target."""
     delay_ms: NonNegative = 0.0
     """Delay from the arrival of a rate setpoint to its shaping."""
 

@@ -12,8 +12,8 @@ Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
-_MOST_WORDS_LISTED = 20
-"""Largest number of known words that a message lists."""
+_MOST_NAMES_LISTED = 20
+"""Largest number of known names that a message lists."""
 _NUMBER_AND_UNIT = re.compile(r"([-+]?[0-9]+(?:[.,][0-9]+)?)\s*(\D*)")
 
 
@@ -23,22 +23,22 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-def preset(words: Mapping[str, object], value: object, what: str) -> object:
-    """Return the preset that a word names; return any other value unchanged.
+def preset(presets: Mapping[str, object], value: object, plural: str) -> object:
+    """Return the preset that a text names; return any other value unchanged.
 
     Args:
-        words: preset by word.
-        value: from the configuration.
-        what: the presets in the plural, for the message.
+        presets: preset by name.
+        value: value of the key in the configuration.
+        plural: what the presets are, for the message, such as "airframes".
 
     Raises:
         ValueError: no preset has this name.
     """
     if not isinstance(value, str):
         return value
-    if value not in words:
-        raise ValueError(f"known {what} are {', '.join(words)}")
-    return words[value]
+    if value not in presets:
+        raise ValueError(f"known {plural} are {', '.join(presets)}")
+    return presets[value]
 
 
 class ConfigError(Exception):
@@ -46,19 +46,19 @@ class ConfigError(Exception):
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:
-    """Return ``; did you mean ...?`` with the nearest known word.
+    """Return ``; did you mean ...?`` with the known name that is most like ``word``.
 
-    If none is near: ``; known are ...`` with all words, or nothing if they are more than 20.
+    If none is like it: ``; known are ...`` with all names, or nothing if they are more than 20.
     """
     names = list(known)
     near = _nearest(word, names)
     if near:
         return f"; did you mean {near}?"
-    return f"; known are {', '.join(sorted(names))}" if len(names) <= _MOST_WORDS_LISTED else ""
+    return f"; known are {', '.join(sorted(names))}" if len(names) <= _MOST_NAMES_LISTED else ""
 
 
 def _nearest(word: str, names: list[str]) -> str | None:
-    """Return the name that is most like a mistyped word; None if none is near."""
+    """Return the name that is most like a mistyped word; None if none is similar enough."""
     near = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
     return near[0] if near else None
 
@@ -89,15 +89,14 @@ def explain(error: ValidationError, model: type[BaseModel]) -> str:
 
 
 def wrong_member(detail: Any, annotation: Any) -> str:
-    """Return the message about a wrong member of a union whose members have a ``kind``.
+    """Return the message about a value, as of `faults`, that is no mapping or has no known kind.
 
     Args:
         detail: error reported by pydantic.
-        annotation: the union, or a section that has it in a key.
+        annotation: the union of the kinds of faults, or a section that has it in a key.
 
     Returns:
-        The message without the path of the member, which goes before it; empty if the error is
-        another one.
+        The message to put after the path of the fault; empty if the error is another one.
     """
     if detail["type"] == "model_attributes_type":
         return f" must be a mapping of keys to values (got {detail['input']!r:.60})"
@@ -116,7 +115,7 @@ def wrong_member(detail: Any, annotation: Any) -> str:
 
 
 def error_path(error: ValidationError) -> list[str]:
-    """Return the keys that lead to the first error, the section ``mock`` before them."""
+    """Return the keys that lead to the first error, beginning with the section ``mock``."""
     return ["mock", *(str(part) for part in error.errors()[0]["loc"])]
 
 

@@ -20,16 +20,16 @@ class EkfConfig(Section):
     fix_period_ms: Annotated[float, Field(ge=20.0, le=1000.0)] = 125.0
     """Time between two satellite fixes."""
     fix_delay_ms: Annotated[float, Field(ge=0.0, le=500.0)] = 110.0
-    """Delay of the filter's fusion time; a value below ``position_delay_ms`` counts as that."""
+    """Delay of the filter's fusion time against now; it is at least ``position_delay_ms``."""
     position_late_ms: Finite = 0.0
-    """Unmodelled delay of a fix's position."""
+    """Mean delay of a fix's position beyond the fusion time, which the filter does not know."""
     velocity_late_ms: Finite = 0.0
-    """Unmodelled delay of a fix's velocity."""
+    """The same for a fix's velocity."""
     fix_slip_ms: NonNegative = 0.0
-    """Range over which the unmodelled delay of a fix slips about its mean: it falls steadily, and
-    then jumps back. The moment of the first jump is random."""
+    """Peak-to-peak amplitude of a sawtooth in both delays: they fall steadily, and then jump back.
+    The moment of the first jump is random."""
     fix_slip_time_s: Positive = 14.0
-    """Time between two such jumps."""
+    """Period of the sawtooth."""
     position_noise_m: NonNegative = 0.0246
     """Standard deviation of the noise of a fix's horizontal position, on each axis."""
     velocity_noise_m_s: NonNegative = 0.0238
@@ -40,14 +40,14 @@ class EkfConfig(Section):
     """Standard deviation of the random walk of roll and pitch in 1 s; the fixes limit it."""
     tilt_bias_deg: tuple[Finite, Finite] = (0.0, 0.0)
     """Constant error of the attitude, as a rotation about north and east. The estimated bias of the
-    accelerometer hides it in level flight; a horizontal acceleration makes the climb wrong."""
+    accelerometer hides it in level flight; a horizontal acceleration causes a climb rate error."""
     yaw_error_deg: NonNegative = 0.3
     """Error of the heading; it rotates the integrated acceleration."""
     yaw_time_s: Positive = 15.0
     """Correlation time of the heading error."""
     turn_yaw_ms: Finite = -4.0
-    """Heading error in a turn, from delayed fixes: minus this times the turn rate of the course.
-    The heading follows it within seconds, the sooner the more the vehicle accelerates."""
+    """Heading error in a turn, from delayed fixes, as minus this times the turn rate of the course.
+    The heading takes seconds to reach this error, fewer at a larger acceleration."""
     compass_error_deg: Finite = 0.0
     """Heading error that the compass causes without acceleration; an acceleration reduces it."""
     yaw_rate_bias_deg_s: Finite = 0.0
@@ -141,14 +141,14 @@ class SensorConfig(Section):
     attitude_delay_ms: NonNegative = 0.0
     """Age of the estimated attitude and specific force."""
     rate_lag_ms: NonNegative = 5.0
-    """By how much the estimated body rates are older than the attitude: the delay of the gyro's
-    low pass. The default is PX4's; ArduPilot's is 11."""
+    """Age of the estimated body rates beyond that of the attitude: the delay of the gyro's low
+    pass. The default is PX4's; ArduPilot's is 11."""
     position_delay_ms: NonNegative = 10.0
     """Age of the estimated position and velocity."""
     stamp_slips_hz: Annotated[float, Field(ge=0.0, le=20.0)] = 0.0
-    """How often the stamp of LOCAL_POSITION_NED slips by 1 ms against its position, back or forth:
-    ArduPilot takes the time, in whole milliseconds, when it writes the message. Its default is
-    1.6."""
+    """How often per second the time stamp of LOCAL_POSITION_NED slips by 1 ms against its position,
+    back or forth. ArduPilot takes the time, in whole ms, when it writes the message; its default
+    is 1.6."""
 
     @field_validator("ekf", mode="before")
     @classmethod

@@ -8,7 +8,7 @@ from sitl_mock.config.faults import LinkFault
 
 
 class DatagramPipe:
-    """One direction of a link.
+    """Applies link faults to the datagrams of one direction of the companion link.
 
     Args:
         direction: ``to_companion`` or ``from_companion``.

@@ -193,7 +193,7 @@ class CompiledPlant:
             count,
         )
 
-    def before(self, steps: int) -> TruthRow:
+    def row_before(self, steps: int) -> TruthRow:
         """Row of the history `steps` steps ago."""
         row: TruthRow = tuple(self._history[(self._steps - steps) % len(self._history)].tolist())
         return row

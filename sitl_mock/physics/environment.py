@@ -9,7 +9,7 @@ from sitl_mock.physics.quaternion import Quaternion, Vector, normalise
 
 
 class Wind:
-    """Wind with gusts. `velocity` is that of the air (NED, m/s); a `step` advances it by `dt` s."""
+    """Wind with gusts. `velocity` is the air's (NED, m/s); each `step` advances time by `dt` s."""
 
     def __init__(self, config: WindConfig, dt: float, seed: int) -> None:
         direction = radians(config.from_deg)

@@ -33,7 +33,7 @@ class Multirotor:
 
     Attributes:
         law: constants.
-        body: motion after the latest step; `at_rest` makes one at rest.
+        body: motion after the latest step. To stop the vehicle, assign `at_rest(q)`.
         actuation: state of controller and rotors after the latest step.
     """
 

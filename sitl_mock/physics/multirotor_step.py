@@ -199,7 +199,7 @@ def _allocate(law: MultirotorLaw, axes: Axes, throttle: float) -> Mix:
 
 
 def _load(law: MultirotorLaw, wrench: Four, wind: Vector) -> Load:
-    """Return the load on the body: by the rotors and by the wind."""
+    """Return the load on the body from thrust (N) and torques x, y, z (N m), with the wind."""
     thrust, torque_x, torque_y, torque_z = wrench
     wind_n, wind_e, wind_d = wind
     return thrust / law.mass, torque_x, torque_y, torque_z, wind_n, wind_e, wind_d
@@ -218,6 +218,6 @@ def move(law: MultirotorLaw, body: Kinematics, load: Load) -> tuple[Kinematics, 
 
 
 def sinks(law: MultirotorLaw, body: Kinematics, load: Load) -> bool:
-    """Whether the vertical acceleration under this load is not upward."""
+    """Whether the body does not accelerate upward under this load."""
     vn, ve, vd, w, x, y, z, p, q, r = body[0]
     return derivative(vn, ve, vd, w, x, y, z, p, q, r, load, law.body)[2] >= 0.0

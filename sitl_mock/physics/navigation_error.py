@@ -15,7 +15,7 @@ TruthRow = tuple[*Motion, *Vector, *Vector]
 """The true motion after a step: 0 to 9 `Motion`, 10 to 12 position (NED, m), 13 to 15 mean
 acceleration (NED, m/s^2)."""
 TruthHistory = list[TruthRow]
-"""The rows of the latest steps in a ring buffer; an array if the steps are compiled."""
+"""Rows of the latest steps in a ring buffer; an array if the steps are compiled."""
 
 
 class ErrorVectors(NamedTuple):
@@ -26,8 +26,8 @@ class ErrorVectors(NamedTuple):
     rotation: Vector
 
 
-class TrackState(NamedTuple):
-    """Errors after a fix, horizontal or vertical."""
+class ErrorState(NamedTuple):
+    """Either the horizontal or the vertical errors after a fix."""
 
     errors: Errors
     pending: tuple[complex, complex]
@@ -39,8 +39,8 @@ class TrackState(NamedTuple):
 class FilterState(NamedTuple):
     """All errors after a fix, and the true motion at its fusion time."""
 
-    horizontal: TrackState
-    vertical: TrackState
+    horizontal: ErrorState
+    vertical: ErrorState
     yaw: float  # heading error, rad
     yaw_pending: float  # part of `yaw` that the output does not yet contain, rad
     noiseless_yaw: float  # heading error without its noise, rad

@@ -12,8 +12,8 @@ from sitl_mock.config.sensors import EkfConfig
 from sitl_mock.physics.navigation_error import (
     ErrorLaw,
     Errors,
+    ErrorState,
     FilterState,
-    TrackState,
     TruthRow,
     pending_share,
     propagated_horizontal,
@@ -75,15 +75,15 @@ class NavigationFilter:
             horizontal, vertical, yaw, 0.0, 0.0, noise, 0.0, noise, 0.0, 0.0, place, speed
         )
 
-    def _initial(self, ratio: float) -> TrackState:
-        """Return the state after the first fix, whose noise (times `ratio`) becomes the error."""
+    def _initial(self, ratio: float) -> ErrorState:
+        """Return the errors after the first fix: its noise, scaled by `ratio`."""
         config, gauss = self._config, self._random.gauss
         sigma_p, sigma_v = ratio * config.position_noise_m, ratio * config.velocity_noise_m_s
         noise = (
             complex(gauss(0.0, sigma_p), gauss(0.0, sigma_p)),
             complex(gauss(0.0, sigma_v), gauss(0.0, sigma_v)),
         )
-        return TrackState((*noise, 0j), (0j, 0j), noise)
+        return ErrorState((*noise, 0j), (0j, 0j), noise)
 
     def is_due(self, at: float) -> bool:
         """Whether a fix is due at a fusion time, s."""
@@ -215,7 +215,7 @@ class NavigationFilter:
         fix_errors: tuple[complex, complex],
         noise: tuple[complex, complex],
         tilt_noise: float,
-    ) -> TrackState:
+    ) -> ErrorState:
         """Return the errors corrected by a fix whose own errors are `fix_errors`.
 
         A random tilt error is added; `tilt_noise` is its standard deviation, m/s^2 of acceleration.
@@ -229,20 +229,20 @@ class NavigationFilter:
         gauss = self._random.gauss
         random_walk = complex(gauss(0.0, tilt_noise), gauss(0.0, tilt_noise))
         corrected = position + to_position, velocity + to_velocity, tilt + to_tilt + random_walk
-        return TrackState(corrected, (0j, 0j), noise)
+        return ErrorState(corrected, (0j, 0j), noise)
 
 
 def _with_pending(
-    before: TrackState, corrected: TrackState, old: Errors, new: Errors, share: float
-) -> TrackState:
-    """Return the corrected track with pending corrections that keep its output continuous.
+    before: ErrorState, corrected: ErrorState, old: Errors, new: Errors, share: float
+) -> ErrorState:
+    """Return the corrected errors with pending corrections that keep the output continuous.
 
     Args:
-        before: the track before the fix.
-        corrected: the track after it.
-        old: present errors by the track before the fix.
-        new: present errors by the track after it.
-        share: share of the corrections of `before` that its output does not contain.
+        before: the errors before the fix.
+        corrected: the errors after the fix.
+        old: `before`, propagated from its own fix to the present.
+        new: `corrected`, propagated from its fix to the present.
+        share: share of the pending corrections of `before` that the output does not yet contain.
     """
     position, velocity = before.pending
     return corrected._replace(

@@ -11,9 +11,9 @@ from sitl_mock.config.rate_loop import AxisShaping
 from sitl_mock.physics.quaternion import Quaternion, Vector, multiply, normalise, to_body
 from sitl_mock.physics.rate_loop import Delays, delay_steps
 
-Closing = tuple[float, float]
-"""How an axis closes an angle, as `sqrt_controller` takes it: body rate per angle, 1/s, and limit
-of the deceleration, rad/s^2."""
+SqrtGains = tuple[float, float]
+"""Arguments of `sqrt_controller` for one axis: body rate per small angle, 1/s; limit of the
+deceleration, rad/s^2."""
 
 
 class Shaped(NamedTuple):
@@ -32,7 +32,7 @@ NOT_SHAPED = Shaped(False, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
 
 
 def slew(goal: float, rate: float, limit: float) -> float:
-    """Return the rate changed towards its goal by at most `limit`.
+    """Return the rate after it has changed towards its goal by at most `limit`, all in rad/s.
 
     A NaN goal holds the rate. With an infinite goal the rate grows without limit, as measured on
     ArduPilot.
@@ -58,12 +58,13 @@ def rotation_vector(q: Quaternion) -> Vector:
 
 
 def sqrt_controller(angle: float, gain: float, acceleration: float) -> float:
-    """Return the rate that closes an angle, as ArduPilot's sqrt_controller does.
+    """Return the rate that reduces an angle to zero, rad/s, as ArduPilot's sqrt_controller does.
 
-    Small angles: proportional. Larger ones: the rate from which `acceleration` stops in time.
+    For small angles it is proportional to the angle. For larger ones it is the rate that
+    `acceleration` brings to zero together with the angle.
 
     Args:
-        angle: angle to close, rad.
+        angle: angle to reduce, rad.
         gain: rate per small angle, 1/s.
         acceleration: limit of the deceleration, rad/s^2.
     """
@@ -78,8 +79,8 @@ class ShapingLaw(NamedTuple):
 
     max_change: Vector
     """Largest change of each rate in one step, rad/s."""
-    closing: tuple[Closing, Closing, Closing]
-    """How roll, pitch and yaw close an angle."""
+    sqrt_gains: tuple[SqrtGains, SqrtGains, SqrtGains]
+    """Gains of roll, pitch and yaw from attitude error to body rate."""
     delays: Delays
     dt: float  # step, s
 
@@ -134,7 +135,7 @@ def shape(law: ShapingLaw, shaped: Shaped, goals: Vector, q: Quaternion) -> tupl
     body_in_target = multiply((w, -x, -y, -z), q)  # attitude of the body in the frame of the target
     turn_x, turn_y, turn_z = rotation_vector(body_in_target)
     roll, pitch, yaw = to_body(body_in_target, rates)
-    for_roll, for_pitch, for_yaw = law.closing
+    for_roll, for_pitch, for_yaw = law.sqrt_gains
     setpoint = (
         roll - sqrt_controller(turn_x, for_roll[0], for_roll[1]),
         pitch - sqrt_controller(turn_y, for_pitch[0], for_pitch[1]),

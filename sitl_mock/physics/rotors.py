@@ -10,6 +10,7 @@ from typing import NamedTuple
 from sitl_mock.config.airframe import AirframeConfig
 
 Four = tuple[float, float, float, float]
+"""One number for each rotor, or thrust and torques about body x, y, z."""
 
 
 class Mix(NamedTuple):
@@ -31,9 +32,9 @@ def mix(throttle: float, roll: float, pitch: float, yaw: float) -> Mix:
 
     Args:
         throttle: collective, not negative; values above 1 mean 1.
-        roll: throttle difference about body x.
-        pitch: throttle difference about body y.
-        yaw: throttle difference about body z.
+        roll: part of each rotor's throttle that gives the torque about body x.
+        pitch: the same for body y.
+        yaw: the same for body z.
     """
     demand = abs(roll) + abs(pitch)
     room = throttle if throttle < 0.5 else 0.5

@@ -8,9 +8,9 @@ from typing import NamedTuple
 from sitl_mock.config.sensors import SensorConfig
 from sitl_mock.physics.navigation_error import (
     ErrorLaw,
+    ErrorState,
     ErrorVectors,
     FilterState,
-    TrackState,
     TruthHistory,
     TruthRow,
     error_at,
@@ -27,8 +27,10 @@ from sitl_mock.physics.quaternion import (
 )
 
 NO_ERRORS = ErrorVectors((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-_NO_TRACK = TrackState((0j, 0j, 0j), (0j, 0j), (0j, 0j))
-_NO_FILTER = FilterState(_NO_TRACK, _NO_TRACK, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0j, 0j)
+_NO_ERROR_STATE = ErrorState((0j, 0j, 0j), (0j, 0j), (0j, 0j))
+_NO_FILTER = FilterState(
+    _NO_ERROR_STATE, _NO_ERROR_STATE, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0j, 0j
+)
 _ESTIMATES_PER_DRAW = 16
 """Number of estimates for which noise is drawn at a time; even, as normal numbers come in pairs."""
 
@@ -45,7 +47,7 @@ class Estimate(NamedTuple):
 
 
 class SensorLaw(NamedTuple):
-    """Constants of the simulated estimator: its delays, errors and noise."""
+    """Constants of the simulated estimator: its delays and errors, without the white noise."""
 
     gravity: float  # m/s^2
     attitude_delay: int  # steps
@@ -131,7 +133,7 @@ def estimate(
 
 
 class Estimator:
-    """Holds the state of the estimator; one seeded generator draws its white noise.
+    """The state of the simulated estimator, and the seeded generator of its white noise.
 
     Only `draw` uses the generator, so the white noise depends on the seed and the number of calls.
     The noise of the navigation filter depends on the seed and the time.
@@ -139,7 +141,7 @@ class Estimator:
     Args:
         config: noise, delays and filter.
         start: the true motion at time 0.
-        gravity: m/s^2.
+        gravity: acceleration of gravity, m/s^2.
         dt: length of a step, s.
         seed: seed of all noise.
         make_noise: like `white_noise`, but it may return the numbers in another container.
@@ -199,7 +201,7 @@ class Estimator:
         self.reset_counter = 0
 
     def shift(self, *, yaw: float = 0.0, position_ned: Vector = (0.0, 0.0, 0.0)) -> None:
-        """Reset the estimator: the estimate jumps by this yaw (rad) and position (m)."""
+        """Reset the estimator: the estimate jumps by this yaw (rad) and position (NED, m)."""
         n, e, d = self.state.offset
         self.state = self.state._replace(
             yaw=multiply(from_yaw(yaw), self.state.yaw),

@@ -153,7 +153,7 @@ class Vehicle:
     def estimate(self) -> Estimate:
         """Return the autopilot's estimate now; every call draws fresh noise."""
         estimator, time = self.estimator, self.time
-        estimator.correct(time, self.plant.before)
+        estimator.correct(time, self.plant.row_before)
         estimate, estimator.rotation = self.plant.estimate(
             estimator.law, estimator.state, time, estimator.draw()
         )

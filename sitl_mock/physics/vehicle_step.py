@@ -60,7 +60,7 @@ class VehicleLaw(NamedTuple):
 
 
 def truth_row(body: Kinematics, position: Vector) -> TruthRow:
-    """Return the data of a step that the estimator needs."""
+    """Return the row of the history after a step: see `TruthRow`."""
     motion, acceleration, _ = body
     return motion + position + acceleration
 
@@ -141,7 +141,7 @@ def _move_or_rest(
 
 
 Outcome = tuple[bool, bool, float]
-"""Result of all steps: on the ground, crashed, total thrust of the rotors (N)."""
+"""After the last step: on the ground, crashed, total thrust of the rotors (N)."""
 
 
 def outcome(state: VehicleState) -> Outcome:
@@ -175,7 +175,7 @@ class Plant(Protocol):
         """Advance by `count` steps under one command."""
         ...
 
-    def before(self, steps: int) -> TruthRow:
+    def row_before(self, steps: int) -> TruthRow:
         """Row of the history `steps` steps ago."""
         ...
 
@@ -207,7 +207,7 @@ class PythonPlant:
         )
         return outcome(self.state)
 
-    def before(self, steps: int) -> TruthRow:
+    def row_before(self, steps: int) -> TruthRow:
         """Row of the history `steps` steps ago."""
         return self._history[(self.state.steps - steps) % len(self._history)]
 

@@ -49,7 +49,7 @@ class ArmingChecks:
         return self._stream.alive(self._state.time_us, self._parameters["COM_OF_LOSS_T"])
 
     def find_problem(self, *, gcs_alive: bool, pilot: bool, refusal: str | None) -> str | None:
-        """Store in the state why arming is refused now (None if it is not), and return that.
+        """Store in the state why arming is refused now, None if it is allowed; return the same.
 
         Args:
             gcs_alive: whether a ground station is connected.

@@ -129,7 +129,7 @@ class Px4Commander:
         self.request_mode(mode)
 
     def receive_heartbeat(self, heartbeat: Message) -> None:
-        """Record a heartbeat, whose MAV_TYPE is that of a ground station or of a companion."""
+        """Record a heartbeat, by whose MAV_TYPE a ground station or a companion is present."""
         self.failsafe.receive_heartbeat(heartbeat.type)
 
     def manual_control(self, message: Message, _: Link) -> None:

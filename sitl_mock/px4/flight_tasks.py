@@ -94,9 +94,9 @@ class FlightTasks:
             self._hold,
             NAN_VECTOR,
             yaw=self.yaw,
-            speed=parameters["MPC_XY_CRUISE"],
-            up_speed=parameters["MPC_Z_V_AUTO_UP"],
-            down_speed=parameters["MPC_Z_V_AUTO_DN"],
+            max_speed=parameters["MPC_XY_CRUISE"],
+            max_up_speed=parameters["MPC_Z_V_AUTO_UP"],
+            max_down_speed=parameters["MPC_Z_V_AUTO_DN"],
         )
 
     def _takeoff(self) -> PositionDemand:
@@ -105,7 +105,7 @@ class FlightTasks:
         x, y, _ = self._hold
         if not state.contact:
             target = (x, y, self._takeoff_z)
-            return PositionDemand(target, NAN_VECTOR, yaw=self.yaw, up_speed=speed)
+            return PositionDemand(target, NAN_VECTOR, yaw=self.yaw, max_up_speed=speed)
         # On the ground the climb rate ramps up from the value at which the thrust is zero.
         ramp_begin_us = max(
             self._entered_us, state.armed_at_us + parameters["COM_SPOOLUP_TIME"] * 1e6
@@ -114,7 +114,7 @@ class FlightTasks:
         lowest = -GRAVITY / parameters["MPC_Z_VEL_P_ACC"]
         climb = lowest + (speed - lowest) * max(0.0, min(1.0, ramp))
         return PositionDemand(
-            NAN_VECTOR, (nan, nan, -climb), LEVEL_DEMAND_ACCELERATION, self.yaw, down_speed=3.0
+            NAN_VECTOR, (nan, nan, -climb), LEVEL_DEMAND_ACCELERATION, self.yaw, max_down_speed=3.0
         )
 
     def _land(self) -> PositionDemand:
@@ -122,7 +122,7 @@ class FlightTasks:
         velocity = (nan, nan, self._descent_speed())
         if not self._state.position_valid:
             return PositionDemand(NAN_VECTOR, velocity, LEVEL_DEMAND_ACCELERATION, self.yaw)
-        return PositionDemand((x, y, nan), velocity, yaw=self.yaw, down_speed=10.0)
+        return PositionDemand((x, y, nan), velocity, yaw=self.yaw, max_down_speed=10.0)
 
     def _descent_speed(self) -> float:
         parameters = self._parameters
@@ -169,8 +169,8 @@ class FlightTasks:
             self._hold,
             NAN_VECTOR,
             yaw=self.yaw,
-            speed=parameters["MPC_XY_CRUISE"],
-            up_speed=parameters["MPC_Z_V_AUTO_UP"],
+            max_speed=parameters["MPC_XY_CRUISE"],
+            max_up_speed=parameters["MPC_Z_V_AUTO_UP"],
         )
 
     def offboard_demand(self, setpoint: PositionSetpoint, dt: float) -> PositionDemand:

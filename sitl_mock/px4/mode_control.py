@@ -20,7 +20,7 @@ ATTITUDE_FAILS_US = 140_000
 """Unusable quaternions, such as NaN, for longer than this, us, make PX4's attitude control fail
 until a restart."""
 TOUCHDOWN_THRUST_RATE = 0.4
-"""After contact in LAND the thrust decreases by this per second."""
+"""After contact in LAND the normalised thrust decreases by this per second."""
 DISARMED_ACCELERATION: Vector = (0.0, 0.0, 100.0)
 """Acceleration setpoint of PX4's own modes while disarmed, m/s^2 (recorded)."""
 _STILL = ActuatorCommand(False, 0.0, 0.0, 0.0, 0.0)
