@@ -172,6 +172,6 @@ def test_json_of_a_flight_that_measured_nothing_is_null_not_nan():
 
 
 def test_every_key_is_explained_in_the_documentation():
-    page = (Path(__file__).parents[2] / "docs/getting-started.md").read_text("utf-8")
+    page = (Path(__file__).parents[2] / "docs/recordings.md").read_text("utf-8")
     for key in summary(FlightTrace()).as_dict():
         assert f"`{key}`" in page, key
