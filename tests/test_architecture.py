@@ -2,6 +2,7 @@
 
 import ast
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -22,10 +23,20 @@ def test_the_function_is_in_the_file(path, function):
     assert re.search(rf"def {function}\(", (ROOT / path).read_text())
 
 
-def test_every_room_is_on_the_map():
-    rooms = {path.parent.name for path in (ROOT / "companion").glob("*/__init__.py")}
-    assert {room for room in rooms if f"`companion/{room}/`" not in PAGE} <= {"mavsdk_link"}
+def test_every_package_is_on_the_map():
+    packages = {path.parent.name for path in (ROOT / "companion").glob("*/__init__.py")}
+    assert {package for package in packages if f"`companion/{package}/`" not in PAGE} == set()
     assert len(FUNCTIONS) > 8
+
+
+def test_the_map_is_in_the_order_of_the_imports():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    contracts = project["tool"]["importlinter"]["contracts"]
+    layers = next(one for one in contracts if one["name"] == "Imports point one way")["layers"]
+    layer = {name: k for k, names in enumerate(layers) for name in re.findall(r"\.(\w+)", names)}
+    shown = [layer[name] for name in re.findall(r"^\| `companion/(\w+)/`", PAGE, re.MULTILINE)]
+    assert len(shown) > 20
+    assert shown == sorted(shown)
 
 
 MOST_LINES_OF_A_FILE, MOST_LINES_OF_A_FUNCTION = 250, 50
