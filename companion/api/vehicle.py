@@ -26,7 +26,7 @@ from companion.flight.phases import (
 )
 from companion.guidance import Maneuver, ManeuverSequence, Pose
 from companion.guidance.finite import finite_number, finite_vector
-from companion.guidance.follow import Follow, HeldFigure, hover
+from companion.guidance.follow import Follow, HeldHeadingManeuver, hover
 from companion.guidance.reference import Vector, minus
 from companion.guidance.source import CommandedSource
 from companion.guidance.trajectory import Hover, Trajectory, line, require_trajectory
@@ -136,7 +136,7 @@ class Vehicle:
         if hypot(*to) < SMALLEST_DISTANCE:
             await self.follow(Hover(0.0, heading=facing))
         elif facing is None:
-            await self._fly(HeldFigure(line(to, speed, acceleration, jerk)))
+            await self._fly(HeldHeadingManeuver(line(to, speed, acceleration, jerk)))
         else:
             path = line(to, speed, acceleration, jerk)
             await self.follow(replace(path, heading=FixedHeading(facing)))

@@ -33,7 +33,8 @@ class HoverLearning:
     @property
     def thrust_limits(self) -> tuple[float, float]:
         """Smallest and largest available specific thrust, as far as known, m/s²."""
-        return self._hover_thrust.smallest_specific, self._hover_thrust.largest_specific
+        hover_thrust = self._hover_thrust
+        return hover_thrust.smallest_specific_thrust, hover_thrust.largest_specific_thrust
 
     @property
     def hover(self) -> float:
@@ -47,7 +48,7 @@ class HoverLearning:
 
     def largest_tilt(self, acceleration_down: float = 0.0) -> float:
         """Largest tilt at which 95 % of full thrust still give `acceleration_down` (m/s²), rad."""
-        return largest_tilt(GRAVITY - acceleration_down, self._hover_thrust.largest_specific_tilted)
+        return largest_tilt(GRAVITY - acceleration_down, self._hover_thrust.largest_tilted_thrust)
 
     def limit_tilt(self, target: Target, acceleration_down: float) -> Target:
         """The target with its tilt limited to `largest_tilt`."""

@@ -66,7 +66,7 @@ class FenceCheck:
         ]
         if not breaches:
             return None
-        time, breach = max(breaches, key=lambda each: each[1].by)
+        time, breach = max(breaches, key=lambda each: each[1].distance_outside)
         return float(time), breach
 
     def _candidate_indices(self, stops: Floats) -> list[int]:
@@ -100,9 +100,9 @@ class FenceCheck:
 
 
 def _breach_text(breach: Breach, time: float, slowing_helps: bool) -> str:
-    if breach.by > 0.0:
+    if breach.distance_outside > 0.0:
         what_happens = "braking would end" if slowing_helps else "it goes"
-        what_happens = f"{what_happens} up to {breach.by:.1f} m outside the fence"
+        what_happens = f"{what_happens} up to {breach.distance_outside:.1f} m outside the fence"
     else:
         what_happens = (
             "it would stop too near to the fence"

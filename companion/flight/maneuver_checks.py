@@ -17,7 +17,7 @@ from companion.files.yaml_file import ConfigError
 from companion.flight.fence_check import FenceCheck
 from companion.guidance import GRAVITY, Doublets, Maneuver, ManeuverSequence
 from companion.guidance.fence import Place
-from companion.guidance.follow import Follow, HeldFigure
+from companion.guidance.follow import Follow, HeldHeadingManeuver
 from companion.guidance.predicted import predict
 from companion.guidance.reference import Vector
 from companion.guidance.trajectory import (
@@ -47,7 +47,7 @@ def require_flyable(config: Config, part: Maneuver, drag: KnownDrag) -> None:
     with naming_trajectory_errors(part.name):
         motions = list(_predicted_motions(part, drag.least))
         _require_motions_inside(config, part, motions, None)
-    if isinstance(part, HeldFigure):
+    if isinstance(part, HeldHeadingManeuver):
         envelope = replace(envelope_of(config, drag), max_tilt_rate=None, fence=None)
         for broken in judge(motions[0], envelope):
             _refuse_violation(part.name, broken, drag.assumption)
@@ -76,7 +76,7 @@ def require_followable(config: Config, maneuver: Maneuver, begin: Vector, drag: 
 
     Args:
         config: configuration of the flight.
-        maneuver: `Follow` or `HeldFigure`.
+        maneuver: `Follow` or `HeldHeadingManeuver`.
         begin: start of the trajectory relative to where control began, m NED.
         drag: drag of the vehicle.
 
@@ -91,7 +91,7 @@ def require_followable(config: Config, maneuver: Maneuver, begin: Vector, drag: 
     def fence(motion: Motion) -> Violation | None:
         return check(replace(motion, position=motion.position + np.array(begin)))
 
-    if isinstance(maneuver, Follow | HeldFigure):
+    if isinstance(maneuver, Follow | HeldHeadingManeuver):
         with naming_trajectory_errors(maneuver.name):
             broken = violations(maneuver.trajectory, replace(envelope, fence=fence))
         if broken:

@@ -79,7 +79,7 @@ def _doublets(identify: IdentifyConfig) -> Doublets:
         tilt_step=identify.tilt_duration_s,
         yaw_rate=identify.yaw_rate,
         yaw_step=identify.yaw_duration_s,
-        climb=identify.climb_m_s2,
+        climb_acceleration=identify.climb_m_s2,
         climb_step=identify.climb_duration_s,
         settle=identify.settle_s,
     )

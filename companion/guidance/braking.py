@@ -6,22 +6,22 @@ from typing import NamedTuple
 from companion.guidance.reference import Reference, Vector, VehicleMotion
 
 _DECELERATION_SHARE = 0.47
-"""Mean deceleration of a smooth stop as a share of the largest horizontal acceleration. The peak is
-a share of 0.7; the rest is left for wind and feedback."""
+"""Mean deceleration of a smooth stop as a share of the largest horizontal acceleration. Its peak is
+0.7 of that largest acceleration; 0.3 are left for wind and feedback."""
 _LARGEST_JERK = 8.0
 """Largest jerk of a smooth stop, m/s³: the vehicle tilts and levels by less than 50°/s."""
 _REST_SPEED = 0.1
-"""A slower vehicle is at rest, m/s."""
+"""A vehicle slower than this counts as at rest, m/s."""
 _NOTICE_TIME = 0.1
 """Time within which the fence's monitor and guidance notice a breach, s."""
 
 
 class AssumedBraking(NamedTuple):
-    """What the fence's monitor assumes of braking; braking must achieve it.
+    """How the fence's monitor assumes that the vehicle brakes; guidance must stop it no later.
 
     Attributes:
-        reaction: `safety.reaction_s`, s.
-        deceleration: `safety.braking_m_s2`, m/s².
+        reaction: delay before the vehicle brakes, s (`safety.reaction_s`).
+        deceleration: constant deceleration after it, m/s² (`safety.braking_m_s2`).
     """
 
     reaction: float
@@ -29,10 +29,10 @@ class AssumedBraking(NamedTuple):
 
 
 def braking_time(speed: float, acceleration: float, assumed: AssumedBraking) -> float:
-    """Time in which the vehicle brakes from a speed, s; 0 for a vehicle at rest.
+    """Time in which the vehicle brakes from a speed to rest, s; 0 for a vehicle at rest.
 
-    It is as long as a smooth stop needs, but the vehicle stops no further away than the fence's
-    monitor assumes; for that it may brake harder.
+    The vehicle stops smoothly. If it would then stop further away than the fence's monitor assumes,
+    it brakes harder.
 
     Args:
         speed: horizontal speed, m/s.
@@ -50,14 +50,14 @@ def braking_time(speed: float, acceleration: float, assumed: AssumedBraking) -> 
 
 
 class Braking(NamedTuple):
-    """Brakes horizontally and stays where the vehicle stops; the present height is held.
+    """Brakes horizontally and stays where the vehicle stops, at the height where braking began.
 
     A hold of the present position would let a fast vehicle pass it and swing back. The speed falls
     by the share 3u² − 2u³, where u grows from 0 to 1 over the duration, so the deceleration begins
     and ends with 0.
 
     Attributes:
-        begun_at: when the vehicle begins to brake, s.
+        begun_at: when the vehicle begins to brake, s of event-loop time.
         motion: motion of the vehicle at that time.
         heading: the heading to keep, rad.
         duration: duration of braking, s; see `braking_time`.
@@ -70,7 +70,7 @@ class Braking(NamedTuple):
 
     @property
     def ends(self) -> float:
-        """Time at which the vehicle is at rest, s."""
+        """When the vehicle is at rest, s of event-loop time."""
         return self.begun_at + self.duration
 
     @property
@@ -79,7 +79,7 @@ class Braking(NamedTuple):
         return self.at(self.ends).position_ned
 
     def at(self, time: float) -> Reference:
-        """The reference at a time, s."""
+        """The reference at `time`, s of event-loop time."""
         duration = self.duration
         if duration == 0.0:
             return Reference(self.motion.position_ned, heading=self.heading)
@@ -102,7 +102,7 @@ def brake(
     """The braking that begins now.
 
     Args:
-        now: present time, s.
+        now: s of event-loop time.
         motion: motion of the vehicle.
         heading: the heading to keep, rad.
         acceleration: largest horizontal acceleration, m/s².

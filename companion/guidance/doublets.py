@@ -4,12 +4,12 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from companion.attitude import BodyRates
-from companion.guidance.maneuvers import spread
+from companion.guidance.maneuvers import check_times_between
 from companion.guidance.reference import Pose, Reference
 
 _SMALL_SIZE = 0.5
-"""Relative size of the first doublet of an axis; a single size cannot tell a slew limit from
-a lag."""
+"""Size of the first doublet of an axis as a share of its second one. From doublets of one size a
+slew limit could not be told from a lag."""
 _REST_TIME = 0.5
 """Time of zero rates after a doublet of body rates, in which the slowest axis comes to rest, s."""
 _CLIMB_COUNT = 3
@@ -17,21 +17,21 @@ _CLIMB_COUNT = 3
 
 
 class _Doublet(NamedTuple):
-    """One doublet of body rates or of vertical acceleration, times +1, −1, +1 for T, 2T, T.
+    """One doublet +A, −A, +A (lasting T, 2T, T) of body rates or of vertical acceleration.
 
     Attributes:
         step: T, s.
-        body_rates: rad/s; None: a doublet of vertical acceleration.
-        climb: vertical acceleration, m/s², positive up.
+        body_rates: A of a doublet of body rates, rad/s; None: it is one of vertical acceleration.
+        climb_acceleration: A of a doublet of vertical acceleration, m/s², positive up.
     """
 
     step: float
     body_rates: BodyRates | None = None
-    climb: float = 0.0
+    climb_acceleration: float = 0.0
 
     @property
     def duration(self) -> float:
-        """Duration, s; of a doublet of body rates with the pause after it."""
+        """Duration, s; that of a doublet of body rates includes the rest after it."""
         return 4.0 * self.step + (0.0 if self.body_rates is None else _REST_TIME)
 
     def at(self, time: float, hold: Reference) -> Reference:
@@ -52,10 +52,11 @@ class _Doublet(NamedTuple):
             speed = time - 4.0 * step
             height = 0.5 * speed * speed
         north, east, down = hold.position_ned
+        up = self.climb_acceleration
         return hold._replace(
-            position_ned=(north, east, down - self.climb * height),
-            velocity_ned=(0.0, 0.0, -self.climb * speed),
-            acceleration_ned=(0.0, 0.0, -self.climb * self._doublet_sign(time)),
+            position_ned=(north, east, down - up * height),
+            velocity_ned=(0.0, 0.0, -up * speed),
+            acceleration_ned=(0.0, 0.0, -up * self._doublet_sign(time)),
             thrust_steps=True,
         )
 
@@ -70,17 +71,17 @@ class Doublets:
     """Doublets +A, −A, +A (lasting T, 2T, T) of roll, pitch and yaw rate, and of climb.
 
     Each axis is excited with half its rate, then with the full rate. The angle changes by A·T at
-    most and then returns to its value before. Three equal climb doublets follow. Position hold
-    corrects the drift for `settle` seconds before each doublet and at the end. Climbs are flown
-    closed loop: the acceleration of the reference is a doublet.
+    most and then returns to its value before the doublet. Three equal doublets of the vertical
+    acceleration follow. They are flown in closed loop: the reference contains the doublet. Position
+    hold corrects the drift for `settle` seconds before each doublet and at the end.
 
     Attributes:
         tilt_rate: A of roll and pitch, rad/s.
         tilt_step: T of roll and pitch, s.
         yaw_rate: A of yaw, rad/s.
         yaw_step: T of yaw, s; yaw responds more slowly.
-        climb: vertical acceleration, m/s².
-        climb_step: T of the climbs, s.
+        climb_acceleration: A of the vertical acceleration, m/s².
+        climb_step: T of the vertical acceleration, s.
         settle: time of position hold before each doublet and at the end, s.
     """
 
@@ -88,7 +89,7 @@ class Doublets:
     tilt_step: float
     yaw_rate: float
     yaw_step: float
-    climb: float
+    climb_acceleration: float
     climb_step: float
     settle: float
     name: str = "identify"
@@ -99,7 +100,7 @@ class Doublets:
 
     @property
     def duration(self) -> float:
-        """All doublets with their rests, and the position hold before each and at the end, s."""
+        """Duration of all doublets, their rests and the times of position hold, s."""
         return self.settle + sum(part.duration + self.settle for part in self._doublets)
 
     def _parts(self) -> tuple[_Doublet, ...]:
@@ -113,19 +114,20 @@ class Doublets:
             )
             for size in (_SMALL_SIZE, 1.0)
         ]
-        return *rates, *(_CLIMB_COUNT * [_Doublet(self.climb_step, climb=self.climb)])
+        climb = _Doublet(self.climb_step, climb_acceleration=self.climb_acceleration)
+        return *rates, *(_CLIMB_COUNT * [climb])
 
     def check_times(self) -> list[float]:
-        """The beginning, times 0.01 s apart over each doublet and its rest, and the end, s."""
+        """Times to check, s: the beginning, every 0.01 s of doublets and rests, and the end."""
         times, begin = [0.0], 0.0
         for part in self._doublets:
             begin += self.settle
-            times += spread(begin, begin + part.duration)
+            times += check_times_between(begin, begin + part.duration)
             begin += part.duration
         return [*times, self.duration]
 
     def at(self, time: float, start: Pose) -> Reference:
-        """The reference: open-loop rates or a climb in a doublet, position hold between them."""
+        """The reference: body rates or a climb in a doublet, position hold between doublets."""
         hold = Reference(start.position_ned, heading=start.heading)
         for part in self._doublets:
             time -= self.settle

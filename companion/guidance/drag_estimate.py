@@ -17,7 +17,7 @@ _WIND_DEVIATION = 2.0
 _WIND_CHANGE = 0.2
 """Standard deviation of the change of the acceleration by wind in 1 s, m/s²."""
 _CLAMP_DEVIATIONS = 3.0
-"""An innovation is clamped to this many standard deviations, because a bump is no sign of drag."""
+"""An innovation is clamped to this many standard deviations, so that bumps do not count as drag."""
 _LARGEST_LINEAR_INCREASE = 2.0
 """Largest estimated linear drag above that of the prior, 1/s."""
 _LARGEST_QUADRATIC = 0.3
@@ -26,10 +26,11 @@ _AXIS_DRAG_DEVIATION, _LARGEST_AXIS_DRAG = 0.03, 0.1
 """Initial standard deviation of `AxisDrag.coefficient`, which begins at 0, and its largest
 estimate, 1/m."""
 _CERTAIN_DEVIATION = 0.1
-"""The drag counts as known if its standard deviation at the top speed is below this, 1/s."""
+"""The drag is certain if the standard deviation of linear + quadratic·`top_speed` is below this,
+1/s."""
 _GUSTY_INNOVATION = 2.0
-"""Above this mean of innovation²/variance the drag does not count as known: gusts that change
-quicker than the filter assumes also move the vehicle, and the filter takes them for drag."""
+"""Above this mean of innovation²/variance the drag is not certain: gusts that change faster than
+the filter assumes also move the vehicle, and the filter takes them for drag."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +90,7 @@ class DragEstimate:
 
     @property
     def certain(self) -> bool:
-        """Whether the vehicle has moved enough for a certain estimate, in calm enough air."""
+        """Whether the vehicle moved fast enough, in calm enough air, for a reliable estimate."""
         if self._innovation_sum > _GUSTY_INNOVATION * self._measurements:
             return False
         speed, p = self.top_speed, self._covariance
@@ -102,7 +103,7 @@ class DragEstimate:
         """Take a measured acceleration; ignored if a number is not finite or `dt` not positive.
 
         Args:
-            dt: duration over which it was measured, s.
+            dt: duration over which the acceleration was measured, s.
             velocity: mean velocity in this time, m/s, NED.
             residual: measured acceleration less the acceleration by thrust, m/s², NED.
             heading: heading of the vehicle, rad.

@@ -1,4 +1,4 @@
-"""Feedback: linear-quadratic gains for the horizontal chain, and a cascade for the height."""
+"""Feedback: linear-quadratic gains for the horizontal position, and a cascade for the height."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -11,7 +11,9 @@ from companion.guidance.reference import GRAVITY, Reference, VehicleMotion
 
 @dataclass(frozen=True, slots=True)
 class Weights:
-    """Weights of the cost ∫ position·e_p² + velocity·e_v² + u² dt.
+    """Weights of the cost ∫ position·e_p² + velocity·e_v² + u² dt of the horizontal feedback.
+
+    e_p and e_v are the errors of position and velocity; u is the acceleration that feedback adds.
 
     Attributes:
         position: weight of the position error, 1/s⁴.
@@ -36,9 +38,9 @@ class ChainGains:
     """Gains of the feedback u = −(position·e_p + velocity·e_v + acceleration·e_a), u in m/s².
 
     Attributes:
-        position: 1/s².
-        velocity: 1/s.
-        acceleration: without unit.
+        position: gain on the position error e_p, 1/s².
+        velocity: gain on the velocity error e_v, 1/s.
+        acceleration: gain on the acceleration error e_a, without unit.
     """
 
     position: float
@@ -105,9 +107,9 @@ def acceleration_down(
         gains: gains and limits of the height cascade.
         reference: the reference now.
         motion: the present motion.
-        ahead: the reference when the rotors will have followed; for feedforward.
-        drag: drag of the vehicle. Where the height is held, thrust balances it in climb and
-            descent; else the vertical acceleration of the reference is commanded as it is.
+        ahead: the reference one rotor lag later; its acceleration and velocity are fed forward.
+        drag: drag of the vehicle, which thrust balances in climb and descent. If the reference does
+            not hold the height, its vertical acceleration is commanded without drag and feedback.
     """
     wanted = ahead.acceleration_ned[2]
     if reference.holds_height:

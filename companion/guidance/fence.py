@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from companion.guidance.reference import Vector
 
 Corner = tuple[float, float]
-"""(north, east) in m, or (latitude, longitude) in degrees."""
+"""A corner of a polygon: (north, east) in m, or (latitude, longitude) in degrees."""
 
 Components = tuple[Any, Any, Any]
 """A `Vector`, or a vector whose components are arrays."""
@@ -29,7 +29,7 @@ class FenceCentre(NamedTuple):
     """Centre of the fence.
 
     Attributes:
-        position_ned: position in the autopilot's frame, m NED.
+        position_ned: position in the autopilot's local frame, m NED.
         place: latitude and longitude; None: unknown.
     """
 
@@ -43,15 +43,15 @@ class Breach(NamedTuple):
     Attributes:
         limit: the configuration key of the limit that is breached.
         relation: how the place lies to the limit, such as "beyond"; the key follows it.
-        where: the place, in words that end a sentence.
-        by: how far the place lies outside, m; negative inside, 0 if it was not computed (polygon
-            without a margin, unknown origin).
+        where: the place in words, such as "12.0 m above where control began".
+        distance_outside: m; negative for a place inside the fence but within the margin; 0 if it
+            was not computed (polygon without a margin, unknown origin).
     """
 
     limit: str
     relation: str
     where: str
-    by: float
+    distance_outside: float
 
     def __str__(self) -> str:
         return f"{self.where}, {self.relation} {self.limit}"
@@ -67,14 +67,14 @@ class Fence:
     """A cylinder between a floor and a ceiling, and an optional polygon; both must be kept.
 
     Attributes:
-        radius: about the place where control began, m.
-        ceiling: above the place where control began, m.
-        floor: above home, m.
+        radius: radius of the cylinder about the place where control began, m.
+        ceiling: largest height above the place where control began, m.
+        floor: smallest height above home, m.
         polygon: corners, m north and east of where control began; empty: only the cylinder.
         places: corners as (latitude, longitude) in degrees, instead of `polygon`.
         deceleration: deceleration that the vehicle certainly reaches, m/s².
         reaction: assumed delay before the vehicle brakes, s.
-        late: delay of the estimated horizontal motion behind the true one, s.
+        estimate_delay: delay of the estimated horizontal motion behind the true one, s.
     """
 
     radius: float
@@ -84,7 +84,7 @@ class Fence:
     places: tuple[Corner, ...]
     deceleration: float
     reaction: float
-    late: float = 0.0
+    estimate_delay: float = 0.0
 
     def breach(
         self, offset: Vector, height: float | None, origin: Place | None, margin: float = 0.0
@@ -127,11 +127,11 @@ class Fence:
     ) -> Components:
         """Where the vehicle stops if it brakes now, m NED from where control began.
 
-        From a horizontal or vertical velocity v, the vehicle stops after v·t + v²/(2b), with the
-        deceleration b and the reaction time t, to which `late` is added horizontally. A horizontal
-        acceleration a that makes the vehicle faster lasts for t: then it stops after
-        v·t + a·t²/2 + (v + a·t)²/(2b). One that brakes does not count, because it may end at any
-        moment.
+        From a horizontal or vertical velocity v, the vehicle stops after v·t + v²/(2b). b is the
+        deceleration. t is the reaction time; horizontally, `estimate_delay` is added to it. A
+        horizontal acceleration a that makes the vehicle faster is assumed to last for t; the
+        vehicle then stops after v·t + a·t²/2 + (v + a·t)²/(2b). An acceleration that brakes is
+        ignored, because it may end at any moment.
 
         Args:
             offset: position of the vehicle relative to where control began, m NED; numbers, or
@@ -140,7 +140,7 @@ class Fence:
             acceleration: north and east, m/s²; numbers, or arrays of them.
         """
         (north, east, down), twice = velocity, 2.0 * self.deceleration
-        reaction = self.reaction + self.late
+        reaction = self.reaction + self.estimate_delay
         gain_north, gain_east = reaction * acceleration[0], reaction * acceleration[1]
         # The square of the speed after the reaction time, minus the square of the present speed.
         gained = gain_north * (2.0 * north + gain_north) + gain_east * (2.0 * east + gain_east)
@@ -163,9 +163,9 @@ class Fence:
         margin: float = 0.0,
         acceleration: tuple[float, float] = (0.0, 0.0),
     ) -> Breach | None:
-        """The breach of the fence at the place of `stop`; None: the vehicle stops inside.
+        """The breach at the place where the vehicle would stop; None: it would stop inside.
 
-        The arguments are those of `breach` and `stop`; `height` is the present one.
+        The arguments are those of `stop` and `breach`; `height` is the vehicle's present one.
         """
         stop = self.stop(offset, velocity, acceleration)
         sunk = stop[2] - offset[2]

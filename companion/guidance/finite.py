@@ -1,4 +1,4 @@
-"""Numbers that a program gives, as plain finite numbers of their own."""
+"""Checks numbers from a user's program and converts them to plain floats."""
 
 from collections.abc import Iterable
 from math import isfinite
@@ -7,10 +7,10 @@ from companion.guidance.reference import Vector
 
 
 def finite_number(name: str, value: float) -> float:
-    """A finite number; `name` is the argument in messages.
+    """Convert `value` to a finite float; messages call it `name`.
 
     Raises:
-        ValueError: it is no number, or not finite.
+        ValueError: `value` is no number, or not finite.
     """
     try:
         plain = float(value)
@@ -22,10 +22,10 @@ def finite_number(name: str, value: float) -> float:
 
 
 def finite_vector(name: str, value: Iterable[float]) -> Vector:
-    """Three finite numbers; `name` is the argument in messages.
+    """Convert `value` to three finite floats; messages call it `name`.
 
     Raises:
-        ValueError: there are not three, one is no number, or one is not finite.
+        ValueError: there are not three values, or one is no number or not finite.
     """
     try:
         x, y, z = (finite_number(name, component) for component in value)

@@ -7,28 +7,28 @@ from companion.guidance.reference import Pose, Reference
 from companion.guidance.trajectory import Hover, Sample, Trajectory, steady_circle, turned_first
 
 
-def hover(duration: float) -> "HeldFigure":
+def hover(duration: float) -> "HeldHeadingManeuver":
     """Maneuver `hover`: stay for `duration` seconds."""
-    return HeldFigure(Hover(duration))
+    return HeldHeadingManeuver(Hover(duration))
 
 
-def circle(radius: float, speed: float, laps: float) -> "HeldFigure":
+def circle(radius: float, speed: float, laps: float) -> "HeldHeadingManeuver":
     """Maneuver `circle`: a circle from rest at the vehicle's position; it ends at rest.
 
     Args:
         radius: m.
-        speed: speed between speeding up and slowing down, m/s.
-        laps: number of laps, in which the vehicle also speeds up and slows down. If it is not
-            whole, the circle does not end where it began.
+        speed: steady speed after speeding up and before slowing down, m/s.
+        laps: number of laps, including speeding up and slowing down. If it is not whole, the
+            circle does not end where it began.
     """
-    return HeldFigure(steady_circle(radius, speed, laps, longest=inf))
+    return HeldHeadingManeuver(steady_circle(radius, speed, laps, longest=inf))
 
 
 @dataclass(frozen=True, slots=True)
-class HeldFigure:
-    """A trajectory that holds its heading and is flown as it is: it is never slowed down.
+class HeldHeadingManeuver:
+    """Flies a trajectory with constant heading, and never slows it down to keep limits.
 
-    Linear guidance always flies it, even if predictive guidance flies each `Follow`.
+    It is always flown by linear guidance, even where predictive guidance flies each `Follow`.
 
     Attributes:
         trajectory: a trajectory whose `holds_heading` is true.
@@ -63,12 +63,12 @@ class HeldFigure:
 class Follow:
     """Flies a trajectory.
 
-    Unless it holds the vehicle's heading, a turn on the spot to its initial heading comes first.
+    If the trajectory has a heading of its own, the vehicle first turns to it on the spot.
 
     Attributes:
         trajectory: the trajectory to follow.
         yaw_rate: largest yaw rate in the turn before the trajectory, rad/s.
-        notes: how its file was read and how it is flown, one sentence each.
+        notes: sentences for the user: how the trajectory's file was read and how it is flown.
     """
 
     trajectory: Trajectory
@@ -84,7 +84,7 @@ class Follow:
 
     @property
     def duration(self) -> float:
-        """Duration with the turn before it, s; with the longest turn until the start is known."""
+        """Duration with the first turn, s; with the longest one while the start is unknown."""
         if self._turned is not None:
             return self._turned.duration
         longest = 0.0 if self.trajectory.holds_heading else tau / self.yaw_rate
@@ -92,11 +92,11 @@ class Follow:
 
     @property
     def turn_duration(self) -> float:
-        """Duration of the turn before the trajectory, s; 0 while the start is unknown."""
+        """Duration of the first turn, s; 0 while the start is unknown."""
         return 0.0 if self._turned is None else self._turned.duration - self.trajectory.duration
 
     def check_times(self) -> list[float]:
-        """The times at which to check the trajectory, s; the turn on the spot is not checked.
+        """The times at which to check the trajectory, s, without the first turn.
 
         Raises:
             TrajectoryError: the trajectory is too long to be checked.
@@ -113,7 +113,7 @@ class Follow:
 
 
 def _reference_from(start: Pose, sample: Sample, heading: float) -> Reference:
-    """The reference of a sample, moved to `start` and with `heading` (rad) added to its heading."""
+    """The reference of a sample whose position counts from `start`, and heading from `heading`."""
     north, east, down = start.position_ned
     return Reference(
         (north + sample.position[0], east + sample.position[1], down + sample.position[2]),

@@ -23,7 +23,7 @@ class ThrustSettings:
     """Settings of the vehicle's thrust.
 
     Attributes:
-        hover: normalised thrust at hover, 0..1.
+        hover: configured normalised thrust at hover, 0..1.
         correction_limit: limit of learning. The learned hover thrust in N is that of `hover` times
             a factor between 1/(1 + correction_limit) and 1 + correction_limit.
         correction_time: time constant with which the learned hover thrust follows a change, s.
@@ -51,8 +51,8 @@ class ThrustSettings:
 class HoverThrust:
     """Normalised thrust for a wanted vertical acceleration, from a hover thrust that is learned.
 
-    The caller calls `observe` only in the air, and passes to `note_thrust` the thrust that the
-    vehicle follows: that of `companion` while it is in control, before that the autopilot's.
+    The caller calls `observe` only in the air. It passes to `note_thrust` the thrust setpoint that
+    the vehicle follows: that of `companion` in offboard control, before that the autopilot's.
     """
 
     def __init__(self, settings: ThrustSettings) -> None:
@@ -78,7 +78,7 @@ class HoverThrust:
 
     @property
     def learned(self) -> float:
-        """Learned normalised thrust at hover, at the first battery voltage in the air."""
+        """Learned normalised thrust at hover, at the battery voltage just after take-off."""
         return self._curve.signal(GRAVITY / self._filter.gain)
 
     @property
@@ -87,26 +87,26 @@ class HoverThrust:
         return self._to_normalised(GRAVITY)
 
     @property
-    def largest_specific(self) -> float:
-        """Largest specific thrust that is sent, m/s²."""
+    def largest_specific_thrust(self) -> float:
+        """Specific thrust at the largest normalised thrust that is sent, m/s²."""
         return self._to_specific(self._settings.highest)
 
     @property
-    def largest_specific_tilted(self) -> float:
-        """Largest specific thrust of a tilted vehicle along its thrust axis, m/s².
+    def largest_tilted_thrust(self) -> float:
+        """Largest specific thrust along the thrust axis of a tilted vehicle, m/s².
 
-        An autopilot that compensates the tilt itself may raise the thrust above `largest_specific`.
+        An autopilot that compensates the tilt itself may give more than `largest_specific_thrust`.
         """
         settings = self._settings
         return self._to_specific(1.0 if settings.tilt_compensated else settings.highest)
 
     @property
-    def smallest_specific(self) -> float:
-        """Smallest specific thrust that is sent, m/s²."""
+    def smallest_specific_thrust(self) -> float:
+        """Specific thrust at the smallest normalised thrust that is sent, m/s²."""
         return self._to_specific(self._settings.lowest)
 
     def normalised(self, acceleration_down: float, q: Quaternion, body_rates: BodyRates) -> float:
-        """Normalised thrust within its bounds for a wanted vertical acceleration.
+        """Normalised thrust for a wanted vertical acceleration, clamped to `limits`.
 
         Args:
             acceleration_down: acceleration that thrust and gravity shall give, m/s², positive down.
@@ -119,11 +119,11 @@ class HoverThrust:
         return self.within_limits(self._to_normalised(thrust))
 
     def within_limits(self, normalised: float) -> float:
-        """The normalised thrust, limited to its bounds."""
+        """A normalised thrust, clamped to `limits`."""
         return min(max(normalised, self._settings.lowest), self._settings.highest)
 
     def note_thrust(self, normalised: float, q: Quaternion) -> None:
-        """Note a normalised thrust that the vehicle follows, and its attitude at that time."""
+        """Note a normalised thrust that the vehicle follows, and the vehicle's attitude `q`."""
         vertical = self._curve.share(normalised) * self._battery.factor
         if not self._settings.tilt_compensated:
             vertical *= cos_tilt(q[1], q[2])
@@ -149,7 +149,7 @@ class HoverThrust:
         self._begin_window(time, velocity_down)
 
     def pause(self) -> None:
-        """Drop the latest velocity: nothing is learned across a pause."""
+        """Drop the latest velocity, so that nothing is learned across a pause."""
         self._window_start = None
 
     def note_voltage(self, time: float, voltage: float | None) -> None:
@@ -157,7 +157,7 @@ class HoverThrust:
         self._battery.note(time, voltage)
 
     def on_ground(self) -> None:
-        """Stop learning, and take the next battery voltage as the first one in the air."""
+        """Note that the vehicle is on the ground: pause, and forget the voltage at take-off."""
         self.pause()
         self._battery.reset()
 

@@ -1,4 +1,4 @@
-"""Response of the attitude loop to its targets, and the lead that compensates this response."""
+"""Response of the attitude loop to its targets, and the lead that compensates its delay."""
 
 from collections import deque
 from collections.abc import Callable
@@ -13,7 +13,7 @@ CoefficientPath = Callable[[float], Coefficients]
 """Coefficients as a function of event-loop time, s."""
 
 _PATH_STEP = 2e-3
-"""Step of the central differences along a path, s; it makes an error of about 1e-7 in flight."""
+"""Time step of the central differences along a path, s; their error in flight is about 1e-7."""
 _INTEGRATION_STEP = 1e-3
 """Step of the integration in `step_time`, s."""
 _MOST_STEPS = 60_000
@@ -23,11 +23,11 @@ _COVERED_SHARE = 1.0 - exp(-1.0)
 
 @dataclass(frozen=True, slots=True)
 class InnerResponse:
-    """Response of the coefficients: ċ + lag·c̈ = gain·(c_d − c), after a dead time.
+    """Response of the coefficients c to their target c_d: ċ + lag·c̈ = gain·(c_d − c), delayed.
 
     Attributes:
         gain: gain p of the planner, 1/s.
-        lag: lag of the second order, s; 0: the response is of first order.
+        lag: s; 0: the response is of first order.
         dead_time: s.
         follows_model: True: the planner accounts for the dead time, and the response is that of its
             model, delayed: ċ + lag·c̈ = gain·(c_d(t − dead_time) − c). False: the planner compares
@@ -42,15 +42,15 @@ class InnerResponse:
 
     @property
     def effective_delay(self) -> float:
-        """Delay of the response as one number for the position hold: 1/gain + lag + dead time, s.
+        """Delay of the response for the design of the position hold: 1/gain + lag + dead time, s.
 
-        A target that moves steadily is followed with less delay: the lag does not count, and the
-        dead time only if `follows_model` is true.
+        A target that moves at constant speed is followed with less delay: 1/gain, plus the dead
+        time if `follows_model` is true.
         """
         return 1.0 / self.gain + self.lag + self.dead_time
 
     def step_time(self, size: float, max_speed: float = inf) -> float:
-        """Time that the coefficients need for 63 % of a step of the target, s.
+        """Time from a step of the target until the coefficients cover 63 % of it, s.
 
         Args:
             size: size of the step, without unit.
@@ -75,7 +75,7 @@ class InnerResponse:
         return inf
 
     def target(self, path: CoefficientPath, time: float) -> Coefficients:
-        """The target at `time` with which the coefficients follow `path` without error."""
+        """The target at `time` that makes the coefficients follow `path` without error."""
         acts = time + self.dead_time
         before, there, after = path(acts - _PATH_STEP), path(acts), path(acts + _PATH_STEP)
         held = there if self.follows_model or self.dead_time == 0.0 else path(time)
@@ -85,10 +85,14 @@ class InnerResponse:
         )
 
     def heading_target(self, heading: Callable[[float], float], time: float) -> tuple[float, float]:
-        """Target heading (rad) and heading rate (rad/s) with which the heading follows its path.
+        """Target heading (rad) and heading rate (rad/s) that make the heading follow `heading`.
 
         The planner turns at gain·(ψ_d − ψ) + ψ̇_d, so only lag·ψ̈ remains to be compensated. With
         a gain of 0 nothing is compensated.
+
+        Args:
+            heading: the wanted heading as a function of event-loop time, rad.
+            time: s of event-loop time.
         """
         acts = time + self.dead_time
         there = heading(acts)

@@ -1,4 +1,4 @@
-"""Linear guidance: follows a reference without lag, by leading the known response of the tilt."""
+"""Linear guidance: follows a reference without lag; its targets lead the known tilt response."""
 
 from dataclasses import dataclass
 from math import sqrt
@@ -50,8 +50,8 @@ class GuidanceInput(NamedTuple):
     Attributes:
         now: present motion.
         predicted: motion predicted for the time when the present command takes effect.
-        thrust: horizontal acceleration due to the present thrust, m/s², NED.
-        disturbance: horizontal acceleration due to wind and bias, m/s², NED.
+        thrust: horizontal acceleration by the present thrust, m/s², NED.
+        disturbance: horizontal acceleration by wind and attitude bias, m/s², NED.
         drag: drag of the vehicle.
         thrust_limits: smallest and largest specific thrust available, m/s².
         axis_drag: how the drag along the body's axes differs from `drag`.
@@ -109,15 +109,15 @@ class Guidance(Protocol):
     def command(
         self, reference_at: ReferenceAt, time: float, inputs: GuidanceInput
     ) -> LinearCommand:
-        """One step; see `LinearGuidance.command`."""
+        """Compute the command of one guidance step; see `LinearGuidance.command`."""
         ...
 
 
 class RestingCoefficients:
-    """Mean target coefficients of the latest drift (`Reference.drifting`).
+    """Mean target coefficients of the latest pause of the position hold (`Reference.drifting`).
 
-    Open-loop coefficients that are added to this mean accelerate the vehicle as asked, even in wind
-    or if the estimated attitude is off by a fraction of a degree.
+    They balance wind and the error of the estimated attitude. Open-loop coefficients are added to
+    them, so that the vehicle accelerates as these coefficients ask.
     """
 
     def __init__(self) -> None:
@@ -126,7 +126,7 @@ class RestingCoefficients:
         self._drifting = False
 
     def take(self, target: Target, *, drifting: bool) -> None:
-        """Take the target of a closed-loop step of guidance; a new drift begins a new mean."""
+        """Take the target of a closed-loop guidance step; each new pause begins a new mean."""
         if drifting:
             if not self._drifting:
                 self._sum, self._count = 0j, 0
@@ -134,8 +134,8 @@ class RestingCoefficients:
             self._count += 1
         self._drifting = drifting
 
-    def added_to(self, coefficients: Coefficients, reference: Reference) -> Coefficients:
-        """Open-loop coefficients of a reference, with the mean added if it asks for that."""
+    def add_to(self, coefficients: Coefficients, reference: Reference) -> Coefficients:
+        """Open-loop `coefficients`, plus the mean if `reference.from_rest` is true."""
         self._drifting = False
         if not reference.from_rest or self._count == 0:
             return coefficients
@@ -144,7 +144,7 @@ class RestingCoefficients:
 
 
 class LinearGuidance:
-    """Commands the reference's acceleration, plus feedback of errors in position and its rates.
+    """Commands the reference's acceleration, plus feedback of position, velocity and acceleration.
 
     Drag and the observed disturbance are fed forward. The result is a path of coefficients.
     `InnerResponse.target` leads the target, so that the coefficients follow this path. Coefficients
@@ -167,7 +167,7 @@ class LinearGuidance:
     def command(
         self, reference_at: ReferenceAt, time: float, inputs: GuidanceInput
     ) -> LinearCommand:
-        """One step.
+        """Compute the target and the vertical acceleration of one guidance step.
 
         Args:
             reference_at: the reference over time; it is also read shortly before and after `time`.
@@ -179,7 +179,7 @@ class LinearGuidance:
         down = acceleration_down(self._settings.height, reference, inputs.now, ahead, inputs.drag)
         ends = time, time + self._settings.period
         if reference.coefficients is not None:
-            north, east = self._rest.added_to(reference.coefficients, reference)
+            north, east = self._rest.add_to(reference.coefficients, reference)
             target, later = (Target(north, east, *self._heading(reference_at, at)) for at in ends)
             return LinearCommand(target, later, down)
         feedback = self._feedback(reference, reference_at(time + self.acts_after), inputs)
@@ -195,7 +195,10 @@ class LinearGuidance:
         return LinearCommand(target, later, down)
 
     def _feedback(self, now: Reference, acts: Reference, inputs: GuidanceInput) -> Horizontal:
-        """Horizontal acceleration that corrects errors and disturbance, m/s², at most the limit."""
+        """Horizontal acceleration that corrects errors and disturbance, m/s².
+
+        `now` is the reference now, `acts` the reference when the feedback takes effect.
+        """
         settings, gains, wind = self._settings, self._settings.gains, inputs.disturbance
         if now.drifting:
             return limited(-wind[0], -wind[1], settings.max_horizontal)
@@ -217,7 +220,10 @@ class LinearGuidance:
     def _coefficients(
         self, reference: Reference, more: Horizontal, down: float, inputs: GuidanceInput
     ) -> Coefficients:
-        """Coefficients for the reference's acceleration, its drag, and `more` (feedback, m/s²)."""
+        """Coefficients for the reference's acceleration and drag, plus `more`.
+
+        `more` is the feedback, `down` the vertical acceleration of the command, m/s².
+        """
         slowed = inputs.deceleration(reference.velocity_ned)
         north, east = limited(
             reference.acceleration_ned[0] + slowed[0] + more[0],
@@ -231,5 +237,5 @@ class LinearGuidance:
         return Coefficients(north / thrust, east / thrust)
 
     def _heading(self, reference_at: ReferenceAt, time: float) -> tuple[float, float]:
-        """Target heading and heading rate with which the heading follows the reference."""
+        """Target heading (rad) and its rate (rad/s) that make the heading follow the reference."""
         return self._settings.heading.heading_target(lambda at: reference_at(at).heading, time)

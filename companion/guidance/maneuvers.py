@@ -9,7 +9,7 @@ from companion.attitude import Coefficients
 from companion.guidance.reference import Pose, Reference
 
 _HOLD_PAUSE = 1.0
-"""Pause of the position hold before open-loop steps, s: its corrections would disturb the attitude
+"""Pause of the position hold before open-loop steps, s. Its corrections would disturb the attitude
 from which a step is measured."""
 _CHECK_STEP = 0.01
 """Largest time between two checks of a maneuver, s."""
@@ -36,12 +36,12 @@ class Maneuver(Protocol):
         """Times at which the maneuver is checked against limits and fence, s, ascending.
 
         Raises:
-            TrajectoryError: it is too long to be checked.
+            TrajectoryError: the maneuver is too long to be checked.
         """
         ...
 
 
-def spread(begin: float, end: float) -> list[float]:
+def check_times_between(begin: float, end: float) -> list[float]:
     """Times from `begin` to `end`, both included, at most `_CHECK_STEP` apart, s."""
     count = max(1, math.ceil((end - begin) / _CHECK_STEP))
     return [begin + (end - begin) * k / count for k in range(count + 1)]
@@ -51,12 +51,12 @@ def spread(begin: float, end: float) -> list[float]:
 class Steps:
     """Acceleration doublets +c, −c, +c (lasting T, 2T, T) along north, east and north-west.
 
-    Before each doublet the position hold pauses, so that the attitude is at rest; c is added to the
-    coefficients of this rest. With an ideal response and no drag the vehicle ends where it began,
-    at rest. Position hold corrects the remaining error for `settle` seconds.
+    Before each doublet the position hold pauses, so that the attitude comes to rest. c is added to
+    the coefficients of this attitude. With an ideal response and no drag the vehicle ends where it
+    began, at rest. Position hold corrects the remaining error for `settle` seconds.
 
     Attributes:
-        coefficient: length of c, the sine of the tilt.
+        coefficient: length of the coefficients c: the sine of the tilt.
         step: T, s.
         settle: time of position hold after each doublet, s.
     """
@@ -82,7 +82,8 @@ class Steps:
         begins = [
             index * self._doublet_period + _HOLD_PAUSE for index in range(len(self.DIRECTIONS))
         ]
-        return [time for begin in begins for time in spread(begin, begin + 4.0 * self.step)]
+        length = 4.0 * self.step
+        return [time for begin in begins for time in check_times_between(begin, begin + length)]
 
     def at(self, time: float, start: Pose) -> Reference:
         """The reference: a pause, open-loop coefficients in the doublet, then position hold."""
@@ -105,7 +106,7 @@ class Corners:
 
     Such steps show the differences between the planners, as in the paper's figure 2; a step through
     level is straight with every planner. Before the first step the position hold pauses, so that
-    the attitude is at rest; the corners are added to the coefficients of this rest. The
+    the attitude comes to rest. The corners are added to the coefficients of this attitude. The
     acceleration goes round the rectangle twice, the second time mirrored. With an ideal response
     and no drag the vehicle ends where it began, at rest. Position hold corrects the remaining error
     for `settle` seconds.
@@ -141,7 +142,8 @@ class Corners:
 
     def check_times(self) -> list[float]:
         """Times 0.01 s apart over the corners, and the end, s."""
-        return [*spread(_HOLD_PAUSE, _HOLD_PAUSE + len(self.CORNERS) * self.step), self.duration]
+        end = _HOLD_PAUSE + len(self.CORNERS) * self.step
+        return [*check_times_between(_HOLD_PAUSE, end), self.duration]
 
     def at(self, time: float, start: Pose) -> Reference:
         """The reference: a pause, steps of the acceleration coefficients to each corner, a hold."""
@@ -161,7 +163,7 @@ class ManeuverSequence:
     """Maneuvers one after the other, all from the same starting pose.
 
     Attributes:
-        parts: the maneuvers; empty: none is known before the flight, and the sequence is not flown.
+        parts: the maneuvers; empty if none is known before the flight: it must not be flown then.
     """
 
     parts: Sequence[Maneuver]
@@ -173,7 +175,7 @@ class ManeuverSequence:
 
     @property
     def duration(self) -> float:
-        """Sum of the parts, s."""
+        """Sum of the durations of the parts, s."""
         return sum(part.duration for part in self.parts)
 
     def part_at(self, time: float) -> tuple[Maneuver, float]:

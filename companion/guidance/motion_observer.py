@@ -1,4 +1,4 @@
-"""Observer of position, velocity and disturbance (wind, bias), and the history of the tilt."""
+"""Observer of horizontal position, velocity and disturbance (wind, bias); history of the tilt."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -16,10 +16,10 @@ one, the observer is unstable at low position rates, and a gap in the positions 
 
 
 class ObserverGains(NamedTuple):
-    """How a measurement corrects the observer.
+    """The observer's gains: correction of each state per error.
 
-    The position is corrected per position error. Velocity and disturbance are corrected per error
-    of the velocity, to which `ObserverSettings.pull` adds the position error.
+    The position is corrected by its own error. Velocity and disturbance are corrected by the error
+    of the velocity plus `ObserverSettings.pull` times the error of the position.
 
     Attributes:
         position: m per m.
@@ -34,36 +34,36 @@ class ObserverGains(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ObserverSettings:
-    """How strongly measurements correct the observer.
+    """Settings from which the observer's gains follow.
 
     Attributes:
         bandwidth: both poles of the error of velocity and disturbance, rad/s.
         position_time: time constant with which the position follows the measured one, s.
-        position_pull: correction of the velocity per position error, 1/s.
-        largest_disturbance: largest disturbance, m/s².
-        sharpening: relative increase of the bandwidth with trusted positions.
-        trusted_pull: increase of `position_pull` with trusted positions, 1/s.
+        position_pull: velocity error that counts for each metre of position error, 1/s.
+        largest_disturbance: largest estimated disturbance, m/s².
+        bandwidth_increase: relative increase of `bandwidth` at a trust of 1.
+        pull_increase: increase of `position_pull` at a trust of 1, 1/s.
     """
 
     bandwidth: float
     position_time: float
     position_pull: float
     largest_disturbance: float
-    sharpening: float = 0.0
-    trusted_pull: float = 0.0
+    bandwidth_increase: float = 0.0
+    pull_increase: float = 0.0
 
     def pull(self, dt: float, trust: float) -> float:
-        """Correction of the velocity per position error, 1/s; `dt` and `trust` as in `gains`."""
-        return min(self.position_pull + trust * self.trusted_pull, _LARGEST_PULL_TIMES_STEP / dt)
+        """`position_pull` at this `dt` and `trust`, 1/s; arguments as in `gains`."""
+        return min(self.position_pull + trust * self.pull_increase, _LARGEST_PULL_TIMES_STEP / dt)
 
     def gains(self, dt: float, trust: float = 0.0) -> ObserverGains:
-        """The gains for measurements `dt` seconds apart.
+        """The gains for two measurements that are `dt` seconds apart.
 
         Args:
             dt: s.
             trust: trust in the positions, 0 to 1 (`PositionCorrection.trust`).
         """
-        bandwidth = (1.0 + trust * self.sharpening) * self.bandwidth
+        bandwidth = (1.0 + trust * self.bandwidth_increase) * self.bandwidth
         position = 1.0 if self.position_time <= 0.0 else 1.0 - exp(-dt / self.position_time)
         return ObserverGains(
             position,
@@ -95,18 +95,18 @@ class MotionObserver:
         self._settings = settings
 
     def observe(
-        self, time: float, measured: VehicleMotion, known: Horizontal, trust: float = 0.0
+        self, time: float, measured: VehicleMotion, modelled: Horizontal, trust: float = 0.0
     ) -> None:
         """Take a measured position and velocity.
 
-        The first one is taken as it is, and so is one after 1 s or more without a measurement, or
-        one that is not newer than the last.
+        The first measurement replaces the estimate. So does one that comes 1 s or more after the
+        last one, or that is not newer than it.
 
         Args:
             time: vehicle time of the measurement, s.
             measured: measured motion, NED.
-            known: mean horizontal acceleration by thrust and drag since the last measurement, m/s²,
-                NED.
+            modelled: mean horizontal acceleration by thrust and drag since the last measurement,
+                m/s², NED.
             trust: trust in the positions, 0 to 1 (`PositionCorrection.trust`).
         """
         motion, dt = self._motion, time - self._time
@@ -119,7 +119,7 @@ class MotionObserver:
         position, velocity = list(measured.position_ned), list(measured.velocity_ned)
         found = [0.0, 0.0]
         for axis in (0, 1):
-            acceleration = known[axis] + disturbance[axis]
+            acceleration = modelled[axis] + disturbance[axis]
             p = motion.position_ned[axis] + dt * (
                 motion.velocity_ned[axis] + 0.5 * dt * acceleration
             )
@@ -133,24 +133,25 @@ class MotionObserver:
         self.disturbance = limited(found[0], found[1], settings.largest_disturbance)
 
     def turn(self, angle: float) -> None:
-        """Rotate the disturbance by `angle` (rad), a jump of the estimated heading.
+        """Rotate the disturbance by `angle` (rad), because the estimated heading jumped by it.
 
         The vehicle itself did not turn, so it must keep the tilt that balances the disturbance.
         """
         self.disturbance = rotated(*self.disturbance, angle)
 
-    def at(self, time: float, known: Horizontal) -> VehicleMotion | None:
-        """The motion predicted from the newest measurement; None before the first.
+    def at(self, time: float, modelled: Horizontal) -> VehicleMotion | None:
+        """The motion at `time`, predicted from the newest measurement; None before the first.
 
         Args:
             time: vehicle time, s.
-            known: mean horizontal acceleration by thrust and drag until then, m/s², NED.
+            modelled: mean horizontal acceleration by thrust and drag from the newest measurement to
+                `time`, m/s², NED.
         """
         motion, dt = self._motion, time - self._time
         if motion is None:
             return None
         (north, east, down), (v_north, v_east, v_down) = motion
-        a_north, a_east = known[0] + self.disturbance[0], known[1] + self.disturbance[1]
+        a_north, a_east = modelled[0] + self.disturbance[0], modelled[1] + self.disturbance[1]
         return VehicleMotion(
             (
                 north + dt * (v_north + 0.5 * dt * a_north),
@@ -171,10 +172,10 @@ _KEPT_ATTITUDES = 200
 
 
 class SlopeHistory:
-    """History of the slope, the horizontal thrust divided by the vertical thrust.
+    """History of the slope: horizontal thrust divided by vertical thrust.
 
-    The observer needs the mean slope between the time stamps of two positions. These come late and
-    at other times than the attitudes, so the history keeps the integral of the slope.
+    The observer needs the mean slope between the time stamps of two positions. Positions come late
+    and at other times than attitudes, so the history keeps the integral of the slope.
 
     Attributes:
         newest: slope of the newest attitude (north, east), without unit.
@@ -186,7 +187,7 @@ class SlopeHistory:
         self.newest: Horizontal = (0.0, 0.0)
 
     def add(self, time: float, slope: Horizontal) -> None:
-        """Add the slope of an attitude; one that is not newer than the last restarts the history.
+        """Add the slope of an attitude; an attitude not newer than the last restarts the history.
 
         Args:
             time: vehicle time, s.

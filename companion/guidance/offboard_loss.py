@@ -1,6 +1,6 @@
 """How far a vehicle can move after its setpoints have ended: a simple worst case.
 
-The autopilot first holds the last rates and the last thrust: the thrust axis turns on along a
+First the autopilot holds the last rates and the last thrust: the thrust axis keeps turning along a
 great circle, while drag slows the vehicle. The part of the rates that is feedback may have any
 direction; it widens the result by a spread. Then the autopilot's failsafe levels the vehicle, and
 brakes it or lets it drift. `tests/flight/test_killed.py` compares this with the mock vehicles.
@@ -34,13 +34,13 @@ class MotionAtLoss(NamedTuple):
         offset: Position from where control began, m NED.
         velocity: m/s NED.
         thrust: Specific thrust, m/s² NED; at hover it is (0, 0, −g).
-        turn: Derivative of `thrust`, m/s³ NED.
+        thrust_rate: Derivative of `thrust`, m/s³ NED.
     """
 
     offset: Vector
     velocity: Vector
     thrust: Vector
-    turn: Vector
+    thrust_rate: Vector
 
 
 class LossFailsafe(NamedTuple):
@@ -83,7 +83,7 @@ class Reach(NamedTuple):
 
 
 class _HeldResult(NamedTuple):
-    """The vehicle when the autopilot stops holding the rates.
+    """Motion of the vehicle from the loss of setpoints until the autopilot stops holding the rates.
 
     Attributes:
         displacement: Displacement without feedback, m NED.
@@ -131,13 +131,13 @@ def reach(at_loss: MotionAtLoss, loss: LossFailsafe) -> Reach:
 
 
 def _held_motion(at_loss: MotionAtLoss, loss: LossFailsafe) -> _HeldResult:
-    """Integrate the motion while rates and thrust are held: the thrust axis turns steadily."""
+    """Integrate the motion while the autopilot holds rates and thrust."""
     duration = loss.hold_time + _FAILSAFE_DELAY
     step = duration / _INTEGRATION_STEPS
     specific_thrust = hypot(*at_loss.thrust)
     axis: Vector = _scaled(at_loss.thrust, 1.0 / specific_thrust)
-    along = sum(a * b for a, b in zip(axis, at_loss.turn, strict=True))
-    across: Vector = _plus_scaled(at_loss.turn, axis, -along)
+    along = sum(a * b for a, b in zip(axis, at_loss.thrust_rate, strict=True))
+    across: Vector = _plus_scaled(at_loss.thrust_rate, axis, -along)
     rate = hypot(*across) / specific_thrust
     ahead = _scaled(across, 1.0 / (rate * specific_thrust)) if rate > 0.0 else (0.0, 0.0, 0.0)
     rate = min(rate, loss.max_tilt_rate)
@@ -183,7 +183,7 @@ def _fall_distance(held: _HeldResult, specific_thrust: float) -> float:
 
 
 def _level_time(tilt: float) -> float:
-    """Time until the autopilot has levelled the vehicle, s, with a delay before it begins."""
+    """Time until the autopilot has levelled the vehicle, s, with the delay before it begins."""
     return _FAILSAFE_DELAY + tilt / _LEVELLING_RATE
 
 
@@ -206,7 +206,7 @@ def _slowed(velocity: Vector, drag: Drag, span: float) -> Vector:
 
 
 def path_thrust(acceleration: Vector, velocity: Vector, drag: Drag) -> Vector:
-    """Specific thrust that follows a path against drag and gravity, m/s² NED."""
+    """Specific thrust that a path with this acceleration and velocity needs, m/s² NED."""
     north, east, down = acceleration
     slowed = drag.deceleration(velocity)
     return north + slowed[0], east + slowed[1], down - GRAVITY

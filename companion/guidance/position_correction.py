@@ -1,4 +1,4 @@
-"""Corrects the autopilot's position ahead of the correction that its estimator will make."""
+"""Anticipates the correction that the autopilot's estimator will make to its position."""
 
 from dataclasses import dataclass
 from math import exp, hypot, sqrt
@@ -9,7 +9,7 @@ _LONGEST_GAP = 0.5
 """Longest time between two positions from which a correction is computed, s."""
 _LONGEST_WINDOW = 0.1
 """Time constant of each low-pass filter for noisy positions while the vehicle moves, s; smooth
-positions need a shorter one (`CorrectionSettings.window`)."""
+positions need a shorter one (`CorrectionSettings.filter_time`)."""
 _WINDOW_PER_NOISE = 0.1
 """Growth of this time constant with the noise of r (see `PositionCorrection`), s per m/s."""
 _SMOOTH_BELOW, _NOISY_ABOVE = 0.2, 0.6
@@ -31,28 +31,29 @@ class CorrectionSettings:
     """How much of the estimator's correction is anticipated.
 
     Attributes:
-        ahead: time constant of the estimator's correction, s: 1/(the estimator's position gain).
-        window: time constant of each of the two low-pass filters while the vehicle moves and its
-            positions are smooth, s, positive; at rest it is twice that.
+        estimator_time: time constant of the estimator's correction, s: 1/(its position gain).
+        filter_time: time constant of each of the two low-pass filters while the vehicle moves and
+            its positions are smooth, s, positive; at rest it is twice that.
         largest_correction: largest anticipated correction, m.
-        lateness: delay of the estimator's position that remains after its corrections, s.
+        position_delay: delay of the estimator's position that its corrections do not remove, s.
     """
 
-    ahead: float
-    window: float
+    estimator_time: float
+    filter_time: float
     largest_correction: float
-    lateness: float
+    position_delay: float
 
 
 class PositionCorrection:
-    """Corrects horizontal positions by what the estimator has not yet corrected itself.
+    """Adds to horizontal positions the correction that the estimator has not made yet.
 
     The autopilot's Kalman filter moves its position by its velocity and towards GPS. The second
-    part, r = ṗ − v, is the filter's gain times the distance to GPS, so ahead·r is that distance. If
-    GPS is later than the filter assumes, the position also lags by lateness·v.
+    part, r = ṗ − v, is the filter's gain times the distance to GPS, so that distance is
+    estimator_time·r. If GPS is later than the filter assumes, the position also lags by
+    position_delay·v.
 
-    r is the difference of two positions over a short time, which amplifies their noise. Filters
-    delay the correction, so their time constant follows the noise of r.
+    r is computed from two positions a short time apart, which amplifies their noise. Low-pass
+    filters reduce the noise but delay the correction, so their time constant follows the noise.
 
     Args:
         settings: settings of the correction.
@@ -67,7 +68,7 @@ class PositionCorrection:
         self._settings = settings
 
     def reset(self) -> None:
-        """Start again: the estimate has jumped."""
+        """Forget the correction, because the estimate has jumped."""
         self._time = 0.0
         self._before: VehicleMotion | None = None
         self._raw: Horizontal = (0.0, 0.0)
@@ -78,9 +79,9 @@ class PositionCorrection:
 
     @property
     def trust(self) -> float:
-        """How far the positions are trusted: 1 if they are smooth and the vehicle moves.
+        """Trust in the positions, 0 to 1: 1 if they are smooth and the vehicle moves.
 
-        0 if they are noisy or rounded, or if the vehicle is at rest.
+        It is 0 if they are noisy or rounded, or if the vehicle is at rest.
         """
         smoothness = min(
             max(0.0, (_NOISY_ABOVE - sqrt(self._noise)) / (_NOISY_ABOVE - _SMOOTH_BELOW)), 1.0
@@ -107,8 +108,8 @@ class PositionCorrection:
         (north, east, down), velocity = measured
         return VehicleMotion(
             (
-                north + self._correction[0] + settings.lateness * velocity[0],
-                east + self._correction[1] + settings.lateness * velocity[1],
+                north + self._correction[0] + settings.position_delay * velocity[0],
+                east + self._correction[1] + settings.position_delay * velocity[1],
                 down,
             ),
             velocity,
@@ -126,10 +127,14 @@ class PositionCorrection:
         change = limited(raw[0] - self._filtered[0], raw[1] - self._filtered[1], _LARGEST_CHANGE)
         for axis in (0, 1):
             filtered[axis] = self._filtered[axis] + (1.0 - kept) * change[axis]
-            wanted = settings.ahead * filtered[axis]
+            wanted = settings.estimator_time * filtered[axis]
             correction[axis] = wanted + kept * (self._correction[axis] - wanted)
         self._raw = raw[0], raw[1]
-        most = settings.largest_correction / settings.ahead if settings.ahead > 0.0 else 0.0
+        most = (
+            settings.largest_correction / settings.estimator_time
+            if settings.estimator_time > 0.0
+            else 0.0
+        )
         self._filtered = limited(filtered[0], filtered[1], most)
         self._correction = limited(correction[0], correction[1], settings.largest_correction)
 
@@ -138,6 +143,9 @@ class PositionCorrection:
         change = hypot(raw[0] - self._raw[0], raw[1] - self._raw[1])
         kept = exp(-dt / _NOISE_TIME)
         self._noise = change * change + kept * (self._noise - change * change)
-        shortest, longest = self._settings.window, max(self._settings.window, _LONGEST_WINDOW)
+        shortest, longest = (
+            self._settings.filter_time,
+            max(self._settings.filter_time, _LONGEST_WINDOW),
+        )
         window = min(shortest + _WINDOW_PER_NOISE * sqrt(self._noise), longest)
         return (2.0 - self._moving) * window

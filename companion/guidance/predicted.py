@@ -1,6 +1,6 @@
 """Predicted motion of a maneuver, from its reference and its open-loop commands.
 
-An open-loop step accelerates the vehicle as its tilt does at constant height. The time until the
+In open loop the acceleration is that of the commanded tilt at constant height. The time until the
 tilt is reached is neglected: it delays the motion and hardly changes it.
 """
 
@@ -16,8 +16,8 @@ _LARGEST_TILT = 1.4
 """The predicted tilt is clamped to this, rad: no maneuver tilts further."""
 
 
-class Moment(NamedTuple):
-    """The vehicle at one time of a maneuver, NED.
+class PredictedMotion(NamedTuple):
+    """The predicted motion at one time of a maneuver, NED.
 
     Attributes:
         time: time since the maneuver began, s.
@@ -32,8 +32,10 @@ class Moment(NamedTuple):
     acceleration: Vector
 
 
-def predict(part: Maneuver, heading: float = 0.0, drag: Drag = NO_DRAG) -> Iterator[Moment]:
-    """The predicted motion at the maneuver's `check_times`; it begins at rest.
+def predict(
+    part: Maneuver, heading: float = 0.0, drag: Drag = NO_DRAG
+) -> Iterator[PredictedMotion]:
+    """The predicted motion at each of the maneuver's `check_times`, beginning at rest.
 
     Args:
         part: the maneuver.
@@ -48,7 +50,7 @@ def predict(part: Maneuver, heading: float = 0.0, drag: Drag = NO_DRAG) -> Itera
     for time in part.check_times():
         reference = part.at(time, start)
         between = part.at(0.5 * (before + time), start)
-        moment = Moment(
+        moment = PredictedMotion(
             time, reference.position_ned, reference.velocity_ned, reference.acceleration_ned
         )
         yield moment if between.closed_loop else open_loop.advance(moment, between, time - before)
@@ -65,8 +67,14 @@ class _OpenLoop:
         self._place = self._speed = (0.0, 0.0)
         self._roll = self._pitch = 0.0
 
-    def advance(self, moment: Moment, reference: Reference, span: float) -> Moment:
-        """Integrate `span` s of the commands of `reference`; return `moment` with that motion."""
+    def advance(
+        self, moment: PredictedMotion, reference: Reference, span: float
+    ) -> PredictedMotion:
+        """Integrate the commands of `reference` over `span` s.
+
+        Returns:
+            `moment`, its horizontal motion replaced by the integrated one.
+        """
         (north, east), (fast_north, fast_east) = self._place, self._speed
         by_tilt = self._acceleration(reference, span)
         slowed = self._drag.deceleration((fast_north, fast_east, 0.0))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from companion.attitude import BodyRates, Coefficients
 
 Vector = tuple[float, float, float]
-"""(north, east, down)."""
+"""A vector in the world frame: (north, east, down)."""
 
 GRAVITY = 9.80665
 """Standard gravity, m/s²."""
@@ -33,13 +33,18 @@ class VehicleMotion(NamedTuple):
 class Reference(NamedTuple):
     """What the vehicle should do at one instant; NED, m, m/s, m/s², rad.
 
-    `coefficients` or `body_rates` (rad/s) command the horizontal motion open loop; position and
-    velocity then count for the height only. `body_rates` command the heading, too. `thrust_steps`
-    says that the vertical acceleration jumps. `drifting` pauses the horizontal feedback: only drag
-    and the disturbance are compensated. With `from_rest`, `coefficients` are added to their mean in
-    the drift just before, which balances wind and a tilted estimate. Without `holds_height`, the
-    vertical acceleration is commanded as it is, and the height is not held. `thrust` (0..1)
-    replaces the thrust that guidance computes.
+    `coefficients` or `body_rates` command the horizontal motion in open loop. Position and velocity
+    are then used for the height only.
+
+    Attributes:
+        coefficients: acceleration coefficients in open loop; None: closed loop.
+        body_rates: body rates in open loop, rad/s; they command the heading, too.
+        thrust_steps: whether the vertical acceleration jumps.
+        drifting: whether the horizontal feedback pauses; drag and disturbance stay compensated.
+        from_rest: whether the mean target coefficients of the latest pause (`drifting`) are added
+            to `coefficients`, to balance wind and the error of the estimated attitude.
+        holds_height: False: `acceleration_ned` is commanded vertically without feedback.
+        thrust: normalised thrust that replaces the one guidance computes, 0..1.
     """
 
     position_ned: Vector
@@ -57,12 +62,12 @@ class Reference(NamedTuple):
 
     @property
     def closed_loop(self) -> bool:
-        """Whether guidance computes the acceleration: no open-loop command is given."""
+        """Whether the horizontal motion is in closed loop: no coefficients or body rates given."""
         return self.coefficients is None and self.body_rates is None
 
     @property
     def holds_position(self) -> bool:
-        """Whether guidance corrects the horizontal position: neither open loop nor drifting."""
+        """Whether guidance corrects the horizontal position: in closed loop and not drifting."""
         return self.closed_loop and not self.drifting
 
     @property
@@ -79,11 +84,11 @@ ReferenceAt = Callable[[float], Reference]
 
 
 Horizontal = tuple[float, float]
-"""(north, east)."""
+"""A horizontal vector: (north, east)."""
 
 
 def minus(left: Vector, right: Vector) -> Vector:
-    """The difference of two vectors."""
+    """The vector `left` − `right`."""
     return left[0] - right[0], left[1] - right[1], left[2] - right[2]
 
 
@@ -96,7 +101,7 @@ def limited(north: float, east: float, most: float) -> Horizontal:
 
 
 def rotated(north: float, east: float, angle: float) -> Horizontal:
-    """The vector turned clockwise, seen from above, by `angle` in rad."""
+    """The vector rotated clockwise, seen from above, by `angle` in rad."""
     c, s = cos(angle), sin(angle)
     return c * north - s * east, s * north + c * east
 
@@ -107,9 +112,9 @@ def change_rate(
     """Rate of change of a commanded vector; None if it has jumped.
 
     Args:
-        old: its components in the previous command.
-        new: its components now.
-        since: time between the two, s.
+        old: components in the previous command.
+        new: components in the present command.
+        since: time between the two commands, s.
         most: largest rate of change that does not count as a jump.
     """
     rate = tuple((b - a) / since for a, b in zip(old, new, strict=True))

@@ -19,7 +19,7 @@ _SHORTEST_JERK_TIME = 0.01
 
 
 class Source(Protocol):
-    """Provides guidance with references: from maneuvers, another program, or a user's coroutine.
+    """Provides references to guidance: from maneuvers, another program, or a user's coroutine.
 
     Times are event-loop times, s. Positions are m NED, in the frame without estimator resets.
     """
@@ -31,7 +31,7 @@ class Source(Protocol):
 
     @property
     def failure(self) -> str | None:
-        """Why an unfinished source cannot continue; None: it can."""
+        """Why the source cannot continue although it has not finished; None: it can continue."""
         ...
 
     def begin(self, now: float, pose: Pose) -> None:
@@ -57,9 +57,9 @@ class ManeuverSource:
 
     Attributes:
         maneuvers: the maneuvers to fly.
-        begun_at: when they began, or None.
+        begun_at: when they began, s of event-loop time, or None.
         pose: the pose at which they began, or None.
-        failure: always None; guidance itself holds when a maneuver is given up.
+        failure: always None; when a maneuver is given up, guidance itself begins a hold.
     """
 
     failure: str | None = None
@@ -97,13 +97,13 @@ class ManeuverSource:
 class CommandedSource:
     """References that another program or the user's code gives one by one.
 
-    Between two of them the reference moves on by its own velocity, acceleration and jerk. If a
+    After each reference the source extrapolates it by its velocity, acceleration and jerk. If a
     reference becomes older than `stale` before the next one comes, the source fails: the vehicle
     holds its position, and later references are not flown.
 
     Args:
         name: who gives the references.
-        stale: age beyond which a reference is not flown, s.
+        stale: largest age of a reference that is flown, s.
         begins_within: time allowed for the first reference, s.
 
     Attributes:
@@ -136,17 +136,17 @@ class CommandedSource:
             reference: the reference at `now`.
             now: s of event-loop time.
             jerk_ned: derivative of the reference's acceleration, m/s³. None: it is computed from
-                the difference to an earlier reference. It is 0 for the first, for one of another
-                kind and after a jump of the acceleration.
+                an earlier reference, and is 0 for the first reference, for one of another kind
+                (`_kind`) and after a jump of the acceleration.
         """
         self._require_fresh(now)
         self._jerk = self._jerk_towards(reference, now) if jerk_ned is None else jerk_ned
         self._newest, self._given_at = reference, now
 
     def _jerk_towards(self, reference: Reference, now: float) -> Vector:
-        """Jerk between an earlier reference and this one, m/s³; 0 if it cannot be computed.
+        """Jerk from an earlier reference to this one, m/s³; 0 if it cannot be computed.
 
-        References less than `_SHORTEST_JERK_TIME` apart keep the last jerk.
+        If this reference comes less than `_SHORTEST_JERK_TIME` later, the last jerk is returned.
         """
         before, since = self._base, now - self._base_at
         if before is not None and since < _SHORTEST_JERK_TIME:
@@ -163,9 +163,9 @@ class CommandedSource:
         self._ended = True
 
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
-        """The newest reference, extrapolated; before the first, a hold of the initial pose.
+        """The newest reference, extrapolated; before the first one, a hold of the initial pose.
 
-        If the newest is too old, it is a hold of the present position.
+        If the newest reference is too old, the present position is held.
         """
         self._require_fresh(now)
         newest, given_at, jerk = self._newest, self._given_at, self._jerk
@@ -184,18 +184,18 @@ class CommandedSource:
         return Reference(motion.position_ned, heading=heading)
 
     def _require_fresh(self, now: float) -> None:
-        """Note a failure if the newest reference is too old, or the first one does not come."""
+        """Note a failure if the newest reference is too old, or the first one is overdue."""
         allowed = self._begins_within if self._newest is None else self._stale
         if self._failure is None and not self._ended and now - self._given_at > allowed:
             self._failure = f"{self.name} gave no new command for {allowed:g} s"
 
     @property
     def failure(self) -> str | None:
-        """Why control must end: as given to `fail`, or that references stopped; None: neither."""
+        """Why control must end: `fail` was called, or references stopped coming; else None."""
         return self._failure
 
     def fail(self, reason: str) -> None:
-        """Note that no more references will come, because of `reason`."""
+        """Note that no more references will come; `reason` is for the user."""
         self._failure = reason
 
     def finished(self, now: float) -> bool:

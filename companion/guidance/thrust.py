@@ -1,4 +1,4 @@
-"""Thrust: specific thrust (m/s²) for a wanted acceleration, and its normalised signal (0..1)."""
+"""Specific thrust (m/s²) for a wanted acceleration; how curve and battery make it normalised."""
 
 from math import acos, hypot, isfinite, sqrt
 
@@ -7,17 +7,17 @@ from companion.attitude.rotation import down_in_body
 from companion.guidance.reference import GRAVITY, Vector
 
 TILT_THRUST_SHARE = 0.95
-"""Share of the largest thrust that tilt may use; the rest is a reserve for gusts."""
+"""Largest share of the largest thrust that a commanded tilt may need; the rest is for gusts."""
 
 _MIN_COSINE = 0.5
 """Cosine of the largest tilt (60°) up to which the thrust is raised with the tilt."""
 
 
 def specific_thrust(acceleration_down: float, cos_tilt: float) -> float:
-    """T = (g − a_D)/cos(tilt) in m/s², for the present tilt.
+    """Specific thrust T = (g − a_D)/cos(tilt) that gives a vertical acceleration a_D, m/s².
 
-    Beyond 60° of tilt the thrust decreases, to 0 at 90°, because upside down it would push the
-    vehicle to the ground.
+    Beyond 60° of tilt it decreases, to 0 at 90°, because upside down thrust would push the vehicle
+    to the ground.
     """
     wanted = max(0.0, GRAVITY - acceleration_down)
     if cos_tilt < _MIN_COSINE:
@@ -31,8 +31,8 @@ def cos_tilt_ahead(q: Quaternion, body_rates: BodyRates, ahead: float) -> float:
     Thrust for this tilt instead of the present one compensates the lag of the rotors while the
     vehicle tilts, to first order (T + lag·Ṫ). Source: third row of Ṙ = R·[ω]ₓ.
 
-    A quick rotation does not last for a long lag. So a tilt below 60° counts as 60° at most: beyond
-    it, the thrust would be reduced as for a vehicle that falls over.
+    If the present tilt is below 60°, the predicted tilt is limited to 60°. A quick rotation seldom
+    lasts as long as the lag, and `specific_thrust` reduces the thrust beyond 60°.
     """
     x, y, z = down_in_body(q)
     cosine = z + ahead * (x * body_rates.pitch - y * body_rates.roll)
@@ -40,9 +40,9 @@ def cos_tilt_ahead(q: Quaternion, body_rates: BodyRates, ahead: float) -> float:
 
 
 def largest_tilt(lift: float, largest_thrust: float) -> float:
-    """The largest tilt at which the share `TILT_THRUST_SHARE` of the thrust gives the lift, rad.
+    """The tilt, rad, at which the lift needs `TILT_THRUST_SHARE` of the largest thrust.
 
-    It is 0 if the lift needs this share or more.
+    It is 0 if the lift needs this share or more without tilt.
 
     Args:
         lift: upward component of the specific thrust, m/s².
@@ -84,11 +84,11 @@ _VOLTAGE_FILTER_TIME = 0.3
 """Time constant of the voltage filter, s; ArduPilot's (MOT_BAT_V_MAX) has a cutoff of 0.5 Hz."""
 
 _PLAUSIBLE_RATIO = 0.6, 1.2
-"""Plausible range of voltage / first voltage; a reading outside it is ignored."""
+"""Plausible range of V/V₀ (see `BatterySag`); a voltage outside it is ignored."""
 
 
 class ThrustCurve:
-    """share = factor·u² + (1 − factor)·u: the share of full thrust at the signal u, both 0..1.
+    """Thrust curve of the motors: a signal u gives factor·u² + (1 − factor)·u of full thrust.
 
     PX4's THR_MDL_FAC and ArduPilot's MOT_THST_EXPO are this factor.
 
@@ -114,17 +114,17 @@ class ThrustCurve:
 
 
 class BatterySag:
-    """Loss of thrust by a falling battery voltage: factor (V/V₀)^exponent.
+    """Loss of thrust when the battery voltage falls: thrust is proportional to (V/V₀)^exponent.
 
-    V₀ is the first voltage in the air, under load, because the configured hover thrust is that of a
-    hovering vehicle.
+    V₀ is the first voltage in the air, because the configured hover thrust is that of a vehicle
+    whose battery is under load.
 
     Args:
         exponent: 2 for plain speed controllers, whose rotor speed follows the voltage; 0 if the
             autopilot or the speed controllers compensate the voltage.
 
     Attributes:
-        factor: thrust relative to that at V₀; 1 while the voltage is not known or compensated.
+        factor: thrust relative to that at V₀; 1 if the voltage is unknown or `exponent` is 0.
     """
 
     def __init__(self, exponent: float) -> None:

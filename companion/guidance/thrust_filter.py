@@ -30,11 +30,11 @@ _REJECTION_TIME = 1.0
 """Time constant of the low-pass filter that finds lasting rejections, s."""
 
 _LASTING_REJECTION = 0.2
-"""If the magnitude of the filtered value is above this at a rejection, the variance is reset.
+"""If the low-pass filter's output is beyond ± this at a rejection, the variance is reset.
 
-That takes about 0.25 s. The filter's input is the squared ratio of the innovation to its gate, at
-most 1, with the sign of the innovation: +1 for a rejected one that is too high, −1 for one that is
-too low.
+That takes about 0.25 s of rejections. The filter's input is the squared ratio of the innovation to
+its gate, at most 1, with the sign of the innovation: +1 for a rejected measurement that is too
+high, −1 for one that is too low.
 """
 
 
@@ -79,7 +79,7 @@ class ThrustFilter:
             span: duration of the measurement, s.
             share: mean share of thrust, 0..1; its component along the measured axis.
             specific_thrust: mean specific thrust along that axis, measured, m/s².
-            extra_variance: variance to add to that of the noise, (m/s²)².
+            extra_variance: variance to add to the learned variance of the measurements, (m/s²)².
         """
         self._variance = min(self._variance + self._drift * span, self._first_variance)
         innovation = specific_thrust - self.gain * share

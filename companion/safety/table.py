@@ -121,4 +121,4 @@ def _link_monitors(config: Config) -> tuple[Monitor, ...]:
 
 def fence_of(config: Config) -> Fence:
     """The fence from the sections `limits` and `safety`; it allows for a late estimate."""
-    return replace(config.fence, late=_ESTIMATE_DELAY)
+    return replace(config.fence, estimate_delay=_ESTIMATE_DELAY)

@@ -13,7 +13,7 @@ from companion.config import trajectory_file
 from companion.config.files import changed, load
 from companion.files.yaml_file import ConfigError
 from companion.guidance import GRAVITY, Pose, Reference, VehicleMotion
-from companion.guidance.follow import HeldFigure
+from companion.guidance.follow import HeldHeadingManeuver
 from companion.guidance.source import CommandedSource
 from companion.guidance.trajectory import line
 from companion.testing import connect, run
@@ -137,7 +137,7 @@ def test_references_from_a_coroutine_are_followed_as_the_built_in_ones_are(
     async def streamed(vehicle):
         await vehicle.take_off()
         start = Pose(vehicle.state.position_ned, vehicle.state.heading)
-        maneuver, clock = HeldFigure(EIGHT), asyncio.get_running_loop().time
+        maneuver, clock = HeldHeadingManeuver(EIGHT), asyncio.get_running_loop().time
         async with vehicle.control() as control:
             began = clock()
             while clock() - began < EIGHT.duration:

@@ -20,7 +20,7 @@ from companion.vehicle.clock import VehicleClock
 from companion.vehicle.records import AttitudeSample, LocalPosition
 from tests.control.kept_messages import KeptMessages
 
-DOUBLETS = Doublets(1.0, 0.25, 0.8, 1.0, climb=2.0, climb_step=0.25, settle=1.0)
+DOUBLETS = Doublets(1.0, 0.25, 0.8, 1.0, climb_acceleration=2.0, climb_step=0.25, settle=1.0)
 IN_FIRST_DOUBLET, IN_HOLD, IN_CLIMB = 1.1, 3.0, DOUBLETS.duration - 1.5
 HERE = (3.0, 4.0, -5.0)
 
@@ -28,7 +28,7 @@ HERE = (3.0, 4.0, -5.0)
 class HoverSpy:
     """Counts its calls."""
 
-    smallest_specific, largest_specific, largest_specific_tilted = 2.0, 18.0, 18.0
+    smallest_specific_thrust, largest_specific_thrust, largest_tilted_thrust = 2.0, 18.0, 18.0
 
     def __init__(self):
         self.observed = self.paused = 0

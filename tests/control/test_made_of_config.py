@@ -276,7 +276,7 @@ def test_a_plugin_that_takes_other_arguments_is_named(monkeypatch, section, key,
 
 def test_the_tilt_is_limited_to_what_the_thrust_can_hold():
     """The largest thrust of 20 m/s² keeps 5 % in reserve."""
-    learning = HoverLearning(SimpleNamespace(largest_specific_tilted=20.0), None)
+    learning = HoverLearning(SimpleNamespace(largest_tilted_thrust=20.0), None)
     level, sinking = acos(GRAVITY / 19.0), acos((GRAVITY - 2.0) / 19.0)
     assert learning.largest_tilt() == pytest.approx(level)
     assert learning.largest_tilt(2.0) == pytest.approx(sinking)

@@ -82,14 +82,14 @@ def test_the_batterys_voltage_reaches_the_thrust():
     bench = Learning()
     bench.hover_thrust = HoverThrust(ThrustSettings(0.5, 0.8, 1.5, 0.1, 0.9, battery_exponent=2.0))
     bench.learning = HoverLearning(bench.hover_thrust, bench.state)
-    full = bench.hover_thrust.largest_specific
+    full = bench.hover_thrust.largest_specific_thrust
     for volts in (16.0, 14.4):
         for _ in range(20):
             bench.state.battery = Battery(bench.now, volts, 0.5)
             bench.hover(0.2, told=None, offboard_active=True, steady=False)
-    assert bench.hover_thrust.largest_specific == pytest.approx(0.81 * full, rel=1e-3)
+    assert bench.hover_thrust.largest_specific_thrust == pytest.approx(0.81 * full, rel=1e-3)
     bench.learning.on_ground()
-    assert bench.hover_thrust.largest_specific == full
+    assert bench.hover_thrust.largest_specific_thrust == full
 
 
 @pytest.mark.parametrize("learned", [0.4, 0.5])

@@ -13,7 +13,7 @@ DOUBLETS = Doublets(
     tilt_step=0.25,
     yaw_rate=0.8,
     yaw_step=1.2,
-    climb=2.0,
+    climb_acceleration=2.0,
     climb_step=0.3,
     settle=1.5,
 )

@@ -62,7 +62,7 @@ def test_the_limits_themselves_are_allowed():
 )
 def test_a_breach_tells_its_limit_and_how_far_outside_it_is(place, limit, words, by):
     found = breach(**place)
-    assert (found.limit, str(found), found.by) == (limit, words, by)
+    assert (found.limit, str(found), found.distance_outside) == (limit, words, by)
 
 
 def test_a_margin_counts_inwards_from_every_side():
@@ -72,11 +72,15 @@ def test_a_margin_counts_inwards_from_every_side():
         assert breach(**place, margin=4.01) is not None
     assert breach(6.0, fence=polygon, margin=4.0) is None
     found = breach(6.5, fence=polygon, margin=4.0)
-    assert (found.limit, found.relation, found.by) == ("safety.fence_polygon_m", "outside", -3.5)
+    assert (found.limit, found.relation, found.distance_outside) == (
+        "safety.fence_polygon_m",
+        "outside",
+        -3.5,
+    )
     where = "6.5 m north and 0.0 m east of where control began"
     assert str(found) == f"{where}, outside safety.fence_polygon_m"
-    assert breach(12.0, fence=polygon).by == 0.0
-    assert breach(12.0, fence=polygon, margin=1.0).by == pytest.approx(2.0)
+    assert breach(12.0, fence=polygon).distance_outside == 0.0
+    assert breach(12.0, fence=polygon, margin=1.0).distance_outside == pytest.approx(2.0)
 
 
 def test_a_fence_on_the_map_needs_to_know_where_it_is():
@@ -89,7 +93,7 @@ def test_a_fence_on_the_map_needs_to_know_where_it_is():
     assert breach(9.9, -9.9, fence=fence) is None
     assert breach(9.9, -10.1, fence=fence).limit == "safety.fence_polygon_deg"
     unknown = breach(fence=fence, origin=None)
-    assert (unknown.limit, unknown.by) == ("safety.fence_polygon_deg", 0.0)
+    assert (unknown.limit, unknown.distance_outside) == ("safety.fence_polygon_deg", 0.0)
     still = (0.0, 0.0, -5.0), (0.0, 0.0, 0.0)
     assert fence.stop_breach(*still, 10.0, HOME) is None
     assert str(unknown) == (
@@ -144,11 +148,11 @@ def test_an_acceleration_lasts_for_the_reaction_time_and_one_that_brakes_does_no
 def test_where_it_would_stop_is_judged_with_its_height_there():
     sinking = ((0.0, 0.0, -5.0), (0.0, 0.0, 2.0))  # 2 m further down
     assert FENCE.stop_breach(*sinking, 4.0, HOME) is None
-    assert FENCE.stop_breach(*sinking, 3.5, HOME).by == pytest.approx(0.5)
+    assert FENCE.stop_breach(*sinking, 3.5, HOME).distance_outside == pytest.approx(0.5)
     assert FENCE.stop_breach(*sinking, 4.0, HOME, margin=0.25).limit == "limits.fence_floor_m"
     assert FENCE.stop_breach(*sinking, None, HOME) is None
     leaving = ((45.0, 0.0, -5.0), (5.0, 0.0, 0.0))
-    assert FENCE.stop_breach(*leaving, 10.0, HOME).by == pytest.approx(3.75)
+    assert FENCE.stop_breach(*leaving, 10.0, HOME).distance_outside == pytest.approx(3.75)
 
 
 @pytest.mark.parametrize(

@@ -214,7 +214,7 @@ def test_the_battery_is_made_up_for_at_once():
         thrust.note_voltage(2.0 + k, 14.4)
     assert thrust.normalised(0.0, LEVEL, STILL) == pytest.approx(0.5 / 0.81, rel=1e-3)
     assert thrust.learned == 0.5
-    assert thrust.largest_specific == pytest.approx(0.9 / 0.5 * GRAVITY * 0.81, rel=1e-3)
+    assert thrust.largest_specific_thrust == pytest.approx(0.9 / 0.5 * GRAVITY * 0.81, rel=1e-3)
     thrust.on_ground()
     assert thrust.normalised(0.0, LEVEL, STILL) == 0.5
 
@@ -232,5 +232,5 @@ def test_what_is_given_out_stays_in_its_bounds():
     thrust = HoverThrust(SETTINGS)
     assert thrust.normalised(-1e9, LEVEL, STILL) == 0.9
     assert thrust.normalised(1e9, LEVEL, STILL) == 0.1
-    assert thrust.smallest_specific == pytest.approx(0.2 * GRAVITY)
-    assert thrust.largest_specific == pytest.approx(1.8 * GRAVITY)
+    assert thrust.smallest_specific_thrust == pytest.approx(0.2 * GRAVITY)
+    assert thrust.largest_specific_thrust == pytest.approx(1.8 * GRAVITY)

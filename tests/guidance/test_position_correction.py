@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from companion.guidance.position_correction import CorrectionSettings, PositionCorrection
 from companion.guidance.reference import VehicleMotion
 
-SETTINGS = CorrectionSettings(ahead=0.7, window=0.1, largest_correction=0.2, lateness=0.0)
+SETTINGS = CorrectionSettings(0.7, 0.1, largest_correction=0.2, position_delay=0.0)
 DT = 0.02
 RATE = 0.4
 """Of how the estimator's velocity wanders, rad/s."""
@@ -19,26 +19,26 @@ metres = st.floats(-1e4, 1e4)
 pairs = st.tuples(metres, metres)
 
 
-def wandering(seconds, lateness=0.0):
+def wandering(seconds, position_delay=0.0):
     """(time, true north, measured motion) at 5 m/s north, with a velocity that is off by 6 cm/s.
 
-    The filter pulls its position to GPS, which comes `lateness` s too late, with a gain of
+    The filter pulls its position to GPS, which comes `position_delay` s too late, with a gain of
     1/ahead.
     """
-    north, rows = -lateness * 5.0, []
+    north, rows = -position_delay * 5.0, []
     for n in range(round(seconds / DT)):
         time = n * DT
         velocity = 5.0 + 0.06 * cos(RATE * time)
         rows.append((time, 5.0 * time, VehicleMotion((north, 3.0, -5.0), (velocity, 0.0, 0.0))))
-        gps = 5.0 * (time - lateness)
-        north += DT * (velocity + (gps - north) / SETTINGS.ahead)
+        gps = 5.0 * (time - position_delay)
+        north += DT * (velocity + (gps - north) / SETTINGS.estimator_time)
     return rows
 
 
-def errors(settings, lateness=0.0):
+def errors(settings, position_delay=0.0):
     """The largest errors of a position after 5 s: as measured, and corrected; m."""
     correction, measured_off, off = PositionCorrection(settings), 0.0, 0.0
-    for time, truth, measured in wandering(40.0, lateness):
+    for time, truth, measured in wandering(40.0, position_delay):
         found = correction.corrected(time, measured)
         assert found.position_ned[1:] == pytest.approx((3.0, -5.0))
         assert found.velocity_ned == measured.velocity_ned
@@ -54,15 +54,15 @@ def test_what_the_estimator_has_still_to_correct_is_taken_ahead():
     assert after <= 0.25 * before
 
 
-def test_a_known_lateness_is_made_up_for():
-    late = CorrectionSettings(0.7, 0.1, 0.2, lateness=0.02)
-    before, after = errors(late, lateness=0.02)
+def test_a_known_position_delay_is_made_up_for():
+    late = CorrectionSettings(0.7, 0.1, 0.2, position_delay=0.02)
+    before, after = errors(late, position_delay=0.02)
     assert before >= 0.12
     assert after <= 0.015
 
 
 def test_other_settings_count_from_the_next_position_on():
-    late = CorrectionSettings(0.7, 0.1, 0.2, lateness=0.02)
+    late = CorrectionSettings(0.7, 0.1, 0.2, position_delay=0.02)
     retuned, kept = PositionCorrection(SETTINGS), PositionCorrection(SETTINGS)
     rows = wandering(6.0)
     for time, _, measured in rows[:200]:
@@ -70,12 +70,12 @@ def test_other_settings_count_from_the_next_position_on():
     retuned.retune(late)
     for time, _, measured in rows[200:]:
         (north, east, down), velocity = kept.corrected(time, measured)
-        later = (north + late.lateness * velocity[0], east, down)
+        later = (north + late.position_delay * velocity[0], east, down)
         assert retuned.corrected(time, measured).position_ned == pytest.approx(later)
 
 
 def test_at_rest_nothing_changes():
-    correction = PositionCorrection(CorrectionSettings(0.7, 0.1, 0.2, lateness=0.05))
+    correction = PositionCorrection(CorrectionSettings(0.7, 0.1, 0.2, position_delay=0.05))
     rest = VehicleMotion((3.0, -2.0, -5.0), (0.0, 0.0, 0.0))
     for n in range(100):
         assert correction.corrected(n * DT, rest) == rest
@@ -94,7 +94,7 @@ def test_a_gap_and_a_reset_begin_anew():
 
 def noisy(metres, speed, seconds=20.0, seed=3):
     """The correction at a speed (m/s), and the errors it adds (m), with white position noise."""
-    quick = CorrectionSettings(ahead=0.65, window=0.04, largest_correction=0.2, lateness=0.0)
+    quick = CorrectionSettings(0.65, 0.04, largest_correction=0.2, position_delay=0.0)
     correction, random, added = PositionCorrection(quick), Random(seed), []
     for n in range(round(seconds / DT)):
         north = speed * n * DT + random.gauss(0.0, metres)
@@ -115,7 +115,7 @@ def test_noise_of_the_positions_lengthens_the_filters():
 @pytest.mark.parametrize("slip", [-0.001, 0.001])
 def test_a_stamp_that_slips_by_a_millisecond_hardly_moves_the_position(slip):
     """As on ArduPilot. Unlimited, these 5 mm become a correction of 28 mm."""
-    quick = CorrectionSettings(ahead=0.65, window=0.04, largest_correction=0.2, lateness=0.0)
+    quick = CorrectionSettings(0.65, 0.04, largest_correction=0.2, position_delay=0.0)
     correction, added = PositionCorrection(quick), []
     for n in range(200):
         time = n * DT + (slip if n >= 100 else 0.0)

@@ -15,7 +15,7 @@ from companion.files import bounded_file
 from companion.files.bounded_file import FileRefusedError, read_text
 from companion.files.yaml_file import ConfigError
 from companion.guidance.trajectory import Envelope, csv_file, curves, slow_down, violations
-from companion.guidance.trajectory.csv_file import table
+from companion.guidance.trajectory.csv_file import parse_csv
 from companion.guidance.trajectory.curves import MOST_CHECKS
 from companion.guidance.trajectory.from_samples import SampleOptions, from_samples
 from companion.guidance.trajectory.sample import TrajectoryError
@@ -104,32 +104,32 @@ def test_numbers_that_no_vehicle_flies_are_refused_by_line(tmp_path, lines, word
 def test_so_are_other_columns(columns, values, words):
     lines = [f"t,x,y,z,{columns}", *(f"{row},{values}" for row in rows())]
     with pytest.raises(TrajectoryError, match=f"line 2: {words}"):
-        table(lines, "given")
+        parse_csv(lines, "given")
 
 
 def test_a_yaw_in_degrees_is_refused_and_one_that_wraps_is_not():
     turning = [f"{row},{(0.5 * k + 3.0) % 6.2832:.4f}" for k, row in enumerate(rows())]
-    assert table(["t,x,y,z,yaw", *turning], "given").yaw is not None
+    assert parse_csv(["t,x,y,z,yaw", *turning], "given").yaw is not None
     degrees = [f"{row},{90 * (k % 2)}" for k, row in enumerate(rows())]
     with pytest.raises(TrajectoryError, match=r"yaw changes by 90 rad .* in degrees"):
-        table(["t,x,y,z,yaw", *degrees], "given")
+        parse_csv(["t,x,y,z,yaw", *degrees], "given")
 
 
 def test_a_column_that_is_named_twice_is_refused():
     lines = ["t,x,y,z,x_m", *(f"{row},0" for row in rows())]
     with pytest.raises(TrajectoryError, match="names the column x more than once"):
-        table(lines, "given")
+        parse_csv(lines, "given")
 
 
 def test_decimal_commas_are_refused():
     """Read as columns, `0,02,1,5` would fly another path."""
     lines = [f"{k // 10},{k % 10},0,{k},0,0,0,0" for k in range(50)]
     with pytest.raises(TrajectoryError, match="line 2: 8 values for 4 columns; write decimals"):
-        table(["t,x,y,z", *lines], "given")
+        parse_csv(["t,x,y,z", *lines], "given")
 
 
 def test_commas_at_the_end_of_a_row_are_no_values():
-    table(["t,x,y,z", *(f"{row},," for row in rows())], "given")
+    parse_csv(["t,x,y,z", *(f"{row},," for row in rows())], "given")
 
 
 @pytest.mark.parametrize("scale", [1e-300, 0.0, 1e-9])
@@ -155,7 +155,7 @@ def test_a_table_is_read_no_further_than_it_may_be_long(tmp_path, monkeypatch):
             yield row
 
     with pytest.raises(TrajectoryError, match="more than 100 samples; leave some out"):
-        table(lines(), "given")
+        parse_csv(lines(), "given")
     assert len(read) < 110
 
 
@@ -256,5 +256,5 @@ def test_the_longest_table_that_may_be_fitted_can_be_judged(monkeypatch):
     monkeypatch.setattr(fitted, "_MOST_PIECES", 100)
     monkeypatch.setattr(curves, "MOST_CHECKS", 100 * fitted._CHECKS_PER_PIECE + 3 * 256)
     moving = [f"{0.01 * k},{0.02 * k},0,0" for k in range(1000)]
-    trajectory = from_samples(table(["t,x,y,z", *moving], "given"), SampleOptions())
+    trajectory = from_samples(parse_csv(["t,x,y,z", *moving], "given"), SampleOptions())
     assert len(trajectory.check_times()) >= 100 * fitted._CHECKS_PER_PIECE

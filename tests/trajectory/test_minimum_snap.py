@@ -5,7 +5,7 @@ import pytest
 from numpy.polynomial import Polynomial
 from scipy.linalg import null_space
 
-from companion.guidance.trajectory.minimum_snap import Fixed, Observations, minimum_snap
+from companion.guidance.trajectory.minimum_snap import FixedStates, Observations, minimum_snap
 from companion.guidance.trajectory.septic_spline import (
     FROM_ENDS,
     STATE_SIZE,
@@ -17,7 +17,9 @@ from companion.guidance.trajectory.septic_spline import (
 def test_rest_to_rest_is_the_septic_of_the_literature():
     states = np.zeros((2, STATE_SIZE, 1))
     states[1, 0] = 1.0
-    spline = minimum_snap(np.array([0.0, 1.0]), Fixed(states, np.ones((2, STATE_SIZE), dtype=bool)))
+    spline = minimum_snap(
+        np.array([0.0, 1.0]), FixedStates(states, np.ones((2, STATE_SIZE), dtype=bool))
+    )
     septic = Polynomial([0, 0, 0, 0, 35, -84, 70, -20])
     for u in np.linspace(0.0, 1.0, 21):
         expected = [septic.deriv(k)(u) if k else septic(u) for k in range(STATE_SIZE)]
@@ -40,7 +42,7 @@ def _problem(seed, count=6):
     mask[:, 0] = True
     mask[[0, -1]] = True
     mask[2, 1] = True
-    return knots, Fixed(states, mask)
+    return knots, FixedStates(states, mask)
 
 
 def _dense(knots, fixed, axis):
@@ -115,7 +117,7 @@ def test_many_waypoints_are_met_and_derivatives_up_to_the_sixth_are_continuous()
 def test_observations_are_met_where_nothing_is_stiff_and_smoothed_where_it_is():
     times = np.linspace(0.0, 4.0, 41)
     knots = np.linspace(0.0, 4.0, 9)
-    nothing = Fixed(np.zeros((9, STATE_SIZE, 1)), np.zeros((9, STATE_SIZE), dtype=bool))
+    nothing = FixedStates(np.zeros((9, STATE_SIZE, 1)), np.zeros((9, STATE_SIZE), dtype=bool))
     smooth, rough = np.sin(times), 0.1 * (-1.0) ** np.arange(41)
     seen = Observations(times, (smooth + rough)[:, None], np.ones(41))
     spline = minimum_snap(knots, nothing, (seen,), stiffness=1e-3)
@@ -134,7 +136,7 @@ def test_observed_velocities_make_up_for_missing_places():
     mask[0, 0] = True
     times = np.linspace(0.0, 2.0, 50)
     slopes = Observations(times, np.cos(times)[:, None], np.ones(50), derivative=1)
-    spline = minimum_snap(knots, Fixed(states, mask), (slopes,), stiffness=1e-9)
+    spline = minimum_snap(knots, FixedStates(states, mask), (slopes,), stiffness=1e-9)
     assert spline.at(2.0)[0][0] == pytest.approx(np.sin(2.0), abs=1e-5)
 
 
@@ -142,7 +144,7 @@ def test_too_little_to_go_by_is_an_error():
     states, mask = np.zeros((4, STATE_SIZE, 1)), np.zeros((4, STATE_SIZE), dtype=bool)
     mask[:3, 0] = True
     with pytest.raises(np.linalg.LinAlgError, match="too little"):
-        minimum_snap(np.arange(4.0), Fixed(states, mask))
+        minimum_snap(np.arange(4.0), FixedStates(states, mask))
 
 
 def test_a_spline_goes_on_past_its_ends_as_its_last_pieces_do():

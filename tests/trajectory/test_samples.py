@@ -17,7 +17,7 @@ from companion.guidance.trajectory import (
     gerono_eight,
     read_csv,
 )
-from companion.guidance.trajectory.csv_file import table
+from companion.guidance.trajectory.csv_file import parse_csv
 from tests.trajectory.finite_differences import (
     assert_derivatives_agree,
     assert_rests_at_both_ends,
@@ -51,7 +51,7 @@ def _errors(found, expected, count=500):
 @pytest.mark.parametrize("derivatives", [0, 1, 2])
 @pytest.mark.parametrize("step", [0.005, 0.02, 0.1])
 def test_a_round_trip_brings_the_trajectory_back(derivatives, step):
-    found = from_samples(table(_lines(EIGHT, step, derivatives), "x"), NED)
+    found = from_samples(parse_csv(_lines(EIGHT, step, derivatives), "x"), NED)
     assert found.duration == pytest.approx(EIGHT.duration)
     assert (_errors(found, EIGHT) < (1e-5, 1e-4, 1e-3, 2e-2)).all()
     assert_derivatives_agree(found, inner_times(found))
@@ -61,16 +61,17 @@ def test_a_round_trip_brings_the_trajectory_back(derivatives, step):
 def test_millimetres_do_not_make_it_ring():
     """Interpolated, samples rounded to 1 mm at 100 Hz would jerk by some 1000 m/s³."""
     lines = _lines(EIGHT, 0.01, digits=3)
-    found = from_samples(table(lines, "x"), NED)
+    found = from_samples(parse_csv(lines, "x"), NED)
     assert (_errors(found, EIGHT) < (1e-3, 1e-2, 0.25, 8.0)).all()
-    rough = from_samples(table(lines, "x"), NED._replace(cutoff=20.0))
+    rough = from_samples(parse_csv(lines, "x"), NED._replace(cutoff=20.0))
     assert _errors(rough, EIGHT)[3] > 10.0 * _errors(found, EIGHT)[3]
 
 
 def test_given_velocities_are_used():
     """Between positions too sparse for the figure, they tell where it went."""
     sparse = {
-        d: from_samples(table(_lines(EIGHT, 0.75, d), "x"), NED).at(6.6).position for d in (0, 1)
+        d: from_samples(parse_csv(_lines(EIGHT, 0.75, d), "x"), NED).at(6.6).position
+        for d in (0, 1)
     }
     expected = EIGHT.at(6.6).position
     without, with_them = (np.linalg.norm(np.subtract(sparse[d], expected)) for d in (0, 1))
@@ -85,7 +86,7 @@ def test_slow_faults_of_the_velocities_are_not_believed_against_the_positions():
         row = [float(x) for x in line.split(",")]
         row[4] += 0.3 * np.sin(2.0 * pi * row[0])
         off.append(",".join(str(float(x)) for x in row))
-    found = from_samples(table(off, "x"), NED)
+    found = from_samples(parse_csv(off, "x"), NED)
     assert 1e-3 < _errors(found, EIGHT)[0] < 3e-3
 
 
@@ -134,7 +135,7 @@ def test_a_file_of_agilicious_is_understood_in_its_frame(frame, ned_from_frame):
     frame_of_ned = Rotation.from_matrix(ned_from_frame).inv()
     flu_to_frd = Rotation.from_euler("x", pi)
     lines = _agilicious(frame_of_ned, flu_to_frd, flown)
-    found = from_samples(table(lines, "x"), SampleOptions(frame))
+    found = from_samples(parse_csv(lines, "x"), SampleOptions(frame))
     assert (_errors(found, flown) < (1e-5, 1e-4, 1e-3, 5e-2)).all()
     turns = {
         round((found.at(t).heading - flown.at(t).heading) / (2.0 * pi), 3) for t in range(1, 15)
@@ -151,13 +152,13 @@ def test_the_default_frame_is_enu():
 
 def test_a_yaw_column_is_followed_fixed_or_passed_over():
     around = circle(5.0, Laps(4.0, 2, along=True))
-    read = table(_lines(around, yaw=True), "x")
+    read = parse_csv(_lines(around, yaw=True), "x")
     followed = from_samples(read, NED)
     assert followed.at(8.0).heading == pytest.approx(around.at(8.0).heading, abs=1e-3)
     assert_derivatives_agree(followed, inner_times(followed))
     fixed = from_samples(read, NED._replace(heading=HeadingFrom.FIXED))
     assert fixed.holds_heading
-    assert from_samples(table(_lines(around), "x"), NED).holds_heading
+    assert from_samples(parse_csv(_lines(around), "x"), NED).holds_heading
 
 
 def test_facing_along_a_path_that_stands_still_for_a_while():
@@ -169,7 +170,7 @@ def test_facing_along_a_path_that_stands_still_for_a_while():
         n, e = (8.0 * s**3 * (10.0 - 15.0 * s + 6.0 * s * s) for s in (u, w))
         noise = rng.normal(0.0, 1e-3, 2)
         lines.append(f"{t:.3f},{n + noise[0]:.4f},{e + noise[1]:.4f},0")
-    found = from_samples(table(lines, "x"), NED._replace(heading=HeadingFrom.ALONG_PATH))
+    found = from_samples(parse_csv(lines, "x"), NED._replace(heading=HeadingFrom.ALONG_PATH))
     assert found.at(2.0).heading == pytest.approx(0.0, abs=0.02)
     assert found.at(9.0).heading == pytest.approx(pi / 2.0, abs=0.02)
     rates = [abs(found.at(t).heading_rate) for t in np.linspace(0.0, found.duration, 500)]
@@ -180,7 +181,7 @@ def test_samples_in_motion_at_their_ends_are_begun_and_ended_at_rest():
     steady = circle(5.0, Laps(4.0, 3))
     begin, end = 0.3 * steady.duration, 0.7 * steady.duration
     assert hypot(*steady.at(begin).velocity) == pytest.approx(4.0)
-    found = from_samples(table(_lines(steady, begin=begin, end=end), "x"), NED)
+    found = from_samples(parse_csv(_lines(steady, begin=begin, end=end), "x"), NED)
     assert_rests_at_both_ends(found)
     assert_derivatives_agree(found, inner_times(found))
     ramp = 2.1875 * 4.0 / 3.0
@@ -197,7 +198,7 @@ def test_velocities_of_another_frame_are_refused():
     lines = _lines(EIGHT, derivatives=1)
     swapped = [lines[0].replace("vx,vy", "vy,vx"), *lines[1:]]
     with pytest.raises(TrajectoryError, match=r"velocity is not the derivative .* off by \d"):
-        from_samples(table(swapped, "x"), NED)
+        from_samples(parse_csv(swapped, "x"), NED)
 
 
 def test_accelerations_with_gravity_are_refused():
@@ -207,7 +208,7 @@ def test_accelerations_with_gravity_are_refused():
         front, down = line.rsplit(",", 1)
         heavy.append(f"{front},{float(down) - 9.81}")
     with pytest.raises(TrajectoryError, match="acceleration is not the derivative"):
-        from_samples(table(heavy, "x"), NED)
+        from_samples(parse_csv(heavy, "x"), NED)
 
 
 GOOD = ["t,x,y,z", "0,0,0,0", "1,1,0,0", "2,2,0,0", "3,3,0,0"]
@@ -234,11 +235,11 @@ GOOD = ["t,x,y,z", "0,0,0,0", "1,1,0,0", "2,2,0,0", "3,3,0,0"]
 )
 def test_a_bad_table_is_refused_with_its_line(lines, text):
     with pytest.raises(TrajectoryError, match=f"^x(,|: ).*{text}"):
-        table(lines, "x")
+        parse_csv(lines, "x")
 
 
 def test_the_first_complete_spelling_counts_and_the_case_does_not():
-    read = table([" T ,P_X,p_y,p_z,x,y,z", *(f"{t},1,2,{t},9,9,9" for t in range(5))], "x")
+    read = parse_csv([" T ,P_X,p_y,p_z,x,y,z", *(f"{t},1,2,{t},9,9,9" for t in range(5))], "x")
     assert read.position[3].tolist() == [1.0, 2.0, 3.0]
     assert read.derivatives == ()
     assert read.yaw is None
@@ -246,7 +247,8 @@ def test_the_first_complete_spelling_counts_and_the_case_does_not():
 
 def test_accelerations_without_velocities_are_passed_over():
     assert (
-        table(["t,x,y,z,ax,ay,az", *(f"{t},0,0,0,5,5,5" for t in range(5))], "x").derivatives == ()
+        parse_csv(["t,x,y,z,ax,ay,az", *(f"{t},0,0,0,5,5,5" for t in range(5))], "x").derivatives
+        == ()
     )
 
 
@@ -260,14 +262,14 @@ def test_a_file_that_cannot_be_read_is_refused(tmp_path):
 
 def test_a_column_may_say_its_unit():
     for header in ("t_s,x_m,y_m,z_m,yaw_rad", "time [s],x [m],y [m],z (m),heading[rad]"):
-        read = table([header, *(f"{t},1,2,{t},0.5" for t in range(5))], "x")
+        read = parse_csv([header, *(f"{t},1,2,{t},0.5" for t in range(5))], "x")
         assert read.position[3].tolist() == [1.0, 2.0, 3.0]
         assert read.yaw is not None
 
 
 def test_a_comment_before_the_header_says_the_frame_and_unused_columns_are_known():
     lines = ["t,x,y,z,battery", *(f"{t},1,2,{t},9" for t in range(5))]
-    assert table(lines, "x").frame is None
-    assert table(["# made by hand", "# frame: NED", *lines], "x").frame == "ned"
-    assert table([*lines[:3], "# frame: ned", *lines[3:]], "x").frame is None
-    assert table(lines, "x").unused == ("battery",)
+    assert parse_csv(lines, "x").frame is None
+    assert parse_csv(["# made by hand", "# frame: NED", *lines], "x").frame == "ned"
+    assert parse_csv([*lines[:3], "# frame: ned", *lines[3:]], "x").frame is None
+    assert parse_csv(lines, "x").unused == ("battery",)

@@ -29,7 +29,7 @@ from companion.guidance.trajectory import (
     violations,
     waypoints,
 )
-from companion.guidance.trajectory.csv_file import table
+from companion.guidance.trajectory.csv_file import parse_csv
 from tests.trajectory.finite_differences import (
     assert_derivatives_agree,
     assert_rests_at_both_ends,
@@ -59,7 +59,9 @@ def _angular(side=12.0, speed=3.0):
         way = k / 20 * speed
         x = min(way, side) - min(max(way - 2 * side, 0.0), side)
         lines.append(f"{k / 20},{x},{min(max(way - side, 0.0), side)},0")
-    return from_samples(table(lines, "angular"), SampleOptions(Frame.NED, cutoff=1.0), "angular")
+    return from_samples(
+        parse_csv(lines, "angular"), SampleOptions(Frame.NED, cutoff=1.0), "angular"
+    )
 
 
 ANGULAR = _angular()

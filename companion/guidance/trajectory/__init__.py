@@ -37,13 +37,13 @@ Made from a table
     Frame, HeadingFrom
 
 Checked
-    require_trajectory  whether a class of your own is a trajectory that fits itself
+    require_trajectory  checks a trajectory of your own class: its members and its derivatives
     Envelope         limits; None is no limit
     violations       the limits that a trajectory breaks: each a `Violation`
     slow_down        slows a trajectory down until it keeps the limits: a `SlowDown`
     SlowDown         the slower trajectory, and what slowed it; parts: SlowedPart
     evenly_slowed    slows the whole trajectory down by one factor
-    Violation        the limit, when it is broken, and what to do
+    Violation        a broken limit, when it is broken, and what to do
     Slowed           a trajectory flown more slowly; SlowerTime: its time law
     judge            like `violations`, for a `Motion`, which is given as arrays
     Motion

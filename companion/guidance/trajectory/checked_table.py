@@ -1,4 +1,4 @@
-"""Checks a table of samples that a program made; tables of files are checked as they are read."""
+"""Checks a table of samples that a user's program made; a file is checked when it is read."""
 
 from dataclasses import replace
 
@@ -11,11 +11,11 @@ from companion.guidance.trajectory.septic_spline import Floats
 
 
 def checked_table(table: Table) -> Table:
-    """The table with float arrays.
+    """The table, checked and converted to arrays of floats.
 
     Raises:
         TrajectoryError: there are fewer than four samples, the times do not increase from 0, a
-            number is not finite, or an array has another shape than the times ask for.
+            number is not finite, or an array does not have one row for each time.
     """
     times = _array("times", table.times, None)
     count = times.shape[0]
@@ -36,10 +36,15 @@ def checked_table(table: Table) -> Table:
 
 
 def _array(name: str, values: ArrayLike, shape: tuple[int, ...] | None) -> Floats:
-    """Finite numbers as an array of this shape; None: of any length.
+    """Convert `values` to an array of finite floats; messages call it `name`.
+
+    Args:
+        name: name of the array in messages.
+        values: the numbers.
+        shape: required shape; None: one dimension of any length.
 
     Raises:
-        TrajectoryError: it is something else.
+        TrajectoryError: `values` have another shape, or a value is no finite number.
     """
     try:
         array = np.asarray(values, dtype=np.float64)

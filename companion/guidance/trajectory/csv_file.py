@@ -1,10 +1,10 @@
 """Trajectories from CSV files, as Agilicious and others publish them.
 
-A header names the columns: Agilicious' `t,p_x,p_y,p_z,q_w,q_x,q_y,q_z,v_x,…,a_lin_x,…` or
-`t,x,y,z,yaw,vx,vy,vz,ax,ay,az` and their like; in s, m and rad, quaternions w first. Time and
-position are required. Velocity, acceleration (with velocity), and yaw or else a quaternion are used
-if present; other columns are ignored. A name may end in its unit: `x_m`, `vx_m_s`, `yaw_rad`. A
-comment before the header, `# frame: ned`, says the frame.
+A header names the columns, such as Agilicious' `t,p_x,p_y,p_z,q_w,q_x,q_y,q_z,v_x,…,a_lin_x,…` or
+`t,x,y,z,yaw,vx,vy,vz,ax,ay,az`. Units are s, m and rad. Time and position are required. Velocity
+is used if present, acceleration if velocity is present too. Yaw is used if present, else the
+quaternion (w first). Other columns are ignored. A name may end in its unit: `x_m`, `vx_m_s`,
+`yaw_rad`. A comment before the header, `# frame: ned`, tells the frame.
 """
 
 import csv
@@ -23,7 +23,7 @@ from companion.guidance.trajectory.sample import FARTHEST, FASTEST, TrajectoryEr
 from companion.guidance.trajectory.septic_spline import Floats
 
 FEWEST_SAMPLES = 4
-"""Smallest number of samples of a table. Fewer do not determine a smooth curve."""
+"""Smallest number of samples of a table; fewer do not determine a smooth curve."""
 
 _MOST_SAMPLES = 50_000
 """Largest number of samples of a table; reading them takes half a second."""
@@ -86,14 +86,14 @@ def read_csv(path: Path) -> Table:
     """
     try:
         text = read_text(path, _MOST_BYTES)
-        return table(io.StringIO(text, newline=""), str(path))
+        return parse_csv(io.StringIO(text, newline=""), str(path))
     except FileRefusedError as error:
         raise TrajectoryError(f"{path}: {error}") from error
     except csv.Error as error:
         raise TrajectoryError(f"{path}: not a CSV file") from error
 
 
-def table(lines: Iterable[str], name: str) -> Table:
+def parse_csv(lines: Iterable[str], name: str) -> Table:
     """Parse lines of text; the first one that is neither empty nor a comment is the header.
 
     Args:
@@ -112,9 +112,9 @@ def table(lines: Iterable[str], name: str) -> Table:
         raise TrajectoryError(fewest)
     if len(rows) > _MOST_SAMPLES + 1:
         raise TrajectoryError(f"{name}: has more than {_MOST_SAMPLES} samples; leave some out")
-    named = [column.strip().lower() for column in rows[0][1]]
-    header = [without_unit(column) for column in named]
-    groups = columns_of(header, named, name)
+    with_units = [column.strip().lower() for column in rows[0][1]]
+    header = [without_unit(column) for column in with_units]
+    groups = columns_of(header, with_units, name)
     if len(rows) <= FEWEST_SAMPLES:
         raise TrajectoryError(fewest)
     _require_no_more_values(rows, name)
@@ -138,10 +138,13 @@ def table(lines: Iterable[str], name: str) -> Table:
 
 
 def _require_no_more_values(rows: Sequence[tuple[int, Sequence[str]]], name: str) -> None:
-    """Check that no value lacks a column because a comma stands where a point should.
+    """Refuse rows with more values than the header, because of decimal commas.
 
-    Some published files do have more values than names. Then each row has equally many values, and
-    decimals have points.
+    Some published files have more values than names in the header. They are accepted if all rows
+    have equally many values and decimals have points.
+
+    Raises:
+        TrajectoryError: a row has too many values; the message names its line.
     """
     columns = len(rows[0][1])
     more = next(((line, len(row)) for line, row in rows[1:] if any(row[columns:])), None)
@@ -163,7 +166,7 @@ def _numbers(
     names: tuple[str, ...],
     name: str,
 ) -> Floats:
-    """The values (m, k) of the columns `names`."""
+    """The values (m, k) of the k columns `names`; messages call the file `name`."""
     columns = [header.index(column) for column in names]
     numbers = np.empty((len(rows), len(columns)))
     for k, (line, row) in enumerate(rows):
@@ -206,7 +209,7 @@ def _require_range(
     """Check that a quantity is within its range, and that a quaternion has the length 1.
 
     Raises:
-        TrajectoryError: it is not; the message names the line.
+        TrajectoryError: a value is out of range; the message names the line.
     """
     most, unit = _LARGEST_VALUES[group]
     outside = np.argwhere(~(np.abs(values) <= most))

@@ -58,19 +58,19 @@ def without_unit(column: str) -> str:
     return found[1] if found else column
 
 
-def columns_of(header: list[str], named: list[str], name: str) -> dict[str, tuple[str, ...]]:
+def columns_of(header: list[str], with_units: list[str], name: str) -> dict[str, tuple[str, ...]]:
     """The columns of the file for each quantity.
 
     Args:
         header: names of the columns, without their units.
-        named: names of the columns with their units, in lower case.
+        with_units: names of the columns with their units, in lower case.
         name: the file's name, for error messages.
 
     Raises:
         TrajectoryError: time or position is missing, a column is named twice, or the first line is
             not a header, is not separated by commas, or names a unit that is not read.
     """
-    _require_header(named, name)
+    _require_header(with_units, name)
     groups = {}
     for group, spellings in _SPELLINGS.items():
         found = [names for names in spellings if all(column in header for column in names)]
@@ -88,18 +88,18 @@ def columns_of(header: list[str], named: list[str], name: str) -> dict[str, tupl
     return groups
 
 
-def _require_header(named: list[str], name: str) -> None:
+def _require_header(with_units: list[str], name: str) -> None:
     """Check that the first line names columns, separated by commas, in units that are read."""
-    columns = shown(",".join(named))
-    if len(named) == 1 and (found := re.search("[;\t]", named[0])):
+    columns = shown(",".join(with_units))
+    if len(with_units) == 1 and (found := re.search("[;\t]", with_units[0])):
         separator = "semicolons" if found[0] == ";" else "tabs"
         raise TrajectoryError(f"{name}: its columns are separated by {separator}; use commas")
-    if all(_is_number(column) for column in named):
+    if all(_is_number(column) for column in with_units):
         raise TrajectoryError(
             f"{name}: its first line must name the columns, such as t,x,y,z; found {columns}"
         )
     known = {column for spellings in _SPELLINGS.values() for names in spellings for column in names}
-    for column in named:
+    for column in with_units:
         found = _OTHER_UNIT.fullmatch(column)
         if found and found[1] in known:
             raise TrajectoryError(

@@ -20,7 +20,7 @@ class CurvePoint(NamedTuple):
 
 
 class PhaseSampling(NamedTuple):
-    """Phases at which to check a curve, so close that an extreme between two is hardly missed.
+    """Phases at which to check a curve against limits, close enough not to miss an extreme.
 
     Attributes:
         step: phase between two checks; None if `phases` lists the checks.
@@ -40,7 +40,7 @@ MOST_CHECKS = 80_000
 """Largest number of checks of one trajectory; they take about a second."""
 
 _CHECKS_PER_LAP = 720
-"""Checks of one lap. They miss an extreme of the k-th harmonic by at most 0.001 k² %."""
+"""Checks of one lap. An extreme of the k-th harmonic is missed by at most 0.001 k² %."""
 
 
 def require_checkable(needed: float) -> None:
@@ -68,10 +68,10 @@ class Curve(Protocol):
         ...
 
     def sampling(self) -> PhaseSampling:
-        """The phases at which to check it.
+        """The phases at which to check the curve against limits.
 
         Raises:
-            TrajectoryError: it takes too many checks.
+            TrajectoryError: the curve needs too many checks.
         """
         ...
 
@@ -96,7 +96,7 @@ class Straight:
     direction: Vector
 
     def sampling(self) -> PhaseSampling:
-        """The phases at which to check it: at equal distances."""
+        """The phases at which to check the line: at equal distances."""
         return PhaseSampling(PATH_STEP)
 
     def at(self, phase: float) -> CurvePoint:
@@ -108,11 +108,11 @@ class Straight:
 
 @dataclass(frozen=True, slots=True)
 class Helix:
-    """Rounds about a centre `radius` north of the start, first eastwards; phase 2π per round.
+    """Laps about a centre `radius` north of the start; leaves eastwards; phase 2π per lap.
 
     Attributes:
         radius: m.
-        rise: climb in each round, m; 0 makes a circle.
+        rise: climb in each lap, m; 0 makes a circle.
     """
 
     radius: float
@@ -124,7 +124,7 @@ class Helix:
         return hypot(self.radius, self.rise / tau)
 
     def sampling(self) -> PhaseSampling:
-        """The phases at which to check it: those of one lap, because all laps are alike."""
+        """The phases at which to check one lap; all laps are alike."""
         return _sampling_of(self)
 
     def at(self, phase: float) -> CurvePoint:
@@ -150,7 +150,7 @@ class GeronoEight:
         return sqrt(2.0) * self.half_width
 
     def sampling(self) -> PhaseSampling:
-        """The phases at which to check it: those of one lap, because all laps are alike."""
+        """The phases at which to check one lap; all laps are alike."""
         return _sampling_of(self)
 
     def at(self, phase: float) -> CurvePoint:
@@ -165,7 +165,7 @@ class GeronoEight:
 
 @dataclass(frozen=True, slots=True)
 class BernoulliEight:
-    """Lemniscate of Bernoulli, (A sin φ, A sin φ cos φ)/(1 + cos² φ): as Gerono's, but rounder.
+    """Lemniscate of Bernoulli, (A sin φ, A sin φ cos φ)/(1 + cos² φ): along north-south.
 
     Attributes:
         half_width: A, m.
@@ -179,7 +179,7 @@ class BernoulliEight:
         return self.half_width
 
     def sampling(self) -> PhaseSampling:
-        """The phases at which to check it: those of one lap, because all laps are alike."""
+        """The phases at which to check one lap; all laps are alike."""
         return _sampling_of(self)
 
     def at(self, phase: float) -> CurvePoint:
@@ -194,11 +194,11 @@ class BernoulliEight:
 
 @dataclass(frozen=True, slots=True)
 class Turned:
-    """A figure turned about the vertical through its start.
+    """A figure rotated about the vertical through its start.
 
     Attributes:
-        figure: the figure that is turned.
-        angle: clockwise seen from above, rad.
+        figure: the figure that is rotated.
+        angle: rotation, clockwise seen from above, rad.
     """
 
     figure: Figure
@@ -214,7 +214,7 @@ class Turned:
         return self.figure.sampling()
 
     def at(self, phase: float) -> CurvePoint:
-        """The turned point."""
+        """The rotated point at `phase`."""
         s, c = sin(self.angle), cos(self.angle)
         return CurvePoint(*((c * n - s * e, s * n + c * e, d) for n, e, d in self.figure.at(phase)))
 

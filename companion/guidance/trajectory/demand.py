@@ -25,9 +25,12 @@ class Motion:
     heading_rate: Floats
 
     def retimed(self, times: Floats, progress: Progress) -> "Motion":
-        """The same path, passed at other `times` (m,).
+        """The same path, flown at other times.
 
-        `progress` is the present time as a function of the new one, at each of these times.
+        Args:
+            times: (m,), new time of each row, s.
+            progress: the time of this motion as a function of the new time, with derivatives, at
+                each of `times`; (m,).
         """
         velocity, acceleration, jerk = derivatives(
             progress, _columns(self.velocity), _columns(self.acceleration), _columns(self.jerk)
@@ -42,7 +45,7 @@ class Motion:
         )
 
     def slowed(self, factor: "float | Floats") -> "Motion":
-        """The motion stretched in time by `factor`: one for all times, or (m,)."""
+        """The motion, slower by `factor`: one number for all times, or (m,)."""
         return self.retimed(self.times * factor, Progress(0.0, 1.0 / factor))  # type: ignore[arg-type]
 
 
@@ -65,11 +68,11 @@ def sampled(trajectory: Trajectory, times: Sequence[float] | None = None) -> Mot
 
 
 def require_finite(motion: Motion) -> None:
-    """Refuse a motion that no limit could refuse: a comparison with NaN is false.
+    """Check that all numbers are finite: a comparison of NaN with a limit would not fail.
 
     Raises:
         FloatingPointError: a value is not finite; see `computable`.
-        TrajectoryError: an array has not as many rows as there are times.
+        TrajectoryError: an array has another number of rows than `times`.
     """
     count = len(motion.times)
     vectors = (motion.position, motion.velocity, motion.acceleration, motion.jerk)
@@ -90,7 +93,7 @@ def _require_all_finite(*columns: Floats) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Demand:
-    """Demand of a motion on the rotors, each (m,).
+    """Tilt, tilt rate and thrust that a motion needs; each array is (m,).
 
     The rotors must produce the specific thrust f = a + d − g, where d is the deceleration by drag.
     The body's vertical axis points along f. It turns with the part of ḟ = jerk + ḋ that is

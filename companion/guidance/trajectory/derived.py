@@ -17,7 +17,7 @@ class Slowed:
 
     Attributes:
         trajectory: the original trajectory.
-        law: the original time as a function of the slowed time.
+        law: the time of the original trajectory as a function of the time of this one.
         moments: times of the original trajectory at which to check it, s. If empty, its own check
             times are used, which is enough if it is slowed down evenly.
     """
@@ -45,7 +45,7 @@ class Slowed:
         """Check times, s.
 
         Raises:
-            TrajectoryError: it is too long to be checked.
+            TrajectoryError: the trajectory is too long to be checked.
         """
         times, _ = self.law.stretched(np.array(self.moments or self.trajectory.check_times()))
         require_duration(float(times[-1]))
@@ -82,8 +82,8 @@ class TurnedFirst:
 
     Attributes:
         trajectory: flown after the turn.
-        begin: heading at the beginning, rad.
-        sign: +1 to turn clockwise, −1 anticlockwise.
+        begin: heading at the beginning of the turn, rad.
+        sign: +1 to turn clockwise seen from above, −1 anticlockwise.
         turn: the time law of the angle turned.
     """
 
@@ -99,7 +99,7 @@ class TurnedFirst:
 
     @property
     def duration(self) -> float:
-        """Duration with the turn, s."""
+        """Duration including the turn, s."""
         return self.turn.duration + self.trajectory.duration
 
     @property
@@ -111,7 +111,7 @@ class TurnedFirst:
         """Check times of the trajectory, s; the turn on the spot needs no check.
 
         Raises:
-            TrajectoryError: it is too long to be checked.
+            TrajectoryError: the trajectory is too long to be checked.
         """
         return [0.0, *(self.turn.duration + time for time in self.trajectory.check_times())]
 

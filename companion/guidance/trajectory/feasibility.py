@@ -109,24 +109,24 @@ class Envelope:
 
 
 class _Need(NamedTuple):
-    """One limited quantity over a motion, and its limit.
+    """A limited quantity over a motion, and its limit.
 
     Attributes:
         limit: key of the limit in the configuration.
         allowed: the limit in SI units; None: no limit.
         needed: (m,), the quantity at each time, in the unit of `allowed`.
-        what: unit and quantity as messages show them after the number, such as "° of tilt".
-        shown_in: factor from the unit of `allowed` to the unit in messages.
-        least: whether the limit is a lower limit.
+        unit_text: unit and quantity as messages show them after the number, such as "° of tilt".
+        message_scale: factor from the unit of `allowed` to the unit in messages.
+        is_lower_limit: whether `allowed` is a lower limit.
         key_scale: `allowed` divided by the value of the key; None: messages do not give that value.
     """
 
     limit: str
     allowed: float | None
     needed: Floats
-    what: str
-    shown_in: float = 1.0
-    least: bool = False
+    unit_text: str
+    message_scale: float = 1.0
+    is_lower_limit: bool = False
     key_scale: float | None = None
 
 
@@ -184,7 +184,9 @@ def _needs(motion: Motion, envelope: Envelope) -> Iterator[_Need]:
     yield _Need("limits.max_yaw_rate_deg_s", e.max_yaw_rate, turn, "°/s of yaw", _TO_DEGREES)
     force, full = " m/s² of thrust", e.full_thrust
     lowest, highest = e.min_thrust, e.max_thrust
-    yield _Need("limits.min_thrust", lowest, rotors.thrust, force, least=True, key_scale=full)
+    yield _Need(
+        "limits.min_thrust", lowest, rotors.thrust, force, is_lower_limit=True, key_scale=full
+    )
     yield _Need("limits.max_thrust", highest, rotors.thrust, force, key_scale=full)
     yield _Need("limits.max_climb_m_s", e.max_climb, climb, " m/s of climb")
     yield _Need("limits.max_descent_m_s", e.max_descent, -climb, " m/s of descent")
@@ -194,7 +196,7 @@ def _needs(motion: Motion, envelope: Envelope) -> Iterator[_Need]:
 def _excess(need: _Need) -> Floats:
     """(m,), excess over the limit in the limit's unit; negative if the limit is kept."""
     allowed = need.allowed or 0.0
-    return allowed - need.needed if need.least else need.needed - allowed
+    return allowed - need.needed if need.is_lower_limit else need.needed - allowed
 
 
 def _violation(times: Floats, need: _Need) -> Violation | None:
@@ -205,13 +207,13 @@ def _violation(times: Floats, need: _Need) -> Violation | None:
     if not broken.any():
         return None
     begins, time = float(times[np.argmax(broken)]), float(times[np.argmax(over)])
-    needed = float(need.needed[np.argmax(over)]) * need.shown_in
-    limit, unit = need.limit, ""
+    needed = float(need.needed[np.argmax(over)]) * need.message_scale
+    allowed, limit, unit = need.allowed * need.message_scale, need.limit, ""
     if need.key_scale is not None:
         limit, unit = f"{limit} = {need.allowed / need.key_scale:.4g}", " m/s²"
     text = (
-        f"at {time:.2f} s it needs {needed:.4g}{need.what}, {limit} allows "
-        f"{'no less than ' if need.least else ''}{need.allowed * need.shown_in:.4g}{unit}"
+        f"at {time:.2f} s it needs {needed:.4g}{need.unit_text}, {limit} allows "
+        f"{'no less than ' if need.is_lower_limit else ''}{allowed:.4g}{unit}"
     )
     if begins < time:
         text += f" (broken from {begins:.2f} s on)"

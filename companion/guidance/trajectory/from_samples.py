@@ -26,28 +26,28 @@ from companion.guidance.trajectory.timed_curve import (
 )
 
 _REST_SPEED = 0.1
-"""Samples slower than this at their beginning or end count as at rest there, m/s."""
+"""Samples that begin or end more slowly than this count as at rest there, m/s."""
 
 _CHECKS_PER_PIECE = 16
-"""Checks of each piece of the spline. A piece lasts half a period of the cutoff frequency."""
+"""Checks of each piece of the spline; a piece lasts half a period of the cutoff frequency."""
 
 _MOST_PIECES = 4500
 """Largest number of pieces of the spline. Fitting so many takes a second."""
 
 _LONGEST_RAMP_SHARE = 0.5
-"""Longest ramp, as a share of the duration."""
+"""Longest ramp from or to rest, as a share of the duration of the samples."""
 
 
 class _Quantity(NamedTuple):
-    """A derivative in a file, and its permitted RMS error: floor + share · RMS of the derivative.
+    """A derivative in a file, and its largest RMS error: floor + share · RMS of the derivative.
 
     The tolerance is needed because published accelerations may jump where the spline is smooth.
 
     Attributes:
-        name: name in messages.
+        name: name of the derivative in messages.
         unit: unit of the derivative and of `floor`.
-        share: allowed error as a share of the derivative's RMS.
-        floor: allowed error of a small derivative.
+        share: error allowed for each unit of the derivative's RMS.
+        floor: error that is always allowed.
     """
 
     name: str
@@ -125,8 +125,8 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
     Raises:
         TrajectoryError: velocity or acceleration is not the derivative of the position, the samples
             last too long, or they never move horizontally and have no heading along the path; the
-            table names another frame than the options, has other shapes than `Table` says, or a
-            number that is not finite; an option is out of range.
+            table names another frame than the options, its arrays have other shapes than `Table`
+            says or a number that is not finite; an option is out of range.
         ArithmeticError, numpy.linalg.LinAlgError: numerical errors; see `computable`.
     """
     table = checked_table(table)
@@ -153,7 +153,7 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
 
 
 def _require_options(table: Table, options: SampleOptions) -> None:
-    """Check options that a program chose; those of files are checked as they are read."""
+    """Check options from a user's program; those from YAML files are checked when they are read."""
     if not isinstance(options.frame, Frame):
         raise TrajectoryError(
             f"the frame of samples is a Frame, as Frame.NED, not {options.frame!r}"

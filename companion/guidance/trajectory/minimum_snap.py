@@ -24,7 +24,7 @@ _SMALLEST_EIGENVALUE = 1e-13
 """The spline is undetermined if an eigenvalue of the scaled last pivot is smaller than this."""
 
 
-class Fixed(NamedTuple):
+class FixedStates(NamedTuple):
     """States that the spline must meet exactly.
 
     Attributes:
@@ -68,7 +68,10 @@ class _Equations(NamedTuple):
 
 
 def minimum_snap(
-    knots: Floats, fixed: Fixed, observations: tuple[Observations, ...] = (), stiffness: float = 1.0
+    knots: Floats,
+    fixed: FixedStates,
+    observations: tuple[Observations, ...] = (),
+    stiffness: float = 1.0,
 ) -> SepticSpline:
     """Minimise stiffness·∫ snap² dt + Σ weight·residual².
 

@@ -1,4 +1,4 @@
-"""Whether an object of a program is a trajectory, and whether its samples fit each other."""
+"""Checks a trajectory of a user's class: its members, and whether its derivatives are right."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -13,18 +13,18 @@ _VECTORS = ("position", "velocity", "acceleration", "jerk")
 _SMALLEST_OFFSET = 1e-3  # m
 _SMALLEST_SPEED = 0.01  # m/s
 
-_PLACES = 24
+_COMPARED_TIMES = 24
 """Number of times at which derivatives are compared."""
-_GOLDEN = 0.6180339887498949
-"""Multiples of it, modulo 1, spread evenly and miss the round times at which pieces are joined."""
+_GOLDEN_RATIO = 0.6180339887498949
+"""Its multiples modulo 1 are spread evenly, and miss the round times at which pieces are joined."""
 _STEP = 1e-3
 """Half the span of a difference quotient, s."""
-_FLOOR, _SHARE = 0.1, 0.02
-"""Largest error of a derivative: m/s or m/s², and as a share of it."""
+_ALLOWED_ERROR, _ALLOWED_SHARE = 0.1, 0.02
+"""Largest error of a derivative: the first, m/s or m/s², plus the second times the derivative."""
 
 
 def require_trajectory(trajectory: Trajectory) -> None:
-    """Check an object of your own: its members, its ends at rest, and its derivatives.
+    """Check a trajectory of your own class: its members, rest at both ends, and its derivatives.
 
     Velocity and acceleration are compared with difference quotients at 24 times. Limits are checked
     by `violations`.
@@ -55,7 +55,7 @@ def _sample(trajectory: Trajectory, time: float) -> Sample:
     """The sample at a time.
 
     Raises:
-        TypeError: it is no `Sample`.
+        TypeError: `at` returned no `Sample`.
         TrajectoryError: a number is not finite.
     """
     sample = trajectory.at(time)
@@ -100,13 +100,13 @@ def _require_times(times: Sequence[float], duration: float) -> None:
 
 
 def _require_derivatives(trajectory: Trajectory, quantity: str, derivative: str, unit: str) -> None:
-    for k in range(_PLACES):
-        time = max(trajectory.duration * (k * _GOLDEN % 1.0), _STEP)
+    for k in range(_COMPARED_TIMES):
+        time = max(trajectory.duration * (k * _GOLDEN_RATIO % 1.0), _STEP)
         before, now, after = (_sample(trajectory, time + by) for by in (-_STEP, 0.0, _STEP))
         change = np.subtract(getattr(after, quantity), getattr(before, quantity)) / (2.0 * _STEP)
         told = np.asarray(getattr(now, derivative), dtype=float)
         size = float(np.linalg.norm(change))
-        if np.linalg.norm(change - told) > _FLOOR + _SHARE * size:
+        if np.linalg.norm(change - told) > _ALLOWED_ERROR + _ALLOWED_SHARE * size:
             raise TrajectoryError(
                 f"at {time:.2f} s its {quantity} changes by {size:.2f} {unit}, but its {derivative}"
                 f" is {np.linalg.norm(told):.2f} {unit}: they must fit in size and direction"

@@ -35,8 +35,8 @@ class Sample(NamedTuple):
         velocity: m/s.
         acceleration: m/s².
         jerk: m/s³.
-        heading: tilt-yaw heading, rad, not wrapped. It counts from north. For a trajectory that
-            `holds_heading` it counts from the heading at the start.
+        heading: tilt-yaw heading, rad, not wrapped. It counts from north, but from the vehicle's
+            heading at the start if `Trajectory.holds_heading` is true.
         heading_rate: rad/s.
     """
 
@@ -49,7 +49,7 @@ class Sample(NamedTuple):
 
 
 class Trajectory(Protocol):
-    """A trajectory begins and ends at rest, and is defined at any time."""
+    """A path over time, from rest to rest, that can be sampled at any time."""
 
     @property
     def name(self) -> str:
@@ -81,12 +81,12 @@ class Trajectory(Protocol):
 
 @contextmanager
 def computable() -> Iterator[None]:
-    """Turn numerical errors into an error for the user.
+    """Turn numerical errors in the block into an error for the user.
 
-    The ranges of values in files exclude the known causes; this catches the others.
+    The checks of files exclude the known causes; this catches the others.
 
     Raises:
-        TrajectoryError: an overflow, a division by zero, equations without a solution.
+        TrajectoryError: an overflow, a division by zero, or equations without a solution.
     """
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):

@@ -1,4 +1,4 @@
-"""Splines of polynomials of degree 7, given by their value, velocity, acceleration and jerk."""
+"""Splines of polynomials of degree 7, given by value and three derivatives at each knot."""
 
 from bisect import bisect_right
 from typing import Any
@@ -30,7 +30,8 @@ def _coefficients_from_ends() -> Floats:
 
 
 FROM_ENDS = _coefficients_from_ends()
-"""Matrix (8, 8) from end states to coefficients. Its entries are multiples of 1/6 and exact."""
+"""Matrix (8, 8) from the states at both ends of a piece to its coefficients. It is exact: its
+entries are multiples of 1/6."""
 
 
 class SepticSpline:
@@ -71,7 +72,7 @@ class SepticSpline:
         return [_horner(piece, u) for piece in self._pieces[index]]
 
     def along(self, times: Floats) -> Floats:
-        """Like `at`, at (m,) times at once; (m, n, 4)."""
+        """Like `at`, for many `times` (m,) at once; returns (m, n, 4)."""
         knots, pieces = self._arrays
         index = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(pieces) - 1)
         u = (times - knots[index])[:, None]

@@ -38,7 +38,7 @@ class _Piece(NamedTuple):
         return 2.0 * self.c + 6.0 * self.d * u
 
     def area(self, u: Number) -> Number:
-        """∫ w du from 0 to u: the stretched time, in widths of a piece."""
+        """∫ w du from 0 to u: stretched time / original duration of the piece."""
         return u * (self.a + u * (self.b / 2.0 + u * (self.c / 3.0 + u * self.d / 4.0)))
 
 

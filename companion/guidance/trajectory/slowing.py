@@ -1,12 +1,12 @@
-"""A trajectory slowed down where it breaks limits.
+"""Slows a trajectory down where it breaks limits.
 
 The path stays the same; only its timing changes. A moment is one of the times at which limits are
 checked.
 
-1. For each moment, find the factor by which the whole trajectory would have to be slowed down for
-   this moment to keep all limits except the fence.
-2. Find a smooth function of time, the stretch factor (`SlowerTime`), that is nowhere below that
-   factor. With it the vehicle brakes before a slow part and speeds up after it.
+1. For each moment, find the needed factor: if the whole trajectory were slowed down by it, this
+   moment would keep all limits except the fence.
+2. Find a smooth function of time, the stretch factor (`SlowerTime`), that is nowhere below the
+   needed factor. With it the vehicle brakes before a slow part and speeds up after it.
 3. Braking needs acceleration, so check the limits again, and raise the stretch factor where a limit
    is broken.
 
@@ -31,7 +31,7 @@ _FACTOR_PRECISION = 1e-3
 _BISECTIONS = 16
 """Number of bisection steps in the search for the factor of one moment."""
 _WIDTHS, _FEWEST_PIECES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2), 4
-"""Durations of one piece of the stretch factor to try, s, and the fewest pieces, as in a ramp."""
+"""Durations of one piece of the stretch factor to try, s, and the smallest number of pieces."""
 _MOST_ROUNDS = 60
 """Largest number of times that the stretch factor is raised before the search gives up."""
 _LEAST_RAISE, _LARGEST_RAISE = 0.004, 0.1
@@ -43,7 +43,7 @@ _EVEN_MOMENTS = 8000
 _SHORTEST_STEP = 0.006
 """Shortest step between evenly spaced moments, s."""
 _MOMENTS_A_PIECE = 8.0
-"""Fewest moments in each piece of the stretch factor; fewer could miss the extreme of a ramp."""
+"""Smallest number of moments in each piece of the stretch factor; fewer could miss an extreme."""
 _LONG_GAP_FACTOR = 3.0
 """A gap between check times is filled if it is this many times as long as the median gap."""
 _WORTHWHILE_SHARE = 0.98
@@ -141,7 +141,7 @@ def _slowed_evenly(
 
 
 def _denser_times(times: Floats) -> Floats:
-    """The check times, evenly spaced ones, and more in laps and other gaps without check times."""
+    """The check times, evenly spaced times, and more in gaps such as laps without check times."""
     gaps = np.diff(times)
     usual = float(np.median(gaps[gaps > 0.0])) if gaps.size else 1.0
     length = float(times[-1])
@@ -167,7 +167,7 @@ def _best_law(motion: Motion, length: float, envelope: Envelope) -> SlowerTime |
 
 
 def _needed_factors(motion: Motion, envelope: Envelope) -> Floats:
-    """Factor of slowing the whole trajectory with which each moment keeps the limits, (m,)."""
+    """The needed factor of each moment, (m,); see step 1 in the module's docstring."""
     low, high = np.zeros_like(motion.times), np.full_like(motion.times, np.log(_LARGEST_FACTOR))
     high[_largest_excess(motion, envelope) <= 0.0] = 0.0
     for _ in range(_BISECTIONS):
@@ -178,7 +178,7 @@ def _needed_factors(motion: Motion, envelope: Envelope) -> Floats:
 
 
 def _largest_excess(motion: Motion, envelope: Envelope) -> Floats:
-    """The largest excess of a limit at each moment, (m,)."""
+    """The largest relative excess over any limit but the fence at each moment, (m,)."""
     nothing = np.full_like(motion.times, -1.0)
     over: Floats = np.max([nothing, *excess(motion, envelope).values()], axis=0)
     return over
@@ -189,7 +189,7 @@ def _law_of_width(
 ) -> SlowerTime | None:
     """The stretch factor with pieces of `width` s that keeps all limits; None if none is found.
 
-    `needed` is the factor of each moment, (m,); `length` is the duration of the trajectory, s.
+    `needed` is the needed factor of each moment, (m,); `length` the original duration, s.
     """
     count = int(np.ceil(length / width))
     piece = np.clip((motion.times * (count / length)).astype(int), 0, count - 1)
@@ -241,7 +241,7 @@ def _parts(motion: Motion, law: SlowerTime, envelope: Envelope) -> Iterator[Slow
 
 
 def _most_exceeded_limit(motion: Motion, envelope: Envelope, moments: Any) -> str:
-    """The limit that `moments` exceed most at the original speed; the fence if they exceed none."""
+    """The limit that `moments` exceed most at the original speed; if none, that of the fence."""
     most = {name: float(over[moments].max()) for name, over in excess(motion, envelope).items()}
     limit = max(most, key=most.__getitem__, default="")
     if limit and most[limit] > 0.0:

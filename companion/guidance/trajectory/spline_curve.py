@@ -10,7 +10,7 @@ from companion.guidance.trajectory.curves import (
     PhaseSampling,
     require_checkable,
 )
-from companion.guidance.trajectory.minimum_snap import Fixed, Observations, minimum_snap
+from companion.guidance.trajectory.minimum_snap import FixedStates, Observations, minimum_snap
 from companion.guidance.trajectory.sample import TrajectoryError
 from companion.guidance.trajectory.septic_spline import STATE_SIZE, Floats, SepticSpline
 
@@ -38,7 +38,7 @@ class SplineCurve:
         spline: three times continuously differentiable.
         checks_per_piece: smallest number of checks in each piece; an extreme between two checks is
             missed by less than 0.3 %.
-        longest_step: largest phase between two checks; a heading may need a short one.
+        longest_step: largest phase between two checks, s; a heading may need a short one.
     """
 
     spline: SepticSpline
@@ -49,7 +49,7 @@ class SplineCurve:
         """Evenly spaced checks in each piece, more in long and in fast pieces.
 
         Raises:
-            TrajectoryError: it takes too many checks.
+            TrajectoryError: the curve needs too many checks.
         """
         knots = self.spline.knots
         spans = np.diff(knots)
@@ -119,7 +119,7 @@ def smoothed(
         Observations(times, known, weights / omega ** (2 * order), order)
         for order, known in enumerate((values, *derivatives))
     )
-    return minimum_snap(knots, Fixed(states, mask), tuple(observations), omega**-8.0)
+    return minimum_snap(knots, FixedStates(states, mask), tuple(observations), omega**-8.0)
 
 
 def heading_spline(times: Floats, headings: Floats, resting: tuple[bool, bool]) -> SplineHeading:

@@ -32,7 +32,7 @@ class Polyline:
     legs: tuple[Straight, ...]
 
     def sampling(self) -> PhaseSampling:
-        """The phases at which to check it: at equal distances."""
+        """The phases at which to check the lines: at equal distances."""
         return PhaseSampling(PATH_STEP)
 
     def at(self, phase: float) -> CurvePoint:
@@ -44,7 +44,7 @@ class Polyline:
 
 
 class Legs:
-    """One leg after another, each from rest to rest in pieces of constant jerk."""
+    """Time law of legs one after another, each from rest to rest in pieces of constant jerk."""
 
     def __init__(self, legs: Sequence[LimitedJerk], phases: Sequence[float]) -> None:
         """Join the legs.
@@ -85,8 +85,8 @@ def straight_legs(
         speed: largest speed, m/s.
         acceleration: largest acceleration, m/s².
         jerk: largest jerk, m/s³.
-        headings: heading at each point, rad from north, or None for any. The vehicle turns on the
-            way, the short way round. Empty: it holds its heading.
+        headings: heading at each point, rad from north, or None for any. The vehicle turns during
+            the legs, the short way round. Empty: it holds its heading.
 
     Raises:
         TrajectoryError: there are no points, two consecutive points are equal, a limit is not

@@ -1,4 +1,4 @@
-"""Time laws: progress along a curve over time."""
+"""Time laws: the phase of a curve (progress along it) as a function of time."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ class Progress(NamedTuple):
 
     Attributes:
         phase: phase in the curve's unit (rad, m or s).
-        first, second, third: derivatives, in that unit per s, s², s³.
+        first, second, third: its derivatives by time, in that unit per s, s², s³.
     """
 
     phase: float
@@ -123,8 +123,8 @@ class Cruise:
     With both ramps 0 the rate is steady from the start, for curves that rest at their ends.
 
     Attributes:
-        length: phase at the end.
-        rate: steady rate, per s.
+        length: phase at the end; the phase begins at 0.
+        rate: steady rate of the phase, per s.
         rise_time: time in which the rate rises, s.
         fall_time: time in which the rate falls, s.
         ramp: how the rate rises and, mirrored, falls: (rate, duration of the ramp in s, time in s)

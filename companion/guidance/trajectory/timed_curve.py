@@ -1,7 +1,7 @@
 """A curve with a time law along it, and the times at which to check it against limits.
 
-Where the rate of the time law is constant, all laps of a figure are alike, so only the first and
-the last one are checked (a helix is lowest and highest in them). The ramps are checked completely.
+Where the rate of the time law is constant, all laps of a figure are alike. So only the first and
+the last lap are checked; a helix is lowest and highest there. The ramps are checked completely.
 Two checks are so close in phase and path length that an extreme between them is missed by less than
 0.3 %; `tests/trajectory/test_check_times.py` compares them with a finer grid.
 """
@@ -62,7 +62,7 @@ def require_duration(seconds: float, longest: float = LONGEST) -> None:
 
 
 def _checked_parts(piece: Piece, sampling: PhaseSampling, law: TimeLaw) -> Iterator[Piece]:
-    """The parts to check: the piece, or its first and last lap if it is steady and longer."""
+    """The parts to check: the whole piece, or only the first and last lap of a long steady one."""
     if piece.steady and sampling.period is not None:
         lap = sampling.period / law.at(piece.begin).first
         if piece.end - piece.begin > 2.0 * lap:
@@ -109,7 +109,7 @@ class Heading(Protocol):
 
 
 class HeldHeading:
-    """Keeps the heading at the start."""
+    """Keeps the heading that the vehicle has at the start, whatever it is."""
 
     def at(self, phase: float, point: CurvePoint) -> tuple[float, float]:
         """0: the heading does not change."""
@@ -118,7 +118,7 @@ class HeldHeading:
 
 @dataclass(frozen=True, slots=True)
 class FixedHeading:
-    """Keeps one heading.
+    """Keeps a given heading.
 
     Attributes:
         heading: rad from north.
@@ -177,14 +177,14 @@ class TimedCurve:
 
     @property
     def holds_heading(self) -> bool:
-        """Whether it keeps the heading at its start."""
+        """Whether the vehicle keeps the heading that it has at the start."""
         return isinstance(self.heading, HeldHeading)
 
     def check_times(self) -> list[float]:
         """Times at which to check it against limits, s.
 
         Raises:
-            TrajectoryError: it is too long to be checked.
+            TrajectoryError: the trajectory is too long to be checked.
         """
         return check_times(self.curve.sampling(), self.law, self.longest)
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.guidance.finite import finite_vector
-from companion.guidance.trajectory.minimum_snap import Fixed, minimum_snap
+from companion.guidance.trajectory.minimum_snap import FixedStates, minimum_snap
 from companion.guidance.trajectory.sample import SMALLEST_DISTANCE, TrajectoryError, Vector
 from companion.guidance.trajectory.septic_spline import STATE_SIZE, Floats, SepticSpline
 from companion.guidance.trajectory.spline_curve import (
@@ -98,7 +98,7 @@ def _place(point: Vector) -> Vector:
     """A waypoint as three finite numbers.
 
     Raises:
-        TrajectoryError: it is something else.
+        TrajectoryError: `point` is not three finite numbers.
     """
     try:
         return finite_vector("each waypoint", point)
@@ -125,7 +125,9 @@ def _spline_through(knots: Floats, places: Floats) -> SepticSpline:
     """A spline through the places (k, n) at the knots, from rest to rest."""
     states = np.zeros((knots.size, STATE_SIZE, places.shape[1]))
     states[:, 0] = places
-    return minimum_snap(knots, Fixed(states, _rest_to_rest_mask(np.ones(knots.size, dtype=bool))))
+    return minimum_snap(
+        knots, FixedStates(states, _rest_to_rest_mask(np.ones(knots.size, dtype=bool)))
+    )
 
 
 def _rest_to_rest_mask(values: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -141,7 +143,7 @@ def _stretch_factor(
 ) -> float:
     """Factor for the knots with which the spline just meets the speed or the acceleration limit.
 
-    A minimum-snap spline over stretched knots has the same path.
+    A minimum-snap spline over knots stretched in time has the same path.
     """
     motion = _sampled(spline, knots)
     fastest, strongest = np.linalg.norm(motion[:, :, 1:3], axis=1).max(axis=0)
@@ -164,7 +166,7 @@ def given_headings(knots: Floats, headings: Sequence[float | None]) -> SplineHea
     given = np.array([angle is not None for angle in (None, *headings)])
     states = np.zeros((knots.size, STATE_SIZE, 1))
     states[given, 0, 0] = np.unwrap([angle for angle in headings if angle is not None])
-    return SplineHeading(minimum_snap(knots, Fixed(states, _rest_to_rest_mask(given))))
+    return SplineHeading(minimum_snap(knots, FixedStates(states, _rest_to_rest_mask(given))))
 
 
 def largest_detour(spline: SepticSpline, times: Floats | None = None) -> float:
