@@ -12,13 +12,13 @@ ROLL, PITCH = 0, 1
 class AxisLead:
     """Compensates the lag of one axis: commands ω + τ·ω̇ + σ·ω̈ for a planned rate ω.
 
-    The quicker axis (shorter dead time) receives older plans, so that a plan takes effect on both
+    The axis with the shorter dead time receives older plans, so that a plan takes effect on both
     axes at the same time.
 
     Args:
         index: `ROLL` or `PITCH`.
         axis: response of this axis.
-        wait: dead time of the other axis less that of this axis, s; 0 for the slower axis.
+        wait: dead time of the other axis minus that of this axis, s; 0 if that is negative.
         plans: plans of tilt and heading.
     """
 
@@ -31,24 +31,24 @@ class AxisLead:
         self._plans = plans
 
     def advance(self) -> None:
-        """Take the newest plan, or on the quicker axis the plan from `wait` seconds before it."""
+        """Take the plan for the time `wait` seconds before that of the newest plan."""
         plans = self._plans
         planned_for = plans.time - self._wait
         self._plan = plans.tilt.at(planned_for) if self._wait else plans.tilt.newest
         self._turn = plans.predicted_turn(planned_for, self._plan)
 
-    def command(self, dt: float, heading: float) -> float:
-        """Advance to the next plan; return the rate to send from the last plan to it, rad/s.
+    def command(self, dt: float, start_heading: float) -> float:
+        """Advance to the next plan; return the rate to send for the `dt` seconds before it, rad/s.
 
-        Both plans are rotated into the body axes, by the headings predicted for their times.
+        The last and the next plan are rotated into the body axes predicted for their times.
 
         Args:
-            dt: time between the two plans, s.
-            heading: heading of the body minus its predicted turn since the plans began, rad.
+            dt: time from the last plan to the next one, s.
+            start_heading: see `FeedForward.advance`.
         """
-        rate, slope = self._planned_rate(heading)
+        rate, slope = self._planned_rate(start_heading)
         self.advance()
-        rate_then, slope_then = self._planned_rate(heading)
+        rate_then, slope_then = self._planned_rate(start_heading)
         return (
             0.5 * (rate + rate_then)
             + self._lag / dt * (rate_then - rate)

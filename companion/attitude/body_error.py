@@ -14,7 +14,7 @@ from companion.attitude.types import Quaternion, Target
 def quaternion(
     q: Quaternion, target: Target, dt: float, constants: Constants
 ) -> tuple[float, float, float]:
-    """Body rates ω = 2p·vec(q⁻¹ ⊗ q_d), rad/s, by the shorter rotation."""
+    """Body rates ω = 2p·vec(q⁻¹ ⊗ q_d), rad/s, along the shorter rotation to the target."""
     north, east, heading, heading_rate = target
     error = body_error(q, attitude_of(north, east, heading))
     return _scaled_rates(error, 2.0 * constants.gain, heading_rate, constants)
@@ -23,7 +23,7 @@ def quaternion(
 def so3(
     q: Quaternion, target: Target, dt: float, constants: Constants
 ) -> tuple[float, float, float]:
-    """Body rates ω = p·Log(q⁻¹ ⊗ q_d), rad/s, by the shorter rotation."""
+    """Body rates ω = p·Log(q⁻¹ ⊗ q_d), rad/s, along the shorter rotation to the target."""
     north, east, heading, heading_rate = target
     error = body_error(q, attitude_of(north, east, heading))
     w, x, y, z = error

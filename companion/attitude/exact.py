@@ -20,7 +20,7 @@ SHORTEST_PERIOD = 1e-4
 at most 1e-4·p (relative).
 """
 LONGEST_PERIOD = 1.0
-"""A longer sample period counts as this, s."""
+"""Longest sample period that is used, s; a longer one counts as this."""
 
 _SETTLED_CHANGE = 1e-14
 """The fixed-point iteration ends when its factor changes by less than this."""
@@ -31,14 +31,13 @@ _MAX_ITERATIONS = 20
 def exact(
     q: Quaternion, target: Target, dt: float, constants: Constants
 ) -> tuple[float, float, float]:
-    """The constant body rate that takes the vehicle in `dt` s to the state of the linear model.
+    """The constant body rates, rad/s, that reach the state of the linear model after `dt` s.
 
-    In that state the coefficients are c_d + (c − c_d)·e^(−p·dt), or as far along that line as the
-    limits allow. The heading error has shrunk by the factor e^(−k·dt), and the turn of the target
-    at its heading rate is added. The vehicle moves there by the shortest rotation, so at the
-    samples the response is exact at any sample rate. Beyond the recovery angle the law is faded
-    into a rotation towards level, as in `first-order`. Rates are in rad/s; more than 1 s count as
-    1 s.
+    In that state the coefficients are c_d + (c − c_d)·e^(−p·dt), or as far along the line to c_d as
+    the limits allow. The heading error has shrunk by the factor e^(−yaw_gain·dt), and the heading
+    has also turned by heading_rate·dt. The vehicle moves there by the shortest rotation, so at the
+    samples the response is exact at any sample rate. Beyond the recovery angle the law fades into a
+    rotation towards level, as in `first-order`. A `dt` above 1 s counts as 1 s.
     """
     gain, yaw_gain, max_rate, max_yaw_rate, max_speed, _, _, _, cos_recovery, slope = constants
     dt = dt if dt > SHORTEST_PERIOD else SHORTEST_PERIOD
@@ -153,10 +152,10 @@ def _reachable_share(
     part: float,
     half_sine: float,
 ) -> float:
-    """Share of the line to the target that the thrust axis covers in a turn by Θ.
+    """Share of the line to the target that the coefficients cover if the thrust axis turns by Θ.
 
-    `half_sine` is sin(Θ/2); the result is at most `part`. With n(s) the thrust axis at the share s
-    of the line, n(0)·n(s) = cos Θ is a quadratic in s.
+    `half_sine` is sin(Θ/2); the result is at most `part`. If n(s) is the thrust axis at the share s
+    of the line, n(0)·n(s) = cos Θ is a quadratic equation in s.
     """
     k = 2.0 * half_sine * half_sine  # 1 − cos Θ
     along = 2.0 * a * (x * remaining_east - y * remaining_north)

@@ -1,4 +1,4 @@
-"""The planned motion of `model-following`, and the rates that follow it in spite of the lag."""
+"""Plans the motion of `model-following`, and computes body rates that compensate the lag."""
 
 from math import sqrt
 
@@ -14,15 +14,15 @@ from companion.attitude.yaw import HeadingModel, TargetFrame, YawModel
 
 
 class FeedForward:
-    """Plans a smooth, straight motion within the limits, and the rates that make it.
+    """Plans a smooth, straight motion within the limits, and the body rates that follow it.
 
     The `ReferenceModel` plans the coefficients, the `HeadingModel` the heading. `AxisLead`
-    compensates the lag of each axis. The rates take effect one dead time later; the quicker axis
-    is delayed, so that roll and pitch take effect at the same time.
+    compensates the lag of each axis. The rates take effect one dead time later. The axis with the
+    shorter dead time is delayed, so that roll and pitch take effect at the same time.
 
-    Yaw responds slowly, so the heading moves while the vehicle tilts. `YawModel` predicts this from
-    the yaw rates that were sent. Roll and pitch rates are along the body axes predicted for the
-    time when they take effect.
+    Yaw responds slowly, so the heading changes while the vehicle tilts. `YawModel` predicts this
+    from the yaw rates that were sent. Roll and pitch rates are along the body axes predicted for
+    the time when they take effect.
 
     Args:
         constants: gains and limits.
@@ -67,9 +67,9 @@ class FeedForward:
         self._heading.retune(constants)
 
     def start(self, q: Quaternion, body_rates: BodyRates | None) -> None:
-        """Begin the plan at `q`, a unit quaternion with a tilt below the recovery angle.
+        """Start the plan at `q`, a unit quaternion with a tilt below the recovery angle.
 
-        `body_rates`: rates at the beginning of the plan, rad/s; None: at rest.
+        `body_rates`: rates at the start of the plan, rad/s; None: at rest.
         """
         w, x, y, z = q
         square, ax, ay = tilt_products(w, x, y, z)
@@ -101,13 +101,14 @@ class FeedForward:
         self._pitch.advance()
 
     def advance(
-        self, target: Target, heading: float, yaw_feedback: float, dt: float
+        self, target: Target, start_heading: float, yaw_feedback: float, dt: float
     ) -> tuple[float, float, float]:
         """Advance the plan by `dt` s; return lag-compensated body rates that follow it, rad/s.
 
         Args:
             target: an admissible target.
-            heading: heading of the body minus its predicted turn since the plans began, rad.
+            start_heading: heading at the start of the plan, rad, computed from the present one: the
+                body's heading minus its predicted turn since the start.
             yaw_feedback: feedback to add to the yaw rate, rad/s.
             dt: time by which the plan advances, s.
         """
@@ -127,7 +128,7 @@ class FeedForward:
         mean_still = 0.5 * (still_before + still_after)
         self.frame.advance(yaw, mean_still, dt)
         self._append_plan(x, y, mean_still * dt, dt)
-        return self._roll.command(dt, heading), self._pitch.command(dt, heading), yaw
+        return self._roll.command(dt, start_heading), self._pitch.command(dt, start_heading), yaw
 
     def _append_plan(self, x: float, y: float, still_turn: float, dt: float) -> None:
         """Append the plan for the time `dt` seconds later.
@@ -135,7 +136,7 @@ class FeedForward:
         Args:
             x: planned roll rate at heading 0, rad/s.
             y: planned pitch rate at heading 0, rad/s.
-            still_turn: yaw during `dt` that keeps the heading still, rad.
+            still_turn: yaw angle during `dt` that keeps the heading still, rad.
             dt: s.
         """
         model, body = self._model, self._body

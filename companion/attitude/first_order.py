@@ -20,10 +20,10 @@ def first_order(
 ) -> tuple[float, float, float]:
     """Body rates, rad/s, under which the acceleration coefficients follow ċ = p·(c_d − c).
 
-    The coefficients move on a straight line to the target, at the same speed at every heading. Both
-    limits, on the tilt rate and on the speed of the coefficients (equation 33), scale the whole
-    tilt rate, so the line stays straight. Beyond the recovery angle the law, with its control of
-    the heading, is faded into a rotation towards level: the heading is undefined upside down.
+    The coefficients move on a straight line to the target, at the same speed at every heading. The
+    limits on the tilt rate and on the speed of the coefficients (equation 33) scale roll and pitch
+    together, so the line stays straight. Beyond the recovery angle the law fades into a rotation
+    towards level without control of the heading, which is undefined upside down.
     """
     gain, yaw_gain, _, max_yaw_rate, _, rate_weight, speed_weight, _, cos_low, slope = constants
     w, x, y, z = q

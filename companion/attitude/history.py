@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Generic, NamedTuple, TypeVar
 
 _ROWS_PER_DROP = 64
-"""Number of rows, older than the longest delay, that are dropped at a time."""
+"""Number of rows that are dropped at a time once they are older than the longest delay."""
 
 
 def locate_time(times: Sequence[float], time: float) -> tuple[int, float]:
@@ -48,7 +48,7 @@ class PlannedYaw(NamedTuple):
     Attributes:
         heading: planned heading, rad, not wrapped.
         turned: integral of `turning` since the start, rad.
-        turning: predicted yaw rate of the body, its response to the rates sent, rad/s.
+        turning: predicted yaw rate of the body in response to the rates sent, rad/s.
     """
 
     heading: float
@@ -74,7 +74,7 @@ class History(Generic[Row]):
         self._rows: list[Row] = []
 
     def start(self, time: float, row: Row, motion: Row) -> None:
-        """Start again with `row` at `time`, s; earlier rows change by `motion` per second."""
+        """Start again with `row` at `time`, s; before that, rows change by `motion` per second."""
         earlier = type(row)(*[a - self._span * b for a, b in zip(row, motion, strict=True)])
         self._times[:] = [time - self._span, time]
         self._rows[:] = [earlier, row]
@@ -100,11 +100,11 @@ class History(Generic[Row]):
 
 
 class Turn(NamedTuple):
-    """Predicted change of the body's heading when a plan takes effect.
+    """The predicted turn of the body when a plan takes effect.
 
     Attributes:
-        angle: change of the heading since the plans began, rad.
-        rate: its rate, rad/s.
+        angle: change of the heading since the start of the plans, rad.
+        rate: rate of the heading, rad/s.
     """
 
     angle: float
@@ -145,14 +145,14 @@ class PlanHistory:
         self.yaw.add(self.time, yaw)
 
     def in_effect(self, late: float) -> tuple[PlannedTilt, PlannedYaw]:
-        """The plans in effect at a sample that came `late` seconds after it was expected."""
+        """The plans of tilt and heading in effect at a sample that came `late` s too late."""
         now = self.time + late
         return self.tilt.at(now - self._dead_time), self.yaw.at(now - self._yaw_dead_time)
 
     def predicted_turn(self, planned_for: float, plan: PlannedTilt) -> Turn:
-        """How far the heading has turned when `plan` for the time `planned_for` (s) takes effect.
+        """The turn of the body when `plan`, which is for the time `planned_for` (s), takes effect.
 
-        The heading turns at the body's yaw rate less the yaw rate that keeps it still.
+        The heading turns at the body's yaw rate minus the yaw rate that keeps it still.
         """
         if plan is not self._turn_plan:  # both axes and the attitude target ask for the newest plan
             acts = planned_for + self._dead_time
@@ -162,7 +162,7 @@ class PlanHistory:
         return self._turn
 
     def yaw_within(self, seconds: float) -> float:
-        """Yaw of the body, rad, in the `seconds` after the newest tilt plan takes effect."""
+        """Predicted yaw of the body, rad, in the `seconds` after the newest tilt plan acts."""
         acts = self.time + self._dead_time - self._yaw_dead_time
         return self.yaw.at(acts + seconds).turned - self.yaw.at(acts).turned
 
@@ -175,12 +175,12 @@ class SampleHold:
     """Corrects the rates for samples that come earlier or later than expected.
 
     The rates of each step of the plan are meant for the expected sample period, but the vehicle
-    keeps them until the next sample. If that is late or early (PX4: after 4 or 8 ms, ArduPilot:
-    some in pairs), the vehicle has turned too far or not far enough, and a step would not be
-    straight. The next rates correct this, for a delay of one period at most.
+    keeps them until the next sample. If that sample is late or early (PX4: after 4 or 8 ms,
+    ArduPilot: some in pairs), the vehicle has turned too far or not far enough, and a step would
+    not be straight. The next rates correct this, for a delay of one period at most.
 
     Attributes:
-        late: how much later than expected the sample came, s.
+        late: how much later than expected the newest sample came, s; negative if it was early.
         period: expected sample period, s; 0 before the first sample.
         step: time by which the plan advances, s.
     """
@@ -205,7 +205,7 @@ class SampleHold:
         self._late_share = min(late / period, 1.0)
 
     def rates(self, roll: float, pitch: float) -> tuple[float, float]:
-        """The planned rates, corrected for the lateness of this answer, rad/s.
+        """The planned rates, corrected because the newest sample came late or early, rad/s.
 
         Args:
             roll: mean roll rate that is planned for the newest step, rad/s.

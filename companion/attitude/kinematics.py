@@ -50,8 +50,8 @@ def speed_to_rates(
     """Body rates (rad/s) that give d(2ax)/dt = e_x, d(2ay)/dt = e_y and keep the heading still.
 
     Equations 21 to 24 with their common term (y·e_x − x·e_y) factored out, then equation 28.
-    `inverse` is 1/a². `inverse_cos_tilt` is 1/cos(tilt); near 90° the caller may bound it, so that
-    the rates stay bounded.
+    `inverse` is 1/a². `inverse_cos_tilt` is 1/cos(tilt); the caller may bound it near 90° of tilt,
+    so that the rates stay bounded.
     """
     across = 2.0 * inverse * (ay * e_x - ax * e_y)
     r_x = inverse_cos_tilt * (e_x - ay * across)
@@ -69,10 +69,10 @@ def into_body(cosine: float, sine: float, r_x: float, r_y: float) -> tuple[float
 def rates_to_speed(
     w: float, x: float, y: float, z: float, roll: float, pitch: float, yaw: float
 ) -> tuple[float, float, float]:
-    """Speed of the coefficients (north, east; 1/s) and of the heading (rad/s) under body rates.
+    """Speed of the coefficients (north, east; 1/s) and of the heading (rad/s) at given body rates.
 
-    It is the inverse of `speed_to_rates`. Under body rates ω in rad/s the thrust axis −R·e_z moves
-    with −R·(ω × e_z). The heading turns at the yaw rate less the R_z that would keep it still.
+    The inverse of `speed_to_rates`. At body rates ω (rad/s) the thrust axis −R·e_z moves with
+    −R·(ω × e_z). The heading turns at the yaw rate minus R_z, the yaw rate that keeps it still.
     """
     north = 2.0 * (x * y - w * z) * roll - (1.0 - 2.0 * (y * y + z * z)) * pitch
     east = (1.0 - 2.0 * (x * x + z * z)) * roll - 2.0 * (x * y + w * z) * pitch
@@ -85,8 +85,8 @@ def rates_to_speed(
 def heading_of(a: float, w: float, z: float) -> float:
     """Tilt-yaw heading 2·atan2(z, w) in rad, in [−π, π]; a² = w² + z², a > 0.
 
-    It is equal for q and −q; only a half turn may be −π for one and π for the other. It is computed
-    by the half angle, so that the argument of the arctangent lies between −1 and 1.
+    It is equal for q and −q, but a half turn may be −π for one and π for the other. The half-angle
+    formula keeps the argument of the arctangent between −1 and 1.
     """
     return 4.0 * atan(z / (w + a if w >= 0.0 else w - a))
 
@@ -96,11 +96,11 @@ SMALLEST_A = 1e-12
 
 
 def share_of_law(cosine: float, cos_recovery: float, slope: float) -> float:
-    """Weight of the law against the rotation to level, a smooth function of the tilt's `cosine`.
+    """Weight of the law beyond the recovery angle; the rest is the weight of the rotation to level.
 
-    It is 1 at the recovery angle and 0 from `limits.RECOVERY_BLEND_ANGLE` (10°) beyond it. Below
-    the recovery angle only the law acts, and this formula is not valid. `slope` is
-    `Constants.recovery_slope`.
+    It falls smoothly from 1 at the recovery angle to 0 at `limits.RECOVERY_BLEND_ANGLE` (10°) more
+    tilt. Below the recovery angle only the law acts, and this formula is not valid. `cosine` is
+    cos(tilt), `slope` is `Constants.recovery_slope`.
     """
     ratio = 1.0 + slope * (cosine - cos_recovery)
     if ratio <= 0.0:
@@ -111,11 +111,11 @@ def share_of_law(cosine: float, cos_recovery: float, slope: float) -> float:
 def levelling_rates(
     gain: float, a: float, inverse: float, w: float, x: float, y: float, z: float
 ) -> tuple[float, float]:
-    """Body rates (roll, pitch) that rotate the vehicle to level, 2·gain·sin(tilt/2), rad/s.
+    """Body rates (roll, pitch) that rotate the vehicle to level at 2·gain·sin(tilt/2), rad/s.
 
-    `inverse` is 1/a². They turn about the tilt axis and do not divide by cos(tilt), so they are
-    valid up to the inverted attitude. Inverted, every axis leads to level equally fast; q and −q
-    are given the same axis.
+    The rotation is about the tilt axis and is not divided by cos(tilt), so it is valid up to the
+    inverted attitude. There every axis leads to level equally fast; q and −q give the same axis.
+    `inverse` is 1/a².
     """
     if a <= SMALLEST_A:
         scale = 2.0 * gain if first_is_negative(x, y, 0.0) else -2.0 * gain

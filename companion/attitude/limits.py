@@ -10,7 +10,7 @@ _SMALLEST_LIMIT = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Bounds on tilt and body rates; `None` is no limit.
+    """Limits of tilt and body rates; `None` is no limit.
 
     Attributes:
         max_tilt: largest tilt of a target, rad, in (0, π/2).
@@ -74,7 +74,7 @@ RECOVERY_BLEND_ANGLE = radians(10.0)
 class Constants(NamedTuple):
     """Gains, limits and recovery angle of one planner; a limit that is not set is infinite.
 
-    A weight is 1/limit², and 0 without a limit: a rate exceeds its limit when weight·rate² > 1.
+    A weight is 1/limit², and 0 without a limit: a quantity exceeds its limit if weight·value² > 1.
     """
 
     gain: float  # p, 1/s
@@ -84,9 +84,9 @@ class Constants(NamedTuple):
     max_speed: float  # of the coefficients, 1/s: W_M·cos(max_tilt) in the paper's shape (eq 33)
     tilt_rate_weight: float  # s²/rad²
     speed_weight: float  # s²
-    longest_target: float  # coefficients, sin of the largest tilt
+    longest_target: float  # largest length of target coefficients: sin of the largest tilt
     cos_recovery: float  # below this cosine of the tilt, recovery begins
-    recovery_slope: float  # 1/(cos(recovery angle) − cos(recovery angle + RECOVERY_BLEND))
+    recovery_slope: float  # 1/(cos(recovery angle) − cos(recovery angle + RECOVERY_BLEND_ANGLE))
 
 
 def make_constants(

@@ -66,11 +66,11 @@ class ModelFollowingPlanner:
         self._forward.retune(constants)
 
     def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
-        """Begin a new plan at `q`: after a gap, a change of mode, or a jump of the estimate.
+        """Start a new plan at `q`: after a gap, a change of mode, or a jump of the estimate.
 
         Args:
-            q: attitude; beyond the recovery angle the plan begins when the tilt is below it.
-            body_rates: rates at the beginning of the plan, rad/s; None or implausible: at rest.
+            q: attitude; if its tilt is beyond the recovery angle, the plan starts once it is below.
+            body_rates: rates at the start of the plan, rad/s; None or implausible: at rest.
 
         Raises:
             InvalidQuaternionError: `q` is not a unit quaternion.
@@ -92,8 +92,8 @@ class ModelFollowingPlanner:
         """Take the attitude target of ArduPilot, which takes body rates along the target's axes.
 
         Args:
-            q: attitude target; ignored if it is not a unit quaternion or beyond the recovery angle,
-                and before the plan has begun.
+            q: attitude target. It is ignored before the plan has started, if it is not a unit
+                quaternion, and if its tilt is beyond the recovery angle.
             age: time from the attitude target to the newest sample, s.
         """
         if not (self._started and is_unit(q)):
@@ -108,8 +108,8 @@ class ModelFollowingPlanner:
     ) -> BodyRates:
         """Body rates to send at attitude `q`, rad/s; `dt` is the time since the last sample, s.
 
-        More than 0.2 s count as 0.2 s: reset the planner after a gap.
-        `body_rates` are the measured ones, rad/s; None or implausible: they count as predicted.
+        A `dt` above 0.2 s counts as 0.2 s; reset the planner after such a gap.
+        `body_rates` are measured, rad/s; if they are None or implausible, predicted ones are used.
 
         Raises:
             InvalidQuaternionError: `q` is not a unit quaternion.
@@ -154,20 +154,20 @@ class ModelFollowingPlanner:
         )
 
     def _advance(
-        self, target: Target, heading: float, yaw_feedback: float
+        self, target: Target, start_heading: float, yaw_feedback: float
     ) -> tuple[float, float, float]:
-        """Advance the plan to when the next sample is expected; see `FeedForward.advance`.
+        """Advance the plan to the time of the next expected sample; see `FeedForward.advance`.
 
-        If the sample came late, the plan first follows the previous target for the time by which it
-        was late, because the new target was not yet in force in that time.
+        If the newest sample came late, the plan first follows the previous target for that delay,
+        because the new target was not in force then.
         """
         hold, forward = self._hold, self._forward
         before, self._target = self._target, target
         if before is None or before == target or hold.late < SHORTEST_PERIOD:
-            return forward.advance(target, heading, yaw_feedback, hold.step)
+            return forward.advance(target, start_heading, yaw_feedback, hold.step)
         late, coming = hold.late, hold.step - hold.late
-        late_roll, late_pitch, _ = forward.advance(before, heading, yaw_feedback, late)
-        roll, pitch, yaw = forward.advance(target, heading, yaw_feedback, coming)
+        late_roll, late_pitch, _ = forward.advance(before, start_heading, yaw_feedback, late)
+        roll, pitch, yaw = forward.advance(target, start_heading, yaw_feedback, coming)
         share = late / hold.step
         return roll + share * (late_roll - roll), pitch + share * (late_pitch - pitch), yaw
 
@@ -179,9 +179,9 @@ class ModelFollowingPlanner:
         east: float,
         heading: float,
     ) -> tuple[float, float, float]:
-        """Feedback towards the plan: speed of north, east (1/s) and heading (rad/s).
+        """Feedback towards the plan: speeds of the coefficients (1/s) and of the heading (rad/s).
 
-        It is 0 in the first dead time after a start, when no plan has taken effect yet.
+        It is 0 in the first dead time after the start, when no plan has taken effect yet.
         """
         speed_north = speed_east = turn = 0.0
         forward = self._forward

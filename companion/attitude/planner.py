@@ -56,7 +56,7 @@ class Planner(Protocol):
 
 
 _NO_TARGET = object()
-"""Marks that no target is remembered; None will not do, because a caller may pass it."""
+"""Marks that there is no last target. None cannot mark this, because a caller may pass None."""
 
 
 class LawPlanner:
@@ -155,7 +155,7 @@ def make_planner(
 
     Raises:
         TypeError: the planner does not take an option, the law does not return three numbers, or
-            the class has not the methods of a planner.
+            the class lacks a method of `Planner`.
         ValueError: unknown name, a value out of range, or `model-following` without `lag` or
             `dead_time`.
     """
@@ -174,10 +174,10 @@ def make_planner(
 
 
 def _made_planner(factory: PlannerFactory, constants: Constants) -> Planner:
-    """A planner of a user's class.
+    """Make a planner of a user's class.
 
     Raises:
-        TypeError: it has not the methods of a planner.
+        TypeError: it lacks a method of `Planner`.
     """
     planner = factory(constants)
     for method in ("rates", "reset", "note_attitude_target"):
@@ -187,10 +187,12 @@ def _made_planner(factory: PlannerFactory, constants: Constants) -> Planner:
 
 
 def _require_three_rates(name: str, planner: LawPlanner) -> None:
-    """Ask a user's law once, at level; a law that raises will raise where it is used.
+    """Call a user's law once, at level, and check what it returns.
+
+    An error that the law raises here is ignored: it will be raised where the law is used.
 
     Raises:
-        TypeError: it does not return three numbers.
+        TypeError: the law does not return three numbers.
     """
     level, target = (1.0, 0.0, 0.0, 0.0), Target(0.0, 0.0, 0.0)
     try:

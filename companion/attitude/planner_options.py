@@ -12,7 +12,7 @@ from companion.attitude.rate_response import AxisResponse, RateResponse
 def constants_of(
     name: str, gain: float, yaw_gain: float, limits: Limits, options: Mapping[str, Any]
 ) -> Constants:
-    """The constants of a law.
+    """The constants of the planner `name`, which takes no option but `recovery_angle`.
 
     Raises:
         TypeError: there is an option that the planner `name` does not take.
@@ -78,7 +78,7 @@ def _like_roll(
     acceleration: float | None,
     damping: float,
 ) -> AxisResponse:
-    """An axis with these values; where one is None, with that of roll."""
+    """The response of an axis; a value that is None is that of roll."""
     return AxisResponse(
         roll.lag if lag is None else lag,
         roll.dead_time if dead_time is None else dead_time,

@@ -21,7 +21,7 @@ class PluginPlanner:
 
     Args:
         planner: planner of another package.
-        limits: limits of the body rates; its largest tilt is not applied.
+        limits: limits of the body rates; `max_tilt` is not applied.
     """
 
     def __init__(self, planner: Planner, limits: Limits) -> None:

@@ -9,8 +9,8 @@ _SMALLEST_LAG = 1e-3
 """Smallest lag that `model-following` computes with, s."""
 
 FIRST_ORDER_SHARE = 0.63
-"""The first-order lag that is closest to PX4's second-order lag, as a share of the latter; the rest
-is nearly a dead time."""
+"""Lag of the first-order model closest to PX4's second-order response, as a share of the lag of
+that response; the rest of the lag acts nearly like a dead time."""
 SHARE_OF_LARGEST_GAIN = 0.25
 """The feedback gain is at most this share of the largest stable gain: a gain margin of 4."""
 
@@ -20,7 +20,7 @@ class AxisResponse:
     """Response of one axis: dead time, then a slew limit, then a lag of gain 1.
 
     Attributes:
-        lag: τ, s; 2ζ/ω of a lag of second order. In both cases it is the mean delay.
+        lag: τ, s; for a lag of second order 2ζ/ω. It is the delay of a slowly changing command.
         dead_time: time from a sample to the first effect of the rates sent for it, s.
         acceleration: slew limit of the autopilot's rate setpoint, rad/s².
         damping: ζ of a lag of second order; infinite for first order.
@@ -32,7 +32,7 @@ class AxisResponse:
     damping: float = inf
 
     def with_least_lag(self) -> "AxisResponse":
-        """This response with a lag of at least 1 ms: a shorter one makes no difference."""
+        """This response with a lag of at least 1 ms; a shorter lag makes no difference."""
         return replace(self, lag=max(self.lag, _SMALLEST_LAG))
 
     @property
@@ -49,7 +49,7 @@ class RateResponse:
     Attributes:
         roll, pitch, yaw: response of each axis.
         frame_lead: time by which ArduPilot's attitude target leads the body in yaw, s; ArduPilot
-            takes the rates along the axes of that target. None: `lead_time` derives it.
+            takes body rates along the axes of that target. None: `lead_time` estimates it.
 
     Raises:
         ValueError: a time is negative, longer than 1 s or NaN, or a slew limit or damping is not
@@ -73,11 +73,11 @@ class RateResponse:
 
     @property
     def lead_time(self) -> float:
-        """`frame_lead`, or an estimate of it if it is None, s.
+        """`frame_lead`, or an estimate if that is None, s.
 
-        An autopilot with a slew limit in yaw is taken to behave like ArduPilot: its attitude target
-        turns as soon as roll and pitch begin to respond, and the body follows after the dead time
-        and lag of yaw. Without a slew limit the lead is 0: the axes are the body's own (PX4).
+        An autopilot with a slew limit in yaw is assumed to behave like ArduPilot: its attitude
+        target turns as soon as roll and pitch begin to respond, and the body follows after the dead
+        time and lag of yaw. Without a slew limit (PX4) rates are along the body's axes: it is 0.
         """
         if self.frame_lead is not None:
             return self.frame_lead
@@ -87,7 +87,7 @@ class RateResponse:
 
     @property
     def tilt(self) -> AxisResponse:
-        """A lag of first order with the mean times of roll and pitch, and the lower slew limit."""
+        """First-order response with mean lag and dead time of roll and pitch; lower slew limit."""
         roll, pitch = self.roll, self.pitch
         return AxisResponse(
             0.5 * (roll.lag + pitch.lag),
@@ -133,6 +133,6 @@ def largest_gain(lag: float, dead_time: float, sigma: float = 0.0) -> float:
 
 
 def feedback_gain(gain: float, axis: AxisResponse) -> float:
-    """The wanted `gain` (1/s), reduced if `axis` needs it for a gain margin of 4."""
+    """The wanted `gain`, 1/s, reduced where `axis` would have a gain margin below 4."""
     stable = SHARE_OF_LARGEST_GAIN * largest_gain(axis.lag, axis.dead_time, axis.sigma)
     return min(gain, stable)

@@ -11,10 +11,9 @@ from companion.attitude.types import Coefficients
 
 
 def distance_left(distance: float, gain: float, max_speed: float, dt: float) -> float:
-    """Distance to the target after `dt` seconds: first order with a largest speed.
+    """Distance d to the target after `dt` seconds of ḋ = −min(gain·d, max_speed).
 
-    d' = −min(gain·d, max_speed): at the largest speed (equation 33) until gain·d falls below it,
-    then exponential.
+    It falls at the largest speed (equation 33) until gain·d is below that, then exponentially.
     """
     beyond = gain * distance - max_speed
     if beyond > 0.0:
@@ -61,7 +60,7 @@ class SecondOrderReference:
 
     @classmethod
     def with_lag(cls, gain: float, lag: float) -> "SecondOrderReference":
-        """First order with gain p (1/s) behind a lag τ (s): c̈ = (p·(c_d − c) − ċ)/τ."""
+        """Model of a proportional gain p (1/s) behind a lag τ (s): c̈ = (p·(c_d − c) − ċ)/τ."""
         return cls(sqrt(gain / lag), 0.5 / sqrt(gain * lag))
 
     def after(
@@ -107,7 +106,7 @@ class SecondOrderReference:
 def first_order_step(rate: float, aim: float, lag: float, dt: float) -> tuple[float, float]:
     """One step of lag·ṙ = aim − r: the integral of r over `dt`, and r at the end.
 
-    `lag` and `dt` are in s; the integral is in the unit of `rate` times s.
+    `rate` is r at the start; `lag` and `dt` are in s.
     """
     kept = exp(-dt / lag)
     return aim * dt + (rate - aim) * lag * (1.0 - kept), aim + (rate - aim) * kept
@@ -124,8 +123,8 @@ def lag_step(
 ) -> tuple[float, float, float]:
     """One step of σ·r̈ + lag·ṙ = aim − r: the integral of r over `dt`, and r and ṙ at the end.
 
-    `sigma` is σ, s²; `slope` is ṙ at the start; `transition` is that of `Lag.transition`. In first
-    order `slope` has no effect, and 0 is returned for ṙ.
+    `rate` and `slope` are r and ṙ at the start; `sigma` is σ, s²; `transition` is
+    `Lag.transition(dt)`. If σ is 0, `slope` has no effect, and 0 is returned for ṙ.
     """
     left, from_slope, falls, kept = transition
     later = aim + left * (rate - aim) + from_slope * slope

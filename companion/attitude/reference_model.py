@@ -13,7 +13,7 @@ body rates grow without bound."""
 _LARGEST_RISE = radians(400.0)
 """Largest change of the planned rate v within the lag τ, if the lag is of second order, rad/s.
 
-A jump by 270 °/s saturates PX4's motors in its simulation; spread over τ, 400 °/s does not."""
+In PX4's simulation a jump by 270 °/s saturates the motors; 400 °/s spread over τ do not."""
 _FOUR_ZETA_SQUARED = 2.7
 """Smallest 4·ζ² of the model, where ζ is its damping ratio."""
 _LARGEST_GAIN_TIMES_STEP = 0.1
@@ -27,7 +27,7 @@ def rates_along(
 ) -> tuple[float, float, float]:
     """Body rates (rad/s) that move the coefficients at this speed (1/s), with the heading at 0.
 
-    `kinematics.into_body` turns the first two to another heading; the third does not depend on it.
+    `kinematics.into_body` rotates roll and pitch to another heading; yaw does not depend on it.
     """
     cosine = sqrt(1.0 - north * north - east * east)
     square = 0.5 + 0.5 * cosine  # a² of equation 9; at heading 0, a·x and a·y are half coefficients
@@ -49,7 +49,7 @@ def model_lag(gain: float, lag: float) -> float:
 
 
 def braking_lead(gain: float, lag: float) -> float:
-    """κ of the model, s: how far ahead it brakes, so that it overshoots by 1 % at most.
+    """κ of the model, s: how far ahead the model brakes, so that it overshoots by 1 % at most.
 
     The damping of τ·c̈ + (1 + p·κ)·ċ + p·c is then 0.82, or more if κ is 0.
     """
@@ -57,7 +57,7 @@ def braking_lead(gain: float, lag: float) -> float:
 
 
 def model_response(gain: float, lag: float) -> tuple[float, float]:
-    """The model of p and τ as c̈ = (p'·(c_d − c) − ċ)/τ': returns p' (1/s) and τ' (s)."""
+    """The model of p and τ (`lag`), as p' (1/s) and τ' (s) of c̈ = (p'·(c_d − c) − ċ)/τ'."""
     slowed = 1.0 + gain * braking_lead(gain, lag)
     return gain / slowed, lag / slowed
 
@@ -140,8 +140,8 @@ class ReferenceModel:
         """Derivatives of the roll and pitch rate of `rates`, rad/s², by differences.
 
         Args:
-            roll: the first of `rates` now, rad/s.
-            pitch: the second, rad/s.
+            roll: roll rate of `rates` now, rad/s.
+            pitch: pitch rate of `rates` now, rad/s.
         """
         later_roll, later_pitch, _ = rates_along(
             self.north + _DIFFERENCE_STEP * self.speed_north,
@@ -196,9 +196,9 @@ class ReferenceModel:
         self._v_north, self._v_east = v_north, v_east
 
     def _stay_inside(self, north: float, east: float, dt: float) -> None:
-        """Keep the reference within the largest tilt.
+        """Keep the coefficients within the largest tilt after a step of `dt` s from (north, east).
 
-        If the step of `dt` s began beyond it, at (north, east), it moves no further out.
+        If they were beyond the largest tilt before the step, they move no further out.
         """
         length = hypot(self.north, self.east)
         if length <= self._constants.longest_target:

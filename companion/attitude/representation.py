@@ -1,4 +1,4 @@
-"""Attitude as coefficients and heading, and the checks of a planner's input."""
+"""Converts attitudes to coefficients and heading and back; checks a planner's input."""
 
 from math import atan2, inf, pi, sqrt
 
@@ -19,7 +19,7 @@ from companion.attitude.types import (
 NORM_TOLERANCE = 1e-3
 """Largest deviation of a quaternion's norm from 1."""
 _LARGEST_BODY_RATE = 100.0
-"""Rates above this about one axis are implausible, rad/s."""
+"""A measured body rate above this is implausible, rad/s."""
 
 
 def _norm(q: Quaternion) -> float:
@@ -36,8 +36,8 @@ def normalised(q: Quaternion) -> Quaternion:
     """Return `q` with unit norm.
 
     Raises:
-        InvalidQuaternionError: `q` is not four numbers, its norm is off by more than 1e-3, or a
-            component is not finite.
+        InvalidQuaternionError: `q` is not four numbers, its norm differs from 1 by more than 1e-3,
+            or a component is not finite.
     """
     try:
         w, x, y, z = q
@@ -118,7 +118,7 @@ def require_period(dt: float) -> None:
 
 
 def limited_target(target: Target, longest: float) -> Target:
-    """`target` with coefficients no longer than `longest`, and its heading wrapped to (−π, π].
+    """`target` with coefficients shortened to `longest`, and its heading wrapped to (−π, π].
 
     Raises:
         InvalidTargetError: `target` is not three or four numbers, or a value is not finite or far
@@ -141,7 +141,7 @@ def limited_target(target: Target, longest: float) -> Target:
 
 
 def plausible_rates(body_rates: BodyRates | None) -> BodyRates | None:
-    """`body_rates`, or None if one is NaN or implausibly large, so that no plan uses them.
+    """`body_rates`, or None if one of them is NaN or implausibly large.
 
     Raises:
         InvalidBodyRatesError: `body_rates` are not three numbers.

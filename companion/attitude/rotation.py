@@ -1,7 +1,7 @@
 """Rotations on plain floats: products, logarithm, Euler angles, rotation at a constant body rate.
 
 As in `kinematics`, every formula is arithmetic on scalars: a flight calls it, and a batch compiles
-the same function. Only for `cos_and_sinc` a batch may use a series instead.
+the same function. A batch may replace `cos_and_sinc` by a polynomial (`companion.batch.series`).
 """
 
 from math import asin, atan2, cos, pi, sin, sqrt
@@ -11,7 +11,7 @@ from companion.attitude.types import Quaternion
 TWO_PI = 2.0 * pi
 
 _SMALL_ANGLE = 1e-12
-"""Below this half angle (rad) sin(h)/h is 1 to double precision."""
+"""Below this half angle h (rad), sin(h)/h is 1 to double precision."""
 
 
 def attitude_of(north: float, east: float, heading: float) -> Quaternion:
@@ -84,7 +84,7 @@ def after_constant_rates(q: Quaternion, rates: tuple[float, float, float], dt: f
 
 
 def turned_about_vertical(q: Quaternion, angle: float) -> Quaternion:
-    """The attitude turned about the world's down axis by `angle` in rad: clockwise from above."""
+    """The attitude rotated about the world's down axis by `angle`, rad: clockwise from above."""
     c, s = cos(0.5 * angle), sin(0.5 * angle)
     w, x, y, z = q
     return c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w

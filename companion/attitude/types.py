@@ -48,11 +48,11 @@ class Target(NamedTuple):
 
 
 class AttitudeError(ValueError):
-    """The input or the result cannot be used; no setpoint must be sent for this sample."""
+    """The input or the result of a planner is invalid; no setpoint must be sent for this sample."""
 
 
 class InvalidQuaternionError(AttitudeError):
-    """A quaternion is not four finite numbers, or its norm is off by more than 1e-3."""
+    """A quaternion is not four finite numbers, or its norm differs from 1 by more than 1e-3."""
 
 
 class InvalidTargetError(AttitudeError):

@@ -12,7 +12,7 @@ from companion.attitude.types import Target
 
 
 class HeadingModel:
-    """ψ̈ = (v − ψ̇)/τ with v = k·(ψ_d − ψ) + ψ̇_d; v has a limit and a slew limit.
+    """Plans the heading ψ: ψ̈ = (v − ψ̇)/τ, v = k·(ψ_d − ψ) + ψ̇_d; v has a limit and a slew limit.
 
     Args:
         constants: gains and limits.
@@ -54,14 +54,14 @@ class HeadingModel:
 
 
 class YawModel:
-    """Predicts the yaw of the body, without dead time: slew limit, then lag.
+    """Predicts the yaw of the body from the yaw rates sent: slew limit, then lag, no dead time.
 
     Args:
         response: response of the yaw axis.
 
     Attributes:
         rate: predicted yaw rate, rad/s.
-        turned: integral of `rate` since the start, rad.
+        turned: yaw angle since the start, rad: the integral of `rate`.
     """
 
     __slots__ = ("_acceleration", "_aim", "_lag", "rate", "turned")
@@ -95,14 +95,14 @@ _BODY_BEHIND_TARGET = 0.008
 """Dead time of roll and pitch from ArduPilot's attitude target to the body, s (measured)."""
 
 _ROWS_PER_DROP = 128
-"""Number of samples that are dropped at a time once they are too old."""
+"""Number of sent rates that are dropped at a time once they are too old."""
 
 
 class TargetFrame:
     """Heading of ArduPilot's attitude target, along whose axes ArduPilot takes body rates.
 
-    A yaw rate turns the target at once, within its slew limit; the body follows 0.2 s later.
-    ATTITUDE_TARGET reports the target's heading; the rates sent since then are added to it.
+    A yaw rate turns the attitude target at once, within its slew limit; the body follows 0.2 s
+    later. ATTITUDE_TARGET reports the target's heading; the turn by the rates sent since is added.
 
     Args:
         response: response of the vehicle's rate loop.
@@ -135,48 +135,48 @@ class TargetFrame:
         self._times[:], self._turns[:] = [0.0], [0.0]
 
     def note(self, heading: float, age: float) -> None:
-        """Take the target's heading (rad), measured `age` seconds before the newest sample.
+        """Take the attitude target's heading (rad), `age` seconds older than the newest sample.
 
-        A heading older than `OLDEST_ATTITUDE_TARGET` is ignored.
+        It is ignored if it is older than `OLDEST_ATTITUDE_TARGET` or newer than the newest sample.
         """
         if not 0.0 <= age <= OLDEST_ATTITUDE_TARGET:
             return
         self._reported_at = self._time - age
         self._offset = heading - self._turn_until(self._reported_at - self._delay)
 
-    def advance(self, yaw: float, still: float, dt: float) -> None:
-        """Advance by `dt` seconds in which the rate `yaw` is sent, rad/s.
+    def advance(self, yaw_rate: float, still_rate: float, dt: float) -> None:
+        """Advance by `dt` seconds in which `yaw_rate` (rad/s) is sent.
 
-        `still` is the part of `yaw` that keeps the heading still.
+        `still_rate` is the part of `yaw_rate` that keeps the heading still.
         """
         if self._reported_at == -inf:
             return  # no attitude target was received, so there is no heading to advance
-        self._aim += clamp(yaw - self._aim, self._acceleration * dt)
+        self._aim += clamp(yaw_rate - self._aim, self._acceleration * dt)
         self._time += dt
         times = self._times
         times.append(self._time)
-        self._turns.append(self._turns[-1] + (self._aim - still) * dt)
+        self._turns.append(self._turns[-1] + (self._aim - still_rate) * dt)
         if (
             len(times) > _ROWS_PER_DROP
             and times[_ROWS_PER_DROP] < self._time - OLDEST_ATTITUDE_TARGET - self._delay
         ):
             del times[:_ROWS_PER_DROP], self._turns[:_ROWS_PER_DROP]
 
-    def lead(self, heading: float, plans: PlanHistory) -> float:
+    def lead(self, start_heading: float, plans: PlanHistory) -> float:
         """Angle by which the target leads the body in yaw when the rates sent now take effect, rad.
 
         It is computed from the newest attitude target. If that is missing, older than
-        `OLDEST_ATTITUDE_TARGET`, or more than `LARGEST_LEAD` ahead or behind, it follows from
-        `RateResponse.lead_time`.
+        `OLDEST_ATTITUDE_TARGET`, or more than `LARGEST_LEAD` from the body, the lead is computed
+        from `RateResponse.lead_time`.
 
         Args:
-            heading: heading of the body minus its predicted turn since the plans began, rad.
+            start_heading: see `FeedForward.advance`.
             plans: plans of tilt and heading.
         """
         reported = self.heading()
         if reported is not None:
             turn = plans.predicted_turn(plans.time, plans.tilt.newest)
-            lead = wrap_angle(reported - heading - turn.angle)
+            lead = wrap_angle(reported - start_heading - turn.angle)
             if abs(lead) <= LARGEST_LEAD:
                 return lead
         return 0.0 if self._lead_time == 0.0 else plans.yaw_within(self._lead_time)
@@ -188,7 +188,7 @@ class TargetFrame:
         return self._offset + self._turns[-1]
 
     def _turn_until(self, time: float) -> float:
-        """How far the rates sent until `time` turn the target, rad; linear between samples."""
+        """Turn of the target by the rates sent until `time`, rad; interpolated linearly."""
         times, turns = self._times, self._turns
         if time < times[0]:
             return turns[0]
