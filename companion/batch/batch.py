@@ -35,7 +35,7 @@ _CACHE_LINE = 8  # float64 numbers
 class History(NamedTuple):
     """The result of `simulate`: attitudes q (steps + 1, 4, n), body rates (steps, 3, n) in rad/s.
 
-    `rates[k]` is held from `q[k]` to `q[k + 1]`.
+    The vehicles turn at `rates[k]` from `q[k]` to `q[k + 1]`.
     """
 
     q: Array
@@ -73,8 +73,8 @@ def rates(
         InvalidQuaternionError: an attitude is not a unit quaternion.
         InvalidTargetError: a value of a target is not finite or far too large.
         MissingExtraError: `compiled` is True and numba is not installed.
-        TypeError: the planner keeps state between samples, or its law is no plain function and is
-            to be compiled.
+        TypeError: the planner keeps state between samples, or `compiled` is True and its law is no
+            plain function.
         ValueError: the shapes of `q` and `targets` are wrong or differ.
     """
     planner, q, targets, loops = _prepared(planner, q, targets, dt, 1, compiled)
@@ -93,8 +93,8 @@ def advance(
 ) -> Array:
     """Attitudes (4, n) after `steps` samples, each with constant body rates.
 
-    Arguments and errors are those of `rates`; `steps` that are negative raise ValueError, and
-    `steps` that are no integer TypeError.
+    Arguments and errors are those of `rates`. Also, a negative `steps` raises ValueError, and one
+    that is no integer TypeError.
     """
     planner, q, targets, loops = _prepared(planner, q, targets, dt, steps, compiled)
     after = _advanced(loops, planner, q, targets, dt, steps)
@@ -152,7 +152,7 @@ def _prepared(
     steps: int,
     compiled: bool | None,
 ) -> tuple[LawPlanner, Array, Array, Loops]:
-    """The planner, the attitudes normalised, the targets limited, and the loops to use."""
+    """Check the arguments; return planner, normalised attitudes, limited targets and loops."""
     if not isinstance(planner, LawPlanner):
         raise TypeError(
             f"a batch maps planners without memory ({', '.join(LAW_NAMES)}, or a law of your own, "
@@ -201,7 +201,7 @@ def _require_plain_function(law: Law) -> None:
 
 
 def _turned_too_far(loops: Loops, q: Array) -> bool:
-    """Whether a sample turned further than the series in these loops is valid for."""
+    """Whether a vehicle turned further in one sample than the series of these loops allow."""
     return not loops.any_angle and not bool(np.isfinite(q).all())
 
 

@@ -1,4 +1,4 @@
-"""Checks and clamps arrays for a law, by the rules with which a planner treats one sample."""
+"""Checks and limits arrays for a law by the rules that a planner applies to one sample."""
 
 from functools import cache
 from math import pi
@@ -22,10 +22,10 @@ _UNIT_TOLERANCE = 1e-14
 
 
 def as_rows(values: ArrayLike, name: str) -> Array:
-    """`values` as a C-contiguous float array (4, n).
+    """Convert `values` to a C-contiguous float array (4, n); messages call it `name`.
 
     Raises:
-        ValueError: the shape is another; the message calls the array `name`.
+        ValueError: `values` have another shape.
     """
     array = np.ascontiguousarray(values, dtype=np.float64)
     if array.ndim != 2 or array.shape[0] != 4:

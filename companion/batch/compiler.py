@@ -37,13 +37,13 @@ class Compiler:
         return self._compiled[function]
 
     def loop(self, function: Callable[..., Any]) -> Any:
-        """Compile a loop; it may close over functions that `function()` returned."""
+        """Compile a loop; its closure may contain functions that `function()` returned."""
         import numba  # noqa: PLC0415
 
         return numba.njit(function, **_OPTIONS)
 
     def _rebuilt(self, function: Callable[..., Any]) -> FunctionType:
-        """The function with globals in which all functions that it calls are compiled ones."""
+        """A copy of the function whose globals hold compiled functions for all that it calls."""
         assert isinstance(function, FunctionType)
         names = dict(function.__globals__)
         for name in function.__code__.co_names:

@@ -1,8 +1,8 @@
 """The loops over vehicles and samples around a law, in Python or compiled.
 
-Compiled inner loops are vectorised. For that they run over whole C-contiguous arrays, from 0 to the
-end, and write to other arrays than they read. The law and the rotation (`turn`) have a loop each,
-because one loop for both needs more registers than a processor has.
+Compiled inner loops are vectorised. To allow that, they run over whole C-contiguous arrays, from 0
+to the end, and do not write to arrays that they read. The law and the rotation (`turn`) have a loop
+each, because one loop for both needs more registers than a processor has.
 """
 
 import math

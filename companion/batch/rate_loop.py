@@ -26,7 +26,7 @@ from companion.extras import require
 STEP_HZ = 1000
 """Simulation steps per second; dead times are rounded to whole steps."""
 _UNLIMITED = 1e300
-"""Slew of an axis without a slew limit, rad/s per step."""
+"""Largest change of the command per step on an axis without a slew limit, rad/s."""
 
 
 class StepFlight(NamedTuple):
@@ -34,7 +34,7 @@ class StepFlight(NamedTuple):
 
     Attributes:
         path: (samples, 2), coefficients north and east at the sample.
-        targets: (samples, 2), target coefficients that the command for the sample follows.
+        targets: (samples, 2), target coefficients at the sample.
         commanded: (samples, 3), commanded body rates, rad/s.
         q: attitude at the end.
     """
@@ -94,7 +94,7 @@ def _rate_loop(axes: Sequence[AxisResponse]) -> tuple[Array, NDArray[np.int64]]:
 
 @cache
 def _compiled(law: Law) -> Callable[..., Quaternion]:
-    """The flight of one vehicle under `law`."""
+    """Compile the flight of one vehicle under `law`."""
     compiler = Compiler({})
     one_law, turn = compiler.function(law), compiler.function(after_constant_rates)
     lag_response, limited = compiler.function(lag_step), compiler.function(clamp)

@@ -48,7 +48,7 @@ def arctangent(t: float) -> float:
 def cos_and_sinc(square: float) -> tuple[float, float]:
     """cos(h) and sin(h)/h for h² from 0 to `LARGEST_SQUARE`; replaces `rotation.cos_and_sinc`.
 
-    A larger h² gives NaN. The attitude then stays NaN, which the caller detects.
+    A larger h² gives NaN. The attitude then stays NaN, and the caller detects that.
     """
     square = square if square <= LARGEST_SQUARE else nan
     fourth = square * square

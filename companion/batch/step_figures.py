@@ -16,7 +16,7 @@ from companion.batch.loops import Array
 from companion.batch.rate_loop import StepFlight
 
 _SHORTEST_LOG, _LONGEST_LOG = log(0.02), log(2.0)
-"""Range in which the time constant is searched, as natural logarithms of s."""
+"""Range in which the time constant is searched, as natural logarithms of seconds."""
 _GOLDEN_RATIO = 0.5 * (sqrt(5.0) - 1.0)
 _NARROWINGS = 17
 """Steps of the golden-section search; the range left is 0.13 % of a time constant."""
@@ -28,10 +28,11 @@ class StepFigures(NamedTuple):
     """Figures of a flight of steps.
 
     Attributes:
-        model_deviation_max: largest distance from the ideal model ċ = p·(c_d − c).
-        cross_axis_max: largest distance from the line of a step.
-        rate_rms: commanded √(ω_x² + ω_y²), rad/s, RMS.
-        rate_max: the largest commanded √(ω_x² + ω_y²), rad/s.
+        model_deviation_max: largest distance of the coefficients from the ideal model
+            ċ = p·(c_d − c).
+        cross_axis_max: largest distance of the coefficients from the straight line of a step.
+        rate_rms: RMS of the commanded roll-pitch rate √(ω_x² + ω_y²), rad/s.
+        rate_max: largest commanded roll-pitch rate, rad/s.
         time_constant_north: time constant of the first-order model that fits the north coefficient
             best (least squares), s; NaN if there was no step north.
         time_constant_east: the same for the east coefficient.
@@ -46,7 +47,7 @@ class StepFigures(NamedTuple):
 
 
 def step_figures(flight: StepFlight, gain: float, period: float) -> StepFigures:
-    """Measure a flight.
+    """Compute the figures of a flight.
 
     Args:
         flight: flight of `fly_steps`.

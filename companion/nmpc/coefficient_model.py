@@ -19,23 +19,23 @@ from companion.nmpc.reference import Node
 from companion.nmpc.settings import Settings
 
 _SMALLEST_COS_SQUARED = 0.01
-"""Lower bound of cos²(tilt) in the prediction, since a Newton step may tilt beyond 90°."""
+"""Lower bound of cos²(tilt) in the prediction: an iteration of the solver may tilt beyond 90°."""
 _SIDE_PAIRS = 6
-"""Number of pairs of opposite sides of the polygon that approximates a disc: a corner each 30°."""
+"""Number of pairs of opposite sides of the polygon that approximates a disc: a corner every 30°."""
 
 
 def coefficient_model(settings: Settings) -> Model:
     """Equation 34 of Xu & Pei with a second-order inner response and the limits of the planner.
 
-    State p, v, c, heading, ċ; control (c_d north, c_d east, heading, specific thrust):
-    V̇ = [T·c_N, T·c_E, g − T·√(1 − c_N² − c_E²)] − d(V) + w, τ·c̈ + ċ = p·(c_d − c); the heading
-    responds in first order.
+    State: position, velocity v, coefficients c, heading, ċ. Control: c_d north, c_d east, heading,
+    specific thrust T. With drag d(v) and wind w, v̇ = [T·c_N, T·c_E, g − T·√(1 − c_N² − c_E²)] −
+    d(v) + w and τ·c̈ + ċ = p·(c_d − c). The heading responds in first order.
 
     Limits: |c_d| ≤ sin(max_tilt), or ≤ |c| at the start if that is larger; the tilt rate of
-    p·(c_d − c) is within W_M; the heading rate is within its own limit. Polygons inside the discs
-    make the constraints linear in the control at a given state. Therefore the first control, the
-    only one that is flown, satisfies them after a single iteration from any guess. The dead time is
-    not part of the model: `prediction` integrates the motion to the end of the dead time.
+    p·(c_d − c) is within W_M; the heading rate is within its own limit. The discs are replaced by
+    polygons inside them, so the constraints are linear in the control at a given state. Therefore
+    the first control, the only one that is flown, satisfies them after a single iteration from any
+    guess. The dead time is not part of the model: `Predictor` integrates the motion to its end.
     """
     symbols = Symbols(size=11, own_constants=1)
     rates, turning = symbols.state[9:11], symbols.turning(settings)
@@ -59,10 +59,10 @@ def coefficient_model(settings: Settings) -> Model:
 
 
 class Symbols:
-    """Symbols of a model whose control is a target of coefficients.
+    """Symbols of a model whose control contains target coefficients.
 
     Args:
-        size: size of the state, which begins with p, v, c and heading.
+        size: size of the state, which begins with position, velocity, coefficients and heading.
         own_constants: number of constants besides `Conditions`.
     """
 
@@ -74,7 +74,7 @@ class Symbols:
         self.heading = self.state[8]
 
     def turning(self, settings: Settings) -> ca.SX:
-        """(3,), commanded speed p·(c_d − c) of the coefficients, 1/s, and of the heading, rad/s."""
+        """(3,), commanded speeds: p·(c_d − c) of the coefficients, 1/s; of the heading, rad/s."""
         return ca.vertcat(
             settings.gain * (self.control[0:2] - self.c),
             settings.yaw_gain * (self.control[2] - self.heading),

@@ -1,4 +1,4 @@
-"""Requests to the solver's process and its answers, and their packed form (`struct`)."""
+"""Requests to the solver's process and its answers, and how they are packed in bytes."""
 
 import struct
 from enum import IntEnum
@@ -64,16 +64,16 @@ class Request(NamedTuple):
     Attributes:
         number: number of the request; its answer has the same number.
         vehicle: state of the vehicle.
-        at: time along the trajectory at `vehicle.time`, s.
+        trajectory_time: time since the trajectory began, at `vehicle.time`, s.
         start: start of the trajectory.
         inputs: latest control inputs, in order of time. They must cover the dead time before
-            `vehicle.time`; the first one is assumed to have been in force before. If there is none,
-            the attitude and the vertical speed are assumed to be held.
+            `vehicle.time`. Before the first input, that input is assumed. If there is no input,
+            attitude and vertical speed are assumed to be held.
     """
 
     number: int
     vehicle: Vehicle
-    at: float
+    trajectory_time: float
     start: Start
     inputs: tuple[Input, ...]
 
@@ -83,7 +83,7 @@ class Status(IntEnum):
 
     SOLVED = 0
     FAILED = 1
-    """The solver found no plan, or a value is not finite."""
+    """The solver found no plan, or a number of the plan is not finite."""
     TILTED_TOO_FAR = 2
     """The tilt is larger than the models allow, now or when the answer would take effect; or the
     attitude is not a unit quaternion."""
@@ -94,28 +94,28 @@ class Answer(NamedTuple):
 
     Attributes:
         number: number of the request.
-        status: how the solve ended; unless it is `SOLVED`, the target, the thrust, `solving` and
+        status: how the solve ended; unless it is `SOLVED`, target, thrust, `solver_seconds` and
             `iterations` are 0.
-        given_at: when the answer was computed, on the computer's monotonic clock, s.
+        computed_at: when the answer was computed, on the computer's monotonic clock, s.
         time: when to use the answer, on the clock of `Vehicle.time`, s.
         north, east: coefficients of the target.
         heading: heading of the target, rad, in (−π, π].
         thrust: specific thrust, m/s².
         seconds: wall time of the computation, including prediction and reference, s.
-        solving: processor time of the solver alone, s.
+        solver_seconds: processor time of the solver alone, s.
         iterations: number of SQP iterations.
     """
 
     number: int
     status: Status
-    given_at: float
+    computed_at: float
     time: float
     north: float
     east: float
     heading: float
     thrust: float
     seconds: float
-    solving: float
+    solver_seconds: float
     iterations: float
 
 
@@ -124,9 +124,9 @@ def pack_request(request: Request) -> bytes:
     vehicle, start = request.vehicle, request.start
     head = _REQUEST_HEAD.pack(
         request.number,
-        request.at,
+        request.trajectory_time,
         *start.position,
-        start.turned,
+        start.heading_offset,
         vehicle.time,
         *vehicle.position,
         *vehicle.velocity,

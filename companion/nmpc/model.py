@@ -1,4 +1,4 @@
-"""A prediction model in CasADi symbols; translation and integration, which all models share."""
+"""The form of a prediction model in CasADi; translation and integrator, which all models share."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -66,7 +66,7 @@ class Model:
         control: (m,), ends with the specific thrust.
         constants: (c,), constant over the horizon; begins with `Conditions`.
         derivative: (n,), ẋ.
-        aim: (k,), the values of the reference at a node to which heading and attitude rate are
+        aim: (k,), values of the reference at a node, with which heading and attitude rate are
             compared.
         heading_error: heading (in studies also yaw) of `state` minus that of `aim`, rad; a smooth
             approximation in the quaternion model, 0 in a model of constant yaw.
@@ -120,7 +120,7 @@ def translation(
         velocity: (3,), NED, m/s.
         thrust: specific thrust, m/s².
         axis: (3,), coefficients north and east, and cos(tilt).
-        heading: tilt-yaw heading, rad, taken as that of the body's forward axis.
+        heading: tilt-yaw heading, rad; the body's forward axis is assumed to point there.
         constants: symbols that begin with `Conditions`.
         settings: settings, which contain gravity.
     """

@@ -1,4 +1,4 @@
-"""Predicts the motion to the time when an answer takes effect; until then earlier inputs act."""
+"""Predicts the motion until an answer takes effect; earlier control inputs act until then."""
 
 from collections.abc import Sequence
 from math import hypot, sin, sqrt
@@ -25,7 +25,7 @@ class TiltedTooFarError(Exception):
 
 
 def motion_of(vehicle: Vehicle) -> Motion:
-    """The vehicle's state as the `Motion` of the models.
+    """The state of the vehicle, converted to the `Motion` of the models.
 
     Raises:
         InvalidQuaternionError: the attitude is not a unit quaternion.
@@ -48,12 +48,12 @@ def motion_of(vehicle: Vehicle) -> Motion:
 
 
 def conditions_of(vehicle: Vehicle) -> Conditions:
-    """Wind and drag on the vehicle for the models."""
+    """Wind and drag of the vehicle's state, converted to the `Conditions` of the models."""
     return Conditions(*vehicle.disturbance, *vehicle.drag, vehicle.axis_drag)
 
 
 class Predictor:
-    """Integrates the motion to a later time by `coefficient_model`, with the inputs until then.
+    """Integrates the `coefficient_model` to a later time, with the control inputs until then.
 
     Args:
         settings: settings of the vehicle.

@@ -29,14 +29,14 @@ _SQP_OPTIONS: dict[str, Any] = {
 
 
 class Program(NamedTuple):
-    """min ½·|r(w, p)|² with bounds on w and on g(w, p); n states, m controls, N steps.
+    """The program min ½·|r(w, p)|² with bounds on w and on g(w, p); n states, m controls, N steps.
 
     Attributes:
         unknown: w, (x_0, u_0, x_1, u_1, …, x_N).
-        parameters: p; `parameters_of` gives its numbers.
+        parameters: p; `parameters_of` computes its numbers.
         residual: r.
-        constraints: g: for each step the gap to the next state, then the bounded terms of the
-            model. HPIPM requires this order.
+        constraints: g: for each step the gap to the next state, then `Model.bounded`. HPIPM
+            requires this order.
         lower, upper: bounds on w; the caller sets the first n to the state at the start.
         g_lower, g_upper: bounds on g.
     """
@@ -85,7 +85,10 @@ def transcribe(model: Model, settings: Settings) -> Program:
 def parameters_of(
     constants: Sequence[float], nodes: Sequence[Node], aims: Sequence[Sequence[float]]
 ) -> Floats:
-    """The numbers for `Program.parameters`: the constants, then each node with its aim."""
+    """The numbers for `Program.parameters`: constants, then each node's reference and aim.
+
+    The reference is position, velocity and thrust of the node; its aim is `Model.aim`.
+    """
     values = [*constants]
     for node, aim in zip(nodes, aims, strict=True):
         values += [*node.position, *node.velocity, node.thrust, *aim]
@@ -151,7 +154,7 @@ class Solution(NamedTuple):
 
 
 class SqpSolver:
-    """CasADi's SQP with HPIPM for the quadratic programs; no code is compiled.
+    """CasADi's SQP method with HPIPM for the quadratic programs; no code is generated.
 
     Args:
         model: the prediction model.

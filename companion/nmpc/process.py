@@ -1,8 +1,8 @@
 """The flight's interface to the solver's process: sends requests and takes the answers.
 
-The solver runs in another process, since a busy thread in the flight's process would delay the
-control loop by milliseconds. In flight nothing here waits for it, except in lockstep, and up to
-20 ms when the process has ended.
+The solver runs in another process, because a busy thread in the flight's process would delay the
+control loop by milliseconds. The flight never waits here for the solver, except in lockstep, and
+for up to 20 ms when that process ends.
 """
 
 import os
@@ -43,7 +43,7 @@ class Trouble(Enum):
     """No answer came within the deadline, or before the next request."""
     FAILED = "failed"
     """The answer says that the problem was not solved."""
-    ABSURD = "absurd"
+    IMPLAUSIBLE = "absurd"
     """The answer has a number that is not finite, or exceeds the limits of tilt or thrust."""
 
 
@@ -74,7 +74,7 @@ class Solver:
     Args:
         settings: vehicle, horizon and solver.
         trajectory: the trajectory to follow; it is pickled.
-        report: called for each trouble, from within the method that notices it.
+        report: called with each trouble, by the method that notices it.
 
     Attributes:
         alive: False after `close`, or after the end of the process was noticed.
@@ -137,7 +137,7 @@ class Solver:
             self._pending = _Pending(request.number, monotonic(), longest_target)
 
     def take(self, wait: float = 0.0) -> Answer | None:
-        """The answer to the last request if it has come and may be flown; it is returned once.
+        """The answer to the last request, once, if it has come and may be flown; else None.
 
         Args:
             wait: longest time to wait for the answer, s; 0 in real time, where the call returns at
@@ -184,7 +184,7 @@ class Solver:
 
     def _checked(self, pending: _Pending, answer: Answer) -> Answer | None:
         """The answer if it may be flown; otherwise None, and the trouble is reported."""
-        elapsed = answer.given_at - pending.sent_at
+        elapsed = answer.computed_at - pending.sent_at
         if elapsed > self._settings.deadline:
             self._report(Trouble.LATE, f"request {pending.number} took {1e3 * elapsed:.1f} ms")
         elif answer.status is not Status.SOLVED:
@@ -193,7 +193,7 @@ class Solver:
             self._report(Trouble.FAILED, message)
         elif implausible := _why_implausible(answer, pending.longest_target, self._settings):
             self._report(
-                Trouble.ABSURD, f"the answer to request {pending.number} has {implausible}"
+                Trouble.IMPLAUSIBLE, f"the answer to request {pending.number} has {implausible}"
             )
         else:
             return answer

@@ -15,13 +15,13 @@ from companion.nmpc.settings import Settings
 
 
 class Plan(NamedTuple):
-    """The first control of a solve.
+    """The result of one solve, with the first control of the plan.
 
     Attributes:
         solved: whether the plan may be flown; if not, the other fields mean nothing.
         converged: whether the iterations reached the tolerance; a real-time iteration seldom does.
         iterations: number of SQP iterations.
-        seconds: processor time of the solver alone, s.
+        solver_seconds: processor time of the solver alone, s.
         north, east, heading: target for the planner: coefficients, and heading in rad.
         thrust: specific thrust, m/s².
     """
@@ -29,7 +29,7 @@ class Plan(NamedTuple):
     solved: bool
     converged: bool
     iterations: int
-    seconds: float
+    solver_seconds: float
     north: float
     east: float
     heading: float
@@ -60,19 +60,19 @@ class RecedingHorizon:
         self._previous_time = 0.0
 
     def forget(self) -> None:
-        """Start the next solve from its reference."""
+        """Start the next solve from the reference instead of the previous plan."""
         self._previous = None
 
     def solve(
         self, time: float, motion: Motion, nodes: Sequence[Node], conditions: Conditions
     ) -> Plan:
-        """Plan from `motion` on.
+        """Solve for a plan that begins at `motion`.
 
         Args:
-            time: time of `motion`, s; the previous plan is shifted to it. If it is before that
-                plan, the solve starts from the reference.
+            time: time of `motion`, s. The solve starts from the previous plan, shifted to this
+                time, or from the reference if the previous plan begins later.
             motion: motion at the start of the horizon.
-            nodes: the reference at the steps + 1 nodes.
+            nodes: the reference at the `Settings.steps` + 1 nodes of the horizon.
             conditions: wind and drag.
         """
         model = self._model
@@ -106,7 +106,7 @@ class RecedingHorizon:
 
 
 def shifted_plan(model: Model, plan: Floats, steps: float) -> Floats:
-    """A plan shifted forward by `steps` of its horizon; beyond its end the last values repeat.
+    """A plan shifted to a time `steps` steps later; beyond its end the last values repeat.
 
     Args:
         model: the model of the plan.
@@ -128,7 +128,7 @@ def plan_on_reference(model: Model, nodes: Sequence[Node], settings: Settings) -
 
 
 def _shifted(rows: Floats, steps: float) -> Floats:
-    """Rows (one for each node) shifted forward by `steps`; the last row repeats."""
+    """Rows, one for each node, shifted to a time `steps` steps later; the last row repeats."""
     whole_steps = floor(steps)
     last = len(rows) - 1
     before = np.minimum(np.arange(len(rows)) + whole_steps, last)

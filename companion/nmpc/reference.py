@@ -40,12 +40,12 @@ class Start(NamedTuple):
 
     Attributes:
         position: position where it begins, m, NED.
-        turned: angle added to its headings, rad: the sum of the heading resets, and for a
-            trajectory that holds its heading, also this heading. Positions are not rotated.
+        heading_offset: angle added to its headings, rad: the sum of the heading resets; for a
+            trajectory that holds its heading, plus that heading. Positions are not rotated.
     """
 
     position: Vector
-    turned: float = 0.0
+    heading_offset: float = 0.0
 
 
 def node_of(
@@ -57,7 +57,7 @@ def node_of(
     gravity: float,
     disturbance: Vector,
 ) -> Node:
-    """Attitude and thrust of a sample: differential flatness of a point mass with drag.
+    """The node of a sample of the trajectory: differential flatness of a point mass with drag.
 
     The rotors must provide f = a + d − w − g, with d the deceleration by drag. The upward part of f
     is kept above a fifth of gravity. |f| is the specific thrust, the horizontal part of f/|f| the
@@ -74,7 +74,7 @@ def node_of(
     """
     velocity, acceleration, jerk = sample.velocity, sample.acceleration, sample.jerk
     d, d_rate = drag.deceleration(velocity), drag.deceleration_rate(velocity, acceleration)
-    heading = nearby_heading + wrap_angle(start.turned + sample.heading - nearby_heading)
+    heading = nearby_heading + wrap_angle(start.heading_offset + sample.heading - nearby_heading)
     axes = AxisDrag(axis_drag, heading)
     axis_d = *axes.deceleration(*velocity[:2]), 0.0
     turn = sample.heading_rate

@@ -19,7 +19,8 @@ class Weights:
         heading: weight of the heading error, 1/rad².
         turning: weight of the commanded attitude rate minus that of the reference, s²/rad².
         thrust: weight of the specific thrust minus that of the reference, s⁴/m².
-        final: factor on the weights of position and velocity at the end of the horizon, s.
+        final: weights of position and velocity at the end of the horizon, divided by the weights
+            over it, s.
 
     Raises:
         ValueError: a weight is not positive and finite.
@@ -44,7 +45,7 @@ class Settings:
     Attributes:
         gain: p of the planner that flies the targets, 1/s.
         yaw_gain: heading gain of that planner, 1/s.
-        lag: τ of its response τ·c̈ + ċ = p·(c_d − c), s.
+        lag: τ of that planner's response τ·c̈ + ċ = p·(c_d − c), s.
         dead_time: time from sending a target to the first response of the vehicle, s.
         gravity: m/s².
         max_tilt: tilt limit of the planner, rad.

@@ -74,7 +74,7 @@ class Worker:
         self._horizon.forget()
 
     def answer(self, request: Request) -> Answer:
-        """Compute the answer to a request, for the time at which it will be used."""
+        """Compute the answer to a request; it is to be used `Settings.lead` after that request."""
         began = perf_counter()
         use_time = request.vehicle.time + self._settings.lead
         try:
@@ -94,7 +94,7 @@ class Worker:
             wrap_angle(plan.heading),
             plan.thrust,
             perf_counter() - began,
-            plan.seconds,
+            plan.solver_seconds,
             plan.iterations,
         )
 
@@ -110,7 +110,8 @@ class Worker:
         """The reference over the horizon; its headings are unwrapped, beginning near `heading`."""
         settings, nodes = self._settings, list[Node]()
         for k in range(settings.steps + 1):
-            sample = self._trajectory.at(request.at + self._effect_delay + k * settings.step)
+            time = request.trajectory_time + self._effect_delay + k * settings.step
+            sample = self._trajectory.at(time)
             node = node_of(
                 sample,
                 request.start,
@@ -132,7 +133,7 @@ def _no_answer(request: Request, status: Status, use_time: float, seconds: float
 
 
 def main() -> None:
-    """Answer the newest request, again and again, until the socket is closed."""
+    """Answer the newest request, repeatedly, until the socket is closed."""
     # Ctrl-C reaches this process too, but the flight handles it and then closes the socket.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     connection = socket.socket(fileno=int(sys.argv[1]))

@@ -177,7 +177,7 @@ def test_each_kind_of_trouble_is_told_once_and_all_are_counted():
     assert len(notes) == 1
     for _ in range(2):
         solver.report(Trouble.LATE, "request 6 took 31.0 ms")
-    solver.report(Trouble.ABSURD, "the answer to request 9 has a thrust of 99.00 m/s²")
+    solver.report(Trouble.IMPLAUSIBLE, "the answer to request 9 has a thrust of 99.00 m/s²")
     assert len(notes) == 2
     assert "took 31.0 ms; linear guidance flies on" in notes[0]
-    assert predictive.record.troubles == {Trouble.LATE: 3, Trouble.ABSURD: 1}
+    assert predictive.record.troubles == {Trouble.LATE: 3, Trouble.IMPLAUSIBLE: 1}

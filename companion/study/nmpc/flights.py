@@ -132,7 +132,7 @@ class Flight:
         )
         at, inputs = self._task.begin + now, tuple(self._inputs[-_INPUTS_GIVEN:])
         answer = self._solver.answer(Request(self._periods, known, at, self._start, inputs))
-        self.seconds.append(answer.solving)
+        self.seconds.append(answer.solver_seconds)
         self.iterations.append(answer.iterations)
         if answer.status is Status.SOLVED:
             target = answer.north, answer.east, answer.heading
