@@ -1,4 +1,4 @@
-"""Makes the command of one step of guidance from reference and motion."""
+"""Makes the command of one guidance step from the reference and the estimated motion."""
 
 from functools import cache
 from math import isfinite
@@ -16,16 +16,15 @@ class CommandMaker:
     """Asks guidance or predictive control for a command; limits the tilt to what thrust can hold.
 
     Args:
-        guidance: makes targets of references.
+        guidance: makes targets from references.
         flown: provides the reference.
         estimate: provides the state of the vehicle, and takes the commanded vertical thrust.
         learning: provides the largest tilt and the thrust limits.
         period: period of guidance, s.
 
     Attributes:
-        guidance: makes targets of references.
-        predictive: predictive control, which flies trajectories instead of linear guidance, or
-            None.
+        guidance: makes targets from references.
+        predictive: predictive control, which flies trajectories instead of `guidance`, or None.
     """
 
     def __init__(
@@ -42,7 +41,7 @@ class CommandMaker:
         self._period = period
 
     def guidance_input(self, now: float) -> GuidanceInput:
-        """The estimated motion at `now` (s of event-loop time) and when a command acts.
+        """The estimated motion at `now` (s of event-loop time) and when a command takes effect.
 
         Raises:
             RuntimeError: no position has come yet.

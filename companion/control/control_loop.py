@@ -29,8 +29,8 @@ from companion.vehicle.clock_jumps import Misfit
 from companion.vehicle.records import AttitudeSample
 
 SendSetpoint = Callable[[int, BodyRates, float], bool]
-"""Sends the sample's time_boot_ms, body rates and thrust; False if the link does not accept it. In
-lockstep the link keeps the setpoint until the step ends, and sends only the last one of a step."""
+"""Sends time_boot_ms of a sample, body rates and thrust as a setpoint; False: the link refused it.
+In lockstep the link keeps setpoints until the step ends, and sends only the last one of a step."""
 
 _MISFIT_REASONS = {Misfit.NOT_NEWER: Unanswered.NOT_NEWER, Misfit.AHEAD: Unanswered.AHEAD}
 _END_THE_STREAM = {None, Unanswered.OLD_TARGET, Unanswered.AWAITING_MODE}
@@ -48,7 +48,7 @@ class ControlLoop:
     Attributes:
         command: the newest command, written by guidance; None before the first and after
             `drop_command`.
-        on: whether samples are answered at all.
+        on: whether the loop answers samples at all.
         taking_over: whether offboard was requested and may become active at any moment.
         offboard_active: whether the autopilot obeys the setpoints.
         awaiting_mode: whether the loop waits for `resume` after a gap.
@@ -145,7 +145,7 @@ class ControlLoop:
             self.release()
 
     def _after_gap(self, now: float) -> bool:
-        """Whether setpoints wait for the mode after a gap; each gap requests the mode once."""
+        """Whether setpoints wait for `resume` after a gap; at a new gap, request the mode."""
         if not (self.offboard_active or self.taking_over):
             return False
         gap = now - self.record.gap_from
@@ -231,7 +231,7 @@ class ControlLoop:
     def end_stream(self) -> None:
         """Answer one more fresh sample with zero body rates, which the autopilot keeps for seconds.
 
-        If it does not obey us, or there is no command, nothing more is sent.
+        If offboard is not active, or there is no command, send nothing more.
         """
         if self.on and self.offboard_active and self.command is not None:
             self._last_command = self._last_command or self.command.without_turning()

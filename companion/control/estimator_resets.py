@@ -1,7 +1,7 @@
 """Resets of the autopilot's estimator: the estimate jumps while the vehicle does not move.
 
 A jump is a change between two samples that neither body rates nor velocity explain. PX4 resets its
-position or heading when it has rejected their measurements for a while. It counts resets in
+position or heading after it has rejected measurements of them for a while. It counts resets in
 ODOMETRY's `reset_counter`, which comes later and does not tell their size. Guidance and control
 work in a frame without these jumps:
 
@@ -9,8 +9,8 @@ work in a frame without these jumps:
 - Poses, references and targets have headings without jumps. An attitude is turned back by all
   heading jumps before its heading is compared with these headings.
 
-Horizontal accelerations stay in the estimator's frame, in which position is measured, so a
-corrected heading improves them at once.
+Horizontal accelerations stay in the estimator's frame, in which position is measured. So they
+become right at once when the estimator corrects its heading.
 """
 
 from collections import deque
@@ -48,7 +48,7 @@ class EstimatorResets:
         corrections: sum of the estimator's gradual heading corrections, rad: heading changes that
             the body rates do not explain, without the jumps; see `StepFrame`.
         rate_lag: learned lag of the body rates behind the attitude.
-        largest_tilt_jump: largest jump of the thrust axis, rad; no reference frame compensates it.
+        largest_tilt_jump: largest jump of the thrust axis, rad; it is not compensated.
         newest: the newest attitude, or None.
         times: when the latest resets were found, s of event-loop time.
     """
@@ -115,7 +115,7 @@ class EstimatorResets:
 
         Args:
             target: the target; its heading stays, because it is in the frame without jumps already.
-            turn: the value of `self.turn` when the target was made, rad.
+            turn: `self.turn` when the target was made, rad.
         """
         if turn == 0.0:
             return target

@@ -16,7 +16,7 @@ from companion.control.inner_loop import (
 from companion.guidance import InnerResponse
 
 _NOTICEABLE_SHARE = 0.99
-"""A change is reported if it reduces the time constant to less than this share of it."""
+"""A change is reported if it reduces the time constant to less than this share."""
 
 _GAIN_KEY, _RATE_LIMIT_KEY = "planner.gain_per_s", "limits.max_tilt_rate_deg_s"
 _LAG_CAUSE, _DEAD_TIME_CAUSE = "the vehicle's lag", "the vehicle's dead time"
@@ -27,13 +27,14 @@ class ExpectedResponse:
     """The response to the largest step of the maneuver `steps`, from −coefficient to coefficient.
 
     Attributes:
-        coefficient: coefficient at which the step ends.
+        coefficient: `steps.coefficient`, at which the step ends.
         time_constant: time until 63 % of the step is covered, s.
         time_constants_without: name of a cause of delay -> time constant (s) if this cause changes:
             with twice the gain, or without the rate limit, the lag or the dead time.
         gain: gain p of the planner, 1/s.
         largest_gain: the largest sensible gain, 1/s; None if lag and dead time are not known.
-        shortest: time constant with that gain and without the rate limit, s; None if not known.
+        shortest_time_constant: time constant with `largest_gain` and without the rate limit, s;
+            None if `largest_gain` is.
     """
 
     coefficient: float
@@ -41,7 +42,7 @@ class ExpectedResponse:
     time_constants_without: dict[str, float]
     gain: float
     largest_gain: float | None
-    shortest: float | None = None
+    shortest_time_constant: float | None = None
 
     @property
     def limited_by(self) -> str:
@@ -62,10 +63,9 @@ class ExpectedResponse:
         )
         tilt = degrees(asin(self.coefficient))
         floor = ""
-        if self.shortest is not None:
-            floor = (
-                f"; the largest sensible gain without rate limit would give {self.shortest:.2f} s"
-            )
+        shortest = self.shortest_time_constant
+        if shortest is not None:
+            floor = f"; the largest sensible gain without rate limit would give {shortest:.2f} s"
         return (
             f"a step from -{self.coefficient:g} to {self.coefficient:g} (±{tilt:.0f}° of tilt) is "
             f"expected to have a time constant of {self.time_constant:.2f} s; "
@@ -96,7 +96,7 @@ def _gain_sentence(gain: float, largest: float) -> str:
 
 
 def expected_response(config: Config) -> ExpectedResponse:
-    """Predict the response with the linear model of planner and rate loop, and the rate limit."""
+    """Predict the response by a linear model of planner and rate loop with the tilt rate limit."""
     step, response = 2.0 * config.steps.coefficient, tilt_response(config)
     speed = _largest_speed(config)
     gain, largest = config.planner.gain_per_s, sensible_gain(config)
@@ -129,7 +129,7 @@ def _without_the_vehicle(config: Config, response: InnerResponse, speed: float) 
 
 
 def _largest_speed(config: Config) -> float:
-    """Speed (1/s) of the coefficients at the largest tilt rate, at half the steps' coefficient."""
+    """Speed of the coefficients (1/s) at the largest tilt rate and half of `steps.coefficient`."""
     roll, pitch, _ = rates_along(0.5 * config.steps.coefficient, 0.0, 1.0, 0.0)
     return config.limits.max_tilt_rate / hypot(roll, pitch)
 
@@ -137,7 +137,7 @@ def _largest_speed(config: Config) -> float:
 def expectations(config: Config) -> list[str]:
     """Messages for the user: expected response, largest sensible gain, position-hold gains.
 
-    For a planner of another package only the last is known.
+    For a planner of another package, only the message about the position hold.
     """
     if config.planner_name not in PLANNER_NAMES:
         return [hold_sentence(config)]

@@ -1,4 +1,4 @@
-"""The source that guidance flies now: none, a held pose, or a source of references."""
+"""What guidance flies now: nothing, a held pose, or a source of references."""
 
 from math import dist, inf
 
@@ -10,7 +10,7 @@ from companion.guidance.reference import ReferenceAt
 from companion.guidance.source import ManeuverSource, Source
 
 _REJOINED_DISTANCE = 1.0
-"""Distance from the reference at which the vehicle counts as returned after open loop, m."""
+"""Distance from the reference below which the vehicle counts as returned after open loop, m."""
 _RETURN_TIME = 10.0
 """Time allowed to return to the reference after open loop, s; a return over 10 m takes 4 s."""
 
@@ -19,7 +19,7 @@ class FlownSource:
     """The held pose, and the source that is flown from it.
 
     Attributes:
-        pose: the held pose, or the one from which the source began; None: no reference.
+        pose: the held pose, or the pose from which the source began; None: neither.
         source: the source of references, or None.
         begun_at: when the source began, s of event-loop time, or None.
     """
@@ -50,13 +50,13 @@ class FlownSource:
         return 0.0 if self._braking is None else max(0.0, self._braking.ends - now)
 
     def finished(self, now: float) -> bool:
-        """Whether the source has reached its end."""
+        """Whether there is a source and it has reached its end."""
         return self.source is not None and self.source.finished(now)
 
     def reference(self, now: float, motion: VehicleMotion, heading: float) -> ReferenceAt:
         """The reference as a function of event-loop time (s).
 
-        Without a source and a pose it is the present place of the vehicle.
+        Without source and pose it is the present position of the vehicle.
 
         Args:
             now: s of event-loop time.
@@ -76,7 +76,7 @@ class FlownSource:
         return lambda _: held
 
     def following(self, now: float, turn: float) -> Following | None:
-        """The trajectory that is followed now, or None.
+        """The trajectory that is followed at `now`; None if no trajectory is.
 
         Args:
             now: s of event-loop time.
@@ -102,9 +102,9 @@ class FlownSource:
     ) -> float | None:
         """Distance from the reference, m; `now` in s of event-loop time.
 
-        It is None without a pose, in open loop, and while the reference drifts. After these it
-        stays None until the vehicle is back at its reference, but at most for `_RETURN_TIME` from
-        the first step in closed loop. Another open loop in between does not extend this time.
+        It is None without a pose, in open loop, and while the reference drifts. After open loop or
+        drift it stays None until the vehicle is back at its reference, but at most for
+        `_RETURN_TIME` in closed loop. Another open loop in between does not extend this time.
         """
         distance = dist(reference.position_ned, motion.position_ned)
         since = self._returning_since

@@ -1,4 +1,4 @@
-"""Whether the vehicle stands on the ground, by more signs than the autopilot's landed flag."""
+"""Tells whether the vehicle stands on the ground: landed flag, height, speed and commands."""
 
 from collections.abc import Callable
 
@@ -17,16 +17,16 @@ _LANDED_TIME = 0.5
 class GroundContact:
     """Compares the landed flag (EXTENDED_SYS_STATE) with height, vertical speed and sent commands.
 
-    A wrong flag in flight must not stop the motors. So while height or vertical speed contradict
-    the flag, zero thrust counts as unsafe.
+    A landed flag that is wrong in flight must not stop the motors. So zero thrust counts as unsafe
+    while height or vertical speed contradict the flag.
 
     Args:
         state: the vehicle's telemetry.
         clock: returns event-loop time, s.
 
     Attributes:
-        takeoff_commanded: whether a take-off was commanded in this flight; after that no setpoint
-            may be idle.
+        takeoff_commanded: whether a take-off was commanded in this flight, or the vehicle already
+            flew. No setpoint may be idle after that.
     """
 
     def __init__(self, state: VehicleState, clock: Callable[[], float]) -> None:
@@ -42,7 +42,7 @@ class GroundContact:
         self._start_height = self._state.height
 
     def note_flying(self) -> None:
-        """Note that the vehicle already flies: this program did not command the take-off."""
+        """Note that the vehicle already flies, although this program commanded no take-off."""
         self.takeoff_commanded = self._left_ground = True
 
     def update(self) -> None:
@@ -62,16 +62,16 @@ class GroundContact:
 
     @property
     def standing(self) -> bool:
-        """Whether the flag says landed, and the vehicle has not lifted off.
+        """Whether the landed flag is set, and the vehicle has not lifted off.
 
-        After a take-off command it has lifted off as soon as it rises.
+        After a take-off command the vehicle has lifted off as soon as it rises.
         """
         rising = self.takeoff_commanded and self._vertical_speed() < -_STILL_SPEED
         return self._state.landed and not self._left_ground and not rising
 
     @property
     def touched_down(self) -> bool:
-        """Whether the vehicle has landed: flag set for 0.5 s and small vertical speed."""
+        """Whether the vehicle has landed: landed flag set for 0.5 s, and small vertical speed."""
         since = self._landed_since
         if not self._state.landed or since is None or self._clock() - since < _LANDED_TIME:
             return False

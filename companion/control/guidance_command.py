@@ -13,7 +13,7 @@ class GuidanceCommand(NamedTuple):
         target: target of the planner; its heading is in the frame without estimator resets.
         acceleration_down: acceleration downwards that thrust and gravity shall give, m/s².
         made_at: when guidance made the command, s of event-loop time.
-        idle: whether zero rates and zero thrust are sent, on the ground.
+        idle: whether zero body rates and zero thrust are sent; only on the ground.
         is_step: whether this is an open-loop step whose response is measured.
         body_rates: body rates that replace the planner's, within the limits, rad/s; None: the
             planner's are sent.

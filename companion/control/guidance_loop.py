@@ -29,16 +29,16 @@ _LEVEL_TARGET = Target(0.0, 0.0, 0.0)
 class GuidanceLoop:
     """Writes a new `GuidanceCommand` to the control loop at a steady rate while position is fresh.
 
-    On the ground the command is idle until a take-off is commanded. After that, without a pose, it
-    damps the motion; `hold_here` stops and holds a pose; `follow` flies a source from it. If
-    open-loop rates tilt the vehicle too far, the source ends and the vehicle stops and holds. Poses
-    and references are in the frame without estimator resets, so no reset moves the vehicle.
+    On the ground the command is idle until a take-off is commanded. After that, guidance damps the
+    motion while it has no pose. `hold_here` stops and holds a pose; `follow` flies a source from
+    it. If open-loop rates tilt the vehicle too far, the source ends, and the vehicle brakes and
+    holds. Poses and references are in the frame without resets, so no reset moves the vehicle.
 
     Attributes:
         flown: the held pose and the source that is flown from it.
         bound_to_hold: True after `give_up`: from then on no source may be flown.
         motion: motion of the vehicle at the last step, without resets, or None.
-        acceleration: its horizontal acceleration then, m/s², NED.
+        acceleration: horizontal acceleration of the vehicle at the last step, m/s², NED.
         tracking_error: distance from the reference at the last step, m; see
             `FlownSource.tracking_error`.
         estimate: estimates the motion.
@@ -116,7 +116,7 @@ class GuidanceLoop:
         return self.flown.braking_left(self._clock())
 
     def hold_reference(self) -> None:
-        """Hold the present reference's pose, at which a maneuver ended; raises as `hold_here`."""
+        """Hold the pose of the present reference, after a maneuver; raises as `hold_here`."""
         now = self._clock()
         self._recorder.action(now, "hold_reference")
         motion = self.maker.guidance_input(now).now
@@ -125,7 +125,7 @@ class GuidanceLoop:
         self.flown.pose = Pose(reference.position_ned, reference.heading)
 
     def give_up(self) -> None:
-        """Brake and hold, and fly no source any more; raises as `hold_here`."""
+        """Brake and hold, and never fly a source again; raises as `hold_here`."""
         now = self._clock()
         self._recorder.action(now, "give_up")
         self.bound_to_hold = True
@@ -161,7 +161,7 @@ class GuidanceLoop:
 
     def step_soon(self) -> None:
         """Make the next command at once, because the source has a new reference."""
-        self._ticker.soon()
+        self._ticker.trigger()
 
     def motion_now(self) -> VehicleMotion:
         """The estimated motion now, in the frame without estimator resets.
@@ -195,7 +195,7 @@ class GuidanceLoop:
     def _step(
         self, now: float, position: LocalPosition | None, *, standing: bool, may_idle: bool
     ) -> StepOutput | None:
-        """Make one command; return the data it was computed from, or None."""
+        """Make one command; return what it was computed from, or None if none was computed."""
         if position is None:
             self.learning.pause()
             return None
@@ -229,7 +229,7 @@ class GuidanceLoop:
         return StepOutput(measured_at, self._q, inputs, reference, self.tracking_error)
 
     def _write_command(self, now: float, inputs: GuidanceInput) -> Reference:
-        """Write the command for `now`, if one can be made; return the reference of this step."""
+        """Write the command for `now`, unless it would not be finite; return the reference."""
         reference, command = self.maker.make(
             now,
             inputs,

@@ -15,8 +15,8 @@ class Hold:
     """Begins a hold when it is asked to, or when open-loop rates tilt the vehicle too far.
 
     Args:
-        flown: the source of guidance that is flown; the hold replaces it.
-        maker: makes the commands, and knows the motion of the vehicle.
+        flown: what guidance flies; the hold replaces it.
+        maker: provides the estimated motion of the vehicle.
         learning: learns the hover thrust, which limits the tilt at which the height is held.
         max_tilt: largest tilt in open loop, rad.
         assumed: reaction and braking that the monitors of the fence assume.
@@ -42,7 +42,7 @@ class Hold:
     def begin(self, now: float, heading: float) -> None:
         """Brake, and hold this heading (rad) at the place where the vehicle stops.
 
-        A vehicle that already brakes for a hold goes on with it, also with its heading.
+        If the vehicle already brakes for a hold, that hold and its heading are kept.
 
         Raises:
             RuntimeError: no position has come yet.
@@ -56,7 +56,7 @@ class Hold:
     def begin_if_tilted(
         self, now: float, motion: VehicleMotion, q: Quaternion, heading: float
     ) -> None:
-        """Give up a source that steers by rates and hold, if the attitude `q` is tilted too far."""
+        """Give up a source that commands body rates, and hold, if `q` is tilted too far."""
         name = self._flown.source_commanding_rates(now, motion)
         if name is None:
             return

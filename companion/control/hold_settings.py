@@ -14,31 +14,33 @@ _CALM_WEIGHTS = Weights(position=1.0, velocity=1.5)
 """Low weights of the hold between doublets, so that its commands do not disturb `identify`."""
 _USUAL_RATE_LOOP_DELAY = 0.12
 """Lag plus dead time of a heavy vehicle's rate loop, assumed if none is identified, s."""
-_HOLD_LATENESS_RANGE = 0.065, 0.08
-"""Delays between which the hold changes from stiff to normal, s. The delay is the dead time, plus
+_STIFF_HOLD_DELAYS = 0.065, 0.08
+"""Delays of the rate loop between which the hold changes from stiff to normal, s: dead time, plus
 half the lag, plus half the time in which the rate loop slews to the largest roll-pitch rate."""
 _SHORTEST_DELAY = 0.275
-"""Shortest delay for which the hold is made stiffer, s. Higher weights multiply the noise of the
-estimate so much that the autopilot's rate loop always slews, and the vehicle swings."""
+"""Shortest delay T that sets the weights of the hold, s; a shorter one counts as this. Higher
+weights would amplify the noise of the estimate: the rate loop would always slew, and the vehicle
+would swing."""
 _SECOND_ORDER_SHARE = 0.2
-"""A second-order lag counts as longer by this share of it in the hold's delay. The hold then keeps
-the margins that it has with a first-order model of PX4's rate loop."""
-_OBSERVER_LATENESS_RANGE = 0.035, 0.06
-"""Delays (dead time plus half the lag) over which the observer changes from quick to normal, s."""
+"""Share of a second-order lag that is added to the delay T of the hold. The hold then keeps the
+stability margins that it has with a first-order model of PX4's rate loop."""
+_QUICK_OBSERVER_DELAYS = 0.035, 0.06
+"""Delays of the rate loop (dead time plus half the lag) between which the observer changes from
+quick to normal, s."""
 _GAIN_RANGE = 5.0, 7.0
 """Gains of the planner between which the observer changes from quick to normal, 1/s."""
 _BANDWIDTH_INCREASE = 0.6
-"""Relative increase of the observer's bandwidth with a quick rate loop."""
+"""`ObserverSettings.bandwidth_increase` of a quick observer."""
 _CALM_BANDWIDTH = 1.0
-"""Bandwidth of the disturbance estimate while the vehicle is identified, rad/s."""
+"""Bandwidth of the disturbance estimate in a flight that identifies the vehicle, rad/s."""
 _POSITION_TIME_CONSTANT = 0.1
 """Time constant with which the estimated position follows the measured one, s."""
 _POSITION_PULL = 4.0, 8.0
-"""Gain from the position error to the observed velocity, with a slow and a quick rate loop, 1/s. It
-is needed because the velocities of PX4 and ArduPilot are off by 0.05 m/s for seconds (measured)."""
+"""`ObserverSettings.position_pull` with a slow and with a quick rate loop, 1/s. It is needed
+because the velocities of PX4 and ArduPilot are off by 0.05 m/s for seconds (measured)."""
 _TRUSTED_PULL_INCREASE = 5.0
-"""Increase of the gain `_POSITION_PULL` with a quick rate loop and trusted positions, 1/s. With
-recorded errors of PX4's and ArduPilot's estimators the vehicle then moves 5 to 25 % less."""
+"""`ObserverSettings.pull_increase` with a quick rate loop, 1/s. With recorded errors of PX4's and
+ArduPilot's estimators the vehicle then moves 5 to 25 % less."""
 _CORRECTION_TIME_CONSTANT = 0.65
 """Time constant of the position corrections of PX4's and ArduPilot's estimators (measured), s."""
 _CORRECTION_FILTER_TIMES = 0.1, 0.04
@@ -51,49 +53,49 @@ _LARGEST_CORRECTION = 0.2
 def hold_weights(config: Config) -> Weights:
     """The weights of the position hold; those not configured follow from the delay T.
 
-    T is the delay of the attitude behind its target (`attitude_delay`), but at least 0.275 s.
-
-    The weights 1/T⁴ and 1/T² place the three poles of the hold about 1/T from 0. A quick rate loop
-    allows up to twice the position weight. `tests/control/test_margins.py` checks the stability
-    margins against errors of T and of the thrust.
+    T is the delay of the attitude behind its target (`attitude_delay`), but at least 0.275 s. The
+    weights 1/T⁴ (position) and 1/T² (velocity) place the three poles of the hold at about 1/T from
+    0. A quick rate loop allows up to twice the position weight. `tests/control/test_margins.py`
+    checks the stability margins against errors of T and of the thrust.
     """
     guidance, delay = config.guidance, _hold_delay(config)
     position, velocity = guidance.position_weight_per_s4, guidance.velocity_weight_per_s2
     return Weights(
-        (1.0 + _hold_quickness(config)) / delay**4 if position is None else position,
+        (1.0 + _hold_stiffness(config)) / delay**4 if position is None else position,
         1.0 / delay**2 if velocity is None else velocity,
     )
 
 
-def _quickness(late: float, quick_and_slow: tuple[float, float]) -> float:
-    """1 up to the first number of the range, 0 from the second on, linear between them."""
-    quick, slow = quick_and_slow
-    return min(max(0.0, (slow - late) / (slow - quick)), 1.0)
+def _falling_share(value: float, one_and_zero: tuple[float, float]) -> float:
+    """Share that is 1 up to the first of two values and 0 from the second on; linear between."""
+    one, zero = one_and_zero
+    return min(max(0.0, (zero - value) / (zero - one)), 1.0)
 
 
-def _hold_quickness(config: Config) -> float:
+def _hold_stiffness(config: Config) -> float:
     """How stiff a hold the rate loop allows, from 0 (normal) to 1 (stiff).
 
-    A rate loop that slews slowly is late only in large motions. After one, a stiff hold would
-    oscillate without end, as on the ArduPilot mock at 200 °/s.
+    A rate loop that slews slowly is late only in large motions. After a large motion a stiff hold
+    would oscillate without end, as on the ArduPilot mock at 200 °/s.
     """
-    return _quickness(_lateness(config) + slewing_delay(config), _HOLD_LATENESS_RANGE)
+    return _falling_share(_rate_loop_delay(config) + slewing_delay(config), _STIFF_HOLD_DELAYS)
 
 
 def slewing_delay(config: Config) -> float:
-    """Delay of the rate loop while it slews to the largest roll-pitch rate: half that time, s.
+    """Half the time in which the rate loop slews to the largest roll-pitch rate, s.
 
-    It is 0 without a known slew limit.
+    It is 0 if no slew limit is known.
     """
     axes = config.vehicle.axes["roll"], config.vehicle.axes["pitch"]
     slews = [axis.acceleration_limit for axis in axes if axis.acceleration_limit is not None]
     return 0.5 * config.limits.max_tilt_rate / min(slews) if slews else 0.0
 
 
-def _lateness(config: Config) -> float:
-    """Dead time plus half the lag of the rate loop, s; infinite if it is not identified.
+def _rate_loop_delay(config: Config) -> float:
+    """Delay of the rate loop: dead time plus half the lag, s; infinite if it is not identified.
 
-    A second-order lag is first converted to first order, because it delays quick commands more.
+    A second-order lag is first converted to first order plus dead time (`FIRST_ORDER_SHARE`),
+    because it delays quick commands more.
     """
     lag, dead_time = slower_tilt(config)
     share = FIRST_ORDER_SHARE if isfinite(tilt_damping(config)) else 1.0
@@ -101,29 +103,36 @@ def _lateness(config: Config) -> float:
 
 
 def observer_quickness(config: Config) -> float:
-    """How quick a motion observer rate loop and gain allow, from 0 (normal) to 1 (quick).
+    """How quick a motion observer the rate loop and the planner's gain allow: 0 normal, 1 quick.
 
-    It is 0 if the bandwidth of the wind estimate is configured or the flight identifies.
+    It is 0 if the bandwidth of the wind estimate is configured, or in a flight that identifies the
+    vehicle.
 
     A quick observer follows the corrected position, so errors of the autopilot's velocity matter
     less. Its commands are less calm: on a rate loop like PX4's, body rates in hover double.
     """
     if config.guidance.disturbance_bandwidth_rad_s is not None or flies_identify(config):
         return 0.0
-    return _quickness(_lateness(config), _OBSERVER_LATENESS_RANGE) * _gain_quickness(config)
+    return _falling_share(_rate_loop_delay(config), _QUICK_OBSERVER_DELAYS) * _gain_quickness(
+        config
+    )
 
 
 def _gain_quickness(config: Config) -> float:
-    """How quick an observer the planner's gain allows, 0..1: it multiplies the observer's noise.
+    """How quick an observer the planner's gain allows, 0..1: the gain amplifies its noise.
 
-    At 90 °/s the mock ArduPilot oscillated without end with a gain of 7.5 and a quick observer.
+    The ArduPilot mock, limited to 90 °/s, oscillated without end with a gain of 7.5 and a quick
+    observer.
     """
-    return _quickness(config.planner.gain_per_s, _GAIN_RANGE)
+    return _falling_share(config.planner.gain_per_s, _GAIN_RANGE)
 
 
 def observer_settings(config: Config) -> ObserverSettings:
     """The settings of the motion observer."""
-    (slow, quick), quickness = _POSITION_PULL, _quickness(_lateness(config), _HOLD_LATENESS_RANGE)
+    (slow, quick), quickness = (
+        _POSITION_PULL,
+        _falling_share(_rate_loop_delay(config), _STIFF_HOLD_DELAYS),
+    )
     return ObserverSettings(
         _CALM_BANDWIDTH if flies_identify(config) else disturbance_bandwidth(config),
         _POSITION_TIME_CONSTANT,
@@ -146,13 +155,13 @@ def correction_settings(config: Config) -> CorrectionSettings:
 
 
 def disturbance_bandwidth(config: Config) -> float:
-    """Bandwidth of the wind estimate, rad/s: as configured, or 1.5 times that of the hold."""
+    """Bandwidth of the wind estimate, rad/s: as configured, or 1.5/T (see `hold_weights`)."""
     configured = config.guidance.disturbance_bandwidth_rad_s
     return 1.5 / _hold_delay(config) if configured is None else configured
 
 
 def attitude_delay(config: Config) -> float:
-    """The delay T of `hold_weights`, s; a usual rate loop is assumed if none is identified.
+    """Delay of the attitude behind its target, s; assumes a usual rate loop if none is identified.
 
     A gain above the largest sensible one is replaced by it: more gain hardly makes the attitude
     quicker, and a stiffer hold would oscillate.
@@ -165,7 +174,7 @@ def attitude_delay(config: Config) -> float:
 
 
 def _hold_delay(config: Config) -> float:
-    """The delay that sets the weights and the wind estimate, s: at least `_SHORTEST_DELAY`."""
+    """The delay T that sets weights and wind estimate, s: `attitude_delay`, at least 0.275 s."""
     return max(_SHORTEST_DELAY, attitude_delay(config))
 
 

@@ -12,7 +12,7 @@ _CLEAR_HEIGHT = 1.0
 """Height above home from which there is neither ground contact nor ground effect, m."""
 
 _MAX_THRUST_AGE = 0.3
-"""Largest age of an ATTITUDE_TARGET that gives the present thrust, s; PX4 sends it at 10 Hz."""
+"""Largest age of an ATTITUDE_TARGET whose thrust is used, s; PX4 sends it at 10 Hz."""
 
 _MISMATCH_SHARE = 0.15
 """Largest relative error of the configured hover thrust that is not reported."""
@@ -21,8 +21,9 @@ _MISMATCH_SHARE = 0.15
 class HoverLearning:
     """Passes telemetry to the hover-thrust estimate, before and during offboard control.
 
-    Before offboard control ATTITUDE_TARGET reports the autopilot's thrust, so a wrong configured
-    hover thrust is corrected before the takeover. After offboard control nothing is learned.
+    Before offboard control ATTITUDE_TARGET reports the autopilot's own thrust. So an error of the
+    configured hover thrust is corrected before the takeover. After offboard control nothing is
+    learned.
     """
 
     def __init__(self, hover_thrust: HoverThrust, state: Telemetry) -> None:
@@ -32,22 +33,22 @@ class HoverLearning:
 
     @property
     def thrust_limits(self) -> tuple[float, float]:
-        """Smallest and largest available specific thrust, as far as known, m/s²."""
+        """Smallest and largest available specific thrust by the learned hover thrust, m/s²."""
         hover_thrust = self._hover_thrust
         return hover_thrust.smallest_specific_thrust, hover_thrust.largest_specific_thrust
 
     @property
     def hover(self) -> float:
-        """Normalised thrust at hover at the first battery voltage, as learned so far, 0..1."""
+        """Learned normalised thrust at hover, at the battery voltage just after take-off, 0..1."""
         return self._hover_thrust.learned
 
     @property
     def present_hover(self) -> float:
-        """Normalised thrust at hover at the present battery voltage, as learned so far, 0..1."""
+        """Learned normalised thrust at hover, at the present battery voltage, 0..1."""
         return self._hover_thrust.present_hover
 
     def largest_tilt(self, acceleration_down: float = 0.0) -> float:
-        """Largest tilt at which 95 % of full thrust still give `acceleration_down` (m/s²), rad."""
+        """Largest tilt at which 95 % of the largest thrust give `acceleration_down` (m/s²), rad."""
         return largest_tilt(GRAVITY - acceleration_down, self._hover_thrust.largest_tilted_thrust)
 
     def limit_tilt(self, target: Target, acceleration_down: float) -> Target:
@@ -57,7 +58,7 @@ class HoverLearning:
         return target._replace(north=north, east=east)
 
     def on_ground(self) -> None:
-        """Note that the vehicle stands on the ground."""
+        """Note that the vehicle stands on the ground: pause, and forget the voltage at take-off."""
         self._hover_thrust.on_ground()
 
     def pause(self) -> None:
@@ -71,7 +72,7 @@ class HoverLearning:
             now: s of event-loop time.
             q: newest attitude.
             offboard_active: whether the autopilot obeys the setpoints.
-            steady: whether the commanded thrust is steady; the rotors lag behind a changing one.
+            steady: whether the commanded thrust is steady; the rotors lag behind a changing thrust.
         """
         battery, position = self._state.battery, self._state.position
         if battery is not None:

@@ -1,4 +1,4 @@
-"""Builds the inner loop from the configuration: planner, limits, thrust, vehicle response."""
+"""Builds planner, limits, thrust conversion and vehicle response from the configuration."""
 
 from math import inf
 from typing import Any
@@ -16,8 +16,8 @@ from companion.files.yaml_file import ConfigError
 from companion.guidance import GRAVITY, HoverThrust, InnerResponse, ThrustSettings
 
 _TRIAL_INPUT = (1.0, 0.0, 0.0, 0.0), Target(0.1, 0.1, 0.0), 0.004
-"""Attitude, target and period with which the planner of another package is tried before it may fly:
-a step from level to 8° of tilt."""
+"""Attitude, target and sample period of the trial that a planner of another package must pass: a
+step from level to 8° of tilt."""
 
 LARGEST_GAIN_TIMES_DELAY = 0.45
 """Largest sensible gain · (lag + dead time); above it, the response overshoots."""
@@ -68,10 +68,15 @@ def law_constants(config: Config) -> Constants:
 
 
 def plugin(key: str, group: str, name: str) -> Any:
-    """The class or function of another package that the configuration names in `key`.
+    """Load a class or function of another package.
+
+    Args:
+        key: configuration key that names it, for messages.
+        group: its group of entry points.
+        name: its name in this group.
 
     Raises:
-        ConfigError: it is not installed or cannot be loaded.
+        ConfigError: the plug-in is not installed or cannot be loaded.
     """
     try:
         return plugins.load(group, name)
@@ -110,12 +115,12 @@ def hover_thrust(config: Config) -> HoverThrust:
 
 
 def full_thrust(config: Config) -> float:
-    """Specific thrust at a normalised thrust of 1 by the configured hover thrust, m/s²."""
+    """Specific thrust at a normalised thrust of 1, from the configured hover thrust, m/s²."""
     return GRAVITY / config.thrust.hover_thrust
 
 
 def thrust_limits(config: Config) -> tuple[float, float]:
-    """Smallest and largest specific thrust by the configured hover thrust, m/s²."""
+    """Smallest and largest specific thrust, from the configured hover thrust, m/s²."""
     full = full_thrust(config)
     return config.limits.min_thrust * full, config.limits.max_thrust * full
 
@@ -138,8 +143,8 @@ def tilt_response(config: Config) -> InnerResponse:
 def slower_tilt(config: Config) -> tuple[float, float]:
     """The larger lag and the larger dead time of roll and pitch, s; 0 if unknown.
 
-    `model-following` delays the axis with the shorter dead time to match the other one, so the
-    coefficients respond like this. With other planners this is the worse case of both axes.
+    With `model-following` the coefficients respond with these, because it delays the axis with the
+    shorter dead time. With other planners they are the worse case of both axes.
     """
     axes = config.vehicle.axes
     tilt = axes["roll"], axes["pitch"]

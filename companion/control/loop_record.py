@@ -9,7 +9,7 @@ from companion.vehicle.interval_sums import IntervalSums
 from companion.vehicle.records import AttitudeSample
 
 _KEPT_GAPS = 32
-"""Number of latest gaps that are kept; far fewer gaps already end a flight."""
+"""Number of latest gaps that are kept; far fewer gaps end a flight."""
 
 
 class Unanswered(Enum):
@@ -35,8 +35,8 @@ class Unanswered(Enum):
     def is_refusal(self) -> bool:
         """Whether the data were fresh, but no valid setpoint could be computed or sent.
 
-        Otherwise none was computed: sample or command was missing, stale or out of order, the mode
-        was not confirmed after a gap, or it may be another vehicle.
+        For the other reasons no setpoint was computed: sample or command was missing, stale or out
+        of order, the mode was not confirmed after a gap, or it may be another vehicle.
         """
         return self in _REFUSALS
 
@@ -65,11 +65,11 @@ _REFUSALS = {
 
 @dataclass(frozen=True, slots=True)
 class Deadlines:
-    """When data are too old, and when a setpoint is too late; s.
+    """Times, s, after which data are too old or a setpoint is too late.
 
     Attributes:
-        telemetry_stale: greatest age of a sample that is answered.
-        target_stale: greatest age of a command from guidance.
+        telemetry_stale: largest age of a sample that is answered.
+        target_stale: largest age of a command from guidance that is used.
         deadline: longest time from a sample's arrival to its setpoint; a longer one is counted.
     """
 
@@ -92,9 +92,9 @@ class LoopRecord:
         thrust: thrust last sent, 0..1.
         last_sample: when the newest sample arrived.
         last_vehicle_time: vehicle time of the newest usable sample, s.
-        last_answer: arrival time of the newest sample that was answered.
-        gap_from: time from which a gap without setpoints counts: `last_answer`, or inf before the
-            first answer and after a gap whose mode was confirmed.
+        last_answer: when the newest answered sample arrived.
+        gap_from: when the present gap without setpoints began: `last_answer`, or inf before the
+            first answer and after `ControlLoop.resume`.
         gaps: when the first answerable sample after each of the latest gaps arrived. A gap is a
             time longer than `Deadlines.telemetry_stale` without a setpoint, while offboard is
             active or requested.
@@ -140,10 +140,10 @@ class LoopRecord:
 
     @property
     def stale(self) -> int:
-        """Number of samples unanswered for other reasons than `refused`; see `is_refusal`."""
+        """Number of samples unanswered for reasons that are no refusal; see `is_refusal`."""
         return sum(n for reason, n in self.unanswered.items() if not reason.is_refusal)
 
     @property
     def refused(self) -> int:
-        """Number of samples unanswered because no valid setpoint could be computed or sent."""
+        """Number of samples for which no valid setpoint could be computed or sent."""
         return sum(n for reason, n in self.unanswered.items() if reason.is_refusal)

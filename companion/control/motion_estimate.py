@@ -1,4 +1,4 @@
-"""Estimates the motion: measured positions, propagated by the measured attitude."""
+"""Estimates the motion from measured positions and, between them, from the measured attitude."""
 
 from collections.abc import Callable
 from math import atan2
@@ -22,9 +22,9 @@ from companion.nmpc import Vehicle
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
 _LEAST_COS_TILT = 0.2
-"""Lower limit of the cosine of the tilt (78°), so that the slope of the thrust stays bounded."""
+"""Lower bound of cos(tilt) (78°), so that the slope (see `SlopeHistory`) stays bounded."""
 _LONGEST_POSITION_GAP = 0.2
-"""Two positions farther apart in time than this give no acceleration, s."""
+"""Longest time between two positions from which an acceleration is computed, s."""
 _DRAG_MISMATCH = 0.15
 """Largest error of the assumed drag that is not reported, 1/s."""
 
@@ -36,8 +36,7 @@ class MotionEstimate:
         observer: estimates position, velocity and disturbance.
         correction: corrects the measured positions.
         drag: estimates the drag.
-        offset: returns vehicle time minus event-loop time, s, or None before the first attitude;
-            gives the age of a position.
+        offset: returns vehicle time minus event-loop time, s, or None before the first attitude.
 
     Attributes:
         vertical_thrust: upward part of the commanded specific thrust, m/s².
@@ -71,7 +70,7 @@ class MotionEstimate:
 
     @property
     def _axis_drag(self) -> AxisDrag:
-        """The drag along the body's axes, as learned so far, at the present heading."""
+        """The learned difference of the drag along the body's axes, at the present heading."""
         return AxisDrag(self.drag.axis_coefficient, self._heading)
 
     def retune(self, observer: ObserverSettings, correction: CorrectionSettings) -> None:
@@ -88,10 +87,10 @@ class MotionEstimate:
         self._slopes.add(sample.vehicle_time, (-2.0 * ay / cosine, 2.0 * ax / cosine))
 
     def turn_to(self, turn: float) -> None:
-        """Take the sum of the heading resets, rad.
+        """Take `turn`, the sum of the heading resets, rad.
 
-        A new reset rotates the disturbance and discards the earlier attitudes and the filtered
-        position correction.
+        If it changed, the disturbance is rotated, and the earlier attitudes and the filtered
+        position correction are discarded.
         """
         if turn != self._turn:
             self._observer.turn(turn - self._turn)
@@ -100,7 +99,7 @@ class MotionEstimate:
             self._turn = turn
 
     def note_position(self, position: LocalPosition, *, offboard_active: bool) -> None:
-        """Take a measured position and velocity; a repeated one is ignored.
+        """Take a measured position and velocity; the same message again is ignored.
 
         Drag is learned only while offboard is active.
         """
@@ -148,7 +147,7 @@ class MotionEstimate:
         )
 
     def vehicle(self, now: float, inputs: GuidanceInput) -> Vehicle:
-        """The state for the solver: `inputs`, newest attitude and body rates.
+        """State of the vehicle for the solver of predictive control.
 
         Args:
             now: time of the state, s of event-loop time.
@@ -169,7 +168,7 @@ class MotionEstimate:
     def vehicle_time(self, now: float, position: LocalPosition) -> float:
         """`now` (s of event-loop time) on the vehicle's clock, s.
 
-        Before its offset is known, `position` counts as measured when it arrived.
+        Before the offset of that clock is known, `position` counts as measured when it arrived.
         """
         offset = self._offset()
         return now + (position.vehicle_time - position.received if offset is None else offset)

@@ -69,15 +69,15 @@ def make_guidance(config: Config) -> Guidance:
 
 
 def _require_command(kind: str, guidance: Guidance, thrust: tuple[float, float]) -> None:
-    """Ask guidance of another package once, to hold a vehicle that is at rest.
+    """Check guidance of another package: ask it once to hold a vehicle that is at rest.
 
     Args:
-        kind: its name in `guidance.kind`.
+        kind: name of the guidance in `guidance.kind`.
         guidance: the guidance.
         thrust: smallest and largest specific thrust, m/s².
 
     Raises:
-        ConfigError: it raises, or does not return a `LinearCommand` of finite numbers.
+        ConfigError: the guidance raises, or does not return a `LinearCommand` of finite numbers.
     """
     rest = VehicleMotion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     inputs = GuidanceInput(rest, rest, (0.0, 0.0), (0.0, 0.0), NO_DRAG, thrust)
@@ -99,7 +99,7 @@ def _require_command(kind: str, guidance: Guidance, thrust: tuple[float, float])
 
 
 def linear_settings(config: Config) -> LinearSettings:
-    """Settings of guidance; `limits.max_tilt` gives its largest horizontal acceleration.
+    """Settings of linear guidance; its horizontal acceleration is limited by `limits.max_tilt_deg`.
 
     Raises:
         ValueError: the gains of the position hold cannot be computed.

@@ -1,4 +1,4 @@
-"""Runs the planner on each sample: periods, restarts, and the frame that the planner sees."""
+"""Runs the planner on each sample: sample period, restarts, and the frame of the attitude."""
 
 from collections.abc import Callable
 from math import inf
@@ -21,13 +21,13 @@ from companion.control.step_frame import StepFrame
 from companion.vehicle.records import AttitudeSample, AttitudeTarget
 
 _LONGEST_PERIOD = 0.1
-"""Longest period that a planner integrates over, s; after a longer one it is reset."""
+"""Longest sample period that a planner gets, s; after a longer one the planner is reset."""
 
 
 class PlannerRunner:
-    """Asks the planner for body rates, in a frame without estimator resets.
+    """Asks the planner for body rates, with attitude and target in a frame without resets.
 
-    During open-loop steps, and for seconds after them, that is the `StepFrame`.
+    During open-loop steps, and for seconds after them, this frame is the `StepFrame`.
 
     Args:
         planner: the planner.
@@ -37,14 +37,14 @@ class PlannerRunner:
     Attributes:
         attitude_target: returns the newest ATTITUDE_TARGET of an autopilot that takes body rates
             along its axes, or None.
-        on_attitude_target: called with each new one before the planner gets it.
-        asked: attitude and target of the newest sample, as the planner saw them, or None.
+        on_attitude_target: called with each new ATTITUDE_TARGET before the planner gets it.
+        planner_input: attitude and target that the planner last got, or None.
     """
 
     def __init__(self, planner: Planner, resets: EstimatorResets, limits: Limits) -> None:
         self.attitude_target: Callable[[], AttitudeTarget | None] = lambda: None
         self.on_attitude_target: Callable[[AttitudeTarget], None] | None = None
-        self.asked: tuple[Quaternion, Target] | None = None
+        self.planner_input: tuple[Quaternion, Target] | None = None
         self._planner = planner
         self._follower = planner if isinstance(planner, ModelFollowingPlanner) else None
         self._resets, self._limits = resets, limits
@@ -82,12 +82,12 @@ class PlannerRunner:
     def rates(
         self, sample: AttitudeSample, command: GuidanceCommand, arrival_period: float
     ) -> BodyRates:
-        """Body rates for a sample within the limits, rad/s: those of guidance, or the planner's.
+        """Body rates for a sample, limited, rad/s: those in the command, or else the planner's.
 
         Args:
             sample: the sample to answer.
             command: the command of guidance.
-            arrival_period: vehicle time since the usable sample before, s.
+            arrival_period: vehicle time from the previous usable sample to this one, s.
 
         Raises:
             AttitudeError: the planner cannot use this attitude or target.
@@ -121,7 +121,7 @@ class PlannerRunner:
         self._period = period
         self._planned_at = sample.vehicle_time
         self._note_attitude_target(sample)
-        self.asked = q, target
+        self.planner_input = q, target
         # A vehicle's clock that stood still or went back must not keep the sample unanswered.
         rates = self._planner.rates(q, target, max(SHORTEST_PERIOD, period), sample.body_rates)
         return rates if self._passed_target is None else self._frame.rates(q, rates)
@@ -129,7 +129,7 @@ class PlannerRunner:
     def _note_attitude_target(self, sample: AttitudeSample) -> None:
         """Pass a new ATTITUDE_TARGET to the planner once a sample is at least as new.
 
-        One from before a heading reset is ignored, because its frame is not known.
+        An ATTITUDE_TARGET from before a heading reset is ignored: its frame is not known.
         """
         if self._resets.turn != self._turn:
             self._turn, self._turned_at_ms = self._resets.turn, sample.time_boot_ms

@@ -1,4 +1,4 @@
-"""Predictive control; linear guidance flies every step for which it has no answer."""
+"""Predictive control; linear guidance flies each step for which the solver has no answer."""
 
 from array import array
 from collections import Counter, deque
@@ -53,13 +53,13 @@ class PredictiveRecord:
 class Predictive:
     """Requests the solver's answer for the next step, at each step of guidance.
 
-    Linear guidance also makes a command at every step. It replaces an answer that is late, failed
-    or implausible without a pause. The first trouble of each kind is reported.
+    Linear guidance also makes a command at every step. It is flown at once if an answer is late,
+    failed or implausible. The first trouble of each kind is reported.
 
     Args:
-        solver: starts the solver's process for a trajectory.
+        solver: starts the solver's process; its argument is called with each trouble.
         period: period of guidance, s.
-        lockstep: whether to wait for the solver, as the vehicle waits in lockstep.
+        lockstep: whether to wait for the solver's answers, because the vehicle waits, too.
         note: called with messages for the user.
 
     Attributes:
@@ -89,7 +89,7 @@ class Predictive:
     def replacement_for(
         self, linear: LinearCommand, turn: float, vehicle: Vehicle, following: Following | None
     ) -> LinearCommand:
-        """The command of predictive control while it follows a trajectory, else `linear`.
+        """The command of predictive control if there is one for this step, else `linear`.
 
         Predictive control works in the estimator's frame, whose heading jumps at each reset. Its
         target is constant for a period, which its model takes into account.
@@ -110,7 +110,7 @@ class Predictive:
     def command(
         self, linear: tuple[Target, float], vehicle: Vehicle, following: Following | None
     ) -> tuple[Target, float]:
-        """Take the solver's answer for this step, else `linear`, and request the next answer.
+        """Choose the solver's answer for this step, else `linear`; request the next answer.
 
         Args:
             linear: target, in the estimator's frame, and downward acceleration (m/s²) of linear

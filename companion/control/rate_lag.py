@@ -1,8 +1,8 @@
-"""How far the body rates in telemetry lag behind the attitude in the same message.
+"""The time by which the body rates in telemetry lag behind the attitude in the same message.
 
 Autopilots send body rates after a low-pass filter, but integrate the attitude from the unfiltered
-gyro. Measured lags: PX4 5 ms, ArduPilot 11 ms. With them, rates of 400°/s explain the turn of the
-heading in a corner only within 0.5°.
+gyro. Measured lags: PX4 5 ms, ArduPilot 11 ms. If the lag is ignored, the turn of the heading that
+is computed from body rates is wrong by up to 0.5° in a corner at 400°/s.
 """
 
 from companion.attitude import Quaternion
@@ -10,7 +10,7 @@ from companion.attitude.rotation import body_error, clamp
 from companion.guidance.reference import Vector
 
 _LARGEST_LAG = 0.03
-"""Largest lag that is learned, s; a low pass of 20 Hz has 11 ms."""
+"""Largest lag that is learned, s; a low-pass filter of 20 Hz has 11 ms."""
 _HALF_LEARNED_SQUARES = 0.01
 """Sum of squared rate changes, rad²/s², after which half of the lag is learned."""
 
@@ -18,17 +18,17 @@ _HALF_LEARNED_SQUARES = 0.01
 class RateLag:
     """Learns the lag of the reported body rates behind the reported attitude.
 
-    Between two samples the attitude turns by more than the mean of the two rates; the difference is
-    the lag times the change of the rates. Only roll and pitch count, because the estimator's
-    corrections of the heading are no rotations of the body.
+    The turn of the attitude between two samples differs from the mean of the two rates times their
+    distance in time. The difference is the lag times the change of the rates. It is learned from
+    roll and pitch only, because the estimator also changes the heading when the body does not turn.
 
-    All rotations have the same weight. So if the lag changes in flight, for example because a
-    filter of the autopilot is switched, it is followed slowly. That matters little: on the mock
-    vehicles, where the lag grew by 11 ms after `corners`, the heading of later steps erred by 0.1°
-    more; without this class it erred by 0.3° more. Forgetting old rotations would save only 0.05°.
+    All rotations have the same weight. So a lag that changes in flight, for example when a filter
+    of the autopilot is switched, is followed slowly. That matters little: on the mock vehicles,
+    where the lag grew by 11 ms after `corners`, the heading of later steps erred by 0.1° more;
+    without this class it erred by 0.3° more. Forgetting old rotations would save only 0.05°.
 
     Attributes:
-        seconds: the lag, s; 0 before the first fast rotation.
+        seconds: the learned lag, s; about 0 before the first fast rotation.
     """
 
     def __init__(self) -> None:
@@ -47,16 +47,18 @@ class RateLag:
             0.5 * (r + new_r) + ahead * (new_r - r),
         )
 
-    def learn(self, before: Vector, now: Vector, predicted: Quaternion, found: Quaternion) -> None:
-        """Compare an attitude with the one that `mean` predicted.
+    def learn(
+        self, before: Vector, now: Vector, predicted: Quaternion, measured: Quaternion
+    ) -> None:
+        """Learn from the difference between a measured attitude and the predicted one.
 
         Args:
-            before: body rates of the sample before, rad/s.
+            before: body rates of the previous sample, rad/s.
             now: body rates of this sample, rad/s.
-            predicted: attitude of this sample, predicted from the sample before by `mean`.
-            found: measured attitude of this sample.
+            predicted: attitude of this sample, predicted from the previous one with `mean`.
+            measured: measured attitude of this sample.
         """
-        _, x, y, _ = body_error(predicted, found)
+        _, x, y, _ = body_error(predicted, measured)
         p, q = now[0] - before[0], now[1] - before[1]
         square = p * p + q * q
         self._products += 2.0 * (x * p + y * q) + self.seconds * square

@@ -19,7 +19,7 @@ from companion.guidance.position_correction import CorrectionSettings
 
 
 class Tuning(NamedTuple):
-    """The values of a configuration that may change in flight, in the form the loops use.
+    """The values of a configuration that may change in flight, computed for the loops.
 
     Attributes:
         guidance: settings of linear guidance.
@@ -104,8 +104,8 @@ def fixed_because(config: Config) -> str | None:
 def interpolated(before: Config, after: Config, share: float) -> Config:
     """A configuration between two others; only keys that differ are interpolated.
 
-    Positive values are interpolated geometrically, others linearly. A value that is null is
-    replaced by the value derived for it.
+    Positive values are interpolated geometrically, others linearly. A value that is null is first
+    replaced by the value that the program computes for it (`value_in_effect`).
 
     Args:
         before: configuration at share 0; only keys that may change in flight differ from `after`.
@@ -130,7 +130,7 @@ def interpolated(before: Config, after: Config, share: float) -> Config:
 
 
 def value_in_effect(config: Config, difference: Difference, value: float | None) -> float:
-    """The value, or for null the value derived in `config`."""
+    """`value`, or for null the value that the program computes from `config`."""
     if value is not None:
         return value
     comes_to = {

@@ -26,8 +26,8 @@ class SampleRecorder:
 
     Attributes:
         on: whether the flight is recorded.
-        checked_at: time of the check of the sample's age before sending, s of event-loop time; NaN:
-            not checked.
+        checked_at: when the sample's age was checked before sending, s of event-loop time; NaN: it
+            was not checked.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class SampleRecorder:
     def answer(
         self, command: GuidanceCommand, rates: BodyRates, thrust: float, latency_ns: int
     ) -> None:
-        """Note the setpoint that was sent; it is recorded at `end`.
+        """Note the setpoint that was sent for this sample; `end` records it.
 
         Args:
             command: command of guidance.
@@ -67,8 +67,11 @@ class SampleRecorder:
             latency_ns: time since the sample's arrival, ns.
         """
         planned = not command.idle and command.body_rates is None
-        asked, plan = (self._planner.asked, self._planner.planned) if planned else (None, None)
-        self._answer = Answer(rates, thrust, latency_ns, asked, plan, command.is_step, command.idle)
+        inputs = self._planner.planner_input if planned else None
+        plan = self._planner.planned if planned else None
+        self._answer = Answer(
+            rates, thrust, latency_ns, inputs, plan, command.is_step, command.idle
+        )
 
     def end(self, sample: AttitudeSample, flags: LoopFlags, reason: Unanswered | None) -> None:
         """Record the sample and its answer.
@@ -76,7 +79,7 @@ class SampleRecorder:
         Args:
             sample: the sample.
             flags: the state of the loop when the sample arrived.
-            reason: why the newest sample that arrived while the loop was on is unanswered.
+            reason: why the newest sample is unanswered, or None; ignored if the loop was off.
         """
         if self._recorder is None:
             return

@@ -1,7 +1,7 @@
 """Converts the control loop's record of a sample to messages of `flight.mcap`.
 
-The loop passes its objects unchanged. The functions here run in the recorder's thread, and take the
-numbers from these objects in the order of the columns in
+The loop hands over its objects. The functions here run in the recorder's thread. They write the
+numbers of these objects in the order of the columns in
 `companion.recording.mcap_file.loop_channels`.
 """
 
@@ -24,7 +24,7 @@ CONTROL_OFF = 1
 """Code of a sample that came while the loop was off."""
 _MISFIT_CODES = {None: 0, Misfit.NOT_NEWER: 1, Misfit.AHEAD: 2}
 _LIMIT_REACHED_SHARE = 1.0 - 1e-9
-"""From this share of a limit on, a body rate counts as limited."""
+"""A body rate of at least this share of its limit counts as limited."""
 _NO_TARGET = Target(nan, nan, nan, nan)
 
 
@@ -48,7 +48,8 @@ class Answer(NamedTuple):
         rates: body rates, rad/s.
         thrust: thrust, 0..1.
         latency_ns: time since the sample's arrival, ns.
-        asked: attitude and target as the planner saw them; None: body rates of guidance, or idle.
+        planner_input: attitude and target that the planner got; None: the planner was not asked,
+            because guidance commanded body rates or idle.
         planned: the plan in effect at the sample, or None.
         is_step: see `GuidanceCommand`.
         idle: see `GuidanceCommand`.
@@ -57,7 +58,7 @@ class Answer(NamedTuple):
     rates: BodyRates
     thrust: float
     latency_ns: int
-    asked: tuple[Quaternion, Target] | None
+    planner_input: tuple[Quaternion, Target] | None
     planned: PlannedTilt | None
     is_step: bool
     idle: bool
@@ -70,7 +71,7 @@ class SampleEntry(NamedTuple):
         sample: the sample.
         reason: why it is unanswered, or None.
         flags: state of the loop before the answer.
-        checked_at: time of the check of its age before sending, s on our clock; NaN: not checked.
+        checked_at: when its age was checked before sending, s of event-loop time; NaN: it was not.
         answer: setpoint that was sent, or None.
     """
 
@@ -125,8 +126,8 @@ class SampleRows:
     def _setpoint(
         self, sample: AttitudeSample, flags: LoopFlags, answer: Answer
     ) -> tuple[float, ...]:
-        rates, thrust, latency_ns, asked, planned, is_step, idle = answer
-        q, target = asked or (sample.q, _NO_TARGET)
+        rates, thrust, latency_ns, planner_input, planned, is_step, idle = answer
+        q, target = planner_input or (sample.q, _NO_TARGET)
         _, ax, ay = tilt_products(*q)
         roll, pitch, yaw = rates
         return (

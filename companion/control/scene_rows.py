@@ -1,4 +1,4 @@
-"""The vehicle as 3D viewers draw it: its body, thrust, wanted thrust, and the last seconds' paths.
+"""The vehicle as 3D viewers draw it: body, thrust, commanded thrust, and paths of the last 20 s.
 
 The frame of paths is x east, y north, z up (ENU); the frame of the vehicle's parts is x forward, y
 left, z up (FLU).
@@ -34,11 +34,11 @@ paths, every fifth sends the paths, every tenth sends the body.
 All are repeated, because a viewer may join late or jump in the recording.
 """
 _GAP_NS = 1_000_000_000
-"""A longer gap than this starts new paths, ns."""
+"""A pause longer than this between two drawings starts new paths, ns."""
 _METRES_PER_M_S2 = 0.1
 """Length of a thrust arrow, m per m/s²."""
 _LEAST_COS = 0.2
-"""Smallest cosine of the tilt for the length of an arrow."""
+"""Lower bound of cos(tilt) in the length of an arrow."""
 _GREY_COLOR: Color = (0.25, 0.25, 0.28, 1.0)
 _FRONT_COLOR: Color = (0.85, 0.35, 0.1, 0.8)
 _BACK_COLOR: Color = (0.3, 0.3, 0.35, 0.8)
@@ -68,7 +68,7 @@ _BODY_ENTITY = Entity(
 
 
 class SceneRows:
-    """Writes `/scene` and `/paths`. Its methods run in the recorder's thread."""
+    """Writes the channels `/scene` and `/paths`; runs in the recorder's thread."""
 
     def __init__(self) -> None:
         self._command: GuidanceCommand | None = None
@@ -147,7 +147,7 @@ def _thrust_arrow_pose(turn: Quaternion) -> Pose:
 
 
 def _arrow(q: Quaternion, goal: Quaternion, lift: float, color: Color) -> Arrow:
-    """An arrow along the thrust of attitude `goal`, about a vehicle of attitude `q`.
+    """An arrow along the thrust of attitude `goal`, in the frame of a vehicle of attitude `q`.
 
     Its length shows the specific thrust whose vertical part is `lift`, m/s².
     """

@@ -6,7 +6,7 @@ from companion.control.retuning import Tuning, interpolated, tuning
 SLEW_TIME = 0.7
 """Time over which a change takes effect, s."""
 _SHORTEST_STEP = 0.035
-"""Shortest time between two steps of a change, s, because each step computes the gains again."""
+"""Shortest time between two steps of a change, s: each step computes the gains again."""
 
 
 class Slew:
@@ -25,7 +25,7 @@ class Slew:
         self._stepped_at = 0.0
 
     def jump(self, wanted: Config) -> None:
-        """Take the wanted values at once, while no loop flies or before one begins."""
+        """Take the wanted values at once, because no loop flies yet or any more."""
         self._present = self._wanted = self.settled = wanted
         self._began_at = None
 

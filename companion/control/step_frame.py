@@ -6,8 +6,9 @@ bends that line by 0.015. The body rates show that the vehicle did not turn. So 
 flown, the planner sees an attitude without the heading changes that body rates do not explain.
 
 In closed loop, guidance computes each acceleration in the estimator's frame. The horizontal target
-is rotated together with the attitude, so the acceleration stays as commanded by guidance, and the
-turn decays. The heading target is not rotated: it would jump by the turn where steps begin and end.
+is rotated together with the attitude, so the acceleration stays as guidance commands it. The turn
+of this frame decays. The heading target is not rotated, because it would jump where steps begin and
+end.
 
 ArduPilot takes body rates along an attitude target that stays in the estimator's frame, so the
 vehicle follows each correction: it turns about the vertical, and when tilted its thrust axis turns,
@@ -74,9 +75,9 @@ class StepFrame:
         )
 
     def target(self, target: Target) -> Target:
-        """A target of the estimator's frame with its horizontal part in this frame.
+        """A target of the estimator's frame, its horizontal part converted to this frame.
 
-        The heading stays. Targets of steps are in this frame already.
+        The heading stays. Targets of open-loop steps are in this frame already.
         """
         if self.turn == 0.0:
             return target

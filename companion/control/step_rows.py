@@ -1,4 +1,4 @@
-"""Converts guidance's record of a step to messages of `flight.mcap`.
+"""Converts the record of a guidance step to messages of `flight.mcap`.
 
 As in `companion.control.sample_rows`, the functions run in the recorder's thread.
 """
@@ -44,9 +44,9 @@ class StepInput(NamedTuple):
     """The telemetry that a step of guidance reads; None: unknown.
 
     Attributes:
-        time: when the step began, s on our clock.
+        time: when the step began, s of event-loop time.
         position: the newest position.
-        clock_offset: vehicle time minus our time, s.
+        clock_offset: vehicle time minus event-loop time, s.
         battery: battery of the vehicle.
         autopilot_thrust: thrust in ATTITUDE_TARGET.
         height: height above home, m.
@@ -68,7 +68,7 @@ class StepOutput(NamedTuple):
     """The result of a guidance step.
 
     Attributes:
-        measured_at: the step's time on the vehicle's clock, s.
+        measured_at: when the step began, on the vehicle's clock, s.
         q: newest attitude.
         inputs: motion, wind and drag at the step.
         reference: reference of the step.
@@ -86,13 +86,13 @@ class StepEntry(NamedTuple):
     """Record of a guidance step.
 
     Attributes:
-        read: its inputs.
-        made: its result; None without a fresh position or while idle on the ground.
+        inputs: the telemetry that the step read.
+        output: its result; None without a fresh position or while idle on the ground.
         command: the command for the control loop; None: no new command.
     """
 
-    read: StepInput
-    made: StepOutput | None
+    inputs: StepInput
+    output: StepOutput | None
     command: GuidanceCommand | None
 
 
@@ -205,8 +205,8 @@ def _east_north_up(ned: Vector) -> Vector:
 def _enu_from_flu(q: Quaternion) -> Quaternion:
     """(x, y, z, w) of body FLU → world ENU, from (w, x, y, z) of body FRD → world NED.
 
-    It is (0, √½, √½, 0) ⊗ q ⊗ (0, 1, 0, 0), with the other sign: the axes of the world are swapped
-    before q, those of the body after it.
+    It is −(0, √½, √½, 0) ⊗ q ⊗ (0, 1, 0, 0): the first factor swaps the axes of the world, the last
+    one those of the body.
     """
     w, x, y, z = q
     return (

@@ -1,4 +1,4 @@
-"""The interfaces of the telemetry that guidance reads."""
+"""Interfaces of what guidance reads: telemetry, ground contact, the vehicle's clock."""
 
 from typing import Protocol
 
@@ -20,7 +20,7 @@ class Telemetry(Protocol):
 
     @property
     def attitude_target_thrust(self) -> AttitudeTargetThrust | None:
-        """The newest thrust setpoint of the autopilot, whatever its source."""
+        """The newest thrust in ATTITUDE_TARGET: the autopilot's own, or ours in offboard."""
         ...
 
     @property
@@ -39,7 +39,7 @@ class Ground(Protocol):
 
     @property
     def standing(self) -> bool:
-        """Whether it stands on the ground."""
+        """Whether the vehicle stands on the ground."""
         ...
 
     @property
@@ -53,11 +53,11 @@ class Clock(Protocol):
 
     @property
     def offset(self) -> float | None:
-        """Vehicle time minus event-loop time, s, or None."""
+        """Vehicle time minus event-loop time, s; None: not known yet."""
         ...
 
     def age(self, vehicle_time: float, now: float) -> float | None:
-        """Age at the event-loop time `now` of a message stamped with `vehicle_time`, s, or None."""
+        """Age, at event-loop time `now`, of a message stamped `vehicle_time`, s; None: unknown."""
         ...
 
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 
 class Ticker:
-    """Waits until the next period begins, or until `soon` is called.
+    """Waits until the next period begins, or until `trigger` is called.
 
     Args:
         period: period, s.
@@ -18,14 +18,14 @@ class Ticker:
         self._soon = False
         self._waiting: asyncio.Future[None] | None = None
 
-    def soon(self) -> None:
-        """End the wait of `tick` at once; the next period then begins."""
+    def trigger(self) -> None:
+        """End the wait of `tick` at once, and begin the next period then."""
         self._soon = True
         if self._waiting is not None:
             _wake(self._waiting)
 
     async def tick(self) -> None:
-        """Wait for the next period, or for `soon`; missed periods are not repeated."""
+        """Wait for the next period or for `trigger`; missed periods are not repeated."""
         self._due = max(self._due + self._period, self._clock())
         if not self._soon:
             await self._sleep(self._due - self._clock())

@@ -1,4 +1,4 @@
-"""Records how guidance tracks its reference, and which maneuver or source is flown."""
+"""Records reference and position at each guidance step, and which maneuver or source is flown."""
 
 from collections.abc import Callable
 from math import nan
@@ -27,7 +27,7 @@ class FlownPart(NamedTuple):
 
 
 def flown_part(flown: FlownSource, now: float) -> FlownPart | None:
-    """The flown part at `now` (s of event-loop time); None: a pose is held, or nothing is flown."""
+    """The maneuver or source that is flown at `now` (s of event-loop time); None: neither is."""
     source, begun_at = flown.source, flown.begun_at
     if source is None or begun_at is None or source.finished(now):
         return None
@@ -61,9 +61,9 @@ class TrackingRecord:
 
         Args:
             now: s of event-loop time.
-            vehicle_time: s.
-            reference: reference at that time.
-            motion: motion of the vehicle at that time.
+            vehicle_time: the same time on the vehicle's clock, s.
+            reference: reference at this time.
+            motion: motion of the vehicle at this time.
         """
         flown = flown_part(self._flown, now)
         part = None if flown is None else flown.part

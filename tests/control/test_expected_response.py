@@ -86,8 +86,9 @@ def test_the_largest_sensible_gain_and_a_warning_above_it():
     assert not expected_response(configured("model-following", 5.0)).gain_is_too_high
     found = expected_response(configured("model-following", 5.0))
     unlimited = expected_response(configured("model-following", found.largest_gain, 1000.0))
-    assert found.shortest == pytest.approx(unlimited.time_constant, abs=0.002)
-    assert found.sentence().endswith(f"without rate limit would give {found.shortest:.2f} s")
+    shortest = found.shortest_time_constant
+    assert shortest == pytest.approx(unlimited.time_constant, abs=0.002)
+    assert found.sentence().endswith(f"without rate limit would give {shortest:.2f} s")
     quick = expected_response(configured("first-order", 6.0))
     assert quick.gain_is_too_high
     assert "6, and 5.2 is the largest sensible one (0.45 / (lag + dead time)); lower it" in (
@@ -95,7 +96,7 @@ def test_the_largest_sensible_gain_and_a_warning_above_it():
     )
     unknown = expected_response(Config())
     assert unknown.largest_gain is None
-    assert unknown.shortest is None
+    assert unknown.shortest_time_constant is None
     assert "would give" not in unknown.sentence()
     assert "not known before `companion identify`" in unknown.gain_sentence()
 
