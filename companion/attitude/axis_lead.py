@@ -18,7 +18,7 @@ class AxisLead:
     Args:
         index: `ROLL` or `PITCH`.
         axis: response of this axis.
-        wait: dead time of the other axis minus that of this axis, s; 0 if that is negative.
+        wait: larger dead time of roll and pitch minus that of this axis, s.
         plans: plans of tilt and heading.
     """
 

@@ -17,7 +17,7 @@ _NOTICE_TIME = 0.1
 
 
 class AssumedBraking(NamedTuple):
-    """How the fence's monitor assumes that the vehicle brakes; guidance must stop it no later.
+    """How the fence's monitor assumes that the vehicle brakes; it must not stop further away.
 
     Attributes:
         reaction: delay before the vehicle brakes, s (`safety.reaction_s`).

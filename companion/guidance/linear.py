@@ -51,7 +51,7 @@ class GuidanceInput(NamedTuple):
         now: present motion.
         predicted: motion predicted for the time when the present command takes effect.
         thrust: horizontal acceleration by the present thrust, m/s², NED.
-        disturbance: horizontal acceleration by wind and attitude bias, m/s², NED.
+        disturbance: horizontal acceleration by wind and bias, m/s², NED.
         drag: drag of the vehicle.
         thrust_limits: smallest and largest specific thrust available, m/s².
         axis_drag: how the drag along the body's axes differs from `drag`.

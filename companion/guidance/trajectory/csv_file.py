@@ -138,7 +138,7 @@ def parse_csv(lines: Iterable[str], name: str) -> Table:
 
 
 def _require_no_more_values(rows: Sequence[tuple[int, Sequence[str]]], name: str) -> None:
-    """Refuse rows with more values than the header, because of decimal commas.
+    """Refuse rows with more values than the header has names, as decimal commas make them.
 
     Some published files have more values than names in the header. They are accepted if all rows
     have equally many values and decimals have points.

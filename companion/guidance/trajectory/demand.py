@@ -68,7 +68,7 @@ def sampled(trajectory: Trajectory, times: Sequence[float] | None = None) -> Mot
 
 
 def require_finite(motion: Motion) -> None:
-    """Check that all numbers are finite: a comparison of NaN with a limit would not fail.
+    """Check that all numbers are finite. No limit would refuse NaN: comparisons with it are false.
 
     Raises:
         FloatingPointError: a value is not finite; see `computable`.
