@@ -135,7 +135,7 @@ def test_the_answer_for_now_is_flown_with_its_thrust():
     assert target == Target(0.3, 0.0, 0.1)
     assert GRAVITY - down == pytest.approx(12.0 * (1.0 - 0.3**2) ** 0.5)
     asked = solver.requests[-1]
-    assert (asked.number, asked.at, asked.start.turned) == (2, 0.02, 0.4)
+    assert (asked.number, asked.trajectory_time, asked.start.heading_offset) == (2, 0.02, 0.4)
     assert [one.north for one in asked.inputs] == [0.1, 0.3]
     assert asked.inputs[-1].thrust == pytest.approx(12.0)
 
