@@ -1,1 +1,1 @@
-"""Campaigns: many flights or batches over swept keys, on many processes and computers."""
+"""Campaigns: many simulated flights with swept configuration keys, on many processes."""

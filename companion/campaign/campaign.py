@@ -16,7 +16,7 @@ from companion.campaign.campaign_file import (
     FaultScenario,
 )
 from companion.campaign.case import Case, Fault
-from companion.campaign.design import Sample, number_of_cases, samples_of
+from companion.campaign.design import PlannedCase, number_of_cases, planned_cases
 from companion.campaign.keys import with_keys
 from companion.campaign.swept import Value, column_value
 from companion.config import Config
@@ -25,12 +25,12 @@ from companion.files.yaml_file import ConfigError
 
 @dataclass(frozen=True)
 class Campaign:
-    """A campaign.
+    """A campaign: what to fly, and the files that the flights read.
 
     Attributes:
-        file: content of the campaign file; a trajectory in its `sweep` is a key of `files`.
-        base: configuration before the sweep, changed by the keys of `set`. Its trajectory, if any,
-            is a key of `files`.
+        file: content of the campaign file. The trajectories in its `sweep` are keys of `files`.
+        base: configuration that the swept keys change; the keys of `set` are already applied. Its
+            `flight.trajectory`, if any, is a key of `files`.
         files: the text of each file that a flight reads, by its path in the campaign's folder.
         name: path of the campaign file, for messages.
     """
@@ -42,53 +42,53 @@ class Campaign:
 
     @property
     def number_of_cases(self) -> int:
-        """The number of cases."""
+        """Number of cases, computed without building them."""
         return number_of_cases(self.file)
 
-    def samples(self) -> Iterator[Sample]:
-        """All cases before they are built, in order."""
-        return samples_of(self.file)
+    def planned_cases(self) -> Iterator[PlannedCase]:
+        """The factor values and seed of every case, in order."""
+        return planned_cases(self.file)
 
     def cases(self) -> Iterator[Case]:
-        """All cases, in order.
+        """Build all cases, in order.
 
         Raises:
             ConfigError: a configuration is refused; see `case`.
         """
-        return map(self.case, self.samples())
+        return map(self.case, self.planned_cases())
 
-    def case(self, sample: Sample) -> Case:
+    def case(self, planned: PlannedCase) -> Case:
         """Build one case.
 
         Raises:
             ConfigError: the program or the mock vehicle refuses its configuration; the message
                 names the case and the key.
         """
-        factors = {name: _stored_value(name, value) for name, value in sample.values.items()}
+        factors = {name: _stored_value(name, value) for name, value in planned.values.items()}
         changes: dict[str, Any] = {}
-        for name, value in sample.values.items():
+        for name, value in planned.values.items():
             if name not in FAULT_FACTORS:
                 for key in self.file.sweep[name].changed_keys(name):
                     changes[key] = self._new_value(name, key, value)
         try:
             config = with_keys(self.base, changes)
             _check_flyable(config)
-            fault = self._fault(sample.values)
+            fault = self._fault(planned.values)
         except ConfigError as error:
-            case = Case(sample.index, sample.seed, factors, self.base, None, {}, 0.0)
+            case = Case(planned.index, planned.seed, factors, self.base, None, {}, 0.0)
             raise ConfigError(f"{self.name}: {case.described()}: {error}") from error
         return Case(
-            sample.index,
-            sample.seed,
+            planned.index,
+            planned.seed,
             factors,
-            config.model_copy(update={"mock": {**(config.mock or {}), "seed": sample.seed}}),
+            config.model_copy(update={"mock": {**(config.mock or {}), "seed": planned.seed}}),
             fault,
             self._files_of(config),
             self.file.limits.flight_s,
         )
 
     def _new_value(self, name: str, key: str, value: Any) -> Any:
-        """The new value of a key: `value`, or with `times_base` `value` times the base's value.
+        """The value that a key gets: `value`, times the value in `base` if `times_base` is true.
 
         Raises:
             ConfigError: the base holds no number to multiply.
@@ -104,7 +104,7 @@ class Campaign:
         return value * base
 
     def _base_value(self, key: str) -> Any:
-        """The value of a dotted key in the base configuration; None: there is no such key."""
+        """The value of a dotted key in the base configuration; None if there is no such key."""
         value: Any = self.base  # its section `mock` is complete: `with_keys` made it
         for name in key.split("."):
             value = value.get(name) if isinstance(value, dict) else getattr(value, name, None)
@@ -125,7 +125,7 @@ class Campaign:
         )
 
     def _files_of(self, config: Config) -> dict[str, str]:
-        """The files that a flight with this configuration reads."""
+        """The entries of `files` that a flight with this configuration reads."""
         path = config.flight.trajectory
         if path is None or "trajectory" not in config.flight.maneuvers:
             return {}
@@ -142,9 +142,8 @@ def _check_flyable(config: Config) -> None:
 
 
 def _stored_value(name: str, value: Any) -> Value:
-    """The value of a factor as stored in the results; for a trajectory the folder of its copy.
+    """The value of a factor as stored in the results; of a trajectory, the name of its folder.
 
-    The folder has the name of the file. Further files of the same name get folders such as
-    `circle-2`.
+    Each trajectory is copied into a folder named after its file: `circle`, then `circle-2`.
     """
     return Path(value).parent.name if name == TRAJECTORY else column_value(value)

@@ -8,8 +8,10 @@ from pydantic import Field, field_validator, model_validator
 from companion.campaign.swept import Swept
 from companion.files.yaml_file import PathKey, Section
 
-Name = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
-Word = Annotated[str, Field(min_length=1, max_length=60)]
+CampaignName = Annotated[
+    str, Field(min_length=1, max_length=60, pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")
+]
+ScenarioName = Annotated[str, Field(min_length=1, max_length=60)]
 Ending = Literal["ground", "ok", "landed", "held", "pilot"]
 FaultPhase = Literal["stream", "arm", "takeoff", "offboard", "maneuvers", "hand back", "land"]
 
@@ -35,7 +37,7 @@ NOUNS = {"flights": "flights", "batch": "vehicles"}
 
 
 class FaultScenario(Section):
-    """A fault of the mock vehicle that begins in a phase, and how the flight may end then."""
+    """Faults of the mock vehicle that begin in a phase of the flight, and the permitted endings."""
 
     inject: Annotated[tuple[dict[str, Any], ...], Field(min_length=1, max_length=10)]
     """Entries as in `mock.faults`, without `at_s` and `after_offboard_s`. All begin together."""
@@ -80,7 +82,7 @@ class CampaignLimits(Section):
     """Longest estimated duration of the campaign. A campaign with at most two cases for each worker
     is not checked against it."""
     flight_s: Annotated[float, Field(ge=1.0, le=36_000.0)] = 600.0
-    """Longest flight, s of vehicle time from boot. A longer one is ended, and is not good."""
+    """Longest flight, s of vehicle time from boot. A longer one is ended then, and is not good."""
 
 
 class Tune(Section):
@@ -91,14 +93,13 @@ class Tune(Section):
     trials: Annotated[int, Field(ge=1, le=100_000)] = 100
     """Number of candidates that are tried; `--trials` replaces it."""
     envelope_m: Annotated[float, Field(gt=0.0, le=1000.0)] | None = 1.0
-    """Largest true distance from the reference (`position_max_m` of the results) for a flight that
-    reaches its end to count as inside the envelope. null: every flight that reaches its end counts
-    as inside.
+    """A flight counts as inside the envelope if it reaches its end and its largest true distance
+    from the reference (`position_max_m` of the results) is at most this. null: any distance.
     """
     inside_share: Annotated[float, Field(gt=0.0, le=1.0)] = 0.999
-    """Share of the flights that must stay inside the envelope."""
+    """Smallest share of the flights that must stay inside the envelope, 0..1."""
     check_samples: Annotated[int, Field(ge=2, le=10_000)] = 8
-    """Number of samples that the search does not see; on them the result is compared with the
+    """Number of further samples, not used in the search, on which the result is compared with the
     unchanged configuration."""
 
     @field_validator("search")
@@ -119,8 +120,8 @@ class Tune(Section):
 class CampaignFile(Section):
     """A campaign; the top level of its YAML file."""
 
-    name: Name
-    """Name of the campaign, and of its folder."""
+    name: CampaignName
+    """CampaignName of the campaign, and of its folder."""
     kind: Literal["flights", "batch"] = "flights"
     """flights: whole flights of the program and the mock vehicle on one virtual clock. batch:
     only the attitude kinematics of a vehicle in each case."""
@@ -146,8 +147,10 @@ class CampaignFile(Section):
     mock.wind.gust_m_s."""
     sweep: Annotated[dict[str, Swept], Field(default_factory=dict, max_length=50)]
     """Swept keys, dotted, of the program and of the mock vehicle (`mock.`). Also fault,
-    fault.phase and fault.after_s, and files for flight.trajectory, relative to this one."""
-    faults: Annotated[dict[Word, FaultScenario], Field(default_factory=dict, max_length=100)]
+    fault.phase and fault.after_s, and files for flight.trajectory, relative to this file."""
+    faults: Annotated[
+        dict[ScenarioName, FaultScenario], Field(default_factory=dict, max_length=100)
+    ]
     """Fault scenarios by the name that the factor `fault` uses."""
     limits: CampaignLimits = CampaignLimits()
     tune: Tune | None = None
@@ -156,7 +159,7 @@ class CampaignFile(Section):
     @field_validator("config", mode="before")
     @classmethod
     def _file_or_keys(cls, value: Any) -> Any:
-        """Refuse other values in one sentence; pydantic would write one for each permitted type."""
+        """Refuse what is neither a path nor keys, in one message; pydantic would write several."""
         if not isinstance(value, str | Path | dict):
             raise ValueError("must name a file, or hold the keys of a configuration")
         return value

@@ -18,17 +18,17 @@ from companion.files.yaml_file import ConfigError
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-MOST_WORKER_DEATHS = 3
-"""A unit is given up when its worker dies for the third time, even if it was only queued there.
+WORKER_DEATHS_TO_GIVE_UP = 3
+"""A unit of work is given up after so many deaths of workers on which it ran or was queued.
 
 An existing cluster follows its own setting, `distributed.scheduler.allowed-failures`.
 """
 _CONNECTION_LOST = "the connection to the Dask scheduler is lost"
-_CONNECT_S = 10.0
-_CLOSE_S = 5.0
+_CONNECT_TIMEOUT_S = 10.0
+_CLOSE_TIMEOUT_S = 5.0
 _PACKAGES = ("dask", "distributed", "numba", "pyarrow", "scipy")
 _LOCAL_SETTINGS = {
-    "distributed.scheduler.allowed-failures": MOST_WORKER_DEATHS - 1,
+    "distributed.scheduler.allowed-failures": WORKER_DEATHS_TO_GIVE_UP - 1,
     # Dask's own profiler, which nobody reads here, uses 10 % of a worker's time.
     "distributed.worker.profile.enabled": False,
     # Dask sets the variables of BLAS and OpenMP to 1 itself.
@@ -42,11 +42,11 @@ class ClusterError(Exception):
 
 
 class EndedUnit(NamedTuple):
-    """A unit that ended.
+    """A unit of work that was run or given up.
 
     Attributes:
         number: number of the unit.
-        result: rows of the unit and their times; None: the unit was given up.
+        result: rows and wall times; None: the unit was given up.
         reason: why the unit was given up.
     """
 
@@ -66,7 +66,7 @@ def require_packages() -> None:
 
 
 def local_workers() -> int:
-    """The number of worker processes on this computer: one for each core that we may use."""
+    """Number of worker processes on this computer: one for each core that this process may use."""
     return len(os.sched_getaffinity(0))
 
 
@@ -75,9 +75,9 @@ def connected(scheduler: str | None, workers: int | None) -> "Iterator[Client]":
     """Connect to a cluster whose workers have the same versions as this process.
 
     Args:
-        scheduler: address of an existing cluster; None: worker processes of our own, which end with
-            the context.
-        workers: number of our own worker processes; None: one for each core.
+        scheduler: address of an existing cluster's scheduler; None: start local worker processes,
+            which end with the context.
+        workers: number of local worker processes; None: one for each core.
 
     Raises:
         ConfigError: the scheduler cannot be reached.
@@ -86,11 +86,11 @@ def connected(scheduler: str | None, workers: int | None) -> "Iterator[Client]":
     import dask  # noqa: PLC0415  an extra
     from distributed import Client, LocalCluster  # noqa: PLC0415  an extra
 
-    _silence()
+    _silence_dask()
     with dask.config.set(_LOCAL_SETTINGS):
         if scheduler is not None:
             try:
-                client = Client(scheduler, timeout=_CONNECT_S)
+                client = Client(scheduler, timeout=_CONNECT_TIMEOUT_S)
             except (OSError, ValueError, TypeError) as error:
                 raise ConfigError(f"no Dask scheduler answers at {scheduler}: {error}") from error
             cluster = None
@@ -108,13 +108,13 @@ def connected(scheduler: str | None, workers: int | None) -> "Iterator[Client]":
             yield client
         finally:
             with suppress(Exception):  # the results are already on the disk
-                client.close(timeout=_CLOSE_S)
+                client.close(timeout=_CLOSE_TIMEOUT_S)
                 if cluster is not None:
-                    cluster.close(timeout=_CLOSE_S)
+                    cluster.close(timeout=_CLOSE_TIMEOUT_S)
 
 
-def _silence() -> None:
-    """Silence the log messages of Dask; our own messages report errors in one sentence."""
+def _silence_dask() -> None:
+    """Silence Dask's log messages; this program reports the errors itself."""
     for name in ("tornado", *logging.root.manager.loggerDict):
         if name.startswith(("distributed", "tornado")):
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
@@ -122,9 +122,9 @@ def _silence() -> None:
 
 @contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """Block SIGINT here and in the threads and processes that begin now.
+    """Block SIGINT in this thread, and in the threads and processes that start in the context.
 
-    Ctrl-C in a terminal reaches all processes. Only the client may act on it: it ends the workers.
+    Ctrl-C in a terminal reaches all processes. Only the client acts on it, and ends the workers.
     """
     resource_tracker.ensure_running()  # started below, it would unblock SIGINT
     previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
@@ -136,9 +136,9 @@ def _interrupts_blocked() -> Iterator[None]:
 
 @contextmanager
 def _termination_deferred() -> Iterator[None]:
-    """Handle SIGTERM only after the block: Dask cannot close a cluster that is half made.
+    """Handle SIGTERM when the context ends: Dask cannot close a cluster that is still starting.
 
-    The signal is not blocked, because Dask ends worker processes by it.
+    SIGTERM is not blocked, because Dask ends the worker processes by it.
     """
     if threading.current_thread() is not threading.main_thread():  # signals are not handled here
         yield
@@ -164,12 +164,12 @@ def wait_for_workers(client: "Client") -> None:
 
 
 def number_of_workers(client: "Client") -> int:
-    """The number of workers that the cluster has now; `scheduler_info` may lack some."""
-    return len(client.nthreads())
+    """Number of workers that the cluster has now."""
+    return len(client.nthreads())  # `scheduler_info` may lack some
 
 
 def _compare_versions(client: "Client") -> None:
-    """Refuse a scheduler or workers of other versions.
+    """Require that the scheduler and the workers have the versions of this process.
 
     For the scheduler, only Python's minor version and the version of Dask are compared.
 
@@ -189,15 +189,15 @@ def _compare_versions(client: "Client") -> None:
 
 
 def _dask_and_python(process: Mapping[str, Any]) -> dict[str, str]:
-    """Versions of Python (minor) and Dask from the entry of a process in `Client.get_versions`."""
+    """Python's minor version and Dask's version, from an entry of `Client.get_versions`."""
     python = ".".join(str(process["host"]["python"]).split(".")[:2])
     return {"python": python, "distributed": str(process["packages"]["distributed"])}
 
 
 def run_tasks(client: "Client", tasks: Mapping[int, tuple[Any, ...]]) -> Iterator[EndedUnit]:
-    """Run tasks on the cluster; yield each unit when it ends, in any order.
+    """Run one task for each unit of work; yield each unit when it ends, in any order.
 
-    Dask queues them, sends them, and repeats those whose worker died.
+    Dask queues and sends the tasks, and repeats a task whose worker died.
 
     Args:
         client: client of the cluster.
@@ -205,7 +205,7 @@ def run_tasks(client: "Client", tasks: Mapping[int, tuple[Any, ...]]) -> Iterato
 
     Raises:
         ClusterError: the connection to the scheduler is lost.
-        ConfigError: the worker's program refuses a case.
+        ConfigError: a worker refuses a case.
         VersionError: a worker that joined later has other versions.
     """
     from distributed import as_completed  # noqa: PLC0415  an extra
@@ -222,7 +222,7 @@ def run_tasks(client: "Client", tasks: Mapping[int, tuple[Any, ...]]) -> Iterato
 
 
 def _ended_unit(number: int, future: "Future") -> EndedUnit:
-    """The unit whose future has ended.
+    """Convert a future that has ended into its unit.
 
     Raises:
         ClusterError: the connection to the scheduler is lost.

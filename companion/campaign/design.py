@@ -1,4 +1,4 @@
-"""The samples of a campaign: the grid of its factors, times the samples of its distributions."""
+"""The design of a campaign: every point of the grid, with every sample of the distributions."""
 
 import hashlib
 from collections.abc import Iterator
@@ -16,13 +16,13 @@ _LARGEST_SEED = 2**63 - 1
 
 
 @dataclass(frozen=True, slots=True)
-class Sample:
-    """One case before it is built.
+class PlannedCase:
+    """The factor values and the seed of one case; `Campaign.case` builds the case from them.
 
     Attributes:
         index: number of the case, from 0.
-        seed: seed of its noise and gusts.
-        values: value of each factor as written in the file.
+        seed: seed of noise and gusts.
+        values: value of each factor as written in the campaign file.
     """
 
     index: int
@@ -31,7 +31,7 @@ class Sample:
 
 
 def number_of_cases(file: CampaignFile) -> int:
-    """The number of cases, computed without building them."""
+    """Number of cases, computed without building them."""
     distributions = sum(swept.sampled for swept in file.sweep.values())
     repeats = (
         file.samples**distributions if file.sampling == "grid" and distributions else file.samples
@@ -39,7 +39,7 @@ def number_of_cases(file: CampaignFile) -> int:
     return repeats * prod(len(swept.grid()) for swept in file.sweep.values() if not swept.sampled)
 
 
-def too_few_samples(file: CampaignFile) -> str | None:
+def few_samples_warning(file: CampaignFile) -> str | None:
     """A warning if `samples` is too small for the distributions; else None."""
     samples = file.samples
     names = [
@@ -56,7 +56,7 @@ def too_few_samples(file: CampaignFile) -> str | None:
     )
 
 
-def samples_of(file: CampaignFile) -> Iterator[Sample]:
+def planned_cases(file: CampaignFile) -> Iterator[PlannedCase]:
     """All cases in order: every point of the grid with the first sample, then with the next.
 
     A campaign that is stopped has therefore flown all points of the grid about equally often.
@@ -67,18 +67,23 @@ def samples_of(file: CampaignFile) -> Iterator[Sample]:
     index = 0
     for sample_number, probabilities in enumerate(_probabilities(file, len(distributions))):
         drawn = {
-            name: swept.at(float(probability))
+            name: swept.quantile(float(probability))
             for (name, swept), probability in zip(distributions.items(), probabilities, strict=True)
         }
         for point in points:
             values = {**point, **drawn}
             seed = seed_of(file.seed, sample_number if file.same_seeds else index)
-            yield Sample(index, seed, {name: values[name] for name in file.sweep})
+            yield PlannedCase(index, seed, {name: values[name] for name in file.sweep})
             index += 1
 
 
 def seed_of(campaign_seed: int, number: int) -> int:
-    """The seed of a case, 0 to 2⁶³ − 1; the same on every computer."""
+    """Seed of a case, 0 to 2⁶³ − 1; the same on every computer.
+
+    Args:
+        campaign_seed: seed of the campaign.
+        number: number of the case, or of its sample if samples share their seed.
+    """
     digest = hashlib.sha256(f"{campaign_seed}:{number}".encode()).digest()
     return int.from_bytes(digest[:8], "big") & _LARGEST_SEED
 
@@ -86,7 +91,8 @@ def seed_of(campaign_seed: int, number: int) -> int:
 def _probabilities(file: CampaignFile, dimensions: int) -> NDArray[np.float64]:
     """(n, dimensions): cumulative probability of each sample in each distribution.
 
-    n is `samples`, except with `sampling: grid`: samples**dimensions, if there are distributions.
+    `dimensions` is the number of distributions. n is `samples`, or samples**dimensions with
+    `sampling: grid` and at least one distribution.
     """
     count = file.samples
     if dimensions == 0:

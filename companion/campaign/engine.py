@@ -1,4 +1,4 @@
-"""Runs a campaign on Dask, and writes its results as they come."""
+"""Runs a campaign on a Dask cluster, and writes the result of each unit when it ends."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -16,9 +16,9 @@ from companion.campaign.folder import Description
 from companion.campaign.unit import (
     Row,
     fly_cases,
-    fly_samples,
-    ranges,
+    fly_planned_cases,
     size_of_units,
+    unit_ranges,
 )
 from companion.campaign.versions import versions
 
@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 
 @dataclass
 class Progress:
-    """What a run has done so far.
+    """Progress of a campaign.
 
     Attributes:
-        flown: number of cases in the results, those of earlier runs included.
-        lost: cases of units that were given up, with the reason, one sentence each.
+        flown: number of cases in the results, including those of earlier runs.
+        lost: for each unit of work that was given up, a sentence with its cases and the reason.
     """
 
     flown: int = 0
@@ -46,10 +46,10 @@ def run(
     folder: Path,
     on_unit: Callable[[Progress], None] = lambda _: None,
 ) -> Progress:
-    """Run the units whose results are missing in the folder.
+    """Run the units of work whose results are missing in the folder.
 
-    Each unit is written when it ends, whole or not at all. If this function is interrupted, only
-    the units that are running are lost.
+    The results of each unit are written when it ends, completely or not at all. If this function is
+    interrupted, only the units that are running are lost.
 
     Args:
         client: client of the cluster.
@@ -60,18 +60,18 @@ def run(
 
     Raises:
         ClusterError: the connection to the scheduler is lost.
-        ConfigError: the worker's program refuses a case.
+        ConfigError: a worker refuses a case.
         OSError: the results cannot be written.
         VersionError: a worker that joined later has other versions.
     """
-    units = ranges(description.cases, description.unit)
+    units = unit_ranges(description.cases, description.unit)
     finished = store.finished_units(folder)
     missing = {number: unit for number, unit in enumerate(units) if number not in finished}
     progress = Progress(flown=sum(len(units[number]) for number in finished))
     on_unit(progress)
-    samples = list(campaign.samples()) if missing else []
+    samples = list(campaign.planned_cases()) if missing else []
     tasks = {
-        number: (fly_samples, campaign, [samples[index] for index in unit], versions())
+        number: (fly_planned_cases, campaign, [samples[index] for index in unit], versions())
         for number, unit in missing.items()
     }
     for ended in run_tasks(client, tasks):
@@ -95,7 +95,7 @@ def _store_unit(
 
 
 def internal_errors(folder: Path, file: CampaignFile) -> Counter[str]:
-    """The number of flights that each internal error of the program ended; empty for a batch."""
+    """How many flights each internal error of the program has ended; empty for a batch."""
     if file.kind != "flights":
         return Counter()
     results = store.read(folder)["result"].to_pylist()
@@ -103,7 +103,7 @@ def internal_errors(folder: Path, file: CampaignFile) -> Counter[str]:
 
 
 def run_on_cluster(client: "Client", kind: str, cases: Sequence[Case], case_s: float) -> list[Row]:
-    """Run cases that need not belong to a campaign; return their rows in order. Nothing is stored.
+    """Run any cases on the cluster; return their rows in order. Nothing is stored.
 
     Args:
         client: client of the cluster.
@@ -113,11 +113,11 @@ def run_on_cluster(client: "Client", kind: str, cases: Sequence[Case], case_s: f
 
     Raises:
         ClusterError: the connection to the scheduler is lost, or a unit was given up.
-        ConfigError: the worker's program refuses a case.
+        ConfigError: a worker refuses a case.
         VersionError: a worker that joined later has other versions.
     """
     size = size_of_units(len(cases), case_s, number_of_workers(client))
-    units = ranges(len(cases), size)
+    units = unit_ranges(len(cases), size)
     tasks = {
         number: (fly_cases, kind, [cases[index] for index in unit], versions())
         for number, unit in enumerate(units)

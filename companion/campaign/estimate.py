@@ -11,20 +11,20 @@ from companion.campaign.unit import run_cases
 from companion.files.yaml_file import ConfigError
 
 MOST_CASES = {"flights": 2000, "batch": 100_000}
-"""Largest number of cases by kind, where `limits.max_cases` is null."""
+"""Largest number of cases by kind of campaign, where `limits.max_cases` is null."""
 _MEASURED_FLIGHTS = 3
 """Largest number of flights whose time is measured."""
 _MEASURED_VEHICLES = 64
 """Largest number of vehicles in the measured batch.
 
-They share one planner, because compiling one takes 2 s.
+They share one planner, because compiling a planner takes 2 s.
 """
 
 
 def case_time(kind: str, cases: Sequence[Case]) -> float:
-    """Measure the time that a case takes in one process here, s.
+    """Measure the mean wall time that a case takes in this process, s.
 
-    A first run, which imports and compiles, is not measured; for flights it lasts 1 s.
+    A first run, which imports and compiles, is not measured. For flights it is 1 s of vehicle time.
 
     Args:
         kind: "flights" or "batch".
@@ -48,7 +48,7 @@ def check_size(campaign: Campaign, case_s: float, workers: int) -> None:
 
     Args:
         campaign: the campaign.
-        case_s: time that a case takes, s.
+        case_s: wall time that a case takes, s.
         workers: number of workers.
 
     Raises:
@@ -64,7 +64,7 @@ def check_size(campaign: Campaign, case_s: float, workers: int) -> None:
     else:
         return
     raise ConfigError(
-        f"{campaign.name}: {size_in_words(campaign, seconds, workers)}, more than {key} allows"
+        f"{campaign.name}: {size_text(campaign, seconds, workers)}, more than {key} allows"
         f" ({allowed}): reduce it, raise {key}, or add --yes"
     )
 
@@ -74,15 +74,15 @@ def most_cases(campaign: Campaign) -> int:
     return campaign.file.limits.max_cases or MOST_CASES[campaign.file.kind]
 
 
-def size_in_words(campaign: Campaign, seconds: float, workers: int) -> str:
-    """The number of cases and the estimated time."""
+def size_text(campaign: Campaign, seconds: float, workers: int) -> str:
+    """The number of cases, the estimated time (`seconds`), and the number of workers, as text."""
     noun = NOUNS[campaign.file.kind]
     processes = "1 worker" if workers == 1 else f"{workers} workers"
-    return f"{campaign.number_of_cases} {noun}, about {duration(seconds)} with {processes}"
+    return f"{campaign.number_of_cases} {noun}, about {duration_text(seconds)} with {processes}"
 
 
-def duration(seconds: float) -> str:
-    """A time in words, rounded to two digits."""
+def duration_text(seconds: float) -> str:
+    """A time in days, h, min or s, rounded to two digits."""
     for unit, length in (("days", 86_400.0), ("h", 3600.0), ("min", 60.0)):
         if seconds >= 1.5 * length:
             rounded = float(f"{seconds / length:.2g}")

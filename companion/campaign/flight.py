@@ -16,14 +16,14 @@ from companion.flight.observer import SilentObserver
 from companion.recording.measurements.summary import Summary
 from companion.testing import MockVehicle, Truth, run, session
 
-WIRE_S = 0.0005
-"""Delay of a datagram, as over UDP, s."""
+DATAGRAM_DELAY_S = 0.0005
+"""Delay of a datagram between program and mock vehicle, as over UDP, s."""
 INTERNAL_ERROR = "internal error: "
 """Prefix of the result of a case in which the program itself failed."""
 _STEPS_PER_TRUTH_ROW = 5
 """Steps of the mock vehicle from one recorded row of its true motion to the next."""
 _WATCHED_AFTERWARDS_S = 10.0
-"""Time for which a vehicle that is still armed is watched after the flight, s."""
+"""Longest time for which a vehicle that is still armed is simulated after the program ended, s."""
 _PILOT_MODES = (  # of PX4 and ArduPilot
     "POSCTL",
     "ALTCTL",
@@ -43,8 +43,8 @@ def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
         folder: folder for the files of a fully recorded flight; None: nothing is written.
 
     Returns:
-        One row of the results: `case`, `seed`, the factors, and the outcomes. A case that raises an
-        error is a row, too: its `result` is the error.
+        One row of the results: `case`, `seed`, the factors, and the outcomes. If the case raises an
+        error, `result` is the error.
     """
     row: dict[str, Value] = {"case": case.index, "seed": case.seed, **case.factors}
     with tempfile.TemporaryDirectory(prefix="companion-case-") as files_folder:
@@ -54,7 +54,7 @@ def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
             reason = str(error)
         except Exception as error:
             reason = f"{INTERNAL_ERROR}{type(error).__name__}: {error}"
-        return row | outcomes.unflown(reason.replace(f"{files_folder}/", ""))
+        return row | outcomes.outcomes_of_error(reason.replace(f"{files_folder}/", ""))
 
 
 class CaseFlight:
@@ -76,7 +76,7 @@ class CaseFlight:
         self._case, self._files_folder = case, files_folder
         self._config = _with_paths_in(case.config, files_folder)
         settings = {**case.mock, "lockstep": False}
-        self._vehicle = MockVehicle(delay_s=WIRE_S, compiled=can_compile(), **settings)
+        self._vehicle = MockVehicle(delay_s=DATAGRAM_DELAY_S, compiled=can_compile(), **settings)
         self._truth: list[tuple[float, ...]] = []
         self._steps = 0
         self._time_limit_reached = False
@@ -120,16 +120,17 @@ class CaseFlight:
         Args:
             summary: the program's summary.
             truth_at_end: true state of the vehicle when the program ended.
-            truth_afterwards: its true state after it disarmed, or `_WATCHED_AFTERWARDS_S` later.
+            truth_afterwards: true state of the vehicle when it disarmed, or
+                `_WATCHED_AFTERWARDS_S` after the program ended.
             flight_s: time from boot to the end of the program, s.
-            begun: whether the phase of the fault was reached.
+            begun: whether the phase in which the fault begins was reached.
         """
         figures, setpoints = summary.as_dict(), self._vehicle.setpoints
         crashed, fault = truth_afterwards["crashed"], self._case.fault
         measured = {
             **outcomes.tracking(summary, np.array(self._truth).reshape(-1, 5)),
             **outcomes.response(summary),
-            **outcomes.activity(setpoints, summary, self._config),
+            **outcomes.control_effort(setpoints, summary, self._config),
             "flight_s": flight_s,
         }
         documented = None
@@ -168,7 +169,7 @@ class _FaultInjector(SilentObserver):
         fault: the scenario; None: no fault.
 
     Attributes:
-        begun: whether there is a fault and its phase was reached.
+        begun: whether there is a fault, and the phase in which it begins was reached.
     """
 
     def __init__(self, vehicle: MockVehicle, fault: Fault | None) -> None:
@@ -179,7 +180,7 @@ class _FaultInjector(SilentObserver):
             self._phases = "stream", "arm"  # the first one reached: not every vehicle has `stream`
 
     def phase(self, name: str, waits_for: str) -> None:
-        """Inject the faults if this is their phase."""
+        """Inject the faults if they begin in the phase `name`."""
         if self._fault is None or self.begun or name not in self._phases:
             return
         self.begun = True
@@ -189,7 +190,7 @@ class _FaultInjector(SilentObserver):
 
 
 def _ending(state: Truth, result: str) -> str:
-    """Classify the end of a flight by the names of `FaultScenario.ends`."""
+    """The ending of a flight, as named in `FaultScenario.ends`."""
     if "took over: mode" in result and state["mode"] in _PILOT_MODES:
         return "pilot" if state["armed"] else "ground"
     if state["armed"]:
@@ -200,9 +201,9 @@ def _ending(state: Truth, result: str) -> str:
 
 
 def _with_paths_in(config: Config, files_folder: Path) -> Config:
-    """The configuration with `recording.directory` and the trajectory in the folder of this flight.
+    """The configuration with its trajectory and its `recording.directory` in `files_folder`.
 
-    `recording.directory` is a new folder, so that values learned by earlier flights are not used.
+    There, `recording.directory` is empty, so the flight uses no values learned by earlier flights.
     """
     recording = config.recording.model_copy(update={"directory": files_folder / "learned"})
     path = config.flight.trajectory

@@ -12,7 +12,7 @@ from typing import Any
 
 from companion.campaign import store
 from companion.campaign.campaign import Campaign
-from companion.campaign.loading import as_written
+from companion.campaign.loading import resolved_keys
 from companion.campaign.versions import VersionError, Versions, as_versions, difference, versions
 from companion.files import bounded_yaml
 from companion.files.bounded_file import FileRefusedError, read_text
@@ -20,27 +20,27 @@ from companion.files.bounded_yaml import YamlError
 from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
 
-RUNS = Path("runs", "campaigns")
-"""Where the folders of campaigns are made, under the working folder."""
-FILE = "campaign.yaml"
-"""Name of the campaign's resolved file in its folder."""
+CAMPAIGNS_FOLDER = Path("runs", "campaigns")
+"""Folder of the campaigns' folders, relative to the working folder."""
+CAMPAIGN_FILE_NAME = "campaign.yaml"
+"""Name of the file with the campaign's configuration and all defaults, in its folder."""
 _DESCRIPTION, _LOCK = "campaign.json", ".lock"
-_MOST_BYTES = 1_000_000
+_LARGEST_FILE_BYTES = 1_000_000
 _SIZE_LIMITS = ("max_cases", "max_hours")
 
 
 @dataclass(frozen=True)
 class Description:
-    """Content of `campaign.json`.
+    """Description of a campaign: the content of `campaign.json`.
 
     Attributes:
         name: name of the campaign.
-        kind: flights or batch.
+        kind: "flights" or "batch".
         seed: seed of the campaign.
         cases: number of cases.
         unit: number of cases in each unit of work; the last unit may have fewer.
-        case_s: time that a case took in the client before the campaign began, s; None: unknown.
-        versions: versions of the program and of all that results depend on.
+        case_s: wall time of a case, measured before the campaign began, s; None: not measured.
+        versions: versions of the program and of the packages that the results depend on.
         began: time at which the folder was made, ISO 8601, UTC.
     """
 
@@ -55,20 +55,26 @@ class Description:
 
 
 def describe(campaign: Campaign, unit: int, case_s: float | None) -> Description:
-    """The description of a campaign that begins now."""
+    """The description of a campaign that begins now.
+
+    Args:
+        campaign: the campaign.
+        unit: number of cases in each unit of work.
+        case_s: wall time of a case, s; None: not measured.
+    """
     file, now = campaign.file, datetime.now(UTC).isoformat(timespec="seconds")
     cases = campaign.number_of_cases
     return Description(file.name, file.kind, file.seed, cases, unit, case_s, versions(), now)
 
 
 def new_path(campaign: Campaign) -> Path:
-    """The path of a new campaign's folder: the campaign's name and the present time in UTC."""
+    """The path of a new folder, named after the campaign and the present time in UTC."""
     stamp = datetime.now(UTC).strftime("%Y-%m-%dT%H-%M-%SZ")
-    return RUNS / f"{campaign.file.name}-{stamp}"
+    return CAMPAIGNS_FOLDER / f"{campaign.file.name}-{stamp}"
 
 
 def make(folder: Path, campaign: Campaign, description: Description) -> None:
-    """Write the folder of a new campaign.
+    """Make and fill the folder of a new campaign.
 
     Raises:
         ConfigError: the folder cannot be written, or holds files already.
@@ -83,13 +89,13 @@ def make(folder: Path, campaign: Campaign, description: Description) -> None:
         for name, text in campaign.files.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             write_whole(folder / name, text)
-        write_whole(folder / FILE, bounded_yaml.dump(as_written(campaign)))
+        write_whole(folder / CAMPAIGN_FILE_NAME, bounded_yaml.dump(resolved_keys(campaign)))
         write_whole(folder / _DESCRIPTION, json.dumps(asdict(description), indent=2) + "\n")
     except OSError as error:
         raise ConfigError(f"{folder}: cannot be written: {error.strerror}") from error
 
 
-def begun(folder: Path) -> bool:
+def holds_campaign(folder: Path) -> bool:
     """Whether the folder holds a campaign."""
     return (folder / _DESCRIPTION).is_file()
 
@@ -102,7 +108,7 @@ def read_description(folder: Path) -> Description:
     """
     path = folder / _DESCRIPTION
     try:
-        values = json.loads(read_text(path, _MOST_BYTES))
+        values = json.loads(read_text(path, _LARGEST_FILE_BYTES))
         description = Description(**{**values, "versions": as_versions(values["versions"])})
         # `range` refuses everything but whole numbers.
         if not (range(description.cases) and range(description.unit)):
@@ -115,7 +121,7 @@ def read_description(folder: Path) -> Description:
 
 
 def resume(folder: Path, campaign: Campaign) -> Description:
-    """Check that the folder holds this campaign, started by this version of the program.
+    """Check that the folder holds this campaign, begun by this version; return its description.
 
     Raises:
         ConfigError: it holds another campaign, or a file in it is damaged.
@@ -138,11 +144,11 @@ def _require_same(folder: Path, campaign: Campaign) -> None:
     Raises:
         ConfigError: says what differs, or that the campaign's file is damaged.
     """
-    path = folder / FILE
+    path = folder / CAMPAIGN_FILE_NAME
     try:
-        before = bounded_yaml.parse(read_text(path, _MOST_BYTES))
+        before = bounded_yaml.parse(read_text(path, _LARGEST_FILE_BYTES))
         # Written and parsed like the file, so that tuples are lists here, too.
-        now = bounded_yaml.parse(bounded_yaml.dump(as_written(campaign)))
+        now = bounded_yaml.parse(bounded_yaml.dump(resolved_keys(campaign)))
     except (FileRefusedError, YamlError) as error:
         raise ConfigError(f"{path}: {error}") from error
     if not isinstance(before, Mapping):
@@ -159,7 +165,7 @@ def _require_same(folder: Path, campaign: Campaign) -> None:
 
 
 def _without_size_limits(data: Mapping[str, Any], key: str) -> Any:
-    """The value of a key of a campaign file; `limits` without those on the campaign's size."""
+    """The value of a key of a campaign file; of `limits`, without `max_cases` and `max_hours`."""
     value = data.get(key)
     if key == "limits" and isinstance(value, Mapping):
         return {name: each for name, each in value.items() if name not in _SIZE_LIMITS}
@@ -179,7 +185,7 @@ def locked(folder: Path) -> Iterator[None]:
     """Lock the folder, so that no other process runs the same campaign.
 
     Raises:
-        ConfigError: another process has locked it, or it cannot be written.
+        ConfigError: another process has locked the folder, or it cannot be written.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)

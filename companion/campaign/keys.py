@@ -1,4 +1,4 @@
-"""Dotted keys of a campaign: of the program's configuration, and of the mock vehicle's."""
+"""Dotted keys of the program's and the mock vehicle's configuration, as a campaign sets them."""
 
 from collections.abc import Mapping
 from typing import Any

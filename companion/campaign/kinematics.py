@@ -2,8 +2,8 @@
 
 There is no position, no estimator and no link. The planner's control law and the attitude functions
 are those of a flight, compiled. The section `vehicle` gives the dead time, slew limit, lag and
-damping of the simulated rate loop; in a flight it only gives what the program assumes of them. The
-vehicle begins level and without rotation, at the heading `mock.home.heading_deg`.
+damping of the simulated rate loop; in a flight they are only what the program assumes. The vehicle
+begins level and without rotation, at the heading `mock.home.heading_deg`.
 """
 
 import hashlib
@@ -35,9 +35,9 @@ from companion.recording.measurements.verdict import STRAIGHTNESS
 
 
 def run_cases(cases: Sequence[Case]) -> list[dict[str, Value]]:
-    """Fly cases one after the other; return a row for each, in order.
+    """Simulate cases one after the other; return a row for each, in order.
 
-    In a row, `ok` is true if every step stayed as close to its line as a good flight must.
+    `ok` is true if every step stayed as close to its straight line as a good flight must.
 
     Raises:
         ConfigError: a case cannot be flown in a batch; see `check_case`.
@@ -50,8 +50,8 @@ def check_case(case: Case) -> None:
     """Check that a case can be flown in a batch.
 
     Raises:
-        ConfigError: its planner keeps state, it has no open-loop maneuver, its sample rate does not
-            divide 1000 Hz, or it has a fault.
+        ConfigError: its planner keeps state, it has no open-loop steps, 1000 Hz is no multiple of
+            its sample rate, or it has a fault.
     """
     if reason := _unflyable(case):
         raise ConfigError(f"{case.described()}: {reason}")
@@ -98,7 +98,13 @@ def _run_case(case: Case) -> dict[str, Value]:
 
 
 def _outcomes(flight: StepFlight, figures: StepFigures, longest_target: float) -> dict[str, Value]:
-    """The outcomes of a case; `longest_target` is the largest length of a target's coefficients."""
+    """The outcomes of a case.
+
+    Args:
+        flight: the simulated flight.
+        figures: its measured figures.
+        longest_target: largest horizontal length of the acceleration targets.
+    """
     time_constants = [each for each in figures[-2:] if isfinite(each)]  # north and east
     values = {
         "cross_axis_max": figures.cross_axis_max,
@@ -126,9 +132,10 @@ def _digest(flight: StepFlight) -> str:
 
 
 def _rate_loop(config: Config) -> list[AxisResponse]:
-    """Response of roll, pitch and yaw to commanded rates.
+    """Response of roll, pitch and yaw rate to the commanded rates.
 
-    A null key means no lag, no dead time, no slew limit, or a lag of first order.
+    Of the section `vehicle`, a null lag or dead time counts as 0 s, a null acceleration limit as no
+    slew limit, and a null damping as a first-order lag.
     """
     return [
         AxisResponse(
@@ -145,7 +152,7 @@ def _targets(config: Config, longest_target: float, heading: float) -> Array:
     """Targets of the open-loop steps, limited as the planner limits them.
 
     Returns:
-        (samples, 4): coefficients north and east, heading (rad), heading rate (rad/s).
+        (samples, 4): acceleration coefficients north and east, heading (rad), heading rate (rad/s).
     """
     name = next(each for each in config.flight.maneuvers if each in ACCELERATION_STEPS)
     amplitude: tuple[float, float]
@@ -160,28 +167,28 @@ def _targets(config: Config, longest_target: float, heading: float) -> Array:
     pattern = _pattern(unit_maneuver, config.link.attitude_rate_hz)
     targets = np.zeros((pattern.samples, 4))
     targets[:, 2] = heading
-    for begin, end, (north, east) in pattern.steps:
+    for begin, end, (north, east) in pattern.parts:
         wanted = Target(north * amplitude[0], east * amplitude[1], heading)
         targets[begin:end] = limited_target(wanted, longest_target)
     return targets
 
 
 class _Pattern(NamedTuple):
-    """The part of a maneuver from its first open-loop step to the last, level between the steps.
+    """A maneuver from its first open-loop step to the end of the last, level between the steps.
 
     Attributes:
         samples: number of samples.
-        steps: one entry for each step or level part: first sample, sample after the last,
-            coefficients.
+        parts: for each step and each level part: its first sample, the sample after its last, and
+            its acceleration coefficients.
     """
 
     samples: int
-    steps: tuple[tuple[int, int, Coefficients], ...]
+    parts: tuple[tuple[int, int, Coefficients], ...]
 
 
 @lru_cache(maxsize=64)
 def _pattern(maneuver: Corners | Steps, rate_hz: float) -> _Pattern:
-    """The pattern of a maneuver of amplitude 1, so that cases with other amplitudes reuse it."""
+    """The pattern of a maneuver; at amplitude 1, so that cases of all amplitudes share it."""
     pose = Pose((0.0, 0.0, 0.0), 0.0)
     times = np.arange(round(maneuver.duration * rate_hz)) / rate_hz
     commanded = [maneuver.at(float(time), pose).coefficients for time in times]

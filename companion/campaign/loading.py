@@ -27,8 +27,8 @@ from companion.files.yaml_file import ConfigError, place_of, validated
 from companion.flight.flown_config import copy_trajectory
 from companion.testing.settings import complete_mock
 
-FILES = "trajectories"
-"""Folder of the trajectory files within the folder of a campaign."""
+TRAJECTORIES_FOLDER = "trajectories"
+"""Folder of the copied trajectory files, in the folder of a campaign."""
 
 
 def load(path: Path) -> Campaign:
@@ -58,7 +58,7 @@ class _CampaignReader:
         self._collected: dict[Path, Path] = {}
 
     def campaign(self) -> Campaign:
-        """The campaign.
+        """Check all keys, collect the trajectory files, and return the campaign.
 
         Raises:
             ConfigError: a file cannot be read or is wrong; see `load`.
@@ -88,7 +88,7 @@ class _CampaignReader:
         return Campaign(file, base, self._files, str(self._path))
 
     def _at(self, *where: str) -> str:
-        """Line number and section of a key, for messages."""
+        """File, line and section of a key, for messages; `where` are the parts of its path."""
         return f"{place_of(where, self._places, str(self._path))}: {'.'.join(where[:-1])}"
 
     def _base(self) -> Config:
@@ -100,7 +100,7 @@ class _CampaignReader:
         return load_config(self._folder / given_config)
 
     def _flyable(self, base: Config) -> Config:
-        """Adapt the base to a flight in memory: the program arms; the trajectory is a copy.
+        """The base with `flight.arm: true`, and with the path of its trajectory's copy.
 
         Raises:
             ConfigError: the configuration needs the MAVSDK link or signing, or its trajectory
@@ -119,7 +119,7 @@ class _CampaignReader:
         return base if path is None else _with_trajectory(base, self._collect(path))
 
     def _with_files(self, name: str, swept: Swept) -> Swept:
-        """A factor with the paths of the copies of its trajectory files.
+        """The factor, with each path of a trajectory file replaced by that of its copy.
 
         Raises:
             ConfigError: a value names no trajectory that can be read.
@@ -133,7 +133,10 @@ class _CampaignReader:
         return swept.model_copy(update={swept.kind: copies})
 
     def _collect(self, path: Path) -> Path:
-        """Copy a trajectory's file and its table into the campaign; return the path of the copy.
+        """Add a trajectory file, and the CSV table that it names, to the campaign's files.
+
+        Returns:
+            path of the copy in the campaign's folder.
 
         Raises:
             ConfigError: the file cannot be read, or holds no trajectory.
@@ -148,8 +151,8 @@ class _CampaignReader:
             copies = Path(folder) / stem
             name = copy_trajectory(path, copies)
             for copy in sorted(copies.iterdir()):
-                self._files[f"{FILES}/{stem}/{copy.name}"] = copy.read_text("utf-8")
-        collected = Path(FILES, stem, name)
+                self._files[f"{TRAJECTORIES_FOLDER}/{stem}/{copy.name}"] = copy.read_text("utf-8")
+        collected = Path(TRAJECTORIES_FOLDER, stem, name)
         self._collected[path] = collected
         return collected
 
@@ -176,10 +179,10 @@ class _CampaignReader:
             raise ConfigError(f"{name}: sweep.{FAULT_AFTER}: each value must be a number")
 
     def _check_names(self, key: str, known: tuple[str, ...]) -> None:
-        """Check that a factor, if it is swept, takes only known names.
+        """Check that a fault factor, if it is swept, lists only known names.
 
         Raises:
-            ConfigError: the factor has no list of names, or an unknown name.
+            ConfigError: the factor has no list of values, or an unknown name among them.
         """
         swept = self._file.sweep.get(key)
         if swept is None:
@@ -199,8 +202,8 @@ def _with_trajectory(config: Config, path: Path) -> Config:
     return config.model_copy(update={"flight": flight})
 
 
-def as_written(campaign: Campaign) -> dict[str, Any]:
-    """The keys of the resolved campaign file: configuration and all defaults written out."""
+def resolved_keys(campaign: Campaign) -> dict[str, Any]:
+    """The content of the campaign's file with the whole configuration and all defaults."""
     data = campaign.file.model_dump(mode="json")
     if campaign.file.tune is None:
         del data["tune"]  # a section without keys would be read as an empty one

@@ -43,15 +43,17 @@ or its thrust is at most the lower limit divided by this share.
 
 
 def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
-    """Tracking errors by the true and the estimated position, m, and the largest true tilt, rad.
+    """Tracking errors of the true and of the estimated position, m, and the largest true tilt, rad.
 
-    The errors cover the maneuvers in closed loop, each after its settling time. The tilt covers the
-    time from the settling of the first such maneuver to the end of the last. The result is empty
-    without such a maneuver, or without rows in `truth`.
+    The errors cover the closed-loop maneuvers, each from the end of its settling time. The tilt is
+    the largest from the end of the first settling time to the end of the last closed-loop maneuver.
 
     Args:
         summary: summary of the flight.
         truth: (N, 5), vehicle time (s), north, east, down (m), tilt (rad).
+
+    Returns:
+        value by name of the outcome; empty without a closed-loop maneuver or without `truth`.
     """
     rows = summary.trace.tracking_rows()
     parts = settled_parts(rows, summary.trace.maneuvers)
@@ -69,10 +71,10 @@ def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
 
 
 def _horizontal_errors(estimated: Floats, true: Floats) -> dict[str, float]:
-    """RMS of the horizontal distances between true position, estimated position and reference, m.
+    """RMS horizontal distances of true position, estimated position and reference, in pairs, m.
 
     Args:
-        estimated: (N, 7), as `FlightTrace.tracking`.
+        estimated: (N, 7), rows of `FlightTrace.tracking`.
         true: (N, 7), the same rows with the true position instead of the estimated one.
     """
     known = np.isfinite(true[:, 1])
@@ -90,7 +92,7 @@ def _horizontal_errors(estimated: Floats, true: Floats) -> dict[str, float]:
 
 
 def response(summary: Summary) -> dict[str, float]:
-    """The response to acceleration steps; empty if there were none."""
+    """Outcomes of the response to acceleration steps; empty if there were none."""
     measured = summary.response()
     if measured is None:
         return {}
@@ -103,10 +105,10 @@ def response(summary: Summary) -> dict[str, float]:
     }
 
 
-def activity(
+def control_effort(
     setpoints: Sequence[ReceivedSetpoint], summary: Summary, config: Config
 ) -> dict[str, float]:
-    """Rates (rad/s) and thrust (0..1) that the autopilot received during the maneuvers.
+    """Outcomes of the rates (rad/s) and thrust (0..1) that the autopilot received in maneuvers.
 
     `thrust_rms` is the standard deviation of the thrust. Empty if there were no maneuvers.
     """
@@ -144,8 +146,8 @@ def digest(setpoints: Sequence[ReceivedSetpoint], state: Truth) -> str:
     return sha256.hexdigest()
 
 
-def unflown(result: str) -> dict[str, Value]:
-    """The outcomes of a case that raised an error instead of being flown."""
+def outcomes_of_error(result: str) -> dict[str, Value]:
+    """The outcomes of a case that raised an error; `result` is the text of the error."""
     return {
         "ok": False,
         "result": result,
@@ -160,7 +162,7 @@ def unflown(result: str) -> dict[str, Value]:
 
 
 def failed_checks(figures: Mapping[str, Any]) -> str:
-    """The reasons why a flight was not good, separated by semicolons.
+    """The reasons why a flight was not good, separated by semicolons; empty if it was good.
 
     Advice on the configuration does not count, because a campaign sweeps wrong values on purpose.
     """

@@ -25,7 +25,7 @@ class Rerun(NamedTuple):
         folder: folder of its recording.
         identical: whether the row equals the stored row to the bit. A case that has no stored row
             yet counts as identical.
-        lines: messages for the user.
+        lines: messages for the user, a line each.
     """
 
     row: dict[str, Value]
@@ -35,7 +35,7 @@ class Rerun(NamedTuple):
 
 
 def rerun(campaign_folder: Path, index: int) -> Rerun:
-    """Fly a case a second time.
+    """Fly a case again, with full recording, and compare it with its stored row.
 
     Args:
         campaign_folder: folder of the campaign.
@@ -46,14 +46,14 @@ def rerun(campaign_folder: Path, index: int) -> Rerun:
             damaged, or the folder of the recording cannot be made.
     """
     description = folder.read_description(campaign_folder)
-    campaign = load(campaign_folder / folder.FILE)
+    campaign = load(campaign_folder / folder.CAMPAIGN_FILE_NAME)
     if campaign.file.kind != "flights":
         raise ConfigError(f"{campaign_folder}: a batch has no flights to record")
     if not 0 <= index < description.cases:
         raise ConfigError(
             f"{campaign_folder}: its cases are 0 to {description.cases - 1}, not {index}"
         )
-    case = campaign.case(next(islice(campaign.samples(), index, None)))
+    case = campaign.case(next(islice(campaign.planned_cases(), index, None)))
     recording = flight_folder(campaign_folder / _CASES_FOLDER / f"case-{index:05d}")
     row = fly_case(case, recording)
     lines = [f"{case.described()}: {_verdict_text(row)}"]
@@ -72,7 +72,7 @@ def rerun(campaign_folder: Path, index: int) -> Rerun:
 
 
 def _verdict_text(row: dict[str, Value]) -> str:
-    """Verdict on a flight, in words."""
+    """Whether a flight was good and, if not, why."""
     if row["ok"]:
         return "good"
     return f"not good: {row['failed_checks'] or row['result']}"
@@ -81,7 +81,7 @@ def _verdict_text(row: dict[str, Value]) -> str:
 def _stored_row(
     campaign_folder: Path, campaign: Campaign, description: folder.Description, index: int
 ) -> dict[str, Any] | None:
-    """The stored row of a case, or None."""
+    """The stored row of a case; None: the case was not flown yet."""
     unit = index // description.unit
     if unit not in store.finished_units(campaign_folder):
         return None

@@ -31,11 +31,11 @@ from companion.campaign.cluster import (
     require_packages,
     wait_for_workers,
 )
-from companion.campaign.design import too_few_samples
+from companion.campaign.design import few_samples_warning
 from companion.campaign.folder import Description
 from companion.campaign.loading import load
 from companion.campaign.report.results import Results
-from companion.campaign.unit import check_cases, ranges, size_of_units
+from companion.campaign.unit import check_cases, size_of_units, unit_ranges
 from companion.campaign.versions import VersionError
 from companion.files.yaml_file import ConfigError
 
@@ -44,9 +44,9 @@ if TYPE_CHECKING:
 
 DONE, FAILED = 0, 1
 _UNMEASURED_CASES = 2
-"""Up to this number of cases for each worker, the time that a case takes is not measured."""
+"""With at most this number of cases for each worker, the wall time of a case is not measured."""
 _MOST_SHOWN = 3
-"""Largest number of lost units, and of internal errors, that are printed."""
+"""Largest number of lost units, of internal errors, and of reasons that are printed."""
 
 
 def run(options: argparse.Namespace) -> int:
@@ -65,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
             raise ConfigError(
                 "--out needs a campaign's file; a folder is continued in place, so leave out --out"
             )
-        path, out = path / folder.FILE, path
+        path, out = path / folder.CAMPAIGN_FILE_NAME, path
     campaign = load(path)
     campaign_folder = out or folder.new_path(campaign)
     console = Console(highlight=False, soft_wrap=True, markup=False)
@@ -98,7 +98,7 @@ class _Run:
 
     def run(self) -> int:
         """Run the campaign; return the exit code."""
-        begun = folder.begun(self._folder)
+        begun = folder.holds_campaign(self._folder)
         if begun:
             folder.resume(self._folder, self._campaign)
         case_s = None if begun else self._check_all_cases()
@@ -121,7 +121,7 @@ class _Run:
             return self._stopped(str(error))
 
     def _check_all_cases(self) -> float | None:
-        """Check every case; return the time that a case takes, s; None: it was not measured.
+        """Check every case; return the wall time that a case takes, s; None: not measured.
 
         Raises:
             ConfigError: a case is refused, or the campaign is larger than its limits.
@@ -130,7 +130,7 @@ class _Run:
         workers = self._options.workers or local_workers()
         if campaign.number_of_cases > estimate.most_cases(campaign) and not self._options.yes:
             # The time of one case is enough to refuse; checking all cases would take long.
-            first = [campaign.case(next(campaign.samples()))]
+            first = [campaign.case(next(campaign.planned_cases()))]
             estimate.check_size(campaign, estimate.case_time(kind, first), workers)
         cases = list(campaign.cases())
         check_cases(kind, cases)
@@ -145,10 +145,10 @@ class _Run:
         """Continue the campaign in its folder, or write the folder of a new one.
 
         Args:
-            case_s: time that a case takes, s; None: it was not measured.
+            case_s: wall time that a case takes, s; None: it was not measured.
             workers: number of workers.
         """
-        if folder.begun(self._folder):
+        if folder.holds_campaign(self._folder):
             return folder.resume(self._folder, self._campaign)
         cases = self._campaign.number_of_cases
         unit = 1 if case_s is None else size_of_units(cases, case_s, workers)
@@ -156,9 +156,9 @@ class _Run:
         folder.make(self._folder, self._campaign, description)
         size = f"{cases} {self._noun}"
         if case_s is not None:
-            size = estimate.size_in_words(self._campaign, cases * case_s / workers, workers)
+            size = estimate.size_text(self._campaign, cases * case_s / workers, workers)
         self._console.print(f"{size}; results in {self._folder}")
-        if warning := too_few_samples(self._campaign.file):
+        if warning := few_samples_warning(self._campaign.file):
             self._console.print(warning)
         return description
 
@@ -196,12 +196,12 @@ class _Run:
         return FAILED if errors else DONE
 
     def _stopped(self, why: str) -> int:
-        """Tell how to continue; return the exit code."""
-        if not folder.begun(self._folder):
+        """Print why the campaign stopped and how to continue; return the exit code."""
+        if not folder.holds_campaign(self._folder):
             self._console.print(f"{why}; no campaign was started")
             return FAILED
         description = folder.read_description(self._folder)
-        units = ranges(description.cases, description.unit)
+        units = unit_ranges(description.cases, description.unit)
         kept = sum(len(units[number]) for number in store.finished_units(self._folder))
         command = f"companion campaign {shlex.quote(str(self._folder))}"
         if self._options.scheduler:
@@ -229,7 +229,7 @@ def progress_bar(console: Console, before: ProgressColumn, *after: ProgressColum
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """SIGTERM ends the campaign like Ctrl-C; further signals are ignored while it ends."""
+    """In the context, SIGTERM raises KeyboardInterrupt like Ctrl-C; further signals are ignored."""
 
     def interrupt(number: int, frame: FrameType | None) -> NoReturn:
         for each in (signal.SIGINT, signal.SIGTERM):

@@ -1,4 +1,4 @@
-"""Stores the results of a campaign: one Parquet file per unit, written completely or not at all."""
+"""Stores the results of a campaign: one Parquet file for each unit of work, whole or not at all."""
 
 import json
 import os
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 RESULTS = "results"
-"""Folder of the units within the folder of a campaign."""
+"""Folder of the units' Parquet files, in the folder of a campaign."""
 METADATA = b"companion.campaign"
-"""Key of the schema's metadata; its value is JSON with `name`, `kind` and `factors`."""
+"""Key in the metadata of the Parquet schema; its value is JSON with `name`, `kind`, `factors`."""
 _OUTCOMES = {
     "flights": (
         ("ok", "bool"),
@@ -47,7 +47,7 @@ _OUTCOMES = {
 
 
 def schema(file: CampaignFile) -> "pa.Schema":
-    """The columns of the results, derived from the campaign's file alone."""
+    """The columns of the results, derived from the campaign's file."""
     import pyarrow as pa  # noqa: PLC0415  an extra
 
     factors = [(name, _column_type(file, name)) for name in file.sweep]
@@ -70,7 +70,7 @@ def _column_type(file: CampaignFile, name: str) -> str:
 
 
 def table(file: CampaignFile, rows: Sequence[Mapping[str, Value]]) -> "pa.Table":
-    """Rows as a table with the campaign's columns."""
+    """Convert rows to a table with the columns of `schema`."""
     import pyarrow as pa  # noqa: PLC0415  an extra
 
     columns = schema(file)
@@ -81,7 +81,7 @@ def table(file: CampaignFile, rows: Sequence[Mapping[str, Value]]) -> "pa.Table"
 
 
 def _stored(value: Value, column_type: Any) -> Value:
-    """A value for a column; in a column of text, any other value becomes JSON."""
+    """A value as stored in a column; in a column of text, any other value becomes JSON text."""
     if str(column_type) == "string" and value is not None and not isinstance(value, str):
         return json.dumps(value)
     return value
@@ -94,14 +94,14 @@ def write_unit(
     rows: Sequence[Mapping[str, Value]],
     timing: Mapping[str, Any],
 ) -> None:
-    """Write the rows of a unit; when this returns, they are on the disk.
+    """Write the rows of a unit of work; when this returns, they are on the disk.
 
     Args:
         folder: folder of the campaign.
         file: content of the campaign file.
         number: number of the unit.
         rows: one row for each case, in order.
-        timing: wall times and worker; they differ between runs, so they get a file of their own.
+        timing: wall times and worker, for a separate file, because they differ between runs.
 
     Raises:
         OSError: a file cannot be written; no results of the unit are left.

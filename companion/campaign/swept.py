@@ -20,7 +20,7 @@ _MOST_VALUES = 1000
 
 
 class Swept(Section):
-    """The values of a swept key. A bare list means the same as `values`.
+    """The values of a swept key. A list in place of this section means the same as `values`.
 
     Exactly one of `values`, `range`, `uniform`, `loguniform`, `normal` and `choice` is given.
     `values` and `range` form a grid: each value is flown with every value of the other grids. The
@@ -30,13 +30,13 @@ class Swept(Section):
     values: Annotated[tuple[Any, ...], Field(min_length=1, max_length=_MOST_VALUES)] | None = None
     """Every one of these values."""
     range: TwoNumbers | None = None
-    """`count` values at equal distances, from the first to the second."""
+    """First and last of `count` values at equal distances."""
     count: Annotated[int, Field(ge=2, le=_MOST_VALUES)] | None = None
     """Number of values of `range`."""
     uniform: TwoNumbers | None = None
-    """Uniform between the two values."""
+    """Uniform distribution between the two values."""
     loguniform: TwoNumbers | None = None
-    """Uniform in the logarithm between the two values."""
+    """Distribution between the two values, uniform in the logarithm."""
     normal: TwoNumbers | None = None
     """Normal distribution: mean and standard deviation."""
     within: TwoNumbers | None = None
@@ -46,7 +46,7 @@ class Swept(Section):
     times_base: bool = False
     """The values multiply the value of the base configuration, instead of replacing it."""
     keys: Annotated[tuple[KeyName, ...], Field(min_length=1, max_length=20)] | None = None
-    """Keys that receive the value, if the factor has a name of its own or changes several keys."""
+    """Keys that get the value. null: the key that the factor is named after."""
 
     @model_validator(mode="before")
     @classmethod
@@ -118,7 +118,7 @@ class Swept(Section):
         return listed is not None and all(isinstance(value, bool) for value in listed)
 
     def changed_keys(self, name: str) -> tuple[str, ...]:
-        """The keys that receive the value of the factor `name`."""
+        """The keys that get the value of the factor `name`."""
         return self.keys or (name,)
 
     def grid(self) -> tuple[Any, ...]:
@@ -128,7 +128,7 @@ class Swept(Section):
         (low, high), count = self.range, self.count or 2
         return tuple(low + (high - low) * step / (count - 1) for step in range(count))
 
-    def at(self, probability: float) -> Any:
+    def quantile(self, probability: float) -> Any:
         """Quantile of the distribution at a cumulative probability, 0..1."""
         if self.choice is not None:
             return self.choice[min(int(probability * len(self.choice)), len(self.choice) - 1)]
@@ -141,7 +141,7 @@ class Swept(Section):
         return low + (high - low) * probability
 
     def described(self) -> dict[str, Any]:
-        """Kind and values, for the metadata of the results."""
+        """Kind and values of the factor, for the metadata of the results."""
         details = {"count": self.count, "within": self.within}
         return {
             "kind": self.kind,

@@ -6,21 +6,22 @@ from typing import NamedTuple
 
 from companion.campaign.campaign import Campaign
 from companion.campaign.case import Case
-from companion.campaign.design import Sample
+from companion.campaign.design import PlannedCase
 from companion.campaign.flight import fly_case
 from companion.campaign.swept import Value
 from companion.campaign.versions import Versions, require_equal, versions
 
 Row = dict[str, Value]
-SECONDS = 2.5
-"""Longest planned time of a unit with several cases, s.
+LONGEST_UNIT_S = 2.5
+"""Longest planned wall time of a unit with several cases, s.
 
-Long compared with the time to send a unit, and short enough that a lost unit costs little.
+It is long compared with the time to send a unit, and so short that a lost unit costs little.
 """
 _UNITS_PER_WORKER = 4
-"""Number of units planned for each worker, so that all workers end at about the same time.
+"""Number of units for each worker where there are few cases, before rounding.
 
-Rounding may give fewer units. Many cases give more, because `SECONDS` limits a unit.
+With several units each, all workers end at about the same time. With many cases `LONGEST_UNIT_S`
+limits the units instead, and there are more of them.
 """
 
 
@@ -29,8 +30,8 @@ class UnitResult(NamedTuple):
 
     Attributes:
         rows: one row for each case, in order.
-        wall_s: wall time of each case, s; for a batch a single number, for all cases together.
-        worker: address of the worker.
+        wall_s: wall time of each flight, s; of a batch, a single number for all cases together.
+        worker: address of the Dask worker.
     """
 
     rows: list[Row]
@@ -38,19 +39,26 @@ class UnitResult(NamedTuple):
     worker: str
 
 
-def fly_samples(campaign: Campaign, samples: Sequence[Sample], expected: Versions) -> UnitResult:
-    """Build the cases of some samples, and fly them.
+def fly_planned_cases(
+    campaign: Campaign, planned: Sequence[PlannedCase], expected: Versions
+) -> UnitResult:
+    """Build planned cases, and fly them.
+
+    Args:
+        campaign: the campaign.
+        planned: the planned cases.
+        expected: versions of the client, which this process must have, too.
 
     Raises:
         ConfigError: a case is refused.
         VersionError: the versions of this process differ from the client's.
     """
     require_equal(expected, versions(), f"the worker {_worker_address()}")
-    return _run_timed(campaign.file.kind, [campaign.case(sample) for sample in samples])
+    return _run_timed(campaign.file.kind, [campaign.case(each) for each in planned])
 
 
 def fly_cases(kind: str, cases: Sequence[Case], expected: Versions) -> UnitResult:
-    """Fly cases that the client has built; otherwise like `fly_samples`."""
+    """Fly cases that the client has built; see `fly_planned_cases`."""
     require_equal(expected, versions(), f"the worker {_worker_address()}")
     return _run_timed(kind, cases)
 
@@ -104,18 +112,23 @@ def _worker_address() -> str:
 
 
 def size_of_units(cases: int, case_s: float, workers: int) -> int:
-    """The number of cases in a unit.
+    """The number of cases in a unit of work.
 
     Args:
-        cases: number of cases of the campaign.
-        case_s: time that a case takes, s.
-        workers: number of workers; none at present counts as one, for which the cluster waits.
+        cases: number of all cases.
+        case_s: wall time that a case takes, s.
+        workers: number of workers; 0, while the first is awaited, counts as 1.
     """
-    by_time = int(SECONDS / max(case_s, 1e-6))
+    by_time = int(LONGEST_UNIT_S / max(case_s, 1e-6))
     by_share = -(-cases // (_UNITS_PER_WORKER * max(1, workers)))
     return max(1, min(by_time, by_share))
 
 
-def ranges(cases: int, size: int) -> list[range]:
-    """The case numbers of each unit of work, in order."""
+def unit_ranges(cases: int, size: int) -> list[range]:
+    """The case numbers of each unit of work, in order.
+
+    Args:
+        cases: number of all cases.
+        size: number of cases in a unit; the last unit may have fewer.
+    """
     return [range(first, min(first + size, cases)) for first in range(0, cases, size)]

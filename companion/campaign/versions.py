@@ -1,4 +1,4 @@
-"""The versions that a result depends on, and their comparison between processes."""
+"""The software versions that a result depends on, and their comparison between processes."""
 
 import hashlib
 import platform
@@ -13,7 +13,7 @@ Versions = dict[str, str]
 
 _PACKAGE = "mavlink-companion"
 _PACKAGES = ("numpy", "numba", "scipy")
-_ROOTS = ("companion", "sitl_mock")
+_SOURCE_FOLDERS = ("companion", "sitl_mock")
 _UNUSED_BY_CASES = ("cli", "report", "live", "bench", "study", "replay", "mavsdk_link")
 """Subpackages of `companion` that no case runs; changing them does not change the results."""
 _DIGEST_LENGTH = 12
@@ -35,7 +35,7 @@ def versions() -> Versions:
 
 
 def source_digest() -> str:
-    """The first digits of the SHA-256 of all source code that a case may run."""
+    """SHA-256 of all source code that a case may run, its first `_DIGEST_LENGTH` hex digits."""
     sha256 = hashlib.sha256()
     base = Path(__file__).parents[2]
     for path in _sources(base):
@@ -45,10 +45,10 @@ def source_digest() -> str:
 
 
 def _sources(base: Path) -> Iterator[Path]:
-    for root in _ROOTS:
+    for root in _SOURCE_FOLDERS:
         for path in sorted((base / root).rglob("*.py")):
             parts = path.relative_to(base).parts
-            if not (parts[0] == _ROOTS[0] and parts[1] in _UNUSED_BY_CASES):
+            if not (parts[0] == _SOURCE_FOLDERS[0] and parts[1] in _UNUSED_BY_CASES):
                 yield path
 
 
@@ -60,7 +60,7 @@ def _version(package: str) -> str:
 
 
 def difference(ours: Versions, others: Versions) -> str:
-    """The differences between two sets of versions, in words; empty if they are equal."""
+    """The differences between two sets of versions, as text; empty if they are equal."""
     names = {"source": "the source of companion", "python": "Python"}
     return ", ".join(
         f"{names.get(name, name)} {others.get(name, 'unknown')} instead of "
@@ -90,5 +90,5 @@ def require_equal(ours: Versions, others: Versions, who: str) -> None:
 
 
 def as_versions(data: Any) -> Versions:
-    """Versions from JSON or from another process, all converted to text."""
+    """Convert versions from JSON or from another process; all become text."""
     return {str(name): str(value) for name, value in data.items()} if isinstance(data, dict) else {}

@@ -23,7 +23,7 @@ TILT = {"limits.max_tilt_deg": [20, 25, 30]}
 
 def row_of(case):
     row = {"case": case.index, "seed": case.seed, **case.factors}
-    return row | outcomes.unflown("ok") | {"ok": True, "digest": f"d{case.index}"}
+    return row | outcomes.outcomes_of_error("ok") | {"ok": True, "digest": f"d{case.index}"}
 
 
 @pytest.fixture
@@ -87,7 +87,7 @@ def test_unknown_versions_are_other_versions(begun, capsys):
 )
 def test_a_damaged_campaign_file_is_refused(begun, text, words):
     campaign, out = begun
-    path = out / folder.FILE
+    path = out / folder.CAMPAIGN_FILE_NAME
     path.unlink() if text is None else path.write_text(text)
     with pytest.raises(ConfigError, match=words):
         folder.resume(out, campaign)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from companion.campaign import estimate, folder, loading
-from companion.campaign.design import samples_of, seed_of, too_few_samples
-from companion.campaign.estimate import duration
+from companion.campaign.design import few_samples_warning, planned_cases, seed_of
+from companion.campaign.estimate import duration_text
 from companion.campaign.swept import Swept
 from companion.cli.main import main
 from companion.files import bounded_yaml
@@ -90,7 +90,7 @@ def test_distributions_have_their_quantiles(tmp_path, sampling):
             "circle.radius_m": {"loguniform": [1, 100]},
         },
     )
-    values = [sample.values for sample in samples_of(campaign.file)]
+    values = [sample.values for sample in planned_cases(campaign.file)]
     winds = np.array([value["mock.wind.speed_m_s"] for value in values])
     radii = np.array([value["circle.radius_m"] for value in values])
     assert winds.min() >= 4.0
@@ -104,7 +104,7 @@ def test_distributions_have_their_quantiles(tmp_path, sampling):
 
 def test_choices_come_equally_often():
     swept = Swept(choice=("a", "b", "c", "d"))
-    assert [swept.at(share) for share in (0.0, 0.2499, 0.25, 0.6, 0.9999)] == list("aabcd")
+    assert [swept.quantile(share) for share in (0.0, 0.2499, 0.25, 0.6, 0.9999)] == list("aabcd")
 
 
 def test_a_preset_and_a_key_of_it_go_together(tmp_path):
@@ -128,7 +128,7 @@ def test_a_trajectory_comes_along(tmp_path):
     place = tmp_path / "run"
     folder.make(place, campaign, folder.describe(campaign, 1, None))
     (tmp_path / "table.csv").unlink()
-    assert list(loading.load(place / folder.FILE).cases()) == [one, two]
+    assert list(loading.load(place / folder.CAMPAIGN_FILE_NAME).cases()) == [one, two]
 
 
 FAULTS = {"gone": {"inject": [{"kind": "gps_los"}]}}
@@ -176,7 +176,7 @@ def test_too_few_samples_are_said(tmp_path):
     laws = {"planner.name": {"choice": ["first-order", "exact", "so3"]}}
 
     def said(samples, sweep):
-        return too_few_samples(load(tmp_path, samples=samples, sweep=sweep).file)
+        return few_samples_warning(load(tmp_path, samples=samples, sweep=sweep).file)
 
     assert said(1, {**wind, **laws}).startswith(
         "samples: 1 gives only one value of mock.wind.speed_m_s, planner.name; raise samples"
@@ -215,4 +215,4 @@ def test_a_configuration_that_is_none_is_refused_in_words(tmp_path):
     [(3.14, "3.1 s"), (100.0, "1.7 min"), (123_456.0, "34 h"), (8_640_000.0, "100 days")],
 )
 def test_a_time_is_told_in_the_largest_unit_that_fits(seconds, told):
-    assert duration(seconds) == told
+    assert duration_text(seconds) == told

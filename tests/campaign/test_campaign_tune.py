@@ -8,12 +8,18 @@ import pytest
 
 from companion.campaign import loading
 from companion.campaign.tune import candidates
-from companion.campaign.tune.candidates import cases, section_of, set_values, starts, unseen
+from companion.campaign.tune.candidates import (
+    cases,
+    configured_values,
+    starts,
+    tune_section,
+    unseen_campaign,
+)
 from companion.campaign.tune.certainty import compared
 from companion.campaign.tune.first_flight import learned
 from companion.campaign.tune.scores import Score, scored
 from companion.campaign.tune.search import Search
-from companion.campaign.tune.writing import Result, result_text, summary_lines
+from companion.campaign.tune.writing import CheckedResult, result_text, summary_lines
 from companion.cli.main import main
 from companion.config.files import load, shipped
 from companion.files.yaml_file import ConfigError
@@ -83,7 +89,7 @@ def searched(place, folder, fleet, trials=14):
     with pytest.MonkeyPatch.context() as patch:
         proposal = Proposal({"planner": {"gain_per_s": 5.5}, "limits": {"max_tilt_deg": 30.0}})
         patch.setattr(candidates, "propose", lambda _: proposal)
-        search = Search(made, section_of(made), folder, fleet, learning_flight=lambda _: None)
+        search = Search(made, tune_section(made), folder, fleet, learning_flight=lambda _: None)
     return search.run(trials), search
 
 
@@ -120,19 +126,19 @@ def test_an_interrupted_search_goes_on_with_the_same_candidates(whole, tmp_path)
 
 def test_the_result_tells_how_sure_it_is_and_can_be_included(whole, tmp_path):
     made = campaign(tmp_path)
-    other, found = unseen(made, 3), whole[0]
+    other, found = unseen_campaign(made, 3), whole[0]
     assert {case.seed for case in other.cases()}.isdisjoint(case.seed for case in made.cases())
     before = scored([row_of(case) for case in other.cases()], 1.0)
     after = scored([row_of(case) for case in cases(other, found.best.values)], 1.0)
     comparison = compared(before, after, 3)
-    result = Result(made, found, found.best, before, after, comparison)
+    result = CheckedResult(made, found, found.best, before, after, comparison)
     assert comparison.ratio.low <= comparison.ratio.value <= comparison.ratio.high < 0.8
     assert comparison.better == comparison.samples == 3
     said = " ".join(summary_lines(result))
     assert f"{comparison.ratio.value:.2f} times the error before" in said
     assert "14 candidates over 4 flights each" in said
     path = tmp_path / "result.yaml"
-    path.write_text(result_text(result, set_values(made.base, FILE["tune"]["search"])))
+    path.write_text(result_text(result, configured_values(made.base, FILE["tune"]["search"])))
     assert "before 5; the best " in path.read_text()
     assert load(path).planner.gain_per_s == found.best.values["planner.gain_per_s"]
 
@@ -154,7 +160,7 @@ def test_a_flight_that_ended_early_is_no_error_but_is_told(tmp_path):
 @pytest.mark.slow
 def test_the_search_also_starts_with_what_companion_tune_proposes(tmp_path):
     made = campaign(tmp_path)
-    found = list(starts(made, section_of(made)))
+    found = list(starts(made, tune_section(made)))
     assert [start.name for start in found] == ["the configuration", "companion tune"]
     assert found[1].values["planner.gain_per_s"] != 5.0
 
@@ -168,7 +174,7 @@ def test_a_first_flight_teaches_a_vehicle_that_is_40_percent_off(tmp_path):
     known = learned(made)
     assert known.vehicle.lag_ms + known.vehicle.dead_time_ms == pytest.approx(1.4 * 87.0, rel=0.1)
     assert known.guidance.drag_per_s == pytest.approx(1.4, rel=0.15)
-    found = list(starts(made, section_of(made), known))
+    found = list(starts(made, tune_section(made), known))
     assert [start.name for start in found] == [
         "the configuration",
         "a first flight",
@@ -192,7 +198,7 @@ def test_a_first_flight_teaches_a_vehicle_that_is_40_percent_off(tmp_path):
 )
 def test_a_search_that_cannot_be_is_refused(tmp_path, changes, message):
     with pytest.raises(ConfigError, match=message):
-        section_of(campaign(tmp_path, **changes))
+        tune_section(campaign(tmp_path, **changes))
 
 
 @pytest.mark.slow

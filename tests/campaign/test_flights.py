@@ -10,7 +10,7 @@ from distributed import Client, LocalCluster
 from companion.campaign import flight, folder, outcomes, running, store, unit
 from companion.campaign.case import Fault
 from companion.campaign.cluster import ClusterError
-from companion.campaign.unit import ranges, size_of_units
+from companion.campaign.unit import size_of_units, unit_ranges
 from companion.campaign.versions import VersionError, difference, require_equal, versions
 from companion.cli import campaign as commands
 from companion.cli.main import main
@@ -216,7 +216,7 @@ def test_what_ends_a_run_early_loses_no_finished_unit(quick, threads, capsys, mo
 
 def quick_row(case):
     row = {"case": case.index, "seed": case.seed, **case.factors}
-    return row | outcomes.unflown("internal error: oops" if case.index == 0 else "ok")
+    return row | outcomes.outcomes_of_error("internal error: oops" if case.index == 0 else "ok")
 
 
 def test_units_take_seconds_and_leave_work_for_all():
@@ -224,7 +224,7 @@ def test_units_take_seconds_and_leave_work_for_all():
     assert size_of_units(500, 60.0, 2) == 1
     assert size_of_units(20, 0.1, 2) == 3
     assert size_of_units(20, 0.1, 0) == size_of_units(20, 0.1, 1) == 5
-    assert [list(each) for each in ranges(5, 2)] == [[0, 1], [2, 3], [4]]
+    assert [list(each) for each in unit_ranges(5, 2)] == [[0, 1], [2, 3], [4]]
 
 
 def test_versions_that_differ_are_refused_in_one_sentence():

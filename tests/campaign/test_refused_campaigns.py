@@ -116,7 +116,7 @@ def test_a_case_is_described_with_its_values(tmp_path):
     assert first.described() == "case 0 (vehicle.damping = null, planner.gain_per_s = 1.23457)"
     assert second.described() == "case 1 (vehicle.damping = 0.7, planner.gain_per_s = 1.23457)"
     assert (
-        load(tmp_path, sweep={}).case(next(load(tmp_path, sweep={}).samples())).described()
+        load(tmp_path, sweep={}).case(next(load(tmp_path, sweep={}).planned_cases())).described()
         == "case 0"
     )
 

@@ -210,8 +210,8 @@ def test_how_a_flight_ended(mode, armed, touchdown, result, ending):
 
 def test_missing_cases_are_told_with_the_command_that_goes_on():
     told = {"ok": [True]}
-    assert page.missing(results(told)) == []
-    assert page.missing(results(told, planned=3)) == [
+    assert page.missing_cases_note(results(told)) == []
+    assert page.missing_cases_note(results(told, planned=3)) == [
         "2 of 3 flights are missing. `companion campaign 'a [b]'` goes on with them."
     ]
 
@@ -240,5 +240,5 @@ def test_steps_without_a_time_constant_have_none():
     measured.time_constant_north_s = nan
     assert isnan(outcomes.response(Summary(measured))["time_constant_s"])
     marks = (SimpleNamespace(vehicle_time=5.0, name="hover"),)
-    assert outcomes.activity([], Summary(), None) == {}
-    assert outcomes.activity([SimpleNamespace(time=4.0)], Summary(marks=marks), None) == {}
+    assert outcomes.control_effort([], Summary(), None) == {}
+    assert outcomes.control_effort([SimpleNamespace(time=4.0)], Summary(marks=marks), None) == {}

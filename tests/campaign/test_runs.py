@@ -24,7 +24,7 @@ TILT = {"limits.max_tilt_deg": [20, 25, 30]}
 
 def row_of(case):
     row = {"case": case.index, "seed": case.seed, **case.factors}
-    return row | outcomes.unflown("ok") | {"ok": True}
+    return row | outcomes.outcomes_of_error("ok") | {"ok": True}
 
 
 @pytest.fixture
@@ -81,7 +81,7 @@ def test_a_worker_of_another_version_flies_nothing(tmp_path, monkeypatch):
     with pytest.raises(
         VersionError, match=r"^the worker this process has numpy .* instead of 1\.0"
     ):
-        unit.fly_samples(campaign, list(campaign.samples()), other)
+        unit.fly_planned_cases(campaign, list(campaign.planned_cases()), other)
     with pytest.raises(VersionError, match=r"^the worker this process has numpy"):
         unit.fly_cases("flights", list(campaign.cases()), other)
 
@@ -218,7 +218,7 @@ def test_a_lost_scheduler_is_no_lost_unit():
 
 
 def test_a_scheduler_that_does_not_answer_is_wrong_usage(monkeypatch):
-    monkeypatch.setattr(cluster, "_CONNECT_S", 0.2)
+    monkeypatch.setattr(cluster, "_CONNECT_TIMEOUT_S", 0.2)
     for address in ("tcp://127.0.0.1:1", "nothing://x"):
         with (
             pytest.raises(ConfigError, match=f"no Dask scheduler answers at {address}"),

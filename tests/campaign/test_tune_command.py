@@ -14,11 +14,18 @@ from companion.campaign import unit
 from companion.campaign.cluster import ClusterError
 from companion.campaign.swept import Swept
 from companion.campaign.tune import candidates, command, first_flight
-from companion.campaign.tune.candidates import Start, near, section_of, starts, suggested, within
+from companion.campaign.tune.candidates import (
+    Start,
+    clamped_to_search,
+    starts,
+    starts_near,
+    suggested,
+    tune_section,
+)
 from companion.campaign.tune.certainty import compared
 from companion.campaign.tune.scores import scored
-from companion.campaign.tune.search import Candidate, Found, Search
-from companion.campaign.tune.writing import Result, result_text, summary_lines
+from companion.campaign.tune.search import Candidate, Search, SearchResults
+from companion.campaign.tune.writing import CheckedResult, result_text, summary_lines
 from companion.campaign.versions import VersionError
 from companion.cli.main import main
 from companion.config.files import changed, load
@@ -97,13 +104,13 @@ def test_what_ends_a_search_early_is_told(tmp_path, quick, monkeypatch, capsys, 
 def test_a_campaign_that_cannot_be_searched_is_refused(tmp_path, monkeypatch):
     batch = {"kind": "batch", "set": {"flight.maneuvers": ["corners"]}}
     with pytest.raises(ConfigError, match="tune needs kind: flights"):
-        section_of(campaign(tmp_path, **batch))
+        tune_section(campaign(tmp_path, **batch))
     several = {"a": {"uniform": [1, 2], "keys": ["planner.gain_per_s"]}}
     with pytest.raises(ConfigError, match="times_base and keys work only in `sweep`"):
-        section_of(campaign(tmp_path, tune={"search": several}))
+        tune_section(campaign(tmp_path, tune={"search": several}))
     monkeypatch.delitem(FILE, "tune")
     with pytest.raises(ConfigError, match="there is no section `tune`"):
-        section_of(campaign(tmp_path))
+        tune_section(campaign(tmp_path))
 
 
 def test_a_damaged_storage_is_one_sentence(tmp_path, quick, capsys):
@@ -173,7 +180,7 @@ def test_a_vehicle_that_no_proposal_covers_starts_without_one(tmp_path, monkeypa
     made = campaign(tmp_path)
     learned = changed(made.base, {"planner": {"gain_per_s": 7.5}}, "a test")
     monkeypatch.setattr(candidates, "propose", refuse)
-    found = list(starts(made, section_of(made), learned))
+    found = list(starts(made, tune_section(made), learned))
     assert [start.name for start in found] == ["the configuration", "a first flight"]
     assert found[1].values["planner.gain_per_s"] == 7.5
 
@@ -187,7 +194,7 @@ SEARCH = {
 
 def test_candidates_near_a_start_stay_in_their_ranges_and_keep_what_is_no_number():
     values = {"planner.name": "so3", "planner.gain_per_s": 7.9, "guidance.drag_per_s": 0.21}
-    found = [start.values for start in near(Start("x", values), SEARCH, 200, 1)]
+    found = [start.values for start in starts_near(Start("x", values), SEARCH, 200, 1)]
     assert {each["planner.name"] for each in found} == {"so3"}
     gains = sorted(each["planner.gain_per_s"] for each in found)
     drags = sorted(each["guidance.drag_per_s"] for each in found)
@@ -202,7 +209,7 @@ def test_candidates_near_a_start_stay_in_their_ranges_and_keep_what_is_no_number
 
 def test_values_that_are_not_among_the_choices_are_left_to_the_search():
     values = {"planner.name": "euler", "planner.gain_per_s": 9.0, "limits.max_climb_m_s": 1.0}
-    assert within(values, SEARCH) == {"planner.gain_per_s": 8.0}
+    assert clamped_to_search(values, SEARCH) == {"planner.gain_per_s": 8.0}
 
 
 def test_suggestions_are_rounded_within_their_range():
@@ -227,7 +234,7 @@ def test_a_candidate_whose_keys_do_not_fit_together_is_not_flown(tmp_path, monke
     made = campaign(tmp_path)
     monkeypatch.setattr(candidates, "propose", lambda _: Proposal({}))
     fly = pytest.fail
-    search = Search(made, section_of(made), tmp_path, fly, learning_flight=lambda _: None)
+    search = Search(made, tune_section(made), tmp_path, fly, learning_flight=lambda _: None)
 
     def refuse(*_):
         raise ConfigError("a minimum above a maximum")
@@ -241,8 +248,8 @@ def result(made, values, near_values, before, after):
     rows = [row_of(case) for case in made.cases()]
     good = scored(rows, 1.0)
     best = Candidate(1, values, good)
-    found = Found(5, 0, best, [replace(best, values=each) for each in near_values])
-    return Result(made, found, best, before or good, after or good, compared(good, good, 4))
+    found = SearchResults(5, 0, best, [replace(best, values=each) for each in near_values])
+    return CheckedResult(made, found, best, before or good, after or good, compared(good, good, 4))
 
 
 def test_the_reasons_say_where_a_value_lies_among_the_best(tmp_path):

@@ -14,7 +14,7 @@ from rich.console import Console
 
 from companion.campaign.campaign import Campaign
 from companion.campaign.cluster import require_packages
-from companion.campaign.folder import FILE
+from companion.campaign.folder import CAMPAIGN_FILE_NAME
 from companion.campaign.loading import load
 from companion.campaign.report import plots, tables
 from companion.campaign.report.results import RATES, TRUE_ERROR, Results, label
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 PARQUET, CSV = "results.parquet", "results.csv"
 _DONE = 0
 _GRID_LIKE, _FEW_SAMPLES = 12, 60
-"""A factor with at most the first number of values counts as a grid. A sampled factor needs the
-second number of values, so that its influence can be separated from that of other factors.
+"""Number of different values of a factor: up to the first number it counts as a grid; a sampled
+factor needs the second number for its influence to be separated from that of other factors.
 """
 
 
@@ -55,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
     require_extra()
     results = Results.read(options.folder)
     page = options.out or options.folder / PAGE
-    text = page_text(results, load(options.folder / FILE))
+    text = page_text(results, load(options.folder / CAMPAIGN_FILE_NAME))
     try:
         write_whole(page, text)
     except OSError as error:
@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
     write_tables(results.table, options.folder)
     console = Console(highlight=False, soft_wrap=True, markup=False)
     console.print(headline(results))
-    for line in missing(results):
+    for line in missing_cases_note(results):
         console.print(line)
     console.print(f"Open {page}")
     return _DONE
@@ -99,7 +99,7 @@ def page_text(results: Results, campaign: Campaign) -> str:
     """
     by_outcome = {
         name: each
-        for name in (results.error, RATES, "ok")
+        for name in (results.error_outcome, RATES, "ok")
         if name == "ok" or results.measured(name)
         if (each := influences(results, name))
     }
@@ -122,20 +122,20 @@ def page_text(results: Results, campaign: Campaign) -> str:
         shown_plots,
         headline=headline(results),
         good=not results.true_cases("crashed") and bool(_success(results).all()),
-        lines=[*missing(results), *what_to_look_at(results, by_outcome)],
+        lines=[*missing_cases_note(results), *what_to_look_at(results, by_outcome)],
         tables=[each for each in first_tables if each is not None],
         last=[tables.configuration(campaign), tables.all_cases(results)],
     )
 
 
 def headline(results: Results) -> str:
-    """One sentence: what was flown, and the success rate with its interval.
+    """One sentence: how many cases were flown, and the success rate with its interval.
 
-    Where each case has a fault, success is that the flight ended as documented for the fault.
+    Success is a good flight or, if every case has a fault, an ending as documented for the fault.
     """
     share = share_of(_success(results))
     success = "with a fault ended as documented" if results.all_faulty else "good"
-    return f"{results.name}: {share.chosen} of {share.of} {results.noun} {success}: {share}"
+    return f"{results.name}: {share.chosen} of {share.total} {results.noun} {success}: {share}"
 
 
 def _success(results: Results) -> NDArray[np.bool_]:
@@ -143,8 +143,8 @@ def _success(results: Results) -> NDArray[np.bool_]:
     return results.documented if results.all_faulty else results.good
 
 
-def missing(results: Results) -> list[str]:
-    """How many cases are missing, and how to go on; empty if all are flown."""
+def missing_cases_note(results: Results) -> list[str]:
+    """A sentence that tells how many cases are not flown yet and how to continue; or nothing."""
     unflown = results.planned - results.count
     if not unflown:
         return []
@@ -155,11 +155,11 @@ def missing(results: Results) -> list[str]:
 
 
 def what_to_look_at(results: Results, by_outcome: dict[str, list[Influence]]) -> Iterator[str]:
-    """A summary: what was flown, and which results deserve attention first.
+    """The sentences at the head of the page: what was swept, and the most important results.
 
     Args:
         results: results of the campaign.
-        by_outcome: the influences on each outcome.
+        by_outcome: the influences of the factors on each outcome, the largest first.
     """
     yield f"Swept: {', '.join(results.factors) or 'nothing but noise and gusts'}."
     if crashed := results.true_cases("crashed"):
@@ -174,7 +174,7 @@ def what_to_look_at(results: Results, by_outcome: dict[str, list[Influence]]) ->
         (reason, times) = reasons.most_common(1)[0]
         yield f"Most frequent reason why a case was not good, {times} times: {reason}."
     yield from _most_influential(results, by_outcome)
-    if results.error == TRUE_ERROR:
+    if results.error_outcome == TRUE_ERROR:
         yield (
             "Errors are distances of the true vehicle from the reference. A flight does not know "
             "its true position: its own report measures by the autopilot's estimate, which is "
@@ -183,9 +183,9 @@ def what_to_look_at(results: Results, by_outcome: dict[str, list[Influence]]) ->
 
 
 def _most_influential(results: Results, by_outcome: dict[str, list[Influence]]) -> Iterator[str]:
-    if results.error in by_outcome:
-        first = by_outcome[results.error][0]
-        error = label(results.error).partition(",")[0]
+    if results.error_outcome in by_outcome:
+        first = by_outcome[results.error_outcome][0]
+        error = label(results.error_outcome).partition(",")[0]
         share = f"{first.share:.0%} ± {first.confidence:.0%}"
         yield f"{first.factor} explains {share} of the variance of the {error} by itself."
         yield from _few_samples(results)
@@ -222,6 +222,8 @@ def _few_samples(results: Results) -> Iterator[str]:
 
 
 def _factors_by_influence(results: Results, by_outcome: dict[str, list[Influence]]) -> list[str]:
-    """The factors ordered by influence, the largest first."""
-    listed = [each.factor for name in ("ok", results.error) for each in by_outcome.get(name, ())]
+    """The factors by their influence on success, then on the error; the others last."""
+    listed = [
+        each.factor for name in ("ok", results.error_outcome) for each in by_outcome.get(name, ())
+    ]
     return list(dict.fromkeys([*listed, *results.factors]))

@@ -32,7 +32,12 @@ _BINS = 40
 
 
 def success(results: Results, order: Sequence[str]) -> Iterator[Plot]:
-    """Success rate by level: one plot for each of the most influential factors."""
+    """Success rate at each level of a factor, a plot for each of the most influential factors.
+
+    Args:
+        results: results of the campaign.
+        order: names of the factors, the most influential first.
+    """
     for name in order[:_MOST_FACTORS]:
         groups = levels(results.columns[name])
         shares = [share_of(results.good[level.cases]) for level in groups]
@@ -48,7 +53,7 @@ def success(results: Results, order: Sequence[str]) -> Iterator[Plot]:
                 "arrayminus": [_percent(each.share - each.low) for each in shares],
             },
             "marker": {"color": MEASURED, "size": 8},
-            "text": [f"{each.chosen} of {each.of}" for each in shares],
+            "text": [f"{each.chosen} of {each.total}" for each in shares],
             "hovertemplate": "%{x}: %{y:.1f} % (%{text})<extra></extra>",
         }
         layout = axes(x=label(name), y=f"good {results.noun}, %")
@@ -63,7 +68,7 @@ def _percent(share: float) -> float | None:
 
 
 def sensitivity(influences: dict[str, list[Influence]]) -> Iterator[Plot]:
-    """The first-order Sobol indices as bars."""
+    """The first-order Sobol indices of each outcome as bars, a bar for each factor."""
     traces = []
     for (outcome, found), colour in zip(
         influences.items(), (MEASURED, NEAREST, REFERENCE), strict=False
@@ -92,9 +97,9 @@ def sensitivity(influences: dict[str, list[Influence]]) -> Iterator[Plot]:
 
 
 def pareto(results: Results) -> Iterator[Plot]:
-    """Error against rate use, coloured by thrust use; the Pareto front is marked."""
+    """Error against commanded rate, coloured by thrust deviation; the Pareto front is marked."""
     columns = results.columns
-    names = [results.error, RATES, *([THRUST] if results.measured(THRUST) else [])]
+    names = [results.error_outcome, RATES, *([THRUST] if results.measured(THRUST) else [])]
     points, titles = [], []
     for choice in choices(results):
         part = choice.cases
@@ -127,7 +132,7 @@ def pareto(results: Results) -> Iterator[Plot]:
         f"case. No other point is better than one on the front in {criteria} at once. Each point "
         "shows its success rate."
     )
-    layout = axes(x=label(RATES), y=label(results.error))
+    layout = axes(x=label(RATES), y=label(results.error_outcome))
     yield Plot("Pareto front", note, traces, layout, 420)
 
 
@@ -145,7 +150,7 @@ def _points(name: str, goals: Floats, titles: list[str], marker: dict[str, Any])
 
 
 def _colour_scale(values: Floats, all_values: Floats, *, shown: bool) -> dict[str, Any]:
-    """Colours for the thrust use of some points, on one scale for all points."""
+    """Colours of some points by their thrust deviation, on one scale for all points."""
     return {
         "color": numbers(values),
         "cmin": float(all_values.min()),

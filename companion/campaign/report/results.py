@@ -46,13 +46,13 @@ LABELS = {
     "max_tilt_rad": "largest true tilt",
     "flight_s": "flight time",
 }
-"""Name of each outcome on the page."""
+"""Text for each outcome on the page."""
 
 
 def label(name: str) -> str:
-    """Name and unit of an outcome or a factor on the page."""
-    words = LABELS.get(name, name)
-    return f"{words}, {unit_of(name)}" if unit_of(name) else words
+    """Text and unit for an outcome or a factor on the page."""
+    text = LABELS.get(name, name)
+    return f"{text}, {unit_of(name)}" if unit_of(name) else text
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class Results:
 
     @cached_property
     def columns(self) -> dict[str, Column]:
-        """Every column, (cases,): float64 with NaN for null; any other type as objects."""
+        """Every column, (cases,), by name: numbers as float64, NaN for null; others as objects."""
         arrays = {}
         for field in self.table.schema:
             column = self.table.column(field.name)
@@ -110,7 +110,7 @@ class Results:
         return np.array(self.columns["ok"], dtype=bool)
 
     def failures(self) -> Counter[str]:
-        """How many cases were not good for each reason; numbers in a reason are left out."""
+        """How many cases were not good for each reason, with its numbers replaced by `…`."""
         reasons = (self.reason(row) for row in range(self.count) if not self.good[row])
         return Counter(_NUMBER.sub("…", reason) for reason in reasons)
 
@@ -123,13 +123,13 @@ class Results:
 
     @cached_property
     def documented(self) -> NDArray[np.bool_]:
-        """(k,): whether each of the k cases with a fault ended as documented for that fault."""
+        """(k,): for each of the k cases with a fault, whether it ended as documented for it."""
         judged = self.columns.get("as_documented", ())
         return np.array([value for value in judged if value is not None], dtype=bool)
 
     @property
     def all_faulty(self) -> bool:
-        """Whether every case has a fault; a flight that is not good may then be as documented."""
+        """Whether every case has a fault; success then means an ending as documented."""
         return self.documented.size == self.count > 0
 
     @property
@@ -138,12 +138,12 @@ class Results:
         return NOUNS[self.kind]
 
     @property
-    def error(self) -> str:
-        """Name of the outcome that serves as the campaign's error."""
+    def error_outcome(self) -> str:
+        """Name of the outcome that serves as the campaign's error; see `ERRORS`."""
         return next((name for name in ERRORS if self.measured(name)), ERRORS[-1])
 
     def measured(self, name: str) -> bool:
-        """Whether a column of float64 exists and has a finite value."""
+        """Whether there is a column of numbers with this name, with at least one finite value."""
         column = self.columns.get(name)
         return column is not None and column.dtype == float and bool(np.isfinite(column).any())
 

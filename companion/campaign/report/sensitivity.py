@@ -15,7 +15,7 @@ from companion.campaign.report.results import Column, Floats, Results
 FEWEST = 100
 """Smallest number of cases for useful indices."""
 _MOST_CASES = 5000
-"""Largest number of cases used; more are thinned out evenly."""
+"""Largest number of cases used; of more cases, so many are taken at even distances."""
 _SEED = 1
 
 
@@ -34,7 +34,7 @@ class Influence(NamedTuple):
 
 
 def influences(results: Results, outcome: str) -> list[Influence]:
-    """The factors by their influence on an outcome, the largest first.
+    """The influence of each factor on an outcome, the largest first.
 
     Factors with a single value are left out. The list is empty if no factor is left, if fewer than
     `FEWEST` cases were measured, or if the outcome is always the same.
@@ -69,9 +69,9 @@ def influences(results: Results, outcome: str) -> list[Influence]:
 
 
 def _as_numbers(column: Column, values: Floats) -> Floats:
-    """A factor as numbers; words and booleans are numbered in the order of their mean outcome.
+    """A factor as numbers; texts and booleans are numbered in the order of their mean outcome.
 
-    In another order, words with different outcomes could share a class, and their difference would
+    In another order, texts with different outcomes could share a class, and their difference would
     be lost. A null among numbers becomes a number below all others.
 
     Args:

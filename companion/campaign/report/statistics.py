@@ -15,7 +15,7 @@ _MOST_LEVELS = 12
 _RANGE_COUNT = 5
 _MOST_CHOICES = 300
 _NOT_CHOSEN = ("mock.", "fault", "flight.", "vehicle.")
-"""Beginnings of the factors that a user does not choose."""
+"""Prefixes of the factors that a user does not choose."""
 
 
 class Share(NamedTuple):
@@ -25,14 +25,14 @@ class Share(NamedTuple):
 
     Attributes:
         chosen: number of cases that have the property.
-        of: number of all cases.
-        share: chosen / of; NaN for no case.
+        total: number of all cases.
+        share: chosen / total; NaN for no case.
         low: lower end of the interval.
         high: upper end.
     """
 
     chosen: int
-    of: int
+    total: int
     share: float
     low: float
     high: float
@@ -49,21 +49,21 @@ def _percent(share: float) -> str:
 
 
 def share_of(chosen: NDArray[np.bool_]) -> Share:
-    """The share of True in (cases,)."""
+    """The share of cases for which the (cases,) array is True."""
     from scipy.stats import binomtest  # noqa: PLC0415  takes a second to import
 
-    count, of = int(np.sum(chosen)), len(chosen)
-    if not of:
+    count, total = int(np.sum(chosen)), len(chosen)
+    if not total:
         return Share(0, 0, np.nan, 0.0, 1.0)
-    interval = binomtest(count, of).proportion_ci(CONFIDENCE, method="wilson")
-    return Share(count, of, count / of, float(interval.low), float(interval.high))
+    interval = binomtest(count, total).proportion_ci(CONFIDENCE, method="wilson")
+    return Share(count, total, count / total, float(interval.low), float(interval.high))
 
 
 class Group(NamedTuple):
-    """Cases that belong together, because some of their factors have the same or similar values.
+    """Cases in which some factors have the same or similar values.
 
     Attributes:
-        name: these values.
+        name: these values, as text.
         cases: (cases,), whether each case belongs to the group.
     """
 
@@ -72,11 +72,11 @@ class Group(NamedTuple):
 
 
 def levels(column: Column) -> list[Group]:
-    """The cases grouped by the levels of a factor: its values, or ranges of them.
+    """The cases grouped by the levels of a factor, which are its values or ranges of them.
 
-    Up to `_MOST_LEVELS` different values give one level each. More numbers give `_RANGE_COUNT`
-    ranges with about equally many cases each; null is then a level of its own. With more words, one
-    level holds all words beyond the first `_MOST_LEVELS` − 1.
+    Up to `_MOST_LEVELS` different values are a level each. More numbers are divided into
+    `_RANGE_COUNT` ranges with about equally many cases, with null as a level of its own. Of more
+    texts, the first `_MOST_LEVELS` − 1 are a level each and the others one level together.
     """
     distinct = sorted({_sort_key(value) for value in column})
     if column.dtype != float or len(distinct) <= _MOST_LEVELS:
@@ -110,13 +110,14 @@ def _sort_key(value: object) -> tuple[float, str]:
     return 0.0, str(value)
 
 
-def worst(results: Results, count: int) -> list[int]:
-    """Rows of the worst cases: crashed, not as documented, not good, then the largest error.
+def worst_rows(results: Results, count: int) -> list[int]:
+    """Row numbers of the `count` worst cases, the worst first.
 
-    An error that was not measured counts as infinite.
+    Crashed cases come first, then those that did not end as documented, then those that were not
+    good; among equals, the larger error. An error that was not measured counts as infinite.
     """
     columns = results.columns
-    error = columns[results.error]
+    error = columns[results.error_outcome]
     crashed = columns.get("crashed", np.zeros(results.count))
     documented = columns.get("as_documented", np.full(results.count, None))
 
@@ -145,9 +146,9 @@ def pareto_front(goals: Floats) -> NDArray[np.bool_]:
 def choices(results: Results) -> list[Group]:
     """The cases grouped by equal values of the swept keys that a user chooses.
 
-    A user chooses neither keys of `mock`, `flight` and `vehicle` nor faults. If no two cases have
-    equal values, or there are more than `_MOST_CHOICES` groups, each group is a single case: every
-    k-th case, with k such that there are fewer than 2·`_MOST_CHOICES`.
+    Those are the keys outside `_NOT_CHOSEN`. If no two cases have equal values, or there are more
+    than `_MOST_CHOICES` groups, each group is a single case. Of many cases only every k-th is
+    returned, so that there are fewer than 2·`_MOST_CHOICES`.
     """
     chosen = [name for name in results.factors if not name.startswith(_NOT_CHOSEN)]
     rows = range(results.count)

@@ -10,7 +10,7 @@ import numpy as np
 from companion.campaign.campaign import Campaign
 from companion.campaign.report.results import LABELS, RATES, Floats, Results, label
 from companion.campaign.report.sensitivity import Influence
-from companion.campaign.report.statistics import levels, median, share_of, worst
+from companion.campaign.report.statistics import levels, median, share_of, worst_rows
 from companion.config.reference import keys
 from companion.config.units import unit_of
 from companion.flight.flown_config import flattened
@@ -26,19 +26,19 @@ _MOST_LEVELS = 12
 
 
 def worst_cases(results: Results) -> Table:
-    """The worst cases, each with the command that repeats it with full recording."""
+    """The worst cases, each with the command that flies it again with full recording."""
     columns = results.columns
     shown = [name for name in ("result", "failed_checks") if name in columns]
     rows = [
         (
             str(columns["case"][row]),
             _rerun_command(results, int(columns["case"][row])),
-            *(_cell(columns[name][row]) for name in (results.error, *shown)),
+            *(_cell(columns[name][row]) for name in (results.error_outcome, *shown)),
             _factor_values(results, row),
         )
-        for row in worst(results, _WORST_SHOWN)
+        for row in worst_rows(results, _WORST_SHOWN)
     ]
-    header = ("case", "fly it again, recorded", label(results.error), *shown, "factors")
+    header = ("case", "fly it again, recorded", label(results.error_outcome), *shown, "factors")
     return Table("Worst cases", tuple(each.replace("_", " ") for each in header), rows)
 
 
@@ -54,7 +54,10 @@ def _factor_values(results: Results, row: int) -> str:
 
 
 def configuration(campaign: Campaign) -> Table:
-    """What all cases share: limits, and keys that are not the default; without swept keys."""
+    """The configuration of every case: limits, and keys that differ from the default.
+
+    Swept keys are left out.
+    """
     swept = campaign.file.swept_keys
     rows = [
         (f"{key.section}.{key.name}", json.dumps(key.value), json.dumps(key.default), key.unit)
@@ -79,7 +82,7 @@ def success_by_factor(results: Results, order: Sequence[str]) -> Table:
     documented = "as_documented" in results.columns and "fault" in results.factors
     header = ["factor", "value", results.noun, "good (95 % interval)"]
     header += ["ended as documented (95 % interval)"] if documented else []
-    header += [f"median {label(results.error)}", f"median {label(RATES)}"]
+    header += [f"median {label(results.error_outcome)}", f"median {label(RATES)}"]
     return Table("Success by factor", tuple(header), rows)
 
 
@@ -91,7 +94,7 @@ def _level_rows(results: Results, name: str) -> Iterator[tuple[str, ...]]:
         if "as_documented" in columns and "fault" in results.factors:
             judged = [value for value in columns["as_documented"][level.cases] if value is not None]
             row.append(str(share_of(np.array(judged, dtype=bool))) if judged else EMPTY)
-        row += [_median_text(columns[each][level.cases]) for each in (results.error, RATES)]
+        row += [_median_text(columns[each][level.cases]) for each in (results.error_outcome, RATES)]
         yield tuple(row)
 
 
@@ -116,9 +119,9 @@ def sensitivity(influences: dict[str, list[Influence]]) -> Table:
 
 
 def crossed(results: Results) -> Table | None:
-    """Median error and success for each pair of values of the first two factors with few values.
+    """Median error and success rate for each pair of values of two factors.
 
-    None if fewer than two factors have few values.
+    They are the first two factors with 2 to `_MOST_LEVELS` values; None if there are no two.
     """
     columns = results.columns
     few = [
@@ -136,14 +139,15 @@ def crossed(results: Results) -> Table | None:
         for other in second_levels:
             in_both = level.cases & other.cases
             good = share_of(results.good[in_both]).share
-            cells.append(f"{_median_text(columns[results.error][in_both])} ({good:.0%})")
+            cells.append(f"{_median_text(columns[results.error_outcome][in_both])} ({good:.0%})")
         rows.append((level.name, *cells))
-    title = f"Median {label(results.error)} and share of good {results.noun}: {first} × {second}"
+    error = label(results.error_outcome)
+    title = f"Median {error} and share of good {results.noun}: {first} × {second}"
     return Table(title, (first, *(each.name for each in second_levels)), rows)
 
 
 def all_cases(results: Results) -> Table:
-    """The cases, at most `_MOST_ROWS` of them, evenly chosen."""
+    """All cases; if they are more than `_MOST_ROWS`, so many of them at even distances."""
     shown = [name for name in results.columns if name not in ("seed", "digest")]
     count = results.count
     chosen = np.unique(np.linspace(0, count - 1, min(count, _MOST_ROWS)).astype(int))

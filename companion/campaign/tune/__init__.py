@@ -1,8 +1,8 @@
 """Search of limits, gains and weights over the cases of a campaign.
 
-first_flight  what flights of the vehicle teach before the search
-candidates  the values that are searched, and where the search starts
-scores      how good a candidate is on some cases
+first_flight  two flights that measure the vehicle before the search
+candidates  the values that are searched, and the candidates with which the search starts
+scores      the errors of a candidate's flights
 search      the search itself, with Optuna; it can be interrupted and continued
 storage     errors of the file in which Optuna keeps the search
 certainty   the comparison with the unchanged configuration on cases that the search has not seen

@@ -1,4 +1,4 @@
-"""The values that are searched, and where the search starts."""
+"""The values that are searched, and the candidates with which the search starts."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
@@ -24,25 +24,28 @@ if TYPE_CHECKING:
 Values = Mapping[str, Any]
 """Value of each searched key."""
 _UNSEEN_SEED_OFFSET = 1_000_003
-"""Offset of the campaign's seed for the cases that the search does not see."""
+"""Added to the campaign's seed for the cases that the search does not see."""
 _NEARBY_DEVIATION = 0.15
-"""Standard deviation of candidates around a start, as a share of the (logarithmic) range."""
+"""Standard deviation of the values around a start, as a share of the range of the key.
+
+With `loguniform` the range is that of the logarithm.
+"""
 
 
 class Start(NamedTuple):
     """A candidate with which the search starts.
 
     Attributes:
-        name: source of its values.
-        values: values of the searched keys; the search draws a missing one.
+        name: source of its values, such as `companion tune`.
+        values: values of the searched keys. Optuna draws the value of a missing key.
     """
 
     name: str
     values: Values
 
 
-def section_of(campaign: Campaign) -> Tune:
-    """The section `tune` of a campaign.
+def tune_section(campaign: Campaign) -> Tune:
+    """Check and return the section `tune` of a campaign.
 
     Raises:
         ConfigError: the section is missing, the campaign is a batch, a searched key is also swept,
@@ -76,14 +79,19 @@ def cases(campaign: Campaign, values: Values) -> list[Case]:
     return list(replace(campaign, base=with_keys(campaign.base, values)).cases())
 
 
-def unseen(campaign: Campaign, samples: int) -> Campaign:
-    """The campaign with other samples, noise and gusts than those of the search."""
+def unseen_campaign(campaign: Campaign, samples: int) -> Campaign:
+    """The campaign with another seed, hence with samples, noise and gusts unlike the search's.
+
+    Args:
+        campaign: the campaign.
+        samples: number of samples.
+    """
     update = {"seed": campaign.file.seed + _UNSEEN_SEED_OFFSET, "samples": samples}
     return replace(campaign, file=campaign.file.model_copy(update=update))
 
 
 def suggested(trial: "Trial", search: Mapping[str, Swept]) -> dict[str, Any]:
-    """The values that the search tries next; numbers are rounded to three digits."""
+    """The values that Optuna suggests for a trial; numbers are rounded to three digits."""
     values: dict[str, Any] = {}
     for key, swept in search.items():
         if swept.choice is not None:
@@ -98,21 +106,23 @@ def suggested(trial: "Trial", search: Mapping[str, Swept]) -> dict[str, Any]:
 def starts(campaign: Campaign, tune: Tune, learned: Config | None = None) -> Iterator[Start]:
     """The starts: the present configuration, `learned`, and the proposal of `companion tune`.
 
-    Without a known rate loop there is no proposal.
+    There is no proposal if the rate loop is not known.
 
     Args:
         campaign: its base is the present configuration.
         tune: section `tune` of the campaign.
-        learned: the configuration with the values measured in first flights of the vehicle. From it
-            `companion tune` computes its proposal. None: from the present configuration.
+        learned: the configuration with the values that first flights measured; None: no such
+            flights. The proposal is computed from `learned` or, without it, from the present
+            configuration.
     """
     yield Start(
-        "the configuration", within(_present_values(campaign.base, tune.search), tune.search)
+        "the configuration",
+        clamped_to_search(_present_values(campaign.base, tune.search), tune.search),
     )
     known = learned or campaign.base
     present = _present_values(known, tune.search)
     if learned is not None:
-        yield Start("a first flight", within(present, tune.search))
+        yield Start("a first flight", clamped_to_search(present, tune.search))
     try:
         changes = propose(_analysed(known)).changes
     except ConfigError:
@@ -122,13 +132,21 @@ def starts(campaign: Campaign, tune: Tune, learned: Config | None = None) -> Ite
         for section, keys in changes.items()
         for key, value in keys.items()
     }
-    yield Start("companion tune", within({**present, **proposed}, tune.search))
+    yield Start("companion tune", clamped_to_search({**present, **proposed}, tune.search))
 
 
-def near(start: Start, search: Mapping[str, Swept], count: int, seed: int) -> Iterator[Start]:
+def starts_near(
+    start: Start, search: Mapping[str, Swept], count: int, seed: int
+) -> Iterator[Start]:
     """Candidates around a start: each number is moved by a normally distributed share of its range.
 
-    The optimum is more often near a reasonable start than anywhere in the ranges.
+    The optimum is likelier near a reasonable start than elsewhere in the ranges.
+
+    Args:
+        start: the start.
+        search: range or choice of each searched key.
+        count: number of candidates.
+        seed: seed of the random numbers.
     """
     rng = np.random.default_rng(seed)
     for _ in range(count):
@@ -141,17 +159,17 @@ def near(start: Start, search: Mapping[str, Swept], count: int, seed: int) -> It
             elif swept.uniform is not None:
                 low, high = swept.uniform
                 moved[key] = value + (high - low) * float(rng.normal(0.0, _NEARBY_DEVIATION))
-        yield Start(f"near {start.name}", within(moved, search))
+        yield Start(f"near {start.name}", clamped_to_search(moved, search))
 
 
 def _analysed(config: Config) -> Config:
-    """The configuration with the planner that `companion tune` analyses."""
+    """The configuration with `planner.name: auto`, for the analysis of `companion tune`."""
     planner = config.planner.model_copy(update={"name": "auto"})
     return config.model_copy(update={"planner": planner})
 
 
 def _present_values(config: Config, keys: Collection[str]) -> dict[str, Any]:
-    """The present values of keys; for a null key the value that the program derives, if any."""
+    """The present values of keys. A null key has the value that the program derives, if any."""
     weights, drag = hold_weights(config), drag_prior(config).drag
     derived = {
         "guidance.position_weight_per_s4": weights.position,
@@ -161,14 +179,14 @@ def _present_values(config: Config, keys: Collection[str]) -> dict[str, Any]:
         "guidance.quadratic_drag_per_m": drag.quadratic,
         "thrust.lag_ms": 1e3 * config.thrust.lag,
     }
-    configured = set_values(config, keys)
+    configured = configured_values(config, keys)
     return {
         key: value for key in keys if (value := configured.get(key, derived.get(key))) is not None
     }
 
 
-def set_values(config: Config, keys: Iterable[str]) -> dict[str, Any]:
-    """The values of some dotted keys, without those that are null."""
+def configured_values(config: Config, keys: Iterable[str]) -> dict[str, Any]:
+    """The values of dotted keys in a configuration; keys that are null are left out."""
     values = {}
     for key in keys:
         section, _, name = key.partition(".")
@@ -178,10 +196,10 @@ def set_values(config: Config, keys: Iterable[str]) -> dict[str, Any]:
     return values
 
 
-def within(values: Values, search: Mapping[str, Swept]) -> dict[str, Any]:
-    """The given values, clamped to the ranges of the search.
+def clamped_to_search(values: Values, search: Mapping[str, Swept]) -> dict[str, Any]:
+    """Values clamped to the ranges of the search.
 
-    Keys that are not searched, and values that are not among the key's choices, are left out.
+    Keys that are not searched are left out, and so are values that are not among a key's choices.
     """
     clamped: dict[str, Any] = {}
     for key, value in values.items():

@@ -1,4 +1,4 @@
-"""How certain a result is: it is compared with the unchanged configuration on unseen cases."""
+"""Compares the result with the unchanged configuration on unseen cases, with 95 % intervals."""
 
 from typing import NamedTuple
 
@@ -26,13 +26,15 @@ class Comparison(NamedTuple):
     """Two configurations compared on the same cases, with the same noise and gusts.
 
     Attributes:
-        before: RMS of the true horizontal error with the configuration before the search, m.
-        after: the same with the result, m.
+        before: RMS horizontal distance of the true position from the reference, m, with the
+            configuration before the search.
+        after: the same distance with the result of the search, m.
         ratio: after / before.
-        estimated: RMS of the horizontal distance of the estimated position from the reference,
-            before and after, m.
-        estimate: RMS of the horizontal error of the position estimate itself, before and after, m.
-        better: number of samples in which the result is better.
+        estimated: RMS horizontal distance of the estimated position from the reference, m, before
+            and after.
+        estimate: RMS horizontal distance of the estimated from the true position, m, before and
+            after.
+        better: number of samples in which the result has the smaller RMS error.
         samples: number of samples that were compared.
     """
 
@@ -48,16 +50,16 @@ class Comparison(NamedTuple):
 def compared(before: Score, after: Score, samples: int) -> Comparison | None:
     """Compare two scores on the same cases, by a paired bootstrap over the samples.
 
-    All cases of a sample are drawn together, because their vehicle is the same. A sample with a
-    flight that ended early has no error and is left out.
+    All cases of a sample are drawn together, because they have the same vehicle. A sample in which
+    a flight ended early is left out, because it has no error.
 
     Args:
         before: score of the configuration before the search.
         after: score of the result.
-        samples: number of samples that the cases belong to, in order; all have equally many cases.
+        samples: number of samples, all with equally many cases, in the order of the scores.
 
     Returns:
-        None if fewer than two samples were flown to their end by both.
+        None if fewer than two samples were flown to their end with both configurations.
     """
     scores = before, after
     errors = [np.array(score.true).reshape(samples, -1) for score in scores]
@@ -97,7 +99,7 @@ def _resampled(errors: Floats, draws: "np.ndarray[tuple[int, ...], np.dtype[np.i
 
 
 def _interval(value: float, resampled: Floats) -> Interval:
-    """A value with the interval between the quantiles of its (resamples,) bootstrap values."""
+    """A value with the 95 % interval of its bootstrap values, (resamples,)."""
     tail = 0.5 * (1.0 - CONFIDENCE)
     low, high = np.quantile(resampled, (tail, 1.0 - tail))
     return Interval(value, float(low), float(high))

@@ -16,13 +16,19 @@ from companion.campaign.case import Case
 from companion.campaign.cluster import ClusterError, connected, require_packages, wait_for_workers
 from companion.campaign.loading import load
 from companion.campaign.running import DONE, FAILED, interruptible, progress_bar
-from companion.campaign.tune.candidates import cases, section_of, set_values, starts, unseen
+from companion.campaign.tune.candidates import (
+    cases,
+    configured_values,
+    starts,
+    tune_section,
+    unseen_campaign,
+)
 from companion.campaign.tune.certainty import compared
 from companion.campaign.tune.scores import Row, scored
-from companion.campaign.tune.search import Fly, Found, Search
+from companion.campaign.tune.search import Fly, Search, SearchResults
 from companion.campaign.tune.storage import StorageError
 from companion.campaign.tune.writing import (
-    Result,
+    CheckedResult,
     best_so_far_text,
     result_text,
     summary_lines,
@@ -52,8 +58,8 @@ def run(options: argparse.Namespace) -> int:
     require_packages()
     require("optuna", "campaign", "`companion campaign tune`")
     campaign = load(options.file)
-    tune = section_of(campaign)
-    search_folder: Path = options.out or folder.RUNS / f"{campaign.file.name}-tune"
+    tune = tune_section(campaign)
+    search_folder: Path = options.out or folder.CAMPAIGNS_FOLDER / f"{campaign.file.name}-tune"
     console = Console(highlight=False, soft_wrap=True, markup=False)
     for start in starts(campaign, tune):
         cases(campaign, start.values)  # refuses a bad value before any work
@@ -82,14 +88,14 @@ def run(options: argparse.Namespace) -> int:
 
 def _begin(search_folder: Path, campaign: Campaign) -> None:
     """Make the folder of the search, or check that it holds this search."""
-    if folder.begun(search_folder):
+    if folder.holds_campaign(search_folder):
         folder.resume(search_folder, campaign)
     else:
         folder.make(search_folder, campaign, folder.describe(campaign, 1, None))
 
 
 def _fly_on(client: "Client", campaign: Campaign) -> Fly:
-    """A function that flies cases on the cluster."""
+    """A function that flies cases on the cluster; the time of a case is measured here first."""
     kind = campaign.file.kind
     case_s = estimate.case_time(kind, list(campaign.cases())[:1])
 
@@ -99,15 +105,21 @@ def _fly_on(client: "Client", campaign: Campaign) -> Fly:
     return fly
 
 
-def _run_search(search: Search, trials: int, console: Console) -> Found:
-    """Search; if the storage fails meanwhile, show the best candidate so far and raise."""
-    newest = Found()
+def _run_search(search: Search, trials: int, console: Console) -> SearchResults:
+    """Search with a progress bar; if the storage fails, print the best candidate so far and raise.
+
+    Args:
+        search: the search.
+        trials: number of candidates, including those of earlier runs.
+        console: console for messages.
+    """
+    newest = SearchResults()
     best_so_far = TextColumn("{task.description}")
     try:
         with progress_bar(console, TextColumn("candidates"), best_so_far) as bar:
             task = bar.add_task("", total=trials)
 
-            def show(found: Found) -> None:
+            def show(found: SearchResults) -> None:
                 nonlocal newest
                 newest = found
                 best = "" if found.best is None else f"best {found.best.score.rms:.3f} m"
@@ -122,7 +134,12 @@ def _run_search(search: Search, trials: int, console: Console) -> Found:
 
 
 def _check_and_write(
-    campaign: Campaign, tune: Tune, search_folder: Path, fly: Fly, found: Found, console: Console
+    campaign: Campaign,
+    tune: Tune,
+    search_folder: Path,
+    fly: Fly,
+    found: SearchResults,
+    console: Console,
 ) -> int:
     """Check the best candidate on unseen cases, write it, and report the outcome.
 
@@ -138,15 +155,18 @@ def _check_and_write(
             "inside the envelope: widen tune.search or tune.envelope_m, or raise tune.trials."
         )
         return FAILED
-    unseen_campaign = unseen(campaign, tune.check_samples)
+    check_campaign = unseen_campaign(campaign, tune.check_samples)
     console.print(
-        f"checking on {unseen_campaign.number_of_cases} flights that the search has not seen…"
+        f"checking on {check_campaign.number_of_cases} flights that the search has not seen…"
     )
-    before = scored(fly(list(unseen_campaign.cases())), tune.envelope_m)
-    after = scored(fly(cases(unseen_campaign, found.best.values)), tune.envelope_m)
+    before = scored(fly(list(check_campaign.cases())), tune.envelope_m)
+    after = scored(fly(cases(check_campaign, found.best.values)), tune.envelope_m)
     comparison = compared(before, after, tune.check_samples)
-    result = Result(campaign, found, found.best, before, after, comparison)
-    path, text = search_folder / RESULT, result_text(result, set_values(campaign.base, tune.search))
+    result = CheckedResult(campaign, found, found.best, before, after, comparison)
+    path, text = (
+        search_folder / RESULT,
+        result_text(result, configured_values(campaign.base, tune.search)),
+    )
     for line in summary_lines(result):
         console.print(line)
     try:

@@ -1,4 +1,4 @@
-"""Two first flights of the campaign's vehicle; the search starts with the values they measure."""
+"""Two flights before the search, which measure the vehicle; one start of the search uses this."""
 
 import tempfile
 from dataclasses import replace
@@ -25,10 +25,10 @@ _DAMPING_KEY = "vehicle.damping"
 
 
 def learned(campaign: Campaign) -> Config:
-    """The campaign's configuration, completed by two flights of the first case's vehicle.
+    """The campaign's configuration with values measured in two flights of the first case's vehicle.
 
-    A flight of `companion identify` measures lag and dead time; the flight of the case itself
-    measures the drag. A second-order rate loop is used only if the search may set
+    A flight of `companion identify` measures lag and dead time of the rate loop. The flight of the
+    case itself measures the drag. A second-order rate loop is identified only if the search may set
     `vehicle.damping`, because it changes the meaning of lag and dead time. Values that were not
     measured stay unchanged.
 

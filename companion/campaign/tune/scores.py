@@ -1,4 +1,4 @@
-"""Scores of a candidate on some cases."""
+"""The score of a candidate: its errors, and which cases stayed inside the envelope."""
 
 from collections.abc import Mapping, Sequence
 from math import inf, isfinite
@@ -16,16 +16,16 @@ _ERROR_NAMES = "true", "estimated", "estimate"
 
 
 class Score(NamedTuple):
-    """The score of a candidate.
+    """The score of a candidate; each attribute has an entry for each case.
 
     Attributes:
-        true: RMS of the true horizontal distance from the reference in each case, m; infinite where
-            a case was not flown to its end, or had no maneuver in closed loop.
-        estimated: the same for the estimated position, which is all that the program knows in
-            flight.
-        estimate: RMS of the horizontal distance between true and estimated position, m.
-            `estimated` and `estimate` are infinite where `true` is.
-        inside: whether each case was flown to its end and stayed inside the envelope.
+        true: RMS horizontal distance of the true position from the reference, m; infinite where a
+            case was not flown to its end, or had no closed-loop maneuver.
+        estimated: RMS horizontal distance of the estimated position from the reference, m; infinite
+            where `true` is.
+        estimate: RMS horizontal distance of the estimated from the true position, m; infinite where
+            `true` is.
+        inside: whether the case was flown to its end and stayed inside the envelope.
     """
 
     true: tuple[float, ...]
@@ -35,16 +35,16 @@ class Score(NamedTuple):
 
     @property
     def rms(self) -> float:
-        """RMS over all cases, m; infinite if one was not flown to its end."""
+        """RMS of `true` over all cases, m; infinite if a case was not flown to its end."""
         return pooled(np.array(self.true))
 
     @property
-    def share(self) -> float:
+    def inside_share(self) -> float:
         """Share of the cases inside the envelope."""
         return sum(self.inside) / len(self.inside)
 
     def first(self, count: int) -> "Score":
-        """The score on only the first `count` cases."""
+        """The score on the first `count` cases alone."""
         return Score(
             self.true[:count], self.estimated[:count], self.estimate[:count], self.inside[:count]
         )
@@ -92,7 +92,7 @@ def scored(rows: Sequence[Row], envelope: float | None) -> Score:
 
 
 def pooled(rms: Floats) -> float:
-    """RMS over cases of (cases,) RMS errors."""
+    """RMS over all cases, from the RMS error of each case."""
     return float(np.sqrt(np.mean(np.square(rms))))
 
 

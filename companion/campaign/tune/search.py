@@ -1,4 +1,4 @@
-"""The search over candidates with Optuna; it can be interrupted and continued at any time."""
+"""The search with Optuna; it can be interrupted at any time and continued."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -13,10 +13,10 @@ from companion.campaign.case import Case
 from companion.campaign.tune.candidates import (
     Values,
     cases,
-    near,
+    clamped_to_search,
     starts,
+    starts_near,
     suggested,
-    within,
 )
 from companion.campaign.tune.first_flight import learned
 from companion.campaign.tune.scores import Row, Score, pooled, scored
@@ -35,16 +35,16 @@ STORAGE = "tune.db"
 """Optuna's storage in the folder of the search."""
 _STUDY_NAME = "tune"
 _STARTS, _FEWEST_NEAR = 3, 4
-"""Largest number of starts, and smallest number of candidates tried near the last start."""
+"""Largest number of starts, and smallest number of candidates that are tried near the last one."""
 _FIRST_DIVISOR = 4
-"""A candidate flies the first 1/4 of its cases, at least 2, before the others."""
+"""A candidate flies the first 1/4 of its cases before the others, at least 2."""
 _FEWEST_FIRST_CASES = 2
 _HOPELESS_FACTOR = 1.3
 """A candidate is abandoned when its error on the first cases is more than this factor times that of
 the best candidate on the same cases.
 """
 _LARGEST_ERROR = 10.0
-"""Largest error of a flight as Optuna sees it, m; the error of a flight that ended early."""
+"""Larger errors are reported to Optuna as this one, m, and so are flights that ended early."""
 _VALUES, _SCORE, _VIOLATION, _COMPLETE = "values", "score", "missed", "whole"
 """Names of the attributes of a trial in Optuna's storage."""
 
@@ -65,16 +65,15 @@ class Candidate:
 
 
 @dataclass
-class Found:
+class SearchResults:
     """The results of a search so far.
 
     Attributes:
         tried: number of all candidates, including those of `stopped_early`.
         stopped_early: number of candidates that were abandoned, or whose keys were refused.
-        best: of the candidates that met the constraint (`inside_share`) the one with the smallest
-            error; None: none met it.
-        near: the best tenth of the candidates that met the constraint, at least three if as many
-            met it; the best one first.
+        best: candidate with the smallest error of those that met the constraint, `inside_share`;
+            None: none met it.
+        near: the best tenth, or at least the best three, of those that met it; the best first.
     """
 
     tried: int = 0
@@ -87,19 +86,19 @@ class Search:
     """A search that keeps its state in a folder.
 
     Args:
-        campaign: gives the cases and the section `tune`.
+        campaign: the campaign; gives the cases.
         tune: section `tune` of the campaign.
         folder: folder for the storage.
         fly: flies cases.
-        learning_flight: flies the vehicle before a new search; returns the configuration with what
-            was measured, or None if nothing was.
+        learning_flight: flies the vehicle before a new search; returns the configuration with the
+            measured values, or None if there are none.
 
     Raises:
         ConfigError: the first case cannot be flown.
         StorageError: the storage in the folder cannot be used.
 
     Attributes:
-        path: the storage.
+        path: file of the storage.
     """
 
     def __init__(
@@ -125,7 +124,9 @@ class Search:
             )
             self._enqueue_starts(learning_flight)
 
-    def run(self, trials: int, on_trial: Callable[[Found], None] = lambda _: None) -> Found:
+    def run(
+        self, trials: int, on_trial: Callable[[SearchResults], None] = lambda _: None
+    ) -> SearchResults:
         """Try candidates until there are `trials` of them, including those of earlier runs.
 
         Raises:
@@ -133,14 +134,14 @@ class Search:
         """
         with storage_errors(self.path):
             while len(self._ended_trials()) < trials:
-                on_trial(self.found())
+                on_trial(self.results())
                 # Each trial has its own seed, so an interruption does not change the candidates.
                 self._study.sampler = self._sampler(len(self._ended_trials()))
                 self._try_candidate(self._interrupted_trial() or self._study.ask())
-            return self.found()
+            return self.results()
 
-    def found(self) -> Found:
-        """The results so far."""
+    def results(self) -> SearchResults:
+        """The results of all trials so far, including those of earlier runs."""
         complete = [each for each in self._ended_trials() if each.user_attrs.get(_COMPLETE)]
         good = sorted(
             (self._candidate(each) for each in complete if not self._violates(each)),
@@ -148,11 +149,11 @@ class Search:
         )
         tried = len(self._ended_trials())
         near = good[: max(3, len(good) // 10)]
-        return Found(tried, tried - len(complete), good[0] if good else None, near)
+        return SearchResults(tried, tried - len(complete), good[0] if good else None, near)
 
     @property
     def _neighbour_count(self) -> int:
-        """Number of candidates near the last start that are tried before Optuna proposes any."""
+        """Number of candidates near the last start that are tried before Optuna suggests any."""
         return max(_FEWEST_NEAR, len(self._tune.search))
 
     def _sampler(self, number: int) -> Any:
@@ -163,15 +164,15 @@ class Search:
         )
 
     def _enqueue_starts(self, learning_flight: Callable[[Campaign], Config | None]) -> None:
-        """Enqueue the starts of a new search."""
+        """Enqueue the starts of a new search, and the candidates near the last one."""
         if not self._study.trials:
             begin = list(starts(self._campaign, self._tune, learning_flight(self._campaign)))
             seed, search = self._campaign.file.seed, self._tune.search
-            for start in (*begin, *near(begin[-1], search, self._neighbour_count, seed)):
+            for start in (*begin, *starts_near(begin[-1], search, self._neighbour_count, seed)):
                 self._study.enqueue_trial(dict(start.values), user_attrs={"start": start.name})
 
     def _interrupted_trial(self) -> "Trial | None":
-        """The candidate whose flights were interrupted; it is tried again."""
+        """The trial whose flights were interrupted, to be tried again; None: there is none."""
         running = self._study.get_trials(states=(self._optuna.trial.TrialState.RUNNING,))
         return self._optuna.trial.Trial(self._study, running[0]._trial_id) if running else None
 
@@ -182,7 +183,7 @@ class Search:
         return list(self._study.get_trials(deepcopy=False, states=ended))
 
     def _try_candidate(self, trial: "Trial") -> None:
-        values = within(suggested(trial, self._tune.search), self._tune.search)
+        values = clamped_to_search(suggested(trial, self._tune.search), self._tune.search)
         trial.set_user_attr(_VALUES, values)
         try:
             flown = cases(self._campaign, values)
@@ -207,28 +208,28 @@ class Search:
         Args:
             trial: the candidate.
             error: RMS error so far, m.
-            violation: violation of the constraint; see `_set_violation`.
+            violation: `_shortfall` of the candidate.
         """
         self._set_violation(trial, violation)
         trial.report(error, 0)
         self._study.tell(trial, state=self._optuna.trial.TrialState.PRUNED)
 
     def _set_violation(self, trial: "Trial", violation: float) -> None:
-        """Tell the sampler the violation of the constraint; 0 or less is no violation."""
+        """Store the violation of the constraint, for Optuna's sampler; at most 0: none."""
         trial.set_user_attr(_VIOLATION, violation)
         trial.set_constraint(_VIOLATION, violation)
 
     def _shortfall(self, score: Score, cases_count: int) -> float:
-        """The required share minus the largest share inside the envelope that is still possible.
+        """`inside_share` minus the largest share inside the envelope that is still possible.
 
-        At most 0: the required share can still be reached. `score` covers the cases flown so far;
+        At most 0: `inside_share` can still be reached. `score` covers the cases flown so far, and
         `cases_count` is the number of all cases.
         """
         outside = sum(not each for each in score.inside)
         return self._tune.inside_share - (cases_count - outside) / cases_count
 
     def _hopeless(self, score: Score) -> bool:
-        best = self.found().best
+        best = self.results().best
         return (
             best is not None
             and score.rms > _HOPELESS_FACTOR * best.score.first(len(score.true)).rms
@@ -245,5 +246,5 @@ class Search:
 
 
 def _capped_rms(score: Score) -> float:
-    """The RMS error for Optuna, m; no flight counts more than `_LARGEST_ERROR`."""
+    """The RMS error for Optuna, m; the error of each flight is at most `_LARGEST_ERROR`."""
     return pooled(np.minimum(score.true, _LARGEST_ERROR))

@@ -6,14 +6,14 @@ from pathlib import Path
 
 
 class StorageError(Exception):
-    """The storage is damaged or cannot be written; the text is a sentence with the reason."""
+    """The storage is damaged or cannot be written; the message gives the reason."""
 
 
 @contextmanager
 def storage_errors(path: Path) -> Iterator[None]:
-    """Turn the errors of the storage at `path` into a `StorageError`.
+    """In the context, turn the errors of the storage at `path` into a `StorageError`.
 
-    Optuna wraps SQLAlchemy's errors in its own, whose text guesses at the cause.
+    Optuna wraps SQLAlchemy's errors in its own, and their text only guesses at the cause.
     """
     from optuna.exceptions import StorageInternalError  # noqa: PLC0415  an extra
     from sqlalchemy.exc import DBAPIError  # noqa: PLC0415  comes with Optuna

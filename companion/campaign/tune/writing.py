@@ -1,4 +1,4 @@
-"""The result of a search as YAML with its reasons, for a configuration to include."""
+"""Writes the result of a search as YAML, with the reasons as comments, to be included."""
 
 from collections.abc import Iterator, Mapping
 from math import isfinite
@@ -9,34 +9,34 @@ from companion.campaign.swept import Swept
 from companion.campaign.tune.candidates import Values
 from companion.campaign.tune.certainty import Comparison
 from companion.campaign.tune.scores import Score
-from companion.campaign.tune.search import Candidate, Found
+from companion.campaign.tune.search import Candidate, SearchResults
 from companion.files import bounded_yaml
 
 _EDGE_SHARE = 0.02
-"""A value closer to an end of its range than this share of the range counts as at the end."""
+"""A value counts as at an end of its range if it is closer to it than this share of the range."""
 
 
-class Result(NamedTuple):
-    """The result of a search.
+class CheckedResult(NamedTuple):
+    """The result of a search, checked on unseen cases.
 
     Attributes:
         campaign: the campaign, with its section `tune`.
         found: results of the search.
         best: the candidate that is proposed.
         before: score of the configuration before the search, on the unseen cases.
-        after: score of the proposal, on the unseen cases.
-        comparison: comparison of the two; None if fewer than two samples were flown to their end.
+        after: score of `best`, on the unseen cases.
+        comparison: `after` compared with `before`; None: too few samples were flown to their end.
     """
 
     campaign: Campaign
-    found: Found
+    found: SearchResults
     best: Candidate
     before: Score
     after: Score
     comparison: Comparison | None
 
 
-def summary_lines(result: Result) -> list[str]:
+def summary_lines(result: CheckedResult) -> list[str]:
     """What was searched, what was found, and how certain it is."""
     found, best, tune = result.found, result.best, result.campaign.file.tune
     assert tune is not None
@@ -46,13 +46,13 @@ def summary_lines(result: Result) -> list[str]:
         f"{found.tried} candidates over {cases} flights each, {found.stopped_early} of them "
         f"refused or stopped early; candidate {best.number} is the best.",
         f"Constraint: at least {tune.inside_share:.1%} of the flights must {bound}; in the search "
-        f"{best.score.share:.1%} did.",
+        f"{best.score.inside_share:.1%} did.",
         f"RMS of the true horizontal error in the search: {best.score.rms:.3f} m.",
     ]
     return [*lines, *_certainty_lines(result)]
 
 
-def _certainty_lines(result: Result) -> Iterator[str]:
+def _certainty_lines(result: CheckedResult) -> Iterator[str]:
     unseen_flights = len(result.after.true)
     early = [
         sum(not isfinite(each) for each in score.true) for score in (result.before, result.after)
@@ -89,7 +89,7 @@ def _certainty_lines(result: Result) -> Iterator[str]:
         yield "The interval holds 1: fly more samples before you believe that it is better."
 
 
-def result_text(result: Result, present: Mapping[str, Any]) -> str:
+def result_text(result: CheckedResult, present: Mapping[str, Any]) -> str:
     """The text of the result file.
 
     Args:
@@ -108,7 +108,7 @@ def result_text(result: Result, present: Mapping[str, Any]) -> str:
 
 
 def best_so_far_text(best: Candidate) -> str:
-    """The best candidate of a search that was ended early, as YAML."""
+    """The best candidate of a search that could not be finished, as YAML."""
     comment = (
         f"# The best candidate so far, not checked on unseen flights, RMS {best.score.rms:.3f} m:"
     )
@@ -116,7 +116,7 @@ def best_so_far_text(best: Candidate) -> str:
 
 
 def _values_lines(values: Values, reasons: Mapping[str, str]) -> Iterator[str]:
-    """Values of dotted keys as lines of YAML, each below its reason, if there is one."""
+    """Values of dotted keys as lines of YAML, each after a comment with its reason, if any."""
     sections: dict[str, list[str]] = {}
     for key, value in values.items():
         section, _, short = key.partition(".")
@@ -128,8 +128,15 @@ def _values_lines(values: Values, reasons: Mapping[str, str]) -> Iterator[str]:
         yield from ("", f"{section}:", *lines)
 
 
-def _reason(key: str, swept: Swept, result: Result, before: Any) -> str:
-    """The reason for the value of a key."""
+def _reason(key: str, swept: Swept, result: CheckedResult, before: Any) -> str:
+    """Text about the value of a key: the value before, and those of the best candidates.
+
+    Args:
+        key: the key.
+        swept: range or choice of the key in the search.
+        result: result of the search.
+        before: value before the search; None: the key was not set.
+    """
     before_text = "not set before" if before is None else f"before {_value_text(before)}"
     near = [each.values[key] for each in result.found.near if key in each.values]
     pair = swept.uniform or swept.loguniform
