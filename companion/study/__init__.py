@@ -1,4 +1,4 @@
-"""The paper's experiments and further ones: figures, tables, and one page with all results.
+"""Studies: experiments of the paper and our own, with figures, tables, and a page of results.
 
 The studies fly the planners of `companion.attitude`, the same code that flies a vehicle. They need
 the extra `study`, and `nmpc` and `track` also the extra `nmpc`. `registry` lists the studies and

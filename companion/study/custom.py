@@ -1,4 +1,4 @@
-"""The study `custom`: the methods compared on a step of the user's own."""
+"""The study `custom`: methods compared on a step that the user defines in a file."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -23,18 +23,18 @@ from companion.study.inner_loop import quickened
 from companion.study.measures import (
     cross_track,
     deviation,
-    from_line,
     heading_effect,
     largest_deviation,
     largest_tilt_rate,
-    time_to,
+    settling_time,
+    signed_distance_from_line,
 )
 from companion.study.methods import BY_PLANNER, LIMIT, Method, planner_of
 from companion.study.outcome import Cell, Job, Outcome, Table, Tick
 from companion.study.step import Floats, Response, fly, fly_loop
 
 Flights = dict[tuple[Method, float], Response]
-"""The response of each method at each rate in Hz."""
+"""The response of each method at each sample rate, Hz."""
 
 
 def prepare(case_file: Path) -> Job:
@@ -61,7 +61,7 @@ def _run(case: Case, tick: Tick) -> Outcome:
         figure=_figure(case, flown),
         caption=(
             f"Every method at {case.rates_hz[0]:g} Hz, at the heading with its largest cross-track."
-            f" The reference is {_reference_words(case)}."
+            f" The reference is {_reference_text(case)}."
         ),
         tables=(_results(case, flown),),
         series=(_responses(case, flown),),
@@ -69,7 +69,7 @@ def _run(case: Case, tick: Tick) -> Outcome:
 
 
 def _results(case: Case, flown: Flights) -> Table:
-    """The largest values of each method at each rate."""
+    """The table of the largest errors and rates of each method at each sample rate."""
     return Table(
         "custom",
         "The custom case; largest values over"
@@ -78,7 +78,7 @@ def _results(case: Case, flown: Flights) -> Table:
             "method",
             "rate, Hz",
             "cross-track",
-            f"largest deviation from {_reference_words(case)}",
+            f"largest deviation from {_reference_text(case)}",
             "time to 5 %, s",
             "largest √(ω_x²+ω_y²), rad/s",
             "difference between headings",
@@ -89,7 +89,7 @@ def _results(case: Case, flown: Flights) -> Table:
                 hz,
                 float(cross_track(response).max()),
                 float(largest_deviation(response, _reference(case, hz)).max()),
-                float(time_to(response).max()),
+                float(settling_time(response).max()),
                 largest_tilt_rate(response),
                 heading_effect(response),
             )
@@ -99,7 +99,7 @@ def _results(case: Case, flown: Flights) -> Table:
 
 
 def _responses(case: Case, flown: Flights) -> Table:
-    """Every sample of every response."""
+    """The table of every sample of every response."""
     return Table(
         "custom-response",
         "Every sample of every response; rates are held until the next sample.",
@@ -111,7 +111,7 @@ def _responses(case: Case, flown: Flights) -> Table:
 def _samples(
     case: Case, method: Method, hz: float, response: Response
 ) -> Iterator[tuple[Cell, ...]]:
-    """Rows of one response: coefficients and commanded body rates of each sample."""
+    """Table rows of one response: coefficients and commanded body rates of each sample."""
     time = response.step.time
     for index, heading in enumerate(case.headings_deg):
         paths, rates = response.at(index), response.rates[:, :, index]
@@ -140,12 +140,15 @@ def _fly(case: Case, method: Method, rate_hz: float) -> Response:
 
 
 def _reference(case: Case, rate_hz: float) -> Floats:
-    """(samples + 1, 2), the first-order reference; with the limit of equation 33 if configured."""
+    """(samples + 1, 2) coefficients of the first-order reference.
+
+    With `rate_limit: paper` their speed has the limit of equation 33.
+    """
     model = FirstOrderReference(case.gain_per_s, case.planner_limits().coefficient_speed)
     return case.step(rate_hz).reference(model)
 
 
-def _reference_words(case: Case) -> str:
+def _reference_text(case: Case) -> str:
     limited = case.limits.rate_limit == "paper"
     return "first order " + ("with the limit of equation 33" if limited else "without limits")
 
@@ -177,10 +180,15 @@ def _figure(case: Case, flown: Flights) -> Figure:
         3, 2, height=3.0
     )
     draw_response(north, east, step.time, curves)
-    draw_reference(north, east, step.time, reference, _reference_words(case))
+    draw_reference(north, east, step.time, reference, _reference_text(case))
     draw_plane(plane, curves, np.array([step.start, step.target]))
     for m, response in shown.items():
-        draw(from_straight_line, step.time, from_line(response)[:, worst_heading[m]], m.line)
+        draw(
+            from_straight_line,
+            step.time,
+            signed_distance_from_line(response)[:, worst_heading[m]],
+            m.line,
+        )
         draw(from_reference, step.time, deviation(response, reference)[:, worst_heading[m]], m.line)
         draw(rate, step.time[:-1], response.tilt_rate[:, worst_heading[m]], m.line)
     from_straight_line.set(title="Distance from the line", xlabel="time, s", ylabel="to its right")

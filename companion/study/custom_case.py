@@ -13,7 +13,7 @@ Coefficient = Annotated[float, Field(gt=-1.0, lt=1.0)]
 Pair = tuple[Coefficient, Coefficient]
 
 MOST_STEPS = 5e6
-"""Largest number of steps. They need about 4 GB of memory, with inner_loop less."""
+"""Largest number of steps in a case. They need about 4 GB of memory; with inner_loop, less."""
 
 
 class CaseLimits(Section):
@@ -26,11 +26,12 @@ class CaseLimits(Section):
     max_yaw_rate_deg_s: Annotated[float, Field(ge=1.0, le=10_000.0)] | None = None
     """Largest yaw rate."""
     rate_limit: Literal["tight", "paper"] = "tight"
-    """Form of the rate limit of first-order and exact; paper: equation 33, needs max_tilt_deg."""
+    """How first-order and exact keep max_tilt_rate_deg_s. tight: only rates above it are scaled.
+    paper: equation 33, which needs max_tilt_deg."""
 
 
 class Case(Section):
-    """A step of the coefficients, and how it is flown."""
+    """A step of the acceleration coefficients, the methods that fly it, and the conditions."""
 
     start: Pair
     """Acceleration coefficients [north, east] at the start; their length is sin(tilt)."""
@@ -40,7 +41,7 @@ class Case(Section):
         tuple[Annotated[float, Field(ge=-360.0, le=360.0)], ...],
         Field(min_length=1, max_length=360),
     ] = (0.0,)
-    """Tilt-yaw headings; the step is flown at each."""
+    """Headings, by the tilt-yaw decomposition; the step is flown at each."""
     methods: Annotated[
         tuple[Annotated[str, Field(max_length=50)], ...],
         Field(min_length=1, max_length=len(LAW_NAMES)),
@@ -52,7 +53,7 @@ class Case(Section):
     ] = (250.0,)
     """Sample rates of the planner; with inner_loop each must divide 1000."""
     gain_per_s: Annotated[float, Field(gt=0.0, le=50.0)] = 5.0
-    """p of every method and of the first-order reference."""
+    """Gain p of every method and of the first-order reference."""
     yaw_gain_per_s: Annotated[float, Field(ge=0.0, le=50.0)] = 2.0
     """Heading gain of first-order and exact; the others use gain_per_s, as in the paper."""
     seconds: Annotated[float, Field(ge=0.1, le=60.0)] = 2.0
@@ -62,7 +63,7 @@ class Case(Section):
     inner_loop: StrictBool = False
     """True: fly with the mock vehicle's rate loop, rotors and rigid body. False: ideal rates."""
     quickness: Annotated[int, Field(ge=1, le=10)] = 1
-    """Divisor of all times of the inner loop; 1 responds as measured on a PX4."""
+    """All times of the inner loop are divided by this; at 1 it responds as measured on a PX4."""
     transport_delay_ms: Annotated[int, Field(ge=0, le=500)] = 0
     """Transport delay of the setpoints; needs inner_loop."""
 
@@ -108,14 +109,14 @@ class Case(Section):
 
     @property
     def steps_to_fly(self) -> float:
-        """Number of steps of the whole case: of the planners, or of the physics with inner_loop."""
+        """Number of simulation steps of the whole case; with inner_loop, of physics steps."""
         flown_s = len(self.headings_deg) * len(self.methods) * self.seconds
         if self.inner_loop:
             return flown_s * len(self.rates_hz) * 1000.0 * self.quickness
         return flown_s * sum(self.rates_hz)
 
     def step(self, rate_hz: float) -> Step:
-        """The step, flown at this sample rate."""
+        """The step of this case at one of its sample rates."""
         return Step(
             Coefficients(*self.start),
             Coefficients(*self.target),
@@ -126,7 +127,7 @@ class Case(Section):
         )
 
     def planner_limits(self) -> Limits:
-        """The limits in SI units."""
+        """The limits of the planners in SI units."""
         limits = self.limits
         return Limits(
             _radians(limits.max_tilt_deg),

@@ -11,7 +11,7 @@ from companion.study.methods import REFERENCE, Line, Method
 from companion.study.step import Floats
 
 _THINNED_POINTS = 400
-"""A line of at least twice as many points is thinned; with all points a page would be megabytes."""
+"""Lines are thinned to about this number of points; otherwise a page would be megabytes."""
 
 STYLE: Any = {  # Any, because matplotlib types the keys as a literal of 300 names
     "font.size": 9.0,
@@ -29,7 +29,7 @@ STYLE: Any = {  # Any, because matplotlib types the keys as a literal of 300 nam
 def new_figure(
     rows: int, columns: int, height: float = 3.4, width: float = 4.6
 ) -> tuple[Figure, Any]:
-    """A figure and its (rows, columns) array of axes, `height` and `width` inches each."""
+    """A figure and its (rows, columns) array of axes; each panel is `height` by `width` inches."""
     figure = Figure(figsize=(width * columns, height * rows), layout="constrained")
     return figure, figure.subplots(rows, columns, squeeze=False)
 
@@ -44,7 +44,14 @@ def draw(axes: Axes, x: Floats, y: Floats, line: Line, label: str = "") -> None:
 def draw_response(
     north: Axes, east: Axes, time: Floats, curves: Iterable[tuple[Method, str, Floats]]
 ) -> None:
-    """Draw both coefficients over time; `curves` are (method, label, (n, 2) coefficients)."""
+    """Draw the north and east coefficients over time.
+
+    Args:
+        north: panel of the north coefficient.
+        east: panel of the east coefficient.
+        time: (n,), s.
+        curves: for each curve its method, label and (n, 2) coefficients.
+    """
     for method, label, c in curves:
         for axes, values in ((north, c[:, 0]), (east, c[:, 1])):
             draw(axes, time, values, method.line, label)
@@ -65,13 +72,19 @@ def label_tilt_rate(axes: Axes, title: str) -> None:
 def draw_reference(
     north: Axes, east: Axes, time: Floats, reference: Floats, label: str = "first-order reference"
 ) -> None:
-    """Draw a reference model over the curves."""
+    """Draw the (n, 2) coefficients of a reference model over the curves."""
     draw(north, time, reference[:, 0], REFERENCE, label)
     draw(east, time, reference[:, 1], REFERENCE, label)
 
 
 def draw_plane(axes: Axes, curves: Iterable[tuple[Method, str, Floats]], ends: Floats) -> None:
-    """Draw paths in the plane of the coefficients; `ends` are (2, 2): start and target."""
+    """Draw paths in the plane of the coefficients.
+
+    Args:
+        axes: the panel.
+        curves: for each curve its method, label and (n, 2) coefficients.
+        ends: (2, 2), start and target.
+    """
     for method, label, c in curves:
         draw(axes, c[:, 1], c[:, 0], method.line, label)
     axes.plot(ends[:, 1], ends[:, 0], **REFERENCE)
@@ -81,7 +94,7 @@ def draw_plane(axes: Axes, curves: Iterable[tuple[Method, str, Floats]], ends: F
 
 
 def note_magnification(axes: Axes, axis: str, span: float, other: str, other_span: float) -> None:
-    """Write below the title of a panel by how much an axis is magnified, compared with another.
+    """Write below the title of a panel how many times larger the scale of one axis is.
 
     Args:
         axes: the panel.

@@ -1,4 +1,4 @@
-"""Flies a planner with the complete inner loop (the paper's figure 5), in the mock's physics.
+"""Flies a planner with the complete inner loop (the paper's figure 5): the mock vehicle's physics.
 
 The planner commands the mock's multirotor: a PI rate loop with feedforward and saturation, rotor
 lag, aerodynamic damping, and a rigid body with gyroscopic torque. There are no sensors: the planner
@@ -22,12 +22,13 @@ from sitl_mock.physics.multirotor import Multirotor
 
 LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
 ROLL_STEP = BodyRates(0.5, 0.0, 0.0)
-"""Step of the rate setpoint that measures the rate loop, rad/s; in 2 s the tilt reaches 57°."""
+"""Step of the rate setpoint with which the rate loop is measured, rad/s; after 2 s the tilt is 57°.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class InnerLoopFlight:
-    """One flight of n samples of the planner. Rates are of the body (FRD), rad/s.
+    """A flight of n planner samples. Rates are body rates (FRD), rad/s.
 
     Attributes:
         time: (n+1,), s from the start.
@@ -35,7 +36,7 @@ class InnerLoopFlight:
         body_rates: (n+1, 3), true rates of the vehicle.
         commanded: (n, 3), rates commanded at each sample, before any delay.
         tilt_saturated: (n,), whether the rotors could not produce the commanded roll and pitch
-            torque in a physics step of the sample.
+            torque in at least one physics step of the sample.
         yaw_saturated: (n,), the same for the yaw torque.
     """
 
@@ -54,8 +55,8 @@ class InnerLoop:
     Attributes:
         airframe: body and rotors; by default those of PX4's simulated quadrotor.
         rate_loop: the body-rate controller; by default tuned to the measured response of PX4.
-        transport_delay: delay of every setpoint (rates and thrust) before the rate loop's own
-            delay, s, rounded to a physics step.
+        transport_delay: delay of every setpoint (rates and thrust) before it reaches the rate loop,
+            s, rounded to a physics step.
 
     Raises:
         ValueError: `transport_delay` is negative or not finite.
@@ -74,7 +75,7 @@ class InnerLoop:
     def fly(
         self, planner: Planner, start: Quaternion, target: Target, *, seconds: float, rate_hz: float
     ) -> InnerLoopFlight:
-        """Fly to one target from rest; the rates are held from one planner sample to the next.
+        """Fly from rest to a target; commanded rates are held until the next planner sample.
 
         The thrust holds the height at the tilt of each sample (`specific_thrust`, as in flight). It
         has no effect on the coefficients, but determines at which torque the rotors saturate.
@@ -122,10 +123,10 @@ class InnerLoop:
             *np.array(saturated).T,
         )
 
-    def rate_step_63(self) -> float:
-        """Seconds until the roll rate reaches 1 − 1/e (63 %) of a step of its setpoint, in hover.
+    def rate_time_63(self) -> float:
+        """Time until the roll rate reaches 1 − 1/e (63 %) of a step of its setpoint in hover, s.
 
-        It includes all delays, and can be compared with 1/p of a planner.
+        The time includes all delays, and can be compared with 1/p of a planner.
 
         Raises:
             ValueError: the roll rate does not reach 63 % in 2 s.
@@ -133,7 +134,7 @@ class InnerLoop:
         goal = ROLL_STEP.roll * (1.0 - exp(-1.0))
         for seconds in (0.25, 2.0):  # a flight of 0.25 s is enough for most loops
             flight = self.fly(
-                _Constant(ROLL_STEP),
+                _ConstantRates(ROLL_STEP),
                 LEVEL,
                 Target(0.0, 0.0, 0.0),
                 seconds=seconds,
@@ -162,7 +163,7 @@ class InnerLoop:
         return steps
 
     def _setpoint_queue(self, throttle: float) -> deque[tuple[BodyRates, float]]:
-        """Queue of the delayed setpoints, newest last; at the start they are zero rates."""
+        """Queue of the delayed setpoints (rates, throttle), newest last; at first all rates 0."""
         length = 1 + round(self.transport_delay * self.airframe.physics_rate_hz)
         return deque([(BodyRates(0.0, 0.0, 0.0), throttle)] * length, maxlen=length)
 
@@ -170,9 +171,9 @@ class InnerLoop:
 def quickened(factor: int) -> InnerLoop:
     """The default inner loop with all of its times divided by `factor`.
 
-    Inertia and rotor lag are smaller and the torques the same, so the body rates follow a command
-    in the same way, `factor` times faster; only the gyroscopic torque is not scaled like the
-    others. The physics run `factor` times as often.
+    Inertia and rotor lag are divided by `factor`, and the torques are the same. So the body rates
+    follow a command in the same way, `factor` times faster, except for the gyroscopic torque. The
+    physics rate is multiplied by `factor`.
     """
     airframe, rate_loop = AirframeConfig(), RateLoopConfig()
     scaled_airframe = {
@@ -196,7 +197,7 @@ def quickened(factor: int) -> InnerLoop:
     )
 
 
-class _Constant:
+class _ConstantRates:
     """A planner that always commands the same rates."""
 
     def __init__(self, rates: BodyRates) -> None:

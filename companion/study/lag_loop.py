@@ -18,14 +18,19 @@ STEP_HZ = 1000
 
 
 class LagFlight(NamedTuple):
-    """A flight: attitudes q (samples + 1, 4), and commanded body rates (samples, 3), rad/s."""
+    """A flight with a `LagLoop`.
+
+    Attributes:
+        q: (samples + 1, 4), attitude (w, x, y, z).
+        commanded: (samples, 3), commanded body rates, rad/s.
+    """
 
     q: Floats
     commanded: Floats
 
 
 class LagBody:
-    """An attitude that follows body rates ω̇ = (ω_commanded(t − θ) − ω)/τ, in steps of 1/STEP_HZ.
+    """A body whose rates follow ω̇ = (ω_commanded(t − θ) − ω)/τ, in steps of 1/STEP_HZ s.
 
     Args:
         q: attitude at the start, at rest.
@@ -82,7 +87,7 @@ class LagLoop:
     def fly(
         self, planner: Planner, start: Quaternion, target: Target, *, seconds: float, rate_hz: float
     ) -> LagFlight:
-        """Fly to one target from rest; the rates are held from one planner sample to the next.
+        """Fly from rest to a target; commanded rates are held until the next planner sample.
 
         Raises:
             ValueError: the sample period is not a whole number of steps.

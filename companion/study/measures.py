@@ -1,4 +1,4 @@
-"""Measures of a response for the tables, and the second-order model fitted to it."""
+"""Measures of a response, such as its cross-track, and the second-order model fitted to it."""
 
 from math import exp, log
 from typing import NamedTuple
@@ -22,20 +22,20 @@ _UPPER_BOUNDS = np.array([log(1000.0), log(100.0), 0.5])
 
 
 def deviation(response: Response, reference: Floats) -> Floats:
-    """(samples + 1, headings) distance from a reference of shape (samples + 1, 2)."""
+    """(samples + 1, headings) distance of the coefficients from a (samples + 1, 2) reference."""
     difference = response.coefficients - reference[:, :, None]
     return np.asarray(np.hypot(difference[:, 0], difference[:, 1]))
 
 
 def largest_deviation(response: Response, reference: Floats) -> Floats:
-    """(headings,) largest distance from a reference of shape (samples + 1, 2)."""
+    """(headings,) largest distance of the coefficients from a (samples + 1, 2) reference."""
     return np.asarray(deviation(response, reference).max(axis=0))
 
 
-def from_line(response: Response) -> Floats:
-    """(samples + 1, headings) distance from the straight line start → target.
+def signed_distance_from_line(response: Response) -> Floats:
+    """(samples + 1, headings) distance of the coefficients from the straight line start → target.
 
-    It is positive to the right of the line, in the plane of the coefficients with north up.
+    Seen with north up and in the direction of the target, it is positive right of the line.
     """
     start, target = np.array(response.step.start), np.array(response.step.target)
     north, east = (target - start) / np.hypot(*(target - start))
@@ -45,13 +45,13 @@ def from_line(response: Response) -> Floats:
 
 def cross_track(response: Response) -> Floats:
     """(headings,) largest distance from the straight line between start and target."""
-    return np.asarray(np.abs(from_line(response)).max(axis=0))
+    return np.asarray(np.abs(signed_distance_from_line(response)).max(axis=0))
 
 
-def time_to(response: Response, share: float = 0.05) -> Floats:
-    """(headings,) time from which the distance to the target stays within `share` of the step.
+def settling_time(response: Response, share: float = 0.05) -> Floats:
+    """(headings,) time from which the distance to the target stays within `share` of the step, s.
 
-    In s; inf if the response ends before.
+    It is inf if the response is outside at its end.
     """
     start, target = np.array(response.step.start), np.array(response.step.target)
     offset = response.coefficients - target[:, None]
@@ -68,16 +68,16 @@ def largest_tilt_rate(response: Response) -> float:
 
 
 def heading_effect(response: Response) -> float:
-    """Largest difference of a coefficient between two headings; 0 if heading has no effect."""
+    """Largest difference of a coefficient between two headings at the same time; 0: no effect."""
     c = response.coefficients
     return float((c.max(axis=2) - c.min(axis=2)).max())
 
 
 def best_and_worst(values: Floats) -> tuple[int, int]:
-    """Indices of the smallest and the largest of (headings,) values; of equal ones the first.
+    """Indices of the smallest and the largest of (headings,) values; of equal values, the first.
 
-    The values are rounded to 1e-9 first: those of the Euler-angle method at opposite headings
-    differ by rounding only.
+    Values are compared after rounding to 1e-9, because those of the Euler-angle method at opposite
+    headings differ only by rounding errors.
     """
     ranked = np.round(values, 9)
     return int(ranked.argmin()), int(ranked.argmax())
@@ -87,7 +87,7 @@ class SecondOrderFit(NamedTuple):
     """A second-order model with a dead time.
 
     Attributes:
-        model: frequency ω and damping ζ.
+        model: the model without dead time: natural frequency ω, rad/s, and damping ratio ζ.
         dead_time: time from the step until the model begins to move, s.
     """
 
@@ -101,7 +101,7 @@ class SecondOrderFit(NamedTuple):
 
 
 def second_order_path(step: Step, fit: SecondOrderFit, time: Floats) -> Floats:
-    """(n, 2) coefficients of the model, from rest, at the times (n,) in s after the step."""
+    """(n, 2) coefficients of the fitted model, from rest, at (n,) times after the step, s."""
     moving = np.maximum(time - fit.dead_time, 0.0)
     return np.array(
         [fit.model.after(step.start, _AT_REST, step.target, float(t))[0] for t in moving]
@@ -109,7 +109,7 @@ def second_order_path(step: Step, fit: SecondOrderFit, time: Floats) -> Floats:
 
 
 def fit_second_order(step: Step, path: Floats) -> SecondOrderFit:
-    """Fit frequency, damping and dead time to a response (least squares).
+    """Fit natural frequency, damping ratio and dead time to a response by least squares.
 
     Args:
         step: the step that was flown.

@@ -1,4 +1,4 @@
-"""The methods that are compared, with the same label and line style in every figure and table."""
+"""The methods (planners) that the studies compare, each with its label and line style."""
 
 from typing import Any, NamedTuple, cast
 
@@ -13,7 +13,14 @@ class Method(NamedTuple):
     """A planner with its label and line style.
 
     The colours are those of Okabe and Ito, for colour-blind readers. Dashes distinguish the methods
-    in black and white. A wider curve stays visible below a narrower one.
+    in black and white. A wider line stays visible below a narrower one.
+
+    Attributes:
+        planner: name of the planner.
+        label: name in figures and tables.
+        colour: colour of the line.
+        dashes: lengths of dashes and gaps in line widths; empty: solid.
+        width: line width, points.
     """
 
     planner: str
@@ -42,10 +49,10 @@ PAPER_LIMIT = Method("first-order", "first-order, paper's limit", "#56B4E9", (3,
 FOLLOWING = Method("model-following", "model-following", "#332288", width=2.2)
 EXACT = Method("exact", "exact", "#CC79A7", (2, 1))
 
-PAPERS = (QUATERNION, SO3, EULER, PROPOSED)
+PAPER_METHODS = (QUATERNION, SO3, EULER, PROPOSED)
 """The methods of the paper's comparison, in drawing order: wide lines first."""
-BY_PLANNER = {method.planner: method for method in (*PAPERS, EXACT)}
-"""The method of every planner without memory, in drawing order."""
+BY_PLANNER = {method.planner: method for method in (*PAPER_METHODS, EXACT)}
+"""The method of every planner without memory, by name of the planner, in drawing order."""
 
 
 def planner_of(
@@ -54,5 +61,5 @@ def planner_of(
     limits: Limits = Limits(),  # noqa: B008  (frozen)
     yaw_gain: float = 2.0,
 ) -> LawPlanner:
-    """The planner of any method but `FOLLOWING`: the same code that flies a vehicle."""
+    """The planner of a method, except `FOLLOWING`; it is the same code that flies a vehicle."""
     return cast(LawPlanner, make_planner(method.planner, gain, yaw_gain, limits))

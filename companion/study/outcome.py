@@ -1,4 +1,4 @@
-"""The results of a study: figure, tables, and findings on the paper's claims."""
+"""The outcome of a study: figure, tables, and findings on the paper's claims and our own."""
 
 import csv
 import io
@@ -92,9 +92,9 @@ class Outcome:
     """The results of one study.
 
     Attributes:
-        name: name of its files.
+        name: name of its files, without the ending.
         title: title on the page.
-        conditions: the flights, in one or a few sentences.
+        conditions: what was flown, in a few sentences.
         figure: the figure, written as SVG and PNG.
         caption: description of the figure.
         tables: tables on the page and in files.
@@ -118,8 +118,8 @@ class Job(NamedTuple):
     """A study that is ready to run.
 
     Attributes:
-        run: runs the study; calls the tick before each part.
-        parts: number of parts; `run` calls the tick as often.
+        run: runs the study; calls its `Tick` before each part.
+        parts: number of parts.
     """
 
     run: Callable[[Tick], Outcome]

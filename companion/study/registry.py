@@ -9,25 +9,25 @@ from typing import NamedTuple
 from companion.extras import require
 
 ALL = "all"
-"""Name on the command line for all studies with `in_all`."""
+"""Name on the command line that selects all studies with `in_all`."""
 
 _PACKAGES = {"study": ("jinja2", "matplotlib", "tabulate"), "nmpc": ("casadi",)}
-"""Packages that each extra must have installed; numba only speeds up large batches."""
+"""The packages of each extra that a study needs; numba only speeds up large batches."""
 
 
 class Study(NamedTuple):
-    """One study.
+    """An entry of the table of studies.
 
     Attributes:
-        name: name on the command line; the names of its files begin with it.
+        name: name on the command line; the names of the study's files begin with it.
         summary: one line for `companion study --help`.
         module: module that is imported when the study runs. It has `run(tick) -> Outcome` and
             `PARTS`, the number of times that `run` calls its tick. With `takes_case` it has
             `prepare(case) -> Job` instead.
-        extra: extra that it needs besides `study`; empty: none.
-        in_all: whether `all` includes it. Such a study takes seconds, and its files are the same on
-            every computer.
-        takes_case: whether it reads a case from `--case FILE`.
+        extra: extra of the package that the study needs besides `study`; empty: none.
+        in_all: whether `all` includes the study. Such a study takes seconds, and its files are the
+            same on every computer.
+        takes_case: whether the study reads a case from `--case FILE`.
         prints_json: whether its outcome has rows for `--json`.
     """
 

@@ -56,7 +56,7 @@ def write_page(outcomes: Sequence[Outcome], path: Path) -> None:
 
 
 def _lay_out(figure: Figure) -> None:
-    """Lay out the figure once; otherwise each `savefig` lays it out twice."""
+    """Lay out the figure once and for all; otherwise each `savefig` lays it out twice."""
     figure.set_dpi(_DPI)
     engine = figure.get_layout_engine()
     if engine is not None:

@@ -28,8 +28,8 @@ from companion.study.report import write_outcome, write_page
 from companion.study.workers import run_in_workers
 
 
-class Written(NamedTuple):
-    """The results of a run.
+class RunResults(NamedTuple):
+    """The results of a run of one or all studies.
 
     Attributes:
         page: path of the page that shows all studies of the run.
@@ -42,7 +42,7 @@ class Written(NamedTuple):
 
 def run(
     name: str, case_file: Path | None, out: Path, console: Console, workers: int = 1
-) -> Written:
+) -> RunResults:
     """Run one study of the registry, or `all`.
 
     Args:
@@ -73,13 +73,14 @@ def run(
         progress.update(task, description=page.name, study="")
         write_page(list(outcomes.values()), page)
         progress.update(task, completed=total, description="done")
-    return Written(page, [row for outcome in outcomes.values() for row in outcome.rows])
+    return RunResults(page, [row for outcome in outcomes.values() for row in outcome.rows])
 
 
 def _run_named(out: Path, name: str, tick: Tick) -> Outcome:
     """In a worker process, run a study that takes no case, and write its files.
 
-    The returned outcome has an empty figure: the figure is in its file, and too large to pass on.
+    The returned outcome has an empty figure, because figures are too large to pass between
+    processes; the file has the real one.
     """
     outcome = _run(_make_job(registry.STUDIES[name], None), out, tick)
     return replace(outcome, figure=Figure())
@@ -96,7 +97,7 @@ def _run(job: Job, out: Path, tick: Tick) -> Outcome:
 
 
 def _make_job(study: Study, case_file: Path | None) -> Job:
-    """Import a study, and give it its case if it takes one.
+    """Import a study and make its job, with the case if the study takes one.
 
     Raises:
         ConfigError: the case is missing or cannot be used, or the study takes none.

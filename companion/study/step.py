@@ -23,11 +23,11 @@ class Step:
     """A step from one steady tilt to another, flown at several headings.
 
     Attributes:
-        start, target: acceleration coefficients.
+        start, target: acceleration coefficients (north, east).
         gain: p of the planners and of the first-order reference, 1/s.
         rate_hz: sample rate of the planner.
         seconds: duration of the response, s.
-        headings: tilt-yaw headings, rad; each flight holds one of them.
+        headings: headings of the tilt-yaw decomposition, rad; each is held during one flight.
     """
 
     start: Coefficients
@@ -48,7 +48,7 @@ class Step:
         return np.arange(self.samples + 1) / self.rate_hz
 
     def reference(self, model: FirstOrderReference | None = None) -> Floats:
-        """(samples + 1, 2) coefficients of `model`; None: first order with the step's `gain`."""
+        """(samples + 1, 2) coefficients of a reference model; None: first order with `gain`."""
         model = model or FirstOrderReference(self.gain)
         return np.array([model.after(self.start, self.target, float(t)) for t in self.time])
 
@@ -61,12 +61,12 @@ FIGURE_4 = Step(Coefficients(-0.5, 0.0), Coefficients(0.0, 0.5))
 
 @dataclass(frozen=True)
 class Response:
-    """The response of one planner to a step, sample by sample.
+    """The response of one planner to a step, sample by sample, at each heading.
 
     Attributes:
         step: the step that was flown.
-        coefficients: (samples + 1, 2, headings), measured from the attitude.
-        rates: (samples, 3, headings) body rates commanded, rad/s.
+        coefficients: (samples + 1, 2, headings), acceleration coefficients of the attitude.
+        rates: (samples, 3, headings), commanded body rates, rad/s.
     """
 
     step: Step
@@ -75,16 +75,16 @@ class Response:
 
     @property
     def tilt_rate(self) -> Floats:
-        """(samples, headings) √(ω_x² + ω_y²) commanded, rad/s."""
+        """(samples, headings) commanded √(ω_x² + ω_y²), rad/s."""
         return np.hypot(self.rates[:, 0], self.rates[:, 1])
 
-    def at(self, heading: int) -> Floats:
-        """(samples + 1, 2) coefficients at one heading, by its index."""
-        return self.coefficients[:, :, heading]
+    def at(self, heading_index: int) -> Floats:
+        """(samples + 1, 2) coefficients at one heading."""
+        return self.coefficients[:, :, heading_index]
 
 
-class Flown(Protocol):
-    """A flight at one heading."""
+class LoopFlight(Protocol):
+    """A flight with an inner loop at one heading."""
 
     @property
     def q(self) -> Floats:
@@ -98,17 +98,17 @@ class Flown(Protocol):
 
 
 class Loop(Protocol):
-    """A model between commanded body rates and attitude."""
+    """An inner loop: a model between commanded body rates and attitude."""
 
     def fly(
         self, planner: Planner, start: Quaternion, target: Target, *, seconds: float, rate_hz: float
-    ) -> Flown:
-        """Fly to one target from rest; see `InnerLoop.fly`."""
+    ) -> LoopFlight:
+        """Fly from rest to a target; see `InnerLoop.fly`."""
         ...
 
 
 def fly(planner: LawPlanner, step: Step) -> Response:
-    """Fly a step with an ideal rate loop: body rates equal their commands (paper, section 4)."""
+    """Fly a step with an ideal rate loop: body rates equal the commanded (paper, section 4)."""
     starts = [attitude(step.start, heading) for heading in step.headings]
     targets = [(*step.target, heading, 0.0) for heading in step.headings]
     history = batch.simulate(
@@ -118,7 +118,7 @@ def fly(planner: LawPlanner, step: Step) -> Response:
 
 
 def fly_loop(planner: Planner, step: Step, loop: Loop) -> Response:
-    """Fly a step with an inner loop between commanded body rates and attitude."""
+    """Fly a step with the inner loop `loop`."""
     flights = []
     for heading in step.headings:
         start = attitude(step.start, heading)

@@ -1,4 +1,4 @@
-"""Runs studies in worker processes, one study per process at a time."""
+"""Runs studies in worker processes; each process runs one study at a time."""
 
 import os
 import signal
@@ -13,10 +13,10 @@ from companion.child_process import end_with_parent
 from companion.study.outcome import Outcome, Tick
 
 RunStudy = Callable[[str, Tick], Outcome]
-"""Runs the study of this name and writes its files; a worker imports it by its name."""
+"""Runs the study of a name and writes its files. Workers import the function, by its own name."""
 
 _POLL_S = 0.05
-"""Time between two looks at the progress, s."""
+"""Time between two reads of the workers' progress, s."""
 
 
 class _Channels(NamedTuple):
@@ -32,11 +32,11 @@ class _Channels(NamedTuple):
 
 
 _shared: list[_Channels] = []
-"""In a worker: its one `_Channels`, because queues can only be passed when the process starts."""
+"""In a worker, its `_Channels`: queues can only be passed to a process when it starts."""
 
 
 class _StoppedError(Exception):
-    """The run was interrupted; ends a study in a worker."""
+    """Ends the study of a worker after the run was interrupted."""
 
 
 def cores() -> int:
@@ -47,14 +47,14 @@ def cores() -> int:
 def run_in_workers(
     run_study: RunStudy, parts: Mapping[str, int], workers: int, tick: Callable[[str, str], None]
 ) -> dict[str, Outcome]:
-    """Run studies in worker processes; on Ctrl-C they end after the part in progress.
+    """Run studies in worker processes; on Ctrl-C each ends after its part in progress.
 
     Args:
-        run_study: function at the top level of a module.
-        parts: names of the studies, and the number of their parts. Studies with more parts begin
-            first, because they take longer.
+        run_study: runs one study; a function at the top level of a module.
+        parts: number of parts by name of the study. Studies with more parts begin first, because
+            they take longer.
         workers: number of processes.
-        tick: called with study and part, in this process, soon after a part begins.
+        tick: called in this process with study and part, soon after a part begins.
 
     Returns:
         the outcomes by study, in the order of `parts`.
@@ -85,10 +85,9 @@ def run_in_workers(
 
 @contextmanager
 def interrupts_blocked() -> Iterator[None]:
-    """Block SIGINT while the block runs.
+    """Block SIGINT in the context, and unblock it afterwards.
 
-    Processes that the block starts inherit this, so that Ctrl-C does not end them. Afterwards this
-    process does not block SIGINT.
+    Processes that are started in the context inherit this, so that Ctrl-C does not end them.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -100,7 +99,7 @@ def interrupts_blocked() -> Iterator[None]:
 def _forward_ticks(
     futures: Sequence[Future[Outcome]], ticks: Any, tick: Callable[[str, str], None]
 ) -> None:
-    """Pass the workers' progress to `tick` until all studies are done or one has failed."""
+    """Pass the workers' progress to `tick` until all studies have ended or one has failed."""
     pending = set(futures)
     while pending:
         done, pending = wait(pending, timeout=_POLL_S)

@@ -13,7 +13,7 @@ from companion.study.measures import (
     largest_deviation,
     largest_tilt_rate,
     second_order_path,
-    time_to,
+    settling_time,
 )
 from companion.study.methods import BY_PLANNER, EXACT, planner_of
 from companion.study.step import Response, Step, fly
@@ -48,8 +48,8 @@ def test_deviation_is_the_largest_distance_from_the_reference():
 def test_time_to_is_when_the_rest_stays_small():
     leaving = np.where((STEP.time > 0.5) & ((STEP.time < 0.9) | (STEP.time > 0.995)), 0.97, 0.5)
     steady = np.where(STEP.time > 0.295, 1.0, 0.0)
-    assert time_to(response(along(leaving), along(steady))) == pytest.approx([1.0, 0.3])
-    assert time_to(response(along(0.9), along(1.0))) == pytest.approx([np.inf, 0.0])
+    assert settling_time(response(along(leaving), along(steady))) == pytest.approx([1.0, 0.3])
+    assert settling_time(response(along(0.9), along(1.0))) == pytest.approx([np.inf, 0.0])
 
 
 def test_the_effect_of_heading_is_the_largest_difference_between_paths():

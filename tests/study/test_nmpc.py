@@ -74,8 +74,8 @@ def out(tmp_path_factory):
     """The whole study, each flight for a second."""
     folder = tmp_path_factory.mktemp("nmpc")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(flights, "SECONDS", 1)
-        patch.setattr(flights, "SETTLED", 0.5)
+        patch.setattr(flights, "FLIGHT_S", 1)
+        patch.setattr(flights, "SETTLED_AFTER_S", 0.5)
         patch.setattr(timing, "_REQUESTS", 20)
         patch.setattr("companion.study.nmpc.study.PARTS", 3)
         assert main(["study", "nmpc", "--out", str(folder)]) == 0

@@ -21,7 +21,7 @@ from companion.cli.main import main
 from companion.files.yaml_file import ConfigError
 from companion.study.track import flights, study
 from companion.study.track.findings import find
-from companion.study.track.flights import PositionError, Tracked
+from companion.study.track.flights import PositionError, TrackedFlight
 from companion.study.track.tasks import WINDY, Course, Task, tasks
 
 OURS = "model-following"
@@ -127,7 +127,7 @@ def made_up(**others):
         path = np.linspace((0.0, 0.0, 0.0, 0.1), (1.0, 2.0, 1.1, 2.1), 50)
         telemetry = PositionError(rms, 2.0 * rms)
         truth = PositionError(0.9 * rms, 1.8 * rms)
-        flown[task] = Tracked("ok" if rms < inf else "lost", telemetry, truth, path)
+        flown[task] = TrackedFlight("ok" if rms < inf else "lost", telemetry, truth, path)
     return flown
 
 

@@ -1,1 +1,1 @@
-"""Every planner with a slow rate loop, which the paper does not study."""
+"""The study `lag`: every planner with a slow rate loop, which the paper does not study."""

@@ -15,7 +15,7 @@ from companion.study.lag.flights import (
     NO_ERROR,
     RATES_HZ,
     SHOWN_RATE_HZ,
-    Complete,
+    CompleteLoopFlights,
     DelayError,
     Example,
     Grid,
@@ -42,7 +42,7 @@ _CROSS_TRACK_LABEL = "largest distance from the line"
 _WORSE_COLOUR = "#A33C00"
 """Colour of cells where another method is straighter, and of `does not hold` on the page."""
 _CUT_HZ, _CUT_LAG_MS, _CUT_DEAD_TIME_MS = 100.0, 25, 40
-"""Sample rate, lag and dead time of the cuts through the grid in the second row."""
+"""Sample rate, and fixed lag and dead time, of the two plots in the second row."""
 _SHADE: Line = {
     "facecolor": (FOLLOWING.colour, 0.15),
     "edgecolor": FOLLOWING.colour,
@@ -65,7 +65,7 @@ _PANELS: list[Any] = [  # Any, because matplotlib has its own type for nested li
 ]
 
 
-def draw_figure(grid: Grid, example: Example, complete: Complete) -> Figure:
+def draw_figure(grid: Grid, example: Example, complete: CompleteLoopFlights) -> Figure:
     """Draw the figure that `CAPTION` describes."""
     figure = Figure(figsize=(9.2, 15.5), layout="constrained")
     panels: dict[str, Any] = figure.subplot_mosaic(_PANELS)
@@ -110,12 +110,20 @@ def _draw_distance(axes: Axes, responses: dict[Method, Response]) -> None:
 def _draw_cut(
     axes: Axes, grid: Grid, cells: list[GridCell], values_ms: list[int], quantity: str
 ) -> None:
-    """Draw the cross-track along one line of the grid."""
+    """Draw the cross-track of every method over the lag or over the dead time.
+
+    Args:
+        axes: the panel.
+        grid: all flights of the grid.
+        cells: cells of the grid that are shown.
+        values_ms: lag or dead time of each cell, ms.
+        quantity: "lag" or "dead time".
+    """
     for method in METHODS:
         cross_tracks = [grid[cell].by_method[method].cross_track for cell in cells]
         axes.plot(values_ms, cross_tracks, marker=".", **method.line)
     with_true_delays = [grid[cell].by_method[FOLLOWING].cross_track for cell in cells]
-    with_worst_delays = [grid[cell].worst for cell in cells]
+    with_worst_delays = [grid[cell].worst_cross_track for cell in cells]
     axes.fill_between(
         values_ms,
         with_true_delays,
@@ -133,7 +141,7 @@ def _draw_cut(
 
 
 def _draw_ratios(axes: Axes, grid: Grid, rate_hz: float) -> None:
-    """Draw the cross-track with the worst error over that of the best other method, by cell."""
+    """Draw `Comparison.ratio` of each cell of the grid at one sample rate."""
     dead_times, lags = _grid_values(grid)
     ratios = np.array(
         [
@@ -171,7 +179,7 @@ def _draw_errors(axes: Axes, scores: dict[DelayError, Score]) -> None:
     axes.legend(ncols=2)
 
 
-def _draw_inner_loop_errors(axes: Axes, complete: Complete) -> None:
+def _draw_inner_loop_errors(axes: Axes, complete: CompleteLoopFlights) -> None:
     comparison = complete.by_rate[SHOWN_RATE_HZ]
     _draw_errors(axes, comparison.by_error)
     other = comparison.best_other
@@ -182,17 +190,17 @@ def _draw_inner_loop_errors(axes: Axes, complete: Complete) -> None:
     )
     axes.set(
         title=f"Wrong lag and dead time, complete inner loop, {SHOWN_RATE_HZ:.0f} Hz",
-        ylim=(0.0, 1.1 * max(cross_track, comparison.worst)),
+        ylim=(0.0, 1.1 * max(cross_track, comparison.worst_cross_track)),
     )
 
 
-def _draw_rates(axes: Axes, complete: Complete) -> None:
+def _draw_rates(axes: Axes, complete: CompleteLoopFlights) -> None:
     rates, comparisons = list(complete.by_rate), complete.by_rate.values()
     for method in METHODS:
         cross_tracks = [comparison.by_method[method].cross_track for comparison in comparisons]
         axes.plot(rates, cross_tracks, marker=".", **method.line)
     with_true_delays = [comparison.by_error[NO_ERROR].cross_track for comparison in comparisons]
-    with_worst_delays = [comparison.worst for comparison in comparisons]
+    with_worst_delays = [comparison.worst_cross_track for comparison in comparisons]
     axes.fill_between(
         rates,
         with_true_delays,

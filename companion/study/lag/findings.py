@@ -1,11 +1,11 @@
-"""The findings of the study `lag`: statements, and whether its numbers support them."""
+"""The findings of the study `lag`: statements, and whether the flights support them."""
 
 from companion.study.lag.flights import (
     MAX_TILT_RATE,
     NO_ERROR,
     OTHERS,
     SHOWN_RATE_HZ,
-    Complete,
+    CompleteLoopFlights,
     DelayError,
     Example,
     Grid,
@@ -20,22 +20,22 @@ _ROUNDING = 1e-9
 
 
 def find(
-    grid: Grid, example: Example, complete: Complete, from_fit: dict[Method, float]
+    grid: Grid, example: Example, complete: CompleteLoopFlights, fit_deviations: dict[Method, float]
 ) -> tuple[Finding, ...]:
     """All findings, those on the example first.
 
     Args:
         grid: flights over dead times, lags and sample rates.
-        example: flights with one rate loop, in full.
+        example: flights with `EXAMPLE_LOOP`.
         complete: flights with the complete inner loop.
-        from_fit: largest deviation from the fitted second-order model, by method.
+        fit_deviations: largest deviation of each method from the second-order model fitted to it.
     """
     return (
         *_on_the_example(example),
         _over_the_grid(grid),
         _wrong_delays_over_the_grid(grid),
         _too_long_or_too_short(grid, complete),
-        *_with_the_complete_loop(complete, from_fit),
+        *_with_the_complete_loop(complete, fit_deviations),
     )
 
 
@@ -106,12 +106,13 @@ def _wrong_delays_over_the_grid(grid: Grid) -> Finding:
         not worse_cells,
         f"Worse than the best other method in {len(worse_cells)} of {len(grid)} cells{where}."
         f" The largest ratio is at {worst_cell}, with {comparison.worst_error}:"
-        f" {comparison.worst:.2g} against {comparison.by_method[other].cross_track:.2g} of"
+        f" {comparison.worst_cross_track:.2g} against"
+        f" {comparison.by_method[other].cross_track:.2g} of"
         f" {other.label}.",
     )
 
 
-def _too_long_or_too_short(grid: Grid, complete: Complete) -> Finding:
+def _too_long_or_too_short(grid: Grid, complete: CompleteLoopFlights) -> Finding:
     short, long = DelayError(-0.5, -0.5), DelayError(0.5, 0.5)
     pairs = [
         (comparison.by_error[long], comparison.by_error[short])
@@ -133,11 +134,11 @@ def _too_long_or_too_short(grid: Grid, complete: Complete) -> Finding:
 
 
 def _with_the_complete_loop(
-    complete: Complete, from_fit: dict[Method, float]
+    complete: CompleteLoopFlights, fit_deviations: dict[Method, float]
 ) -> tuple[Finding, Finding, Finding]:
     by_rate = complete.by_rate
     cross_tracks = {m: flown.cross_track for m, flown in by_rate[SHOWN_RATE_HZ].by_method.items()}
-    nearest = min(OTHERS, key=lambda method: from_fit[method])
+    nearest = min(OTHERS, key=lambda method: fit_deviations[method])
     worst_rate = max(by_rate, key=lambda rate: by_rate[rate].ratio)
     comparison = by_rate[worst_rate]
     return (
@@ -158,7 +159,7 @@ def _with_the_complete_loop(
             " lag and dead time wrong by up to ±50 %.",
             comparison.ratio < 1.0,
             f"The largest ratio is at {worst_rate:.0f} Hz, with {comparison.worst_error}:"
-            f" {comparison.worst:.2g} against"
+            f" {comparison.worst_cross_track:.2g} against"
             f" {comparison.by_method[comparison.best_other].cross_track:.2g} of"
             f" {comparison.best_other.label}.",
         ),
@@ -166,8 +167,8 @@ def _with_the_complete_loop(
             "ours",
             "With the complete inner loop the response of model-following is the nearest to second"
             " order with dead time.",
-            from_fit[FOLLOWING] < from_fit[nearest],
-            f"It stays within {from_fit[FOLLOWING]:.2g} of the fitted model; {nearest.label}, the"
-            f" next, within {from_fit[nearest]:.2g}.",
+            fit_deviations[FOLLOWING] < fit_deviations[nearest],
+            f"It stays within {fit_deviations[FOLLOWING]:.2g} of the fitted model; {nearest.label},"
+            f" the next, within {fit_deviations[nearest]:.2g}.",
         ),
     )

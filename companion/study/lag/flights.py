@@ -1,4 +1,4 @@
-"""Flies every planner with a slow rate loop, of which model-following assumes lag and dead time."""
+"""Flies every planner with a slow rate loop; model-following assumes its lag and dead time."""
 
 from dataclasses import replace
 from itertools import product
@@ -8,31 +8,31 @@ from typing import NamedTuple
 from companion.attitude import Limits, Planner, make_planner
 from companion.study.inner_loop import InnerLoop
 from companion.study.lag_loop import LagLoop
-from companion.study.measures import cross_track, time_to
-from companion.study.methods import EXACT, FOLLOWING, PAPERS, Method
+from companion.study.measures import cross_track, settling_time
+from companion.study.methods import EXACT, FOLLOWING, PAPER_METHODS, Method
 from companion.study.outcome import Tick
 from companion.study.step import FIGURE_2, Loop, Response, Step, fly_loop
 
-METHODS = (*PAPERS, EXACT, FOLLOWING)
+METHODS = (*PAPER_METHODS, EXACT, FOLLOWING)
 OTHERS = tuple(method for method in METHODS if method is not FOLLOWING)
-"""The methods that do not use lag and dead time of the rate loop."""
+"""All methods but model-following; they do not use lag and dead time of the rate loop."""
 RATES_HZ = (50.0, 100.0, 250.0)
 DEAD_TIMES_MS = (0, 20, 40, 60, 80)
 LAGS_MS = (10, 25, 40, 60)
 EXAMPLE_LOOP = LagLoop(lag_ms=25, dead_time_ms=45)
 """The lag is between ArduPilot's (22 ms) and PX4's (47 ms), the dead time above PX4's (40 ms)."""
 EXAMPLE_RATES_HZ = (100.0, 250.0)
-EXAMPLE_ERRORS_HZ = 100.0
+EXAMPLE_ERRORS_HZ = 100.0  # sample rate of the flights with wrong lag and dead time
 MAX_TILT_RATE = pi / 2.0
 """W_M of the flights with a rate limit, rad/s."""
 
 COMPLETE_LOOP = InnerLoop(transport_delay=0.02)
 SHOWN_RATE_HZ = 250.0
-"""The sample rate at which the complete inner loop is shown."""
+"""Sample rate of the flights with the complete inner loop that the figure shows, Hz."""
 
 
 class DelayError(NamedTuple):
-    """Relative errors of the lag and dead time that model-following assumes; 0.5: 50 % too long."""
+    """Relative errors of the assumed lag and dead time; 0.5: 50 % longer than the true value."""
 
     lag: float
     dead_time: float
@@ -44,11 +44,11 @@ class DelayError(NamedTuple):
 NO_ERROR = DelayError(0.0, 0.0)
 GRID_ERRORS = (-0.5, 0.0, 0.5)
 FINE_ERRORS = (-0.5, -0.3, 0.0, 0.3, 0.5)
-"""Errors tried in the example and with the complete inner loop."""
+"""Relative errors of lag and dead time, in the example and with the complete inner loop."""
 
 
 class RateLoopDelays(NamedTuple):
-    """Lag and dead time of a rate loop by axis, s, under the planner's own option names."""
+    """Lags and dead times of a rate loop, s, named like the options of the planner."""
 
     lag: float
     dead_time: float
@@ -56,7 +56,7 @@ class RateLoopDelays(NamedTuple):
     yaw_dead_time: float
 
     def with_error(self, error: DelayError) -> "RateLoopDelays":
-        """Lags and dead times that are wrong by these relative errors."""
+        """These lags and dead times, wrong by the relative errors `error`."""
         lag, dead_time = 1.0 + error.lag, 1.0 + error.dead_time
         return RateLoopDelays(
             lag * self.lag,
@@ -72,7 +72,7 @@ COMPLETE_DELAYS = RateLoopDelays(
     yaw_lag=0.37,
     yaw_dead_time=0.102 + COMPLETE_LOOP.transport_delay,
 )
-"""First order and dead time fitted to the measured PX4, plus the transport delay."""
+"""Lag and dead time fitted to the measured response of PX4, with the transport delay added."""
 
 
 class Score(NamedTuple):
@@ -80,19 +80,19 @@ class Score(NamedTuple):
 
     Attributes:
         cross_track: largest distance of the coefficients (a/T, no unit) from the straight line.
-        time: time from which the distance to the target stays within 5 % of the step, s; or inf.
+        settling_time: time from which the distance to the target stays within 5 % of the step, s.
     """
 
     cross_track: float
-    time: float
+    settling_time: float
 
 
 class Comparison(NamedTuple):
-    """All methods with one rate loop at one sample rate.
+    """Scores with one rate loop at one sample rate.
 
     Attributes:
-        by_method: score of every method; model-following knows the true lag and dead time.
-        by_error: score of model-following by the error of the lag and dead time it assumes.
+        by_method: score of every method; model-following assumes the true lag and dead time.
+        by_error: score of model-following for each error of its assumed lag and dead time.
     """
 
     by_method: dict[Method, Score]
@@ -100,27 +100,27 @@ class Comparison(NamedTuple):
 
     @property
     def best_other(self) -> Method:
-        """The straightest of `OTHERS`."""
+        """The method of `OTHERS` with the smallest cross-track."""
         return min(OTHERS, key=lambda method: self.by_method[method].cross_track)
 
     @property
     def worst_error(self) -> DelayError:
-        """The error of lag and dead time with the largest cross-track."""
+        """The error of the assumed lag and dead time that gives the largest cross-track."""
         return max(self.by_error, key=lambda error: self.by_error[error].cross_track)
 
     @property
-    def worst(self) -> float:
+    def worst_cross_track(self) -> float:
         """Cross-track of model-following with `worst_error`."""
         return self.by_error[self.worst_error].cross_track
 
     @property
     def ratio(self) -> float:
-        """`worst` over the cross-track of `best_other`; below 1 model-following is better."""
-        return self.worst / self.by_method[self.best_other].cross_track
+        """`worst_cross_track` / cross-track of `best_other`; below 1 model-following is better."""
+        return self.worst_cross_track / self.by_method[self.best_other].cross_track
 
 
 class GridCell(NamedTuple):
-    """One cell of the grid: sample rate, and dead time and lag of the rate loop."""
+    """Conditions of a comparison in the grid: sample rate, dead time and lag of the rate loop."""
 
     rate_hz: float
     dead_time_ms: int
@@ -139,7 +139,7 @@ class Example(NamedTuple):
     Attributes:
         free: responses of every method by sample rate (Hz), without limits.
         limited: responses of model-following with the limit W_M, by sample rate (Hz).
-        by_error: as in `Comparison`, at 100 Hz, including no error.
+        by_error: as in `Comparison`, at `EXAMPLE_ERRORS_HZ`; includes `NO_ERROR`.
     """
 
     free: dict[float, dict[Method, Response]]
@@ -147,7 +147,7 @@ class Example(NamedTuple):
     by_error: dict[DelayError, Score]
 
 
-class Complete(NamedTuple):
+class CompleteLoopFlights(NamedTuple):
     """The flights with the complete inner loop.
 
     Attributes:
@@ -166,7 +166,7 @@ def in_percent(error: float) -> str:
 
 def score(response: Response) -> Score:
     """The score of a response at its first heading."""
-    return Score(float(cross_track(response)[0]), float(time_to(response)[0]))
+    return Score(float(cross_track(response)[0]), float(settling_time(response)[0]))
 
 
 def step_at(rate_hz: float) -> Step:
@@ -195,7 +195,7 @@ def fly_grid(tick: Tick) -> Grid:
 
 
 def fly_example() -> Example:
-    """Fly the example with every method, with the rate limit, and with wrong lag and dead time."""
+    """Fly the example with every method, with a rate limit, and with wrong lag and dead time."""
     loop, limits = EXAMPLE_LOOP, Limits(max_tilt_rate=MAX_TILT_RATE)
     delays = _delays_of(loop)
     return Example(
@@ -205,7 +205,7 @@ def fly_example() -> Example:
     )
 
 
-def fly_complete(tick: Tick) -> Complete:
+def fly_complete(tick: Tick) -> CompleteLoopFlights:
     """Fly every method at every rate, model-following also with wrong lag and dead time."""
     flown, by_rate = {}, {}
     for rate in RATES_HZ:
@@ -215,11 +215,11 @@ def fly_complete(tick: Tick) -> Complete:
             {method: score(response) for method, response in flown[rate].items()},
             _with_errors(_combined(FINE_ERRORS), COMPLETE_DELAYS, COMPLETE_LOOP, rate),
         )
-    return Complete(by_rate, flown[SHOWN_RATE_HZ])
+    return CompleteLoopFlights(by_rate, flown[SHOWN_RATE_HZ])
 
 
 def _combined(errors: tuple[float, ...]) -> list[DelayError]:
-    """Every combination of these errors of lag and dead time."""
+    """Every pair of an error of the lag and an error of the dead time."""
     return [DelayError(*pair) for pair in product(errors, repeat=2)]
 
 

@@ -14,7 +14,7 @@ from companion.study.lag.flights import (
     METHODS,
     RATES_HZ,
     SHOWN_RATE_HZ,
-    Complete,
+    CompleteLoopFlights,
     DelayError,
     Example,
     Grid,
@@ -44,7 +44,7 @@ _SCORE_COLUMNS = ("cross-track", "time to 5 %, s")
 
 
 class _Fitted(NamedTuple):
-    """The second-order model fitted to a response."""
+    """The second-order model fitted to a response, and the largest deviation from it."""
 
     fit: SecondOrderFit
     deviation: float  # largest deviation of the response from the model
@@ -107,7 +107,7 @@ def _fit_model(response: Response) -> _Fitted:
 
 
 def _example_table(example: Example) -> Table:
-    """Every method by sample rate, and model-following with the limit of the tilt rate."""
+    """Scores of every method by sample rate, and of model-following with a limited tilt rate."""
     rows: list[tuple[Cell, ...]] = []
     for rate, responses in example.free.items():
         flown = [(method.label, response) for method, response in responses.items()]
@@ -150,7 +150,11 @@ def _worst_table(grid: Grid) -> Table:
             comparison.by_method[comparison.best_other].cross_track for comparison in comparisons
         ]
         rows.append(
-            (f"{rate:.0f} Hz, {lag} ms", *(comparison.worst for comparison in comparisons), *others)
+            (
+                f"{rate:.0f} Hz, {lag} ms",
+                *(comparison.worst_cross_track for comparison in comparisons),
+                *others,
+            )
         )
     return Table(
         "lag-worst-knowledge",
@@ -166,7 +170,7 @@ def _worst_table(grid: Grid) -> Table:
     )
 
 
-def _fit_table(complete: Complete, fitted: dict[Method, _Fitted]) -> Table:
+def _fit_table(complete: CompleteLoopFlights, fitted: dict[Method, _Fitted]) -> Table:
     """Score and fitted model of every method at `SHOWN_RATE_HZ`."""
     scores = complete.by_rate[SHOWN_RATE_HZ].by_method
     return Table(
@@ -181,7 +185,7 @@ def _fit_table(complete: Complete, fitted: dict[Method, _Fitted]) -> Table:
     )
 
 
-def _rates_table(complete: Complete) -> Table:
+def _rates_table(complete: CompleteLoopFlights) -> Table:
     """Cross-track of every method by sample rate, and of model-following with the worst error."""
     by_rate = complete.by_rate
     rows: list[tuple[Cell, ...]] = [
@@ -191,7 +195,7 @@ def _rates_table(complete: Complete) -> Table:
     rows.append(
         (
             "model-following, lag and dead time wrong by the worst error",
-            *(comparison.worst for comparison in by_rate.values()),
+            *(comparison.worst_cross_track for comparison in by_rate.values()),
         )
     )
     return Table(
@@ -204,7 +208,7 @@ def _rates_table(complete: Complete) -> Table:
 
 
 def _grid_series(grid: Grid) -> tuple[Table, Table]:
-    """Every flight of the grid: with the true lag and dead time, and with wrong ones."""
+    """Every flight of the grid: a table with true, and one with wrong lag and dead time."""
     cell_columns = ("dead time, ms", "lag, ms", "rate, Hz")
     return (
         Table(
@@ -230,7 +234,7 @@ def _grid_series(grid: Grid) -> tuple[Table, Table]:
     )
 
 
-def _complete_series(complete: Complete) -> Table:
+def _complete_series(complete: CompleteLoopFlights) -> Table:
     """Cross-track of model-following for every error at every sample rate."""
     return Table(
         "lag-inner-loop-beliefs",

@@ -1,1 +1,1 @@
-"""Predictive control: solve time of each prediction model, and its position error in flight."""
+"""The study `nmpc`: predictive control with several models, their solve time and position error."""

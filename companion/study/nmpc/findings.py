@@ -1,4 +1,4 @@
-"""The findings of the study `nmpc`: statements, and whether its numbers support them."""
+"""The findings of the study `nmpc`: statements, and whether the results support them."""
 
 from collections.abc import Sequence
 from math import isinf
@@ -21,9 +21,9 @@ from companion.study.nmpc.variants import (
 from companion.study.outcome import Finding, Source
 
 _SETTLED_M = 0.1
-"""Largest error in the last 2 s of a flight that has settled, m."""
+"""A flight has settled if its errors in the last 2 s are at most this, m."""
 _LAST_PERIODS = round(2.0 * RATE_HZ)
-"""Number of periods in these 2 s."""
+"""Number of solver periods in the last 2 s."""
 _MAX_ANSWER_MS = 10.0
 """Required 99th percentile of the solver process's answer time, ms; half a period."""
 
@@ -43,7 +43,7 @@ def find(flown: Flights, counts: ColdStarts, times: ProcessTimes) -> tuple[Findi
 
 
 def _solved_faster(source: Source, others: Sequence[ModelName], flown: Flights) -> Finding:
-    """Whether the proposed model is solved faster than `others`, with one and all iterations."""
+    """Whether the proposed model is solved faster than `others`, with one or all iterations."""
     ratios = {
         (model, iterations): _median_ms(model, iterations, flown)
         / _median_ms("proposed", iterations, flown)
@@ -111,7 +111,7 @@ def _smallest_error(flown: Flights) -> Finding:
 
 
 def _dead_time(flown: Flights) -> Finding:
-    """Whether knowing the dead time reduces the error on the figure-eight, and by how much."""
+    """Whether models that know the dead time have the smaller error on the figure-eight."""
     gains = {
         model: flown[EIGHT.name, Variant(model, knows_dead_time=False)].rms
         / flown[EIGHT.name, Variant(model)].rms

@@ -1,4 +1,4 @@
-"""The flights: every variant flies the same tasks with the same simulated vehicle."""
+"""The flights of the study `nmpc`: all variants fly the tasks with the same simulated vehicle."""
 
 from math import dist
 
@@ -33,11 +33,11 @@ from companion.study.nmpc.variants import (
 from companion.study.outcome import Tick
 from companion.study.step import Floats
 
-SECONDS = 6
-SETTLED = 4.0
-"""Time from which errors count, s."""
+FLIGHT_S = 6
+SETTLED_AFTER_S = 4.0
+"""Time after the begin of a flight from which its errors count, s."""
 _INPUTS_GIVEN = 8
-"""Number of latest inputs given to the solver; they cover dead time plus lead."""
+"""Number of the latest inputs that the solver gets; they cover dead time plus lead."""
 _PLANNER_HZ = 250
 _STEPS_PER_SAMPLE = STEP_HZ // _PLANNER_HZ
 
@@ -99,7 +99,7 @@ class Flight:
     Attributes:
         errors: distance from the trajectory after each period, m.
         path: position after each period, m, NED.
-        seconds: processor time of each solve, s.
+        solve_s: processor time of each solve, s.
         iterations: number of iterations of each solve.
         failures: number of solves without a usable answer.
     """
@@ -107,7 +107,7 @@ class Flight:
     def __init__(self, task: Task, variant: Variant) -> None:
         self.errors: list[float] = []
         self.path: list[tuple[float, float, float]] = []
-        self.seconds: list[float] = []
+        self.solve_s: list[float] = []
         self.iterations: list[float] = []
         self.failures = 0
         self._task = task
@@ -120,7 +120,7 @@ class Flight:
         self._periods = 0
 
     def step(self) -> None:
-        """Simulate one period: solve, and fly the previous answer."""
+        """Simulate one period: solve, and fly with the answer of the period before."""
         now, vehicle, flown = self._periods / RATE_HZ, self._vehicle, self._inputs[-1]
         known = KnownState(
             now,
@@ -132,7 +132,7 @@ class Flight:
         )
         at, inputs = self._task.begin + now, tuple(self._inputs[-_INPUTS_GIVEN:])
         answer = self._solver.answer(Request(self._periods, known, at, self._start, inputs))
-        self.seconds.append(answer.solver_seconds)
+        self.solve_s.append(answer.solver_seconds)
         self.iterations.append(answer.iterations)
         if answer.status is Status.SOLVED:
             target = answer.north, answer.east, answer.heading
@@ -151,8 +151,8 @@ class Flight:
 
     @property
     def settled(self) -> Floats:
-        """The errors from `SETTLED` on, m."""
-        return np.array(self.errors[round(SETTLED * RATE_HZ) :])
+        """The errors from `SETTLED_AFTER_S` on, m."""
+        return np.array(self.errors[round(SETTLED_AFTER_S * RATE_HZ) :])
 
     @property
     def rms(self) -> float:
@@ -165,22 +165,22 @@ class Flight:
         return float(self.settled.max())
 
     def solve_ms(self, percentile: float) -> float:
-        """Solve time at this percentile, ms."""
-        return float(1e3 * np.percentile(self.seconds, percentile))
+        """Percentile of the solve times, ms."""
+        return float(1e3 * np.percentile(self.solve_s, percentile))
 
 
 Flights = dict[tuple[str, Variant], Flight]
-"""Flights by name of the task and variant."""
+"""The flights, by name of the task and by variant."""
 
 
 def fly_all(tick: Tick) -> Flights:
-    """Fly all variants, one period of each in turn.
+    """Fly all variants side by side, one period of each in turn.
 
-    So other load on the computer slows all of them equally. The order rotates with every period.
+    Other load on the computer therefore slows all equally. The order rotates with every period.
     """
     flown = _new_flights()
     turns = list(flown.values())
-    for second in range(SECONDS):
+    for second in range(FLIGHT_S):
         tick(f"flights, second {second + 1}")
         for _ in range(round(RATE_HZ)):
             for flight in turns:
@@ -190,7 +190,7 @@ def fly_all(tick: Tick) -> Flights:
 
 
 def _new_flights() -> Flights:
-    """All flights; none has begun."""
+    """All flights of the study, before their first period."""
     unlimited = [
         Variant(model, knows_dead_time=known) for known in (True, False) for model in UNLIMITED
     ]

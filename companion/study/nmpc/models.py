@@ -35,10 +35,11 @@ ModelName = Literal["proposed", "limited", "euler", "euler-reduced", "quaternion
 
 
 def proposed(settings: Settings) -> Model:
-    """Equation 34: state: position, velocity V, c, heading; control: c_d N, E, heading, thrust T.
+    """Equation 34, with the acceleration coefficients c = (c_N, c_E) as the attitude.
 
-    V̇ = [T·c_N, T·c_E, g − T·√(1 − c_N² − c_E²)] − d(V) + w, ċ = p·(c_d − c), the heading likewise;
-    w is the disturbance, d the drag. Only the product with the thrust, and the root, are nonlinear.
+    State: position, velocity V, c, heading. Control: c_d, commanded heading, specific thrust T.
+    V̇ = [T·c_N, T·c_E, g − T·√(1 − c_N² − c_E²)] − d(V) + w, with drag d and disturbance w.
+    ċ = p·(c_d − c), the heading likewise. Only the products with T and the root are nonlinear.
     """
     symbols = Symbols(size=9)
     return symbols.model(
@@ -50,7 +51,7 @@ def proposed(settings: Settings) -> Model:
 
 
 def euler(settings: Settings) -> Model:
-    """Equation 37: p, v, and the Euler angles Z-Y-X; control (body rates, specific thrust).
+    """Equation 37: state (position, velocity, Euler angles Z-Y-X); control (body rates, thrust).
 
     The rates of the angles are M(φ, θ)⁻¹·ω, with the matrix M of section 4.2.
     """
@@ -88,8 +89,7 @@ def euler(settings: Settings) -> Model:
 def euler_reduced(settings: Settings) -> Model:
     """Equation 37 without its matrix and with constant yaw, for a fair comparison.
 
-    The controls are φ̇, θ̇ and the specific thrust, since ω = M·(φ̇, θ̇, ψ̇) can be computed
-    afterwards. So the matrix drops out. The yaw is constant over the horizon.
+    The controls are φ̇, θ̇ and the specific thrust; ω = M·(φ̇, θ̇, ψ̇) can be computed afterwards.
     """
     state, control, constants = ca.SX.sym("x", 8), ca.SX.sym("u", 3), constants_symbols(own=1)
     yaw = own_constant(constants)
@@ -123,7 +123,7 @@ def euler_reduced(settings: Settings) -> Model:
 
 
 def quaternion(settings: Settings) -> Model:
-    """Equation 39: p, v, and the attitude as a unit quaternion; control (body rates, thrust).
+    """Equation 39: state (position, velocity, unit quaternion); control (body rates, thrust).
 
     q̇ = ½·q ⊗ (0, ω).
     """
@@ -177,7 +177,7 @@ MAKERS: dict[ModelName, Callable[[Settings], Model]] = {
 
 
 def _conditions_only(conditions: Conditions, _start: Motion) -> Floats:
-    """The constants of a model that needs only `Conditions`."""
+    """The constants of a model that needs none besides `Conditions`."""
     return conditions
 
 
@@ -189,7 +189,7 @@ def _led_target(
     thrust: ca.SX,
     settings: Settings,
 ) -> ca.SX:
-    """The target for which a first-order planner turns the attitude as `derivative` does.
+    """The target at which a first-order planner commands the rotation in `derivative`.
 
     c_d = c + ċ/p, and likewise for the heading.
     """
@@ -203,7 +203,7 @@ def _led_target(
 
 
 def _euler_rates(roll: Any, pitch: Any, x: Any, y: Any, z: Any) -> tuple[Any, Any, Any]:
-    """Rates of the Euler angles, M(φ, θ)⁻¹·ω, at body rates (x, y, z); symbols or numbers."""
+    """Rates of the Euler angles, M(φ, θ)⁻¹·ω, for body rates ω = (x, y, z); symbols or numbers."""
     turning = ca.sin(roll) * y + ca.cos(roll) * z
     return (
         x + ca.tan(pitch) * turning,
@@ -213,7 +213,7 @@ def _euler_rates(roll: Any, pitch: Any, x: Any, y: Any, z: Any) -> tuple[Any, An
 
 
 def _thrust_axis(roll: ca.SX, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
-    """Coefficients and cos(tilt), (3,): body z in NED, its north and east components negated."""
+    """(3,): coefficients north and east, cos(tilt); body z in NED is (−north, −east, cos(tilt))."""
     pitch_part = ca.sin(pitch) * ca.cos(roll)
     return ca.vertcat(
         -(ca.cos(yaw) * pitch_part + ca.sin(yaw) * ca.sin(roll)),
@@ -223,7 +223,7 @@ def _thrust_axis(roll: ca.SX, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
 
 
 def _heading(roll: ca.SX, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
-    """Tilt-yaw heading 2·atan2(z, w) of Euler angles."""
+    """Heading of the tilt-yaw decomposition, 2·atan2(z, w), from Euler angles, rad."""
     level, tilted = (f(0.5 * roll) * f(0.5 * pitch) for f in (ca.cos, ca.sin))
     half = 0.5 * yaw
     return 2.0 * ca.atan2(
@@ -238,13 +238,13 @@ def _euler_near_heading(north: float, east: float, heading: float) -> tuple[floa
 
 
 def _body_rates(node: Node) -> tuple[float, float, float]:
-    """Body rates that keep a vehicle on the reference, rad/s."""
+    """Body rates of a vehicle that follows the reference exactly, rad/s."""
     x, y, z = rates_along(node.north, node.east, node.speed_north, node.speed_east)
     return (*into_body(cos(node.heading), sin(node.heading), x, y), z + node.heading_rate)
 
 
 def _angle_rates(node: Node) -> tuple[float, float]:
-    """φ̇ and θ̇ that keep a vehicle on the reference, rad/s."""
+    """φ̇ and θ̇ of a vehicle that follows the reference exactly, rad/s."""
     roll, pitch, _ = _euler_near_heading(node.north, node.east, node.heading)
     roll_rate, pitch_rate, _ = _euler_rates(roll, pitch, *_body_rates(node))
     return roll_rate, pitch_rate

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from companion.study.drawing import draw, new_figure
 from companion.study.methods import REFERENCE
 from companion.study.nmpc.findings import find
-from companion.study.nmpc.flights import SECONDS, Flights, fly_all
+from companion.study.nmpc.flights import FLIGHT_S, Flights, fly_all
 from companion.study.nmpc.timing import (
     STATES,
     ColdStarts,
@@ -27,7 +27,7 @@ from companion.study.nmpc.variants import (
 )
 from companion.study.outcome import Cell, Outcome, Table, Tick
 
-PARTS = SECONDS + 2
+PARTS = FLIGHT_S + 2
 
 _CAPTION = (
     "All models know the dead time; one iteration per solve. The standing start into the circle"
@@ -37,7 +37,7 @@ _CAPTION = (
 
 
 def run(tick: Tick) -> Outcome:
-    """Count iterations from a cold start, time the solver process, and fly all models.
+    """Count the iterations of cold starts, time the solver process, and fly all models.
 
     Raises:
         ChildProcessError: the solver process does not start.
@@ -72,7 +72,7 @@ def run(tick: Tick) -> Outcome:
 
 
 def _time_table(flown: Flights) -> Table:
-    """Solve times of every model, with one iteration and with all."""
+    """Solve times of every model, with one iteration and with iterations to the tolerance."""
     rows: list[tuple[Cell, ...]] = []
     for model in MODELS:
         single = flown[EIGHT.name, Variant(model)]
@@ -160,7 +160,7 @@ def _process_table(times: ProcessTimes) -> Table:
 
 
 def _flights_table(flown: Flights) -> Table:
-    """Table of every period of every flight."""
+    """Error and solve time in every period of every flight."""
     return Table(
         "nmpc-flights",
         "All flights.",
@@ -185,7 +185,7 @@ def _flights_table(flown: Flights) -> Table:
             )
             for (task, variant), flight in flown.items()
             for period, (error, seconds) in enumerate(
-                zip(flight.errors, flight.seconds, strict=True)
+                zip(flight.errors, flight.solve_s, strict=True)
             )
         ),
     )
@@ -234,7 +234,7 @@ def _draw_errors(axes: Axes, flown: Flights, task: Task, title: str) -> None:
 def _draw_times(axes: Axes, flown: Flights) -> None:
     for model in MODELS:
         for iterations, width in ((1, 1.0), (MAX_ITERATIONS, 2.5)):
-            times = np.sort(flown[EIGHT.name, Variant(model, iterations)].seconds)
+            times = np.sort(flown[EIGHT.name, Variant(model, iterations)].solve_s)
             share = (np.arange(len(times)) + 1) / len(times)
             axes.plot(1e3 * times, share, **{**STYLES[model].line, "linewidth": width})
     axes.set(

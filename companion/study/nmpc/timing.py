@@ -1,4 +1,4 @@
-"""Cost of a solve outside flights: iterations from a cold start, and times of the process."""
+"""Cost of a solve outside flights: iterations of cold starts, and times of the solver process."""
 
 from math import inf
 from time import monotonic, sleep
@@ -16,17 +16,17 @@ from companion.study.nmpc.variants import CIRCLE, DRAG, EIGHT, MODELS, RATE_HZ, 
 from companion.study.step import Floats
 
 _COLD_ITERATIONS = 60
-"""SQP iterations after which a cold start counts as not converged."""
+"""Number of SQP iterations after which a cold start counts as not converged."""
 _REQUESTS = 150
 """Number of requests with which the solver process is timed."""
 _START_TIMEOUT = 30.0  # s
 
 
 class State(NamedTuple):
-    """A state of the vehicle while it should be on the circle at 5 m/s.
+    """A state of the vehicle from which it should fly the circle at 5 m/s.
 
     Attributes:
-        offset: position relative to its place on the circle, m, NED.
+        offset: position relative to the reference position on the circle, m, NED.
         velocity: m/s, NED.
         coefficients: acceleration coefficients (north, east) of its attitude.
         body_rates: rad/s.
@@ -54,11 +54,11 @@ STATES = {
 }
 
 ColdStarts = dict[ModelName, dict[str, float]]
-"""SQP iterations to the tolerance, by model and state; inf if it is not reached."""
+"""Number of SQP iterations to the tolerance, by model and state; inf: not reached."""
 
 
 def count_iterations() -> ColdStarts:
-    """Solve from every state with every model, with the circle as the first guess."""
+    """Count the iterations of every model from every state; the first guess is the circle."""
     counts: ColdStarts = {}
     for model in MODELS:
         solver = Variant(model, _COLD_ITERATIONS).solver(CIRCLE.trajectory)
@@ -89,7 +89,7 @@ class ProcessTimes(NamedTuple):
 
     Attributes:
         answer_ms: (n,), time from before a request is packed until its answer is unpacked, ms.
-        computing_ms: (n,), time in `Worker.answer`: prediction, reference and solve, ms.
+        computing_ms: (n,), part of it in `Worker.answer`: prediction, reference and solve, ms.
         troubles: number of answers that were late, failed or implausible.
     """
 

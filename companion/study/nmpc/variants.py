@@ -23,7 +23,7 @@ _MIN_THRUST, _MAX_THRUST = 3.0, 18.0
 RATE_HZ = 50.0
 """Rate of solves, Hz."""
 MAX_ITERATIONS = 20
-"""Largest number of SQP iterations of a solve to the tolerance."""
+"""Largest number of SQP iterations of a solve that iterates to the tolerance."""
 
 STYLES: dict[ModelName, Method] = {
     "quaternion": Method("", "quaternion (39)", "#E69F00", width=3.0),
@@ -39,12 +39,12 @@ UNLIMITED = tuple(model for model in MODELS if model != "limited")
 
 
 class Variant(NamedTuple):
-    """A model and how it is solved.
+    """A prediction model and how it is solved.
 
     Attributes:
         model: name of the model.
         iterations: largest number of SQP iterations; 1 is the real-time iteration.
-        knows_dead_time: whether the motion is predicted to the end of the dead time.
+        knows_dead_time: whether the dead time is compensated by predicting the motion to its end.
     """
 
     model: ModelName
@@ -53,7 +53,7 @@ class Variant(NamedTuple):
 
     @property
     def settings(self) -> Settings:
-        """Solver settings with the true values of the vehicle; an unknown dead time is 0."""
+        """Solver settings with the true values of the vehicle; the dead time is 0 if not known."""
         return Settings(
             gain=GAIN,
             yaw_gain=YAW_GAIN,
@@ -93,6 +93,6 @@ class Task(NamedTuple):
 
 
 CIRCLE = Task("circle", circle(5.0, Laps(5.0, laps=4.0)), 5.0)
-"""A standing start: the vehicle is at rest where the trajectory has a speed of 5 m/s."""
+"""A circle that the vehicle begins at rest, where the trajectory already has 5 m/s."""
 EIGHT = Task("eight", gerono_eight(3.0, Laps(5.0, laps=3.0)), 0.0)
 """A figure-eight that begins at rest, like the vehicle."""

@@ -22,12 +22,12 @@ from companion.study.measures import (
     deviation,
     heading_effect,
     largest_deviation,
-    time_to,
+    settling_time,
 )
 from companion.study.methods import (
     EULER,
     EXACT,
-    PAPERS,
+    PAPER_METHODS,
     PROPOSED,
     QUATERNION,
     SO3,
@@ -38,18 +38,18 @@ from companion.study.outcome import Cell, Finding, Outcome, Table, Tick
 from companion.study.step import FIGURE_2, Floats, Response, fly
 
 _SAME_WITHIN = 1e-9
-"""Paths at two headings that differ by less count as the same."""
-_METHODS = (*PAPERS, EXACT)
+"""Coefficients at two headings count as the same if they differ by less."""
+_METHODS = (*PAPER_METHODS, EXACT)
 PARTS = len(_METHODS) + 1
 
 
 def _printed_quaternion_law(
     q: Quaternion, target: Target, dt: float, constants: Constants
 ) -> tuple[float, float, float]:
-    """ω = 2p·vec(q_d ⊗ q⁻¹), the quaternion method with the error as printed in section 4.2.
+    """ω = 2p·vec(q_d ⊗ q⁻¹), the quaternion method with the attitude error of section 4.2.
 
-    vec(q_d ⊗ q⁻¹) = q ⊗ vec(q⁻¹ ⊗ q_d) ⊗ q⁻¹ is the body-frame error rotated to the world frame.
-    Using it as body rates shows the effect of this misprint.
+    vec(q_d ⊗ q⁻¹) = q ⊗ vec(q⁻¹ ⊗ q_d) ⊗ q⁻¹ is the error in the world frame, a misprint for the
+    error in the body frame. Its use as body rates shows the effect of the misprint.
     """
     w, x, y, z = q
     i, j, k = body_error.quaternion(q, target, dt, constants)
@@ -112,7 +112,7 @@ def run(tick: Tick) -> Outcome:
 
 def _rows(label: str, response: Response, reference: Floats) -> list[tuple[Cell, ...]]:
     away, across = largest_deviation(response, reference), cross_track(response)
-    arrived, effect = time_to(response), heading_effect(response)
+    arrived, effect = settling_time(response), heading_effect(response)
     if effect < _SAME_WITHIN:
         return [(label, float(away.max()), float(across.max()), float(arrived[0]), effect)]
     rows: list[tuple[Cell, ...]] = []
@@ -127,19 +127,19 @@ def _rows(label: str, response: Response, reference: Floats) -> list[tuple[Cell,
 def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
     time = FIGURE_2.time
     _, worst = best_and_worst(largest_deviation(responses[EULER], reference))
-    shown_heading = {method: worst if method is EULER else 0 for method in PAPERS}
+    shown_heading = {method: worst if method is EULER else 0 for method in PAPER_METHODS}
     curves = [
         (
             method,
             f"{method.label} (worst heading)" if method is EULER else method.label,
             responses[method].at(shown_heading[method]),
         )
-        for method in PAPERS
+        for method in PAPER_METHODS
     ]
     figure, ((north, east), (away, plane)) = new_figure(2, 2)
     draw_response(north, east, time, curves)
     draw_reference(north, east, time, reference)
-    for method in PAPERS:
+    for method in PAPER_METHODS:
         error = deviation(responses[method], reference)[:, shown_heading[method]]
         draw(away, time, error, method.line)
     away.set(

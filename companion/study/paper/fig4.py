@@ -16,7 +16,12 @@ from companion.study.drawing import (
     label_tilt_rate,
     new_figure,
 )
-from companion.study.measures import cross_track, largest_deviation, largest_tilt_rate, time_to
+from companion.study.measures import (
+    cross_track,
+    largest_deviation,
+    largest_tilt_rate,
+    settling_time,
+)
 from companion.study.methods import (
     EULER,
     LIMIT,
@@ -83,7 +88,7 @@ def _row(method: Method, response: Response, reference: Floats) -> tuple[Cell, .
     return (
         method.label,
         largest_tilt_rate(response),
-        float(time_to(response).max()),
+        float(settling_time(response).max()),
         float(cross_track(response).max()),
         float(largest_deviation(response, reference).max()),
     )
@@ -91,7 +96,7 @@ def _row(method: Method, response: Response, reference: Floats) -> tuple[Cell, .
 
 def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
     time = FIGURE_4.time
-    slowest = int(time_to(responses[EULER]).argmax())
+    slowest = int(settling_time(responses[EULER]).argmax())
     shown_heading = {method: slowest if method is EULER else 0 for method in _METHODS}
     curves = [
         (method, method.label, responses[method].at(shown_heading[method])) for method in _METHODS
@@ -113,10 +118,10 @@ def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
 
 def _findings(responses: dict[Method, Response], reference: Floats) -> tuple[Finding, ...]:
     rate = {method: largest_tilt_rate(responses[method]) for method in _METHODS}
-    arrived = {method: float(time_to(responses[method]).max()) for method in _METHODS}
+    arrived = {method: float(settling_time(responses[method]).max()) for method in _METHODS}
     across = {method: float(cross_track(responses[method]).max()) for method in _METHODS}
     away = float(largest_deviation(responses[PAPER_LIMIT], reference).max())
-    euler = time_to(responses[EULER])
+    euler = settling_time(responses[EULER])
     return (
         Finding(
             "paper",

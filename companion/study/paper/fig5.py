@@ -12,11 +12,11 @@ from companion.study.measures import (
     deviation,
     heading_effect,
     largest_deviation,
-    time_to,
+    settling_time,
 )
 from companion.study.methods import (
     EULER,
-    PAPERS,
+    PAPER_METHODS,
     PROPOSED,
     QUATERNION,
     REFERENCE,
@@ -38,7 +38,8 @@ from companion.study.step import FIGURE_2
 __all__ = ["PARTS", "run"]
 
 _SECOND_ORDER_SHARE = 0.02
-"""Largest deviation from second order, as a share of the step, that counts as second order."""
+"""A response counts as second order if it deviates from the fit by at most this share of the step.
+"""
 _SECOND_ORDER_LINE = {**REFERENCE, "color": "#666666", "linestyle": (0, (4, 1.5, 1, 1.5))}
 
 
@@ -91,7 +92,7 @@ def _table(quick: LoopFlights, measured: LoopFlights) -> Table:
                 1e3 * loop.time_63,
                 float(largest_deviation(loop.responses[method], reference).max()),
                 loop.cross_track(method),
-                float(time_to(loop.responses[method]).max()),
+                float(settling_time(loop.responses[method]).max()),
                 *loop.fits[method].cells,
                 loop.from_second_order(method),
                 heading_effect(loop.responses[method]),
@@ -106,9 +107,9 @@ def _sweep_table(sweep: Sweep) -> Table:
     return Table(
         "fig5-quickness",
         "Cross-track by the speed of the inner loop, heading 0.",
-        ("63 % of a rate step, ms", *(method.label for method in PAPERS)),
+        ("63 % of a rate step, ms", *(method.label for method in PAPER_METHODS)),
         tuple(
-            (1e3 * time_63, *(across[method] for method in PAPERS))
+            (1e3 * time_63, *(across[method] for method in PAPER_METHODS))
             for time_63, across in sweep.items()
         ),
     )
@@ -120,8 +121,8 @@ def _figure(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> Figure:
     _draw_loop((axes[2, 0], axes[2, 1], axes[3, 0]), measured)
     away, across = axes[1, 1], axes[3, 1]
     step = quick.responses[PROPOSED].step
-    for method in PAPERS:
-        error = deviation(quick.responses[method], step.reference())[:, quick.worst(method)]
+    for method in PAPER_METHODS:
+        error = deviation(quick.responses[method], step.reference())[:, quick.worst_heading(method)]
         draw(away, step.time, error, method.line)
         times = 1e3 * np.array(list(sweep))
         values = [tracks[method] for tracks in sweep.values()]
@@ -145,10 +146,11 @@ def _figure(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> Figure:
 
 
 def _draw_loop(panels: tuple[Axes, Axes, Axes], loop: LoopFlights) -> None:
-    """Response and path of every method with one inner loop, each at its worst heading."""
+    """Draw response and path of every method with one inner loop, each at its worst heading."""
     north, east, plane = panels
     curves = [
-        (method, method.label, loop.responses[method].at(loop.worst(method))) for method in PAPERS
+        (method, method.label, loop.responses[method].at(loop.worst_heading(method)))
+        for method in PAPER_METHODS
     ]
     step, second = loop.responses[PROPOSED].step, loop.fitted_path(PROPOSED)
     draw_response(north, east, step.time, curves)
@@ -163,7 +165,7 @@ def _draw_loop(panels: tuple[Axes, Axes, Axes], loop: LoopFlights) -> None:
 
 def _findings(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> tuple[Finding, ...]:
     """Findings on straightness, on the order of the response, and on the effect of heading."""
-    others = [method for method in PAPERS if method is not PROPOSED]
+    others = [method for method in PAPER_METHODS if method is not PROPOSED]
     straightest_at = [
         t for t, across in sweep.items() if across[PROPOSED] < min(across[m] for m in others)
     ]
@@ -188,7 +190,9 @@ def _findings(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> tuple[
             "Heading does not change the response with a complete inner loop either.",
             max(heading_effect(measured.responses[m]) for m in (PROPOSED, QUATERNION, SO3)) < 1e-3,
             "Largest difference of the paths between any two headings, measured inner loop: "
-            + ", ".join(f"{m.label} {heading_effect(measured.responses[m]):.2g}" for m in PAPERS)
+            + ", ".join(
+                f"{m.label} {heading_effect(measured.responses[m]):.2g}" for m in PAPER_METHODS
+            )
             + " (required: 0.001).",
         ),
         _second_order("paper", "quick", quick),

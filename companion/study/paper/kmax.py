@@ -1,6 +1,7 @@
-"""Appendix A: the body rate needed per rate of the coefficients, by tilt and direction."""
+"""Appendix A: body rate needed for a rate of the coefficients, by tilt and direction."""
 
 from math import cos, degrees, pi, radians, sin
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -20,12 +21,27 @@ _LARGEST_TILT_SHOWN = radians(60.0)
 _DIRECTIONS = 72
 PARTS = 2
 
-_Row = tuple[int, float, float, float, float]
-"""Tilt in degrees, largest K, bound of K, smallest K, mean body rate / largest body rate."""
+
+class _Row(NamedTuple):
+    """K at one tilt, over all directions.
+
+    Attributes:
+        tilt_deg: tilt, °.
+        largest: largest K.
+        bound: bound of K by the formula of the paper.
+        smallest: smallest K.
+        rate_share: mean body rate / largest body rate.
+    """
+
+    tilt_deg: int
+    largest: float
+    bound: float
+    smallest: float
+    rate_share: float
 
 
 def scaling_factor(c: Coefficients, direction: float) -> float:
-    """K = (ω_x² + ω_y²)/|ċ|² when the coefficients c move towards `direction` (rad from north)."""
+    """K = (ω_x² + ω_y²)/|ċ|² where the coefficients c move in `direction`, rad from north."""
     roll, pitch, _ = rates_along(c.north, c.east, cos(direction), sin(direction))
     return roll * roll + pitch * pitch
 
@@ -45,7 +61,7 @@ def run(tick: Tick) -> Outcome:
     }
     tick("disc")
     rows: tuple[_Row, ...] = tuple(
-        (
+        _Row(
             round(degrees(tilt)),
             float(k.max()),
             bound(tilt),
@@ -86,7 +102,7 @@ def run(tick: Tick) -> Outcome:
 
 def _findings(rows: tuple[_Row, ...], by_tilt: dict[float, Floats]) -> tuple[Finding, ...]:
     computed = {angle: float(by_tilt[radians(float(angle))].max()) for angle in PRINTED}
-    share = {row[0]: row[4] for row in rows}
+    share = {row.tilt_deg: row.rate_share for row in rows}
     return (
         Finding(
             "paper",

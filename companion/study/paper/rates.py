@@ -1,4 +1,4 @@
-"""Discretisation error of the paper's planner by sample rate; the planner `exact` has none."""
+"""Discretisation error of the planner `first-order` by sample rate; `exact` has none."""
 
 from dataclasses import replace
 
@@ -122,5 +122,5 @@ def _figure(
 
 
 def _from_line(c: Floats) -> Floats:
-    """(n,) distance of (n, 2) coefficients from the line of the step, in thousandths."""
+    """(n,) distance of (n, 2) coefficients from the straight line of the step, in thousandths."""
     return np.asarray(1e3 * (c[:, 1] - FIGURE_2.target.east))

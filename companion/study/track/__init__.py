@@ -1,1 +1,1 @@
-"""Position error on trajectories: every planner, several speeds, with and without lead, in wind."""
+"""The study `track`: position error on trajectories, by planner, speed, lead and wind."""

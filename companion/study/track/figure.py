@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from companion.attitude.planner import MODEL_FOLLOWING
 from companion.study.drawing import draw, new_figure
-from companion.study.methods import EXACT, FOLLOWING, PAPERS, PROPOSED, REFERENCE, Line
+from companion.study.methods import EXACT, FOLLOWING, PAPER_METHODS, PROPOSED, REFERENCE, Line
 from companion.study.track.flights import Flown
 from companion.study.track.tasks import (
     CALM,
@@ -29,7 +29,7 @@ CAPTION = (
     " (not led), in still air (solid) and in wind (dotted)."
 )
 
-_METHODS = (*PAPERS, EXACT, FOLLOWING)
+_METHODS = (*PAPER_METHODS, EXACT, FOLLOWING)
 _NOT_LED_COLOUR = "#D55E00"
 _STILL_AIR: Line = {"linestyle": "-", "marker": "o", "markersize": 4.0, "linewidth": 1.6}
 _IN_WIND: Line = {"linestyle": ":", "marker": "s", "markersize": 4.0, "linewidth": 1.6}
@@ -67,7 +67,7 @@ def _draw_paths(axes: Axes, flown: Flown, course: Course) -> None:
 
 
 def _draw_planners(axes: Axes, errors: dict[Task, float], courses: Sequence[Course]) -> None:
-    """Draw the error (mm) of every planner with every guidance over speed, in still air."""
+    """Draw the error over speed in still air, mm, for every planner and every guidance."""
     for (guidance, marker), method in product(zip(GUIDANCES, _MARKERS, strict=False), _METHODS):
         if method.planner not in planners(guidance):
             continue
@@ -78,7 +78,7 @@ def _draw_planners(axes: Axes, errors: dict[Task, float], courses: Sequence[Cour
 
 
 def _draw_lead_and_wind(axes: Axes, errors: dict[Task, float], courses: Sequence[Course]) -> None:
-    """Draw the error (mm) over speed, with and without lead, in still air and in wind."""
+    """Draw the error over speed, mm, with and without lead, in still air and in wind."""
     for wind, style in ((CALM, _STILL_AIR), (WINDY, _IN_WIND)):
         wind_label = f", wind of {wind:g} m/s" if wind else ""
         for lead, colour in ((True, FOLLOWING.colour), (False, _NOT_LED_COLOUR)):

@@ -1,4 +1,4 @@
-"""The findings of the study `track`: statements, and whether its numbers support them."""
+"""The findings of the study `track`: statements, and whether the flights support them."""
 
 from collections.abc import Callable
 from math import isfinite
@@ -6,7 +6,7 @@ from math import isfinite
 from companion.attitude import PLANNER_NAMES
 from companion.attitude.planner import FIRST_ORDER, MODEL_FOLLOWING
 from companion.study.outcome import Finding
-from companion.study.track.flights import Flown, Tracked
+from companion.study.track.flights import Flown, TrackedFlight
 from companion.study.track.tasks import (
     CALM,
     CIRCLE_AT_5,
@@ -18,19 +18,20 @@ from companion.study.track.tasks import (
     Task,
 )
 
-_EQUAL = 2e-4
-"""Errors that differ by less count as equal, m; another seed of the noise changes them as much."""
+_EQUAL_WITHIN_M = 2e-4
+"""Errors that differ by at most this count as equal, m: another noise seed changes them as much."""
 _OTHERS = tuple(planner for planner in PLANNER_NAMES if planner != MODEL_FOLLOWING)
 _REQUIRED_RATIO = 3.0
-"""Required ratio of the error without lead to the error with lead."""
+"""Smallest allowed ratio of the error without lead to the error with lead."""
 _REQUIRED = {
     Task(CIRCLE_AT_5, MODEL_FOLLOWING): 0.08,
     Task(EIGHT_AT_5, MODEL_FOLLOWING): 0.06,
     Task(EIGHT_AT_5, MODEL_FOLLOWING, wind=WINDY): 0.12,
 }
-"""Largest error allowed, m."""
+"""Largest allowed error of each task, m."""
 
-Error = Callable[[Tracked], float]
+Error = Callable[[TrackedFlight], float]
+"""Selects an error of a flight, m."""
 
 
 def find(flown: Flown) -> tuple[Finding, ...]:
@@ -53,8 +54,8 @@ def find(flown: Flown) -> tuple[Finding, ...]:
     )
 
 
-def _by_telemetry(tracked: Tracked) -> float:
-    """Position error by telemetry, rms, m."""
+def _by_telemetry(tracked: TrackedFlight) -> float:
+    """RMS error of the position that guidance received, m."""
     return tracked.telemetry.rms
 
 
@@ -65,8 +66,8 @@ def _smallest(flown: Flown, statement: str, error: Error) -> Finding:
     ours = {course: error_of(course, MODEL_FOLLOWING) for course in COURSES}
     best = {course: min(_OTHERS, key=lambda other: error_of(course, other)) for course in COURSES}
     difference = {course: ours[course] - error_of(course, best[course]) for course in COURSES}
-    larger_on = [course for course in COURSES if not difference[course] <= _EQUAL]
-    smaller_on = [course for course in COURSES if difference[course] < -_EQUAL]
+    larger_on = [course for course in COURSES if not difference[course] <= _EQUAL_WITHIN_M]
+    smaller_on = [course for course in COURSES if difference[course] < -_EQUAL_WITHIN_M]
     comparisons = "; ".join(
         f"{course}: {_in_mm(ours[course])}, {best[course]} {_in_mm(error_of(course, best[course]))}"
         for course in larger_on
@@ -75,9 +76,9 @@ def _smallest(flown: Flown, statement: str, error: Error) -> Finding:
         "ours",
         statement,
         not larger_on,
-        f"Its error is the smallest by more than {1e3 * _EQUAL:g} mm on {len(smaller_on)} of"
-        f" {len(COURSES)} courses; on {len(larger_on)} another planner is better by more than that"
-        f"{': ' if larger_on else ''}{comparisons}.",
+        f"Its error is the smallest by more than {1e3 * _EQUAL_WITHIN_M:g} mm on {len(smaller_on)}"
+        f" of {len(COURSES)} courses; on {len(larger_on)} another planner is better by more than"
+        f" that{': ' if larger_on else ''}{comparisons}.",
     )
 
 

@@ -1,4 +1,4 @@
-"""The flights: the mock vehicle follows one course, in lockstep over a socket."""
+"""The flights of the study `track`: the mock vehicle follows a course, in lockstep by socket."""
 
 import asyncio
 import json
@@ -31,10 +31,10 @@ from companion.study.workers import cores, interrupts_blocked
 POSITION_RATE_HZ = 30.0
 MAX_TILT_DEG, MAX_TILT_RATE_DEG_S, MAX_THRUST = 58.0, 250.0, 0.98
 """Limits of the flights: on the circle at 7 m/s, drag makes 51° of tilt necessary, wind more."""
-GUSTS = 1.0 / 3.0
+GUST_SHARE = 1.0 / 3.0
 """Standard deviation of the gusts north and east, as a share of the mean wind."""
 HOLD_S = 2.0
-"""Duration of the hover before the course, s, so that the takeover is not measured."""
+"""Duration of the hover before the course, s; it keeps the takeover out of the measured part."""
 _HEIGHT_M = 3.0
 _SHORT_PHASES = {
     "prearm_delay_s": 0.2,
@@ -48,9 +48,9 @@ _SHORT_PHASES = {
 }
 """Vehicle settings that shorten take-off and landing."""
 _TRUTH_PERIOD = 0.02
-"""Time between two requests of the true position, s of vehicle time."""
+"""Time between two requests for the true position, s of vehicle time."""
 _TRUTH_TIMEOUT = 1.0
-"""Time allowed for an answer, s of wall time; it takes about 0.1 ms."""
+"""Time allowed for the answer to such a request, s of wall time; it takes about 0.1 ms."""
 _MEASURED_PHASE = "maneuvers"
 
 
@@ -61,13 +61,13 @@ class PositionError(NamedTuple):
     largest: float
 
 
-class Tracked(NamedTuple):
+class TrackedFlight(NamedTuple):
     """The result of a flight; the errors of a failed flight are infinite.
 
     Attributes:
         result: "ok", or why the flight ended.
-        telemetry: error of the position that guidance received.
-        truth: error of the vehicle's true position.
+        telemetry: distance of the position that guidance received from the reference.
+        truth: distance of the vehicle's true position from the reference.
         path: (n, 4), reference north and east, true north and east, m.
     """
 
@@ -82,21 +82,21 @@ class Tracked(NamedTuple):
         return self.result == "ok"
 
 
-Flown = dict[Task, Tracked]
+Flown = dict[Task, TrackedFlight]
 
 
 def fly_all(tasks: Sequence[Task], tick: Tick) -> Flown:
-    """Fly every task, one flight per core at a time; `tick` is called when each begins.
+    """Fly every task, with as many flights at a time as cores; call `tick` as each begins.
 
     The result of a flight does not depend on other flights. On Ctrl-C this function waits for the
     flights in progress, so that no vehicle process is left behind.
 
     Raises:
-        ConfigError, LinkError, VehicleStoppedError: a flight raised it (see `fly`); no more are
-            started.
+        ConfigError, LinkError, VehicleStoppedError: raised by a flight, see `fly`; no further
+            flights are begun.
     """
     count = cores()
-    flown: dict[Task, Future[Tracked]] = {}
+    flown: dict[Task, Future[TrackedFlight]] = {}
     workers = min(count, len(tasks))
     with ProcessPoolExecutor(workers, get_context("spawn"), end_with_parent) as pool:
         for task in tasks:
@@ -107,7 +107,7 @@ def fly_all(tasks: Sequence[Task], tick: Tick) -> Flown:
         return {task: future.result() for task, future in flown.items()}
 
 
-def _await_a_free_core(flights: Sequence[Future[Tracked]], count: int) -> None:
+def _await_a_free_core(flights: Sequence[Future[TrackedFlight]], count: int) -> None:
     unfinished = [flight for flight in flights if not flight.done()]
     if len(unfinished) >= count:
         wait(unfinished, return_when=FIRST_COMPLETED)
@@ -116,7 +116,7 @@ def _await_a_free_core(flights: Sequence[Future[Tracked]], count: int) -> None:
             flight.result()  # raises the flight's exception before more flights are started
 
 
-def fly(task: Task) -> Tracked:
+def fly(task: Task) -> TrackedFlight:
     """Start the mock vehicle, fly the task with it, and measure the errors.
 
     Raises:
@@ -132,7 +132,7 @@ def fly(task: Task) -> Tracked:
         vehicle.write_text(
             bounded_yaml.dump({"mock": _vehicle_settings(shipped, task, truth_port)})
         )
-        course.write_text(bounded_yaml.dump(task.course.file))
+        course.write_text(bounded_yaml.dump(task.course.file_content))
         config = _task_config(shipped, task, course, wire.endpoint)
         truth = TruthRecorder(truth_port)
         session = Session(config, folder, truth, decline_landing)
@@ -140,13 +140,13 @@ def fly(task: Task) -> Tracked:
             summary = lockstep.run(session.fly())
     if summary.result != "ok":
         failed = PositionError(inf, inf)
-        return Tracked(summary.result, failed, failed, np.empty((0, 4)))
+        return TrackedFlight(summary.result, failed, failed, np.empty((0, 4)))
     return _measure(summary.trace.tracking_rows(), truth.rows())
 
 
 def _vehicle_settings(shipped: Config, task: Task, truth_port: int) -> dict[str, Any]:
     """Settings of the shipped mock vehicle, with the wind of the task."""
-    wind = {"speed_m_s": task.wind, "gust_m_s": GUSTS * task.wind}
+    wind = {"speed_m_s": task.wind, "gust_m_s": GUST_SHARE * task.wind}
     return {**(shipped.mock or {}), **_SHORT_PHASES, "control_port": truth_port, "wind": wind}
 
 
@@ -179,8 +179,8 @@ def _task_config(shipped: Config, task: Task, course: Path, endpoint: str) -> Co
 class TruthRecorder(SilentObserver):
     """Requests the true position from the vehicle's control channel during the measured phase.
 
-    In lockstep, vehicle time stops until `companion` answers. So a request may block the event
-    loop, and its answer belongs to the present vehicle time.
+    In lockstep, vehicle time stops until `companion` answers. A request may therefore block the
+    event loop, and its answer belongs to the present vehicle time.
 
     Args:
         port: port of the control channel on this computer.
@@ -192,7 +192,7 @@ class TruthRecorder(SilentObserver):
         self._request_task: asyncio.Task[None] | None = None
 
     def phase(self, name: str, waits_for: str) -> None:
-        """Start requests with the measured phase, and stop them with the next phase."""
+        """Start the requests when the measured phase begins, and stop them when the next begins."""
         if name == _MEASURED_PHASE:
             self._request_task = asyncio.create_task(self._request_truth())
         elif self._request_task is not None:
@@ -214,7 +214,7 @@ class TruthRecorder(SilentObserver):
                 await asyncio.sleep(_TRUTH_PERIOD)
 
 
-def _measure(tracking: Floats, truth: Floats) -> Tracked:
+def _measure(tracking: Floats, truth: Floats) -> TrackedFlight:
     """Measure the errors on the course: from the end of the hover to the last true position.
 
     Args:
@@ -226,7 +226,7 @@ def _measure(tracking: Floats, truth: Floats) -> Tracked:
     reference, telemetry = flown[:, 1:4], flown[:, 4:7]
     true = np.column_stack([np.interp(flown[:, 0], time, axis) for axis in truth[:, 1:].T])
     path = np.hstack([reference[:, :2], true[:, :2]])
-    return Tracked("ok", _error(telemetry - reference), _error(true - reference), path)
+    return TrackedFlight("ok", _error(telemetry - reference), _error(true - reference), path)
 
 
 def _error(offsets: Floats) -> PositionError:

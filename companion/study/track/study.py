@@ -9,7 +9,7 @@ from companion.study.outcome import Cell, Outcome, Table, Tick
 from companion.study.track.figure import CAPTION, draw_figure
 from companion.study.track.findings import find
 from companion.study.track.flights import (
-    GUSTS,
+    GUST_SHARE,
     MAX_TILT_DEG,
     MAX_TILT_RATE_DEG_S,
     POSITION_RATE_HZ,
@@ -54,11 +54,11 @@ def run(tick: Tick) -> Outcome:
             f" position arrives at {POSITION_RATE_HZ:g} Hz, 10 ms old, with 1 cm of noise. The"
             " companion uses configs/mock-px4.yaml, with limits of"
             f" {MAX_TILT_DEG:g}° and {MAX_TILT_RATE_DEG_S:g} °/s. The wind is {WINDY:g} m/s from"
-            f" north, with gusts of {GUSTS * WINDY:g} m/s (standard deviation, north and east). All"
-            " flights have the same seed, so the same noise and the same gusts; with another seed"
-            " the differences between planners change by at most 0.2 mm. The error by telemetry is"
-            " that of the position that guidance receives. The true position is 10 ms of flight"
-            " ahead of it, so a planner that lags by 10 ms has a smaller true error."
+            f" north, with gusts of {GUST_SHARE * WINDY:g} m/s (standard deviation, north and"
+            " east). All flights have the same seed, so the same noise and the same gusts; with"
+            " another seed the differences between planners change by at most 0.2 mm. The error by"
+            " telemetry is that of the position that guidance receives. The true position is 10 ms"
+            " of flight ahead of it, so a planner that lags by 10 ms has a smaller true error."
         ),
         figure=draw_figure(flown),
         caption=CAPTION,
@@ -100,7 +100,7 @@ def _rows(flown: Flown) -> tuple[dict[str, Any], ...]:
 
 
 def _tables(flown: Flown) -> tuple[Table, ...]:
-    """Tables of all planners in still air, by telemetry and by true position; of lead and wind."""
+    """The tables: all planners in still air, by telemetry and by true position; lead and wind."""
     return (
         _planners_table(
             "track",

@@ -21,7 +21,7 @@ class Course(NamedTuple):
     Attributes:
         trajectory: `CIRCLE` or `EIGHT`.
         speed: steady speed on the circle, largest speed on the figure-eight, m/s.
-        laps: number of laps, enough to hold the speed for a while.
+        laps: number of laps, so many that the vehicle holds the speed for a while.
     """
 
     trajectory: str
@@ -32,8 +32,8 @@ class Course(NamedTuple):
         return f"{self.trajectory}, {self.speed:g} m/s"
 
     @property
-    def file(self) -> dict[str, Any]:
-        """The content of the trajectory file."""
+    def file_content(self) -> dict[str, Any]:
+        """Content of the trajectory file of this course."""
         if self.trajectory == CIRCLE:
             return {"circle": {"radius_m": RADIUS_M, "speed_m_s": self.speed, "laps": self.laps}}
         eight = {"half_width_m": HALF_WIDTH_M, "peak_speed_m_s": self.speed, "laps": self.laps}
@@ -41,7 +41,7 @@ class Course(NamedTuple):
 
 
 class Task(NamedTuple):
-    """One flight.
+    """The conditions of one flight.
 
     Attributes:
         course: the trajectory and its speed.
@@ -76,12 +76,12 @@ COURSES = (*CIRCLES, *EIGHTS)
 
 
 def planners(guidance: str) -> tuple[str, ...]:
-    """The planners flown with this guidance in still air; predictive control has one only."""
+    """The planners that fly with this guidance in still air; predictive control has only one."""
     return PLANNER_NAMES if guidance == LINEAR else (MODEL_FOLLOWING,)
 
 
 def tasks() -> tuple[Task, ...]:
-    """Every planner in still air, two in wind, one without lead, one with predictive control."""
+    """All flights: every planner in still air, two in wind, one without lead, one with nmpc."""
     calm = [
         Task(course, planner, guidance)
         for course in COURSES
