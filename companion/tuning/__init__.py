@@ -1,4 +1,4 @@
-"""Proposes gain, weights and bandwidth for an identified vehicle, with NumPy.
+"""Proposes planner gain, guidance weights and observer bandwidth for an identified vehicle.
 
     >>> from pathlib import Path
     >>> from companion.config.files import changed, load, shipped
@@ -15,7 +15,7 @@ needs `companion.testing`.
 A proposal
     propose        a `Proposal` for a configuration
     Proposal       the values, `changes` for `companion.config.files.changed`, what to expect
-    Aims           the margins to keep
+    Aims           the stability margins to keep, and how much of the rate limit may be used
     Design         the values that are searched
 
 The analysis

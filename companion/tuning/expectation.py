@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from companion.config import Config
 from companion.tuning.feedback import Complex
 from companion.tuning.loop import EXACT, Loop, ModelError, control_loop
-from companion.tuning.margins import Margins, frequencies, margins, smaller
+from companion.tuning.margins import Margins, frequencies, margins, smaller_margins
 
 Floats = NDArray[np.float64]
 
 _SETTLED_SHARE = 0.05
-"""Share of its peak below which the response to a gust has settled."""
+"""The response to a gust has settled when it stays below this share of its peak."""
 _RESPONSE_DURATION = 10.0
 """Duration of the computed response to a gust, s."""
 _RESPONSE_PERIOD = 0.01
@@ -29,19 +29,19 @@ class Disturbances:
     Densities are one-sided amplitude spectral densities.
 
     Attributes:
-        gust: standard deviation of the wind speed, m/s; drag turns it into an acceleration.
+        gust: standard deviation of the gusts, m/s; drag turns them into an acceleration.
         gust_time: correlation time of the gusts, s.
         velocity_error: standard deviation of the slow error of the estimated velocity on a path,
             m/s.
         acceleration_error: standard deviation of the slow error of the predicted acceleration on a
             path, m/s².
         path_time: correlation time of `velocity_error` and `acceleration_error`, s.
-        velocity_density: density of the velocity error in hover, m/s/√Hz.
+        velocity_density: density of the error of the estimated velocity in hover, m/s/√Hz.
         acceleration_density: density of the acceleration that tilt and drag do not explain,
             m/s²/√Hz.
-        position_noise: standard deviation of the noise of a single position, m.
-        velocity_noise: standard deviation of the noise of a single velocity, m/s.
-        source: source of the last four values, for the user.
+        position_noise: standard deviation of the noise of a single position estimate, m.
+        velocity_noise: standard deviation of the noise of a single velocity estimate, m/s.
+        source: source of the two densities and two noises, as text for the user.
     """
 
     gust: float = 0.5
@@ -57,13 +57,13 @@ class Disturbances:
 
 
 class Errors(NamedTuple):
-    """Expected standard deviations, horizontal.
+    """Expected standard deviations of the horizontal position error and of the commanded rate.
 
     Attributes:
         gusts: position error due to gusts, m.
         path: position error on a path at 5 m/s, m.
         noise: position error due to the noise of the estimate, m.
-        rate: commanded roll and pitch rate due to gusts, path and noise, rad/s.
+        rate: commanded roll-pitch rate √(p² + q²) due to gusts, path and noise, rad/s.
     """
 
     gusts: float
@@ -82,11 +82,12 @@ class Expectation:
     """The expected behaviour of a configuration.
 
     Attributes:
-        whole: margins of the whole loop, opened at the commanded body rate.
-        outer: margins opened at the commanded acceleration.
-        errors: tracking error and rate use.
+        whole: margins of the loop opened at the commanded body rate.
+        outer: margins of the loop opened at the commanded acceleration.
+        errors: expected position errors and commanded rate.
         peak: largest position error after a gust that changes the velocity by 1 m/s at once, m.
-        settling: time until this error stays below a twentieth of its peak, s; at most 10 s.
+        settling: time from the gust until its position error stays below 5 % of `peak`, s; at most
+            10 s.
     """
 
     whole: Margins
@@ -97,28 +98,32 @@ class Expectation:
 
     @property
     def margins(self) -> Margins:
-        """The smaller margins of the two ways to open the loop."""
-        return smaller(self.whole, self.outer)
+        """Each margin the smaller of `whole` and `outer`."""
+        return smaller_margins(self.whole, self.outer)
 
 
 def stability(config: Config, error: ModelError = EXACT) -> Margins:
-    """The smaller margins of the two ways to open the loop.
+    """Margins of a configuration: each the smaller of the two of `Expectation.margins`.
+
+    Args:
+        config: the configuration.
+        error: difference between the real rate loop and the configured one.
 
     Raises:
         ConfigError: see `control_loop`.
     """
     s = frequencies()
     loop = control_loop(config, s, error)
-    return smaller(margins(s, loop.whole), margins(s, loop.outer))
+    return smaller_margins(margins(s, loop.whole), margins(s, loop.outer))
 
 
 def expected_errors(loop: Loop, disturbances: Disturbances, period: float) -> Errors:
-    """The expected errors of a loop.
+    """The expected errors of a control loop.
 
     Args:
         loop: loop at `frequencies`.
         disturbances: disturbances of the vehicle.
-        period: time between two positions, s.
+        period: time between two position messages, s.
     """
     omega = loop.s.imag
     by_acceleration, by_velocity = loop.by_acceleration(), loop.by_velocity_error()
@@ -157,12 +162,12 @@ def expected_errors(loop: Loop, disturbances: Disturbances, period: float) -> Er
 
 
 def _slow_density(omega: Floats, deviation: float, time: float) -> Floats:
-    """One-sided power density (n,), per Hz, of first-order noise.
+    """(n,), one-sided power spectral density of low-pass filtered (first-order) noise, per Hz.
 
     Args:
         omega: (n,), frequencies, rad/s.
         deviation: standard deviation of the noise.
-        time: its correlation time, s.
+        time: correlation time of the noise, s.
     """
     density: Floats = 4.0 * deviation**2 * time / (1.0 + (omega * time) ** 2)
     return density
@@ -187,12 +192,18 @@ def expectation(config: Config, disturbances: Disturbances) -> Expectation:
 
 
 def _variance(omega: Floats, response: Complex, density: Floats | float) -> float:
-    """Variance of a response to noise of a one-sided power density, per Hz."""
+    """Variance of the response to noise with a one-sided power spectral density, per Hz.
+
+    Args:
+        omega: (n,), frequencies, rad/s.
+        response: (n,), frequency response to the noise.
+        density: (n,), or a number for white noise.
+    """
     return float(np.trapezoid(np.abs(response) ** 2 * density, omega) / (2.0 * pi))
 
 
 def _after_gust(config: Config) -> tuple[float, float]:
-    """Peak (m) and settling time (s) of the position after the velocity jumps by 1 m/s."""
+    """`Expectation.peak` and `Expectation.settling` of a configuration."""
     offset = 0.1  # 1/s; real part of the frequencies, so that the integrators lie to their left
     omega = np.arange(0.0, 60.0, 0.05)
     s = np.asarray(offset + 1j * omega, dtype=np.complex128)

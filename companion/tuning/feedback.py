@@ -13,14 +13,14 @@ Complex = NDArray[np.complex128]
 
 
 class Feedback(NamedTuple):
-    """Responses of the commanded coefficient to the measurements, with the opposite sign.
+    """Frequency responses of the commanded coefficient to the measurements, with opposite sign.
 
     The command is −(tilt·c + velocity·v + position·x), before it is held for a guidance period.
 
     Attributes:
-        tilt: (n,), per coefficient.
-        velocity: (n,), per m/s.
-        position: (n,), per m.
+        tilt: (n,), per measured coefficient c.
+        velocity: (n,), per measured velocity v, m/s.
+        position: (n,), per measured position x, m.
     """
 
     tilt: Complex
@@ -29,7 +29,7 @@ class Feedback(NamedTuple):
 
 
 def hold_element(s: Complex, period: float) -> Complex:
-    """Response (n,) of a value that is held for `period` seconds, at the frequencies `s`, rad/s."""
+    """(n,), frequency response of a zero-order hold of `period` s at the frequencies `s`, rad/s."""
     held: Complex = (1.0 - np.exp(-s * period)) / (s * period)
     return held
 
@@ -43,15 +43,15 @@ def guidance_feedback(
 ) -> Feedback:
     """The feedback of `LinearGuidance` with the states of `MotionObserver`.
 
-    Both are linear while no limit is reached. A position is used from 0 to one period after it was
-    measured, on average half a period; the prediction covers this time.
+    Both are linear while no limit is reached. A position is used until the next one arrives, so its
+    mean age is half a period. The prediction covers this age.
 
     Args:
         s: (n,), frequencies, rad/s, none of them 0.
         guidance: gains, response of the tilt and period of guidance.
         observer: settings of the motion observer.
         drag: linear drag that the program assumes, 1/s.
-        position_period: time between two positions, s.
+        position_period: time between two position messages, s.
     """
     by_acceleration, by_position, by_velocity = _observer_responses(s, observer, position_period)
     age = 0.5 * position_period
@@ -86,10 +86,11 @@ def guidance_feedback(
 def _observer_responses(
     s: Complex, observer: ObserverSettings, period: float
 ) -> tuple[Complex, Complex, Complex]:
-    """Responses (n, 3) of the observed position, velocity and disturbance.
+    """Frequency responses of the motion observer, as three arrays (n, 3).
 
-    One array for each input: known acceleration, measured position, measured velocity. The observer
-    is x = (I − K·C)·(A·x/z + B·a) + K·y, where a is the mean over the past period.
+    The arrays are for the inputs known acceleration, measured position and measured velocity; the
+    columns for the observed position, velocity and disturbance. The observer is
+    x = (I − K·C)·(A·x/z + B·a) + K·y, where a is the mean acceleration over the past period.
     """
     # The largest trust, in motion, leaves the smallest margins.
     gains, pull = observer.gains(period, trust=1.0), observer.pull(period, trust=1.0)

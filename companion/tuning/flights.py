@@ -18,12 +18,12 @@ _Rows = np.ndarray[Any, np.dtype[np.float64]]
 GUSTS: Mapping[str, float] = {"speed_m_s": 3.0, "gust_m_s": 1.0}
 """Wind of the flights in gusts, m/s: mean and standard deviation."""
 _STRONG_GUST = 2.0
-"""A strong gust, in standard deviations."""
+"""A strong gust is this number of standard deviations of the gusts."""
 _LARGEST_RESERVE = 0.8
-"""Largest reserve for feedback and wind, as a share of what the tilt limit gives."""
+"""Largest reserve for feedback and wind, as a share of the acceleration at the tilt limit."""
 _MAX_THRUST = 0.95
 _FENCE_SIZE = 50.0  # m
-_WIRE_S = 0.0005
+_DATAGRAM_DELAY_S = 0.0005
 """Delay of each datagram between program and mock vehicle, s."""
 _STEPS_PER_TRUTH_ROW = 5
 """Steps of the mock vehicle from one recorded true position to the next."""
@@ -36,7 +36,7 @@ _QUICK_TAKEOFF_AND_LANDING = {
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """A trajectory in some wind.
+    """A trajectory to fly, and the wind.
 
     Attributes:
         name: name for the user.
@@ -58,16 +58,17 @@ COURSES = (CIRCLE, EIGHT, CIRCLE_IN_GUSTS, EIGHT_IN_GUSTS)
 
 @dataclass(frozen=True, slots=True)
 class CourseResult:
-    """Tracking of a course; NaN if the flight failed.
+    """How well a course was tracked; the figures are NaN if the flight failed.
 
     Attributes:
         result: "ok", or why the flight ended early.
-        reported: RMS of the horizontal distance between estimated position and reference, m.
-        true: the same for the true position.
-        estimate: RMS of the distance between true and estimated position, m; no setting reduces it.
-        rate: commanded roll and pitch rate, rad/s, RMS.
+        reported: RMS horizontal distance of the estimated position from the reference, m.
+        true: RMS horizontal distance of the true position from the reference, m.
+        estimate: RMS horizontal distance of the estimated from the true position, m; no setting
+            reduces it.
+        rate: RMS commanded roll-pitch rate, rad/s.
         rate_limited: share of the setpoints at the rate limit.
-        speed: largest speed of the reference, m/s; below the course's if it was slowed down.
+        speed: largest speed of the reference, m/s; lower if the course was slowed down.
     """
 
     result: str
@@ -85,7 +86,10 @@ class CourseResult:
 
 
 def autopilot_like(config: Config) -> str:
-    """The most similar personality of the mock vehicle: ArduPilot if roll has a slew limit."""
+    """The autopilot of the mock vehicle that is most similar: "ardupilot" if roll has a slew limit.
+
+    Otherwise "px4".
+    """
     slews = [axis.acceleration_limit for axis in config.vehicle.axes.values()]
     return "px4" if slews[0] is None else "ardupilot"
 
@@ -93,14 +97,14 @@ def autopilot_like(config: Config) -> str:
 def fly_course(config: Config, course: Course, autopilot: str, seed: int = 3) -> CourseResult:
     """Fly a course on the mock vehicle, with this configuration's gains, lag and dead time.
 
-    The configured limits of tilt and tilt rate apply. A course that would exceed them, with a
-    reserve for feedback and wind, is slowed down. Thrust, take-off height and fence suit the mock
-    vehicle and the course, and no message is signed.
+    The configured limits of tilt and tilt rate apply. The course is slowed down if it would exceed
+    them, with a reserve for feedback and wind. Thrust, take-off height and fence are not the
+    configured ones, but suit the mock vehicle and the course. No message is signed.
 
     Args:
         config: the configuration.
         course: course to fly.
-        autopilot: personality of the mock vehicle: "px4" or "ardupilot".
+        autopilot: autopilot of the mock vehicle, "px4" or "ardupilot".
         seed: seed of the noise and the gusts.
 
     Raises:
@@ -111,7 +115,7 @@ def fly_course(config: Config, course: Course, autopilot: str, seed: int = 3) ->
     vehicle = MockVehicle(
         autopilot,
         lockstep=False,
-        delay_s=_WIRE_S,
+        delay_s=_DATAGRAM_DELAY_S,
         prearm_delay_s=0.2,
         seed=seed,
         wind=dict(course.wind),
@@ -128,10 +132,10 @@ def fly_course(config: Config, course: Course, autopilot: str, seed: int = 3) ->
 def _tracking(
     tracking: _Rows, truth: _Rows, vehicle: MockVehicle, flown_config: Config
 ) -> CourseResult:
-    """How a course was tracked while its reference moved.
+    """The tracking figures of a course, over the time in which its reference moved.
 
     Args:
-        tracking: rows of the flight's tracking record.
+        tracking: rows of `FlightTrace.tracking_rows`.
         truth: rows of `_recorded_truth`.
         vehicle: vehicle after the flight.
         flown_config: configuration of the flight.
@@ -164,7 +168,7 @@ def _rms(offsets: _Rows) -> float:
 
 @contextmanager
 def _recorded_truth(vehicle: MockVehicle) -> Iterator[list[tuple[float, float, float]]]:
-    """Rows of time and true position north and east, filled while the vehicle flies."""
+    """In the context, record rows of vehicle time (s) and true position north and east (m)."""
     rows: list[tuple[float, float, float]] = []
     steps = 0
 
@@ -207,7 +211,7 @@ def _flight_config(config: Config, course: Course, mock: Config) -> Config:
 
 
 def _reserve(config: Config, course: Course, mock: Config) -> float:
-    """Horizontal acceleration to reserve for feedback and against the drag in the wind, m/s²."""
+    """Horizontal acceleration that a course must leave for feedback and wind drag, m/s²."""
     wind_peak = course.wind.get("speed_m_s", 0.0) + _STRONG_GUST * course.wind.get("gust_m_s", 0.0)
     wind_deceleration, _, _ = (mock.guidance.drag or NO_DRAG).deceleration((wind_peak, 0.0, 0.0))
     largest_reserve = _LARGEST_RESERVE * config.limits.largest_horizontal

@@ -1,6 +1,6 @@
 """The whole control loop on one horizontal axis as a linear model, built from the configuration.
 
-It contains planner, rate loop, tilt, motion and guidance near hover, within all limits.
+It contains planner, rate loop, tilt, motion and guidance near hover, while no limit is reached.
 `tests/tuning/test_loop.py` compares it with the program's own code.
 """
 
@@ -25,7 +25,7 @@ from companion.tuning.feedback import Complex, guidance_feedback, hold_element
 POSITION_LATENESS = 0.010
 """Delay of the autopilot's position that its time stamp does not show, s."""
 _USUAL_LAG, _USUAL_DEAD_TIME = 0.07, 0.05
-"""Lag and dead time, s, assumed if none is identified: a heavy vehicle's (`hold_settings`)."""
+"""Lag and dead time of the rate loop, s, if none is identified: a heavy vehicle's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +57,8 @@ class Loop:
             closed.
         rates: coefficient per commanded body rate, s.
         command: coefficient per coefficient that guidance commands, without feedback.
-        velocity: command of guidance per m/s of measured velocity, with the opposite sign.
-        position: command of guidance per m of measured position, with the opposite sign.
+        velocity: commanded coefficient per measured velocity, s/m, with the opposite sign.
+        position: commanded coefficient per measured position, 1/m, with the opposite sign.
         drag: linear drag, 1/s.
     """
 
@@ -88,16 +88,16 @@ class Loop:
         return GRAVITY * tilt / (self.s * (self.s + self.drag)), tilt / self.rates
 
     def _tilt(self, subtracted: Complex) -> Complex:
-        """Closed-loop coefficient if `subtracted` is subtracted from guidance's command."""
+        """Closed-loop coefficient when `subtracted` is subtracted from the command of guidance."""
         return -self.command * subtracted / (1.0 + self.whole)
 
 
 def control_loop(config: Config, s: Complex, error: ModelError = EXACT) -> Loop:
-    """The loop at the frequencies `s`.
+    """The frequency responses of a configuration's control loop.
 
     Args:
         config: gains, weights and the assumed vehicle.
-        s: (n,), rad/s, none of them 0.
+        s: (n,), frequencies, rad/s, none of them 0.
         error: difference between the real rate loop and the configured one.
 
     Raises:
@@ -136,7 +136,7 @@ def control_loop(config: Config, s: Complex, error: ModelError = EXACT) -> Loop:
 
 
 def _slower_axis(config: Config) -> AxisResponse:
-    """The configured response of the slower of roll and pitch; a usual one if there is none."""
+    """The configured response of the slower of roll and pitch; a heavy vehicle's if not known."""
     if not config.vehicle.known:
         return AxisResponse(_USUAL_LAG, _USUAL_DEAD_TIME)
     lag, dead_time = slower_tilt(config)
@@ -144,11 +144,11 @@ def _slower_axis(config: Config) -> AxisResponse:
 
 
 def _planner_response(config: Config, s: Complex) -> tuple[Complex, float]:
-    """Body rate per target coefficient, and, with the opposite sign, per measured coefficient, 1/s.
+    """Body rate per target coefficient (n,) and, with opposite sign, per measured one, 1/s.
 
-    `model-following` sends the rates that compensate the lag of its model of the motion, and feeds
-    back the difference from this model, one dead time later. All other planners feed back p times
-    the error.
+    `model-following` commands the rates that compensate the lag in its reference model, and feeds
+    back the difference from this model, one dead time later. All other planners command p times the
+    error.
     """
     gain = config.planner.gain_per_s
     if config.planner_name != MODEL_FOLLOWING:

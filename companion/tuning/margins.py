@@ -8,7 +8,7 @@ import numpy as np
 from companion.tuning.feedback import Complex
 
 _REAL_PART = 1e-2
-"""Real part of the frequencies, 1/s, so that the integrators of the loop lie to their left."""
+"""Real part of the frequencies s, 1/s; it keeps them right of the loop's integrators at s = 0."""
 _HIGHEST_FREQUENCY = 150.0
 """Highest frequency, rad/s; guidance at 50 Hz has its Nyquist frequency at 157 rad/s."""
 _FREQUENCY_COUNT = 120
@@ -27,14 +27,14 @@ def frequencies() -> Complex:
 
 
 class Margins(NamedTuple):
-    """Margins of one loop.
+    """Stability margins of one loop.
 
     Attributes:
-        gain_db: gain margin, the smaller of rise and fall, dB; infinite if the phase never crosses
-            -180°.
+        gain_db: gain margin, dB: the smaller of the rise and the fall of the gain that the loop
+            tolerates; infinite if the phase never crosses -180°.
         phase_deg: phase margin, degrees; infinite if the gain never crosses 1.
         delay: delay margin, s; infinite if the gain never crosses 1.
-        stable: whether the closed loop is stable; if not, the other values say how far it is from
+        stable: whether the closed loop is stable; if not, the margins say how far it is from
             stability.
     """
 
@@ -44,7 +44,7 @@ class Margins(NamedTuple):
     stable: bool
 
     def sentence(self) -> str:
-        """A sentence for the user."""
+        """The margins in a sentence for the user."""
         if not self.stable:
             return "unstable"
         delay = 1e3 * self.delay
@@ -52,7 +52,7 @@ class Margins(NamedTuple):
 
 
 def margins(s: Complex, loop_gain: Complex) -> Margins:
-    """The margins of a loop that is stable when opened.
+    """The margins of a loop whose open loop is stable.
 
     The closed loop is stable if 1 + L does not encircle 0. L is real at the first frequency.
 
@@ -81,8 +81,8 @@ def margins(s: Complex, loop_gain: Complex) -> Margins:
     return Margins(gain_db, degrees(phase_margin), delay, bool(stable))
 
 
-def smaller(one: Margins, other: Margins) -> Margins:
-    """The smaller of each margin of two loops."""
+def smaller_margins(one: Margins, other: Margins) -> Margins:
+    """The smaller of each margin of two loops; stable only if both are."""
     return Margins(
         min(one.gain_db, other.gain_db),
         min(one.phase_deg, other.phase_deg),

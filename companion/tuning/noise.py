@@ -1,4 +1,4 @@
-"""What disturbed a recorded flight: estimator errors and gusts, from its telemetry."""
+"""Measures the disturbances of a recorded flight, estimator errors and gusts, in its telemetry."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -15,28 +15,28 @@ from companion.vehicle.registry import AUTOPILOTS
 Floats = NDArray[np.float64]
 
 _HOLD_BAND = 0.15, 1.5
-"""Frequencies at which the hold responds to disturbances, Hz."""
+"""Range of frequencies at which position hold responds to disturbances, Hz."""
 _WHITE_NOISE_SHARE = 0.6
-"""Share of half the telemetry rate above which only the noise of single messages remains."""
+"""Above this share of the Nyquist frequency of the telemetry, a spectrum is noise of messages."""
 _SEGMENT_DURATION = 8.0
-"""Duration of one segment of the record for a spectrum, s."""
+"""Duration of the segments of the record whose spectra are computed, s."""
 _LEAST_HEIGHT = 1.0
-"""Positions less than this above the first one of the log are left out, m."""
+"""Telemetry less than this height above the first position of the log is left out, m."""
 _AUTOPILOTS = {autopilot.mav_autopilot for autopilot in AUTOPILOTS}
 
 
 def measured_disturbances(log: Path, drag: float, usual: Disturbances) -> Disturbances:
-    """The disturbances in the air in a `.tlog`.
+    """The disturbances in flight, measured in a `.tlog`.
 
-    `velocity_density` is the change of the position that the velocity does not explain.
-    `acceleration_density` is the change of the velocity that tilt and drag do not explain,
-    including gusts.
+    `velocity_density` is measured as the change of position that the velocity does not explain,
+    `acceleration_density` as the change of velocity that tilt and drag do not explain. The latter
+    includes gusts.
 
     Args:
         log: a `.tlog` of this or another program.
         drag: linear drag of the vehicle, 1/s.
-        usual: usual disturbances, which give the values that a log does not: gusts and the errors
-            on a path. They are returned unchanged if the log has too little flight.
+        usual: disturbances that supply what a log does not show: gusts and the errors on a path.
+            They are returned unchanged if the log has too little flight.
 
     Raises:
         LogError: the file cannot be read or is not a `.tlog`.
@@ -69,7 +69,7 @@ def measured_disturbances(log: Path, drag: float, usual: Disturbances) -> Distur
 def _telemetry(log: Path) -> tuple[Floats, Floats]:
     """Motion (n, 5): time, position and velocity north and east; slopes (m, 3): time, north, east.
 
-    A slope is the horizontal part of the thrust over its vertical part.
+    The times are in s. A slope is the horizontal part of the thrust divided by its vertical part.
     """
     vehicle: tuple[int, int] | None = None
     motion: list[tuple[float, ...]] = []
@@ -96,19 +96,19 @@ def _telemetry(log: Path) -> tuple[Floats, Floats]:
 
 
 def _integral(time: Floats, slopes: Floats) -> Floats:
-    """Integral (n, 2) of the slopes up to each time."""
+    """(n, 2), integral over time of the slopes (m, 3), up to each time (n,), s."""
     steps = np.diff(slopes[:, 0], prepend=slopes[0, 0])[:, None]
     sums = np.cumsum(steps * slopes[:, 1:], axis=0)
     return np.column_stack([np.interp(time, slopes[:, 0], each) for each in sums.T])
 
 
 def _densities(time: Floats, residual: Floats) -> tuple[float, float]:
-    """Density of a residual in the hold's band, per √Hz, and noise of a single measurement.
+    """Density of a residual in `_HOLD_BAND`, per √Hz, and noise of a single measurement.
 
     Args:
         time: (n,), s.
-        residual: (n, 2), north and east: unexplained change of a measurement from one message to
-            the next, per second.
+        residual: (n, 2), north and east: change of a measurement from one message to the next that
+            is not explained, per second.
     """
     period = float(np.median(np.diff(time)))
     length = round(_SEGMENT_DURATION / period)

@@ -1,4 +1,4 @@
-"""Proposes gain, weights and bandwidth for an identified vehicle."""
+"""Proposes planner gain, guidance weights and observer bandwidth for an identified vehicle."""
 
 from dataclasses import dataclass
 
@@ -10,12 +10,12 @@ from companion.tuning.margins import Margins
 from companion.tuning.search import Aims, Design, errors_to_tolerate, search
 
 _ANALYSED_MANEUVERS = ("hover",)
-"""The analysis assumes a hover: a configuration for `identify` would be analysed with low gains."""
+"""The maneuvers that the analysis assumes: with `identify`, the gains in effect would be low."""
 
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """A proposed configuration, and what it changes.
+    """A proposed configuration, and what to expect of it.
 
     Attributes:
         untuned: configuration before.
@@ -23,10 +23,10 @@ class Proposal:
         design: the proposed values.
         before: expectation of `untuned`.
         after: expectation of `tuned`.
-        with_errors: margins of `tuned` if lag and dead time differ from the identified ones.
+        with_errors: model errors of lag and dead time, each with the margins of `tuned` then.
         disturbances: disturbances of the vehicle.
-        aims: requirements of the search. The margins without model error are kept to within a
-            twentieth; the others may be missed a little.
+        aims: requirements of the search. The margins without model error reach at least 95 % of
+            them; the other requirements may be missed a little.
     """
 
     untuned: Config
@@ -42,7 +42,7 @@ class Proposal:
     def changes(self) -> dict[str, dict[str, float]]:
         """The proposed keys by section, in the form for `companion.config.files.changed`.
 
-        They include a known drag, because the analysis assumes its feedforward.
+        A known drag is among them, because the analysis assumes the feedforward of this drag.
         """
         design, drag = self.design, self.tuned.guidance.drag
         known_drag = {}
@@ -69,7 +69,7 @@ def propose(
     Args:
         config: the configuration to tune; `vehicle` must be identified.
         disturbances: disturbances of the vehicle; None: the usual ones.
-        aims: margins to keep; None: the default ones.
+        aims: requirements such as the margins to keep; None: the default ones.
 
     Raises:
         ConfigError: lag and dead time are unknown, the analysis does not support planner or

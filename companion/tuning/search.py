@@ -1,4 +1,4 @@
-"""Searches gain, weights and bandwidth with the smallest expected error within the margins."""
+"""Searches gain, weights and bandwidth for the smallest expected error within the margins."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,12 +10,12 @@ from companion.control.hold_settings import attitude_delay, slewing_delay
 from companion.control.inner_loop import sensible_gain, with_gain
 from companion.tuning.expectation import Disturbances, expected_errors
 from companion.tuning.loop import ModelError, control_loop
-from companion.tuning.margins import Margins, frequencies, margins, smaller
+from companion.tuning.margins import Margins, frequencies, margins, smaller_margins
 
 _FIRST_STEP, _LAST_STEP = 0.4, 0.08
 """First and last step of the search: changes of the natural logarithm of a value."""
 _COST_OF_MISSED_AIM = 30.0
-"""Cost of a missed aim, per unit by which it is missed (`_shortfall`). The expected error costs
+"""Cost of a missed aim, times how far it is missed (`_shortfall`). The expected error costs
 its natural logarithm."""
 
 
@@ -27,11 +27,11 @@ class Aims:
         gain_db: smallest gain margin, dB.
         phase_deg: smallest phase margin, degrees.
         mismatch: factor by which real lag and dead time may be larger or smaller than configured.
-        mismatch_gain_db: smallest gain margin in that case, dB. While the rate loop slews, half of
-            it and half of `mismatch_phase_deg` are enough.
-        mismatch_phase_deg: smallest phase margin in that case, degrees.
-        rate_share: largest share of the rate limit that three standard deviations of the commanded
-            roll and pitch rates may take.
+        mismatch_gain_db: smallest gain margin with this mismatch, dB. With the delay of a rate loop
+            at its slew limit, half of this margin and half of `mismatch_phase_deg` are enough.
+        mismatch_phase_deg: smallest phase margin with this mismatch, degrees.
+        rate_share: three standard deviations of the commanded roll-pitch rate may be at most this
+            share of the rate limit.
     """
 
     gain_db: float = 7.0
@@ -43,12 +43,12 @@ class Aims:
 
 
 class Design(NamedTuple):
-    """The values that are searched.
+    """The values of the configuration that are searched.
 
     Attributes:
-        gain: p, 1/s.
-        position: weight of the position, 1/s⁴.
-        velocity: weight of the velocity, 1/s².
+        gain: p of the planner, 1/s.
+        position: weight of the position in guidance, 1/s⁴.
+        velocity: weight of the velocity in guidance, 1/s².
         bandwidth: bandwidth of the motion observer, rad/s.
     """
 
@@ -68,7 +68,7 @@ class Design(NamedTuple):
         return with_gain(config, self.gain).model_copy(update={"guidance": guidance})
 
     def rounded(self) -> "Design":
-        """The values rounded to three digits, as they are written."""
+        """The values rounded to three digits, as in the file of the proposal."""
         return Design(*(float(f"{value:.3g}") for value in self))
 
 
@@ -79,19 +79,19 @@ _SMALLEST_DESIGN = Design(1.0, 0.01, 0.01, 0.3)
 _LARGEST_BANDWIDTH_SLEWING = 8.0
 """Largest bandwidth for a rate loop with a slew limit (ArduPilot), rad/s.
 
-Position and velocity of ArduPilot's estimator do not quite agree, which the analysis does not know.
-On the mock vehicle, 14 rad/s gave errors that were an eighth larger in still air and a fifth in
-gusts.
+Position and velocity of ArduPilot's estimator do not quite agree, and the analysis neglects this.
+On the mock vehicle, 14 rad/s gave errors an eighth larger in still air and a fifth larger in gusts.
 """
 _SLEWING_SHARE = 0.5
-"""Share of the margins for wrong lag and dead time that must remain while the rate loop slews.
+"""Share of the `mismatch` margins that must remain while the rate loop is at its slew limit.
 
-Without any margin left, a figure-eight in gusts could swing by more than 1 m on the mock vehicle.
+Without any margin left, a figure-eight in gusts could oscillate by more than 1 m on the mock
+vehicle.
 """
 
 
 def largest_gain(config: Config) -> float:
-    """The largest sensible planner gain, as in `companion check-config`, but at most 20, 1/s."""
+    """The largest planner gain that is searched, 1/s: that of `check-config`, but at most 20."""
     return min(_LARGEST_DESIGN.gain, sensible_gain(config))
 
 
@@ -103,12 +103,12 @@ def largest_design(config: Config) -> Design:
 
 
 def search(config: Config, disturbances: Disturbances, aims: Aims) -> Design:
-    """The design with the smallest cost (expected error, missed aims), by a pattern search.
+    """The design with the smallest `_cost`, found by a pattern search.
 
     Args:
         config: a configuration with an identified vehicle.
         disturbances: disturbances of the vehicle.
-        aims: requirements.
+        aims: requirements of the proposal.
 
     Raises:
         ConfigError: see `control_loop`.
@@ -120,7 +120,7 @@ def search(config: Config, disturbances: Disturbances, aims: Aims) -> Design:
 def _best_near(
     config: Config, start: Design, disturbances: Disturbances, aims: Aims
 ) -> tuple[float, Design]:
-    """The best design near `start`, and its cost."""
+    """The cost and the values of the best design near `start`."""
     largest = largest_design(config)
     best, step = Design(*map(min, start, largest)), _FIRST_STEP
     cost = _cost(config, best, disturbances, aims)
@@ -136,10 +136,10 @@ def _best_near(
 
 
 def _starts(config: Config) -> Iterator[Design]:
-    """Designs near the program's rule (`hold_settings.hold_weights`), which scale with the delay.
+    """Three starts, because the pattern search finds only the nearest minimum.
 
-    Their velocity weights are lower and their observers quicker than by this rule. The pattern
-    search finds only the nearest minimum, so it has three starts.
+    Like the program's rule (`hold_settings.hold_weights`), they scale with the delay of the
+    attitude; their velocity weights are lower and their observers quicker than by this rule.
     """
     for share, position, velocity, bandwidth in (
         (1.0, 1.0, 0.5, 2.0),
@@ -152,7 +152,7 @@ def _starts(config: Config) -> Iterator[Design]:
 
 
 def _neighbours(design: Design, step: float, largest: Design) -> Iterator[Design]:
-    """Designs a step away in one value, or in two of them, within the bounds."""
+    """Designs that differ by one step in one or two values, clamped to the bounds."""
     up, down = exp(step), exp(-step)
     scales = [
         *((1.0,) * k + (factor,) + (1.0,) * (3 - k) for k in range(4) for factor in (up, down)),
@@ -165,22 +165,22 @@ def _neighbours(design: Design, step: float, largest: Design) -> Iterator[Design
 
 
 def _cost(
-    config: Config, design: Design, disturbances: Disturbances, aims: Aims, enough: float = inf
+    config: Config, design: Design, disturbances: Disturbances, aims: Aims, stop_at: float = inf
 ) -> float:
-    """Logarithm of the expected error, plus a penalty for each missed aim.
+    """Logarithm of the expected position error, plus a penalty for each missed aim.
 
-    From `enough` on, the computation stops: the result is then only a lower bound.
+    The computation stops when the cost reaches `stop_at`; the result is then a lower bound.
     """
     candidate = design.applied(config)
     s = frequencies()
     loop = control_loop(candidate, s)
     expected = expected_errors(loop, disturbances, 1.0 / config.link.position_rate_hz)
-    exact = smaller(margins(s, loop.whole), margins(s, loop.outer))
+    exact = smaller_margins(margins(s, loop.whole), margins(s, loop.outer))
     missed = _shortfall(exact, aims.gain_db, aims.phase_deg)
     missed += max(0.0, 3.0 * expected.rate / (aims.rate_share * config.limits.max_tilt_rate) - 1.0)
     cost = log(expected.position) + _COST_OF_MISSED_AIM * missed
     for error in errors_to_tolerate(candidate, aims):
-        if cost >= enough:
+        if cost >= stop_at:
             break
         loop = control_loop(candidate, s, error)
         share = _SLEWING_SHARE if error.delay else 1.0
@@ -190,16 +190,16 @@ def _cost(
 
 
 def errors_to_tolerate(config: Config, aims: Aims) -> list[ModelError]:
-    """Errors of lag and dead time for which the loop must keep margins; see `Aims`."""
+    """Model errors with which the loop must keep margins: `Aims.mismatch`, and delay by slewing."""
     errors = [ModelError(time_factor=each) for each in (aims.mismatch, 1.0 / aims.mismatch)]
     delay = slewing_delay(config)
     return [*errors, ModelError(delay=delay)] if delay > 0.0 else errors
 
 
 def _shortfall(actual: Margins, gain_db: float, phase_deg: float) -> float:
-    """How far the margins are missed, in units of 6 dB and 30°.
+    """How far the margins are missed, as the sum of their shortfalls in units of 6 dB and of 30°.
 
-    For an unstable loop: 1 plus the found margins in these units.
+    For an unstable loop: 1 plus the sum of its margins in these units.
     """
     if not actual.stable:
         return 1.0 + actual.gain_db / 6.0 + actual.phase_deg / 30.0

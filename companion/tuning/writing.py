@@ -1,4 +1,4 @@
-"""Writes a proposal as YAML with its reasons, for a configuration to include."""
+"""Writes a proposal as YAML, with the reasons as comments, for a configuration to include."""
 
 from collections.abc import Mapping
 from math import degrees
@@ -15,26 +15,26 @@ from companion.tuning.proposal import Proposal
 from companion.tuning.search import largest_gain
 
 Flights = Mapping[str, tuple[CourseResult, CourseResult]]
-"""Flights before and with the proposal, by the name of the course."""
+"""Results of the flights before and with the proposal, by name of the course."""
 
 
 _WORSE_FACTOR, _WORSE_BY = 1.25, 0.01
-"""A course is flown worse if its true error grows both by this factor and by this distance, m."""
+"""A course is flown worse if its true error grows by both this factor and this distance, m."""
 
 
 def proposal_text(
-    proposal: Proposal, vehicle: Path | Mapping[str, Any], flights: Flights, where: str
+    proposal: Proposal, vehicle: Path | Mapping[str, Any], flights: Flights, source: str
 ) -> str:
-    """The file's text: what was analysed, what to expect, and the keys with their reasons.
+    """The text of the proposal's file: what to expect, and the keys with their reasons.
 
     Args:
         proposal: the proposal.
         vehicle: vehicle file to include, relative to the file; or a mapping with the section
             `vehicle` itself.
         flights: flights on the mock vehicle; empty if none was flown.
-        where: where the values of the vehicle come from, for the reader.
+        source: name of the source of the vehicle's values, for the reader.
     """
-    lines = [f"# Proposed by `companion tune` for {where}.", "#"]
+    lines = [f"# Proposed by `companion tune` for {source}.", "#"]
     lines += [f"# {line}".rstrip() for line in summary_lines(proposal, flights)]
     if isinstance(vehicle, Path):
         lines += ["", f"include: {bounded_yaml.dump_value(str(vehicle))}  # the identified vehicle"]
@@ -49,7 +49,7 @@ def proposal_text(
 
 
 def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
-    """Expectation before and after, and the cost of the proposal, for the user."""
+    """For the user: what to expect before and with the proposal, its rate use, and its flights."""
     before, after, aims = proposal.before, proposal.after, proposal.aims
     limit = degrees(proposal.tuned.limits.max_tilt_rate)
     warning = worse_sentence(flights)
@@ -131,7 +131,7 @@ def _flight_line(name: str, before: CourseResult, after: CourseResult) -> str:
 
 
 def _reasons(proposal: Proposal) -> dict[str, str]:
-    """The reason for each value."""
+    """The reason for the value of each key."""
     untuned, tuned, design = proposal.untuned, proposal.tuned, proposal.design
     limit, weights = largest_gain(tuned), hold_weights(untuned)
     capped = design.gain > 0.97 * limit
