@@ -11,8 +11,8 @@
     >>> round(fit.lag, 2), round(fit.dead_time, 2), fit.is_good()
     (0.05, 0.04, True)
 
-The time of a command is the vehicle time of the sample to which it responds. So a dead time found
-here is the time from a sample to the first effect of its command, like `vehicle.dead_time_ms`.
+The time of a command is the vehicle time of the sample to which it responds. The dead time found
+here is therefore from a sample to the first effect of its command, like `vehicle.dead_time_ms`.
 `companion.vehicle.flight_log.read_flight_log` gives the rows of a `.tlog`.
 
 A whole vehicle
@@ -28,7 +28,7 @@ One axis
     FitQuality, FitNeeds      how good a fit is, and how good it must be
     SecondOrderFit            the second-order response that fits best
     BadFitError               raised if bad fits leave an axis without values
-    dead_time_by_correlation  the delay alone, by cross-correlation
+    dead_time_by_correlation  the dead time alone, by cross-correlation
 
 Thrust
     fit_thrust_map            specific thrust over thrust 0..1: a `ThrustMap`

@@ -1,8 +1,8 @@
 """The delay between commands and measurements, from their cross-correlation.
 
-Both are filtered to the frequencies at which a first-order lag describes a real rate loop best. At
-low frequencies the autopilot's rate integrator compensates the lag: PX4 follows a circle (1 rad/s)
-with a delay of 40 ms, and steps with 87 ms. At high frequencies the rate loop is of second order.
+Both are band-pass filtered to the frequencies at which a first-order lag describes a real rate loop
+best. At low frequencies the autopilot's rate integrator compensates the lag: PX4 follows a circle
+(1 rad/s) with a delay of 40 ms, but steps with 87 ms. At high frequencies the loop is second-order.
 """
 
 import numpy as np
@@ -17,14 +17,14 @@ Floats = NDArray[np.float64]
 _GRID_PERIOD = 0.004
 """Sample period of the correlation, s."""
 _DELAY_COUNT = int(LONGEST_DEAD_TIME / _GRID_PERIOD)
-"""Number of compared delays besides 0; they are `_GRID_PERIOD` apart."""
+"""Number of delays that are compared, besides 0; they are `_GRID_PERIOD` apart."""
 _CENTRE_PHASE = 0.38
-"""Phase of the lag at the centre frequency of the filter, rad."""
+"""The centre frequency of the filter is that at which the known lag has this phase, rad."""
 _CENTRE_FREQUENCIES = 5.0, 9.0
-"""Range of the centre frequency, rad/s. At 8 rad/s on PX4 and 9 rad/s on ArduPilot, the dead times
+"""Bounds of the centre frequency, rad/s. At 8 rad/s on PX4 and 9 rad/s on ArduPilot, the dead times
 measured in steps, circles, figure-eights and doublets agree within 3 ms."""
 _FILTER_REACH = 3.5
-"""Half width of the filter, in its standard deviations."""
+"""Half width of the filter's impulse response, in standard deviations of its Gaussian."""
 _LEAST_EXPLAINED = 0.985
 """Smallest R² of a correlation that is used; below it, gusts or another axis distort the delay."""
 _LEAST_EXCITATION = 0.005
@@ -40,19 +40,19 @@ def dead_time_by_correlation(
     slew: float | None = None,
     damping: float = np.inf,
 ) -> float | None:
-    """The delay at which filtered commands and measurements correlate most.
+    """The dead time: the delay at which filtered commands and measurements correlate most.
 
-    The commands are first passed through the known lag, so that the remaining delay is the dead
-    time. With a lag of 0, the result is the whole delay: dead time plus most of a short lag.
+    The commands first pass through the known lag, so that the remaining delay is the dead time.
+    With a `lag` of 0, the result is the whole delay: dead time plus most of a short lag.
 
     Args:
         time: (n,), vehicle time of the sample to which each command responds, s.
         commanded: (n,), body rates of one axis, rad/s; rows that are not finite are left out.
         measured_time: (m,), vehicle time, s; need not be regular.
         measured: (m,), body rates, rad/s; rows that are not finite are left out.
-        lag: known lag of the rate loop, s; 2ζ/ω for a lag of second order.
+        lag: known lag of the rate loop, s; 2ζ/ω for a second-order lag.
         slew: slew limit of the rate loop, rad/s²; None: no limit.
-        damping: ζ of a lag of second order; infinite for first order.
+        damping: ζ of a second-order lag; infinite for a first-order one.
 
     Returns:
         The delay, s, less than 0.5; None if the record is too short, the commands changed too
@@ -75,7 +75,7 @@ def dead_time_by_correlation(
 
 
 def _correlation(pairs: list[tuple[Floats, Floats]]) -> Floats | None:
-    """(`_DELAY_COUNT` + 1,), correlation of filtered commands and measurements by their delay.
+    """(`_DELAY_COUNT` + 1,), correlation of filtered commands and measurements at each delay.
 
     None: there are no pairs, or the commands or the measurements hardly changed.
     """
@@ -102,7 +102,7 @@ def _centre_frequency(lag: float, damping: float) -> float:
 
 
 def _second_order_delay(lag: float, damping: float) -> float:
-    """Extra delay of a second-order lag compared with a first-order one, s."""
+    """Delay of a second-order lag at the centre frequency, beyond that of a first-order one, s."""
     frequency = _centre_frequency(lag, damping)
     lag_phase = frequency * lag
     phase = np.arctan2(lag_phase, 1.0 - (0.5 * lag_phase / damping) ** 2)
@@ -110,10 +110,10 @@ def _second_order_delay(lag: float, damping: float) -> float:
 
 
 def _band_pass(lag: float, damping: float) -> Floats:
-    """(k,), taps of a band-pass filter for samples on the grid: a Gaussian's third derivative.
+    """(k,), taps of a band-pass filter for samples on the grid: third derivative of a Gaussian.
 
-    Its gain, proportional to ω³·exp(−1.5·(ω/ω₀)²), is 1 at ω₀, its maximum, and nearly 0 for slow
-    turns. The filter delays commands and measurements equally.
+    Its gain is proportional to ω³·exp(−1.5·(ω/ω₀)²): 1 at its maximum, the centre frequency ω₀, and
+    nearly 0 for slow turns. The filter delays commands and measurements equally.
     """
     frequency = _centre_frequency(lag, damping)
     deviation = 3.0**0.5 / frequency
@@ -128,7 +128,7 @@ def _band_pass(lag: float, damping: float) -> Floats:
 def _filtered(
     stretch: Stretch, lag: float, slew: float | None, band: Floats
 ) -> tuple[Floats, Floats] | None:
-    """Filtered commands (n + `_DELAY_COUNT`,) and measurements (n,), sampled at the same period.
+    """Filtered commands (n + `_DELAY_COUNT`,) and measurements (n,), both sampled on the grid.
 
     Both end at the same time. None: the measurements are shorter than the filter.
     """
@@ -149,7 +149,7 @@ def _filtered(
 def _peak_delay(correlation: Floats) -> float | None:
     """Delay of the largest correlation, s, interpolated by a parabola.
 
-    None if this correlation is too small, or is at the first or last delay.
+    None if the largest correlation is too small, or is at the first or last delay.
     """
     peak = int(np.argmax(correlation))
     if correlation[peak] < _LEAST_EXPLAINED**0.5 or peak in {0, correlation.size - 1}:

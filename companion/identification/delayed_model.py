@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 
 class Model(Protocol):
-    """A linear response of gain 1; its shape is the logarithms of its k parameters.
+    """A linear response of gain 1 with k parameters; their logarithms are called its shape.
 
     Attributes:
         lowest: (k,), lower bounds of the shape.
@@ -38,10 +38,10 @@ class Model(Protocol):
         """(m,), response at the times `at` (m,), s, from the steady state of the first command."""
         ...
 
-    def free_responses(self, shape: Floats, since: Floats) -> Floats:
-        """(m, k), k independent free responses, `since` (m,) seconds after the start.
+    def free_responses(self, shape: Floats, elapsed: Floats) -> Floats:
+        """(m, k), k independent free responses at (m,) times after the start, s.
 
-        Their weighted sum is the effect of any initial state.
+        The effect of any initial state is a weighted sum of them.
         """
         ...
 
@@ -55,15 +55,16 @@ class FirstOrder:
         """The response of this lag; see `Model.response`."""
         return lagged(commands, exp(shape[0]), at)
 
-    def free_responses(self, shape: Floats, since: Floats) -> Floats:
+    def free_responses(self, shape: Floats, elapsed: Floats) -> Floats:
         """The free responses of this lag; see `Model.free_responses`."""
-        return np.asarray(np.exp(-since / exp(shape[0])))[:, np.newaxis]
+        return np.asarray(np.exp(-elapsed / exp(shape[0])))[:, np.newaxis]
 
 
 class SecondOrder:
     """A second-order lag; its shape is (log 2ζ/ω, log ζ).
 
-    These two are nearly independent in a fit, unlike ω and ζ. 2ζ/ω is the delay on a ramp, s.
+    In a fit, these two parameters are nearly independent, unlike ω and ζ. 2ζ/ω is the delay of the
+    response to a ramp, s.
     """
 
     lowest, highest = np.log([0.002, 0.2]), np.log([1.0, 4.0])
@@ -72,9 +73,9 @@ class SecondOrder:
         """The response of this lag; see `Model.response`."""
         return second_order(commands, *frequency_damping(shape), at)
 
-    def free_responses(self, shape: Floats, since: Floats) -> Floats:
+    def free_responses(self, shape: Floats, elapsed: Floats) -> Floats:
         """The free responses of this lag; see `Model.free_responses`."""
-        return second_order_decay(since, *frequency_damping(shape))
+        return second_order_decay(elapsed, *frequency_damping(shape))
 
 
 def frequency_damping(shape: Floats) -> tuple[float, float]:
@@ -88,16 +89,16 @@ class SecondOrderFit:
     """A second-order fit: ÿ = ω²·(gain·u(t − dead time) − y) − 2ζω·ẏ.
 
     Attributes:
-        frequency: ω, rad/s.
-        damping: ζ.
-        dead_time: s.
+        frequency: natural frequency ω, rad/s.
+        damping: damping ratio ζ.
+        dead_time: dead time, s.
         gain: measured per commanded rate.
         slew: slew limit of the command, per second; None: no sign of a limit.
         explained: R².
-        misfit: root mean square of the part of the residual that the commands explain, as a share
-            of the measurements' standard deviation.
-        dead_time_error: standard error of the dead time by noise, s.
-        lag_error: standard error of the lag by noise, s.
+        misfit: RMS of the part of the residual that the commands explain, as a share of the
+            standard deviation of the measurements.
+        dead_time_error: standard error of the dead time due to noise, s.
+        lag_error: standard error of `lag` due to noise, s.
     """
 
     frequency: float
@@ -112,7 +113,7 @@ class SecondOrderFit:
 
     @property
     def lag(self) -> float:
-        """2ζ/ω, s: the first-order lag that has the same delay on a ramp."""
+        """2ζ/ω, s: the first-order lag with the same delay of the response to a ramp."""
         return 2.0 * self.damping / self.frequency
 
     @property
@@ -128,8 +129,8 @@ class SecondOrderFit:
 DEAD_TIME_RANGE = 0.0, LONGEST_DEAD_TIME - 0.01
 """Range in which the dead time is searched, s."""
 _RAMP_TIMES = 0.01, 0.5
-"""Shortest and longest ramp of the search for the slew limit, s: how long the largest change of the
-commands takes at that limit."""
+"""Bounds of the search for the slew limit, as the time that the largest change of the commands
+takes at that limit, s."""
 _SAME_COMMAND_SHARE = 0.005
 """Commands that differ by less than this share of their range count as the same."""
 
@@ -138,15 +139,15 @@ class DelayedModel:
     """A record with every n-th sample, and the response of a model to its commands.
 
     y(t) = gain·x(t − dead time) + offset + remainder of the initial state of each stretch, where x
-    is the model's exact response. Offset, initial states and a gain that is not given are linear;
-    they are eliminated. The unknowns are the model's shape, the dead time (s), and optionally the
-    logarithm of the slew limit.
+    is the model's exact response. Offset, initial states, and the gain if it is not given, are
+    linear, and linear regression gives them. The unknowns are the model's shape, the dead time (s),
+    and optionally the logarithm of the slew limit.
 
     Attributes:
         model: the model.
-        gain: the given gain; None: it is fitted.
+        gain: the given gain; None: the gain is fitted.
         thinning: n; every n-th sample is used.
-        commands: commands of each stretch, without slew limit.
+        commands: commands of each stretch, before the slew limit.
         times: times of the samples of each stretch, s.
         measured: (m,), the samples of all stretches.
         largest_change: largest change of a command.
@@ -169,7 +170,7 @@ class DelayedModel:
         self._slew_cache: tuple[float, list[Knots]] = (nan, [])
 
     def projection(self, unknown: Floats) -> tuple[Floats, Floats]:
-        """The best weights (gain, offset, initial states), and their residual, (m,)."""
+        """The best values of gain, offset and initial states, and the (m,) residual with them."""
         response = self.response(unknown)
         if self.gain is None:
             columns = np.column_stack((response, self._offset_columns(unknown)))
@@ -183,29 +184,29 @@ class DelayedModel:
         shape = unknown[: self._dead_time_index]
         return self._per_stretch(unknown, lambda knots, at: self.model.response(shape, knots, at))
 
-    def delayed_commands(self, unknown: Floats, later: float = 0.0) -> Floats:
-        """(m,), the commands after slew limit and dead time, delayed by another `later` s."""
+    def delayed_commands(self, unknown: Floats, extra_delay: float = 0.0) -> Floats:
+        """(m,), the commands after slew limit, dead time and `extra_delay`, s."""
         return self._per_stretch(
-            unknown, lambda knots, at: value_at(knots, np.maximum(at - later, knots.time[0]))
+            unknown, lambda knots, at: value_at(knots, np.maximum(at - extra_delay, knots.time[0]))
         )
 
     def dead_time(self, unknown: Floats) -> float:
-        """Dead time among these unknowns, s."""
+        """The dead time in the unknowns, s."""
         return float(unknown[self._dead_time_index])
 
     def slew(self, unknown: Floats) -> float | None:
-        """Slew limit among these unknowns, per second; None if they have none."""
+        """The slew limit in the unknowns, per second; None if they contain none."""
         return exp(unknown[-1]) if unknown.size > self._dead_time_index + 1 else None
 
     def search(self, start: Floats) -> Solution:
-        """The best fit near `start`."""
+        """The best fit near the unknowns `start`."""
         ramps = [log(self.largest_change / ramp) for ramp in reversed(_RAMP_TIMES)]
         limits = [*zip(self.model.lowest, self.model.highest, strict=True), DEAD_TIME_RANGE, ramps]
         lowest, highest = np.array(limits[: start.size]).T
         return minimise(self.projection, start, lowest, highest)
 
     def best_of(self, points: list[Floats]) -> Floats:
-        """The point with the smallest sum of squares."""
+        """The point (unknowns) with the smallest sum of squares of the residual."""
         residuals = [self.projection(point)[1] for point in points]
         return points[int(np.argmin([float(residual @ residual) for residual in residuals]))]
 
@@ -215,10 +216,10 @@ class DelayedModel:
         return 1.0 - found.squares / float(spread @ spread) if spread.any() else 0.0
 
     def _offset_columns(self, unknown: Floats) -> Floats:
-        """(m, 1 + initial states): ones, and the remainder of the initial state of each stretch.
+        """(m, 1 + number of initial states): ones, and free responses of each stretch.
 
-        The initial state is taken at the first sample of the stretch. A state at the first command
-        would have decayed to nearly nothing there, and its weight would be unbounded.
+        The free responses begin at the first sample of the stretch. From the first command on, they
+        would have decayed to nearly nothing there, and their weights would be unbounded.
         """
         shape = unknown[: self._dead_time_index]
         decays = [self.model.free_responses(shape, times - times[0]) for times in self.times]
@@ -232,14 +233,14 @@ class DelayedModel:
         return columns
 
     def _per_stretch(self, unknown: Floats, compute: Callable[[Knots, Floats], Floats]) -> Floats:
-        """(m,), result of `compute` for each stretch's commands after slew limit and delay."""
+        """(m,), results of `compute` for the slew-limited, delayed commands of each stretch."""
         slew, delay = self.slew(unknown), self.dead_time(unknown)
         commands = self.commands if slew is None else self._slew_limited(slew)
         pairs = zip(commands, self.times, strict=True)
         return np.concatenate([compute(knots, times - delay) for knots, times in pairs])
 
     def _slew_limited(self, slew: float) -> list[Knots]:
-        """The commands after the slew limit; cached, because the search often repeats a limit."""
+        """The commands of each stretch after the slew limit; the result for the last is cached."""
         if slew != self._slew_cache[0]:
             self._slew_cache = slew, [slewed(knots, slew) for knots in self.commands]
         return self._slew_cache[1]

@@ -1,6 +1,6 @@
 """Fits a first-order lag with dead time to commands and measurements of any unit.
 
-Gain, offset and initial states are linear; only lag, dead time and slew limit are searched for. A
+Only lag, dead time and slew limit are searched for; gain, offset and initial states are linear. A
 second-order lag is tried too, and reported if it fits clearly better.
 """
 
@@ -20,7 +20,7 @@ from companion.identification.delayed_model import (
     frequency_damping,
 )
 from companion.identification.record import Stretch, most_excited
-from companion.identification.residual_analysis import analyse
+from companion.identification.residual_analysis import analyse_residual
 from companion.least_squares import Solution
 
 Floats = NDArray[np.float64]
@@ -30,28 +30,28 @@ LAG_RANGE = exp(FirstOrder.lowest[0]), exp(FirstOrder.highest[0])
 _TRIED_LAGS = np.geomspace(0.005, 1.0, 7)
 _TRIED_DEAD_TIMES = np.linspace(0.0, 0.48, 25)
 _TRIED_RAMP_TIMES = (0.03, 0.06, 0.12, 0.25)
-"""Slew limits from which the search starts. Each is given as the time (s) that the largest change
-of command takes at that limit."""
+"""Starts of the search for a slew limit, as the time (s) that the largest change of command takes
+at that limit."""
 _LAG_SHARES = (0.15, 0.4, 1.0)
 _DEAD_TIME_SHARES = (0.6, 1.0)
-"""Shares of the lag and dead time found without a slew limit; the search with one starts there."""
+"""Starts of the search with a slew limit, as shares of the lag and dead time found without it."""
 _BETTER_SHARE = 0.6
 """A model with more unknowns needs a sum of squares below this share of the simpler model's."""
 _TRIED_DAMPINGS = (0.4, 0.7, 1.0)
 _TRIED_DEAD_TIME_SHARES = (0.0, 0.3, 0.6)
-"""Starts of the search for the dead time of a second-order model, as shares of the whole delay."""
+"""Starts of the search for the dead time of a second-order model, as shares of lag + dead time."""
 _EXCITED_SHARE = 0.02
 """A sample is excited if the modelled response differs from the command by more than this share of
 the commands' range."""
-_MEMORY_DELAYS = 4.0
-"""Length of the vehicle's response and of its noise correlation, as multiples of the delay."""
+_RESPONSE_DURATION_FACTOR = 4.0
+"""Duration of the vehicle's response and of the correlation of its noise, in lag + dead time."""
 _COARSE_SAMPLES = 500
 """Approximate number of samples used to find the start of the search."""
 _MOST_SAMPLES = 4000
 """Largest number of samples used for the fit: more take longer and change nothing."""
 _FEWEST_SAMPLES = 10
 _NEIGHBOUR_DISTANCE = 0.005
-"""Distance in lag and dead time to the neighbouring minima, s."""
+"""Distance in lag and dead time at which neighbouring minima are searched, s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,16 +59,16 @@ class LagFit:
     """Result of a fit, in s and the units of commands and measurements.
 
     Attributes:
-        dead_time: s.
-        lag: s.
-        gain: measured per commanded; fitted freely, even if lag and dead time are for a given gain.
+        dead_time: dead time, s.
+        lag: lag, s.
+        gain: measured per commanded value; fitted even if lag and dead time are for a given gain.
         offset: measurement at a command of zero.
         slew: slew limit of the command, per second; None: no sign of a limit.
         explained: R².
-        misfit: root mean square of the part of the residual that the commands explain, as a share
-            of the measurements' standard deviation.
-        dead_time_error: standard error of the dead time by noise, s.
-        lag_error: standard error of the lag by noise, s.
+        misfit: RMS of the part of the residual that the commands explain, as a share of the
+            standard deviation of the measurements.
+        dead_time_error: standard error of the dead time due to noise, s.
+        lag_error: standard error of the lag due to noise, s.
         span: largest command minus smallest command, after the slew limit.
         excited: number of samples where model and command differ by more than 2 % of the span.
         second_order: second-order fit, if it is clearly better; else None.
@@ -91,7 +91,7 @@ class LagFit:
 def fit_lag(
     record: list[Stretch], gain: float | None = None, *, may_slew: bool = True
 ) -> LagFit | None:
-    """The best fit; None if no command changes, or for fewer than 10 samples.
+    """The best fit; None if no command changes, or there are fewer than 10 samples.
 
     Args:
         record: commands and measurements.
@@ -118,7 +118,7 @@ def fit_lag(
 
 
 def _with_slew_if_better(best: Solution, data: DelayedModel, coarse: DelayedModel) -> Solution:
-    """The best fit with a slew limit, if it is clearly better than `best`, else `best`."""
+    """The best fit with a slew limit if it is clearly better than `best`, else `best`."""
     promising = coarse.search(_slewed_start(best, coarse))
     if promising.squares > _BETTER_SHARE * coarse.search(best.unknown).squares:
         return best
@@ -127,7 +127,7 @@ def _with_slew_if_better(best: Solution, data: DelayedModel, coarse: DelayedMode
 
 
 def _slewed_start(best: Solution, coarse: DelayedModel) -> Floats:
-    """(3,), the best start with a slew limit from a coarse grid.
+    """(3,), the best of a coarse grid of starts of the search with a slew limit.
 
     A slew limit delays too, so smaller lags and dead times than without it are tried.
     """
@@ -145,7 +145,7 @@ def _slewed_start(best: Solution, coarse: DelayedModel) -> Floats:
 def _second_order_fit(
     record: list[Stretch], first_data: DelayedModel, first_order: Solution, thinning: int
 ) -> SecondOrderFit | None:
-    """The best second-order fit of free gain, if it is clearly better than the first-order one."""
+    """The best second-order fit, also of the gain; None: not clearly better than first order."""
     lag, dead_time, *slew = first_order.unknown.tolist()
     delay = exp(lag) + dead_time
     model: Model = SecondOrder()
@@ -207,15 +207,15 @@ def _quality(data: DelayedModel, found: Solution) -> _Quality:
     commands = data.delayed_commands(unknown)
     span = float(np.ptp(commands))
     excited = int((np.abs(data.response(unknown) - commands) > _EXCITED_SHARE * span).sum())
-    memory = _MEMORY_DELAYS * (lag + data.dead_time(unknown))
+    response_duration = _RESPONSE_DURATION_FACTOR * (lag + data.dead_time(unknown))
     sample_period = float(np.median(np.diff(np.concatenate(data.times))))
-    residuals = analyse(
+    residuals = analyse_residual(
         found.residual,
         found.slopes,
-        lambda later: data.delayed_commands(unknown, later),
-        memory,
+        lambda delay: data.delayed_commands(unknown, delay),
+        response_duration,
         excited,
-        correlated=1 + int(memory / max(sample_period, 1e-4)),
+        correlated_samples=1 + int(response_duration / max(sample_period, 1e-4)),
     )
     deviation = float(np.std(data.measured))
     return _Quality(
@@ -231,7 +231,7 @@ def _best_without_slew(data: DelayedModel, start: Floats) -> Solution:
     """The best fit without a slew limit.
 
     If samples come at regular times after commands, there are shallow minima one sample apart, with
-    the same sum of lag and dead time. So the neighbouring minima are tried too.
+    the same sum of lag and dead time. Neighbouring minima are therefore tried too.
     """
     found = data.search(start)
     lag, dead_time = exp(found.unknown[0]), float(found.unknown[1])
@@ -244,7 +244,7 @@ def _best_without_slew(data: DelayedModel, start: Floats) -> Solution:
 
 
 def _grid_start(data: DelayedModel) -> Floats:
-    """(2,), the best start (log lag, dead time) from a coarse grid."""
+    """(2,), the best start (log lag, dead time) of a coarse grid."""
     return data.best_of(
         [np.array([log(lag), dead_time]) for lag in _TRIED_LAGS for dead_time in _TRIED_DEAD_TIMES]
     )

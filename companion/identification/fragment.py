@@ -1,4 +1,4 @@
-"""Writes the configuration fragment of an identified vehicle: good fits, else configured values."""
+"""Writes an identified vehicle as YAML to include: good fits, otherwise the configured values."""
 
 from collections.abc import Mapping, Sequence
 from math import degrees
@@ -8,13 +8,13 @@ from companion.files import bounded_yaml
 from companion.identification.response import BadFitError, RateResponse
 from companion.identification.vehicle import IdentifiedVehicle
 
-Known = Mapping[str, Sequence[float | None]]
+ConfiguredValues = Mapping[str, Sequence[float | None]]
 """Lag (ms), dead time (ms), acceleration limit (°/s²) and damping by axis, as configured."""
 
 _KEY_PREFIX = {"roll": "", "pitch": "pitch_", "yaw": "yaw_"}
 _AXIS_KEYS = "lag_ms", "dead_time_ms", "acceleration_limit_deg_s2", "damping"
 _NO_SLEW_LIMIT = 100_000.0
-"""Slew limit written for an axis that has none while roll has one, °/s²; null would mean roll's."""
+"""Slew limit written for an axis without one if roll has one, °/s²; null would mean roll's."""
 _SAME_MS = 3.0
 """Lags and dead times of roll and pitch that differ by at most this count as the same, ms."""
 _SAME_SLEW_SHARE = 0.1
@@ -29,10 +29,10 @@ class AxisValues(NamedTuple):
     """The configuration values of one axis.
 
     Attributes:
-        lag: ms.
-        dead_time: ms.
+        lag: lag, ms.
+        dead_time: dead time, ms.
         slew: slew limit, °/s²; None: no limit.
-        damping: ζ of a lag of second order; None: first order.
+        damping: damping ratio ζ of a second-order lag; None: first order.
     """
 
     lag: float
@@ -50,7 +50,7 @@ class AxisValues(NamedTuple):
 def vehicle_fragment(
     vehicle: IdentifiedVehicle,
     gravity: float,
-    known: Known,
+    known: ConfiguredValues,
     flight: str = "",
     second_order: bool = True,
 ) -> str:
@@ -60,14 +60,14 @@ def vehicle_fragment(
     values, and a comment says so. If roll and pitch hardly differ, their mean values are written as
     those of roll. The hover thrust is written only if the thrust map is good.
 
-    Roll and pitch are written as lags of second order if this is clearly better for both.
+    Roll and pitch are written as second-order lags if this fits both clearly better.
 
     Args:
         vehicle: the identified vehicle.
         gravity: gravity, m/s², which gives the hover thrust.
-        known: present configuration of each axis; axes may be missing, values None.
+        known: configured values by axis; axes may be missing, and values None.
         flight: name of the flight, written as `identified`; empty: it is not written.
-        second_order: whether lags of second order may be written.
+        second_order: whether second-order lags may be written.
 
     Raises:
         BadFitError: no fit is good, or an axis with a bad fit has no configured values; the message
@@ -89,10 +89,10 @@ def vehicle_fragment(
 
 
 def second_order_axes(vehicle: IdentifiedVehicle) -> dict[str, AxisValues]:
-    """Roll and pitch as lags of second order, as the vehicle file holds them.
+    """Values of roll and pitch as second-order lags, as the vehicle file holds them.
 
-    Empty unless both have a good fit, and on both second order without a slew limit fits clearly
-    better than first order, with a damping ratio that the configuration accepts.
+    Empty unless both axes have a good fit, and on both a second-order lag without a slew limit fits
+    clearly better than a first-order one, with a damping ratio that the configuration accepts.
     """
     axes = {}
     for name in ("roll", "pitch"):
@@ -106,8 +106,8 @@ def second_order_axes(vehicle: IdentifiedVehicle) -> dict[str, AxisValues]:
     return axes
 
 
-def kept_axes(vehicle: IdentifiedVehicle, known: Known) -> dict[str, AxisValues]:
-    """The configured values of the axes whose fit is bad.
+def kept_axes(vehicle: IdentifiedVehicle, known: ConfiguredValues) -> dict[str, AxisValues]:
+    """The configured values of the axes whose fit is bad; those axes keep them.
 
     Raises:
         BadFitError: no fit is good, or an axis with a bad fit has no configured values.
@@ -129,7 +129,7 @@ def _fitted_values(response: RateResponse) -> AxisValues:
 
 
 def _tilt_keys(roll: AxisValues, pitch: AxisValues) -> list[str]:
-    """Lines of roll and pitch; if they hardly differ, mean values for roll, null for pitch."""
+    """YAML lines of roll and pitch; if they hardly differ, mean values for roll, null for pitch."""
     if not _nearly_same(roll, pitch):
         return _axis_keys("roll", roll) + _axis_keys("pitch", pitch, roll.slew)
     mean = AxisValues(
@@ -159,9 +159,9 @@ def _near(one: float | None, other: float | None, tolerance: float) -> bool:
 
 
 def _axis_keys(name: str, axis: AxisValues, inherited: float | None = None) -> list[str]:
-    """Lines of one axis; `inherited` is roll's slew limit, which counts if none is written.
+    """YAML lines of one axis; a null slew limit would mean `inherited`, the slew limit of roll.
 
-    Keys without a value are written as null, so that no value of another file remains in force.
+    Keys without a value are written as null, so that no value of another file remains in effect.
     """
     slew = axis.slew if axis.slew is not None or inherited is None else _NO_SLEW_LIMIT
     values = {
@@ -175,7 +175,7 @@ def _axis_keys(name: str, axis: AxisValues, inherited: float | None = None) -> l
 
 
 def _comment(name: str, response: RateResponse, kept: Mapping[str, AxisValues]) -> str:
-    """A line on the fit of an axis, or on the reason why its configured values are kept."""
+    """A comment on the fit of an axis, or on the reason why its configured values are kept."""
     if name in kept:
         return (
             f"# {name}: kept from the configuration: {kept[name].described()}; the fit is bad: "

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[Any]
-"""An array of real or complex numbers."""
+"""Array of real or complex numbers."""
 
 _LARGEST_EXPONENT = 500.0
 """Largest exponent used, so that `exp` does not overflow."""
 
 
 class Knots(NamedTuple):
-    """A command in straight pieces, with possible jumps between them.
+    """A piecewise linear command, with possible jumps between the pieces.
 
     Attributes:
         time: (n,), start of each piece, s, not decreasing.
@@ -36,7 +36,7 @@ def held_commands(time: Floats, commanded: Floats, tolerance: float = 0.0) -> Kn
     """Commands (n,), each held from its time (n,) until the next.
 
     A command begins a new piece only if it differs by more than `tolerance` from the latest piece.
-    So noise in the commands does not make many pieces, which take time.
+    Otherwise noise in the commands would make many pieces, which take time.
     """
     kept, latest = [], np.inf
     for number, value in enumerate(commanded.tolist()):
@@ -47,7 +47,7 @@ def held_commands(time: Floats, commanded: Floats, tolerance: float = 0.0) -> Kn
 
 
 def slewed(commands: Knots, slew: float) -> Knots:
-    """Held commands after a slew limit `slew` (per second); the output starts at the first one."""
+    """Held commands after the slew limit `slew`, per second; they start at the first command."""
     start = _start_values(commands, slew)
     change = commands.value - start
     arrival = commands.time + np.abs(change) / slew
@@ -79,7 +79,7 @@ def _start_values(commands: Knots, slew: float) -> Floats:
 
 
 def lagged(commands: Knots, lag: float, at: Floats) -> Floats:
-    """(m,), response of a lag of `lag` > 0 s to the commands, at the times `at` (m,), s.
+    """(m,), response of a first-order lag of `lag` > 0 s to the commands, at the times `at`, s.
 
     It starts in the steady state of the first command. No time may be before the first knot.
     """
@@ -87,9 +87,9 @@ def lagged(commands: Knots, lag: float, at: Floats) -> Floats:
 
 
 def complex_lagged(commands: Knots, lag: complex, at: Floats) -> Numbers:
-    """`lagged` for a complex lag, s.
+    """Like `lagged`, for a complex lag, s.
 
-    An underdamped second-order response is the sum of two of these, with conjugate lags.
+    An underdamped second-order response is a weighted sum of two, with conjugate complex lags.
     """
     steady = commands.value - commands.slope * lag
     ends = steady[:-1] + commands.slope[:-1] * np.diff(commands.time)
@@ -105,7 +105,7 @@ def complex_lagged(commands: Knots, lag: complex, at: Floats) -> Numbers:
 def _decayed_sums(ages: Numbers, jumps: Numbers) -> Numbers:
     """(n,), sum of all jumps up to each age, each decayed exponentially since its own age.
 
-    An age is a time divided by the lag. The sums are running sums, in parts short enough that no
+    An age is a time divided by the lag. The sums are computed in parts, each so short that no
     exponential overflows.
     """
     sums = np.empty_like(jumps)
@@ -130,7 +130,7 @@ def value_at(commands: Knots, at: Floats) -> Floats:
 
 
 _NEARLY_CRITICAL = 1e-6
-"""Smallest |ζ² − 1| that is used; at 0 both lags are equal, and their difference is 0."""
+"""Smallest |ζ² − 1| that is used; at 0 both lags would be equal, with a division by 0."""
 
 
 def second_order(commands: Knots, frequency: float, damping: float, at: Floats) -> Floats:
@@ -138,9 +138,9 @@ def second_order(commands: Knots, frequency: float, damping: float, at: Floats) 
 
     Args:
         commands: the commands; no time in `at` may be before the first knot.
-        frequency: ω, rad/s.
-        damping: ζ.
-        at: (m,), s.
+        frequency: natural frequency ω, rad/s.
+        damping: damping ratio ζ.
+        at: (m,), times, s.
     """
     first, second = _two_lags(frequency, damping)
     if first.imag:
@@ -151,19 +151,25 @@ def second_order(commands: Knots, frequency: float, damping: float, at: Floats) 
     return (slow * by_slow - quick * by_quick) / (slow - quick)
 
 
-def second_order_decay(since: Floats, frequency: float, damping: float) -> Floats:
-    """(m, 2), components of the free response, `since` (m,) seconds after the start."""
+def second_order_decay(elapsed: Floats, frequency: float, damping: float) -> Floats:
+    """(m, 2), two independent free responses of a second-order lag.
+
+    Args:
+        elapsed: (m,), time after the start, s.
+        frequency: natural frequency ω, rad/s.
+        damping: damping ratio ζ.
+    """
     first, second = _two_lags(frequency, damping)
     if first.imag:
-        oscillation = np.exp(-since / first)
+        oscillation = np.exp(-elapsed / first)
         return np.column_stack((np.real(oscillation), np.imag(oscillation)))
-    slow, quick = np.exp(-since / first.real), np.exp(-since / second.real)
+    slow, quick = np.exp(-elapsed / first.real), np.exp(-elapsed / second.real)
     # The second column is a difference, so that the two stay independent near critical damping.
     return np.column_stack((slow, (slow - quick) / (first.real - second.real)))
 
 
 def _two_lags(frequency: float, damping: float) -> tuple[complex, complex]:
-    """The two first-order lags of which a second-order lag is made, s; the longer one first."""
+    """The two first-order lags in a second-order one, s: the longer first, or a conjugate pair."""
     discriminant = damping * damping - 1.0
     discriminant = copysign(max(abs(discriminant), _NEARLY_CRITICAL), discriminant)
     root = complex(0.0, sqrt(-discriminant)) if discriminant < 0.0 else complex(sqrt(discriminant))

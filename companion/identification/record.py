@@ -10,17 +10,17 @@ Floats = NDArray[np.float64]
 LONGEST_DEAD_TIME = 0.5
 """Longest dead time that can be found, s."""
 _LONGEST_HOLD = 0.5
-"""Longest time between two commands of a stretch, s. Autopilots react to missing setpoints
-later: by default PX4 after 1 s, ArduPilot after 3 s."""
+"""Longest time between two commands of a stretch, s. Until then autopilots hold the last setpoint:
+by default PX4 for 1 s, ArduPilot for 3 s."""
 
 _MOST_ROWS = 16_000
-"""Largest number of commands and samples in a fit: half a minute of both at 250 Hz."""
+"""Largest number of commands plus samples in a fit: half a minute of both at 250 Hz."""
 _WINDOW_DURATION = 10.0
 """A long record is cut into windows of this length, s; the fit uses those with the most
 excitation."""
 _WINDOW_LEAD = 1.5
-"""Time before a window from which commands are kept, s: more than the longest dead time plus the
-longest duration of a slew-limited change of command that is searched."""
+"""Commands are kept from this time before a window on, s. It is more than the longest dead time
+plus the longest slew-limited change of command that is searched."""
 
 
 class Stretch(NamedTuple):
@@ -30,7 +30,7 @@ class Stretch(NamedTuple):
         time: (n,), times of the commands, s.
         commanded: (n,), the commands.
         measured_time: (m,), times of the samples, s, from `LONGEST_DEAD_TIME` after the first
-            command to the last command, so that for every dead time the command is known.
+            command to the last command. For each, the command is thus known at every dead time.
         measured: (m,), the samples, in the unit of the commands.
     """
 
@@ -68,7 +68,7 @@ def stretches(
 
 
 def most_excited(record: list[Stretch]) -> list[Stretch]:
-    """The record; if it is long, only the windows in which the commands varied most.
+    """The record or, if it is long, only the windows in which the commands varied most.
 
     Half an hour of flight contains hardly more information on the response than its most excited
     half minute. Each window keeps the commands shortly before it.
@@ -102,7 +102,11 @@ def _windows(stretch: Stretch) -> list[Stretch]:
 
 
 def _checked_series(time: ArrayLike, values: ArrayLike) -> tuple[Floats, Floats]:
-    """Times and values without rows that are not finite, in order of time."""
+    """Check two series, and return times and values in order of time, without non-finite rows.
+
+    Raises:
+        ValueError: they are not one-dimensional and equally long.
+    """
     t, v = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if t.ndim != 1 or t.shape != v.shape:
         raise ValueError(

@@ -1,9 +1,9 @@
 """Splits the residual of a fit: the part that the commands explain is misfit, the rest is noise.
 
-Misfit is an error of the model. It is the same in each flight, and is the error of predictions.
-Noise makes the results of flights differ, and only noise gives the standard errors. The residual is
-regressed on the commands at many delays (a finite impulse response), which explains as much as a
-linear model of any order can (Ljung, System Identification, 16.6).
+Misfit is an error of the model, the same in each flight. It limits how well the model predicts.
+Noise makes the results of flights differ, and the standard errors come from noise alone. The split
+is a regression of the residual on the commands at many delays (a finite impulse response). It
+explains as much as a linear model of any order can (Ljung, System Identification, 16.6).
 """
 
 from collections.abc import Callable
@@ -18,14 +18,14 @@ Floats = NDArray[np.float64]
 
 _MOST_DELAYS = 24
 _SAMPLES_PER_DELAY = 8
-"""Number of excited samples needed for each delay; with fewer, the regression fits the noise."""
+"""Excited samples needed for each delay of the regression; with fewer, it would fit the noise."""
 
 
 class Residuals(NamedTuple):
-    """Result of `analyse`: the misfit of a fit, and the standard errors of its unknowns.
+    """Result of `analyse_residual`: misfit of a fit, and standard errors of its unknowns.
 
     Attributes:
-        misfit: root mean square of the part that the commands explain, in the measurements' unit.
+        misfit: RMS of the part that the commands explain, in the unit of the measurements.
         errors: (k,), standard errors of the unknowns.
     """
 
@@ -33,46 +33,47 @@ class Residuals(NamedTuple):
     errors: Floats
 
 
-def analyse(
+def analyse_residual(
     residual: Floats,
     slopes: Floats,
     commands: Callable[[float], Floats],
-    memory: float,
+    response_duration: float,
     excited: int,
-    correlated: int,
+    correlated_samples: int,
 ) -> Residuals:
-    """Split a residual. With fewer than 8 excited samples all of it counts as noise.
+    """Split a residual; with fewer than 8 excited samples, all of it counts as noise.
 
     Args:
         residual: (m,), measured − modelled.
         slopes: (m, k), derivatives of the residual with respect to the unknowns; the effect of the
             linear unknowns is projected out.
-        commands: function of a delay (s) → (m,), the model's commands delayed by it.
-        memory: longest time for which the vehicle responds to a command, s.
-        excited: number of excited samples.
-        correlated: number of samples over which the noise is correlated.
+        commands: function from a further delay, s, to the (m,) delayed commands of the model.
+        response_duration: longest time for which the vehicle responds to a command, s.
+        excited: number of excited samples; see `FitQuality`.
+        correlated_samples: number of samples over which the noise is correlated.
     """
     delays = min(_MOST_DELAYS, excited // _SAMPLES_PER_DELAY)
     noise = residual
     if delays:
         # Negative delays too, because the fitted dead time may be too long.
-        delay_values = np.linspace(-0.25 * memory, memory, delays)
+        delay_values = np.linspace(-0.25 * response_duration, response_duration, delays)
         columns = np.column_stack([commands(delay) for delay in delay_values.tolist()])
         _, noise = project(np.column_stack((columns, np.ones(residual.size))), residual)
     # The regression takes one degree of freedom for each delay.
     correction = excited / max(excited - delays, 1)
     return Residuals(
-        _rms(residual - noise), _standard_errors(slopes, noise, correlated) * np.sqrt(correction)
+        _rms(residual - noise),
+        _standard_errors(slopes, noise, correlated_samples) * np.sqrt(correction),
     )
 
 
-def _standard_errors(slopes: Floats, noise: Floats, correlated: int) -> Floats:
-    """Standard errors that allow for correlated noise (Newey & West)."""
+def _standard_errors(slopes: Floats, noise: Floats, correlated_samples: int) -> Floats:
+    """(k,), standard errors of the unknowns that allow for correlated noise (Newey & West)."""
     scores = slopes * noise[:, np.newaxis]
     spread = scores.T @ scores
-    for shift in range(1, min(correlated, noise.size)):
+    for shift in range(1, min(correlated_samples, noise.size)):
         shifted = scores[shift:].T @ scores[:-shift]
-        spread += (1.0 - shift / correlated) * (shifted + shifted.T)
+        spread += (1.0 - shift / correlated_samples) * (shifted + shifted.T)
     # Slopes near the smallest float have no inverse: such unknowns are not determined.
     with np.errstate(over="ignore", invalid="ignore"):
         inverse = np.linalg.pinv(slopes.T @ slopes)

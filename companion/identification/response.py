@@ -1,4 +1,4 @@
-"""Response of one axis to body rates: the fit, its quality, and when it must not be used."""
+"""Response of one axis to commanded rates: the fit, its quality, and whether it may be used."""
 
 from dataclasses import dataclass
 from math import isnan
@@ -20,11 +20,11 @@ class FitQuality:
 
     Attributes:
         explained: R², share of the measurements' variance that the model explains.
-        misfit: error of the model: RMS of the part of the residual that correlates with the
-            commands, so it is no noise, as a share of the measurements' standard deviation.
+        misfit: error of the model: RMS of the part of the residual that the commands explain, as a
+            share of the standard deviation of the measurements. It does not contain noise.
         dead_time_error: standard error of the dead time due to noise, s.
         lag_error: standard error of the lag due to noise, s.
-        span: range of the slew-limited commands: largest minus smallest, rad/s.
+        span: largest minus smallest command, after the slew limit, rad/s.
         excited: number of samples at which the model differs from the command by more than 2 %
             of the span; only these contain information on lag and dead time.
     """
@@ -44,7 +44,8 @@ class FitNeeds:
     Attributes:
         misfit: largest misfit.
         error: largest standard error of lag and dead time, s.
-        relative_error: the same as a share of lag + dead time; the larger of both limits counts.
+        relative_error: largest standard error as a share of lag + dead time; the larger of the
+            limits `error` and `relative_error` counts.
         span: smallest span of the commands, rad/s.
         excited: smallest number of excited samples.
         gain: smallest and largest gain; that of a working rate loop is about 1.
@@ -69,9 +70,9 @@ class RateResponse:
     Attributes:
         dead_time: time from a sample to the first effect of its command, s; NaN if not found.
         lag: time constant, s; NaN if not found.
-        gain: steady rate per commanded rate; NaN if not found. It is fitted freely, even if lag and
-            dead time are for a given gain. If there is a second-order fit, it is the gain of this.
-        slew: slew limit of the autopilot before the lag, rad/s²; None if none was found.
+        gain: steady rate per commanded rate; NaN if not found. It is fitted even if lag and dead
+            time are for a given gain. If there is a second-order fit, the gain is that of this fit.
+        slew: slew limit of the commanded rate, before the lag, rad/s²; None if none was found.
         fit: quality of the fit.
         second_order: second-order fit, if it is clearly better; else None.
     """
@@ -154,7 +155,7 @@ def fit_rate_response(
     first half second of each stretch is left out, since it depends on commands before the stretch.
     A constant offset of the measurements and the rate at the start of each stretch are fitted too.
 
-    A slew limit can be told from a slow lag only if there are commands of clearly different size.
+    A slew limit differs visibly from a slow lag only if some commands are much larger than others.
 
     Args:
         time: (n,), vehicle time of the sample to which each command responds, s.

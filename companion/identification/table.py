@@ -18,8 +18,8 @@ _NO_VALUE = "–"
 def vehicle_table(vehicle: IdentifiedVehicle, gravity: float) -> RenderableType:
     """Table of the fits with one row per axis, and lines on the models; at most 80 columns wide.
 
-    An axis that is written as a lag of second order shows that fit. A column without values is left
-    out.
+    An axis that the vehicle file holds as a second-order lag shows that fit. A column without
+    values is left out.
 
     Args:
         vehicle: the identified vehicle.
@@ -46,7 +46,7 @@ def vehicle_table(vehicle: IdentifiedVehicle, gravity: float) -> RenderableType:
 
 
 def _cells(response: RateResponse, second_order: SecondOrderFit | None) -> tuple[str, ...]:
-    """The cells of an axis: of this second-order fit, or of the first-order one."""
+    """The cells of an axis, from `second_order`; None: from the first-order fit."""
     verdict = "good" if response.is_good() else "bad"
     if isnan(response.lag):
         return *(_NO_VALUE,) * 6, verdict

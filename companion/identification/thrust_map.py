@@ -11,7 +11,7 @@ from companion.identification.record import Stretch, stretches
 _LEAST_EXPLAINED = 0.8
 """Smallest R² of a usable map."""
 _EXCITED_SHARE = 0.2
-"""A command is excited if it differs from the median by more than this share of the range."""
+"""A command is excited if it differs from the median by more than this share of their range."""
 _ACCEPTED_HOVER = 0.05, 0.95
 """Range of the normalised thrust at hover that the configuration accepts."""
 _LARGEST_DELAY = 0.5
@@ -20,11 +20,11 @@ _LARGEST_DELAY = 0.5
 
 @dataclass(frozen=True, slots=True)
 class ThrustMap:
-    """Specific thrust T = slope·u + offset at normalised thrust u, behind the rotors' lag.
+    """Specific thrust T = slope·u + offset, which follows the normalised thrust u with a lag.
 
     Attributes:
         slope: m/s² per unit of normalised thrust.
-        offset: m/s².
+        offset: specific thrust at u = 0, by extrapolation, m/s².
         lag: lag of the rotors, s.
         dead_time: time from a sample to the first effect of its command on the thrust, s.
         explained: R².
@@ -41,10 +41,10 @@ class ThrustMap:
         return (specific_thrust - self.offset) / self.slope
 
     def flaw(self, gravity: float) -> str | None:
-        """Why the map may not be used, in words; None if it may.
+        """Why the map may not be used, as text; None if it may be used.
 
         Args:
-            gravity: m/s²; by the map, the vehicle must hover at a thrust between 0.05 and 0.95.
+            gravity: m/s²; the thrust at which the map gives it must be between 0.05 and 0.95.
         """
         if not self.explained >= _LEAST_EXPLAINED:
             return f"it explains {self.explained:.0%} of the measured thrust"
@@ -61,7 +61,7 @@ class ThrustMap:
         return None
 
     def described(self) -> str:
-        """The map in one line."""
+        """The map as a line of text."""
         return (
             f"T/m = {self.slope:.2f}·u {self.offset:+.2f} m/s² for u in 0..1, lag "
             f"{1e3 * self.lag:.0f} ms, dead time {1e3 * self.dead_time:.0f} ms, explains "
@@ -93,7 +93,7 @@ def _excited_samples(record: list[Stretch]) -> list[Stretch]:
 def fit_thrust_map(
     time: ArrayLike, thrust: ArrayLike, measured_time: ArrayLike, specific_thrust: ArrayLike
 ) -> ThrustMap | None:
-    """Fit a straight line behind a first-order lag with dead time (least squares).
+    """Fit a straight line with a first-order lag and dead time (least squares).
 
     Thrust doublets of a level, slow vehicle give the best fit. In fast flight, drag along the body
     z axis would be taken for thrust.

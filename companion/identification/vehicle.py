@@ -1,4 +1,4 @@
-"""Identifies a whole vehicle from the rows of one flight."""
+"""Identifies a whole vehicle, three axes and thrust, from the rows of one flight."""
 
 from dataclasses import dataclass
 
@@ -24,7 +24,7 @@ class IdentifiedVehicle:
         roll: response of the roll rate.
         pitch: response of the pitch rate.
         yaw: response of the yaw rate.
-        thrust: the thrust map, or None if thrust never changed or was hardly measured.
+        thrust: the thrust map; None if thrust never changed or was hardly measured.
     """
 
     roll: RateResponse
@@ -38,7 +38,7 @@ class IdentifiedVehicle:
         return dict(zip(AXES, (self.roll, self.pitch, self.yaw), strict=True))
 
     def faults(self) -> dict[str, str]:
-        """Reason for each axis whose fit must not be used; empty if all may be used."""
+        """By axis, why its fit must not be used; empty if all fits may be used."""
         reasons = {name: response.reason() for name, response in self.axes.items()}
         return {name: reason for name, reason in reasons.items() if reason is not None}
 
@@ -48,12 +48,12 @@ def identify_vehicle(
 ) -> IdentifiedVehicle:
     """Fit each axis and the thrust map.
 
-    Lag and dead time are fitted for a first-order rate loop of gain 1, as planners assume it. For
-    a loop of another order or gain, they are the best approximation.
+    Lag and dead time are fitted for a first-order rate loop of gain 1, as the planners assume. If
+    the real loop has another order or gain, they are the best approximation.
 
     Args:
         setpoints: (n, 5), setpoints that controlled the vehicle: vehicle time of the sample to
-            which the setpoint responds in s, roll, pitch and yaw rate in rad/s, normalised thrust.
+            which each responds, s; roll, pitch and yaw rate, rad/s; normalised thrust.
         rates: (m, 4), vehicle time in s, measured roll, pitch and yaw rate in rad/s.
         specific_thrust: (k, 2), vehicle time in s, m/s²; may be empty.
 
