@@ -1,1 +1,1 @@
-"""Benchmarks: latency and processor time, compared with other programs; speed in one process."""
+"""Benchmarks of latency, processor time, planners and whole flights, with comparisons."""

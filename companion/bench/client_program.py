@@ -1,7 +1,7 @@
-"""Clients of the benchmark: they read all forwarded frames, and count the lost ones.
+"""Clients for `companion bench serve`: they read all forwarded frames, and count the lost ones.
 
-`python -m companion.bench.client_program PORT COUNT` ends with a line of JSON when its standard
-input is closed.
+`python -m companion.bench.client_program PORT COUNT` runs until its standard input is closed, and
+then prints the counts as a line of JSON.
 """
 
 import json
@@ -26,8 +26,8 @@ class Counter:
     """Counts the autopilot's frames on one socket, and the gaps in their sequence numbers.
 
     Attributes:
-        received: frames.
-        lost: frames missing by their sequence numbers.
+        received: number of frames received.
+        lost: number of frames lost, by the gaps.
     """
 
     def __init__(self) -> None:
@@ -35,7 +35,7 @@ class Counter:
         self._sequence: int | None = None
 
     def take(self, datagram: bytes) -> None:
-        """Count the frames of a datagram: whole, unsigned MAVLink 2 frames."""
+        """Count the frames of a datagram; they must be whole, unsigned MAVLink 2 frames."""
         start = 0
         while start + _HEADER_BYTES <= len(datagram) and datagram[start] == _MAGIC:
             if (

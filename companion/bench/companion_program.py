@@ -1,4 +1,4 @@
-"""A program that answers samples as `companion fly` does: link, control loop, planner, thrust."""
+"""A program that answers samples like `companion fly`: link, control loop, planner, thrust."""
 
 import asyncio
 import sys
@@ -19,7 +19,7 @@ _GUIDANCE_PERIOD_S = 0.02
 
 
 async def fly(port: int) -> None:
-    """Answer each sample until killed."""
+    """Answer each attitude sample with a setpoint until killed; `port` is a UDP port."""
     async with Link(LinkSettings(endpoint=f"udpin://127.0.0.1:{port}")) as link:
         await answer(link)
 

@@ -1,6 +1,6 @@
-"""The lower bound: a blocking socket that answers each datagram with one of a setpoint's size.
+"""The lower bound of latency: each datagram is answered at once by one of the size of a setpoint.
 
-It decodes and computes nothing; Python cannot answer faster than this.
+The program blocks on its socket, and decodes and computes nothing. Python cannot be faster.
 """
 
 import socket
@@ -12,7 +12,7 @@ _TIME_BOOT_MS = slice(10, 14)  # bytes of time_boot_ms, in a sample and in a set
 
 
 def main(port: int) -> None:
-    """Answer until killed."""
+    """Answer each datagram on a UDP port until killed."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as opened:
         opened.bind(("127.0.0.1", port))
         while True:

@@ -1,20 +1,20 @@
-"""Shared by the latency benchmarks: the length of a round, and the figures of a sender."""
+"""What the latency benchmarks share: the length of a round, and the figures of a sender."""
 
 import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from companion.bench.process import ContestantError
+from companion.bench.process import BenchmarkError
 from companion.bench.sender import Sender
 
 ROUND_S = 1.0
-"""The programs are measured in turn, in rounds of this length, s: load affects all equally."""
+"""The programs are measured in turn, in rounds of this length, s, so load affects all equally."""
 
 
 @contextmanager
 def no_garbage_collection() -> Iterator[None]:
-    """Switch the garbage collector off, so that the sender does not pause while it measures."""
+    """Switch Python's garbage collector off in the context, so that the sender does not pause."""
     enabled = gc.isenabled()
     gc.disable()
     try:
@@ -25,14 +25,14 @@ def no_garbage_collection() -> Iterator[None]:
 
 
 def figures_of(sender: Sender) -> dict[str, Any]:
-    """Round trips in µs, processor time in % of one core, and counts.
+    """The figures of one program: round trips in µs, processor time in % of a core, and counts.
 
     Raises:
-        ContestantError: no sample was answered in time.
+        BenchmarkError: no sample was answered in time.
     """
     ordered = sorted(sender.round_trips_ns)
     if not ordered:
-        raise ContestantError(f"{sender.name} answered none of {sender.sent} samples in time")
+        raise BenchmarkError(f"{sender.name} answered none of {sender.sent} samples in time")
     return {
         "p50_us": _quantile_us(ordered, 0.50),
         "p99_us": _quantile_us(ordered, 0.99),

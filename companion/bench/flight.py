@@ -12,16 +12,16 @@ from rich.console import Console
 from rich.table import Table
 
 from companion.batch import can_compile
-from companion.bench.profile import sampled, shares
+from companion.bench.profile import sampling, shares
 from companion.config import Config
 from companion.config.files import changed, load, shipped
 from companion.extras import pip_command
 from companion.testing import MockVehicle, fly
 
-FILES = {"px4": "mock-px4.yaml", "ardupilot": "mock-ardupilot.yaml"}
-"""The shipped configuration of each autopilot."""
+CONFIG_FILES = {"px4": "mock-px4.yaml", "ardupilot": "mock-ardupilot.yaml"}
+"""File name of the shipped configuration for each autopilot of the mock vehicle."""
 CLOCKS = {"lockstep": True, "free": False}
-"""Kinds of clock by name. True: lockstep. False: samples come without waiting, as over UDP."""
+"""Whether a kind of clock is lockstep; with `free`, samples come without waiting, as over UDP."""
 
 _FLIGHTS = 3
 _WARM_UP_S = 0.2
@@ -29,24 +29,24 @@ _LINK_DELAY_S = 0.0005
 
 
 def run(seconds: float, as_json: bool, profile: bool = False) -> dict[str, Any]:
-    """Fly a hover with each autopilot, in lockstep and free.
+    """Fly a hover with each autopilot and each of `CLOCKS`.
 
     Args:
         seconds: duration of the hover, without take-off and landing, s.
         as_json: print nothing; the caller prints the result.
-        profile: fly once more and measure which part uses how much processor time.
+        profile: fly once more, and measure how much processor time each part of the code uses.
 
     Returns:
-        By autopilot and clock, of the quickest of three flights: `vehicle_s`, `cpu_s`, their ratio
-        `times_real_time`, `setpoints`, and whether the physics are `compiled`; with `profile` also
-        `shares` of the processor time by part.
+        Figures by autopilot and clock, of the quickest of three flights: `vehicle_s`, `cpu_s`,
+        their ratio `times_real_time`, number of `setpoints`, and whether the physics are
+        `compiled`; with `profile` also the `shares` of the processor time by part.
 
     Raises:
         ConfigError: a shipped configuration cannot be found.
         RuntimeError: a flight failed; the message says why.
     """
     figures: dict[str, Any] = {}
-    for autopilot in FILES:
+    for autopilot in CONFIG_FILES:
         figures[autopilot] = {
             name: _measure(autopilot, CLOCKS[name], seconds, profile) for name in CLOCKS
         }
@@ -62,7 +62,7 @@ def _measure(autopilot: str, lockstep: bool, seconds: float, profile: bool) -> d
         key=lambda flight: flight["cpu_s"],
     )
     if profile:
-        with sampled() as counts:
+        with sampling() as counts:
             _fly_once(autopilot, lockstep, seconds)
         best["shares"] = shares(counts)
     return best
@@ -70,7 +70,7 @@ def _measure(autopilot: str, lockstep: bool, seconds: float, profile: bool) -> d
 
 def _fly_once(autopilot: str, lockstep: bool, seconds: float) -> dict[str, Any]:
     """Figures of one flight."""
-    path = shipped(FILES[autopilot])
+    path = shipped(CONFIG_FILES[autopilot])
     config = _hover_config(load(path), seconds)
     compiled = can_compile()
     vehicle = MockVehicle(
@@ -115,7 +115,7 @@ def _print(figures: dict[str, Any]) -> None:
 
 
 def _print_shares(figures: dict[str, Any], console: Console) -> None:
-    """Print the shares of the processor time, a column for each kind of flight."""
+    """Print the shares of the processor time, with a column for each autopilot and clock."""
     flights = {
         f"{autopilot}, {clock}": flown["shares"]
         for autopilot, clocks in figures.items()

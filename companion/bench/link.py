@@ -1,4 +1,4 @@
-"""`companion bench link`: the time from a sample to its setpoint, of this and other programs.
+"""`companion bench link`: the time from a sample to its setpoint, for this and other programs.
 
 A sender simulates the vehicle for five programs in turn, in short rounds, so that the load of the
 computer affects all of them equally. The programs are a bare echo in Python (the lower bound), this
@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from companion.bench.figures import ROUND_S, figures_of, no_garbage_collection
-from companion.bench.process import Contestant
+from companion.bench.process import BenchmarkedProgram
 from companion.bench.sender import Sender, Stamp, stamp_by_time, stamp_by_yaw_rate
 from companion.extras import require
 
@@ -25,9 +25,13 @@ _BACKEND_PROGRAM = "companion.bench.backend_program"
 
 
 class _Program(NamedTuple):
-    """A program: its key in the result, its title, its module, and how its setpoints are matched.
+    """A program to measure.
 
-    `stamp` and `modulus` are those of `Sender`.
+    Attributes:
+        key: key of the program in the result.
+        title: name for the user.
+        module: module that is run.
+        stamp, modulus: how its setpoints are matched with samples; see `Sender`.
     """
 
     key: str
@@ -55,18 +59,18 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
 
     Args:
         seconds: Time for which each program is measured, s.
-        rate_hz: Rate of samples, Hz.
+        rate_hz: Rate of the attitude samples, Hz.
         as_json: Print nothing; the caller prints the result.
 
     Returns:
         For each of `echo`, `companion`, `pymavlink`, `companion_mavsdk` and `mavsdk`: `p50_us`,
-        `p99_us`, `max_us`, `cpu_percent` (of one core), `samples` and `unanswered`. Also `ratio`:
-        the p50 of `companion` divided by that of `echo`, `pymavlink` and `mavsdk`, as
-        `companion_to_…`.
+        `p99_us`, `max_us`, `cpu_percent` (of one core), `samples` and `unanswered`. Under `ratio`,
+        as `companion_to_…`, the p50 of `companion` divided by that of `echo`, `pymavlink` and
+        `mavsdk`.
 
     Raises:
         MissingExtraError: MAVSDK is not installed.
-        ContestantError: A program failed.
+        BenchmarkError: A program failed.
         LinkError: There are no free ports.
     """
     require("mavsdk", "mavsdk", "this benchmark")
@@ -91,9 +95,9 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
 
 
 def _start(stack: ExitStack, program: _Program) -> Sender:
-    contestant = Contestant(program.title, program.module)
-    stack.callback(contestant.stop)
-    sender = Sender(contestant, program.stamp, program.modulus)
+    benchmarked = BenchmarkedProgram(program.title, program.module)
+    stack.callback(benchmarked.stop)
+    sender = Sender(benchmarked, program.stamp, program.modulus)
     stack.callback(sender.close)
     return sender
 

@@ -1,7 +1,7 @@
 """A program that answers samples with MAVSDK's asyncio interface, as a user of MAVSDK writes it.
 
-MAVSDK stamps setpoints with its own clock. So this program returns the sample's time stamp in the
-yaw rate: 1 °/s for each ms.
+MAVSDK stamps setpoints with its own clock. This program therefore returns the time stamp of the
+sample in the yaw rate, as 1 °/s for each ms, modulo `STAMP_MODULUS`.
 """
 
 import asyncio
@@ -23,7 +23,10 @@ _DT = 0.004
 
 
 def setpoint(roll_deg_s: float, pitch_deg_s: float, yaw_deg_s: float) -> AttitudeRate:
-    """An AttitudeRate with these values; its C structure has no constructor for them."""
+    """An AttitudeRate with these rates, in °/s, and hover thrust.
+
+    AttitudeRate is a C structure without a constructor for values.
+    """
     rate = AttitudeRate()
     rate.roll_deg_s, rate.pitch_deg_s, rate.yaw_deg_s = roll_deg_s, pitch_deg_s, yaw_deg_s
     rate.thrust_value = _HOVER_THRUST
@@ -31,7 +34,7 @@ def setpoint(roll_deg_s: float, pitch_deg_s: float, yaw_deg_s: float) -> Attitud
 
 
 async def fly(port: int) -> None:
-    """Answer each sample until killed."""
+    """Answer each attitude sample with a setpoint until killed; `port` is a UDP port."""
     planner = make_planner(Config())
     target = Target(0.1, 0.0, 0.0)
     configuration = Configuration.create_with_component_type(ComponentType.COMPANION_COMPUTER)

@@ -1,8 +1,8 @@
 """`companion bench planner`: the time of one step of a planner, in a flight and in a batch.
 
-Times are the best of many short repeats without garbage collection, so that other load on the
-computer hardly counts. The baselines, a bare Python call and a copy of the same arrays, are
-measured in between, under the same conditions.
+Times are the shortest of many short repeats without garbage collection, so that other load on the
+computer hardly counts. Two baselines are measured in between, under the same conditions: a bare
+Python call, and a copy of the same arrays.
 """
 
 from collections.abc import Callable
@@ -30,7 +30,7 @@ _STEPS, _STEPS_IN_PYTHON = 4_000, 10  # number of steps of `advance` in a repeat
 
 
 class _Case(NamedTuple):
-    """A case to time.
+    """Code whose run time is measured.
 
     Attributes:
         group: key of the group in the result.
@@ -46,7 +46,7 @@ class _Case(NamedTuple):
 
 
 class _Fleet(NamedTuple):
-    """Attitudes (4, n) and targets (4, n) of n vehicles."""
+    """Attitudes `q` (4, n) and `targets` (4, n) of n vehicles, as `companion.batch` takes them."""
 
     q: NDArray[np.float64]
     targets: NDArray[np.float64]
@@ -56,7 +56,7 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
     """Measure every planner without memory, interleaved with the baselines.
 
     Args:
-        seconds: Time of measuring without compiling, s; at least one round is measured.
+        seconds: Duration of the measurement without compilation, s; at least one round is measured.
         as_json: Print nothing; the caller prints the result.
 
     Returns:
@@ -97,7 +97,7 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
 
 
 def _flight_cases() -> list[_Case]:
-    """Cases of two steps: with the same target, as in most steps of a flight, and with another."""
+    """Cases of a step with the same target as before, as most in flight, and with a new target."""
     vehicle = _fleet(2)
     same, other = (Target(*column) for column in vehicle.targets.T.tolist())
     values: dict[str, Any] = {"q": tuple(vehicle.q[:, 0].tolist()), "same": same, "other": other}
@@ -146,7 +146,7 @@ def _planner(name: str) -> LawPlanner:
 
 
 def _fleet(count: int) -> _Fleet:
-    """Vehicles at many headings, some with a large tilt, and targets within the limits."""
+    """`count` vehicles at many headings, some with a large tilt, and targets within the limits."""
     random = np.random.default_rng(1)
     q = random.normal(size=(4, count))
     q[0] = 1.5 + np.abs(q[0])

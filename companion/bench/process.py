@@ -1,4 +1,4 @@
-"""A process that runs one of the programs to measure."""
+"""A process that runs one of the programs that are measured."""
 
 import subprocess
 import sys
@@ -10,12 +10,12 @@ from companion.mavlink.errors import LinkError
 from companion.mavlink.transport.free_port import free_port
 
 
-class ContestantError(LinkError):
-    """A program of the benchmark failed."""
+class BenchmarkError(LinkError):
+    """A program that is measured, or a client of it, failed."""
 
 
-class Contestant:
-    """One program to measure: starts `python -m MODULE PORT …`, and reads its processor time.
+class BenchmarkedProgram:
+    """A program that is measured, run as `python -m MODULE PORT …` in its own process.
 
     Args:
         name: Name to show to users.
@@ -36,15 +36,15 @@ class Contestant:
         )
 
     def check_running(self) -> None:
-        """Raise `ContestantError` with its last line of error output if the program has ended."""
+        """Raise `BenchmarkError`, with the last line of error output, if the program has ended."""
         if self._process.poll() is not None:
             self._output.seek(0)
             error_lines = self._output.read().decode(errors="replace").strip().splitlines()
             reason = error_lines[-1] if error_lines else "it printed no error"
-            raise ContestantError(f"{self.name} ended early: {reason}")
+            raise BenchmarkError(f"{self.name} ended early: {reason}")
 
     def cpu_ns(self) -> int:
-        """Processor time of all its threads so far, ns (Linux only)."""
+        """Processor time of all threads of the program so far, ns (Linux only)."""
         tasks = Path(f"/proc/{self._process.pid}/task").iterdir()
         return sum(int((task / "schedstat").read_text().split()[0]) for task in tasks)
 

@@ -1,4 +1,4 @@
-"""Processor time used by each part of the program and of the mock vehicle, by sampling."""
+"""Measures the processor time of each part of the program and of the mock vehicle by sampling."""
 
 import signal
 from collections import Counter
@@ -36,7 +36,7 @@ PARTS = {
     ),
     "recording": ("companion/recording/",),
 }
-"""Parts, and the files of each; a file belongs to the first part that names it."""
+"""Files and folders of each part; a file belongs to the first part that names it."""
 _OTHER_CODE = "rest"
 _ROOTS = tuple(
     f"{Path(spec.origin).parents[1]}/"
@@ -46,8 +46,8 @@ _ROOTS = tuple(
 
 
 @contextmanager
-def sampled() -> Iterator[Counter[str]]:
-    """Count samples by part while the block runs, in the main thread.
+def sampling() -> Iterator[Counter[str]]:
+    """In the context, count samples of the main thread's stack by part.
 
     A function in a file that no part names, such as one of another package, counts for the part
     that called it.
@@ -76,13 +76,13 @@ def sampled() -> Iterator[Counter[str]]:
 
 
 def shares(counts: Counter[str]) -> dict[str, float]:
-    """Share of each part, largest first; together they are 1."""
+    """Share of each part in all samples, largest first; the sum is 1."""
     total = counts.total()
     return {part: count / total for part, count in counts.most_common()}
 
 
 def _part_of(file: str) -> str | None:
-    """Part of a source file; `None`: no part names it."""
+    """The part to which a source file belongs; None if no part names it."""
     for root in _ROOTS:
         name = file.removeprefix(root)
         for part, prefixes in PARTS.items():

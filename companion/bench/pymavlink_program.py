@@ -1,4 +1,4 @@
-"""A simple program on pymavlink: a blocking socket and the same law in a loop.
+"""A simple program on pymavlink: a loop with a blocking socket and the same control law.
 
 It decodes, computes and encodes. It has no offboard-loss checks, thrust control or recording.
 """
@@ -17,7 +17,7 @@ _HOVER_THRUST = 0.5
 
 
 def main(port: int) -> None:
-    """Answer until killed."""
+    """Answer each attitude sample on a UDP port with a setpoint until killed."""
     law, target, mavlink = planner(Config()), Target(0.1, 0.0, 0.0), dialect.MAVLink(None, 1, 191)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as opened:
         opened.bind(("127.0.0.1", port))

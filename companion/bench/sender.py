@@ -1,4 +1,4 @@
-"""Simulates the vehicle of the benchmark: sends samples at a rate, and times the setpoints."""
+"""Simulates the vehicle of a benchmark: sends attitude samples, and times the setpoints."""
 
 import contextlib
 import select
@@ -11,10 +11,10 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common as dialect
 
-from companion.bench.process import Contestant, ContestantError
+from companion.bench.process import BenchmarkedProgram, BenchmarkError
 
 Stamp = Callable[[bytes], int]
-"""From the bytes of a setpoint: time stamp (ms) of its sample, modulo `Sender`'s `modulus`."""
+"""Function from the bytes of a setpoint to the time stamp of its sample, ms, modulo `modulus`."""
 
 _SETPOINT_BYTES = 51
 _SETPOINT_ID = 82
@@ -32,7 +32,7 @@ def stamp_by_time(setpoint: bytes) -> int:
 
 
 def stamp_by_yaw_rate(setpoint: bytes) -> int:
-    """The stamp that `mavsdk_program` puts in the yaw rate, in whole degrees per second."""
+    """The time stamp (ms) that `mavsdk_program` returns in the yaw rate, 1 °/s for each ms."""
     return round(degrees(struct.unpack_from("<f", setpoint, _YAW_RATE_OFFSET)[0]))
 
 
@@ -40,23 +40,27 @@ class Sender:
     """Simulates one vehicle for one program.
 
     Args:
-        contestant: The program that answers.
+        program: The program that answers.
         stamp: Finds the time stamp in a setpoint.
-        modulus: Value at which these stamps wrap, ms.
+        modulus: Value at which the time stamps in setpoints wrap, ms.
         extra_messages: Messages that follow each sample, each in a datagram of its own.
 
     Attributes:
         round_trips_ns: Times from sample to setpoint, ns.
         sent: Number of samples sent in measured rounds.
-        cpu_ns: Processor time of the program in these rounds, ns.
-        wall_ns: Duration of these rounds, ns.
+        cpu_ns: Processor time of the program in measured rounds, ns.
+        wall_ns: Duration of the measured rounds, ns.
     """
 
     def __init__(
-        self, contestant: Contestant, stamp: Stamp, modulus: int, extra_messages: Sequence[Any] = ()
+        self,
+        program: BenchmarkedProgram,
+        stamp: Stamp,
+        modulus: int,
+        extra_messages: Sequence[Any] = (),
     ) -> None:
         self._extra_messages = extra_messages
-        self._contestant, self._stamp, self._modulus = contestant, stamp, modulus
+        self._program, self._stamp, self._modulus = program, stamp, modulus
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", 0))
         self._socket.setblocking(False)
@@ -77,14 +81,14 @@ class Sender:
     @property
     def name(self) -> str:
         """Name of the program, to show to users."""
-        return self._contestant.name
+        return self._program.name
 
     def close(self) -> None:
         """Close the socket."""
         self._socket.close()
 
     def heartbeat(self) -> None:
-        """Send the heartbeat of an armed vehicle in offboard."""
+        """Send the heartbeat of an armed PX4 vehicle in offboard mode."""
         self._send_message(
             dialect.MAVLink_heartbeat_message(
                 _QUADROTOR, _PX4, _OFFBOARD_ARMED, _OFFBOARD, _ACTIVE, 3
@@ -95,16 +99,16 @@ class Sender:
         """Send samples until the program answers one.
 
         Raises:
-            ContestantError: The program ended, or did not answer within 30 s.
+            BenchmarkError: The program ended, or did not answer within 30 s.
         """
         end = time.monotonic() + _READY_TIMEOUT_S
         heartbeat_due = 0.0
         answered = False
         while not answered:
-            self._contestant.check_running()
+            self._program.check_running()
             if time.monotonic() > end:
-                raise ContestantError(
-                    f"{self._contestant.name} did not answer within {_READY_TIMEOUT_S:g} s"
+                raise BenchmarkError(
+                    f"{self._program.name} did not answer within {_READY_TIMEOUT_S:g} s"
                 )
             if time.monotonic() > heartbeat_due:
                 heartbeat_due = time.monotonic() + 0.5
@@ -116,23 +120,23 @@ class Sender:
         """Send samples at `rate_hz` for `seconds`, and record the round trips.
 
         Raises:
-            ContestantError: The program ended.
+            BenchmarkError: The program ended.
         """
-        self._contestant.check_running()
+        self._program.check_running()
         self.heartbeat()
         due = self._send_samples(_SETTLE_SAMPLES, rate_hz, time.perf_counter_ns())
         self._sent_ns.clear()
         self._recording = True
-        cpu, began = self._contestant.cpu_ns(), time.perf_counter_ns()
+        cpu, began = self._program.cpu_ns(), time.perf_counter_ns()
         count = round(rate_hz * seconds)
         self._send_samples(count, rate_hz, due)
         self.sent += count
-        self.cpu_ns += self._contestant.cpu_ns() - cpu
+        self.cpu_ns += self._program.cpu_ns() - cpu
         self.wall_ns += time.perf_counter_ns() - began
         self._recording = False
 
     def forget(self) -> None:
-        """Forget what was measured so far."""
+        """Reset all measurements."""
         self.round_trips_ns.clear()
         self.sent = self.cpu_ns = self.wall_ns = 0
 
@@ -156,7 +160,7 @@ class Sender:
             self._send_message(message)
 
     def _listen_until(self, due_ns: int) -> bool:
-        """Take answers until the time `due_ns`; return whether one belonged to a sample."""
+        """Receive until the time `due_ns`; return whether a setpoint answered a sample."""
         matched = False
         while (remaining_ns := due_ns - time.perf_counter_ns()) > 0:
             # poll() counts whole milliseconds; the rest is slept.
@@ -177,7 +181,7 @@ class Sender:
         return matched
 
     def _accept_commands(self, data: bytes) -> None:
-        """Accept every command, which MAVSDK needs to start."""
+        """Accept every command in the received bytes; MAVSDK needs this to start."""
         for message in self._parser.parse_buffer(data) or ():
             if message.get_type() == "COMMAND_LONG":
                 self._send_message(dialect.MAVLink_command_ack_message(message.command, 0))
@@ -192,4 +196,4 @@ class Sender:
 
     def _send(self, frame: bytes) -> None:
         with contextlib.suppress(OSError):  # refused: the program has not started yet
-            self._socket.sendto(frame, ("127.0.0.1", self._contestant.port))
+            self._socket.sendto(frame, ("127.0.0.1", self._program.port))

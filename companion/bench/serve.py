@@ -1,8 +1,8 @@
-"""`companion bench serve`: how much other programs on the link delay the setpoints.
+"""`companion bench serve`: how much forwarding to other programs delays the setpoints.
 
-Two processes answer the same samples and telemetry in turn, in short rounds. The first forwards
-them to nobody. The second forwards them to three clients that read everything, and to a fourth that
-is stopped (SIGSTOP).
+Two processes get the same samples and telemetry in turn, in short rounds. The first has no clients.
+The second forwards everything to three clients that read all, and to a fourth that is stopped
+(SIGSTOP).
 """
 
 import json
@@ -18,7 +18,7 @@ from rich.console import Console
 from rich.table import Table
 
 from companion.bench.figures import ROUND_S, figures_of, no_garbage_collection
-from companion.bench.process import Contestant, ContestantError
+from companion.bench.process import BenchmarkedProgram, BenchmarkError
 from companion.bench.sender import Sender, stamp_by_time
 from companion.child_process import end_with_parent
 from companion.mavlink.transport.free_port import free_port
@@ -43,17 +43,17 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
     """Measure with and without clients, in interleaved rounds of about 1 s.
 
     Args:
-        seconds: Time for which each is measured, s.
-        rate_hz: Rate of samples, and of each of five telemetry messages, Hz.
+        seconds: Time of each of the two measurements, s.
+        rate_hz: Rate of the attitude samples and of each of five telemetry messages, Hz.
         as_json: Print nothing; the caller prints the result.
 
     Returns:
-        For `alone` and `with_clients` the figures of `companion bench link`; `ratio`: p50 and p99
-        with clients divided by those without; `clients`: frames received and lost by each of the
-        three that read.
+        For `alone` and `with_clients` the figures as of `companion bench link`; `ratio`: p50 and
+        p99 with clients divided by those without; `clients`: number of frames that each of the
+        three reading clients received and lost.
 
     Raises:
-        ContestantError: A program failed.
+        BenchmarkError: A program failed.
         LinkError: There are no free ports.
     """
     rounds = ceil(seconds / ROUND_S)
@@ -84,9 +84,9 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
 
 
 def _start(stack: ExitStack, key: str, client_port: int) -> Sender:
-    contestant = Contestant(_TITLES[key], "companion.bench.serve_program", str(client_port))
-    stack.callback(contestant.stop)
-    sender = Sender(contestant, stamp_by_time, _NO_WRAP, _TELEMETRY)
+    program = BenchmarkedProgram(_TITLES[key], "companion.bench.serve_program", str(client_port))
+    stack.callback(program.stop)
+    sender = Sender(program, stamp_by_time, _NO_WRAP, _TELEMETRY)
     stack.callback(sender.close)
     return sender
 
@@ -108,7 +108,7 @@ def _start_clients(stack: ExitStack, port: int, count: int) -> subprocess.Popen[
 def _read_counts(process: subprocess.Popen[str]) -> list[dict[str, int]]:
     out, _ = process.communicate()
     if process.returncode != 0:
-        raise ContestantError(f"the clients of the benchmark ended with {process.returncode}")
+        raise BenchmarkError(f"the clients of the benchmark ended with {process.returncode}")
     counts: list[dict[str, int]] = json.loads(out)
     return counts
 

@@ -1,4 +1,4 @@
-"""Answers samples and forwards all messages to clients, as `companion serve` does in control."""
+"""A program that answers samples and forwards all messages to clients, like `companion serve`."""
 
 import sys
 
@@ -10,7 +10,12 @@ from companion.vehicle.link import Link
 
 
 async def fly(port: int, client_port: int) -> None:
-    """Answer each sample, and pass everything to the clients, until killed."""
+    """Answer each attitude sample, and forward everything to the clients, until killed.
+
+    Args:
+        port: UDP port for the vehicle.
+        client_port: UDP port for the clients.
+    """
     link = Link(LinkSettings(endpoint=f"udpin://127.0.0.1:{port}"))
     async with link, Network(link, [f"udpin://127.0.0.1:{client_port}"]) as network:
         network.routing.intercept = lambda *_: False

@@ -15,7 +15,7 @@ LARGE = {"event loop and wire", "link: frames, messages, state", "guidance", "ve
 
 
 def test_the_table_of_the_bench_is_also_json(capsys, monkeypatch):
-    monkeypatch.setattr(flight, "FILES", {"px4": flight.FILES["px4"]})
+    monkeypatch.setattr(flight, "CONFIG_FILES", {"px4": flight.CONFIG_FILES["px4"]})
     monkeypatch.setattr(flight, "_FLIGHTS", 1)
     monkeypatch.setattr(flight, "MockVehicle", partial(QuickVehicle, full_rate=True))
     assert main(["bench", "flight", "--seconds", "0.2", "--json", "--profile"]) == 0

@@ -7,7 +7,7 @@ import pytest
 from pymavlink.dialects.v20 import common as dialect
 
 from companion.bench import link
-from companion.bench.process import Contestant, ContestantError
+from companion.bench.process import BenchmarkedProgram, BenchmarkError
 from companion.bench.sender import Sender, stamp_by_time, stamp_by_yaw_rate
 
 
@@ -26,8 +26,8 @@ def test_stamps_are_read_where_pymavlink_puts_them():
 
 @pytest.mark.parametrize("module", ["echo_program", "companion_program", "pymavlink_program"])
 def test_every_sample_is_answered_and_its_time_taken(module):
-    contestant = Contestant(module, f"companion.bench.{module}")
-    sender = Sender(contestant, stamp_by_time, 2**32)
+    program = BenchmarkedProgram(module, f"companion.bench.{module}")
+    sender = Sender(program, stamp_by_time, 2**32)
     try:
         sender.wait_ready()
         sender.send_for(100.0, 0.5)
@@ -37,7 +37,7 @@ def test_every_sample_is_answered_and_its_time_taken(module):
         assert sender.cpu_ns > 0
     finally:
         sender.close()
-        contestant.stop()
+        program.stop()
 
 
 def test_the_echo_is_of_a_setpoints_size():
@@ -49,13 +49,13 @@ def test_the_echo_is_of_a_setpoints_size():
 
 
 def test_a_program_that_ends_early_is_told_with_its_last_words():
-    contestant = Contestant("broken", "companion.bench.no_such_program")
+    program = BenchmarkedProgram("broken", "companion.bench.no_such_program")
     try:
-        contestant._process.wait(10)
-        with pytest.raises(ContestantError, match=r"broken ended early: .*no_such_program"):
-            contestant.check_running()
+        program._process.wait(10)
+        with pytest.raises(BenchmarkError, match=r"broken ended early: .*no_such_program"):
+            program.check_running()
     finally:
-        contestant.stop()
+        program.stop()
 
 
 @pytest.mark.slow

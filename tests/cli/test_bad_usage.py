@@ -191,8 +191,8 @@ def test_a_vehicle_started_by_hand_does_not_need_its_standard_input():
 
 def test_a_program_of_the_benchmark_ends_with_a_benchmark_that_is_killed():
     code = (
-        "from companion.bench.process import Contestant; import time;"
-        "one = Contestant('echo', 'companion.bench.echo_program');"
+        "from companion.bench.process import BenchmarkedProgram; import time;"
+        "one = BenchmarkedProgram('echo', 'companion.bench.echo_program');"
         "print(one._process.pid, flush=True); time.sleep(60)"
     )
     process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
