@@ -83,7 +83,7 @@ def _is_whole(record: FlightRecord) -> bool:
 def replay(options: argparse.Namespace) -> int:
     """Replay a recorded flight; fail if the setpoints differ although its configuration is used."""
     from companion.replay.replay import Replay  # noqa: PLC0415  no other command needs it
-    from companion.replay.report import words, write_csv  # noqa: PLC0415
+    from companion.replay.report import result_lines, write_csv  # noqa: PLC0415
 
     if options.csv is not None:  # a long flight takes a minute to replay
         require_writable(options.csv, "--csv", force=True)
@@ -97,7 +97,7 @@ def replay(options: argparse.Namespace) -> int:
     whole = _is_whole(record)
     if not samples:
         raise ConfigError(f"{options.folder}: no attitude sample is recorded there to replay")
-    for line in words(samples, record.began, follows_record=replayed.follows_record):
+    for line in result_lines(samples, record.began, follows_record=replayed.follows_record):
         print(line)
     if options.csv is not None:
         try:

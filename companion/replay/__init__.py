@@ -1,1 +1,1 @@
-"""Runs the code of a flight again with the inputs that the flight recorded."""
+"""Replays a flight: runs its control loop and guidance loop again with the recorded inputs."""

@@ -1,6 +1,7 @@
-"""The inputs of the loops of a recorded flight, in order.
+"""Reads the recorded inputs of the control loop and the guidance loop, in order.
 
-They are samples, guidance steps, actions, changes of values and the autopilot's attitude targets.
+They are samples, guidance steps, actions of phases, changes of configuration values in flight, and
+the autopilot's ATTITUDE_TARGET.
 """
 
 from collections.abc import Iterator
@@ -29,21 +30,21 @@ from companion.replay.recorded import (
 )
 from companion.vehicle.records import AttitudeTarget
 
-Entry = RecordedSample | RecordedStep | RecordedAction | ValuesChange | AttitudeTarget
-"""An input of the loops, with what the flight computed from it."""
+RecordedInput = RecordedSample | RecordedStep | RecordedAction | ValuesChange | AttitudeTarget
+"""An input of the loops, with the output that the flight computed from it."""
 
 
-def entries(record: FlightRecord) -> Iterator[Entry]:
+def recorded_inputs(record: FlightRecord) -> Iterator[RecordedInput]:
     """All inputs of a flight, in the order in which the program took them.
 
     Raises:
-        RecordError: an entry is not valid.
+        RecordError: a recorded input is not valid.
     """
     with as_recorded(record.folder):
         yield from _ordered_entries(_Messages(record))
 
 
-def _ordered_entries(messages: "_Messages") -> Iterator[Entry]:
+def _ordered_entries(messages: "_Messages") -> Iterator[RecordedInput]:
     while (topic := messages.next()) is not None:
         if topic == SAMPLE.topic:
             row = messages.take(SAMPLE)
@@ -71,7 +72,7 @@ _CHANNELS = (SAMPLE, SETPOINT, INPUT, TARGET, GUIDANCE, ACTION, ATTITUDE_TARGET)
 
 
 class _Messages:
-    """The messages of the replayed channels and the changes, in the order of the file."""
+    """Reads messages of the replayed channels, and changes of values, in the order of the file."""
 
     def __init__(self, record: FlightRecord) -> None:
         used = {_CHANGE_TOPIC, *(channel.topic for channel in _CHANNELS)}
@@ -94,7 +95,7 @@ class _Messages:
         next(self._rows[topic])
 
     def take(self, channel: Channel) -> Row:
-        """The next message if it is one of `channel`, else a row of NaN."""
+        """Take the next message if it is of `channel`; else take none and return NaN values."""
         names = channel.dtype.names or ()
         if self.next() != channel.topic:
             return dict.fromkeys(names, float("nan"))

@@ -20,7 +20,7 @@ from companion.vehicle.records import (
 )
 
 Row = dict[str, Any]
-"""One message: value by column name."""
+"""A message of `flight.mcap`: value by column name."""
 
 _TARGET_COLUMNS = "north", "east", "heading_rad", "heading_rate_rad_s"
 _MISFITS = (None, Misfit.NOT_NEWER, Misfit.AHEAD)  # by number in the record
@@ -34,14 +34,15 @@ class Setpoint(NamedTuple):
 
 
 class RecordedSample(NamedTuple):
-    """A sample, and the flight's answer to it.
+    """An attitude sample, and the flight's answer to it.
 
     Attributes:
         sample: the sample; `received_ns`, from which latencies are computed, is 0.
-        flags: state of the control loop at its arrival.
-        checked: time at which its age was checked before sending, s; NaN: not checked.
+        flags: state of the control loop when the sample arrived.
+        checked: time of the last check of the sample's age, before sending, s on our clock; NaN:
+            not checked.
         reason: "answered", or why it is unanswered; one of `REASONS`.
-        setpoint: setpoint that was sent, or None.
+        setpoint: setpoint that was sent; None: none was sent.
     """
 
     sample: AttitudeSample
@@ -52,27 +53,27 @@ class RecordedSample(NamedTuple):
 
 
 class RecordedStep(NamedTuple):
-    """A step of guidance.
+    """A step of the guidance loop.
 
     Attributes:
-        read: its inputs.
-        command: its command to the control loop, or None.
-        reference: its reference, or None.
+        inputs: inputs of the step.
+        command: command that the step gave to the control loop; None: it gave none.
+        reference: reference that the step followed; None: it had none.
     """
 
-    read: StepInput
+    inputs: StepInput
     command: GuidanceCommand | None
     reference: Reference | None
 
 
 class RecordedAction(NamedTuple):
-    """A call by which a phase controls guidance or the control loop.
+    """A call by which a phase of the flight controlled guidance or the control loop.
 
     Attributes:
-        time: time on our clock, s.
-        name: one of `ACTIONS`.
-        clock_offset: vehicle time minus our time, s, or None.
-        drag: drag learned in an earlier flight, or None.
+        time: time of the call, s on our clock.
+        name: name of the call, one of `ACTIONS`.
+        clock_offset: vehicle time minus our time, s; None: unknown.
+        drag: drag learned in an earlier flight, for the action `drag_prior`; None: there is none.
     """
 
     time: float
@@ -82,7 +83,7 @@ class RecordedAction(NamedTuple):
 
 
 def recorded_sample(row: Row, sent: Row | None) -> RecordedSample:
-    """The sample of a row of `SAMPLE`; `sent` is the row of its `SETPOINT`, or None."""
+    """The sample in a row of `SAMPLE`; `sent` is the row of its `SETPOINT`, None: none was sent."""
     sample = AttitudeSample(
         int(row["time_boot_ms"]),
         row["vehicle_time_s"],
@@ -100,7 +101,13 @@ def recorded_sample(row: Row, sent: Row | None) -> RecordedSample:
 
 
 def recorded_step(row: Row, target: Row | None, guidance: Row | None) -> RecordedStep:
-    """The step of a row of `INPUT`; its rows of `TARGET` and `GUIDANCE` may each be None."""
+    """The step in a row of `INPUT`.
+
+    Args:
+        row: row of `INPUT`.
+        target: row of `TARGET` of this step; None: the step gave no command.
+        guidance: row of `GUIDANCE` of this step; None: the step had no reference.
+    """
     position = None
     if not isnan(row["position_received_s"]):
         position = LocalPosition(
@@ -114,7 +121,7 @@ def recorded_step(row: Row, target: Row | None, guidance: Row | None) -> Recorde
         battery = Battery(row["battery_received_s"], _none_if_nan(row["battery_v"]), None)
     if not isnan(received := row["autopilot_thrust_received_s"]):
         thrust = AttitudeTargetThrust(received, row["autopilot_thrust"])
-    read = StepInput(
+    inputs = StepInput(
         row["time_s"],
         position,
         _none_if_nan(row["clock_offset_s"]),
@@ -132,7 +139,7 @@ def recorded_step(row: Row, target: Row | None, guidance: Row | None) -> Recorde
             heading=guidance["reference_heading_rad"],
             thrust_steps=not guidance["height_steady"],
         )
-    return RecordedStep(read, None if target is None else _command(target), reference)
+    return RecordedStep(inputs, None if target is None else _command(target), reference)
 
 
 def _command(row: Row) -> GuidanceCommand:
@@ -155,7 +162,7 @@ def _command(row: Row) -> GuidanceCommand:
 
 
 def recorded_action(row: Row) -> RecordedAction:
-    """The action of a row of `ACTION`."""
+    """The action in a row of `ACTION`."""
     linear = row["drag_per_s"]
     drag = None if isnan(linear) else Drag(linear, row["quadratic_drag_per_m"])
     name = ACTIONS[row["action"]]
@@ -163,7 +170,7 @@ def recorded_action(row: Row) -> RecordedAction:
 
 
 def attitude_target(row: Row) -> AttitudeTarget:
-    """The ATTITUDE_TARGET of a row."""
+    """The ATTITUDE_TARGET in a row of the channel `ATTITUDE_TARGET`."""
     return AttitudeTarget(int(row["time_boot_ms"]), _quaternion(row))
 
 

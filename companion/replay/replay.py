@@ -1,9 +1,9 @@
-"""Replays a recorded flight: the same loops with the recorded inputs, in the same order.
+"""Replays a recorded flight: the same control and guidance loops get the recorded inputs, in order.
 
-Guidance flies the maneuvers of the configuration again. But the record lacks the inputs from a
-program that commanded the flight, and from the solver's process of predictive control. In these two
-cases the recorded commands of guidance are used, and only the control loop is replayed. Changes of
-values in flight are repeated.
+Guidance flies the maneuvers of the configuration again, with two exceptions: a program commanded
+the flight, or the solver process of predictive control did. The record lacks these inputs, so the
+recorded commands of guidance are used, and only the control loop is replayed. Changes of values in
+flight are repeated.
 """
 
 from math import isnan
@@ -27,21 +27,21 @@ from companion.recording.flight_record import FlightRecord, as_recorded
 from companion.recording.mcap_file.flight_events import ValuesChange
 from companion.recording.mcap_file.loop_channels import REASONS
 from companion.recording.trace import FlightTrace
-from companion.replay.entries import entries
+from companion.replay.entries import recorded_inputs
 from companion.replay.recorded import RecordedAction, RecordedSample, RecordedStep, Setpoint
 from companion.replay.vehicle import ReplayedVehicle
 
 
 class ReplayedSample(NamedTuple):
-    """One sample in the flight and in the replay.
+    """The answers to one sample, in the flight and in the replay.
 
     Attributes:
-        received: its arrival, s on our clock.
-        vehicle_time: its time stamp, s.
-        recorded: setpoint of the flight, or None.
-        replayed: setpoint of the replay, or None.
+        received: arrival of the sample, s on our clock.
+        vehicle_time: time stamp of the sample, s.
+        recorded: setpoint of the flight; None: no setpoint.
+        replayed: setpoint of the replay; None: no setpoint.
         recorded_reason: "answered", or why the flight did not answer; one of `REASONS`.
-        replayed_reason: the same for the replay.
+        replayed_reason: "answered", or why the replay did not answer; one of `REASONS`.
     """
 
     received: float
@@ -53,7 +53,7 @@ class ReplayedSample(NamedTuple):
 
     @property
     def same(self) -> bool:
-        """Whether both sent the same setpoint to the bit, or none for the same reason."""
+        """Whether flight and replay sent the same setpoint to the bit, or none for one reason."""
         return self.recorded == self.replayed and self.recorded_reason == self.replayed_reason
 
 
@@ -65,7 +65,7 @@ class Replay:
         config: configuration for the replay.
 
     Attributes:
-        follows_record: whether the commands of guidance are taken from the record.
+        follows_record: whether the commands of guidance are those of the record.
 
     Raises:
         ConfigError: a maneuver of the configuration cannot be flown.
@@ -107,11 +107,11 @@ class Replay:
         """Replay the whole flight; return every sample that reached the control loop.
 
         Raises:
-            RecordError: an entry of the record is not valid.
+            RecordError: a recorded input is not valid.
             ConfigError: a recorded change of values does not fit the configuration.
         """
         samples = []
-        for entry in entries(self._record):
+        for entry in recorded_inputs(self._record):
             if isinstance(entry, RecordedSample):
                 samples.append(self._replay_sample(entry))
             elif isinstance(entry, RecordedStep):
@@ -144,7 +144,7 @@ class Replay:
         )
 
     def _replay_step(self, entry: RecordedStep) -> None:
-        inputs = entry.read
+        inputs = entry.inputs
         self._vehicle.take(inputs)
         self._now = inputs.time
         self._loop.offboard_active = inputs.flags.offboard_active
@@ -201,7 +201,7 @@ class Replay:
 
 
 def _assumed_drag(record: FlightRecord, config: Config) -> KnownDrag:
-    """The drag that the flight assumed for its maneuvers, without what was learned since."""
+    """The drag assumed for the maneuvers: as configured, otherwise as when the flight began."""
     if config.guidance.drag is not None:
         return KnownDrag(config.guidance.drag)
     flight = record.metadata["flight"]
@@ -213,7 +213,11 @@ def _assumed_drag(record: FlightRecord, config: Config) -> KnownDrag:
 
 
 class _RecordedSource:
-    """Gives guidance the recorded references; the recorded commands then replace its own."""
+    """Gives guidance the recorded references; its commands are then replaced by the recorded ones.
+
+    Attributes:
+        step_reference: recorded reference of the next step; None: the step had none.
+    """
 
     name = "the record"
     failure: str | None = None
@@ -222,7 +226,7 @@ class _RecordedSource:
         self.step_reference: Reference | None = None
 
     def begin(self, now: float, pose: Pose) -> None:
-        """Do nothing, because the references come one by one."""
+        """Do nothing: the references are set step by step."""
 
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
         """The recorded reference of this step."""
@@ -231,5 +235,5 @@ class _RecordedSource:
         return lambda _: reference
 
     def finished(self, now: float) -> bool:
-        """Always false: a recorded action ends this source."""
+        """Always false, because a recorded action ends this source."""
         return False

@@ -1,4 +1,4 @@
-"""The result of a replay, in words and as a table."""
+"""The result of a replay, as sentences and as a table."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -18,13 +18,15 @@ _COLUMNS = (
 )
 
 
-def words(samples: Sequence[ReplayedSample], began: float, *, follows_record: bool) -> list[str]:
-    """What is equal and what differs, in sentences.
+def result_lines(
+    samples: Sequence[ReplayedSample], began: float, *, follows_record: bool
+) -> list[str]:
+    """Sentences on what is equal and what differs between flight and replay.
 
     Args:
         samples: result of the replay.
-        began: beginning of the flight, s on our clock.
-        follows_record: see `Replay`.
+        began: time at which the flight began, s on our clock.
+        follows_record: whether the commands of guidance are those of the record; see `Replay`.
     """
     recorded = sum(each.recorded is not None for each in samples)
     different = [each for each in samples if not each.same]
@@ -71,7 +73,7 @@ def _largest_differences(both_answered: Sequence[ReplayedSample], began: float) 
 
 
 def _reason_changes(different: Sequence[ReplayedSample]) -> list[str]:
-    """Differences in answering: only one of both answered, or the reasons differ."""
+    """Sentences on samples that only flight or replay answered, or whose reasons differ."""
     changes = Counter(
         (each.recorded_reason, each.replayed_reason)
         for each in different
@@ -85,7 +87,7 @@ def _reason_changes(different: Sequence[ReplayedSample]) -> list[str]:
 
 
 def write_csv(samples: Sequence[ReplayedSample], path: Path) -> None:
-    """Write both answers to each sample; an empty field means that nothing was sent.
+    """Write the answers of flight and replay to each sample; an empty field: nothing was sent.
 
     Raises:
         OSError: the file cannot be written.

@@ -1,4 +1,4 @@
-"""The vehicle of a replay: the recorded inputs of guidance, step by step."""
+"""The vehicle as guidance sees it in a replay: the recorded inputs of each guidance step."""
 
 from companion.control.step_rows import StepInput
 from companion.vehicle.records import (
@@ -15,7 +15,7 @@ class ReplayedVehicle:
     The attributes are those of `Telemetry`, `Ground` and `Clock` in `companion.control.telemetry`.
 
     Attributes:
-        attitude_target: the newest ATTITUDE_TARGET, or None.
+        attitude_target: the newest ATTITUDE_TARGET; None: there was none yet.
     """
 
     def __init__(self) -> None:
@@ -28,18 +28,18 @@ class ReplayedVehicle:
         self.standing = self.may_idle = False
         self.offset: float | None = None
 
-    def take(self, read: StepInput) -> None:
-        """Take the inputs of the next guidance step.
+    def take(self, inputs: StepInput) -> None:
+        """Set the attributes to the inputs of the next guidance step.
 
-        A position that was stale in the flight is left out, so that it is stale in the replay.
+        A position that was stale in the flight is set to None, so that the replay does not use it.
         """
-        self.position = read.position if read.flags.fresh else None
-        self.battery = read.battery
-        self.attitude_target_thrust = read.autopilot_thrust
-        self.height, self.armed = read.height, read.armed
-        self.standing, self.may_idle = read.flags.standing, read.flags.may_idle
-        self.offset = read.clock_offset
+        self.position = inputs.position if inputs.flags.fresh else None
+        self.battery = inputs.battery
+        self.attitude_target_thrust = inputs.autopilot_thrust
+        self.height, self.armed = inputs.height, inputs.armed
+        self.standing, self.may_idle = inputs.flags.standing, inputs.flags.may_idle
+        self.offset = inputs.clock_offset
 
     def age(self, vehicle_time: float, now: float) -> float | None:
-        """Always None (unknown): `take` leaves out every position that is not fresh."""
+        """Always None, unknown: `take` has already left out every position that is stale."""
         return None

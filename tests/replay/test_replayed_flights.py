@@ -29,7 +29,7 @@ from companion.recording.mcap_file.flight_events import ValuesChange
 from companion.recording.measurements.recorded_summary import derived_summary, summary_of
 from companion.replay.recorded import RecordedAction, Setpoint
 from companion.replay.replay import Replay, ReplayedSample
-from companion.replay.report import words
+from companion.replay.report import result_lines
 from tests.flight.fly import fly, mock_vehicle
 
 FLIGHTS = {
@@ -316,12 +316,12 @@ def test_answers_that_only_one_of_both_gave_are_told_by_their_reasons():
         ReplayedSample(2.0, 2.0, sent, None, "answered", "not_in_control"),
         ReplayedSample(3.0, 3.0, None, None, "stale", "stale"),
     ]
-    assert words(samples, 1.5, follows_record=False) == [
+    assert result_lines(samples, 1.5, follows_record=False) == [
         "The answers to 1 of 2 samples differ from those in the flight, the first 0.50 s after the "
         "flight began.",
         "1 samples: answered in the flight, not in control in the replay.",
     ]
-    same = words(samples[1:], 1.5, follows_record=True)
+    same = result_lines(samples[1:], 1.5, follows_record=True)
     assert same[0].startswith("The commands of guidance are those of the record")
     assert same[1] == (
         "identical: 0 setpoints to the bit, 1 unanswered samples with the same reasons"
