@@ -23,8 +23,8 @@ CONFIG_FILES = {"px4": "mock-px4.yaml", "ardupilot": "mock-ardupilot.yaml"}
 CLOCKS = {"lockstep": True, "free": False}
 """Whether a kind of clock is lockstep; with `free`, samples come without waiting, as over UDP."""
 
-_FLIGHTS = 3
-_WARM_UP_S = 0.2
+_FLIGHTS = 3  # of which the quickest counts
+_WARM_UP_S = 0.2  # hover of the flight that is not measured
 _LINK_DELAY_S = 0.0005
 
 

@@ -21,7 +21,9 @@ from companion.attitude.planner import LawPlanner
 from companion.extras import pip_command
 
 BATCHES = (1, 1_000, 10_000)
+"""Numbers of vehicles in the batches whose single step is timed."""
 VEHICLES = 1_000
+"""Number of vehicles in the simulated batch, at `RATE_HZ` samples per second."""
 RATE_HZ = 1_000.0
 
 _LIMITS = Limits(max_tilt=0.6, max_tilt_rate=1.5, max_yaw_rate=1.0)

@@ -135,7 +135,7 @@ class Sender:
         self.wall_ns += time.perf_counter_ns() - began
         self._recording = False
 
-    def forget(self) -> None:
+    def reset_measurements(self) -> None:
         """Reset all measurements."""
         self.round_trips_ns.clear()
         self.sent = self.cpu_ns = self.wall_ns = 0

@@ -66,7 +66,7 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
         stopped = _start_clients(stack, ports["with_clients"], 1)
         senders["with_clients"].send_for(rate_hz, ROUND_S)  # all four connect, and receive
         stopped.send_signal(signal.SIGSTOP)
-        senders["with_clients"].forget()
+        senders["with_clients"].reset_measurements()
         for _ in range(rounds):
             for measured in senders.values():
                 measured.send_for(rate_hz, seconds / rounds)

@@ -26,7 +26,7 @@ CAMPAIGN_FILE_NAME = "campaign.yaml"
 """Name of the file with the campaign's configuration and all defaults, in its folder."""
 _DESCRIPTION, _LOCK = "campaign.json", ".lock"
 _LARGEST_FILE_BYTES = 1_000_000
-_SIZE_LIMITS = ("max_cases", "max_hours")
+_SIZE_LIMITS = ("max_cases", "max_hours")  # keys of the section `limits`
 
 
 @dataclass(frozen=True)

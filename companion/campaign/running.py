@@ -42,7 +42,7 @@ from companion.files.yaml_file import ConfigError
 if TYPE_CHECKING:
     from distributed import Client
 
-DONE, FAILED = 0, 1
+DONE, FAILED = 0, 1  # exit codes
 _UNMEASURED_CASES = 2
 """With at most this number of cases for each worker, the wall time of a case is not measured."""
 _MOST_SHOWN = 3

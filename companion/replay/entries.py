@@ -45,17 +45,17 @@ def recorded_inputs(record: FlightRecord) -> Iterator[RecordedInput]:
 
 
 def _ordered_entries(messages: "_Messages") -> Iterator[RecordedInput]:
-    while (topic := messages.next()) is not None:
+    while (topic := messages.next_topic()) is not None:
         if topic == SAMPLE.topic:
             row = messages.take(SAMPLE)
             answered = row["unanswered"] == 0
-            if answered and messages.next() is None:
+            if answered and messages.next_topic() is None:
                 return  # the record was cut off between the sample and its setpoint
             yield recorded_sample(row, messages.take(SETPOINT) if answered else None)
         elif topic == INPUT.topic:
             row = messages.take(INPUT)
-            target = messages.take(TARGET) if messages.next() == TARGET.topic else None
-            guidance = messages.take(GUIDANCE) if messages.next() == GUIDANCE.topic else None
+            target = messages.take(TARGET) if messages.next_topic() == TARGET.topic else None
+            guidance = messages.take(GUIDANCE) if messages.next_topic() == GUIDANCE.topic else None
             yield recorded_step(row, target, guidance)
         elif topic == ACTION.topic:
             yield recorded_action(messages.take(ACTION))
@@ -81,7 +81,7 @@ class _Messages:
         self._rows = {each.topic: iter(record.rows(each.name).tolist()) for each in _CHANNELS}
         self._index = 0
 
-    def next(self) -> str | None:
+    def next_topic(self) -> str | None:
         """Topic of the next message; None at the end."""
         return self._order[self._index] if self._index < len(self._order) else None
 
@@ -97,7 +97,7 @@ class _Messages:
     def take(self, channel: Channel) -> Row:
         """Take the next message if it is of `channel`; else take none and return NaN values."""
         names = channel.dtype.names or ()
-        if self.next() != channel.topic:
+        if self.next_topic() != channel.topic:
             return dict.fromkeys(names, float("nan"))
         self._index += 1
         return dict(zip(names, next(self._rows[channel.topic]), strict=True))

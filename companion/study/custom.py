@@ -12,7 +12,7 @@ from companion.attitude.reference import FirstOrderReference
 from companion.files import yaml_file
 from companion.study.custom_case import Case
 from companion.study.drawing import (
-    draw,
+    draw_line,
     draw_plane,
     draw_reference,
     draw_response,
@@ -114,7 +114,7 @@ def _samples(
     """Table rows of one response: coefficients and commanded body rates of each sample."""
     time = response.step.time
     for index, heading in enumerate(case.headings_deg):
-        paths, rates = response.at(index), response.rates[:, :, index]
+        paths, rates = response.at_heading(index), response.rates[:, :, index]
         for instant, coefficients, body_rates in zip(time[:-1], paths[:-1], rates, strict=True):
             yield (
                 method.label,
@@ -175,7 +175,7 @@ def _figure(case: Case, flown: Flights) -> Figure:
     step, reference = case.step(hz), _reference(case, hz)
     shown = {method: response for (method, rate), response in flown.items() if rate == hz}
     worst_heading = {m: int(cross_track(r).argmax()) for m, r in shown.items()}
-    curves = [(m, m.label, r.at(worst_heading[m])) for m, r in shown.items()]
+    curves = [(m, m.label, r.at_heading(worst_heading[m])) for m, r in shown.items()]
     figure, ((north, east), (plane, from_straight_line), (from_reference, rate)) = new_figure(
         3, 2, height=3.0
     )
@@ -183,14 +183,16 @@ def _figure(case: Case, flown: Flights) -> Figure:
     draw_reference(north, east, step.time, reference, _reference_text(case))
     draw_plane(plane, curves, np.array([step.start, step.target]))
     for m, response in shown.items():
-        draw(
+        draw_line(
             from_straight_line,
             step.time,
             signed_distance_from_line(response)[:, worst_heading[m]],
             m.line,
         )
-        draw(from_reference, step.time, deviation(response, reference)[:, worst_heading[m]], m.line)
-        draw(rate, step.time[:-1], response.tilt_rate[:, worst_heading[m]], m.line)
+        draw_line(
+            from_reference, step.time, deviation(response, reference)[:, worst_heading[m]], m.line
+        )
+        draw_line(rate, step.time[:-1], response.tilt_rate[:, worst_heading[m]], m.line)
     from_straight_line.set(title="Distance from the line", xlabel="time, s", ylabel="to its right")
     from_reference.set(
         title="Distance from the reference", xlabel="time, s", ylabel="|c − reference|"

@@ -34,7 +34,7 @@ def new_figure(
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 
-def draw(axes: Axes, x: Floats, y: Floats, line: Line, label: str = "") -> None:
+def draw_line(axes: Axes, x: Floats, y: Floats, line: Line, label: str = "") -> None:
     """Draw a line, thinned to fewer than about two times `_THINNED_POINTS` points."""
     stride = max(1, len(x) // _THINNED_POINTS)
     keep = np.unique(np.append(np.arange(0, len(x), stride), len(x) - 1))
@@ -54,7 +54,7 @@ def draw_response(
     """
     for method, label, c in curves:
         for axes, values in ((north, c[:, 0]), (east, c[:, 1])):
-            draw(axes, time, values, method.line, label)
+            draw_line(axes, time, values, method.line, label)
     label_response(north, east)
 
 
@@ -73,8 +73,8 @@ def draw_reference(
     north: Axes, east: Axes, time: Floats, reference: Floats, label: str = "first-order reference"
 ) -> None:
     """Draw the (n, 2) coefficients of a reference model over the curves."""
-    draw(north, time, reference[:, 0], REFERENCE, label)
-    draw(east, time, reference[:, 1], REFERENCE, label)
+    draw_line(north, time, reference[:, 0], REFERENCE, label)
+    draw_line(east, time, reference[:, 1], REFERENCE, label)
 
 
 def draw_plane(axes: Axes, curves: Iterable[tuple[Method, str, Floats]], ends: Floats) -> None:
@@ -86,7 +86,7 @@ def draw_plane(axes: Axes, curves: Iterable[tuple[Method, str, Floats]], ends: F
         ends: (2, 2), start and target.
     """
     for method, label, c in curves:
-        draw(axes, c[:, 1], c[:, 0], method.line, label)
+        draw_line(axes, c[:, 1], c[:, 0], method.line, label)
     axes.plot(ends[:, 1], ends[:, 0], **REFERENCE)
     axes.plot(*ends[0, ::-1], "o", color="black", markersize=4)
     axes.plot(*ends[1, ::-1], "*", color="black", markersize=8)

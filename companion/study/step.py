@@ -78,7 +78,7 @@ class Response:
         """(samples, headings) commanded √(ω_x² + ω_y²), rad/s."""
         return np.hypot(self.rates[:, 0], self.rates[:, 1])
 
-    def at(self, heading_index: int) -> Floats:
+    def at_heading(self, heading_index: int) -> Floats:
         """(samples + 1, 2) coefficients at one heading."""
         return self.coefficients[:, :, heading_index]
 

@@ -77,8 +77,8 @@ def test_a_flown_response_begins_at_the_start_and_ends_at_the_target():
     for method in BY_PLANNER.values():
         flown = fly(planner_of(method, STEP.gain), STEP)
         assert flown.coefficients.shape == (201, 2, 2)
-        assert flown.at(1)[0] == pytest.approx(STEP.start, abs=1e-12)
-        assert flown.at(1)[-1] == pytest.approx(STEP.target, abs=1e-3)
+        assert flown.at_heading(1)[0] == pytest.approx(STEP.start, abs=1e-12)
+        assert flown.at_heading(1)[-1] == pytest.approx(STEP.target, abs=1e-3)
 
 
 def test_exact_follows_the_reference_of_the_step():

@@ -17,6 +17,7 @@ from companion.campaign.report.statistics import (
 from companion.report.plots import IDEAL, MEASURED, NEAREST, REFERENCE, Plot, axes, numbers
 
 _MOST_FACTORS = 6
+"""Largest number of factors with a plot of their own."""
 _DISTRIBUTIONS = (
     "position_rms_m",
     "height_rms_m",
@@ -29,6 +30,7 @@ _DISTRIBUTIONS = (
 _SHOWN_SHARE = 0.995
 """Share of the values that a distribution shows; the last bin holds the larger ones."""
 _BINS = 40
+"""Number of bins of a histogram."""
 
 
 def success(results: Results, order: Sequence[str]) -> Iterator[Plot]:

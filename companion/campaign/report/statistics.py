@@ -13,7 +13,9 @@ CONFIDENCE = 0.95
 _MOST_LEVELS = 12
 """A factor with more different values is shown in ranges."""
 _RANGE_COUNT = 5
+"""Number of these ranges."""
 _MOST_CHOICES = 300
+"""With more groups of equal values, `choices` shows single cases."""
 _NOT_CHOSEN = ("mock.", "fault", "flight.", "vehicle.")
 """Prefixes of the factors that a user does not choose."""
 

@@ -18,9 +18,9 @@ from companion.report.tables import Table
 from companion.testing.settings import complete_mock
 
 EMPTY = "–"
-_WORST_SHOWN = 10
-_MOST_ROWS = 200
-_MOST_FACTORS = 12
+_WORST_SHOWN = 10  # cases in the table of worst cases
+_MOST_ROWS = 200  # of the table of all cases
+_MOST_FACTORS = 12  # in the table of success by factor
 _MOST_LEVELS = 12
 """Largest number of values of a factor in the table of two factors."""
 

@@ -7,7 +7,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from companion.study.drawing import draw, draw_plane
+from companion.study.drawing import draw_line, draw_plane
 from companion.study.lag.flights import (
     EXAMPLE_ERRORS_HZ,
     FINE_ERRORS,
@@ -37,7 +37,7 @@ CAPTION = (
     " sample rate."
 )
 
-_ENDS = np.array([FIGURE_2.start, FIGURE_2.target])
+_ENDS = np.array([FIGURE_2.start, FIGURE_2.target])  # of the step, coefficients
 _CROSS_TRACK_LABEL = "largest distance from the line"
 _WORSE_COLOUR = "#A33C00"
 """Colour of cells where another method is straighter, and of `does not hold` on the page."""
@@ -96,13 +96,13 @@ def _grid_values(grid: Grid) -> tuple[list[int], list[int]]:
 
 
 def _draw_paths(axes: Axes, responses: dict[Method, Response]) -> None:
-    draw_plane(axes, [(m, m.label, r.at(0)) for m, r in responses.items()], _ENDS)
+    draw_plane(axes, [(m, m.label, r.at_heading(0)) for m, r in responses.items()], _ENDS)
 
 
 def _draw_distance(axes: Axes, responses: dict[Method, Response]) -> None:
     for method, response in responses.items():
-        distance = response.at(0)[:, 1] - FIGURE_2.target.east
-        draw(axes, response.step.time, distance, method.line, method.label)
+        distance = response.at_heading(0)[:, 1] - FIGURE_2.target.east
+        draw_line(axes, response.step.time, distance, method.line, method.label)
     axes.set(title="Distance from the line", xlabel="time, s", ylabel="$a_E$ + 0.5", xlim=(0, 1.5))
     axes.legend(ncols=2)
 

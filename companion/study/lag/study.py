@@ -101,7 +101,7 @@ def run(tick: Tick) -> Outcome:
 
 
 def _fit_model(response: Response) -> _Fitted:
-    fit = fit_second_order(response.step, response.at(0))
+    fit = fit_second_order(response.step, response.at_heading(0))
     model = second_order_path(response.step, fit, response.step.time)
     return _Fitted(fit, float(largest_deviation(response, model)[0]))
 

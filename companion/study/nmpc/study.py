@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from companion.study.drawing import draw, new_figure
+from companion.study.drawing import draw_line, new_figure
 from companion.study.methods import REFERENCE
 from companion.study.nmpc.findings import find
 from companion.study.nmpc.flights import FLIGHT_S, Flights, fly_all
@@ -227,7 +227,7 @@ def _draw_errors(axes: Axes, flown: Flights, task: Task, title: str) -> None:
     for model in MODELS:
         errors = np.array(flown[task.name, Variant(model)].errors)
         time = (np.arange(len(errors)) + 1) / RATE_HZ
-        draw(axes, time, errors, STYLES[model].line, STYLES[model].label)
+        draw_line(axes, time, errors, STYLES[model].line, STYLES[model].label)
     axes.set(title=title, xlabel="time, s", ylabel="distance, m")
 
 

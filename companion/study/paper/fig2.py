@@ -9,7 +9,7 @@ from companion.attitude import Quaternion, Target, body_error
 from companion.attitude.limits import Constants
 from companion.attitude.planner import LawPlanner
 from companion.study.drawing import (
-    draw,
+    draw_line,
     draw_plane,
     draw_reference,
     draw_response,
@@ -132,7 +132,7 @@ def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
         (
             method,
             f"{method.label} (worst heading)" if method is EULER else method.label,
-            responses[method].at(shown_heading[method]),
+            responses[method].at_heading(shown_heading[method]),
         )
         for method in PAPER_METHODS
     ]
@@ -141,7 +141,7 @@ def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
     draw_reference(north, east, time, reference)
     for method in PAPER_METHODS:
         error = deviation(responses[method], reference)[:, shown_heading[method]]
-        draw(away, time, error, method.line)
+        draw_line(away, time, error, method.line)
     away.set(
         title="Distance from the reference",
         xlabel="time, s",

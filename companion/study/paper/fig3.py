@@ -8,7 +8,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from companion.study.drawing import draw, draw_reference, label_response, new_figure
+from companion.study.drawing import draw_line, draw_reference, label_response, new_figure
 from companion.study.measures import best_and_worst, cross_track, largest_deviation
 from companion.study.methods import EULER, PROPOSED, planner_of
 from companion.study.outcome import Finding, Outcome, Table, Tick
@@ -70,10 +70,10 @@ def _figure(response: Response, reference: Floats) -> Figure:
     colours = colour_scale.to_rgba(angle_to_step)
     for k in np.argsort(-angle_to_step):
         line = {"color": colours[k], "linewidth": 0.8}
-        c = response.at(k)
-        draw(north, time, c[:, 0], line)
-        draw(east, time, c[:, 1], line)
-        draw(plane, c[:, 1], c[:, 0], line)
+        c = response.at_heading(k)
+        draw_line(north, time, c[:, 0], line)
+        draw_line(east, time, c[:, 1], line)
+        draw_line(plane, c[:, 1], c[:, 0], line)
     draw_reference(north, east, time, reference)
     label_response(north, east)
     plane.set(

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from companion.attitude import Limits
 from companion.attitude.reference import FirstOrderReference
 from companion.study.drawing import (
-    draw,
+    draw_line,
     draw_plane,
     draw_reference,
     label_response,
@@ -99,13 +99,16 @@ def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
     slowest = int(settling_time(responses[EULER]).argmax())
     shown_heading = {method: slowest if method is EULER else 0 for method in _METHODS}
     curves = [
-        (method, method.label, responses[method].at(shown_heading[method])) for method in _METHODS
+        (method, method.label, responses[method].at_heading(shown_heading[method]))
+        for method in _METHODS
     ]
     figure, ((north, east), (rate, plane)) = new_figure(2, 2)
     for method, label, c in curves:
-        draw(north, time, c[:, 0], method.line, label)
-        draw(east, time, c[:, 1], method.line)
-        draw(rate, time[:-1], responses[method].tilt_rate[:, shown_heading[method]], method.line)
+        draw_line(north, time, c[:, 0], method.line, label)
+        draw_line(east, time, c[:, 1], method.line)
+        draw_line(
+            rate, time[:-1], responses[method].tilt_rate[:, shown_heading[method]], method.line
+        )
     draw_reference(north, east, time, reference, "reference, equation 33")
     rate.axhline(MAX_TILT_RATE, **LIMIT)
     label_response(north, east)

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from companion.study.drawing import draw, draw_plane, draw_reference, draw_response, new_figure
+from companion.study.drawing import draw_line, draw_plane, draw_reference, draw_response, new_figure
 from companion.study.measures import (
     FIT_COLUMNS,
     deviation,
@@ -123,7 +123,7 @@ def _figure(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> Figure:
     step = quick.responses[PROPOSED].step
     for method in PAPER_METHODS:
         error = deviation(quick.responses[method], step.reference())[:, quick.worst_heading(method)]
-        draw(away, step.time, error, method.line)
+        draw_line(away, step.time, error, method.line)
         times = 1e3 * np.array(list(sweep))
         values = [tracks[method] for tracks in sweep.values()]
         across.plot(times, values, marker="o", markersize=4, **method.line)
@@ -149,13 +149,13 @@ def _draw_loop(panels: tuple[Axes, Axes, Axes], loop: LoopFlights) -> None:
     """Draw response and path of every method with one inner loop, each at its worst heading."""
     north, east, plane = panels
     curves = [
-        (method, method.label, loop.responses[method].at(loop.worst_heading(method)))
+        (method, method.label, loop.responses[method].at_heading(loop.worst_heading(method)))
         for method in PAPER_METHODS
     ]
     step, second = loop.responses[PROPOSED].step, loop.fitted_path(PROPOSED)
     draw_response(north, east, step.time, curves)
     draw_reference(north, east, step.time, step.reference())
-    draw(north, step.time, second[:, 0], _SECOND_ORDER_LINE, "second-order reference")
+    draw_line(north, step.time, second[:, 0], _SECOND_ORDER_LINE, "second-order reference")
     draw_plane(plane, curves, np.array([step.start, step.target]))
     for panel in (north, east):
         panel.set(xlim=(0.0, 1.5))

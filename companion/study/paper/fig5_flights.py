@@ -70,7 +70,9 @@ def fly_methods(factor: int, tick: Tick) -> LoopFlights:
         tick(f"{method.label}, {1e3 * flown.time_63:.0f} ms")
         response = fly_loop(planner_of(method, STEP.gain), STEP, inner_loop)
         flown.responses[method] = response
-        flown.fits[method] = fit_second_order(STEP, response.at(flown.worst_heading(method)))
+        flown.fits[method] = fit_second_order(
+            STEP, response.at_heading(flown.worst_heading(method))
+        )
     return flown
 
 

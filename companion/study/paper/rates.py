@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from matplotlib.figure import Figure
 
-from companion.study.drawing import draw, new_figure
+from companion.study.drawing import draw_line, new_figure
 from companion.study.measures import cross_track, deviation, largest_deviation
 from companion.study.methods import EXACT, PROPOSED, Method, planner_of
 from companion.study.outcome import Finding, Outcome, Table, Tick
@@ -101,7 +101,7 @@ def _figure(
     slowest = min(RATES_HZ)
     for method in (PROPOSED, EXACT):
         error = deviation(flown[method, slowest], steps[slowest].reference())[:, 0]
-        draw(over_time, steps[slowest].time[1:], error[1:], method.line, method.label)
+        draw_line(over_time, steps[slowest].time[1:], error[1:], method.line, method.label)
     over_time.set(
         title=f"Deviation at {slowest:.0f} Hz",
         xlabel="time, s",
@@ -110,11 +110,11 @@ def _figure(
     )
     shades = np.linspace(1.0, 0.35, len(RATES_HZ))
     for hz, alpha in zip(reversed(RATES_HZ), shades, strict=True):
-        c = flown[PROPOSED, hz].at(0)
+        c = flown[PROPOSED, hz].at_heading(0)
         line = {**PROPOSED.line, "alpha": alpha}
-        draw(plane, _from_line(c), c[:, 0], line, f"proposed, {hz:.0f} Hz")
-    exact = flown[EXACT, slowest].at(0)
-    draw(plane, _from_line(exact), exact[:, 0], EXACT.line, f"exact, {slowest:.0f} Hz")
+        draw_line(plane, _from_line(c), c[:, 0], line, f"proposed, {hz:.0f} Hz")
+    exact = flown[EXACT, slowest].at_heading(0)
+    draw_line(plane, _from_line(exact), exact[:, 0], EXACT.line, f"exact, {slowest:.0f} Hz")
     plane.set(title="Paths, enlarged across", xlabel="($a_E$ + 0.5) × 1000", ylabel="$a_N$")
     plane.set_xlim(right=5.2)
     plane.legend(loc="center right")

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from companion.attitude.planner import MODEL_FOLLOWING
-from companion.study.drawing import draw, new_figure
+from companion.study.drawing import draw_line, new_figure
 from companion.study.methods import EXACT, FOLLOWING, PAPER_METHODS, PROPOSED, REFERENCE, Line
 from companion.study.track.flights import Flown
 from companion.study.track.tasks import (
@@ -59,10 +59,10 @@ def _draw_paths(axes: Axes, flown: Flown, course: Course) -> None:
     """Draw the reference path, and the paths flown with and without lead."""
     led = flown[Task(course, MODEL_FOLLOWING)]
     not_led = flown[Task(course, MODEL_FOLLOWING, lead=False)]
-    draw(axes, led.path[:, 3], led.path[:, 2], FOLLOWING.line, "led")
+    draw_line(axes, led.path[:, 3], led.path[:, 2], FOLLOWING.line, "led")
     not_led_line = {"color": _NOT_LED_COLOUR, "linewidth": 1.0}
-    draw(axes, not_led.path[:, 3], not_led.path[:, 2], not_led_line, "not led")
-    draw(axes, led.path[:, 1], led.path[:, 0], REFERENCE, "reference")
+    draw_line(axes, not_led.path[:, 3], not_led.path[:, 2], not_led_line, "not led")
+    draw_line(axes, led.path[:, 1], led.path[:, 0], REFERENCE, "reference")
     axes.set(title=f"Path: {course}", xlabel="east, m", ylabel="north, m", aspect="equal")
 
 
