@@ -121,7 +121,7 @@ class CampaignFile(Section):
     """A campaign; the top level of its YAML file."""
 
     name: CampaignName
-    """CampaignName of the campaign, and of its folder."""
+    """Name of the campaign, and of its folder."""
     kind: Literal["flights", "batch"] = "flights"
     """flights: whole flights of the program and the mock vehicle on one virtual clock. batch:
     only the attitude kinematics of a vehicle in each case."""

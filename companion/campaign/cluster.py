@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from distributed import Client, Future
 
 WORKER_DEATHS_TO_GIVE_UP = 3
-"""A unit of work is given up after so many deaths of workers on which it ran or was queued.
+"""A unit of work is given up at this number of deaths of workers on which it ran or was queued.
 
 An existing cluster follows its own setting, `distributed.scheduler.allowed-failures`.
 """

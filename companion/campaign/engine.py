@@ -69,9 +69,9 @@ def run(
     missing = {number: unit for number, unit in enumerate(units) if number not in finished}
     progress = Progress(flown=sum(len(units[number]) for number in finished))
     on_unit(progress)
-    samples = list(campaign.planned_cases()) if missing else []
+    planned = list(campaign.planned_cases()) if missing else []
     tasks = {
-        number: (fly_planned_cases, campaign, [samples[index] for index in unit], versions())
+        number: (fly_planned_cases, campaign, [planned[index] for index in unit], versions())
         for number, unit in missing.items()
     }
     for ended in run_tasks(client, tasks):

@@ -54,7 +54,7 @@ def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
             reason = str(error)
         except Exception as error:
             reason = f"{INTERNAL_ERROR}{type(error).__name__}: {error}"
-        return row | outcomes.outcomes_of_error(reason.replace(f"{files_folder}/", ""))
+        return row | outcomes.of_error(reason.replace(f"{files_folder}/", ""))
 
 
 class CaseFlight:

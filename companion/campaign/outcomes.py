@@ -146,7 +146,7 @@ def digest(setpoints: Sequence[ReceivedSetpoint], state: Truth) -> str:
     return sha256.hexdigest()
 
 
-def outcomes_of_error(result: str) -> dict[str, Value]:
+def of_error(result: str) -> dict[str, Value]:
     """The outcomes of a case that raised an error; `result` is the text of the error."""
     return {
         "ok": False,

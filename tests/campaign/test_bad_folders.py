@@ -23,7 +23,7 @@ TILT = {"limits.max_tilt_deg": [20, 25, 30]}
 
 def row_of(case):
     row = {"case": case.index, "seed": case.seed, **case.factors}
-    return row | outcomes.outcomes_of_error("ok") | {"ok": True, "digest": f"d{case.index}"}
+    return row | outcomes.of_error("ok") | {"ok": True, "digest": f"d{case.index}"}
 
 
 @pytest.fixture

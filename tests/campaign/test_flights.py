@@ -216,7 +216,7 @@ def test_what_ends_a_run_early_loses_no_finished_unit(quick, threads, capsys, mo
 
 def quick_row(case):
     row = {"case": case.index, "seed": case.seed, **case.factors}
-    return row | outcomes.outcomes_of_error("internal error: oops" if case.index == 0 else "ok")
+    return row | outcomes.of_error("internal error: oops" if case.index == 0 else "ok")
 
 
 def test_units_take_seconds_and_leave_work_for_all():

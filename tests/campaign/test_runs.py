@@ -24,7 +24,7 @@ TILT = {"limits.max_tilt_deg": [20, 25, 30]}
 
 def row_of(case):
     row = {"case": case.index, "seed": case.seed, **case.factors}
-    return row | outcomes.outcomes_of_error("ok") | {"ok": True}
+    return row | outcomes.of_error("ok") | {"ok": True}
 
 
 @pytest.fixture

@@ -144,7 +144,7 @@ def _success(results: Results) -> NDArray[np.bool_]:
 
 
 def missing_cases_note(results: Results) -> list[str]:
-    """A sentence that tells how many cases are not flown yet and how to continue; or nothing."""
+    """One sentence: how many cases are missing and how to continue; empty if all are flown."""
     unflown = results.planned - results.count
     if not unflown:
         return []

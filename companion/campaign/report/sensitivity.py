@@ -15,7 +15,7 @@ from companion.campaign.report.results import Column, Floats, Results
 FEWEST = 100
 """Smallest number of cases for useful indices."""
 _MOST_CASES = 5000
-"""Largest number of cases used; of more cases, so many are taken at even distances."""
+"""Largest number of cases used; if there are more, cases at even distances are taken."""
 _SEED = 1
 
 

@@ -147,7 +147,7 @@ def crossed(results: Results) -> Table | None:
 
 
 def all_cases(results: Results) -> Table:
-    """All cases; if they are more than `_MOST_ROWS`, so many of them at even distances."""
+    """All cases or, if they are more, `_MOST_ROWS` of them at even distances."""
     shown = [name for name in results.columns if name not in ("seed", "digest")]
     count = results.count
     chosen = np.unique(np.linspace(0, count - 1, min(count, _MOST_ROWS)).astype(int))

@@ -80,7 +80,7 @@ def cases(campaign: Campaign, values: Values) -> list[Case]:
 
 
 def unseen_campaign(campaign: Campaign, samples: int) -> Campaign:
-    """The campaign with another seed, hence with samples, noise and gusts unlike the search's.
+    """The campaign with another seed, so that samples, noise and gusts differ from the search's.
 
     Args:
         campaign: the campaign.

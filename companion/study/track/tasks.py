@@ -21,7 +21,7 @@ class Course(NamedTuple):
     Attributes:
         trajectory: `CIRCLE` or `EIGHT`.
         speed: steady speed on the circle, largest speed on the figure-eight, m/s.
-        laps: number of laps, so many that the vehicle holds the speed for a while.
+        laps: number of laps; with these the vehicle holds the speed for a while.
     """
 
     trajectory: str
