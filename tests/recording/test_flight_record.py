@@ -21,7 +21,7 @@ from companion.recording.mcap_file.scene import Entity, scene_message
 from companion.recording.mcap_file.writer import McapWriter
 from companion.recording.measurements.recorded_summary import derived_summary, summary_of
 from companion.recording.recorder import _McapEntries
-from companion.replay.entries import entries
+from companion.replay.entries import recorded_inputs
 
 ROWS = 50
 
@@ -181,7 +181,7 @@ def row(channel, number, code):
         ("/alarm", b"", lambda record: record.alarms),
         ("/log", b"", lambda record: record.events),
         ("/sample", cdr.CDR + bytes(3), lambda record: record.rows("sample")),
-        ("/action", row(ACTION, 1.0, 200), lambda record: list(entries(record))),
+        ("/action", row(ACTION, 1.0, 200), lambda record: list(recorded_inputs(record))),
         ("/setpoint", row(SETPOINT, np.nan, 0), derived_summary),
         ("/resources", row(RESOURCES, np.nan, 0), summary_of),
     ],
