@@ -345,6 +345,6 @@ def test_a_package_that_is_not_there_is_a_version_too():
 def test_only_the_loggers_of_dask_are_silenced():
     dasks, other = logging.getLogger("distributed.of_a_test"), logging.getLogger("of_a_test")
     other.setLevel(logging.INFO)
-    cluster._silence()
+    cluster._silence_dask()
     assert not dasks.isEnabledFor(logging.CRITICAL)
     assert other.level == logging.INFO
