@@ -10,8 +10,8 @@ Floats = NDArray[np.float64]
 LONGEST_DEAD_TIME = 0.5
 """Longest dead time that can be found, s."""
 _LONGEST_HOLD = 0.5
-"""Longest time between two commands of a stretch, s. Until then autopilots hold the last setpoint:
-by default PX4 for 1 s, ArduPilot for 3 s."""
+"""Longest time between two commands of a stretch, s. Autopilots react to missing setpoints only
+later: by default PX4 after 1 s, ArduPilot after 3 s."""
 
 _MOST_ROWS = 16_000
 """Largest number of commands plus samples in a fit: half a minute of both at 250 Hz."""
