@@ -26,10 +26,10 @@ def companion_settings(config: Config) -> CompanionSettings:
         hover_thrust=config.thrust.hover_thrust,
         curve_factor=config.thrust.curve_factor,
         battery_exponent=config.thrust.battery_exponent,
-        tilt_compensated=config.thrust.autopilot_compensates_tilt,
+        autopilot_compensates_tilt=config.thrust.autopilot_compensates_tilt,
         acceleration_limits=limits,
         max_tilt=config.limits.max_tilt,
-        signs=config.link.signing_key_file is not None,
+        signing=config.link.signing_key_file is not None,
     )
 
 

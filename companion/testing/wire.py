@@ -41,7 +41,7 @@ class MemoryTransport:
         receiver = self._receiver
         if self._connected:
             self._heard = receiver.receive(datagram, received_ns) or self._heard
-        elif receiver.claim(datagram, received_ns, _NAME) or receiver.may_answer(_NAME):
+        elif receiver.claim(datagram, received_ns, _NAME) or receiver.may_prove_date(_NAME):
             self._connected = self._heard = True
 
     def send(self, frame: bytes) -> bool:

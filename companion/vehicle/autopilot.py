@@ -54,7 +54,7 @@ class OffboardLossFailsafe(NamedTuple):
     """What the autopilot does when setpoints stop.
 
     Attributes:
-        parameter: Name of the parameter that sets how long it holds the last rates, s.
+        parameter: Name of the parameter that sets how long it holds the last body rates, s.
         action: What it does after that time, in words.
         brakes: Whether it then brakes the vehicle to a stop.
     """
@@ -78,28 +78,29 @@ FLIGHT_RATES: Mapping[str, float] = MappingProxyType(
 )
 """Messages that a flight needs from every autopilot, with the requested rate, Hz.
 
-An autopilot may have another rate in its `wanted_rates`, and section `link` sets two of them."""
+`Autopilot.wanted_rates` may replace a rate. Section `link` of the configuration sets the rates of
+ATTITUDE_QUATERNION and LOCAL_POSITION_NED."""
 
 
 class Autopilot(Protocol):
     """How to command one kind of autopilot, and what its modes and parameters mean to a flight.
 
-    Every autopilot takes thrust as 0..1 of the collective. When setpoints stop it holds the last
-    rates for a while, and then obeys a later setpoint unless a mode was commanded in between.
+    Every autopilot takes collective thrust as 0..1. When setpoints stop, it holds the last rates
+    for a while. It obeys a later setpoint again, unless a mode was commanded in between.
 
     Attributes:
         name: Name to show to users, such as `PX4`.
         mav_autopilot: MAV_AUTOPILOT number.
         modes: `custom_mode` of each mode that may be commanded, by name.
-        ready_mode: Name of the mode from which a pilot who has armed hands control over.
+        ready_mode: Name of the mode that a pilot who has armed enters to hand over control.
         offboard_mode: Name of the mode in which the autopilot obeys setpoints.
         control_entry: How the autopilot begins to obey setpoints.
         bytewise_parameters: Whether integer parameters are sent as bytes; see
             `companion.mavlink.parameters`.
         wanted_rates: Messages that a flight needs, with the rate to request, Hz.
         interval_step_us: SET_MESSAGE_INTERVAL is rounded down to a whole multiple of this, us.
-        rates_along_target: True: body rates are taken along the axes of ATTITUDE_TARGET, which
-            turns before the body follows. False: along the axes of the body.
+        rates_about_target_axes: True: body rates are taken about the axes of the attitude setpoint
+            (ATTITUDE_TARGET), which leads the body. False: about the axes of the body.
         body_yaw_is_relative: Whether a yaw in a body frame of SET_POSITION_TARGET_LOCAL_NED counts
             from the present yaw, not from north.
         can_compensate_tilt: Whether the autopilot can divide thrust by cos(tilt) itself; a rule in
@@ -118,7 +119,7 @@ class Autopilot(Protocol):
     bytewise_parameters: bool
     wanted_rates: Mapping[str, float]
     interval_step_us: int
-    rates_along_target: bool
+    rates_about_target_axes: bool
     body_yaw_is_relative: bool
     can_compensate_tilt: bool
     offboard_loss_failsafe: OffboardLossFailsafe
@@ -129,7 +130,7 @@ class Autopilot(Protocol):
         """Name of the mode in a heartbeat; an unknown mode is named by its number."""
 
     def roles(self, mode: str) -> frozenset[Role]:
-        """Roles of the mode of that name (see `mode_name`); empty: the mode has none."""
+        """Roles of a mode, by its name (see `mode_name`); empty if it has none."""
 
     def set_mode(self, name: str) -> Command:
         """Command that enters a mode of `modes`. Raises `KeyError` for any other mode."""
@@ -138,7 +139,7 @@ class Autopilot(Protocol):
         """What is missing before the vehicle can be armed and flown, in words; `None`: nothing."""
 
     def arm(self) -> tuple[Command, ...]:
-        """Commands that enter a mode in which it can arm, and arm it with all checks, in order."""
+        """Commands, in order, that enter a mode that allows arming, and arm with all checks."""
 
     def disarm(self) -> Command:
         """Command that disarms on the ground."""

@@ -28,7 +28,7 @@ class VehicleClient:
         router: Delivers the messages received.
         stats: Counters of the link.
         clock: Returns the event-loop time, s.
-        vehicle_clock: Dates the positions.
+        vehicle_clock: Converts the time stamps of positions.
 
     Attributes:
         settings: The endpoint, and the ids of the vehicle and of this program.

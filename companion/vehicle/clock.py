@@ -1,8 +1,8 @@
 """The vehicle's clock, compared with the event loop's: ages of samples, and jumps of the clock.
 
-Each attitude sample gives the offset, vehicle time minus event-loop time, less the delay of the
-sample. The largest offset belongs to the sample with the smallest delay, the "quickest" sample.
-TIMESYNC measures how late the quickest sample is.
+The offset is vehicle time minus event-loop time. An attitude sample shows the offset less its own
+delay. So the largest value comes from the sample with the smallest delay, the "quickest" sample.
+TIMESYNC measures the delay of the quickest sample.
 """
 
 from collections.abc import Callable
@@ -29,7 +29,7 @@ _MIN_CLOCK_SETBACK = 0.5
 _TIMESYNC_LAG = 0.012
 """Largest lag of TIMESYNC behind the samples' stamps in the simulators, s (measured)."""
 _TIMESYNC_WAIT = 3.0
-"""Time after the first sample before an unknown age is reported, s: TIMESYNC takes a while."""
+"""Time allowed for TIMESYNC after the first sample, s; then an unknown age is reported."""
 
 
 class VehicleClock:
@@ -42,12 +42,12 @@ class VehicleClock:
             TIMESYNC.
 
     Attributes:
-        rate: Rate of the vehicle's clock.
-        delay: Delay of the quickest sample, measured by TIMESYNC.
+        rate: Estimates the rate of the vehicle's clock.
+        delay: Estimates the delay of the quickest sample, by TIMESYNC.
         changes: Counts jumps, wraps, standstills and restarts of the clock.
         restarts: Counts restarts of the autopilot, after which its time since boot continues from a
             smaller value.
-        last_change: The newest of these changes in words.
+        last_change: The newest change counted in `changes`, in words; empty before the first.
         outliers: Number of single samples dropped because they were stamped far ahead.
         on_event: Called with a sentence for the user.
     """
@@ -123,7 +123,7 @@ class VehicleClock:
             self.rate.note(received, quickest)
         return Reading(time, late + self.delay.seconds)
 
-    def exchange(self, sent: float, received: float, vehicle_ns: int) -> None:
+    def take_timesync(self, sent: float, received: float, vehicle_ns: int) -> None:
         """Take a TIMESYNC exchange.
 
         An exchange also shows whether the clock has slipped: on a busy computer simulators lose
@@ -132,7 +132,7 @@ class VehicleClock:
         Args:
             sent: Event-loop time of the request, s.
             received: Event-loop time of the answer, s.
-            vehicle_ns: The vehicle's clock in between, ns.
+            vehicle_ns: The vehicle's time in the answer, ns.
         """
         if self._lockstep or self._began == inf:
             return
@@ -142,7 +142,7 @@ class VehicleClock:
         attitude_fits = received - self._received < 1.0 and self._late < SMALLEST_JUMP
         error = half_round_trip + self.rate.spread(max(0.0, received - self._received))
         delay = time - middle_time - quickest
-        setback = self.delay.compare(received, error, delay)
+        setback = self.delay.take_exchange(received, error, delay)
         if setback is None:
             if -delay < SMALLEST_JUMP:
                 self._quickest -= max(0.0, -delay - error - _TIMESYNC_LAG)
@@ -152,7 +152,7 @@ class VehicleClock:
         else:
             # The answer may be a little older than the newest sample.
             was_set_back = time < self._newest - _MIN_CLOCK_SETBACK
-            self._accept_jump(-setback, round(vehicle_ns * 1e-6), restarted=was_set_back)
+            self._accept_jump(-setback, round(vehicle_ns * 1e-6), set_back=was_set_back)
 
     def update(self, now: float) -> None:
         """Drop expired TIMESYNC exchanges; report when ages become unknown or known again.
@@ -173,7 +173,7 @@ class VehicleClock:
             self.on_event("the age of telemetry is known by TIMESYNC")
 
     def _judge_misfit(self, time_boot_ms: int, stamp: Stamp, quickest: float) -> Misfit | None:
-        """Why `stamp` does not fit the clock; None if it fits, or a change is accepted."""
+        """Why `stamp` does not fit the clock; None if it fits, or if a jump is accepted now."""
         if self._began == inf:
             self._began = self._received = stamp.received
             self._quickest = 0.0 if self._lockstep else stamp.ahead
@@ -195,7 +195,7 @@ class VehicleClock:
         self._misfits.stamps.clear()
         self._quickest = quickest
         self._newest = -inf
-        self._accept_jump(jump, time_boot_ms, restarted=jump < 0.0)
+        self._accept_jump(jump, time_boot_ms, set_back=jump < 0.0)
         return None
 
     def _link_got_quicker(self, stamp: Stamp, quickest: float) -> bool:
@@ -216,16 +216,16 @@ class VehicleClock:
     def _end_misfits(self, time_boot_ms: int, late: float) -> None:
         """Take the first sample whose stamp fits the clock again; it came `late` seconds late.
 
-        If all samples before it that did not fit repeated one stamp, the clock stood still.
+        If all misfits before it repeated the newest stamp that fitted, the clock stood still.
         """
         clock_stopped = self._misfits.clock_stopped(self._newest)
         lasted = self._misfits.stamps[-1].received - self._received
         self._drop_misfits()
         if clock_stopped and min(lasted, late) >= SMALLEST_JUMP:
-            self._accept_jump(-late, time_boot_ms, restarted=False)
+            self._accept_jump(-late, time_boot_ms, set_back=False)
 
     def _drop_misfits(self) -> None:
-        """Drop the misfits as outliers: the clock continues as before, or changes again."""
+        """Drop the misfits; those that were stamped ahead of the clock count as outliers."""
         ahead = sum(stamp.time > self._newest for stamp in self._misfits.stamps)
         if ahead and not self._reported_outlier:
             self._reported_outlier = True
@@ -237,7 +237,7 @@ class VehicleClock:
         self.outliers += ahead
         self._misfits.stamps.clear()
 
-    def _accept_jump(self, jump: float, time_boot_ms: int, *, restarted: bool) -> None:
+    def _accept_jump(self, jump: float, time_boot_ms: int, *, set_back: bool) -> None:
         """Accept that the vehicle's clock jumped by `jump` s; vehicle times stay continuous."""
         before = self._received + self._quickest - self._shift
         self._shift -= jump
@@ -245,6 +245,6 @@ class VehicleClock:
         if self._received - self._began < _SETTLING_TIME and jump > -RESTART_SETBACK:
             return
         self.changes += 1
-        self.restarts += restarted and not has_wrapped(jump, before) and jump < -RESTART_SETBACK
-        self.last_change = describe_change(jump, before, time_boot_ms / 1000.0, restarted=restarted)
+        self.restarts += set_back and not has_wrapped(jump, before) and jump < -RESTART_SETBACK
+        self.last_change = describe_change(jump, before, time_boot_ms / 1000.0, set_back=set_back)
         self.on_event(self.last_change)

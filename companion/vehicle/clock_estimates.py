@@ -10,8 +10,8 @@ from math import inf
 from typing import NamedTuple
 
 MOST_DRIFT = 0.02
-"""Largest difference in rate between the two clocks, s per s. It is less than 0.0002 for crystals,
-and was 0.006 for a simulator that ran slower than real time."""
+"""Largest assumed difference in rate between the two clocks, s per s. Crystals differ by less than
+0.0002; a simulator that ran slower than real time differed by 0.006."""
 _RATE_UNCERTAINTY = 0.005
 """Uncertainty of a measured rate, s per s."""
 _LATE_SAMPLES_RISE = 0.005
@@ -20,14 +20,14 @@ measurement of the rate restarts. Without a restart, a backlog of 68 ms at the s
 PX4) would give a rate of 1.4 %, and samples would seem up to 79 ms old for 40 s.
 """
 _NOTE_PERIOD = 1.0
-"""Time between two offsets that are noted, s."""
+"""Time between two offsets that are noted to measure the rate, s."""
 _MIN_WINDOW, _MAX_WINDOW = 5, 20
 """Shortest and longest time over which a rate is measured, s."""
 
 EXCHANGE_LIFETIME = 20.0
 """Time for which a TIMESYNC exchange is used, s; there is one each second."""
 _MAX_DELAY = 10.0
-"""Largest plausible delay of a sample, s; a greater difference means another clock."""
+"""Largest plausible delay of a sample, s; a larger one means that TIMESYNC uses another clock."""
 _MAX_TIMESYNC_LAG = 0.05
 """Tolerated lag of TIMESYNC behind the samples' stamps, s; in the simulators up to 0.012."""
 
@@ -89,22 +89,28 @@ class DelayUnknown(Enum):
 
 
 class _Exchange(NamedTuple):
-    """A TIMESYNC exchange: event-loop time, half the round trip, and the delay it gives; s."""
+    """A TIMESYNC exchange.
+
+    Attributes:
+        at: Event-loop time of the answer, s.
+        first_error: Largest error of the delay at that time, s.
+        delay: TIMESYNC's offset minus the quickest sample's, s.
+    """
 
     at: float
-    half: float
+    first_error: float
     delay: float
 
     def error(self, now: float) -> float:
         """Largest error of the delay at the event-loop time `now`, s."""
-        return self.half + MOST_DRIFT * (now - self.at)
+        return self.first_error + MOST_DRIFT * (now - self.at)
 
 
 class TelemetryDelay:
     """The delay of the quickest sample, from the TIMESYNC exchange with the smallest error.
 
-    The error of an exchange is half its round trip, and grows by `MOST_DRIFT` with its age, because
-    in the samples a growing queue looks like a slower clock.
+    The largest error of an exchange grows with its age, by `MOST_DRIFT`: samples that a growing
+    queue delays look like those of a slower clock.
 
     Attributes:
         known: Whether the delay is known.
@@ -119,31 +125,34 @@ class TelemetryDelay:
         self._exchanges: deque[_Exchange] = deque(maxlen=round(EXCHANGE_LIFETIME) + 10)
         self._odd: _Exchange | None = None
 
-    def compare(self, now: float, half: float, delay: float) -> float | None:
-        """Take an exchange whose delay is plausible; judge two implausible ones that agree.
+    def take_exchange(self, now: float, error: float, delay: float) -> float | None:
+        """Take an exchange; one with a plausible delay is kept.
 
-        A single implausible one is ignored. Two in a row that agree show that a clock has changed.
-        If the delay was known and is negative now, TIMESYNC has fallen behind the samples' stamps,
-        and the caller judges why. Otherwise TIMESYNC uses another clock, and the known delay is
-        forgotten.
+        A single implausible delay is ignored. Two in a row that agree show that a clock changed. If
+        exchanges are kept and the new delay is negative, TIMESYNC has fallen behind the samples'
+        stamps, and the caller finds out why. Otherwise TIMESYNC uses another clock, and all
+        exchanges are forgotten.
 
         Args:
             now: Event-loop time, s.
-            half: Half of the exchange's round trip, s.
+            error: Largest error of `delay`, s: half the round trip, and the clock's drift since the
+                newest sample.
             delay: TIMESYNC's offset minus the quickest sample's, s.
 
         Returns:
-            How far TIMESYNC has fallen behind the samples' stamps, s; None: it has not.
+            How far TIMESYNC has fallen behind the samples' stamps, s; None if it has not.
         """
-        exchange = _Exchange(now, half, delay)
-        if -(half + _MAX_TIMESYNC_LAG) <= delay <= _MAX_DELAY:
+        exchange = _Exchange(now, error, delay)
+        if -(error + _MAX_TIMESYNC_LAG) <= delay <= _MAX_DELAY:
             self._odd = None
             self.unknown = DelayUnknown.UNANSWERED
             self._exchanges.append(exchange)
             self.expire(now)
             return None
         before, self._odd = self._odd, exchange
-        if before is None or abs(before.delay - delay) > before.half + half + _MAX_TIMESYNC_LAG:
+        if before is None:
+            return None
+        if abs(before.delay - delay) > before.first_error + error + _MAX_TIMESYNC_LAG:
             return None
         self._odd = None
         if self._exchanges and delay < 0.0:
@@ -152,9 +161,9 @@ class TelemetryDelay:
         return None
 
     def largest_possible(self, before: float) -> float:
-        """The largest delay possible by the exchanges until the event-loop time `before`, s.
+        """The largest delay that the exchanges up to event-loop time `before` (s) allow, s.
 
-        Without such an exchange it is 0.
+        It is 0 without such an exchange.
         """
         earlier = [each for each in self._exchanges if each.at <= before]
         if not earlier:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 SMALLEST_JUMP = 0.05
 """A stamp further ahead of the clock than this, s, is no drift; simulators slip by up to 0.016."""
 SAME_CLOCK_SPREAD = 0.1
-"""Largest difference of offsets of samples that may belong to one clock, s."""
+"""Two misfits whose offsets differ by less than this, s, may come from the same jump."""
 _MIN_JUMP_SAMPLES = 3
 """Number of misfits in a row that shows a jump of the clock; fewer are outliers."""
 _MIN_JUMP_SPAN = 0.04
@@ -47,7 +47,7 @@ class Stamp(NamedTuple):
 
     Attributes:
         time: Vehicle time, s.
-        ahead: Vehicle time minus event-loop time at its arrival, s.
+        ahead: Vehicle time minus event-loop time at its arrival, s; its offset less its delay.
         received: Event-loop time of its arrival, s.
     """
 
@@ -106,20 +106,20 @@ def has_wrapped(jump: float, before: float) -> bool:
     )
 
 
-def describe_change(jump: float, before: float, now: float, *, restarted: bool) -> str:
+def describe_change(jump: float, before: float, now: float, *, set_back: bool) -> str:
     """A change of the vehicle's clock in words.
 
     Args:
         jump: How far the clock moved, s.
         before: Time since boot before the change, s.
         now: Time since boot after the change, s.
-        restarted: True: the clock went back and goes on from there. False: it stood still.
+        set_back: With a negative `jump`: True if the clock was set back, False if it stood still.
     """
     if has_wrapped(jump, before):
         return "the vehicle's time since boot wrapped around after 49.7 days"
     if jump > 0.0:
         return f"the vehicle's clock jumped ahead by {jump:.2f} s"
-    if not restarted:
+    if not set_back:
         return f"the vehicle's clock stood still for {-jump:.2f} s"
     if jump < -RESTART_SETBACK:
         return (

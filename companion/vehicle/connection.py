@@ -25,9 +25,9 @@ class Connection:
     Args:
         endpoint: The endpoint to open.
         inbox: Takes the bytes that arrive.
-        outbox: Sends over the open transport; without one it drops frames.
+        outbox: Sends over the open transport; drops frames while none is open.
         stats: Counts the reconnects.
-        on_dropped: Called with the reason of each drop; ends all waiting for answers.
+        on_dropped: Called with the reason when the connection drops.
         opener: Opens the transport.
     """
 
@@ -57,7 +57,7 @@ class Connection:
             EndpointError: The transport cannot be opened; the message says why and what to do.
         """
         # First, because bytes may arrive before this coroutine resumes.
-        self._inbox.connect(streaming=not isinstance(self._endpoint, UdpIn | UdpOut))
+        self._inbox.start_connection(streaming=not isinstance(self._endpoint, UdpIn | UdpOut))
         self._lost_early = None
         transport = await self._opener(self._endpoint, self._inbox, self._on_lost)
         if self._lost_early is not None:
@@ -87,7 +87,7 @@ class Connection:
             self._drop_transport()
             self._reopening = asyncio.get_running_loop().create_task(self._reopen())
         else:  # a TCP server goes on listening
-            self._inbox.connect(streaming=True)
+            self._inbox.start_connection(streaming=True)
             self._stats.reconnects += 1
         self._on_dropped(reason)
 

@@ -15,7 +15,7 @@ Row = tuple[float, ...]
 
 _ARMED_FLAG = 128
 _RELEVANT_BITS = IGNORE_ATTITUDE | 0b1100111
-"""Bits of a type mask that are compared: quaternion, three rates, throttle, body thrust."""
+"""Bits of a setpoint's type mask that are compared: quaternion, rates, throttle, body thrust."""
 _STANDARD_GRAVITY = 9.80665
 _RECENT_SAMPLES = 500
 """Number of newest samples whose time stamp a setpoint may carry."""
@@ -39,7 +39,7 @@ class FlightLog:
         setpoints: Setpoints that the autopilot obeyed: (time of the sample to which the setpoint
             responds, roll, pitch, yaw rate in rad/s, thrust 0..1).
         rates: Measured rates: (time, roll, pitch, yaw rate in rad/s).
-        specific_thrust: The accelerometer's −z (FRD): (time, m/s²).
+        specific_thrust: The accelerometer's −z axis (body FRD): (time, m/s²).
     """
 
     setpoints: list[Row]
@@ -78,7 +78,7 @@ def read_flight_log(path: Path | str) -> FlightLog:
 
 @dataclass(slots=True)
 class _Reader:
-    """Takes messages in the order in which they were recorded.
+    """Collects setpoints and measurements from messages, taken in the order of their recording.
 
     Attributes:
         vehicle: system and component of the autopilot, from its first heartbeat.

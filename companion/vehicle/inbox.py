@@ -1,8 +1,8 @@
 """Checks arriving bytes, and passes their frames to the control loop and to the router.
 
 Every frame takes the same way, whatever the transport: scan, filter, control loop, count,
-subscribers. In lockstep, frames also wait for the beacon (a SYSTEM_TIME) that closes their step,
-and samples for the tasks of the step.
+subscribers. In lockstep, frames first wait for the beacon (a SYSTEM_TIME) that closes their step,
+and samples then wait until the event loop has run the tasks of that step.
 """
 
 import asyncio
@@ -44,9 +44,9 @@ class Inbox:
     Attributes:
         on_attitude: Called with each attitude sample, synchronously.
         on_foreign: Called with each frame of another system or component than the vehicle's.
-        on_frame: Called with each frame of the peer, whatever its source and message, after the
-            control loop and all subscribers; not with beacons, nor with frames of the vehicle whose
-            signature is refused.
+        on_frame: Called with each frame of the peer, from any system and of any message, after the
+            control loop and all subscribers. Beacons, and frames of the vehicle with a refused
+            signature, are left out.
         lockstep: Handles beacons in lockstep; None without lockstep.
     """
 
@@ -78,13 +78,13 @@ class Inbox:
             last_setpoint,
             every_frame_claims=settings.signing is not None or settings.lockstep,
         )
-        self.connect(streaming=False)
+        self.start_connection(streaming=False)
 
-    def connect(self, *, streaming: bool) -> None:
-        """Prepare for the bytes of another connection: forget an incomplete frame.
+    def start_connection(self, *, streaming: bool) -> None:
+        """Prepare for a new connection: forget an incomplete frame and the last sequence number.
 
         Args:
-            streaming: whether a frame may continue in the bytes received next.
+            streaming: Whether a frame may continue in the bytes received next.
         """
         self._scanner = FrameScanner(
             CRC_EXTRA, streaming=streaming, stats=self._stats, keep_unknown=True
@@ -140,11 +140,11 @@ class Inbox:
             self._router.report(error)
         return True
 
-    def may_answer(self, sender: str) -> bool:
-        """Let `sender` answer a TIMESYNC request, if that could make its signatures acceptable.
+    def may_prove_date(self, sender: str) -> bool:
+        """Whether an answer to TIMESYNC could prove the date of `sender`, whose claim was refused.
 
-        Returns whether it may; then frames are sent to `sender`, although its frame was refused,
-        and the next frame that `receive` accepts makes `sender` the peer.
+        If so, the transport sends to `sender`, and the next frame that `receive` accepts makes
+        `sender` the peer.
         """
         if not self._filter.awaits_answer:
             return False
@@ -156,7 +156,7 @@ class Inbox:
         return self._peer_rule.lapsed()
 
     def note_stranger(self, sender: str) -> None:
-        """Tell the user that bytes of `sender` were ignored, as the endpoint names other peers."""
+        """Tell the user that `sender` was ignored, because the endpoint names only other peers."""
         self._peer_rule.ignore(sender)
 
     def tell_remarks(self) -> None:

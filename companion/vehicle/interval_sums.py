@@ -1,9 +1,9 @@
 """The effective rate of setpoints or samples, from the intervals between them."""
 
 _MAX_UNEVENNESS = 2.0
-"""Up to this ratio of Σg²/Σg to the mean of the intervals g, the effective rate is the mean rate.
+"""Largest ratio of Σg²/Σg to the mean interval at which the effective rate is the mean rate.
 
-If the intervals are less even, the ratio is larger, and the effective rate is lower.
+g is each interval. The ratio is 1 for equal intervals. A larger one lowers the effective rate.
 """
 
 

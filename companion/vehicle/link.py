@@ -153,8 +153,9 @@ class Link(VehicleClient):
 
     @property
     def on_attitude(self) -> Callable[[AttitudeSample], None] | None:
-        """Called with each attitude sample, inside the read callback; in lockstep after the tasks.
+        """Called with each attitude sample, inside the read callback.
 
+        In lockstep it is called after the event loop has run the tasks of the step.
         An exception that it raises goes to `on_error`.
         """
         return self._inbox.on_attitude
@@ -232,7 +233,7 @@ class Link(VehicleClient):
         self._tasks.append(task)
 
     def _report_failure(self, task: asyncio.Task[None]) -> None:
-        """Report that a task failed, which ends a flight; without it the link is not whole."""
+        """Report the failure of a task to `on_error`: the link needs every one of its tasks."""
         error = None if task.cancelled() else task.exception()
         if isinstance(error, Exception):
             self._router.report(error)

@@ -8,11 +8,11 @@ from companion.vehicle.parameter_rules import Check, CheckResult, CompanionSetti
 UNSAFE, INEFFECTIVE = CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 
 LONGEST_RATE_HOLD = 2.0
-"""Longest time for which the last rates may be held, s. 0.4 rad/s held for 1 s became 24° of tilt
-(measured on PX4); twice that tilt is not recoverable."""
+"""Longest time for which the autopilot may hold the last rates, s. 0.4 rad/s held for 1 s became
+24° of tilt (measured on PX4); twice that tilt is not recoverable."""
 
 _MAX_HOVER_RATIO = 1.4
-"""Largest plausible ratio of two hover thrusts; above it, one of them is wrong."""
+"""Largest plausible ratio of two hover thrusts, the autopilot's and the configured one."""
 
 _MAX_LIMIT_RATIO = 1.15
 """Acceleration limits that differ by less than this factor have the same effect."""
@@ -38,7 +38,7 @@ def first_problem(*checks: Check) -> Check:
     return check
 
 
-def action(good: Iterable[float], bad: Mapping[float, str], set_to: float) -> Check:
+def safe_action(good: Iterable[float], bad: Mapping[float, str], set_to: float) -> Check:
     """A check of what the autopilot does in an emergency: only the actions in `good` are safe.
 
     Args:
@@ -112,7 +112,7 @@ def shortest_rate_hold(silence_limit: float) -> float:
 
 
 def rates_held(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
-    """Check the time for which the last rates are held.
+    """Check the time for which the autopilot holds the last rates after setpoints stop.
 
     It must be longer than `silence_limit`, and at most `LONGEST_RATE_HOLD`.
     """
@@ -148,7 +148,7 @@ def hover_thrust(value: float, _: Values, settings: CompanionSettings) -> Proble
 
 
 def thrust_curve(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
-    """Check that only one of autopilot and `companion` compensates the rotors' thrust curve."""
+    """Check that autopilot and `companion` do not both compensate the rotors' thrust curve."""
     if value == 0.0 or settings.curve_factor == 0.0:
         return None
     return Problem(
@@ -159,7 +159,7 @@ def thrust_curve(value: float, _: Values, settings: CompanionSettings) -> Proble
 
 
 def battery_scaling(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
-    """Check that only one of autopilot and `companion` compensates the battery voltage."""
+    """Check that autopilot and `companion` do not both compensate the battery voltage."""
     if value <= 0.0 or settings.battery_exponent == 0.0:
         return None
     return Problem(
@@ -182,7 +182,7 @@ def system_id(value: float, _: Values, settings: CompanionSettings) -> Problem |
 
 
 def acceleration_limit(unit: float, axis: str) -> Check:
-    """A check that the planner assumes the autopilot's acceleration limit of an axis.
+    """A check that the planner assumes the autopilot's angular acceleration limit of an axis.
 
     Args:
         unit: the parameter's unit as a multiple of 1 °/s².

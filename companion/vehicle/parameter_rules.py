@@ -21,14 +21,14 @@ class CompanionSettings(NamedTuple):
         source_system: System id of `companion`.
         attitude_rate_hz: Rate of attitude samples that is requested, Hz.
         silence_limit: Time without setpoints after which `companion` releases control, s.
-        hover_thrust: Normalised thrust at hover with which the flight begins.
+        hover_thrust: Configured collective thrust at hover, 0..1.
         curve_factor: Factor of the thrust curve that `companion` compensates; 0: none.
         battery_exponent: Exponent of the voltage that `companion` compensates; 0: none.
-        tilt_compensated: Whether the autopilot is expected to divide thrust by cos(tilt).
-        acceleration_limits: Limits of `roll`, `pitch` and `yaw` that the planner assumes, rad/s²;
-            `None`: no limit.
+        autopilot_compensates_tilt: Whether the autopilot is expected to divide thrust by cos(tilt).
+        acceleration_limits: Angular acceleration limits of `roll`, `pitch` and `yaw` that the
+            planner assumes, rad/s²; `None`: no limit.
         max_tilt: Largest tilt of a target, rad.
-        signs: Whether signing is configured.
+        signing: Whether message signing is configured.
     """
 
     source_system: int
@@ -37,10 +37,10 @@ class CompanionSettings(NamedTuple):
     hover_thrust: float
     curve_factor: float
     battery_exponent: float
-    tilt_compensated: bool
+    autopilot_compensates_tilt: bool
     acceleration_limits: Mapping[str, float | None]
     max_tilt: float
-    signs: bool
+    signing: bool
 
 
 class CheckResult(Enum):

@@ -121,7 +121,7 @@ class TimeSync:
         if message.ts1 in self._requests:
             self._requests.remove(message.ts1)
             self._round_trips.append((now * _S_PER_NS, (now - message.ts1) * _S_PER_NS))
-            self._vehicle_clock.exchange(message.ts1 * _S_PER_NS, now * _S_PER_NS, message.tc1)
+            self._vehicle_clock.take_timesync(message.ts1 * _S_PER_NS, now * _S_PER_NS, message.tc1)
         elif message.ts1 not in self._probes:  # it answers another station
             return
         self._probes.take_answer(message.ts1, now)

@@ -11,7 +11,9 @@ _MAX_TELEMETRY_AGE = 5.0
 """Age from which telemetry counts as unknown, s; every message should come at 1 Hz or faster."""
 
 _MAX_CHARGE_AGE = 1.5
-"""Age up to which a charge is kept although a newer message lacks it, s; both come at 1 Hz."""
+"""Age up to which a charge is kept although a newer message lacks it, s.
+
+The charge is in SYS_STATUS and BATTERY_STATUS, which come at 1 Hz or faster."""
 
 
 def outdated(received: float, now: float) -> bool:
@@ -101,7 +103,7 @@ class LocalPosition(NamedTuple):
     velocity_ned: Vector
 
 
-class Landed(NamedTuple):
+class LandedState(NamedTuple):
     """EXTENDED_SYS_STATE.
 
     Attributes:

@@ -45,7 +45,7 @@ def autopilot_for(mav_autopilot: int, vehicle_type: int) -> Autopilot:
 
 
 def read_events(router: Router, texts: TextAssembler, clock: Callable[[], float]) -> None:
-    """Turn PX4's events into texts; on some links it sends them instead of STATUSTEXT.
+    """Turn PX4's events into texts; on some links PX4 sends events instead of STATUSTEXT.
 
     Args:
         router: delivers EVENT.

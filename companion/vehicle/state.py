@@ -22,7 +22,7 @@ from companion.vehicle.records import (
     GlobalPosition,
     Gps,
     Home,
-    Landed,
+    LandedState,
     LocalPosition,
     Prearm,
     gps_fault,
@@ -38,7 +38,7 @@ _LANDED_UNDEFINED, LANDED_ON_GROUND, LANDED_TAKEOFF = 0, 1, 3
 
 @dataclass
 class _Values:
-    landed_state: Landed | None = None
+    landed_state: LandedState | None = None
     position: LocalPosition | None = None
     battery: Battery | None = None
     attitude_target_thrust: AttitudeTargetThrust | None = None
@@ -59,13 +59,14 @@ class VehicleState(ModeState, _Values):
     Mode and arming are in the base class `ModeState`.
 
     Attributes:
-        landed_state: `Landed`; `landed`, `flying` and `taking_off` ignore an outdated one.
+        landed_state: `LandedState`; to `landed`, `flying` and `taking_off` an outdated one is
+            unknown.
         position: `LocalPosition` with the newest time stamp of the vehicle.
-        attitude_target: `AttitudeTarget`; only of an autopilot with `rates_along_target`, and only
-            with a unit quaternion.
+        attitude_target: `AttitudeTarget`; only of an autopilot with `rates_about_target_axes`, and
+            only with a unit quaternion.
         global_position: `GlobalPosition`; `None` until the vehicle knows it.
         attitude_target_thrust, battery, gps, home, estimator, prearm: See the record of each.
-        positions: Number of positions taken.
+        positions: Number of positions accepted.
         gps_was_good: Whether GPS has had a 3D fix since the link was opened.
         reset_counter: Counter in ODOMETRY that rises whenever the estimate jumps.
         texts: Texts of the autopilot, newest last.
@@ -154,7 +155,7 @@ class VehicleState(ModeState, _Values):
         return gps_fault(self.gps, self._clock()) if self.gps_was_good else None
 
     def _on_extended_sys_state(self, message: Message) -> None:
-        self.landed_state = Landed(self._clock(), message.landed_state)
+        self.landed_state = LandedState(self._clock(), message.landed_state)
 
     def _landed_state(self) -> int | None:
         landed = self.landed_state
@@ -210,7 +211,7 @@ class VehicleState(ModeState, _Values):
         elif not isfinite(message.thrust):
             self._stats.refuse_non_finite("ATTITUDE_TARGET", self._clock())
         autopilot = self.autopilot
-        if autopilot is not None and autopilot.rates_along_target:
+        if autopilot is not None and autopilot.rates_about_target_axes:
             self._take_attitude_target(message.time_boot_ms, tuple(message.q))
 
     def _take_attitude_target(self, time_boot_ms: int, q: Quaternion) -> None:

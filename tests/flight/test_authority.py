@@ -21,7 +21,7 @@ from companion.mavlink.errors import CommandRefused
 from companion.safety.actions import Exit
 from companion.vehicle.link import Link
 from companion.vehicle.px4.autopilot import Px4
-from companion.vehicle.records import Landed
+from companion.vehicle.records import LandedState
 from companion.vehicle.state import VehicleState
 from tests.flight.fly import fly, mock_vehicle, run, session_for
 from tests.flight.others import When
@@ -159,7 +159,7 @@ def test_a_false_landing_in_control_is_not_made_true(tmp_path):
     """An autopilot that calls a flying vehicle landed must not get thrust 0 for it."""
 
     def claim():
-        session._assembled.context.link.state.landed_state = Landed(inf, 1)
+        session._assembled.context.link.state.landed_state = LandedState(inf, 1)
 
     with mock_vehicle(tmp_path) as mock:
         observer = When("maneuvers", claim, after=2.0)

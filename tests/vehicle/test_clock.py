@@ -57,7 +57,7 @@ class Link:
     def compare(self, trip=0.004):
         out = trip * self.random.random()
         asked = self.vehicle + self.other + self.rate * out
-        self.clock.exchange(self.now, self.now + trip, round(asked * 1e9))
+        self.clock.take_timesync(self.now, self.now + trip, round(asked * 1e9))
 
 
 def stood_still(link):
@@ -277,7 +277,9 @@ def test_a_real_px4_with_a_slow_clock_is_not_late(timesync):
                 ages.append(clock.take(int(vehicle_ms), received).age)
                 clock.update(received)
             elif timesync:
-                clock.exchange(float(row["timesync_sent_s"]), received, round(1e6 * vehicle_ms))
+                clock.take_timesync(
+                    float(row["timesync_sent_s"]), received, round(1e6 * vehicle_ms)
+                )
     assert len(ages) > 900
     assert max(ages) < 0.01
     assert clock.rate.rate == pytest.approx(-0.006, abs=0.001)

@@ -9,7 +9,7 @@ def compared(*exchanges):
     """A delay after exchanges (time, half the round trip, delay), s; and the last answer."""
     delay, answer = TelemetryDelay(), None
     for exchange in exchanges:
-        answer = delay.compare(*exchange)
+        answer = delay.take_exchange(*exchange)
     return delay, answer
 
 

@@ -14,10 +14,10 @@ SETTINGS = CompanionSettings(
     hover_thrust=0.4,
     curve_factor=0.3,
     battery_exponent=1.0,
-    tilt_compensated=False,
+    autopilot_compensates_tilt=False,
     acceleration_limits={"roll": radians(1000.0), "pitch": None, "yaw": radians(270.0)},
     max_tilt=0.6,
-    signs=False,
+    signing=False,
 )
 UNSAFE, BAD = CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 WORSE = "it falls"
@@ -33,7 +33,7 @@ def problem(check, value):
     [
         (checks.forbidden, (UNSAFE, {3.0: WORSE}, 1.0), (0.0, 2.0), (3.0,), 1.0),
         (checks.forbidden, (UNSAFE, {3.0: WORSE}), (0.0, 2.0), (3.0,), None),
-        (checks.action, ((1.0, 2.0), {3.0: WORSE}, 2.0), (1.0, 2.0), (3.0,), 2.0),
+        (checks.safe_action, ((1.0, 2.0), {3.0: WORSE}, 2.0), (1.0, 2.0), (3.0,), 2.0),
         (checks.required, (UNSAFE, 4.0, WORSE), (4.0,), (0.0, 5.0), 4.0),
         (checks.positive, (UNSAFE, WORSE, 7.0), (0.1, 9.0), (0.0, -1.0), 7.0),
         (checks.at_most, (UNSAFE, 5.0, WORSE, 1.5), (5.0, -2.0), (5.1,), 1.5),
@@ -52,7 +52,7 @@ def test_a_bad_value_is_named_with_its_consequence_and_the_value_to_set(
 
 
 def test_an_action_that_nobody_knows_is_unsafe():
-    found = problem(checks.action((1.0,), {3.0: WORSE}, 1.0), 99.0)
+    found = problem(checks.safe_action((1.0,), {3.0: WORSE}, 1.0), 99.0)
     assert found == Problem(UNSAFE, "companion does not know this action", 1.0)
 
 

@@ -23,10 +23,10 @@ OTHER = CompanionSettings(
     hover_thrust=0.25,
     curve_factor=0.3,
     battery_exponent=1.0,
-    tilt_compensated=True,
+    autopilot_compensates_tilt=True,
     acceleration_limits={"roll": 20.0, "pitch": 20.0, "yaw": 5.0},
     max_tilt=1.0,
-    signs=True,
+    signing=True,
 )
 """Other values everywhere."""
 

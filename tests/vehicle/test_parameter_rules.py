@@ -17,10 +17,10 @@ PX4_SETUP = CompanionSettings(
     hover_thrust=0.49,
     curve_factor=0.0,
     battery_exponent=2.0,
-    tilt_compensated=False,
+    autopilot_compensates_tilt=False,
     acceleration_limits={"roll": None, "pitch": None, "yaw": None},
     max_tilt=radians(35.0),
-    signs=False,
+    signing=False,
 )
 ARDUPILOT_SETUP = PX4_SETUP._replace(
     hover_thrust=0.364,
@@ -176,7 +176,7 @@ def test_each_mistake_is_found_by_itself_and_mended_by_what_is_proposed(
         (PX4, {"source_system": 245}, "MAV_SYS_ID"),
         (PX4, {"attitude_rate_hz": 400.0}, "IMU_INTEG_RATE"),
         (ARDUPILOT, {"attitude_rate_hz": 500.0}, "SCHED_LOOP_RATE"),
-        (ARDUPILOT, {"tilt_compensated": True}, "ATC_ANGLE_BOOST"),
+        (ARDUPILOT, {"autopilot_compensates_tilt": True}, "ATC_ANGLE_BOOST"),
     ],
 )
 def test_our_own_configuration_counts_too(autopilot, setup, name):

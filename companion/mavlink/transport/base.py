@@ -15,7 +15,7 @@ accepted.
 class Receiver(Protocol):
     """Takes the bytes that a transport receives. `PeerRule` explains claims."""
 
-    def connect(self, *, streaming: bool) -> None:
+    def start_connection(self, *, streaming: bool) -> None:
         """Forget an incomplete frame: the next bytes come over another connection.
 
         Args:
@@ -31,7 +31,7 @@ class Receiver(Protocol):
         Without a valid claim in the bytes, no frame in them is accepted.
         """
 
-    def may_answer(self, sender: str) -> bool:
+    def may_prove_date(self, sender: str) -> bool:
         """Whether frames are sent to `sender` although its claim was refused.
 
         Its signature is good but its date is not proven; an answer to TIMESYNC would prove it.

@@ -142,7 +142,7 @@ class TcpTransport:
         if self._closed:
             return
         if self._server is not None and not self._claimed:
-            self._receiver.connect(streaming=True)  # not the peer, so the link is not lost
+            self._receiver.start_connection(streaming=True)  # not the peer, so the link is not lost
             return
         self._lost(reason)
 

@@ -156,7 +156,7 @@ class UdpTransport:
         """Take a datagram of an unconnected socket; return whether its sender becomes the peer.
 
         The sender becomes the peer if its claim is valid, or if it must receive frames in order to
-        prove its claim (`Receiver.may_answer`).
+        prove its claim (`Receiver.may_prove_date`).
         """
         sender = host_and_port(address)
         if not self._named_peers.admit(address):
@@ -166,7 +166,7 @@ class UdpTransport:
             accepted = self._receiver.receive(data, received_ns)  # the peer was only silent
         else:
             accepted = self._receiver.claim(data, received_ns, sender)
-        return accepted or self._receiver.may_answer(sender)
+        return accepted or self._receiver.may_prove_date(sender)
 
     def _check_peer(self) -> None:
         self._timer = self._loop.call_later(PEER_SILENCE_S, self._check_peer)

@@ -48,7 +48,7 @@ class ArduPilot:
     """ArduCopter's `Autopilot`.
 
     GUIDED is the mode of both take-off and offboard control. The first setpoint ends the take-off,
-    so no setpoint may be sent during the climb. The guided bit of `base_mode` distinguishes both:
+    so no setpoint may be sent during the climb. The guided bit of `base_mode` tells the two apart:
     it is set while the position controller runs, and clear while body rates are obeyed.
     """
 
@@ -74,7 +74,7 @@ class ArduPilot:
         }
     )
     interval_step_us = 1000
-    rates_along_target = True
+    rates_about_target_axes = True
     body_yaw_is_relative = True
     can_compensate_tilt = True
     offboard_loss_failsafe = OffboardLossFailsafe(
@@ -86,13 +86,13 @@ class ArduPilot:
     parameters = ARDUPILOT_PARAMETERS
 
     def mode_name(self, base_mode: int, custom_mode: int) -> str:
-        """Name of the mode in a heartbeat; GUIDED has another name while it obeys body rates."""
+        """Name of the mode in a heartbeat; GUIDED that obeys body rates has a name of its own."""
         name = _NAMES.get(custom_mode, f"mode {custom_mode}")
         by_rates = name == "GUIDED" and base_mode & _ARMED_FLAG and not base_mode & _GUIDED_FLAG
         return _BY_RATES if by_rates else name
 
     def roles(self, mode: str) -> frozenset[Role]:
-        """Roles of a mode in a flight; empty: the mode has none."""
+        """Roles of a mode in a flight; empty if it belongs to the pilot or to a failsafe."""
         return _ROLES.get(mode, frozenset())
 
     def set_mode(self, name: str) -> Command:
@@ -102,7 +102,7 @@ class ArduPilot:
     def not_ready(self, readiness: Readiness) -> str | None:
         """What is missing: estimator, position, home or ArduPilot's own pre-arm checks.
 
-        ArduPilot boots in STABILIZE, whose pre-arm checks need no position; those of GUIDED do.
+        ArduPilot boots in STABILIZE, whose pre-arm checks need no position, and GUIDED needs one.
         """
         flags = readiness.estimator_flags
         if flags is None:

@@ -28,14 +28,14 @@ _STOPS_MOTORS = "the motors stop in the air"
 
 
 def _angle_boost(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
-    if value and not settings.tilt_compensated:
+    if value and not settings.autopilot_compensates_tilt:
         return Problem(
             UNSAFE,
             "both ArduPilot and companion divide thrust by cos(tilt), so the vehicle climbs when "
             "it tilts (thrust.autopilot_compensates_tilt is false)",
             0.0,
         )
-    if not value and settings.tilt_compensated:
+    if not value and settings.autopilot_compensates_tilt:
         return Problem(
             UNSAFE,
             "neither ArduPilot nor companion divides thrust by cos(tilt), so the vehicle sinks "

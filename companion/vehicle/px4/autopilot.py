@@ -68,7 +68,7 @@ class Px4:
     """PX4's `Autopilot`.
 
     OFFBOARD can be entered after setpoints have streamed at 2 Hz or more for a second. When they
-    stop, PX4 holds the last rates for COM_OF_LOSS_T, so the caller must stop the rotation first.
+    stop, PX4 holds the last rates for COM_OF_LOSS_T, so the caller must stop the rotation before.
     While the intended mode is OFFBOARD, a later setpoint enters it again; only a mode command
     releases control for good.
     """
@@ -94,7 +94,7 @@ class Px4:
         }
     )
     interval_step_us = 1
-    rates_along_target = False
+    rates_about_target_axes = False
     body_yaw_is_relative = False
     can_compensate_tilt = False
     offboard_loss_failsafe = OffboardLossFailsafe(
@@ -108,7 +108,7 @@ class Px4:
         return _NAMES.get(custom_mode, f"mode 0x{custom_mode:08x}")
 
     def roles(self, mode: str) -> frozenset[Role]:
-        """Roles of a mode in a flight; empty: the mode has none."""
+        """Roles of a mode in a flight; empty if it belongs to the pilot or to a failsafe."""
         return _ROLES.get(mode, frozenset())
 
     def set_mode(self, name: str) -> Command:

@@ -54,13 +54,13 @@ _FAILSAFE_CAUSES = {
 }
 
 
-class _Text(NamedTuple):
+class _Template(NamedTuple):
     """Template of the text of an event.
 
     Attributes:
         text: The text with ``{}`` for each value.
         layout: `struct` format of the values in the event's arguments.
-        meanings: For each value, a text for each number; None: the number itself is shown.
+        meanings: For each value, the words for each number; None shows the number itself.
     """
 
     text: str
@@ -69,56 +69,56 @@ class _Text(NamedTuple):
 
 
 _EVENTS = {
-    "commander_armed_by": _Text("Armed by {}", "<B", (_ARMING_REASONS,)),
-    "commander_disarmed_by": _Text("Disarmed by {}", "<B", (_ARMING_REASONS,)),
-    "commander_arm_denied_resolve_failures": _Text(
+    "commander_armed_by": _Template("Armed by {}", "<B", (_ARMING_REASONS,)),
+    "commander_disarmed_by": _Template("Disarmed by {}", "<B", (_ARMING_REASONS,)),
+    "commander_arm_denied_resolve_failures": _Template(
         "Arming denied: Resolve system health failures first"
     ),
-    "commander_disarm_denied_not_landed": _Text("Disarming denied: not landed"),
-    "commander_modeswitch_not_avail": _Text("Switching to that mode is currently not possible"),
-    "commander_takeoff_detected": _Text("Takeoff detected"),
-    "commander_landing_current_pos": _Text("Landing at current position"),
-    "commander_landing_detected": _Text("Landing detected"),
-    "commander_rtl": _Text("Returning to launch"),
-    "navigator_takeoff_default_alt": _Text(
+    "commander_disarm_denied_not_landed": _Template("Disarming denied: not landed"),
+    "commander_modeswitch_not_avail": _Template("Switching to that mode is currently not possible"),
+    "commander_takeoff_detected": _Template("Takeoff detected"),
+    "commander_landing_current_pos": _Template("Landing at current position"),
+    "commander_landing_detected": _Template("Landing detected"),
+    "commander_rtl": _Template("Returning to launch"),
+    "navigator_takeoff_default_alt": _Template(
         "Using default takeoff altitude: {:.1f} m", "<f", (None,)
     ),
-    "commander_failsafe_enter": _Text(
+    "commander_failsafe_enter": _Template(
         "Failsafe activated due to {1}, triggering {0}",
         "<4xBB",
         (_FAILSAFE_ACTIONS, _FAILSAFE_CAUSES),
     ),
-    "commander_failsafe_enter_generic": _Text(
+    "commander_failsafe_enter_generic": _Template(
         "Failsafe activated, triggering {}", "<4xB", (_FAILSAFE_ACTIONS,)
     ),
-    "commander_failsafe_enter_autopilot_disengaged": _Text(
+    "commander_failsafe_enter_autopilot_disengaged": _Template(
         "Failsafe activated, triggering {}", "<4xB", (_FAILSAFE_ACTIONS,)
     ),
-    "commander_failsafe_enter_hold": _Text(
+    "commander_failsafe_enter_hold": _Template(
         "Failsafe activated due to {2}, triggering {0} in {1} seconds",
         "<4xBHB",
         (_FAILSAFE_ACTIONS, None, _FAILSAFE_CAUSES),
     ),
-    "commander_failsafe_enter_generic_hold": _Text(
+    "commander_failsafe_enter_generic_hold": _Template(
         "Failsafe activated, triggering {} in {} seconds", "<4xBH", (_FAILSAFE_ACTIONS, None)
     ),
-    "commander_failsafe_enter_warn": _Text(
+    "commander_failsafe_enter_warn": _Template(
         "Failsafe warning triggered due to {}", "<4xB", (_FAILSAFE_CAUSES,)
     ),
-    "commander_failsafe_enter_generic_warn": _Text("Failsafe warning triggered"),
-    "commander_failsafe_enter_low_bat": _Text("Low battery level, return advised"),
-    "commander_failsafe_enter_crit_bat_warn": _Text("Critical battery level, land now"),
-    "commander_failsafe_enter_crit_low_bat_warn": _Text(
+    "commander_failsafe_enter_generic_warn": _Template("Failsafe warning triggered"),
+    "commander_failsafe_enter_low_bat": _Template("Low battery level, return advised"),
+    "commander_failsafe_enter_crit_bat_warn": _Template("Critical battery level, land now"),
+    "commander_failsafe_enter_crit_low_bat_warn": _Template(
         "Emergency battery level, land immediately"
     ),
-    "commander_rc_lost": _Text("Manual control lost"),
-    "commander_rc_regained": _Text("Manual control regained"),
-    "commander_rc_override": _Text("Pilot took over using sticks"),
-    "failsafe_rc_override": _Text("Pilot took over using sticks"),
-    "commander_gcs_lost": _Text("Connection to ground control station lost"),
-    "commander_dl_regained": _Text("GCS connection regained"),
-    "commander_mission_comp_lost": _Text("Connection to mission computer lost"),
-    "commander_onboard_ctrl_regained": _Text("Onboard controller regained"),
+    "commander_rc_lost": _Template("Manual control lost"),
+    "commander_rc_regained": _Template("Manual control regained"),
+    "commander_rc_override": _Template("Pilot took over using sticks"),
+    "failsafe_rc_override": _Template("Pilot took over using sticks"),
+    "commander_gcs_lost": _Template("Connection to ground control station lost"),
+    "commander_dl_regained": _Template("GCS connection regained"),
+    "commander_mission_comp_lost": _Template("Connection to mission computer lost"),
+    "commander_onboard_ctrl_regained": _Template("Onboard controller regained"),
 }
 
 _CHECK_TEXTS = {
@@ -153,10 +153,10 @@ def event_id(name: str) -> int:
 
 # The names of 17980399 and 30203637 are not known. Their texts come from the STATUSTEXTs that PX4
 # sent together with them.
-_WORDS_BY_ID = {event_id(name): words for name, words in _EVENTS.items()} | {
-    17980399: _Text("Logging to {}-{:02}-{:02}/{:02}_{:02}_{:02}.ulg", "<H5B", (None,) * 6),
+_TEMPLATES_BY_ID = {event_id(name): template for name, template in _EVENTS.items()} | {
+    17980399: _Template("Logging to {}-{:02}-{:02}/{:02}_{:02}_{:02}.ulg", "<H5B", (None,) * 6),
 }
-_CHECKS_BY_ID = {event_id(name): words for name, words in _CHECK_TEXTS.items()} | {
+_CHECKS_BY_ID = {event_id(name): text for name, text in _CHECK_TEXTS.items()} | {
     30203637: "No heading reference",
 }
 _SETPOINT_CHECK_IDS = {event_id(name) for name in _SETPOINT_CHECKS}
@@ -203,21 +203,21 @@ class EventReader:
             if number not in known and severity <= _WARNING_SEVERITY:
                 self._add_text(severity, number, _CHECKS_BY_ID.get(number))
         elif severity < _PROGRAMS_ONLY_SEVERITY:
-            words = _WORDS_BY_ID.get(number)
-            self._add_text(severity, number, words and _filled_in(words, arguments))
+            template = _TEMPLATES_BY_ID.get(number)
+            self._add_text(severity, number, template and _filled_in(template, arguments))
 
-    def _add_text(self, severity: int, number: int, words: str | None) -> None:
-        if words is not None:
-            self._texts.take_event(severity, words, self._clock())
+    def _add_text(self, severity: int, number: int, text: str | None) -> None:
+        if text is not None:
+            self._texts.take_event(severity, text, self._clock())
         elif number not in self._unknown:
             self._unknown.add(number)
             self._texts.take_event(severity, f"unknown PX4 event {number}", self._clock())
 
 
-def _filled_in(words: _Text, arguments: bytes) -> str:
-    values = struct.unpack_from(words.layout, arguments)
+def _filled_in(template: _Template, arguments: bytes) -> str:
+    values = struct.unpack_from(template.layout, arguments)
     named = (
         value if meaning is None else meaning.get(value, str(value))
-        for value, meaning in zip(values, words.meanings, strict=True)
+        for value, meaning in zip(values, template.meanings, strict=True)
     )
-    return words.text.format(*named)
+    return template.text.format(*named)

@@ -18,7 +18,7 @@ _TILT_OVERSHOOT = 15.0
 
 
 def attitude_rate(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
-    """Check that attitude is estimated as often as `link.attitude_rate_hz` asks for it."""
+    """Check that PX4 estimates attitude (IMU_INTEG_RATE) as often as `link.attitude_rate_hz`."""
     wanted = settings.attitude_rate_hz
     if value >= min(wanted, _INTEGRATION_RATES[-1]):
         return None
@@ -71,7 +71,7 @@ def signing(value: float, _: Values, settings: CompanionSettings) -> Problem | N
 
     The reverse needs no rule: with signing, unsigned frames of the vehicle are refused anyway.
     """
-    if not value or settings.signs:
+    if not value or settings.signing:
         return None
     return Problem(
         INEFFECTIVE,

@@ -6,7 +6,6 @@ Sources: PX4's parameter reference and `commander`; "measured": PX4 main in simu
 from companion.vehicle.parameter_checks import (
     INEFFECTIVE,
     UNSAFE,
-    action,
     at_most,
     battery_scaling,
     bit_clear,
@@ -17,6 +16,7 @@ from companion.vehicle.parameter_checks import (
     positive,
     rates_held,
     required,
+    safe_action,
     system_id,
     thrust_curve,
 )
@@ -46,7 +46,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
         ("COM_OBL_RC_ACT",),
         "what PX4 does when setpoints stop (0 position, 1 altitude, 3 return, 4 land, 5 hold)",
-        action(
+        safe_action(
             (0.0, 1.0, 3.0, 4.0, 5.0),
             {
                 2.0: "PX4 goes to manual flight, and falls or drifts unless a pilot acts at once",
@@ -94,14 +94,14 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
         ("NAV_DLL_ACT",),
         f"what PX4 does without a ground station's heartbeat, even with setpoints {_ACTIONS}",
-        action(_LINK_LOSS_ACTIONS, {5.0: _STOPS_MOTORS, 6.0: _STOPS_MOTORS}, set_to=2.0),
+        safe_action(_LINK_LOSS_ACTIONS, {5.0: _STOPS_MOTORS, 6.0: _STOPS_MOTORS}, set_to=2.0),
         f"{_REFERENCE}; {_MEASURED}",
         universal=True,
     ),
     ParameterRule(
         ("NAV_RCL_ACT",),
         f"what PX4 does when the pilot's transmitter is lost {_ACTIONS}",
-        action(_LINK_LOSS_ACTIONS, {5.0: _STOPS_MOTORS, 6.0: _STOPS_MOTORS}, set_to=2.0),
+        safe_action(_LINK_LOSS_ACTIONS, {5.0: _STOPS_MOTORS, 6.0: _STOPS_MOTORS}, set_to=2.0),
         _REFERENCE,
         universal=True,
     ),
@@ -148,7 +148,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
         ("GF_ACTION",),
         "what PX4 does at its own geofence (0 nothing, 1 warn, 2 hold, 3 return, 5 land)",
-        action((0.0, 1.0, 2.0, 3.0, 5.0), {4.0: _STOPS_MOTORS}, set_to=2.0),
+        safe_action((0.0, 1.0, 2.0, 3.0, 5.0), {4.0: _STOPS_MOTORS}, set_to=2.0),
         _REFERENCE,
         universal=True,
     ),
