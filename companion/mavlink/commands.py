@@ -9,7 +9,7 @@ from typing import NamedTuple
 from companion.mavlink.errors import CommandRefused, CommandTimeout, CommandUnfinished
 from companion.mavlink.messages import Message, dialect
 from companion.mavlink.outbox import Outbox
-from companion.mavlink.pending import Pending, PendingRegistry
+from companion.mavlink.pending import AnswerQueue, AnswerQueueRegistry
 from companion.mavlink.router import Router
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.texts import TextAssembler
@@ -60,12 +60,12 @@ class _Try:
     """A COMMAND_LONG that was sent and has no final ACK yet.
 
     Attributes:
-        answers: receives the results of its ACKs.
-        deadline: time until which its ACK is expected, s of event-loop time; inf while a call
+        answers: Receives the results of its ACKs.
+        deadline: Event-loop time until which an ACK counts for this try, s; inf while its call
             waits.
     """
 
-    answers: Pending[int]
+    answers: AnswerQueue[int]
     deadline: float = inf
 
 
@@ -82,7 +82,7 @@ class CommandClient:
         settings: LinkSettings,
         outbox: Outbox,
         router: Router,
-        registry: PendingRegistry,
+        registry: AnswerQueueRegistry,
         texts: TextAssembler,
     ) -> None:
         self._settings, self._outbox, self._registry = settings, outbox, registry
@@ -113,12 +113,12 @@ class CommandClient:
         lock = self._locks.setdefault(command, asyncio.Lock())
         async with lock:
             began = asyncio.get_running_loop().time()
-            with Pending[int](self._registry) as answers:
+            with AnswerQueue[int](self._registry) as answers:
                 result = await self._exchange(command, params, timeout_s, retries, answers)
             if result != _ACCEPTED:
                 await asyncio.sleep(_REASON_DELAY_S)
-                words = self._texts.since(began)
-                raise CommandRefused(command_name(command), result, result_name(result), words)
+                texts = self._texts.since(began)
+                raise CommandRefused(command_name(command), result, result_name(result), texts)
 
     async def _exchange(
         self,
@@ -126,7 +126,7 @@ class CommandClient:
         params: tuple[float, ...],
         timeout_s: float,
         retries: int,
-        answers: Pending[int],
+        answers: AnswerQueue[int],
     ) -> int:
         time = asyncio.get_running_loop().time
         for confirmation in range(retries + 1):
@@ -147,7 +147,7 @@ class CommandClient:
             f"is system {self._settings.target_system} still there?"
         )
 
-    async def _final_result(self, command: int, answers: Pending[int]) -> int:
+    async def _final_result(self, command: int, answers: AnswerQueue[int]) -> int:
         """Wait for the final result of a command that is in progress."""
         try:
             async with asyncio.timeout(_IN_PROGRESS_TIMEOUT_S):

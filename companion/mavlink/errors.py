@@ -34,7 +34,7 @@ class LogError(LinkError):
 
 
 class SigningError(LinkError):
-    """The signing key cannot be used, or there is no folder to keep its time stamps."""
+    """The signing key cannot be used, or there is no folder for the time stamps of signatures."""
 
 
 class InvalidSetpoint(LinkError, ValueError):  # noqa: N818
@@ -60,16 +60,16 @@ class CommandRefused(LinkError):  # noqa: N818
         command: The command's name, such as `MAV_CMD_COMPONENT_ARM_DISARM`.
         result: MAV_RESULT number of the ACK.
         result_name: The result without its prefix, such as `TEMPORARILY_REJECTED`.
-        words: The autopilot's texts (STATUSTEXT, or PX4's events) from the command until 0.3 s
+        texts: The autopilot's texts (STATUSTEXT, or PX4's events) from the command until 0.3 s
             after the refusal, oldest first; may be empty.
     """
 
-    def __init__(self, command: str, result: int, result_name: str, words: tuple[str, ...]) -> None:
+    def __init__(self, command: str, result: int, result_name: str, texts: tuple[str, ...]) -> None:
         self.command = command
         self.result = result
         self.result_name = result_name
-        self.words = words
-        reason = "; ".join(words) if words else "the autopilot gave no reason"
+        self.texts = texts
+        reason = "; ".join(texts) if texts else "the autopilot gave no reason"
         super().__init__(f"{command} was refused ({result_name}): {reason}")
 
 
@@ -86,4 +86,4 @@ class UnansweredParameter(UnknownParameter):
 
 
 class ParameterRefused(ParameterError):  # noqa: N818
-    """The autopilot refused the request, or the parameter cannot hold the value or kept another."""
+    """The autopilot refused the request or kept another value, or the type excludes the value."""

@@ -41,7 +41,7 @@ class FrameFilter:
 
     @property
     def awaits_answer(self) -> bool:
-        """Whether the last frame was refused only until the vehicle answers a TIMESYNC request."""
+        """Whether the last frame is refused only until an answer to TIMESYNC proves its date."""
         return self._signing is not None and self._signing.awaits_answer
 
     def is_vehicle(self, frame: Frame) -> bool:
@@ -49,7 +49,7 @@ class FrameFilter:
         return (frame.system, frame.component) == self._source
 
     def admits_source(self, frame: Frame) -> bool:
-        """Whether a frame comes from the vehicle; a frame of another source is counted."""
+        """Whether a frame carries the vehicle's ids; if not, it is counted as foreign."""
         if self.is_vehicle(frame):
             return True
         self._stats.ignored_foreign += 1

@@ -89,7 +89,7 @@ class _BeaconClock:
 
 
 class SettlingSelector(HotSelector, ABC):
-    """Detects when the loop has nothing left to do."""
+    """Detects when the loop has nothing left to do in a lockstep step."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -97,7 +97,7 @@ class SettlingSelector(HotSelector, ABC):
         self._iterations = 0
 
     def settle(self, callback: Callable[[], None]) -> None:
-        """Call `callback`, without I/O, once no other callback or timer of the loop is ready."""
+        """Call `callback` once nothing else in the loop is ready or due; do no I/O until then."""
         self._on_settled, self._iterations = callback, 0
 
     @property
@@ -122,7 +122,7 @@ class SettlingSelector(HotSelector, ABC):
 
 
 class _SteppingSelector(SettlingSelector):
-    """Lets no timer wait on the wall clock while the vehicle sends beacons."""
+    """Waits for the vehicle's beacons, not for timers: only a beacon makes a timer due."""
 
     def __init__(self, clock: _BeaconClock) -> None:
         super().__init__()
@@ -164,8 +164,8 @@ class LockstepEventLoop(LinkEventLoop):
     wall time, its time advances by that amount, so that timeouts expire if the vehicle is gone.
 
     Args:
-        clock: clock to use instead of the one described above; needs `selector` too.
-        selector: the selector that advances `clock`.
+        clock: Clock to use instead of the one described above; needs `selector` too.
+        selector: The selector that advances `clock`.
     """
 
     def __init__(

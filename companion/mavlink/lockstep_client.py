@@ -37,7 +37,7 @@ class LockstepClient:
         """Vehicle time of the open step, ms; `None` while no step is open."""
         return self._step_ms
 
-    def beacon(self, time_boot_ms: int) -> None:
+    def take_beacon(self, time_boot_ms: int) -> None:
         """Take a beacon: start a step, or answer a repeated beacon again."""
         if self._step_ms is not None:
             return  # a beacon repeated during the step; the answer to the step will follow

@@ -64,7 +64,7 @@ class Outbox:
         self._latched = (time_boot_ms, rates, thrust)
 
     def close_step(self, time_boot_ms: int) -> None:
-        """Close a lockstep step: send its setpoint, or a SYSTEM_TIME, which is not recorded."""
+        """Close a lockstep step: send its setpoint; without one, a SYSTEM_TIME, not recorded."""
         latched, self._latched = self._latched, None
         if latched is not None:
             self.send_setpoint(*latched)

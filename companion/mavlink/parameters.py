@@ -13,7 +13,7 @@ from typing import NamedTuple
 from companion.mavlink.errors import ParameterRefused, UnansweredParameter, UnknownParameter
 from companion.mavlink.messages import MESSAGE_IDS, Message
 from companion.mavlink.outbox import Outbox
-from companion.mavlink.pending import Pending, PendingRegistry
+from companion.mavlink.pending import AnswerQueue, AnswerQueueRegistry
 from companion.mavlink.router import Router
 from companion.mavlink.settings import LinkSettings
 
@@ -47,7 +47,7 @@ class ParameterClient:
         settings: System and component ids of the vehicle and of this program.
         outbox: Sends the requests.
         router: Delivers the answers.
-        registry: Ends the waiting when the connection drops.
+        registry: Ends the waits when the connection drops.
         bytewise: Returns True if an integer is sent as its bytes (PX4), False if as a float
             (ArduPilot).
     """
@@ -57,12 +57,12 @@ class ParameterClient:
         settings: LinkSettings,
         outbox: Outbox,
         router: Router,
-        registry: PendingRegistry,
+        registry: AnswerQueueRegistry,
         bytewise: Callable[[], bool],
     ) -> None:
         self._outbox, self._registry = outbox, registry
         self._target = settings.target_system, settings.target_component
-        self._pending: dict[str, Pending[_Value | int]] = {}  # a value, or a MAV_PARAM_ERROR
+        self._pending: dict[str, AnswerQueue[_Value | int]] = {}  # a value, or a MAV_PARAM_ERROR
         self._locks: dict[str, asyncio.Lock] = {}
         self._bytewise = bytewise
         router.subscribe_raw("PARAM_VALUE", self._on_value)
@@ -113,7 +113,7 @@ class ParameterClient:
     async def _exchange(
         self, message: str, payload: bytes, name: str, timeout_s: float, retries: int
     ) -> _Value:
-        with Pending[_Value | int](self._registry) as answers:
+        with AnswerQueue[_Value | int](self._registry) as answers:
             self._pending[name] = answers
             try:
                 for _ in range(retries + 1):

@@ -1,4 +1,4 @@
-"""The peer: which sender may become the peer, by which frames, and for how long it remains it."""
+"""The peer: the one sender that a transport talks to. Who may become it, how, and for how long."""
 
 import asyncio
 import ipaddress
@@ -95,7 +95,7 @@ class PeerRule:
 
     Args:
         stats: Counts the changes of the peer.
-        notice: Called with a sentence for the user at each change, and at each `ignore`.
+        notice: Called with a sentence for the user at each change, and by `report_ignored`.
         clock: Returns the event-loop time, s.
         last_setpoint: Returns the event-loop time of the last setpoint, s; −inf before the first.
         every_frame_claims: Whether each accepted frame is a claim: with signing or in lockstep.
@@ -151,8 +151,8 @@ class PeerRule:
                 f"to prevent this, name the vehicle's address in the endpoint (?peer=ADDRESS)"
             )
 
-    def ignore(self, sender: str) -> None:
-        """Tell the user that `sender` sends, but the endpoint does not name it as a peer."""
+    def report_ignored(self, sender: str) -> None:
+        """Tell the user that frames of `sender`, which the endpoint does not name, are ignored."""
         self._notice(
             f"{PEER_NOTICE}frames from {sender} are ignored, as the endpoint names another peer; "
             f"if {sender} is the vehicle, correct ?peer="

@@ -32,9 +32,9 @@ WRITE_PERIOD_S = 10.0
 _STAMP_RESERVE = 15 * TICKS_PER_S
 """How far the stamps in the file are ahead of the newest stamps while the link is open, ticks.
 
-It is longer than `WRITE_PERIOD_S`. So even if this program is killed, the stamps that its next run
-sends are newer, and no older frame is accepted again. In that case the vehicle's frames are also
-refused until their stamps are newer than those in the file, for 15 s at most.
+It is longer than `WRITE_PERIOD_S`. So even after this program is killed, its next run sends newer
+stamps and accepts no older frame again. That run refuses the vehicle's frames until their stamps
+are newer than those in the file, for 15 s at most.
 """
 _LAST_WRITE_TIMEOUT_S = 2.0
 """Time allowed for the last write, s."""
@@ -118,7 +118,8 @@ class Signing:
             return SignatureResult.WRONG_KEY
         stamp = int.from_bytes(signature[1 : 1 + _STAMP_BYTES], "little")
         stream = (frame.system, frame.component, signature[0])
-        result = self._judge.judge(stream, stamp, answers=self._answers_timesync(frame))
+        answers_timesync = self._answers_timesync(frame)
+        result = self._judge.judge(stream, stamp, answers_timesync=answers_timesync)
         if result is SignatureResult.GOOD:
             self._newest_stamp = max(self._newest_stamp, stamp)
         elif result is SignatureResult.AHEAD and self._judge.awaits_answer(stamp):
@@ -129,7 +130,7 @@ class Signing:
 
     @property
     def awaits_answer(self) -> bool:
-        """Whether the last frame was refused only until the vehicle answers a TIMESYNC request."""
+        """Whether the last frame is refused only until an answer to TIMESYNC proves its date."""
         return self._unproven_stamp != 0
 
     def stamps(self) -> Stamps:
@@ -153,7 +154,7 @@ def _timesync_fields(payload: bytes) -> tuple[bytes, bytes]:
     return padded[:8], padded[8:16]
 
 
-class StampKeeper:
+class StampWriter:
     """A thread that writes the stamps every 10 s, when a new stream is heard, and at the end.
 
     It is a thread, so that the event loop never waits for a disk. A failure is reported once, in

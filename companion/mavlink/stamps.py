@@ -114,13 +114,13 @@ class StampJudge:
         # Once a stamp near the date was accepted, no other stamp changes the date.
         return in_reach and not self._date_proven and not self._newest[False]
 
-    def judge(self, stream: Stream, stamp: int, *, answers: bool) -> SignatureResult:
+    def judge(self, stream: Stream, stamp: int, *, answers_timesync: bool) -> SignatureResult:
         """Judge a stamp; only a good one is remembered.
 
         Args:
             stream: The signer's stream.
             stamp: The time stamp, ticks.
-            answers: Whether the frame answers a TIMESYNC request of this run.
+            answers_timesync: Whether the frame answers a TIMESYNC request of this run.
         """
         date = self.date()
         ahead = stamp > date + _DAY
@@ -136,7 +136,7 @@ class StampJudge:
                 )
             return SignatureResult.REPLAYED
         if ahead and not self._date_proven:
-            if not answers:
+            if not answers_timesync:
                 self._remark_ahead(
                     stamp - date,
                     f"and refused until the vehicle answers a TIMESYNC request; {SET_CLOCK}",

@@ -26,7 +26,7 @@ class LinkStats:
         ignored_foreign: Frames of other systems or components than the vehicle's.
         unclaimed: Frames with the vehicle's ids, from a sender that is not the peer (`PeerRule`).
         non_finite: Messages refused for a NaN or infinity.
-        non_finite_at: When the newest of them came, s of event-loop time, by message.
+        non_finite_at: Event-loop time at which the newest of them came, s, by message name.
         outdated: Positions refused because one with the same or a later time stamp had come.
         stamped_ahead: Positions refused because they were stamped ahead of the vehicle's clock.
         malformed: Messages that could not be decoded or whose values are impossible.
@@ -101,7 +101,7 @@ class FrameCounter:
         self._last_sequence = None
 
     def _missing(self, sequence: int) -> int:
-        """Number of frames missing before this one; −1 if it is repeated or up to 127 late."""
+        """Frames missing before this one; −1 if it is repeated, or late by up to 127 frames."""
         step = 1 if self._last_sequence is None else (sequence - self._last_sequence) & 0xFF
         if step == 0 or step > 128:
             return -1

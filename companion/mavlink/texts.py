@@ -8,7 +8,7 @@ from companion.mavlink.framing import build_frame
 from companion.mavlink.messages import CRC_EXTRA, Message, dialect, encode
 
 _CHUNK_CHARACTERS = 50
-MOST_TEXT_NUMBER = 0xFFFF
+MAX_TEXT_ID = 0xFFFF
 _MAX_TEXTS = 100
 _REPETITION_TIME_S = 1.0
 
@@ -41,16 +41,16 @@ class TextAssembler:
         self._severity = 6
         self._events: deque[StatusText] = deque(maxlen=_MAX_TEXTS)
 
-    def take_event(self, severity: int, words: str, now: float) -> None:
+    def take_event(self, severity: int, text: str, now: float) -> None:
         """Take the text of an event.
 
         Args:
             severity: MAV_SEVERITY.
-            words: The text.
+            text: The text.
             now: Event-loop time, s.
         """
-        if not _is_repetition(self.texts, words, now):
-            event = StatusText(now, severity, words)
+        if not _is_repetition(self.texts, text, now):
+            event = StatusText(now, severity, text)
             self.texts.append(event)
             self._events.append(event)
 
@@ -79,29 +79,29 @@ class TextAssembler:
         self._id, self._pieces = 0, []
 
     def _keep(self, now: float, severity: int, text: str) -> None:
-        words = text.rstrip("\t ").strip()
-        if words and not _is_repetition(self._events, words, now):
-            self.texts.append(StatusText(now, severity, words))
+        text = text.rstrip("\t ").strip()
+        if text and not _is_repetition(self._events, text, now):
+            self.texts.append(StatusText(now, severity, text))
 
 
-def _is_repetition(texts: deque[StatusText], words: str, now: float) -> bool:
-    """Whether one of `texts` from the last second has the same words."""
-    return any(text.text == words for text in texts if text.time >= now - _REPETITION_TIME_S)
+def _is_repetition(texts: deque[StatusText], text: str, now: float) -> bool:
+    """Whether the same text is among those of `texts` from the last second."""
+    return any(each.text == text for each in texts if each.time >= now - _REPETITION_TIME_S)
 
 
-def status_texts(text: str, severity: int, number: int) -> list[Message]:
+def status_texts(text: str, severity: int, text_id: int) -> list[Message]:
     """The STATUSTEXTs of an ASCII text: a long one in pieces of 50 characters, the last shorter.
 
     Args:
-        text: the text.
+        text: The text.
         severity: MAV_SEVERITY.
-        number: joins the pieces of one text, 1..65535; not used for a text of one piece.
+        text_id: Joins the pieces of one text, 1..65535; not used for a text of one piece.
     """
     if len(text) <= _CHUNK_CHARACTERS:
         return [dialect.MAVLink_statustext_message(severity, text.encode("ascii"))]
     return [
         dialect.MAVLink_statustext_message(
-            severity, text[start : start + _CHUNK_CHARACTERS].encode("ascii"), number, order
+            severity, text[start : start + _CHUNK_CHARACTERS].encode("ascii"), text_id, order
         )
         for order, start in enumerate(range(0, len(text) + 1, _CHUNK_CHARACTERS))
     ]
@@ -110,22 +110,22 @@ def status_texts(text: str, severity: int, number: int) -> list[Message]:
 class TextFrames:
     """Makes STATUSTEXT frames with texts of this program, for a log; they are not sent.
 
-    Their component is MAV_COMP_ID_LOG. With the component id of the frames that are sent, their
-    sequence numbers would look as if frames had been lost.
+    Their component is MAV_COMP_ID_LOG: among the frames that are sent, their sequence numbers
+    would look as if frames had been lost.
 
     Args:
-        system: system id of the frames.
+        system: System id of the frames.
     """
 
     def __init__(self, system: int) -> None:
         self._system = system
         self._sequence = self._id = 0
 
-    def frames(self, words: str) -> list[bytes]:
+    def frames(self, text: str) -> list[bytes]:
         """The frames of a text, in ASCII, with at most 50 characters each, in order."""
-        self._id = self._id % MOST_TEXT_NUMBER + 1
-        texts = status_texts(ascii_for(words), dialect.MAV_SEVERITY_INFO, self._id)
-        return [self._frame(message) for message in texts]
+        self._id = self._id % MAX_TEXT_ID + 1
+        messages = status_texts(ascii_for(text), dialect.MAV_SEVERITY_INFO, self._id)
+        return [self._frame(message) for message in messages]
 
     def _frame(self, message: Message) -> bytes:
         kind = message.get_msgId()

@@ -3,8 +3,8 @@
 MAVSDK forwards frames between its two connections: one to the vehicle, and one of its type `raw` to
 this process. So each side gets each frame as the other sent it, with its time stamp.
 
-MAVSDK sends a frame from a thread of its own, so it reaches the kernel 0.1 ms later. MAVSDK does
-not report whether it was sent. It queues frames that a serial port or TCP connection cannot take.
+MAVSDK sends from a thread of its own, so a frame reaches the kernel 0.1 ms later. MAVSDK does not
+report whether a frame was sent, and queues frames that a serial port or TCP connection cannot take.
 """
 
 import asyncio

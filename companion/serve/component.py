@@ -9,7 +9,7 @@ from companion.mavlink.commands import MAV_CMD_DO_SET_MODE
 from companion.mavlink.framing import Frame, build_frame
 from companion.mavlink.messages import CRC_EXTRA, Message, decode, dialect, encode
 from companion.mavlink.settings import MAV_TYPE_ONBOARD_CONTROLLER, LinkSettings
-from companion.mavlink.texts import MOST_TEXT_NUMBER, status_texts
+from companion.mavlink.texts import MAX_TEXT_ID, status_texts
 from companion.serve.mode_requests import MISSION_ITEMS
 from companion.serve.network.addresses import Address
 from companion.serve.network.client import Client
@@ -106,7 +106,7 @@ class Component:
         return True
 
     def _text_messages(self, text: str, severity: int) -> list[Message]:
-        self._text_id = self._text_id % MOST_TEXT_NUMBER + 1
+        self._text_id = self._text_id % MAX_TEXT_ID + 1
         return status_texts(ascii_for(text)[:_MAX_TEXT_LENGTH], severity, self._text_id)
 
     def _frame(self, message: Message, sender: Address | None = None) -> bytes:

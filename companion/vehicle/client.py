@@ -7,7 +7,7 @@ from companion.mavlink.errors import LinkTimeout, NotConnected
 from companion.mavlink.messages import Message, message_id
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.parameters import ParameterClient
-from companion.mavlink.pending import Pending, PendingRegistry
+from companion.mavlink.pending import AnswerQueue, AnswerQueueRegistry
 from companion.mavlink.router import Router, Unsubscribe
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.stats import LinkStats
@@ -47,7 +47,7 @@ class VehicleClient:
     ) -> None:
         self.settings, self.stats = settings, stats
         self._outbox, self._router = outbox, router
-        self._registry = PendingRegistry()
+        self._registry = AnswerQueueRegistry()
         texts = TextAssembler()
         self.state = VehicleState(router, stats, texts, clock, vehicle_clock)
         read_events(router, texts, clock)
@@ -105,7 +105,7 @@ class VehicleClient:
             LinkTimeout: The autopilot accepted the request, but the message did not come.
             LinkLost: The connection dropped while waiting.
         """
-        with Pending[Message](self._registry) as answers:
+        with AnswerQueue[Message](self._registry) as answers:
             unsubscribe = self._router.subscribe(name, answers.put)
             try:
                 await self.command(MAV_CMD_REQUEST_MESSAGE, float(message_id(name)))

@@ -157,7 +157,7 @@ class Inbox:
 
     def note_stranger(self, sender: str) -> None:
         """Tell the user that `sender` was ignored, because the endpoint names only other peers."""
-        self._peer_rule.ignore(sender)
+        self._peer_rule.report_ignored(sender)
 
     def tell_remarks(self) -> None:
         """Pass the remarks about the time stamps of signatures to the user."""
@@ -180,7 +180,7 @@ class Inbox:
         if beacon is None:
             self._held.append((frame, received_ns))
         else:  # not counted as telemetry: beacons have sequence numbers of their own
-            self.lockstep.beacon(beacon)
+            self.lockstep.take_beacon(beacon)
 
     def _pass_on(self, frame: Frame, received_ns: int) -> None:
         """Pass a frame to the tap, the control loop, the counter and the router.

@@ -12,10 +12,10 @@ from companion.mavlink.framing import Frame
 from companion.mavlink.lockstep import LockstepEventLoop
 from companion.mavlink.lockstep_client import LockstepClient
 from companion.mavlink.outbox import Outbox
-from companion.mavlink.pending import Pending
+from companion.mavlink.pending import AnswerQueue
 from companion.mavlink.router import Router
 from companion.mavlink.settings import LinkSettings
-from companion.mavlink.signing import StampKeeper
+from companion.mavlink.signing import StampWriter
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.transport.base import Tap
 from companion.mavlink.transport.endpoint import parse_endpoint
@@ -82,9 +82,9 @@ class Link(VehicleClient):
         self._connection = Connection(
             endpoint, self._inbox, outbox, self.stats, self._on_dropped, opener
         )
-        self._keeper: StampKeeper | None = None
+        self._stamp_writer: StampWriter | None = None
         if settings.signing is not None and settings.signing.file is not None:
-            self._keeper = StampKeeper(settings.signing, settings.signing.file)
+            self._stamp_writer = StampWriter(settings.signing, settings.signing.file)
         self._lockstep: LockstepClient | None = None
         if settings.lockstep:
             if not isinstance(self._loop, LockstepEventLoop):
@@ -101,8 +101,8 @@ class Link(VehicleClient):
         except BaseException:
             await self.__aexit__()
             raise
-        if self._keeper is not None:
-            self._keeper.start()
+        if self._stamp_writer is not None:
+            self._stamp_writer.start()
         self._inbox.tell_remarks()
         self._start(send_heartbeats(self.settings, self._outbox))
         self._start(synchronise(self.timesync, self.clock))
@@ -117,8 +117,8 @@ class Link(VehicleClient):
         self._tasks.clear()
         self._registry.fail("this program closed it")
         await self._connection.close()
-        if self._keeper is not None:
-            self._keeper.stop()
+        if self._stamp_writer is not None:
+            self._stamp_writer.stop()
         self._inbox.tell_remarks()
 
     async def wait_connected(self, timeout_s: float) -> Heartbeat:
@@ -129,7 +129,7 @@ class Link(VehicleClient):
             LinkLost: The connection dropped while waiting.
             UnsupportedAutopilot: This program cannot fly the autopilot.
         """
-        with Pending[None](self._registry) as heard:
+        with AnswerQueue[None](self._registry) as heard:
             unsubscribe = self._router.subscribe("HEARTBEAT", lambda _: heard.put(None))
             try:
                 async with asyncio.timeout(timeout_s):

@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import common as dialect
 from companion.mavlink.framing import FrameScanner, build_frame
 from companion.mavlink.messages import CRC_EXTRA
 from companion.mavlink.settings import LinkSettings
-from companion.mavlink.signing import Signing, StampKeeper
+from companion.mavlink.signing import Signing, StampWriter
 from companion.mavlink.stamp_file import StampFile
 from companion.mavlink.stamps import EPOCH_UNIX_S, SignatureResult
 from companion.vehicle.link import Link
@@ -58,7 +58,7 @@ def run_once(clock, *frames):
     """A run of the program that ends well: its verdicts, and what it said."""
     file = StampFile(KEY)
     ours = signing(clock, file)
-    keeper = StampKeeper(ours, file)
+    keeper = StampWriter(ours, file)
     keeper.start()
     verdicts = [ours.check(one) for one in frames]
     keeper.stop()
@@ -126,7 +126,7 @@ def test_a_vehicle_that_answers_is_the_better_clock():
 def test_what_was_heard_with_a_wrong_clock_is_refused_after_the_next_start_too():
     file = StampFile(KEY)
     ours = signing(NOW - 90 * DAY, file)
-    keeper = StampKeeper(ours, file)
+    keeper = StampWriter(ours, file)
     keeper.start()
     heard = frame(NOW, question(ours))
     assert ours.check(heard) is SignatureResult.GOOD
@@ -148,7 +148,7 @@ def test_a_stamp_of_the_far_future_moves_nothing(years):
 def test_a_key_holder_ahead_does_not_silence_the_vehicle_even_if_it_answers():
     file = StampFile(KEY)
     ours = signing(NOW, file)
-    keeper = StampKeeper(ours, file)
+    keeper = StampWriter(ours, file)
     keeper.start()
     assert ours.check(frame(NOW + 90 * DAY, question(ours))) is SignatureResult.GOOD
     assert ours.check(frame(NOW + 1)) is SignatureResult.GOOD
@@ -201,7 +201,7 @@ def test_after_a_kill_our_stamps_rise_and_nothing_heard_before_is_heard_again():
     """The file is ahead of the truth while a link is open, so no last write is needed."""
     file = StampFile(KEY)
     ours = signing(NOW, file)
-    keeper = StampKeeper(ours, file)
+    keeper = StampWriter(ours, file)
     keeper.start()
     heard = frame(NOW)
     ours.check(heard)

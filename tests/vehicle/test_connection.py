@@ -18,7 +18,7 @@ def test_a_connection_that_is_dropped_at_once_says_why_and_is_closed():
         return SimpleNamespace(close=lambda: closed.append(endpoint))
 
     endpoint = parse_endpoint("tcpout://127.0.0.1:5760")
-    inbox = SimpleNamespace(connect=lambda *, streaming: None)
+    inbox = SimpleNamespace(start_connection=lambda *, streaming: None)
     outbox = SimpleNamespace(transport=None)
     connection = Connection(endpoint, inbox, outbox, None, lambda reason: None, opener)
     with pytest.raises(EndpointError, match="dropped at once: the other end closed it"):
@@ -42,7 +42,7 @@ def test_a_connection_is_opened_again_whatever_the_first_tries_raise():
 
     async def scene():
         endpoint = parse_endpoint("tcpout://127.0.0.1:5760")
-        inbox = SimpleNamespace(connect=lambda *, streaming: None)
+        inbox = SimpleNamespace(start_connection=lambda *, streaming: None)
         outbox, stats = SimpleNamespace(transport=None), SimpleNamespace(reconnects=0)
         connection = Connection(endpoint, inbox, outbox, stats, lambda reason: None, opener)
         await connection.open()

@@ -15,7 +15,7 @@ class Bench:
     def __init__(self):
         self.now, self.sent, self.exchanges = 100.0, [], []
         outbox = SimpleNamespace(send=self.sent.append)
-        clock = SimpleNamespace(exchange=lambda *seen: self.exchanges.append(seen))
+        clock = SimpleNamespace(take_timesync=lambda *seen: self.exchanges.append(seen))
         self.timesync = TimeSync(outbox, Router(LinkStats()), lambda: self.now, clock)
 
     def answer(self, after):

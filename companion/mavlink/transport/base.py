@@ -16,7 +16,7 @@ class Receiver(Protocol):
     """Takes the bytes that a transport receives. `PeerRule` explains claims."""
 
     def start_connection(self, *, streaming: bool) -> None:
-        """Forget an incomplete frame: the next bytes come over another connection.
+        """Prepare for a new connection: forget an incomplete frame and the last sequence number.
 
         Args:
             streaming: Whether a frame may continue in the bytes received next.
@@ -32,9 +32,10 @@ class Receiver(Protocol):
         """
 
     def may_prove_date(self, sender: str) -> bool:
-        """Whether frames are sent to `sender` although its claim was refused.
+        """Whether to send frames to `sender`, although its claim was refused.
 
-        Its signature is good but its date is not proven; an answer to TIMESYNC would prove it.
+        True if its signature has the right key but an unproven date. An answer to TIMESYNC can
+        prove the date; the next frame that is accepted then makes `sender` the peer.
         """
 
     def claim_lapsed(self) -> bool:

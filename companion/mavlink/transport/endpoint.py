@@ -91,8 +91,8 @@ def parse_endpoint(text: str) -> Endpoint:
     several separated by commas.
 
     Raises:
-        EndpointError: The text is in none of the five notations, a host name is not valid, or a
-            port is not 1..65535 (a listening endpoint also takes 0: any free port). If it is a
+        EndpointError: The text is in none of the notations in `_HELP`, a host name is not valid, or
+            a port is not 1..65535 (a listening endpoint also takes 0: any free port). For the
             notation of another program, the message says what to write instead.
     """
     scheme, separator, rest = text.strip().partition("://")

@@ -66,8 +66,8 @@ class TcpTransport:
     """A TCP client or server with at most one connection at a time.
 
     A server goes on listening when the vehicle's connection drops, so the link need not open it
-    again. While a client is connected, a second client is refused. The second one replaces the
-    first only if the first made no valid claim (`PeerRule`) within 5 s, or its claim has lapsed.
+    again. While a client is connected, a second one is refused, unless the first made no valid
+    claim (`PeerRule`) within 5 s or its claim has lapsed: then the second replaces the first.
 
     Attributes:
         local: (host, port) of a listening server; `None` for a client.
@@ -123,7 +123,7 @@ class TcpTransport:
             return self._receiver.claim_lapsed()
         return self._loop.time() - self._connected_at > CLAIM_LASTS_S
 
-    def data(self, connection: asyncio.Transport, data: bytes) -> None:
+    def take_data(self, connection: asyncio.Transport, data: bytes) -> None:
         """Pass on the bytes that a connection received."""
         if connection is not self._connection:
             return  # from a connection that was replaced and is not closed yet
@@ -179,7 +179,7 @@ class _Connection(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         if self._transport is not None:
-            self._owner.data(self._transport, data)
+            self._owner.take_data(self._transport, data)
 
     def connection_lost(self, exc: Exception | None) -> None:
         reason = f"connection broken: {exc}" if exc else "closed by the other side"

@@ -42,9 +42,9 @@ class UdpAddress(NamedTuple):
     """The addresses of an endpoint.
 
     Attributes:
-        family: address family of the socket.
-        address: socket address to bind or to send to.
-        named_peers: the senders that the endpoint names.
+        family: Address family of the socket.
+        address: Socket address to bind or to send to.
+        named_peers: The senders that the endpoint names.
     """
 
     family: socket.AddressFamily
@@ -77,9 +77,11 @@ class UdpTransport:
     A listening socket connects to the first sender that makes a valid claim (`PeerRule`). The
     kernel then drops datagrams of other senders, and a round trip is about 8 us shorter. The
     kernel's queue may still hold earlier datagrams of other senders, so the source of each datagram
-    is checked. If the peer of a listening socket is silent for 2 to 4 s, or its claim has lapsed, a
-    new socket is opened, so that a vehicle that returns at another port is heard. ICMP refusals
-    (the vehicle has not started yet) are ignored.
+    is checked.
+
+    If the peer of a listening socket is silent for 2 to 4 s, or its claim has lapsed, a new socket
+    is opened, so that a vehicle that returns at another port is heard. ICMP refusals (the vehicle
+    has not started yet) are ignored.
 
     A datagram counts as received when the kernel received it, not when this process read it. So
     latency includes a late wake-up of this process.
@@ -155,8 +157,8 @@ class UdpTransport:
     def _take_unconnected(self, data: bytes, received_ns: int, address: Any) -> bool:
         """Take a datagram of an unconnected socket; return whether its sender becomes the peer.
 
-        The sender becomes the peer if its claim is valid, or if it must receive frames in order to
-        prove its claim (`Receiver.may_prove_date`).
+        It becomes the peer if its claim is valid, or if it needs a TIMESYNC request to prove its
+        date (`Receiver.may_prove_date`).
         """
         sender = host_and_port(address)
         if not self._named_peers.admit(address):
