@@ -28,7 +28,7 @@ WARNING, NOTICE = dialect.MAV_SEVERITY_WARNING, dialect.MAV_SEVERITY_NOTICE
 
 
 class Component:
-    """Sends to the clients as the companion computer, and answers their commands to it.
+    """Sends to the clients as the component of the companion computer, and answers commands to it.
 
     Args:
         settings: our ids and our signing key.
@@ -70,7 +70,7 @@ class Component:
                 self._network.send_to(client, self._frame(message))
 
     def send_value(self, name: str, value: float) -> None:
-        """Send a NAMED_VALUE_FLOAT; the name has at most 10 characters."""
+        """Send a NAMED_VALUE_FLOAT to all clients; the name has at most 10 characters."""
         boot_ms = round((time.monotonic() - self._start_time) * 1e3) & 0xFFFFFFFF
         message = dialect.MAVLink_named_value_float_message(boot_ms, name.encode(), value)
         self._network.send(self._frame(message))
@@ -81,7 +81,7 @@ class Component:
         Args:
             client: sender of the frame.
             frame: COMMAND_LONG, COMMAND_INT, SET_MODE, MISSION_ITEM or any other frame.
-            result: MAV_RESULT of the command; a mission item is denied whatever it is.
+            result: MAV_RESULT of the command; a mission item is always denied.
             sender: component that answers; clients accept only an answer from the component they
                 commanded.
         """

@@ -15,7 +15,7 @@ from companion.serve.kept_fence import KeptFence
 from companion.serve.mode_requests import (
     asks_for_control,
     leaves_control,
-    starves_control,
+    reduces_telemetry,
     steers_in_our_mode,
 )
 from companion.serve.network.addresses import Address, source_of, target_of
@@ -31,7 +31,7 @@ from companion.serve.served_flight import (
 )
 from companion.serve.setpoints.approach import UnplannableError
 from companion.serve.setpoints.request import RefusedSetpoint, Request
-from companion.serve.setpoints.understand import SETPOINTS, understand
+from companion.serve.setpoints.understand import SETPOINTS, decode_setpoint
 from companion.serve.situation import SituationKeeper
 from companion.vehicle.autopilot import ControlEntry, Role
 from companion.vehicle.link import Link
@@ -53,7 +53,7 @@ class ServedControl:
         observer: receives phases and events of each flight.
         environment: environment of the flights.
         records: makes the records of the flights.
-        changes: changes of values in flight.
+        changes: changes of configuration values in flight.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class ServedControl:
 
     @property
     def in_control(self) -> bool:
-        """Whether the autopilot obeys us for a client."""
+        """Whether the autopilot obeys setpoints that this program sends for a client."""
         return self._flight is not None and self._flight.in_control
 
     @property
@@ -108,7 +108,7 @@ class ServedControl:
         if steers_in_our_mode(frame, autopilot):
             self._component.answer(client, f"refused: {owner} is in control; change the mode first")
             self._answer(client, frame, REJECTED)
-        elif starves_control(frame, wanted_rates(self._config, self._link)):
+        elif reduces_telemetry(frame, wanted_rates(self._config, self._link)):
             self._answer(client, frame, ACCEPTED)
         else:
             if isinstance(owner, Program) and owner.client is client and leaves_control(frame):
@@ -139,7 +139,7 @@ class ServedControl:
         now, owner = self._clock(), Program(client, source_of(frame))
         owner_before = self.ownership.owner
         try:
-            request = understand(
+            request = decode_setpoint(
                 frame, situation, self._targets, body_yaw_is_relative=autopilot.body_yaw_is_relative
             )
             refusal = self.ownership.note_setpoint(owner, now)
@@ -170,9 +170,9 @@ class ServedControl:
         return None
 
     def _give_control(self, program: Program, now: float) -> bool:
-        """Give control to a program whose setpoints alone begin a flight; return whether it has it.
+        """Give control if setpoints alone begin a flight; return whether `program` has control.
 
-        They do so in the air in ArduPilot's GUIDED. A refused program receives the reason.
+        They begin one only in the air, in ArduPilot's GUIDED. A refused program gets the reason.
         """
         autopilot, state = self._link.autopilot, self._link.state
         if autopilot.control_entry is not ControlEntry.BY_FIRST_SETPOINT or now < self._retry_time:
@@ -231,7 +231,7 @@ class ServedControl:
         task.add_done_callback(self._unfinished.discard)
 
     async def _fly(self, flight: ServedFlight, command: ControlRequest | None) -> None:
-        """Fly, release control, and then complete the record; the next flight need not wait."""
+        """Fly, then release control; complete the record, while the next flight may begin."""
         begun = False
         try:
             begun = await flight.run(command)

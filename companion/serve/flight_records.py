@@ -28,10 +28,10 @@ class FlightRecords:
     Args:
         directory: folder for the flights' folders; None: nothing is recorded.
         environment: environment of the flights.
-        note: called with events as sentences.
+        note: called with each event, as a sentence for the user.
 
     Attributes:
-        grants: real-time settings that were requested, and which of them were refused.
+        grants: requested real-time settings, and which of them were refused.
         on_recorded: called with the folder of each flight when its record is complete; returns a
             sentence for the clients, or None. It runs in a thread, except on a virtual clock.
     """
@@ -53,7 +53,7 @@ class FlightRecords:
         if self._tap is not None:
             self._tap(time, frame)
 
-    def new(self, config: Config) -> FlightFiles:
+    def new_record(self, config: Config) -> FlightFiles:
         """The open record of a new flight; a record without folder if none can be created.
 
         Args:

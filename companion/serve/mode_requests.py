@@ -27,7 +27,7 @@ _STEERING_COMMANDS = dialect.MAV_CMD_DO_REPOSITION, dialect.MAV_CMD_DO_PAUSE_CON
 _LEAVING_COMMANDS = MAV_CMD_DO_SET_MODE, MAV_CMD_NAV_LAND, MAV_CMD_NAV_RETURN_TO_LAUNCH
 _CUSTOM_MODE_FLAG = 1
 _MAIN_MODE = 0xFF << 16
-"""PX4's main mode within a custom mode. OFFBOARD has no sub mode, and PX4 ignores one."""
+"""Mask of PX4's main mode in `custom_mode`. OFFBOARD has no sub mode, and PX4 ignores one."""
 _MODE_MESSAGES = frozenset({_COMMAND_LONG, _COMMAND_INT, _SET_MODE})
 """Messages that can command a mode."""
 
@@ -36,7 +36,7 @@ def asks_for_control(frame: Frame, autopilot: Autopilot) -> bool:
     """Whether a frame commands the mode in which the autopilot obeys setpoints.
 
     This applies only to a mode entered by a command (PX4's OFFBOARD). Every form that PX4 accepts
-    counts: it reads modes as bytes, and also accepts NAV_GUIDED_ENABLE.
+    counts: PX4 reads modes as bytes, and also accepts NAV_GUIDED_ENABLE.
     """
     if (
         frame.message_id not in _MODE_MESSAGES
@@ -85,7 +85,7 @@ def leaves_control(frame: Frame) -> bool:
     return decode(frame.message_id, frame.payload).command in _LEAVING_COMMANDS
 
 
-def starves_control(frame: Frame, needed: dict[str, float]) -> bool:
+def reduces_telemetry(frame: Frame, needed: dict[str, float]) -> bool:
     """Whether a frame could reduce telemetry below the rates that control needs.
 
     Args:

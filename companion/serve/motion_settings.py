@@ -10,7 +10,7 @@ from companion.serve.setpoints.motion import CommandedMotion, MotionLimits
 _MOTION_LIMITS = frozenset(
     {"limits.max_climb_m_s", "limits.max_descent_m_s", "limits.max_yaw_rate_deg_s"}
 )
-"""Limits that `CommandedMotion` takes at the takeover."""
+"""Configuration keys of limits that `CommandedMotion` takes over when control begins."""
 
 
 def commanded_motion(config: Config) -> CommandedMotion:
@@ -32,9 +32,9 @@ def commanded_motion(config: Config) -> CommandedMotion:
 def change_refusal(before: Config, after: Config) -> str | None:
     """Why a change is refused while a client is in control; None: it is permitted.
 
-    Motions are planned with the limits at the takeover. With lower limits in the guidance loop, the
-    vehicle could not keep up with them. So these limits must not change, and the tilt limit must
-    stay large enough.
+    Motions are planned with the limits at the takeover, but the guidance loop uses changed limits
+    at once, and with lower ones the vehicle could not follow the motions. So these limits must not
+    change, and the tilt limit must stay large enough.
     """
     changed_names = {each.name for each in differences(before, after)} & _MOTION_LIMITS
     if changed_names:

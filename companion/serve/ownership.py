@@ -10,7 +10,7 @@ _MAX_CLIENTS = 64
 
 
 class ControlState(Enum):
-    """How the vehicle is controlled for its owner."""
+    """What the vehicle does for its owner, the client in control."""
 
     FREE = "no client is in control"
     LIVE = "the owner's setpoints are flown"
@@ -32,7 +32,7 @@ class _Stream:
 
 
 class Ownership:
-    """Keeps one owner, and gives all others the reason why they are refused.
+    """Keeps one owner, the client in control, and refuses all others with a reason.
 
     Args:
         timeout: a client without a setpoint for this long is silent, s.
@@ -98,8 +98,8 @@ class Ownership:
         """End the ownership: the owner has released control, or the vehicle has left our mode."""
         self.owner = None
 
-    def control(self, now: float) -> ControlState:
-        """How the vehicle is controlled for its owner now."""
+    def state(self, now: float) -> ControlState:
+        """What the vehicle does for its owner at `now`, s."""
         if self.owner is None:
             return ControlState.FREE
         overdue = now - self._streams.get(self.owner, _Stream()).newest - self._timeout

@@ -13,7 +13,7 @@ from companion.realtime import schedule_as_usual
 _PAGE_TIMEOUT = 120.0
 """Time allowed for one page, s; a small computer needs about ten seconds."""
 _CHECK_PERIOD = 1.0
-"""Period at which the wait for the process checks whether it must end, s."""
+"""Period of the checks whether to stop waiting for the process, s."""
 _NICENESS = 19
 """Niceness of the process, so that it yields to everything else; the next flight may have begun."""
 _INTERRUPTED = "interrupted"
@@ -46,7 +46,7 @@ class ReportPages:
             self._process.kill()
 
     def _run_report(self, folder: Path) -> str:
-        """Return the path of the page when the process has written it.
+        """Start the process, wait until it has written the page, and return the page's path.
 
         Raises:
             OSError: the process cannot be started.

@@ -61,7 +61,7 @@ class ServedFlight:
         observer: receives phases and events.
         environment: environment of the flight.
         records: makes the record of the flight.
-        changes: changes of values in flight.
+        changes: changes of configuration values in flight.
         fence_centre: centre of the fence of an earlier flight; None: the fence is centred where
             control begins.
         from_ground: whether the vehicle stands armed, and takes off first.
@@ -82,7 +82,7 @@ class ServedFlight:
         *,
         from_ground: bool = False,
     ) -> None:
-        self._records, self._record = records, records.new(changes.begin_flight())
+        self._records, self._record = records, records.new_record(changes.begin_flight())
         self._recorder = self._record.recorder(observer)
         self._summary: Summary | None = None
         self._link, self._component, self._ownership = link, component, ownership
@@ -112,7 +112,7 @@ class ServedFlight:
 
     @property
     def in_control(self) -> bool:
-        """Whether the autopilot obeys us."""
+        """Whether the autopilot obeys the setpoints of this flight."""
         return self._assembled.context.loop.offboard_active
 
     @property
@@ -152,7 +152,7 @@ class ServedFlight:
         self._assembled.flight.interrupt(reason)
 
     async def run(self, command: ControlRequest | None) -> bool:
-        """Fly; return whether control had begun."""
+        """Fly; answer `command`, if there is one; return whether control had begun."""
         limited = self._changes.limited_by(change_refusal)
         with self._records.recording(self._record), limited:
             result = "stopped at once"
@@ -225,7 +225,7 @@ class ServedFlight:
         self._component.tell(f"{self._source.name} is in control")
         reported = ControlState.LIVE
         while True:
-            now = self._ownership.control(self._clock())
+            now = self._ownership.state(self._clock())
             if now is not reported and now in (ControlState.LIVE, ControlState.HOLDING):
                 self._component.tell(f"{self._source.name}: {now.value}")
                 reported = now

@@ -42,14 +42,14 @@ class ServeSession:
 
     Args:
         config: configuration of the vehicle, with the section `serve`.
-        note: called with events as sentences.
+        note: called with each event, as a sentence for the user.
         observer: receives phases and events of each flight under a client's control.
         environment: clocks and transports of this computer, or their replacement in tests.
         directory: folder for the folders of flights under a client's control; None: nothing is
             recorded.
 
     Attributes:
-        changes: changes of values in flight; they stay in force for the next flight.
+        changes: changes of configuration values in flight, in force for the next flight too.
         network: network of the clients, once it is open.
         control: control by clients' setpoints, once the link is open, if `serve.control` is true.
         records: records of the flights under a client's control.

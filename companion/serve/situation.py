@@ -33,11 +33,11 @@ _NEW_ORIGIN_DISTANCE = 2.0
 
 
 class SituationKeeper:
-    """Keeps the newest situation, from the link and the network.
+    """Keeps the vehicle's newest position and yaw, and the origin of its local frame.
 
     Args:
         link: link to the vehicle.
-        network: keeps the newest attitude.
+        network: has the payload of the newest attitude.
     """
 
     def __init__(self, link: Link, network: Network) -> None:
@@ -48,7 +48,11 @@ class SituationKeeper:
     def situation(self) -> Situation | None:
         """The present situation; None while position or attitude is unknown or outdated."""
         position, now = self._link.state.position, self._network.now()
-        decoded = decode_attitude(self._network.attitude) if self._network.attitude else None
+        decoded = (
+            decode_attitude(self._network.attitude_payload)
+            if self._network.attitude_payload
+            else None
+        )
         if position is None or decoded is None:
             return None
         age = self._link.clock.age(position.vehicle_time, now) or 0.0
@@ -75,10 +79,10 @@ class SituationKeeper:
         Args:
             wanted: rates by message name, Hz; called once the autopilot is known.
         """
-        newest = self._network.attitude
+        newest = self._network.attitude_payload
         while True:
             await asyncio.sleep(_CHECK_PERIOD)
-            before, newest = newest, self._network.attitude
+            before, newest = newest, self._network.attitude_payload
             if newest != before or self._link.state.autopilot is None:
                 continue
             with suppress(LinkError):  # the autopilot may be booting; the request is repeated

@@ -59,7 +59,7 @@ class ServedSource:
     def begin(self, now: float, pose: Pose) -> None:
         """Start from the pose that was held so far, with the newest request if it is fresh."""
         self.start_pose = pose
-        live = self._ownership.control(now) is ControlState.LIVE
+        live = self._ownership.state(now) is ControlState.LIVE
         self._ownership.begin(now)
         self._vehicle = VehicleMotion(pose.position_ned, (0.0, 0.0, 0.0))
         self._motion.begin(pose.position_ned, (0.0, 0.0, 0.0), pose.heading, now)
@@ -91,7 +91,7 @@ class ServedSource:
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
         """The reference over time; if the client is silent, the reference comes to rest."""
         self._vehicle = motion
-        if self._ownership.control(now) is not ControlState.LIVE and not self._stopped:
+        if self._ownership.state(now) is not ControlState.LIVE and not self._stopped:
             self._leave_direct(now)
             self._motion.stop(now, motion)
             self._stopped = True
@@ -100,7 +100,7 @@ class ServedSource:
 
     def finished(self, now: float) -> bool:
         """Whether no client is in control any more: it released control, or was silent too long."""
-        return self._ownership.control(now) not in _FLOWN_STATES
+        return self._ownership.state(now) not in _FLOWN_STATES
 
     def _leave_direct(self, now: float) -> None:
         """If attitudes or rates were flown, let the commanded motion begin where the vehicle is."""

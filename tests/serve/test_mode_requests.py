@@ -23,7 +23,7 @@ from companion.serve.control import ServedControl
 from companion.serve.flight_records import FlightRecords
 from companion.serve.mode_requests import (
     asks_for_control,
-    starves_control,
+    reduces_telemetry,
     steers_in_our_mode,
 )
 from companion.serve.network.addresses import Address
@@ -42,8 +42,8 @@ def command(number, *parameters):
 def test_a_number_that_is_none_asks_for_nothing(number):
     assert asks_for_control(command(176, 1.0, 6.0, 0.0), Px4())
     assert not asks_for_control(command(176, number, 6.0, 0.0), Px4())
-    assert starves_control(command(511, 31.0, -1.0, 0.0), {"ATTITUDE_QUATERNION": 250.0})
-    assert not starves_control(command(511, number, -1.0, 0.0), {"ATTITUDE_QUATERNION": 250.0})
+    assert reduces_telemetry(command(511, 31.0, -1.0, 0.0), {"ATTITUDE_QUATERNION": 250.0})
+    assert not reduces_telemetry(command(511, number, -1.0, 0.0), {"ATTITUDE_QUATERNION": 250.0})
 
 
 def framed(message):
@@ -127,7 +127,7 @@ def test_a_record_that_cannot_be_opened_leaves_a_flight_without_record(tmp_path,
         records = FlightRecords(tmp_path, THIS_COMPUTER, notes.append)
         with monkeypatch.context() as patched:
             patched.setattr(recorder, "McapWriter", full)
-            record = records.new(Config())
+            record = records.new_record(Config())
         assert record.folder is None
         with records.recording(record):
             pass
@@ -137,7 +137,7 @@ def test_a_record_that_cannot_be_opened_leaves_a_flight_without_record(tmp_path,
 
         changes = Changes(Config())
         changes.change({"planner": {"gain_per_s": 4.9}}, "a test")
-        with records.recording(records.new(changes.begin_flight())) as _:
+        with records.recording(records.new_record(changes.begin_flight())) as _:
             changes.change({"planner": {"gain_per_s": 4.8}}, "a test")
         (folder,) = tmp_path.iterdir()
         assert "gain_per_s: 4.9" in (folder / "config.yaml").read_text()
@@ -162,7 +162,7 @@ def test_what_is_to_be_told_of_a_record_is_told_in_the_event_loop(tmp_path, monk
 
         records = FlightRecords(tmp_path, THIS_COMPUTER, note)
         records.on_recorded = page
-        record = records.new(Config())
+        record = records.new_record(Config())
         with records.recording(record):
             pass
         monkeypatch.setattr(flight_files, "write_with_timeout", lambda *_: "the disk is full")

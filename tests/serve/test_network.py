@@ -177,7 +177,7 @@ def test_the_attitude_of_another_vehicle_or_component_is_not_ours(run):
         async with network() as (net, link, _):
             (ours,) = frames_of(attitude(4))
             link._inbox.receive(ours, 0)
-            kept = net.attitude
+            kept = net.attitude_payload
             assert kept
             for ids in ((1, 154), (2, 1)):
                 other = dialect.MAVLink(None, *ids)
@@ -187,7 +187,7 @@ def test_the_attitude_of_another_vehicle_or_component_is_not_ours(run):
                     ).pack(other),
                     0,
                 )
-                assert net.attitude is kept
+                assert net.attitude_payload is kept
 
     run(scene())
 

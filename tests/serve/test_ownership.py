@@ -48,7 +48,7 @@ def test_a_setpoint_that_cannot_be_flown_keeps_nobody_live(ownership):
         now = 0.2 + 0.1 * number
         assert ownership.note_setpoint("a", now) is None
         ownership.withdraw("a", "a")
-    assert ownership.control(now) is ControlState.HOLDING
+    assert ownership.state(now) is ControlState.HOLDING
     before = ownership.owner
     assert ownership.note_setpoint("b", now) is None
     ownership.withdraw("b", before)
@@ -57,7 +57,7 @@ def test_a_setpoint_that_cannot_be_flown_keeps_nobody_live(ownership):
 
 def test_setpoints_without_asking_give_no_control(ownership):
     stream(ownership, "a", 0.0, 1.0)
-    assert ownership.control(1.0) is ControlState.FREE
+    assert ownership.state(1.0) is ControlState.FREE
 
 
 def test_another_clients_setpoints_are_refused_by_name_while_the_owner_is_live(ownership):
@@ -72,17 +72,17 @@ def test_a_silent_owner_is_held_for_and_then_handed_back(ownership):
     stream(ownership, "a", 0.0, 1.0)
     ownership.request_control("a", 1.0)
     now = 1.0
-    assert ownership.control(now + TIMEOUT - 0.01) is ControlState.LIVE
-    assert ownership.control(now + TIMEOUT + 0.01) is ControlState.HOLDING
-    assert ownership.control(now + TIMEOUT + HOLD - 0.01) is ControlState.HOLDING
-    assert ownership.control(now + TIMEOUT + HOLD + 0.01) is ControlState.EXPIRED
+    assert ownership.state(now + TIMEOUT - 0.01) is ControlState.LIVE
+    assert ownership.state(now + TIMEOUT + 0.01) is ControlState.HOLDING
+    assert ownership.state(now + TIMEOUT + HOLD - 0.01) is ControlState.HOLDING
+    assert ownership.state(now + TIMEOUT + HOLD + 0.01) is ControlState.EXPIRED
 
 
 def test_an_owner_that_resumes_is_live_again(ownership):
     stream(ownership, "a", 0.0, 1.0)
     ownership.request_control("a", 1.0)
     ownership.note_setpoint("a", 2.0)
-    assert ownership.control(2.1) is ControlState.LIVE
+    assert ownership.state(2.1) is ControlState.LIVE
 
 
 def test_another_client_takes_over_from_a_silent_owner(ownership):
@@ -97,7 +97,7 @@ def test_after_release_nobody_is_in_control(ownership):
     stream(ownership, "a", 0.0, 1.0)
     ownership.request_control("a", 1.0)
     ownership.release()
-    assert ownership.control(1.1) is ControlState.FREE
+    assert ownership.state(1.1) is ControlState.FREE
     assert ownership.note_setpoint("b", 1.1) is None
 
 
@@ -127,5 +127,5 @@ def test_at_any_time_only_a_live_owner_is_flown(ownership):
                     newest[client] = now
         if before is not None and ownership.owner != before:
             assert now - newest.get(before, -9.0) > TIMEOUT
-        if ownership.control(now) is ControlState.LIVE:
+        if ownership.state(now) is ControlState.LIVE:
             assert now - newest[ownership.owner] <= TIMEOUT

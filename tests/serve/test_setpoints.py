@@ -23,7 +23,7 @@ from companion.serve.setpoints.request import (
     RefusedSetpoint,
     Situation,
 )
-from companion.serve.setpoints.understand import understand as understand_frame
+from companion.serve.setpoints.understand import decode_setpoint
 from companion.serve.situation import OriginEstimate
 
 LOCAL, OFFSET, BODY, BODY_OFFSET, BODY_FRD = 1, 7, 8, 9, 12
@@ -38,7 +38,7 @@ TARGETS = Address(1, 1), Address(1, 191)
 def understand(message, situation=SITUATION, *, ardupilot=False):
     raw = message.pack(dialect.MAVLink(None, 245, 190))
     (frame,) = FrameScanner(CRC_EXTRA).feed(raw)
-    return understand_frame(frame, situation, TARGETS, body_yaw_is_relative=ardupilot)
+    return decode_setpoint(frame, situation, TARGETS, body_yaw_is_relative=ardupilot)
 
 
 def local(mask, frame=LOCAL, position=POSITION, target=(1, 1), **changed):

@@ -11,7 +11,7 @@ _MANUAL_CONTROL = 69
 
 
 class Address(NamedTuple):
-    """A system and one of its components; as a target, 0 means all of them."""
+    """A system id and a component id; in a target, 0 means all systems or all components."""
 
     system: int
     component: int

@@ -30,8 +30,8 @@ class ClientStats:
     dropped: int = 0
 
 
-class Clients(Protocol):
-    """Receives the events of all clients from their endpoints."""
+class ClientListener(Protocol):
+    """Is told by the endpoints when clients connect, send frames and go."""
 
     def attach(self, client: "Client") -> None:
         """A client has connected."""

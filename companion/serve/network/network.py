@@ -49,14 +49,14 @@ class Network:
         link: open link to the vehicle; its `on_frame` is replaced.
         endpoints: endpoints of the clients, in the notation of
             `companion.mavlink.transport.endpoint`.
-        note: called with events as sentences.
+        note: called with each event, as a sentence for the user.
 
     Attributes:
-        routing: the rules and their counters; takes hooks for setpoints and for our component.
+        routing: the routing rules and their counters; set its `intercept` and `on_own_frame`.
         uplink: the clients' frames on their way to the vehicle.
         ports: the open endpoints, in the order of `endpoints`.
-        attitude: payload of the autopilot's newest ATTITUDE_QUATERNION; empty before the first.
-        attitude_at: arrival of that payload, s on our clock.
+        attitude_payload: of the autopilot's newest ATTITUDE_QUATERNION; empty before the first.
+        attitude_at: event-loop time at which that payload arrived, s.
         overflowed: frames of the vehicle that were dropped because the queue was full.
 
     Raises:
@@ -78,7 +78,7 @@ class Network:
             clock,
         )
         self.ports: list[Port] = []
-        self.attitude = b""
+        self.attitude_payload = b""
         self.attitude_at = -inf
         self.overflowed = 0
         self._link, self._note_event = link, note
@@ -116,7 +116,7 @@ class Network:
         return tuple(self._clients)
 
     def now(self) -> float:
-        """The time on our clock, s."""
+        """The event-loop time, s."""
         return self._loop.time()
 
     def send(self, frame: bytes) -> None:
@@ -153,7 +153,7 @@ class Network:
         self._flush_later()
 
     def flush(self) -> None:
-        """Forward the queued frames; those for the vehicle first, as far as their rate permits."""
+        """Forward the queued frames; those to the vehicle first, as far as `uplink` permits."""
         self._flush_handle = None
         if self._timer is not None:
             self._timer.cancel()
@@ -174,7 +174,7 @@ class Network:
             return
         self._from_vehicle.append(frame)
         if frame.message_id == ATTITUDE_QUATERNION and source_of(frame) == self._autopilot:
-            self.attitude, self.attitude_at = frame.payload, self._loop.time()
+            self.attitude_payload, self.attitude_at = frame.payload, self._loop.time()
             if self._flush_handle is None:
                 self._flush_handle = self._loop.call_soon(self.flush)
         elif self._timer is None:

@@ -27,8 +27,8 @@ _READING_MESSAGES = frozenset(
         dialect.MAVLINK_MSG_ID_LOG_REQUEST_END,
     }
 )
-"""Messages that change nothing on the vehicle. HEARTBEAT is not among them: that of a ground
-station holds off the autopilot's failsafe for a lost ground station."""
+"""Messages that change nothing on the vehicle. HEARTBEAT is not among them: heartbeats of a ground
+station hold off the autopilot's failsafe for a lost ground station."""
 _READING_COMMANDS = frozenset(
     {
         dialect.MAV_CMD_REQUEST_MESSAGE,

@@ -1,6 +1,6 @@
 """Where a frame goes: learned addresses, targets, no loops (MAVLink guide, "Routing").
 
-Nothing here sends: frames are only queued at the given channels. The clock is given, too.
+Nothing here sends: frames are only queued at the channels. Time comes only from the given clock.
 """
 
 from collections import OrderedDict
@@ -45,8 +45,8 @@ class RoutingStats:
         to_clients: frames of the vehicle that were queued for clients, counted for each client.
         to_vehicle: clients' frames that were queued for the vehicle.
         between_clients: clients' frames that were queued for other clients.
-        looped: frames dropped because they were repetitions, or claimed to be the autopilot's or
-            ours.
+        looped: frames of clients and of other components that were dropped, because they were
+            repetitions, came from a client that had gone, or had our or the autopilot's address.
         no_route: frames dropped because their target was never heard.
     """
 
@@ -70,7 +70,7 @@ class Routing:
         vehicle: the channel to the autopilot.
         autopilot: address of the autopilot.
         own: address of our component.
-        clock: our clock, s.
+        clock: returns the event-loop time, s.
 
     Attributes:
         stats: counters of frames.
@@ -189,7 +189,7 @@ class _Repeats:
     never increases its sequence number, equal frames are forwarded only once in 0.2 s.
 
     Args:
-        clock: our clock, s.
+        clock: returns the event-loop time, s.
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:

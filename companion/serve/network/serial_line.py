@@ -5,7 +5,7 @@ import asyncio
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.transport.endpoint import SerialPort
 from companion.mavlink.transport.serial_port import SerialTransport
-from companion.serve.network.client import Client, Clients
+from companion.serve.network.client import Client, ClientListener
 
 _RETRY_PAUSE = 2.0
 """Pause before opening a lost device again, s."""
@@ -18,7 +18,7 @@ class SerialLine:
         EndpointError: the device is missing, in use, or not permitted.
     """
 
-    def __init__(self, endpoint: SerialPort, clients: Clients) -> None:
+    def __init__(self, endpoint: SerialPort, clients: ClientListener) -> None:
         self._endpoint, self._clients = endpoint, clients
         self._reopening: asyncio.Task[None] | None = None
         self._client = SerialClient(endpoint.device)

@@ -4,11 +4,11 @@ import asyncio
 import socket
 
 from companion.mavlink.errors import EndpointError
-from companion.mavlink.peer import NamedPeers, host_and_port, plain_host, resolve
+from companion.mavlink.peer import NamedPeers, host_and_port, plain_host, resolve_peers
 from companion.mavlink.transport.base import why_not_opened
 from companion.mavlink.transport.endpoint import TcpClient as TcpOut
 from companion.mavlink.transport.endpoint import TcpServer
-from companion.serve.network.client import Client, Clients, FloodDetector
+from companion.serve.network.client import Client, ClientListener, FloodDetector
 
 _MAX_CLIENTS = 16
 _MAX_UNSENT_BYTES = 65_536
@@ -22,14 +22,14 @@ _RETRY_PAUSE = 2.0
 _CONNECT_TIMEOUT = 5.0
 
 
-async def open_tcp_server(endpoint: TcpServer, clients: Clients) -> "TcpPort":
+async def open_tcp_server(endpoint: TcpServer, clients: ClientListener) -> "TcpPort":
     """Listen for clients.
 
     Raises:
         EndpointError: the port is in use or not permitted, the address is not that of an interface
             of this computer, or a peer's host name is unknown.
     """
-    named_peers = await resolve(endpoint.peers, socket.SOCK_STREAM)
+    named_peers = await resolve_peers(endpoint.peers, socket.SOCK_STREAM)
     port = TcpPort(clients, named_peers)
     try:
         server = await asyncio.get_running_loop().create_server(
@@ -42,7 +42,7 @@ async def open_tcp_server(endpoint: TcpServer, clients: Clients) -> "TcpPort":
     return port
 
 
-def open_tcp_client(endpoint: TcpOut, clients: Clients) -> "TcpPort":
+def open_tcp_client(endpoint: TcpOut, clients: ClientListener) -> "TcpPort":
     """Connect to a program that listens, now or later; reconnect when the connection is lost."""
     port = TcpPort(clients, NamedPeers())
     port.connect(endpoint)
@@ -56,7 +56,7 @@ class TcpPort:
         local: (host, port) listened on, or None.
     """
 
-    def __init__(self, clients: Clients, named_peers: NamedPeers) -> None:
+    def __init__(self, clients: ClientListener, named_peers: NamedPeers) -> None:
         self._clients, self._named_peers = clients, named_peers
         self._server: asyncio.Server | None = None
         self._connecting: asyncio.Task[None] | None = None

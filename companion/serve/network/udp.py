@@ -9,7 +9,7 @@ from companion.mavlink.peer import NamedPeers, host_and_port, plain_host
 from companion.mavlink.transport.base import why_not_opened
 from companion.mavlink.transport.endpoint import UdpIn, UdpOut
 from companion.mavlink.transport.udp import udp_address
-from companion.serve.network.client import Client, Clients, FloodDetector
+from companion.serve.network.client import Client, ClientListener, FloodDetector
 
 _READ_BYTES = 4_096
 _MAX_DATAGRAM = 1_400
@@ -21,7 +21,7 @@ _SILENCE_TIMEOUT = 15.0
 _MAX_CLIENTS = 16
 
 
-async def open_udp(endpoint: UdpIn | UdpOut, clients: Clients) -> "UdpPort":
+async def open_udp(endpoint: UdpIn | UdpOut, clients: ClientListener) -> "UdpPort":
     """Open a UDP endpoint for clients.
 
     Raises:
@@ -53,7 +53,9 @@ class UdpPort:
         local: the (host, port) it is bound to.
     """
 
-    def __init__(self, sock: socket.socket, clients: Clients, named_peers: NamedPeers) -> None:
+    def __init__(
+        self, sock: socket.socket, clients: ClientListener, named_peers: NamedPeers
+    ) -> None:
         self._socket, self._clients, self._named_peers = sock, clients, named_peers
         self.local: tuple[str, int] = sock.getsockname()[:2]
         self._loop = asyncio.get_running_loop()

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from companion.mavlink.transport.endpoint import Endpoint, SerialPort
 
 _MAX_QUEUED_FRAMES = 64
-"""Largest number of frames that wait for one client."""
+"""Largest number of frames of one client that wait to be sent to the vehicle."""
 _MAX_FRAME_AGE = 1.0
 """Largest age of a frame that is sent, s: a command to arm must not arrive after an outage."""
 _LARGEST_FRAME = 280
@@ -14,7 +14,7 @@ _SERIAL_SHARE = 0.5
 """Share of a serial line that clients may use; our setpoints and requests need the rest."""
 _BITS_PER_BYTE = 10
 _NETWORK_RATE = 500_000.0
-"""Largest rate of clients' bytes over a network, per second."""
+"""Largest rate of clients' bytes on a UDP or TCP link to the vehicle, bytes/s."""
 _NETWORK_BURST = 50_000.0
 
 
@@ -33,7 +33,7 @@ class Uplink:
         send: sends a whole frame now; returns false if it could not be sent.
         rate: bytes per second.
         burst: bytes that may be sent at once.
-        clock: our clock, s.
+        clock: returns the event-loop time, s.
 
     Attributes:
         sent: number of frames sent.

@@ -5,15 +5,16 @@ from typing import NamedTuple
 
 from ruckig import ControlInterface, InputParameter, Ruckig, RuckigError, Trajectory
 
-Values = tuple[float, ...]
+AxisValues = tuple[float, ...]
+"""One number for each axis."""
 
 
-class State(NamedTuple):
+class AxisState(NamedTuple):
     """Position, velocity and acceleration along some axes; SI units or radians."""
 
-    position: Values
-    velocity: Values
-    acceleration: Values
+    position: AxisValues
+    velocity: AxisValues
+    acceleration: AxisValues
 
 
 class AxisLimits(NamedTuple):
@@ -43,14 +44,20 @@ class Approach:
         error: initial error.
         limits: limits of each axis.
         begin_time: time when the motion begins, s.
-        by_velocity: whether only the velocity must become zero, at any position.
+        by_velocity: whether only the velocity error must become zero, and the position error need
+            not.
 
     Raises:
         UnplannableError: no such motion exists.
     """
 
     def __init__(
-        self, error: State, limits: Sequence[AxisLimits], begin_time: float, *, by_velocity: bool
+        self,
+        error: AxisState,
+        limits: Sequence[AxisLimits],
+        begin_time: float,
+        *,
+        by_velocity: bool,
     ) -> None:
         axes = len(limits)
         problem = InputParameter(axes)
@@ -74,11 +81,11 @@ class Approach:
         if int(result) < 0:
             raise _unplannable(result)
 
-    def at(self, time: float) -> State:
+    def at(self, time: float) -> AxisState:
         """The error at a time, s; constant after the end."""
         elapsed = max(0.0, time - self._begin_time)
         position, velocity, acceleration = self._trajectory.at_time(elapsed)[:3]
-        return State(tuple(position), tuple(velocity), tuple(acceleration))
+        return AxisState(tuple(position), tuple(velocity), tuple(acceleration))
 
 
 def _unplannable(reason: object) -> UnplannableError:

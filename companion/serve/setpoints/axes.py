@@ -1,4 +1,4 @@
-"""Axes that follow a stream of commands directly, and a jump by a motion within limits.
+"""Follows a stream of commands directly, and a jump of the command by a motion within limits.
 
 The commanded state is extrapolated between setpoints (`CommandedState`). When it jumps, the
 difference between the present and the commanded state becomes an error, which a jerk-limited motion
@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from companion.attitude.rotation import clamp
 from companion.guidance.reference import LARGEST_JERK, change_rate
-from companion.serve.setpoints.approach import Approach, AxisLimits, State, Values
+from companion.serve.setpoints.approach import Approach, AxisLimits, AxisState, AxisValues
 from companion.serve.setpoints.commanded_state import (
     AxisMotion,
     CommandedState,
@@ -29,7 +29,7 @@ _LARGEST_ACCELERATION = 15.0
 _MAX_BRAKING_FACTOR = 2.0
 """Largest acceleration at the beginning of a motion, as a multiple of the acceleration limit."""
 _MAX_LEAD_DISTANCE = 1.5
-"""Largest distance of the reference ahead of the vehicle if no position is commanded, m."""
+"""Largest distance between reference and vehicle if no position is commanded, m."""
 _MAX_LEAD_SPEED = 2.0
 """Largest difference between the velocities of reference and vehicle if only accelerations are
 commanded, m/s.
@@ -51,40 +51,40 @@ class Continuity(NamedTuple):
     velocity: float
 
 
-class Axes:
+class CommandFollower:
     """Follows commands along one or more axes.
 
     Args:
         limits: limits of motions after a jump, one for each axis. A motion along several axes is
             limited along its direction.
         continuity: largest jumps that are followed directly.
-        timeout: time for which a command that is repeated unchanged goes on moving its position or
-            changing its velocity, s.
+        timeout: time for which a command repeated unchanged is extrapolated, s. After it, a
+            commanded position stands still, and a commanded velocity stays constant.
     """
 
     def __init__(
         self, limits: Sequence[AxisLimits], continuity: Continuity, timeout: float
     ) -> None:
         self._limits, self._continuity, self._timeout = limits, continuity, timeout
-        self._zero: Values = (0.0,) * len(limits)
+        self._zero: AxisValues = (0.0,) * len(limits)
         self._demand: AxisDemand | None = None
         self._commanded_at = 0.0
         self._approach: Approach | None = None
         self._commanded = CommandedState(self._zero, self._zero, self._zero, self._zero, 0.0)
 
-    def begin(self, state: State, now: float) -> None:
+    def begin(self, state: AxisState, now: float) -> None:
         """Start from a state, and come to rest until a command comes."""
         self._demand, self._approach = None, None
         self._commanded = CommandedState(*state, self._zero, now)
         self.stop(now)
 
-    def at(self, time: float) -> State:
+    def at(self, time: float) -> AxisState:
         """The state at a time, s."""
         commanded = self._commanded.at(time)
         if self._approach is None:
             return commanded
         error = self._approach.at(time)
-        return State(
+        return AxisState(
             plus(commanded.position, error.position),
             plus(commanded.velocity, error.velocity),
             plus(commanded.acceleration, error.acceleration),
@@ -130,7 +130,7 @@ class Axes:
         self._demand, self._commanded_at = demand, now
 
     def _repeat(self, demand: AxisDemand, now: float, actual: AxisMotion | None) -> None:
-        """Follow a repeated command for a limited time, because its sender may hang."""
+        """Follow an unchanged command; extrapolate it only for a time, as its sender may hang."""
         if demand.position is None:
             self._repeat_motion(demand, now, actual)
             return
@@ -142,7 +142,7 @@ class Axes:
     def _repeat_motion(self, demand: AxisDemand, now: float, actual: AxisMotion | None) -> None:
         """Follow a repeated velocity or acceleration.
 
-        The reference stays at most `_MAX_LEAD_DISTANCE` ahead of the vehicle.
+        The reference stays within `_MAX_LEAD_DISTANCE` of the vehicle.
         """
         current = self.at(now)
         if demand.velocity is not None and now - self._commanded_at > self._timeout:
@@ -154,7 +154,7 @@ class Axes:
         if demand.velocity is None or strayed or still_accelerates:
             self._follow_motion(demand, _near_vehicle(current, actual, demand), now)
 
-    def _follow_position(self, demand: AxisDemand, current: State, now: float) -> None:
+    def _follow_position(self, demand: AxisDemand, current: AxisState, now: float) -> None:
         assert demand.position is not None
         velocity = demand.velocity or self._zero
         acceleration, jerk = self._derivatives(demand, now)
@@ -166,7 +166,7 @@ class Axes:
             approach = self._plan(error, error.position, now, by_velocity=False)
         self._commanded, self._approach = target, approach
 
-    def _follow_motion(self, demand: AxisDemand, current: State, now: float) -> None:
+    def _follow_motion(self, demand: AxisDemand, current: AxisState, now: float) -> None:
         velocity = current.velocity if demand.velocity is None else demand.velocity
         acceleration = demand.acceleration or self._zero
         target = CommandedState(current.position, velocity, acceleration, self._zero, now)
@@ -176,8 +176,10 @@ class Axes:
             approach = self._plan(error, error.velocity, now, by_velocity=True)
         self._commanded, self._approach = target, approach
 
-    def _plan(self, error: State, direction: Values, now: float, *, by_velocity: bool) -> Approach:
-        """A motion of the error to zero; the limits hold along its direction, not for each axis."""
+    def _plan(
+        self, error: AxisState, direction: AxisValues, now: float, *, by_velocity: bool
+    ) -> Approach:
+        """A motion of the error to zero; the limits hold along `direction`, not for each axis."""
         length = hypot(*direction)
         limits = [
             each if length == 0.0 else _scaled(each, max(_MIN_LIMIT_SHARE, abs(along) / length))
@@ -190,7 +192,7 @@ class Axes:
         start = error._replace(acceleration=acceleration)
         return Approach(start, limits, now, by_velocity=by_velocity)
 
-    def _derivatives(self, demand: AxisDemand, now: float) -> tuple[Values, Values]:
+    def _derivatives(self, demand: AxisDemand, now: float) -> tuple[AxisValues, AxisValues]:
         """Acceleration and jerk of a stream; estimated if they are not commanded."""
         before, interval = self._demand, now - self._commanded_at
         commanded = demand.acceleration
@@ -211,7 +213,7 @@ class Axes:
         jerk = change_rate(before.acceleration, commanded, interval, LARGEST_JERK)
         return commanded, self._zero if jerk is None else _blend(self._commanded.jerk, jerk)
 
-    def _is_continuous(self, error: State) -> bool:
+    def _is_continuous(self, error: AxisState) -> bool:
         return (
             hypot(*error.position) <= self._continuity.position
             and hypot(*error.velocity) <= self._continuity.velocity
@@ -222,14 +224,14 @@ def _scaled(limits: AxisLimits, share: float) -> AxisLimits:
     return AxisLimits(*(share * each for each in limits))
 
 
-def _blend(old: Values, new: Values) -> Values:
+def _blend(old: AxisValues, new: AxisValues) -> AxisValues:
     return tuple(a + _DERIVATIVE_WEIGHT * (b - a) for a, b in zip(old, new, strict=True))
 
 
-def _near_vehicle(current: State, actual: AxisMotion | None, demand: AxisDemand) -> State:
-    """The state, with values that are too far from the vehicle's replaced by the vehicle's.
+def _near_vehicle(current: AxisState, actual: AxisMotion | None, demand: AxisDemand) -> AxisState:
+    """The state, but the vehicle's own position or velocity where the state is too far from it.
 
-    This applies to the position, and to a velocity that is not commanded.
+    A commanded velocity is never replaced.
     """
     if actual is None:
         return current
@@ -238,4 +240,4 @@ def _near_vehicle(current: State, actual: AxisMotion | None, demand: AxisDemand)
         position = actual.position
     if demand.velocity is None and are_far_apart(velocity, actual.velocity, _MAX_LEAD_SPEED):
         velocity = actual.velocity
-    return State(position, velocity, acceleration)
+    return AxisState(position, velocity, acceleration)

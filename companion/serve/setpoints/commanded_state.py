@@ -3,7 +3,7 @@
 from math import hypot
 from typing import NamedTuple
 
-from companion.serve.setpoints.approach import State, Values
+from companion.serve.setpoints.approach import AxisState, AxisValues
 
 
 class AxisMotion(NamedTuple):
@@ -14,8 +14,8 @@ class AxisMotion(NamedTuple):
         velocity: m/s.
     """
 
-    position: Values
-    velocity: Values
+    position: AxisValues
+    velocity: AxisValues
 
 
 class CommandedState(NamedTuple):
@@ -24,13 +24,13 @@ class CommandedState(NamedTuple):
     Position, velocity, acceleration and jerk are in SI units or radians.
     """
 
-    position: Values
-    velocity: Values
-    acceleration: Values
-    jerk: Values
+    position: AxisValues
+    velocity: AxisValues
+    acceleration: AxisValues
+    jerk: AxisValues
     begins: float
 
-    def at(self, time: float) -> State:
+    def at(self, time: float) -> AxisState:
         """The state at a time, s."""
         t = max(0.0, time - self.begins)
         position, velocity, acceleration = [], [], []
@@ -39,26 +39,26 @@ class CommandedState(NamedTuple):
             position.append(p + t * (v + t * (0.5 * a + t * j / 6.0)))
             velocity.append(v + t * (a + 0.5 * t * j))
             acceleration.append(a + t * j)
-        return State(tuple(position), tuple(velocity), tuple(acceleration))
+        return AxisState(tuple(position), tuple(velocity), tuple(acceleration))
 
-    def error_of(self, state: State) -> State:
+    def error_of(self, state: AxisState) -> AxisState:
         """A state minus the commanded state at `begins`."""
-        return State(
+        return AxisState(
             _minus(state.position, self.position),
             _minus(state.velocity, self.velocity),
             _minus(state.acceleration, self.acceleration),
         )
 
 
-def plus(left: Values, right: Values) -> Values:
+def plus(left: AxisValues, right: AxisValues) -> AxisValues:
     """The sum of two vectors."""
     return tuple([a + b for a, b in zip(left, right, strict=True)])
 
 
-def _minus(left: Values, right: Values) -> Values:
+def _minus(left: AxisValues, right: AxisValues) -> AxisValues:
     return tuple(a - b for a, b in zip(left, right, strict=True))
 
 
-def are_far_apart(left: Values, right: Values, distance: float) -> bool:
+def are_far_apart(left: AxisValues, right: AxisValues, distance: float) -> bool:
     """Whether two vectors are further apart than `distance`."""
     return hypot(*_minus(left, right)) > distance

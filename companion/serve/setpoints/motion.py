@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 from companion.attitude.representation import wrap_angle
 from companion.guidance.reference import Reference, Vector, VehicleMotion
-from companion.serve.setpoints.approach import AxisLimits, State, UnplannableError
-from companion.serve.setpoints.axes import Axes, Continuity
+from companion.serve.setpoints.approach import AxisLimits, AxisState, UnplannableError
+from companion.serve.setpoints.axes import CommandFollower, Continuity
 from companion.serve.setpoints.commanded_state import AxisMotion
 from companion.serve.setpoints.request import AxisDemand, MotionRequest
 
@@ -33,8 +33,8 @@ class MotionLimits(NamedTuple):
         jerk: largest jerk, m/s³; vertically at most `_VERTICAL_JERK`.
         climb, descent: largest vertical speeds, m/s.
         yaw_rate: largest yaw rate, rad/s.
-        timeout: time for which a request that is repeated unchanged goes on moving its position or
-            changing its velocity, s.
+        timeout: time for which a request repeated unchanged is extrapolated, s. After it, a
+            commanded position stands still, and a commanded velocity stays constant.
     """
 
     speed: float
@@ -64,19 +64,19 @@ class CommandedMotion:
             min(limits.jerk, _VERTICAL_JERK),
         )
         yaw = AxisLimits(limits.yaw_rate, limits.yaw_rate, _YAW_ACCELERATION, _YAW_JERK)
-        self._horizontal = Axes((level, level), _HORIZONTAL_CONTINUITY, limits.timeout)
-        self._vertical = Axes((down,), _VERTICAL_CONTINUITY, limits.timeout)
-        self._heading = Axes((yaw,), _HEADING_CONTINUITY, limits.timeout)
+        self._horizontal = CommandFollower((level, level), _HORIZONTAL_CONTINUITY, limits.timeout)
+        self._vertical = CommandFollower((down,), _VERTICAL_CONTINUITY, limits.timeout)
+        self._heading = CommandFollower((yaw,), _HEADING_CONTINUITY, limits.timeout)
         self._climb, self._descent = limits.climb, limits.descent
         self._largest_yaw_rate = limits.yaw_rate
         self._newest_yaw: tuple[float, float, float] | None = None  # request, heading demand, time
 
     def begin(self, position_ned: Vector, velocity_ned: Vector, heading: float, now: float) -> None:
-        """Start from a motion, and come to rest until a request comes."""
+        """Start from a position, velocity and heading, and come to rest until a request comes."""
         (x, y, z), (u, v, w) = position_ned, velocity_ned
-        self._horizontal.begin(State((x, y), (u, v), (0.0, 0.0)), now)
-        self._vertical.begin(State((z,), (w,), (0.0,)), now)
-        self._heading.begin(State((heading,), (0.0,), (0.0,)), now)
+        self._horizontal.begin(AxisState((x, y), (u, v), (0.0, 0.0)), now)
+        self._vertical.begin(AxisState((z,), (w,), (0.0,)), now)
+        self._heading.begin(AxisState((heading,), (0.0,), (0.0,)), now)
         self._newest_yaw = None
 
     def command(self, request: MotionRequest, now: float, actual: VehicleMotion) -> None:

@@ -31,7 +31,7 @@ _MAX_POSITION, _MAX_SPEED, _MAX_ACCELERATION, _MAX_YAW_RATE = 10_000.0, 100.0, 1
 
 
 class _Frame(NamedTuple):
-    """A frame of SET_POSITION_TARGET_LOCAL_NED.
+    """A coordinate frame of SET_POSITION_TARGET_LOCAL_NED.
 
     Attributes:
         offset: whether positions are relative to the vehicle.

@@ -1,4 +1,4 @@
-"""Converts a client's frame to its command, or to the reason why it is not flown."""
+"""Converts the frame of a client's setpoint to a request, or to the reason why it is not flown."""
 
 from companion.mavlink.framing import Frame
 from companion.mavlink.messages import decode, dialect
@@ -14,14 +14,14 @@ SETPOINTS = frozenset({_ATTITUDE_TARGET_ID, _LOCAL_TARGET_ID, _GLOBAL_TARGET_ID}
 """Numbers of the messages that command a motion, an attitude or body rates."""
 
 
-def understand(
+def decode_setpoint(
     frame: Frame,
     situation: Situation,
     targets: tuple[Address, Address],
     *,
     body_yaw_is_relative: bool,
 ) -> Request:
-    """The command of a setpoint.
+    """The request that a setpoint makes.
 
     Args:
         frame: frame of one of `SETPOINTS`.
