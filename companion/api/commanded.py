@@ -1,4 +1,4 @@
-"""What a program commands, as plain numbers of its own.
+"""Copies what a program commands, and checks its numbers.
 
 A program may pass NumPy arrays and go on writing into them; guidance must not see that.
 """
@@ -9,7 +9,7 @@ from companion.guidance.reference import Reference
 
 
 def copied(reference: Reference) -> Reference:
-    """The reference with plain numbers of its own.
+    """A copy of the reference, with plain floats and tuples.
 
     Raises:
         TypeError: it is no `Reference`.

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from companion.api.ctrl_c import on_ctrl_c
 from companion.api.flight_loop import FlightLoop, flight_loop
-from companion.api.program import Program, ended_by
+from companion.api.program import ProgramPlan, ended_by
 from companion.api.state import NewestState
 from companion.api.vehicle import Vehicle
 from companion.config import Config
@@ -77,7 +77,7 @@ def as_config(config: Configuration) -> Config:
 
     Raises:
         ConfigError: the configuration is wrong.
-        TypeError: it is none.
+        TypeError: it is no configuration.
     """
     if isinstance(config, Config):
         return config
@@ -95,11 +95,11 @@ async def flying(
     observer: Observer | None = None,
     environment: Environment = THIS_COMPUTER,
 ) -> AsyncGenerator[Vehicle, None]:
-    """Like `connect`, for a complete configuration; nothing is recorded without a folder."""
+    """Like `connect`, with a complete configuration; without a folder nothing is recorded."""
     loop, wait_cancelled = flight_loop(), False
     try:
         session, program = await loop.start(_make_session(config, folder, observer, environment))
-        loop.on_lost(partial(_end_lost_flight, session, program))
+        loop.register_end(partial(_end_lost_flight, session, program))
         flight = loop.start(_fly(session, program))
         try:
             with on_ctrl_c(loop, session.interrupt):
@@ -118,7 +118,7 @@ async def flying(
 
 @asynccontextmanager
 async def _connected_vehicle(
-    loop: FlightLoop, session: Session, program: Program, flight: asyncio.Future[None]
+    loop: FlightLoop, session: Session, program: ProgramPlan, flight: asyncio.Future[None]
 ) -> AsyncGenerator[Vehicle, None]:
     """The vehicle after the preflight checks; at the end of the block the flight ends."""
     try:
@@ -140,7 +140,7 @@ async def _connected_vehicle(
 def run(main: Coroutine[Any, Any, T], *, in_lockstep: bool = False) -> T:
     """Like `asyncio.run`, in the event loop that a flight needs.
 
-    In real time the garbage collector ignores all objects that exist already.
+    Unless `in_lockstep`, the garbage collector ignores all objects that exist already.
 
     Args:
         main: the program.
@@ -154,15 +154,15 @@ def run(main: Coroutine[Any, Any, T], *, in_lockstep: bool = False) -> T:
 
 async def _make_session(
     config: Config, folder: Path | None, observer: Observer | None, environment: Environment
-) -> tuple[Session, Program]:
-    program = Program()
+) -> tuple[Session, ProgramPlan]:
+    program = ProgramPlan()
     observer = observer or SilentObserver()
     session = Session(config, folder, observer, decline_landing, program, environment)
     program.interrupt = session.interrupt
     return session, program
 
 
-async def _fly(session: Session, program: Program) -> None:
+async def _fly(session: Session, program: ProgramPlan) -> None:
     """Fly, and tell the program why the flight has ended."""
     try:
         summary = await session.fly()
@@ -175,7 +175,9 @@ async def _fly(session: Session, program: Program) -> None:
     program.end(ended_by(summary.result))
 
 
-async def _wait_connected(loop: FlightLoop, program: Program) -> tuple[FlightContext, NewestState]:
+async def _wait_connected(
+    loop: FlightLoop, program: ProgramPlan
+) -> tuple[FlightContext, NewestState]:
     context = await asyncio.shield(program.connected)
     return context, NewestState(context, loop)
 
@@ -184,7 +186,7 @@ async def _interrupt(session: Session, reason: str) -> bool:
     return session.interrupt(reason)
 
 
-async def _end_flight(program: Program) -> None:
+async def _end_flight(program: ProgramPlan) -> None:
     """End the flight: hand back in the air; on the ground leave the vehicle as it is."""
     if program.busy:
         program.interrupt("the program ended before its request was completed")
@@ -197,7 +199,7 @@ def _ending_phases(context: FlightContext) -> Sequence[Phase]:
     return (hand_back_phase(),) if context.loop.offboard_active else ()
 
 
-async def _end_lost_flight(session: Session, program: Program) -> None:
-    """End the flight of a program whose loop or thread has ended; wait for its end."""
+async def _end_lost_flight(session: Session, program: ProgramPlan) -> None:
+    """End a flight that still runs, because its program has ended; wait until it has ended."""
     if not program.finished.is_set() and session.interrupt("the program ended in flight"):
         await program.finished.wait()

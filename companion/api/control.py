@@ -6,7 +6,7 @@ from math import inf, isnan
 
 from companion.api.commanded import copied
 from companion.api.flight_loop import FlightLoop
-from companion.api.program import Program
+from companion.api.program import ProgramPlan
 from companion.api.state import NewestState, State
 from companion.attitude import BodyRates, Coefficients
 from companion.flight.context import FlightContext
@@ -25,9 +25,9 @@ class Control:
     autopilot holds the vehicle and control ends. Frames are world NED and body FRD, in SI units.
 
     Args:
-        program: knows whether the flight has ended.
+        program: the flight's plan; has the error to raise once the flight has ended.
         context: context of the flight.
-        newest: the state of the vehicle.
+        newest: publishes the state of the vehicle.
         loop: loop of the flight.
         source: takes the references.
         control_end: future that is done when control has ended.
@@ -35,7 +35,7 @@ class Control:
 
     def __init__(
         self,
-        program: Program,
+        program: ProgramPlan,
         context: FlightContext,
         newest: NewestState,
         loop: FlightLoop,
@@ -111,8 +111,9 @@ class Control:
     def follow(self, reference: Reference, jerk_ned: Vector | None = None) -> None:
         """Command a reference: the position, velocity and acceleration wanted now.
 
-        The vehicle follows it without lag; until the next reference comes, it is extrapolated. Far
-        from it, the vehicle tilts as far as the limits allow; to fly there, use `Vehicle.go_to`.
+        The vehicle follows it without lag. The reference is extrapolated until the next one comes.
+        A vehicle far from the reference tilts as far as the limits allow; to fly to a distant
+        place, use `Vehicle.go_to`.
 
         Args:
             reference: state that the vehicle should have now.
@@ -144,8 +145,8 @@ class Control:
         """Command acceleration coefficients, and hold the height at which control began.
 
         Args:
-            north: horizontal acceleration to the north per specific thrust.
-            east: likewise to the east; sin(tilt) is √(north² + east²).
+            north: acceleration to the north divided by specific thrust (thrust per mass).
+            east: the same to the east; sin(tilt) is √(north² + east²).
             heading: rad; None: the heading at which control began.
 
         Raises:
@@ -178,8 +179,8 @@ class Control:
         return self._start_state.heading if heading is None else heading
 
     def _require_control(self) -> None:
-        if self._program.ended is not None:
-            raise self._program.ended
+        if self._program.end_error is not None:
+            raise self._program.end_error
         if self._control_end.done():
             self._control_end.result()
             raise FlightEnded("the program has ended its control")

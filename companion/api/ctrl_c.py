@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-from companion.api.flight_loop import FlightLoop, OwnThread
+from companion.api.flight_loop import FlightLoop, OwnThreadLoop
 
 REACTION_TIMEOUT = 0.5
 """Time after Ctrl-C within which the program's event loop must run, s."""
@@ -27,7 +27,7 @@ def on_ctrl_c(loop: FlightLoop, interrupt: Callable[[str], object]) -> Iterator[
     """
     before = signal.getsignal(signal.SIGINT)
     in_main_thread = threading.current_thread() is threading.main_thread()
-    if not in_main_thread or not isinstance(loop, OwnThread) or not callable(before):
+    if not in_main_thread or not isinstance(loop, OwnThreadLoop) or not callable(before):
         yield
         return
     previous: Callable[[int, FrameType | None], object] = before
@@ -45,7 +45,7 @@ def on_ctrl_c(loop: FlightLoop, interrupt: Callable[[str], object]) -> Iterator[
 
 
 class _ReactionCheck:
-    """Waits in the flight's loop until the program's loop runs, and hands back if it does not.
+    """Waits in the flight's loop for the program's loop, and hands back if that does not run.
 
     Args:
         loop: loop of the flight.
@@ -57,7 +57,7 @@ class _ReactionCheck:
 
     def begin(self) -> None:
         """Begin to wait for the program's loop to run."""
-        self._loop.tell(self._note_reaction)
+        self._loop.post_to_program(self._note_reaction)
         asyncio.get_running_loop().call_later(REACTION_TIMEOUT, self._hand_back_without_reaction)
 
     def _note_reaction(self) -> None:

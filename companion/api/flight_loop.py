@@ -48,16 +48,19 @@ class FlightLoop(Protocol):
         """Call a function in the flight's loop without waiting for it."""
         ...
 
-    def tell(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
+    def post_to_program(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
         """Call a function in the program's loop; the flight does not wait for it."""
         ...
 
-    def on_lost(self, end: Callable[[], Awaitable[object]]) -> None:
-        """Register `end`, which ends a flight that runs at `close` or when the program is lost."""
+    def register_end(self, end: Callable[[], Awaitable[object]]) -> None:
+        """Register `end`, which ends the flight if it still runs when the loop ends.
+
+        The loop ends by `close`, or because the program's loop or thread has ended.
+        """
         ...
 
     def close(self, *, wait: bool) -> None:
-        """Accept no further work; `wait` until the thread has ended, if there is one."""
+        """End the loop's own thread, if it has one; with `wait`, return when it has ended."""
         ...
 
 
@@ -78,19 +81,19 @@ class SharedLoop:
         """Call the function at once."""
         callback(*args)
 
-    def tell(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
+    def post_to_program(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
         """Call the function at once."""
         callback(*args)
 
-    def on_lost(self, end: Callable[[], Awaitable[object]]) -> None:
+    def register_end(self, end: Callable[[], Awaitable[object]]) -> None:
         """Do nothing: the flight ends with the loop."""
 
     def close(self, *, wait: bool) -> None:
         """Do nothing, because the loop continues."""
 
 
-class OwnThread:
-    """The flight runs in its own thread, which begins here.
+class OwnThreadLoop:
+    """Runs the flight in a thread of its own, which is started at once.
 
     If the program's loop or thread ends without `close`, the flight hands the vehicle back. The
     interpreter waits for that before it ends.
@@ -127,17 +130,17 @@ class OwnThread:
         with suppress(RuntimeError):
             self._loop.call_soon_threadsafe(callback, *args)
 
-    def tell(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
+    def post_to_program(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
         """Schedule the function in the program's loop; ignored after that loop has ended."""
         with suppress(RuntimeError):
             self._program.call_soon_threadsafe(callback, *args)
 
-    def on_lost(self, end: Callable[[], Awaitable[object]]) -> None:
-        """Register `end`, which is awaited in the flight's loop when this thread ends."""
+    def register_end(self, end: Callable[[], Awaitable[object]]) -> None:
+        """Register `end`; the flight's loop awaits it before this thread ends."""
         self._end_flight = end
 
     def close(self, *, wait: bool) -> None:
-        """End the flight if it still runs, and the thread; `wait` for both."""
+        """End the flight if it still runs, and the thread; with `wait`, return after both."""
         self.post(self._closing.set)
         if wait:
             self._thread.join()
@@ -169,7 +172,7 @@ class OwnThread:
 
 _switch_interval_lock = threading.Lock()
 _intervals_before: list[float] = []
-"""Python's previous switch interval, once for each running flight."""
+"""One entry for each running flight; the first is Python's interval before any of them, s."""
 
 
 @contextmanager
@@ -196,4 +199,4 @@ def flight_loop() -> FlightLoop:
     """
     if isinstance(asyncio.get_running_loop(), LockstepEventLoop):
         return SharedLoop()
-    return OwnThread()
+    return OwnThreadLoop()

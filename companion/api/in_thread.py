@@ -1,4 +1,4 @@
-"""Runs slow work of a program's call without holding up its event loop."""
+"""Runs slow work of a program's call without blocking the event loop in which it is called."""
 
 import asyncio
 from collections.abc import Callable

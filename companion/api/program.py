@@ -16,7 +16,7 @@ _NEXT_CALL = "the program's next call"
 
 
 @dataclass(slots=True, eq=False)
-class Request:
+class PhaseRequest:
     """Phases that the program asked for.
 
     Attributes:
@@ -32,7 +32,7 @@ class Request:
     )
 
 
-class Program:
+class ProgramPlan:
     """The plan of a flight that runs the phases a program requests, and waits between requests.
 
     While it waits in the air under our control, it holds the position and the safety monitors stay
@@ -44,7 +44,7 @@ class Program:
         summary: summary of the flight, available after it has ended.
         over: whether the flight has no further phases: the last request is done, or the flight has
             ended.
-        ended: exception that every later call raises; None before the end of the flight.
+        end_error: exception that every later call raises; None before the end of the flight.
         finished: set when the flight has ended and its files are written.
         interrupt: function that ends the flight for a reason in words: see `Session.interrupt`.
     """
@@ -55,10 +55,10 @@ class Program:
         self.summary: Summary | None = None
         self.over = False
         self.interrupt: Callable[[str], object] = lambda _: None
-        self._waiting: deque[Request] = deque()
-        self._running: Request | None = None
+        self._waiting: deque[PhaseRequest] = deque()
+        self._running: PhaseRequest | None = None
         self._new_request = asyncio.Event()
-        self.ended: Exception | None = None
+        self.end_error: Exception | None = None
         self.finished = asyncio.Event()
 
     async def phases(self, context: FlightContext) -> AsyncGenerator[Phase, None]:
@@ -96,11 +96,11 @@ class Program:
             FlightEnded: the flight has ended; we do not control the vehicle any more.
             RuntimeError: an earlier request has not ended yet.
         """
-        if self.ended is not None:
-            raise self.ended
+        if self.end_error is not None:
+            raise self.end_error
         if self.busy:
             raise RuntimeError("another call of this vehicle has not ended yet: await it first")
-        request = Request(phases, last)
+        request = PhaseRequest(phases, last)
         self._waiting.append(request)
         self._new_request.set()
         try:
@@ -116,14 +116,14 @@ class Program:
         """Whether a request is waiting or running."""
         return self._running is not None or bool(self._waiting)
 
-    def end(self, reason: Exception) -> None:
-        """Note that the flight has ended; calls that wait, and all later ones, raise `reason`."""
-        self.ended, self.over = reason, True
+    def end(self, error: Exception) -> None:
+        """Note that the flight has ended; calls that wait, and all later ones, raise `error`."""
+        self.end_error, self.over = error, True
         if not self.connected.done():
-            self.connected.set_exception(reason)
+            self.connected.set_exception(error)
         for request in (self._running, *self._waiting):
             if request is not None and not request.done.done():
-                request.done.set_exception(reason)
+                request.done.set_exception(error)
                 request.done.exception()  # no warning of asyncio if nobody waits for it any more
 
     def _waiting_phase(self, context: FlightContext) -> Phase:

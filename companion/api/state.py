@@ -17,7 +17,7 @@ class State(NamedTuple):
     of the tilt stays in the attitude.
 
     Attributes:
-        time: time of the state, s on the clock of the event loop.
+        time: event-loop time of the flight, s.
         position_ned: m.
         velocity_ned: m/s.
         q: attitude, body to world, w first.
@@ -86,7 +86,7 @@ class NewestState:
 
 
 class _Wake:
-    """Calls a function in the program's loop, at most once until the program has run it."""
+    """Calls a function in the program's loop; calls before the previous one has run are dropped."""
 
     def __init__(self, loop: FlightLoop, callback: Callable[[], object]) -> None:
         self._loop, self._callback, self._pending = loop, callback, False
@@ -94,7 +94,7 @@ class _Wake:
     def __call__(self) -> None:
         if not self._pending:
             self._pending = True
-            self._loop.tell(self._run)
+            self._loop.post_to_program(self._run)
 
     def _run(self) -> None:
         self._pending = False
@@ -102,7 +102,7 @@ class _Wake:
 
 
 def state_of(context: FlightContext, now: float) -> State:
-    """The newest state; `now` is the time on our clock, s.
+    """The newest state; `now` is the event-loop time of the flight, s.
 
     Raises:
         RuntimeError: no position or no attitude has come yet.

@@ -11,7 +11,7 @@ from pathlib import Path
 from companion.api.control import Control
 from companion.api.flight_loop import FlightLoop
 from companion.api.in_thread import call_in_thread
-from companion.api.program import Program
+from companion.api.program import ProgramPlan
 from companion.api.state import NewestState, State
 from companion.config import trajectory_file
 from companion.flight.context import FlightContext
@@ -47,14 +47,14 @@ class Vehicle:
     While one call runs, another raises `RuntimeError`.
 
     Args:
-        program: takes the requests.
+        program: the flight's plan, which takes the requests.
         context: context of the flight; it is only read here.
-        newest: the state of the vehicle.
+        newest: publishes the state of the vehicle.
         loop: loop of the flight.
     """
 
     def __init__(
-        self, program: Program, context: FlightContext, newest: NewestState, loop: FlightLoop
+        self, program: ProgramPlan, context: FlightContext, newest: NewestState, loop: FlightLoop
     ) -> None:
         self._program = program
         self._context = context
@@ -112,11 +112,11 @@ class Vehicle:
     ) -> None:
         """Fly a straight line to a position, from rest to rest, within the limits given here.
 
-        Where the vehicle is there already, it only turns to the heading.
+        If the vehicle is there already, it only turns to the heading.
 
         Args:
             position_ned: m, in the frame of `State.position_ned`.
-            heading: heading, rad, to which the vehicle turns before it leaves; None: the present.
+            heading: rad; the vehicle turns to it before it leaves; None: the present heading.
             speed: largest speed, m/s.
             acceleration: largest acceleration, m/s².
             jerk: largest jerk, m/s³.
@@ -125,7 +125,7 @@ class Vehicle:
             ConfigError: the configured limits or the fence do not allow it; nothing was flown.
             FlightEnded: the vehicle is not under our control.
             TrajectoryError: a limit given here is not positive.
-            ValueError: an argument is not finite, or the heading is above two turns (90 for 90°).
+            ValueError: an argument is not finite, or the heading exceeds two turns.
         """
         to = minus(finite_vector("position_ned", position_ned), self._held_pose().position_ned)
         names = "speed", "acceleration", "jerk"
@@ -144,14 +144,14 @@ class Vehicle:
     async def follow(self, trajectory: Trajectory | Path | str) -> None:
         """Follow a trajectory from the present position.
 
-        Unless it holds the heading, the vehicle first turns to its initial heading.
+        Unless the trajectory holds the heading, the vehicle first turns to its initial heading.
 
         Args:
             trajectory: a trajectory, or the path of its file (the format of `flight.trajectory`).
 
         Raises:
             ConfigError: the trajectory cannot be read or computed, or breaks a limit or the fence.
-                An object also if `companion.guidance.trajectory.require_trajectory` refuses it.
+                Also, for an object: `companion.guidance.trajectory.require_trajectory` refuses it.
             FlightEnded: the vehicle is not under our control.
             TypeError: the object is no trajectory.
         """
@@ -166,8 +166,8 @@ class Vehicle:
     async def control(self, name: str = "the program") -> AsyncGenerator[Control, None]:
         """Command the vehicle from this coroutine while the block runs.
 
-        After the block the vehicle stops and is held by us. If the commands stop for longer than
-        `deadman.target_stale_ms` or the block raises, it is handed back and the flight ends.
+        After the block the vehicle stops and holds. If commands stop for longer than
+        `deadman.target_stale_ms` or the block raises, the vehicle is handed back; the flight ends.
 
         Args:
             name: name of the commanding program in the list of events.
@@ -242,8 +242,8 @@ class Vehicle:
         Raises:
             FlightEnded: the flight has ended, or the vehicle is not under our control.
         """
-        if self._program.ended is not None:
-            raise self._program.ended
+        if self._program.end_error is not None:
+            raise self._program.end_error
         pose = self._context.guidance_loop.flown.pose
         if pose is None or not self._context.loop.offboard_active:
             raise FlightEnded("the vehicle is not under our control: take off first", Exit.LEAVE)

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from companion.api.flight_loop import SWITCH_INTERVAL, OwnThread, SharedLoop, flight_loop
+from companion.api.flight_loop import SWITCH_INTERVAL, OwnThreadLoop, SharedLoop, flight_loop
 from companion.api.state import _Wake
 from companion.safety.actions import FlightEnded
 
@@ -39,7 +39,7 @@ def test_results_errors_and_cancellation_cross_the_threads():
 
     async def main():
         loop = flight_loop()
-        assert isinstance(loop, OwnThread)
+        assert isinstance(loop, OwnThreadLoop)
         assert await loop.start(where()) == "flight"
         with pytest.raises(ZeroDivisionError):
             await loop.start(fails())
@@ -99,7 +99,7 @@ def test_a_program_that_is_lost_has_its_flight_ended(lost):
         ended.set()
 
     async def main():
-        flight_loop().on_lost(end)
+        flight_loop().register_end(end)
 
     loop = asyncio.new_event_loop()
     if lost == "loop":
@@ -133,7 +133,7 @@ def test_news_do_not_queue_up_while_the_program_does_not_run():
     queued, heard = [], []
 
     class Blocked(SharedLoop):
-        def tell(self, callback, *args):
+        def post_to_program(self, callback, *args):
             queued.append(callback)
 
     async def main():
