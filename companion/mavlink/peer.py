@@ -13,7 +13,7 @@ from companion.mavlink.stats import LinkStats
 from companion.mavlink.transport.endpoint import PeerAddress
 
 
-async def resolve(peers: Sequence[PeerAddress], kind: socket.SocketKind) -> "NamedPeers":
+async def resolve_peers(peers: Sequence[PeerAddress], kind: socket.SocketKind) -> "NamedPeers":
     """Look up the addresses of the peers that the endpoint names.
 
     Raises:

@@ -134,7 +134,7 @@ class SnapshotBuilder:
                 record.missed_deadlines,
                 late,
                 record.setpoint_intervals.copy(),
-                self._link.state.positions,
+                self._link.state.position_count,
             )
         )
         while len(counted) > 2 and now - counted[1].now >= _AVERAGING_TIME:

@@ -26,8 +26,8 @@ from companion.vehicle.connection import Connection
 from companion.vehicle.inbox import Inbox
 from companion.vehicle.presence import (
     TimeSync,
-    no_beacon,
-    no_heartbeat,
+    no_beacon_message,
+    no_heartbeat_message,
     send_heartbeat,
     send_heartbeats,
     synchronise,
@@ -136,7 +136,9 @@ class Link(VehicleClient):
                     while self.state.heartbeat is None:
                         await heard.next(timeout_s)
             except TimeoutError:
-                raise LinkTimeout(no_heartbeat(self.settings, self.stats, timeout_s)) from None
+                raise LinkTimeout(
+                    no_heartbeat_message(self.settings, self.stats, timeout_s)
+                ) from None
             finally:
                 unsubscribe()
         if self.state.unsupported is not None:
@@ -245,4 +247,4 @@ class Link(VehicleClient):
             async with asyncio.timeout(self.settings.first_beacon_timeout_s):
                 await lockstep.first_beacon
         except TimeoutError:
-            raise LinkTimeout(no_beacon(self.settings, self.stats)) from None
+            raise LinkTimeout(no_beacon_message(self.settings, self.stats)) from None

@@ -147,10 +147,10 @@ async def synchronise(timesync: TimeSync, clock: VehicleClock) -> None:
         clock.update(now())
 
 
-def no_heartbeat(settings: LinkSettings, stats: LinkStats, timeout_s: float) -> str:
+def no_heartbeat_message(settings: LinkSettings, stats: LinkStats, timeout_s: float) -> str:
     """The error message if no heartbeat of the autopilot came within `timeout_s`."""
     opening = f"no heartbeat from system {settings.target_system} within {timeout_s:g} s"
-    refused = _why_refused(opening, stats)
+    refused = _refusal_message(opening, stats)
     if refused is not None:
         return refused
     if stats.bad_crc:
@@ -161,14 +161,14 @@ def no_heartbeat(settings: LinkSettings, stats: LinkStats, timeout_s: float) -> 
     return f"{opening} on {settings.endpoint}; is the vehicle running and sending to this address?"
 
 
-def no_beacon(settings: LinkSettings, stats: LinkStats) -> str:
+def no_beacon_message(settings: LinkSettings, stats: LinkStats) -> str:
     """The error message if no lockstep beacon came within `first_beacon_timeout_s`."""
     opening = f"no lockstep beacon within {settings.first_beacon_timeout_s:g} s"
     why = f"{opening} on {settings.endpoint}; is the vehicle running, and in lockstep?"
-    return _why_refused(opening, stats) or why
+    return _refusal_message(opening, stats) or why
 
 
-def _why_refused(opening: str, stats: LinkStats) -> str | None:
+def _refusal_message(opening: str, stats: LinkStats) -> str | None:
     """The error message if frames were refused for their sender or signature; otherwise None.
 
     Args:

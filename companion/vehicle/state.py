@@ -47,7 +47,7 @@ class _Values:
     gps: Gps | None = None
     home: Home | None = None
     estimator: Estimator | None = None
-    positions: int = 0
+    position_count: int = 0
     prearm: Prearm | None = None
     gps_was_good: bool = False
     reset_counter: int | None = None
@@ -66,7 +66,7 @@ class VehicleState(ModeState, _Values):
             only with a unit quaternion.
         global_position: `GlobalPosition`; `None` until the vehicle knows it.
         attitude_target_thrust, battery, gps, home, estimator, prearm: See the record of each.
-        positions: Number of positions accepted.
+        position_count: Number of positions accepted.
         gps_was_good: Whether GPS has had a 3D fix since the link was opened.
         reset_counter: Counter in ODOMETRY that rises whenever the estimate jumps.
         texts: Texts of the autopilot, newest last.
@@ -177,7 +177,7 @@ class VehicleState(ModeState, _Values):
         ):
             self._stats.outdated += 1
         else:
-            self.positions += 1
+            self.position_count += 1
             self.position = LocalPosition(now, stamp, values[:3], values[3:])
 
     def _on_sys_status(self, message: Message) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from companion.attitude import BodyRates
 from companion.mavlink.errors import EndpointError, LinkTimeout
-from companion.mavlink.peer import PeerRule, resolve
+from companion.mavlink.peer import PeerRule, resolve_peers
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.transport import tcp as tcp_module
@@ -191,13 +191,13 @@ def test_only_the_named_peer_is_heard(run):
 
 def test_a_named_host_fits_in_every_spelling():
     async def scene():
-        named = await resolve([PeerAddress("127.0.0.1"), PeerAddress("::1", 5)], SOCK_DGRAM)
+        named = await resolve_peers([PeerAddress("127.0.0.1"), PeerAddress("::1", 5)], SOCK_DGRAM)
         assert named.admit(("::ffff:127.0.0.1", 9, 0, 0))
         assert named.admit(("::1", 5, 0, 0))
         assert not named.admit(("::1", 6, 0, 0))
         assert not named.admit(("127.0.0.2", 9))
         with pytest.raises(EndpointError, match=r"peer 'no-such-host\.invalid' is unknown"):
-            await resolve([PeerAddress("no-such-host.invalid")], SOCK_DGRAM)
+            await resolve_peers([PeerAddress("no-such-host.invalid")], SOCK_DGRAM)
 
     asyncio.run(scene())
 

@@ -189,7 +189,7 @@ def run_for(flight, seconds):
         flight.stats.frames, flight.stats.lost = 6 * step, 4 * step
         flight.record.setpoints, flight.record.missed_deadlines = 4 * step, step
         flight.record.setpoint_intervals.add(0.005)
-        flight.state.positions = step // 5
+        flight.state.position_count = step // 5
         flight.listen(10.0 + 0.02 * step)
     return flight.snapshot(10.0 + seconds)
 
@@ -220,7 +220,7 @@ def test_rates_of_three_looks_far_apart_are_those_since_the_second_one():
     """And what came late before the second one does not count."""
     flight = Flight()
     for now, positions, setpoints in ((10.0, 0, 5), (11.5, 10, 6), (13.0, 13, 7)):
-        flight.state.positions = positions
+        flight.state.position_count = positions
         flight.record.setpoints = flight.record.missed_deadlines = setpoints
         flight.listen(now)
     told = flight.snapshot(13.0).health

@@ -182,12 +182,12 @@ def position(bench, seconds, north=0.0):
 
 def test_a_position_stamped_no_later_than_the_last_is_counted_never_stored(bench):
     kept = position(bench, 60.0, 1.0)
-    assert bench.state.positions == 1
+    assert bench.state.position_count == 1
     for bench.now, stamp in ((10.1, 60.0), (10.2, 59.9), (10.3, 50.0), (20.0, 60.0), (21.0, 57.0)):
         assert position(bench, stamp, 2.0) == kept
     assert bench.stats.outdated == 5
     assert position(bench, 60.1, 3.0).position_ned == (3.0, 0.0, 0.0)
-    assert bench.state.positions == 2
+    assert bench.state.position_count == 2
 
 
 def attitudes(bench, seconds, began=0.0):
@@ -380,7 +380,7 @@ def test_of_another_vehicle_only_the_heartbeat_is_kept(bench):
     state = bench.state
     assert (state.mode, state.armed) == ("OFFBOARD", True)
     assert (state.position, state.battery, state.home, state.gps) == (None, None, None, None)
-    assert (state.positions, state.armings, state.gps_was_good) == (0, 0, False)
+    assert (state.position_count, state.armings, state.gps_was_good) == (0, 0, False)
     assert state.readiness == (None, None, False, False)
 
 

@@ -5,7 +5,7 @@ import socket
 import time
 
 from companion.mavlink.errors import EndpointError
-from companion.mavlink.peer import CLAIM_LASTS_S, NamedPeers, host_and_port, resolve
+from companion.mavlink.peer import CLAIM_LASTS_S, NamedPeers, host_and_port, resolve_peers
 from companion.mavlink.transport.base import OPEN_TIMEOUT_S, Lost, Receiver, why_not_opened
 from companion.mavlink.transport.endpoint import TcpClient, TcpServer
 
@@ -49,7 +49,7 @@ async def open_tcp_server(endpoint: TcpServer, receiver: Receiver, lost: Lost) -
         EndpointError: The port is in use or not permitted, the address is not that of an interface
             of this computer, or a peer's host name is unknown.
     """
-    named_peers = await resolve(endpoint.peers, socket.SOCK_STREAM)
+    named_peers = await resolve_peers(endpoint.peers, socket.SOCK_STREAM)
     transport = TcpTransport(receiver, lost, named_peers)
     where = f"TCP {endpoint.host}:{endpoint.port}"
     try:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.loop import unwatch, watch
-from companion.mavlink.peer import NamedPeers, host_and_port, resolve
+from companion.mavlink.peer import NamedPeers, host_and_port, resolve_peers
 from companion.mavlink.transport.base import Receiver, why_not_opened
 from companion.mavlink.transport.endpoint import UdpIn, UdpOut
 
@@ -67,7 +67,7 @@ async def udp_address(endpoint: UdpIn | UdpOut) -> UdpAddress:
             "IP address"
         ) from error
     family, _, _, _, address = addresses[0]
-    named_peers = await resolve(endpoint.peers if isinstance(endpoint, UdpIn) else (), kind)
+    named_peers = await resolve_peers(endpoint.peers if isinstance(endpoint, UdpIn) else (), kind)
     return UdpAddress(family, address, named_peers)
 
 

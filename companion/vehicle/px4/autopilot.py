@@ -68,7 +68,7 @@ class Px4:
     """PX4's `Autopilot`.
 
     OFFBOARD can be entered after setpoints have streamed at 2 Hz or more for a second. When they
-    stop, PX4 holds the last rates for COM_OF_LOSS_T, so the caller must stop the rotation before.
+    stop, PX4 holds the last rates for COM_OF_LOSS_T, so the last setpoint must command zero rates.
     While the intended mode is OFFBOARD, a later setpoint enters it again; only a mode command
     releases control for good.
     """
