@@ -51,7 +51,7 @@ def test_results_errors_and_cancellation_cross_the_threads():
         await asyncio.sleep(0)
         assert cancelled.wait(5.0)
         told = asyncio.get_running_loop().create_future()
-        loop.post(loop.tell, told.set_result, "back")
+        loop.post(loop.post_to_program, told.set_result, "back")
         assert await told == "back"
         loop.close(wait=True)
 
