@@ -150,7 +150,7 @@ class Climb:
 
 def test_a_stall_of_our_own_is_counted_from_the_last_setpoint():
     """`listen` is called every 20 ms; a call that is less than 10 ms late is no stall."""
-    state = SimpleNamespace(reset_counter=None, positions=0)
+    state = SimpleNamespace(reset_counter=None, position_count=0)
     link = SimpleNamespace(state=state, stats=SimpleNamespace(frames=0, lost=0))
     resets = SimpleNamespace(on_counter=lambda *_: None)
     loop = SimpleNamespace(resets=resets, record=LoopRecord())

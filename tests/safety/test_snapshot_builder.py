@@ -30,7 +30,7 @@ class Flight:
             global_position=SimpleNamespace(latitude_deg=47.0, longitude_deg=8.0, received=9.0),
             height=12.5,
             reset_counter=3,
-            positions=0,
+            position_count=0,
             gps_was_good=True,
         )
         self.clock = SimpleNamespace(changes=2, last_change="it jumped")
