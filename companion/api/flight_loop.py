@@ -1,6 +1,7 @@
-"""The event loop of a program's flight: a loop in its own thread, or in lockstep the program's.
+"""The event loop of a program's flight: a loop in a thread of its own; in lockstep the program's.
 
-With its own thread, a program that computes, blocks or never yields delays only its own commands.
+With a thread for the flight, a program that computes, blocks or never yields delays only its own
+commands.
 The flight continues to answer samples, notices the missing commands, and hands the vehicle back.
 """
 

@@ -35,8 +35,8 @@ class PhaseRequest:
 class ProgramPlan:
     """The plan of a flight that runs the phases a program requests, and waits between requests.
 
-    While it waits in the air under our control, it holds the position and the safety monitors stay
-    active.
+    Between requests in the air, the vehicle holds its position if it is under the program's
+    control, and the safety monitors stay active.
 
     Attributes:
         maneuvers: empty, because they are not known before the flight.
@@ -93,7 +93,7 @@ class ProgramPlan:
             last: whether the flight ends after these phases.
 
         Raises:
-            FlightEnded: the flight has ended; we do not control the vehicle any more.
+            FlightEnded: the flight has ended; the program does not control the vehicle any more.
             RuntimeError: an earlier request has not ended yet.
         """
         if self.end_error is not None:

@@ -94,7 +94,7 @@ class Vehicle:
         """Hold the position and the heading for a time, s.
 
         Raises:
-            FlightEnded: the vehicle is not under our control.
+            FlightEnded: the vehicle is not under the program's control.
             ValueError: the time is negative or not finite; nothing was flown.
         """
         if not finite_number("seconds", seconds) >= 0.0:
@@ -123,7 +123,7 @@ class Vehicle:
 
         Raises:
             ConfigError: the configured limits or the fence do not allow it; nothing was flown.
-            FlightEnded: the vehicle is not under our control.
+            FlightEnded: the vehicle is not under the program's control.
             TrajectoryError: a limit given here is not positive.
             ValueError: an argument is not finite, or the heading exceeds two turns.
         """
@@ -152,7 +152,7 @@ class Vehicle:
         Raises:
             ConfigError: the trajectory cannot be read or computed, or breaks a limit or the fence.
                 Also, for an object: `companion.guidance.trajectory.require_trajectory` refuses it.
-            FlightEnded: the vehicle is not under our control.
+            FlightEnded: the vehicle is not under the program's control.
             TypeError: the object is no trajectory.
         """
         if isinstance(trajectory, Path | str):
@@ -173,7 +173,7 @@ class Vehicle:
             name: name of the commanding program in the list of events.
 
         Raises:
-            FlightEnded: the vehicle is not under our control, or control ended before the block.
+            FlightEnded: the vehicle is not under the program's control when the block begins.
         """
         self._held_pose()  # raises if the vehicle is not under our control
         source = CommandedSource(name, self._context.config.deadman.target_stale, _START_TIMEOUT)
@@ -240,7 +240,7 @@ class Vehicle:
         """The pose at which guidance began to fly its present source.
 
         Raises:
-            FlightEnded: the flight has ended, or the vehicle is not under our control.
+            FlightEnded: the flight has ended, or the vehicle is not under the program's control.
         """
         if self._program.end_error is not None:
             raise self._program.end_error

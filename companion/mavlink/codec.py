@@ -2,7 +2,7 @@
 
 The control loop receives ATTITUDE_QUATERNION and sends SET_ATTITUDE_TARGET; lockstep uses
 SYSTEM_TIME. pymavlink takes about 40 us for one message, because its checksum is computed in
-Python; this code takes 2 us. Tests compare both byte for byte.
+Python; this code takes 2 us. Tests compare its results with those of pymavlink.
 """
 
 import struct

@@ -1,4 +1,7 @@
-"""Our component on the clients' network: heartbeat, texts, named values, answers to commands."""
+"""This program as a MAVLink component on the clients' network.
+
+It sends heartbeats, texts, named values, and answers to commands.
+"""
 
 import asyncio
 import time
@@ -31,7 +34,7 @@ class Component:
     """Sends to the clients as the component of the companion computer, and answers commands to it.
 
     Args:
-        settings: our ids and our signing key.
+        settings: ids and signing key of this program.
         network: network of the clients.
         to_vehicle: sends a message over the link, so that it reaches ground stations connected to
             the autopilot.

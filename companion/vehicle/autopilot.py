@@ -104,7 +104,7 @@ class Autopilot(Protocol):
         body_yaw_is_relative: Whether a yaw in a body frame of SET_POSITION_TARGET_LOCAL_NED counts
             from the present yaw, not from north.
         can_compensate_tilt: Whether the autopilot can divide thrust by cos(tilt) itself; a rule in
-            `parameters` then compares its setting with ours.
+            `parameters` then compares its setting with the configuration.
         offboard_loss_failsafe: What the autopilot does when setpoints stop.
         cannot_arm_in: Roles of the modes in which a disarmed vehicle cannot be armed.
         parameters: Rules for the parameters that matter to a flight by body rates.

@@ -16,7 +16,7 @@ from companion.vehicle.clock_jumps import (
     WRAP_PERIOD_NS,
     Misfit,
     MisfitRun,
-    Reading,
+    SampleTiming,
     Stamp,
     describe_change,
     has_wrapped,
@@ -77,7 +77,7 @@ class VehicleClock:
         return None if self._began == inf else self._quickest + self.delay.seconds
 
     def vehicle_time(self, time_boot_ms: int) -> float:
-        """Convert the stamp of any message to a time on the clock of `Reading.vehicle_time`, s."""
+        """Convert the stamp of any message, ms, to vehicle time as in `SampleTiming`, s."""
         return time_boot_ms / 1000.0 + self._shift
 
     def age(self, vehicle_time: float, now: float) -> float | None:
@@ -95,7 +95,7 @@ class VehicleClock:
         spread = self.rate.spread(max(0.0, now - self._received))
         return vehicle_time - now > self._quickest + self.delay.seconds + SMALLEST_JUMP + spread
 
-    def take(self, time_boot_ms: int, received: float) -> Reading:
+    def take(self, time_boot_ms: int, received: float) -> SampleTiming:
         """Take the times of an attitude sample; return its vehicle time and age.
 
         Args:
@@ -108,7 +108,7 @@ class VehicleClock:
         if time <= self._newest or ahead > quickest + SMALLEST_JUMP:
             misfit = self._judge_misfit(time_boot_ms, Stamp(time, ahead, received), quickest)
             if misfit is not None:
-                return Reading(time, nan, misfit)
+                return SampleTiming(time, nan, misfit)
             time = time_boot_ms / 1000.0 + self._shift
             ahead, quickest = time - received, self._quickest
         elif self._misfits.stamps:
@@ -121,7 +121,7 @@ class VehicleClock:
         self._quickest, self._received, self._newest, self._late = quickest, received, time, late
         if received >= self.rate.due:
             self.rate.note(received, quickest)
-        return Reading(time, late + self.delay.seconds)
+        return SampleTiming(time, late + self.delay.seconds)
 
     def take_timesync(self, sent: float, received: float, vehicle_ns: int) -> None:
         """Take a TIMESYNC exchange.

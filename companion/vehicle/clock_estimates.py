@@ -123,7 +123,7 @@ class TelemetryDelay:
         self.seconds = 0.0
         self.unknown = DelayUnknown.UNANSWERED
         self._exchanges: deque[_Exchange] = deque(maxlen=round(EXCHANGE_LIFETIME) + 10)
-        self._odd: _Exchange | None = None
+        self._implausible: _Exchange | None = None
 
     def take_exchange(self, now: float, error: float, delay: float) -> float | None:
         """Take an exchange; one with a plausible delay is kept.
@@ -144,17 +144,17 @@ class TelemetryDelay:
         """
         exchange = _Exchange(now, error, delay)
         if -(error + _MAX_TIMESYNC_LAG) <= delay <= _MAX_DELAY:
-            self._odd = None
+            self._implausible = None
             self.unknown = DelayUnknown.UNANSWERED
             self._exchanges.append(exchange)
             self.expire(now)
             return None
-        before, self._odd = self._odd, exchange
+        before, self._implausible = self._implausible, exchange
         if before is None:
             return None
         if abs(before.delay - delay) > before.first_error + error + _MAX_TIMESYNC_LAG:
             return None
-        self._odd = None
+        self._implausible = None
         if self._exchanges and delay < 0.0:
             return self.seconds - delay
         self.forget(DelayUnknown.OTHER_CLOCK)

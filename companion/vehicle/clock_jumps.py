@@ -27,7 +27,7 @@ class Misfit(Enum):
     AHEAD = "stamped far ahead of the vehicle's clock"
 
 
-class Reading(NamedTuple):
+class SampleTiming(NamedTuple):
     """Vehicle time and age of one sample.
 
     Attributes:
@@ -43,7 +43,7 @@ class Reading(NamedTuple):
 
 
 class Stamp(NamedTuple):
-    """One sample's time by both clocks.
+    """One sample's time by the vehicle's clock and by the event loop's.
 
     Attributes:
         time: Vehicle time, s.

@@ -38,7 +38,7 @@ _READING_COMMANDS = frozenset(
 )
 _COMMAND_IDS = dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT
 _COMMAND_OFFSET = 28
-"""Offset of the command's number in both payloads, after seven fields of four bytes each."""
+"""Offset of the command's number in these two payloads, after seven fields of four bytes each."""
 _FTP_ID = dialect.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL
 _OPCODE_OFFSET = 6
 """Offset of the FTP opcode, after three address bytes, a sequence number and a session."""

@@ -1,4 +1,4 @@
-"""Queues clients' frames to the vehicle: limited, fair, and without delay of our setpoints."""
+"""Queues clients' frames to the vehicle: at a limited rate, in turn, without delay of setpoints."""
 
 from collections import deque
 from collections.abc import Callable
