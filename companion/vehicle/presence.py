@@ -84,9 +84,9 @@ class TimeSync:
 
     @property
     def uplink(self) -> Uplink:
-        """The way to the vehicle, by the probes of the last moments.
+        """Present delay and loss on the link to the vehicle, measured by probes.
 
-        A link that becomes slow lengthens its round trip within a second, `round_trip_s` only
+        If the link becomes slow, `Uplink.round_trip` shows it within a second, `round_trip_s` only
         after 16 s.
         """
         return self._probes.uplink(self._now_ns())
@@ -98,7 +98,7 @@ class TimeSync:
         self._send_request(stamp)
 
     def probe(self) -> None:
-        """Send a TIMESYNC request that measures only the way to the vehicle, if one is due."""
+        """Send a probe (`UplinkProbes`), if one is due."""
         stamp = self._now_ns()
         if self._probes.due(stamp):
             self._probes.note_sent(stamp)

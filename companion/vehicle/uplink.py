@@ -1,7 +1,7 @@
-"""The way of setpoints to the vehicle, judged by how it answers probes.
+"""Delay and loss on the link to the vehicle, by which setpoints go, measured by probes.
 
 A probe is a TIMESYNC request that does not enter the estimate of the vehicle's clock. Setpoints
-have no acknowledgement of their own: that they are late or lost shows only in these answers.
+are not acknowledged, so only the answers to probes show that setpoints come late or are lost.
 """
 
 from collections import deque
@@ -9,14 +9,15 @@ from typing import NamedTuple
 
 _PERIOD_S = 0.1
 _WINDOW_S = 0.7
-"""A longer delay of the link is noticed after about this time, s; single late answers are not."""
+"""Only probes answered within this time count, s. A link that becomes slow is noticed after about
+this time; a single late answer has no effect."""
 _MIN_ANSWERS = 4
 _KEPT = 16
 _S_PER_NS = 1e-9
 
 
 class Uplink(NamedTuple):
-    """The way to the vehicle at present.
+    """Present delay and loss on the link to the vehicle.
 
     Attributes:
         round_trip: Shortest round trip of the probes answered in the last 0.7 s, s; None: fewer
@@ -39,11 +40,11 @@ class UplinkProbes:
         self._unanswered: int | None = None
 
     def due(self, now: int) -> bool:
-        """Whether the next probe should be sent: they are sent at most ten times a second."""
+        """Whether the next probe should be sent; at most ten are sent in a second."""
         return not self._sent or now - self._sent[-1] >= _PERIOD_S / _S_PER_NS
 
     def note_sent(self, stamp: int) -> None:
-        """Remember the probe that was sent at `stamp`, which its answer will contain."""
+        """Remember the probe that was sent at `stamp`; its answer will contain this time."""
         self._sent.append(stamp)
         if self._unanswered is not None:
             self._unanswered += 1
@@ -60,7 +61,7 @@ class UplinkProbes:
         self._unanswered = min(sent_later, self._unanswered or sent_later)
 
     def uplink(self, now: int) -> Uplink:
-        """The way to the vehicle at the time `now`."""
+        """Delay and loss on the link to the vehicle at the time `now`."""
         oldest = now - _WINDOW_S / _S_PER_NS
         trips = [trip for received, trip in self._round_trips if received >= oldest]
         shortest = _S_PER_NS * min(trips) if len(trips) >= _MIN_ANSWERS else None

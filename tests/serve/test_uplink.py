@@ -1,7 +1,7 @@
 """Clients' frames on their way to the vehicle."""
 
 from companion.mavlink.transport.endpoint import parse_endpoint
-from companion.serve.network.uplink import Uplink, uplink_rate
+from companion.serve.network.uplink import UplinkQueue, uplink_rate
 
 
 class Line:
@@ -14,7 +14,7 @@ class Line:
         return self.open
 
     def uplink(self, rate=1000.0, burst=100.0):
-        return Uplink(self.send, rate, burst, lambda: self.now)
+        return UplinkQueue(self.send, rate, burst, lambda: self.now)
 
 
 def test_a_serial_line_keeps_half_of_its_bytes_for_us():

@@ -27,7 +27,7 @@ from companion.serve.network.routing import Routing
 from companion.serve.network.serial_line import SerialLine
 from companion.serve.network.tcp import TcpPort, open_tcp_client, open_tcp_server
 from companion.serve.network.udp import UdpPort, open_udp
-from companion.serve.network.uplink import Uplink, uplink_rate
+from companion.serve.network.uplink import UplinkQueue, uplink_rate
 from companion.vehicle.link import Link
 
 _MAX_FORWARDING_DELAY = 0.004
@@ -70,7 +70,7 @@ class Network:
         clock = self._loop.time
         self._autopilot = Address(settings.target_system, settings.target_component)
         rate, burst = uplink_rate(parse_endpoint(settings.endpoint))
-        self.uplink = Uplink(link.forward, rate, burst, clock)
+        self.uplink = UplinkQueue(link.forward, rate, burst, clock)
         self.routing = Routing(
             self.uplink,
             self._autopilot,

@@ -26,7 +26,7 @@ def uplink_rate(endpoint: Endpoint) -> tuple[float, float]:
     return _NETWORK_RATE, _NETWORK_BURST
 
 
-class Uplink:
+class UplinkQueue:
     """Queues the frames of each client and sends them in turn, as fast as the link allows.
 
     Args:
