@@ -17,7 +17,7 @@ from companion.config.files import changed, load
 from companion.config.known_drag import drag_prior
 from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
-from companion.recording.learned_file import newest
+from companion.recording.learned_file import newest_learned
 from companion.tuning import Disturbances, Proposal, propose
 from companion.tuning.flights import COURSES, CourseResult, autopilot_like, fly_course
 from companion.tuning.noise import measured_disturbances
@@ -85,7 +85,7 @@ def _configuration(source: Path, vehicle: Path, base: Path | None) -> tuple[Conf
 
 def _with_learned_drag(config: Config, source: Path) -> Config:
     """The configuration with the drag learned by the flights in the same folder as `source`."""
-    learned = newest(source.resolve().parent) if source.is_dir() else None
+    learned = newest_learned(source.resolve().parent) if source.is_dir() else None
     if config.guidance.drag is not None or learned is None:
         return config
     drag = {

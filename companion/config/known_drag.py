@@ -11,7 +11,7 @@ from typing import NamedTuple
 from companion.config import Config
 from companion.drag import NO_DRAG, Drag
 from companion.guidance.drag_estimate import ANY_VEHICLE, DragPrior
-from companion.recording.learned_file import LearnedFile, newest
+from companion.recording.learned_file import LearnedFile, newest_learned
 
 _LINEAR_DEVIATION_PER_S = 0.2
 """Standard deviation of a configured or learned linear drag, 1/s; the flight corrects it."""
@@ -58,7 +58,7 @@ def before_connecting(config: Config) -> KnownDrag:
     """The configured drag, or the one of the vehicle that flew last; unknown without either."""
     if config.guidance.drag is not None:
         return KnownDrag(config.guidance.drag)
-    learned = newest(config.recording.directory)
+    learned = newest_learned(config.recording.directory)
     return KnownDrag() if learned is None else KnownDrag(learned.drag, learned.path)
 
 

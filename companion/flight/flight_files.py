@@ -12,8 +12,8 @@ from companion.config import Config
 from companion.files.write_whole import ReservedSpace, write_with_timeout
 from companion.flight import flown_config
 from companion.flight.assembled import Assembled
-from companion.flight.course import advice, course_of
 from companion.flight.environment import Environment
+from companion.flight.flight_facts import advice, facts_of
 from companion.flight.observer import EventRecorder, Observer
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.texts import TextFrames
@@ -175,7 +175,7 @@ class FlightFiles:
             dead_times=dead_times,
             predictive=assembled.predictive_figures(),
             realtime={grant.name: grant.refusal or "granted" for grant in grants},
-            course=course_of(assembled, recorder.phases, result, advised),
+            facts=facts_of(assembled, recorder.phases, result, advised),
         )
 
     def save(self, summary: Summary) -> Summary:

@@ -22,17 +22,17 @@ Item_contra = TypeVar("Item_contra", contravariant=True)
 _CHECK_PERIOD = 0.05
 """Time between two checks for new items, s."""
 _SMALLEST_SLICE = 20
-"""Number of items in a slice, if few are waiting."""
+"""Smallest number of items in a slice, unless fewer are waiting."""
 _MOST_SLICES = 50
 """Largest number of slices in which a backlog is written."""
 _SLICE_PAUSE = 0.001
 """Pause after a slice, s."""
 _SYNC_PERIOD = 0.5
-"""Period of syncs, s; a power cut loses this much, plus the time that the disk takes."""
+"""Time between two syncs to the disk, s. A power cut loses what was written since the last one."""
 
 
 class ItemFile(Protocol[Item_contra]):
-    """A file of one format, used by one thread."""
+    """The format of a `BackgroundFile`. Only the thread that writes the file calls it."""
 
     def write(self, items: Sequence[Item_contra]) -> None:
         """Write items. Raises OSError if the disk is full or has failed."""
@@ -43,20 +43,20 @@ class ItemFile(Protocol[Item_contra]):
         ...
 
     def close(self, *, complete: bool) -> None:
-        """Complete the file if it is intact, and close it. Raises OSError."""
+        """Close the file; if `complete`, first write its end, such as an index. Raises OSError."""
         ...
 
 
 class BackgroundFile(ABC, Generic[T]):
     """Writes items to a file in its own thread; it never delays or ends a flight.
 
-    Items are accepted at once, and written when the file is open.
+    `put` takes items also before `open`. They are written once the file is open.
 
     Attributes:
         path: path of the file.
         dropped: number of items that were not written, because too many waited, writing had failed,
             or (`FlightRecorder`) an item could not be encoded.
-        failure: why writing ended early, for example a full disk; None: it did not.
+        failure: why writing stopped, for example a full disk; None: it has not failed.
 
     Args:
         path: path of the file.
@@ -133,7 +133,7 @@ class BackgroundFile(ABC, Generic[T]):
             self._write_waiting(file)
             self._sync_when_due(file)
         self._write_waiting(file)
-        self._guarded(lambda: file.close(complete=self.failure is None))
+        self._catch_failure(lambda: file.close(complete=self.failure is None))
 
     def _write_waiting(self, file: ItemFile[T]) -> None:
         """Write the items that are waiting now; items that arrive later wait for the next call."""
@@ -149,16 +149,16 @@ class BackgroundFile(ABC, Generic[T]):
 
     def _write_slice(self, file: ItemFile[T], items: Sequence[T]) -> None:
         if self.failure is None:
-            self._guarded(lambda: file.write(items))
+            self._catch_failure(lambda: file.write(items))
         if self.failure is not None:
             self.dropped += len(items)
 
     def _sync_when_due(self, file: ItemFile[T]) -> None:
         if self.failure is None and monotonic() - self._synced_at >= _SYNC_PERIOD:
-            self._guarded(file.sync)
+            self._catch_failure(file.sync)
             self._synced_at = monotonic()
 
-    def _guarded(self, work: Callable[[], None]) -> None:
+    def _catch_failure(self, work: Callable[[], None]) -> None:
         try:
             work()
         except OSError as error:

@@ -22,12 +22,12 @@ _INTERRUPTED = ("interrupted by ", LEFT_BY_USER)
 
 
 class Invocation(NamedTuple):
-    """The command line of this call, for the suggested next command.
+    """The command line that started the program; the suggested next command resembles it.
 
     Attributes:
         program: name or path by which a shell finds the program.
         arguments: arguments of the command that flew.
-        config: configuration file; None: that of the bundled vehicle.
+        config: configuration file of the flight; None: the demo's own.
     """
 
     program: str
@@ -40,8 +40,8 @@ class ClosingWords(NamedTuple):
 
     Attributes:
         headline: what flew, and whether it was good.
-        lines: the reasons.
-        next_command: a command line, or None.
+        lines: the figures and advice behind the headline, or how and why the flight ended early.
+        next_command: suggested next command line, or None.
         good: whether the flight was good; see `is_good`.
         flown: whether the maneuvers were flown to their end.
     """
@@ -58,7 +58,7 @@ def closing_words(figures: Figures, invocation: Invocation | None) -> ClosingWor
 
     Args:
         figures: result of `Summary.as_dict`.
-        invocation: this call; None: no next command is suggested.
+        invocation: see `Invocation`; None: no next command is suggested.
     """
     flown, good = figures["result"] == "ok", is_good(figures)
     headline, lines = _headline_and_reasons(figures) if flown else _ended_early(figures)
@@ -97,7 +97,7 @@ def _beyond_limit(beyond: list[Check]) -> list[str]:
 
 
 def _by_subject(good: Sequence[Check]) -> list[str]:
-    """One line for each subject, with its figures within their limits."""
+    """One line for each subject of the passed checks, with all their figures."""
     found: dict[str, list[str]] = {}
     for check in good:
         found.setdefault(check.what, []).append(check.found)
@@ -155,7 +155,7 @@ def _when_ended(end: dict[str, Any]) -> str:
 
 
 def _final_silence(figures: Figures) -> float | None:
-    """How long the vehicle was silent at the end of the flight, s; None: it was heard."""
+    """How long the vehicle was silent before the flight ended, s; None: it was heard."""
     silence: float | None = figures["at_the_end"].get("unheard_s")
     return silence
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from companion.extras import require
 from companion.recording.flight_record import FlightRecord, RecordError, read_flight
-from companion.recording.history import HEIGHTS, Marks, draw_history, marks_of
+from companion.recording.history import PANEL_HEIGHTS, Marks, draw_history, marks_of
 from companion.recording.measurements.recorded_summary import summary_of, trace_of
 from companion.recording.measurements.response import first_order
 from companion.recording.measurements.second_order import StepRun, nearest_second_order, step_runs
@@ -71,7 +71,9 @@ def draw_flight(folder: Path, out: Path) -> str | None:
             for axes, draw in zip(grid[0], panels, strict=True):
                 draw(axes)
         if motion is not None:
-            grid = next(parts).subplots(len(HEIGHTS), 1, sharex=True, height_ratios=HEIGHTS)
+            grid = next(parts).subplots(
+                len(PANEL_HEIGHTS), 1, sharex=True, height_ratios=PANEL_HEIGHTS
+            )
             draw_history(grid, motion, marks)
         # Without a format matplotlib would add a suffix to a name that has none.
         figure.savefig(out, dpi=120, format=out.suffix[1:] or "png")
@@ -123,7 +125,7 @@ def _gain(record: FlightRecord) -> float:
 
 
 def _marks(record: FlightRecord) -> Marks:
-    """The marks of the history."""
+    """The phases, the maneuvers and the end that the panels of the history mark."""
     summary, _ = summary_of(record)
     try:
         return marks_of(summary)
@@ -133,7 +135,7 @@ def _marks(record: FlightRecord) -> Marks:
 
 
 def _draw_steps(axes: "Axes", runs: list[StepRun], gain: float) -> None:
-    """The first doublet along its own direction, with the ideal and the best linear response."""
+    """The first doublet along its direction, with the ideal and the nearest second-order model."""
     run, model = runs[0], nearest_second_order(runs)
     along, time = run.direction, run.time - run.time[0]
     nearest = f"second order, {1e3 * model.dead_time:.0f} ms dead time"
@@ -157,7 +159,7 @@ def _draw_steps(axes: "Axes", runs: list[StepRun], gain: float) -> None:
 
 
 def _draw_plane(axes: "Axes", runs: list[StepRun]) -> None:
-    """All doublets in the plane of the coefficients: a linear response moves on straight lines."""
+    """All doublets, east over north coefficient: a linear response moves on straight lines."""
     for number, run in enumerate(runs):
         style = _STYLES[number % len(_STYLES)]
         north, east = run.measured.T

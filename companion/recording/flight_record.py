@@ -33,8 +33,8 @@ from companion.recording.mcap_file.flight_events import AlarmChange, Event, Phas
 from companion.recording.mcap_file.reader import McapContent, changed_topic, read_mcap
 from companion.recording.trace import ManeuverMark
 
-FILE = "flight.mcap"
-_BY_NAME = {channel.name: channel for channel in CHANNELS}
+RECORD_FILE = "flight.mcap"
+_CHANNEL_BY_NAME = {channel.name: channel for channel in CHANNELS}
 _LONGEST_CONFIGURATION = 1 << 20
 """Largest `config.yaml` that is read, bytes."""
 
@@ -44,16 +44,18 @@ class RecordError(Exception):
 
 
 @contextmanager
-def as_recorded(folder: Path) -> Iterator[None]:
-    """While the block reads the record in `folder`, turn invalid values into an error.
+def record_errors(folder: Path) -> Iterator[None]:
+    """Turn errors of the `with` block into RecordError, with the `folder` of the flight.
 
     Raises:
-        RecordError: the block read such a value.
+        RecordError: the block read an invalid value from the record.
     """
     try:
         yield
     except (ValueError, IndexError, OverflowError, TypeError) as error:
-        raise RecordError(f"{folder / FILE}: not a valid record of a flight: {error}") from error
+        raise RecordError(
+            f"{folder / RECORD_FILE}: not a valid record of a flight: {error}"
+        ) from error
 
 
 @dataclass(frozen=True)
@@ -86,11 +88,11 @@ class FlightRecord:
             KeyError: there is no such channel; the message names all.
             RecordError: a message is not valid.
         """
-        if name not in _BY_NAME:
-            raise KeyError(f"no channel {name!r}; there are {', '.join(_BY_NAME)}")
+        if name not in _CHANNEL_BY_NAME:
+            raise KeyError(f"no channel {name!r}; there are {', '.join(_CHANNEL_BY_NAME)}")
         if name not in self._rows:
-            channel = _BY_NAME[name]
-            with as_recorded(self.folder):
+            channel = _CHANNEL_BY_NAME[name]
+            with record_errors(self.folder):
                 data = [each for _, each in self.content.messages[channel.topic]]
                 self._rows[name] = channel.rows(data)
         return self._rows[name]
@@ -106,9 +108,9 @@ class FlightRecord:
 
     @property
     def fault(self) -> str | None:
-        """Why not all of the flight was read, as a sentence; None: the record has no such fault.
+        """Why the record holds less than the flight, as a sentence; None: it holds all.
 
-        A record that was cut off with its flight, which then has no summary, has no fault.
+        If the flight was killed, it has no summary, and a record that ends there has no fault.
         """
         if self.damage is not None:
             return (
@@ -116,11 +118,12 @@ class FlightRecord:
                 f"{self.damage}"
             )
         if not self.content.order:
-            return f"{self.folder / FILE} is missing or empty: no sample and no event was recorded"
+            path = self.folder / RECORD_FILE
+            return f"{path} is missing or empty: no sample and no event was recorded"
         if not self.complete and (self.folder / "summary.json").is_file():
             return (
-                f"{self.folder / FILE} ends at {self.duration:.1f} s, before its flight did: "
-                "it was cut off, or the disk was full"
+                f"{self.folder / RECORD_FILE} ends at {self.duration:.1f} s, before its flight "
+                "did: it was cut off, or the disk was full"
             )
         return None
 
@@ -133,13 +136,13 @@ class FlightRecord:
     @cached_property
     def phases(self) -> tuple[Phase, ...]:
         """The phases of the flight, in order."""
-        found = self._fields("/phase", 1, 2)
+        found = self._decoded("/phase", 1, 2)
         return tuple(Phase(time - self.began, *words) for (time,), words in found)
 
     @cached_property
     def maneuvers(self) -> tuple[ManeuverMark, ...]:
         """Beginning of each maneuver and end of the last one (name None); `time` on our clock."""
-        found = self._fields("/maneuver", 2, 1)
+        found = self._decoded("/maneuver", 2, 1)
         return tuple(
             ManeuverMark(time, vehicle_time, name or None)
             for (time, vehicle_time), (name,) in found
@@ -150,7 +153,7 @@ class FlightRecord:
         """All events, in order."""
         events = []
         for time_ns, data in self.content.messages["/log"]:
-            with as_recorded(self.folder):
+            with record_errors(self.folder):
                 level, text, source = cdr.log_of(data)
             events.append(Event(time_ns * 1e-9 - self.epoch - self.began, text, level, source))
         return tuple(events)
@@ -158,16 +161,16 @@ class FlightRecord:
     @cached_property
     def alarms(self) -> tuple[AlarmChange, ...]:
         """The alarms of the safety monitors, in order."""
-        found = self._fields("/alarm", 2, 3)
+        found = self._decoded("/alarm", 2, 3)
         return tuple(
             AlarmChange(time - self.began, raised != 0.0, *words) for (time, raised), words in found
         )
 
     @cached_property
     def changes(self) -> tuple[ValuesChange, ...]:
-        """The changes of values in flight, in order."""
-        found = self._fields("/change", 2, 1)
-        with as_recorded(self.folder):
+        """The changes of configuration values in flight, in order."""
+        found = self._decoded("/change", 2, 1)
+        with record_errors(self.folder):
             return tuple(
                 ValuesChange(time, at_once != 0.0, json.loads(values))
                 for (time, at_once), (values,) in found
@@ -189,11 +192,11 @@ class FlightRecord:
             raise RecordError(f"{self.folder / 'config.yaml'}: not a configuration")
         return found
 
-    def _fields(
+    def _decoded(
         self, topic: str, numbers: int, texts: int
     ) -> list[tuple[tuple[float, ...], list[str]]]:
         messages = self.content.messages[topic]
-        with as_recorded(self.folder):
+        with record_errors(self.folder):
             return [cdr.fields_of(data, numbers, texts) for _, data in messages]
 
 
@@ -209,7 +212,7 @@ def read_flight(folder: Path | str) -> FlightRecord:
     folder = Path(folder)
     if folder.is_file():
         raise RecordError(f"{folder} is a file; name the folder of the flight: {folder.parent}")
-    path = folder / FILE
+    path = folder / RECORD_FILE
     killed_at_start = (folder / "config.yaml").is_file()
     try:
         content = read_mcap(path)
@@ -238,7 +241,7 @@ def read_flight(folder: Path | str) -> FlightRecord:
 
 def _not_a_flight(path: Path, error: OSError) -> str:
     """Why the record at `path` cannot be opened, and which folder was probably meant."""
-    flights = sorted(path.parent.glob(f"*/{FILE}"))
+    flights = sorted(path.parent.glob(f"*/{RECORD_FILE}"))
     if isinstance(error, FileNotFoundError) and flights:
         return (
             f"{path.parent} holds the folders of flights; name one of them, such as "

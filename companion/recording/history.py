@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-HEIGHTS = (1.0, 1.0, 1.0, 1.4)
+PANEL_HEIGHTS = (1.0, 1.0, 1.0, 1.4)
 """Relative heights of the panels, from top to bottom."""
 _MARGIN_AFTER_END = 0.02
 """Space on the time axis after the end of the flight, as a share of its duration."""
@@ -92,7 +92,7 @@ def marks_of(summary: Any) -> Marks:
 
 
 def _title(maneuver: Any) -> str:
-    """The name of a maneuver; "(open loop)" explains why the error has a gap there."""
+    """The name of a maneuver, and "(open loop)" if the panel of the error has a gap there."""
     return f"{maneuver['name']}{' (open loop)' if maneuver['open_loop'] else ''}"
 
 
@@ -122,9 +122,9 @@ def draw_history(panels: Sequence["Axes"], motion: Floats, marks: Marks) -> None
 
 
 def _marks_until(last: float, marks: Marks) -> Marks:
-    """The marks of the time that was recorded; a damaged record ends before its flight did.
+    """The marks up to time `last` (s), where the rows end: a damaged record ends before its flight.
 
-    The layout has no room for names beside the axes.
+    A name that is drawn beyond the axes would spoil the layout.
     """
     maneuvers = [
         span._replace(end=min(span.end, last)) for span in marks.maneuvers if span.begin < last

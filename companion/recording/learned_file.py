@@ -20,11 +20,11 @@ _MOST_SPEED = 1000.0
 
 
 class Learned(NamedTuple):
-    """Learned values of a vehicle.
+    """Drag of a vehicle, learned in earlier flights.
 
     Attributes:
         drag: drag of the vehicle.
-        top_speed: largest speed at which it was learned, m/s.
+        top_speed: largest speed at which the drag was learned, m/s.
         path: path of the file.
     """
 
@@ -73,10 +73,10 @@ class LearnedFile:
         write_whole(self.path, text + "\n")
 
 
-def newest(directory: Path) -> Learned | None:
-    """Learned values of the vehicle whose file was saved last. Never raises.
+def newest_learned(directory: Path) -> Learned | None:
+    """Learned drag of the vehicle whose file in `directory` was saved last. Never raises.
 
-    None: there are none, that file is damaged, or the folder has more than `_MOST_FILES` of them.
+    None: there is no file, the newest is damaged, or there are more than `_MOST_FILES` files.
     """
     try:
         paths = sorted(directory.glob("learned-*.json"), key=lambda path: -path.stat().st_mtime)

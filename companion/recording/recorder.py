@@ -21,8 +21,8 @@ _MOST_WAITING = 50_000
 _INFORMATION, _WARNING = 2, 3
 
 Encoder = Callable[[McapWriter, int, Any], None]
-"""Writes the messages of an entry. Arguments: the file; the time in ns since 1970 (in vehicle time:
-since its boot); the values."""
+"""Writes the messages of an entry. Arguments: the file; the time in ns since 1970 (in vehicle
+time: since the vehicle's boot); the values."""
 
 
 class Entry(NamedTuple):
@@ -133,7 +133,7 @@ class FlightRecorder(BackgroundFile[Entry]):
         self.add(now, _write_fields, ("/change", (now, float(at_once)), (json.dumps(values),)))
 
     def event(self, text: str) -> None:
-        """Record an event at the present time."""
+        """Record an event now; its text may begin with its source, such as "safety: "."""
         source, colon, _ = text.partition(": ")
         source = source if colon and source in ("safety", "autopilot", "phase") else "flight"
         self.add(self._clock(), _write_log, (text, source))

@@ -23,7 +23,7 @@ def flight_table(summary: Summary) -> RenderableType:
     if summary.predictive is not None:
         parts.append(_predictive_words(summary.predictive))
     if summary.counts.setpoints:
-        if not summary.course.lockstep:  # vehicle time has no latency
+        if not summary.facts.lockstep:  # vehicle time has no latency
             parts.append(_loop(summary))
         parts.append(_loop_words(summary))
     return Group(*parts)
@@ -158,7 +158,7 @@ def _loop_words(summary: Summary) -> Text:
         f"{count} {name.replace('_', ' ')}" for name, count in counts.unanswered.items() if count
     ]
     unanswered = f"\nunanswered samples: {', '.join(reasons)}" if reasons else ""
-    missed = "" if summary.course.lockstep else f"{counts.missed_deadlines} missed deadlines, "
+    missed = "" if summary.facts.lockstep else f"{counts.missed_deadlines} missed deadlines, "
     rate = f", {counts.rate_hz:.0f} Hz in the maneuvers" if counts.rate_hz else ""
     return Text(
         f"{counts.setpoints} setpoints for {counts.samples} samples{rate}\n{missed}"

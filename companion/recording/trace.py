@@ -14,7 +14,7 @@ from companion.recording.recorder import FlightRecorder
 from companion.recording.series import Series, Spool
 
 _KEPT_RATES = 10_240
-"""Number of the newest rates kept for reading in flight: 10 s at 1000 Hz."""
+"""Number of rows of `FlightTrace.rates` kept in memory for reading in flight: 10 s at 1000 Hz."""
 
 _RESPONSE = ("vehicle_time_s", "q_w", "q_x", "q_y", "q_z", "target_north", "target_east")
 _TRACKING = (

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-BY_MONITOR: Mapping[str, str] = {
+ADVICE_BY_MONITOR: Mapping[str, str] = {
     "unheard": "check cable, radio and power: the vehicle was not heard any more",
     "silence": "fix the cause named above: the telemetry, its values, or this computer",
     "clock": "find why the autopilot restarted or its clock jumped; check its power supply",
@@ -33,7 +33,7 @@ BY_MONITOR: Mapping[str, str] = {
 }
 """Advice by the name of the monitor."""
 
-BY_PHASE: Mapping[str, str] = {
+ADVICE_BY_PHASE: Mapping[str, str] = {
     "connect": "check power, cable and link.endpoint; nothing else may use the same port",
     "checks": "fix what the message names; `companion doctor` explains each check",
     "stream": "check the link: the autopilot sent too little telemetry to answer",
@@ -42,7 +42,7 @@ BY_PHASE: Mapping[str, str] = {
     "offboard": "fix what the message names; the autopilot must accept our setpoints",
     "maneuvers": "read the events before the end; if the pilot took over, nothing needs fixing",
     "hand back": "read the events before the end; the pilot may have taken over",
-    "listen": BY_MONITOR["unheard"],
+    "listen": ADVICE_BY_MONITOR["unheard"],
     "land": "read the events before the end; the pilot may have taken over",
     "disarm": "disarm by the pilot's switch",
 }
@@ -51,6 +51,6 @@ BY_PHASE: Mapping[str, str] = {
 
 def what_to_do(monitor: str | None, phase: str) -> str:
     """Advice as one sentence without a full stop."""
-    if monitor is not None and monitor in BY_MONITOR:
-        return BY_MONITOR[monitor]
-    return BY_PHASE.get(phase, "read the events before the end")
+    if monitor is not None and monitor in ADVICE_BY_MONITOR:
+        return ADVICE_BY_MONITOR[monitor]
+    return ADVICE_BY_PHASE.get(phase, "read the events before the end")

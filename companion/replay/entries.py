@@ -6,7 +6,7 @@ the autopilot's ATTITUDE_TARGET.
 
 from collections.abc import Iterator
 
-from companion.recording.flight_record import FlightRecord, as_recorded
+from companion.recording.flight_record import FlightRecord, record_errors
 from companion.recording.mcap_file.fields import Channel
 from companion.recording.mcap_file.flight_events import ValuesChange
 from companion.recording.mcap_file.loop_channels import (
@@ -40,7 +40,7 @@ def recorded_inputs(record: FlightRecord) -> Iterator[RecordedInput]:
     Raises:
         RecordError: a recorded input is not valid.
     """
-    with as_recorded(record.folder):
+    with record_errors(record.folder):
         yield from _ordered_entries(_Messages(record))
 
 

@@ -9,7 +9,7 @@ from companion.control.sample_rows import LoopFlags
 from companion.control.step_rows import StepFlags, StepInput
 from companion.drag import Drag
 from companion.guidance import Reference
-from companion.recording.mcap_file.loop_channels import ACTIONS, REASONS
+from companion.recording.mcap_file.loop_channels import ACTIONS, UNANSWERED_CODES
 from companion.vehicle.clock_jumps import Misfit
 from companion.vehicle.records import (
     AttitudeSample,
@@ -41,7 +41,7 @@ class RecordedSample(NamedTuple):
         flags: state of the control loop when the sample arrived.
         checked: time of the last check of the sample's age, before sending, s on our clock; NaN:
             not checked.
-        reason: "answered", or why it is unanswered; one of `REASONS`.
+        reason: "answered", or why it is unanswered; one of `UNANSWERED_CODES`.
         setpoint: setpoint that was sent; None: none was sent.
     """
 
@@ -97,7 +97,9 @@ def recorded_sample(row: Row, sent: Row | None) -> RecordedSample:
     )
     setpoint = None if sent is None else Setpoint(_rates(sent, "commanded"), sent["thrust"])
     flags = LoopFlags(*(bool(row[name]) for name in LoopFlags._fields))
-    return RecordedSample(sample, flags, row["checked_s"], REASONS[row["unanswered"]], setpoint)
+    return RecordedSample(
+        sample, flags, row["checked_s"], UNANSWERED_CODES[row["unanswered"]], setpoint
+    )
 
 
 def recorded_step(row: Row, target: Row | None, guidance: Row | None) -> RecordedStep:

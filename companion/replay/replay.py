@@ -23,9 +23,9 @@ from companion.guidance.drag_estimate import ANY_VEHICLE
 from companion.guidance.reference import ReferenceAt
 from companion.guidance.source import ManeuverSource, Source
 from companion.mavlink.codec import SetpointEncoder
-from companion.recording.flight_record import FlightRecord, as_recorded
+from companion.recording.flight_record import FlightRecord, record_errors
 from companion.recording.mcap_file.flight_events import ValuesChange
-from companion.recording.mcap_file.loop_channels import REASONS
+from companion.recording.mcap_file.loop_channels import UNANSWERED_CODES
 from companion.recording.trace import FlightTrace
 from companion.replay.entries import recorded_inputs
 from companion.replay.recorded import RecordedAction, RecordedSample, RecordedStep, Setpoint
@@ -40,8 +40,8 @@ class ReplayedSample(NamedTuple):
         vehicle_time: time stamp of the sample, s.
         recorded: setpoint of the flight; None: no setpoint.
         replayed: setpoint of the replay; None: no setpoint.
-        recorded_reason: "answered", or why the flight did not answer; one of `REASONS`.
-        replayed_reason: "answered", or why the replay did not answer; one of `REASONS`.
+        recorded_reason: "answered", or why the flight did not answer; one of `UNANSWERED_CODES`.
+        replayed_reason: "answered", or why the replay did not answer; one of `UNANSWERED_CODES`.
     """
 
     received: float
@@ -137,8 +137,9 @@ class Replay:
         loop.on_sample(sample)
         self._guidance.note_attitude(sample)
         reason = loop.record.reason
-        name = REASONS[1] if not flags.on else REASONS[0] if reason is None else reason.value
-        sent = self._sent if name == REASONS[0] else None
+        answered, control_off, *_ = UNANSWERED_CODES
+        name = control_off if not flags.on else answered if reason is None else reason.value
+        sent = self._sent if name == answered else None
         return ReplayedSample(
             sample.received, sample.vehicle_time, entry.setpoint, sent, entry.reason, name
         )
@@ -208,7 +209,7 @@ def _assumed_drag(record: FlightRecord, config: Config) -> KnownDrag:
     linear = flight.get("assumed_drag_per_s")
     if linear is None:
         return KnownDrag()
-    with as_recorded(record.folder):
+    with record_errors(record.folder):
         return KnownDrag(Drag(float(linear), float(flight.get("assumed_quadratic_drag_per_m", 0))))
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from companion.files.write_whole import write_whole
 from companion.recording.closing_words import ClosingWords, closing_words
-from companion.recording.flight_record import FILE, RecordError
+from companion.recording.flight_record import RECORD_FILE, RecordError
 from companion.report import PAGE
 from companion.report.control_plots import compared_steps, control_plots
 from companion.report.flight_data import FlightData, recorded
@@ -33,7 +33,7 @@ def read(path: Path) -> FlightData:
             message then says to name its folder.
         LogError: the log cannot be used.
     """
-    is_log = path.is_file() and path.name != FILE
+    is_log = path.is_file() and path.name != RECORD_FILE
     return logged(path) if is_log else recorded(path)
 
 

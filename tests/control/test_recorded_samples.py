@@ -11,7 +11,7 @@ from companion.control.guidance_command import GuidanceCommand
 from companion.control.loop_record import Deadlines, Unanswered
 from companion.control.sample_rows import Answer, LoopFlags, SampleEntry, SampleRows
 from companion.guidance import HoverThrust, ThrustSettings
-from companion.recording.mcap_file.loop_channels import REASONS
+from companion.recording.mcap_file.loop_channels import UNANSWERED_CODES
 from companion.recording.trace import FlightTrace
 from companion.vehicle.clock_jumps import Misfit
 from companion.vehicle.records import (
@@ -127,14 +127,14 @@ def test_rates_of_guidance_have_no_target_and_no_plan():
 def test_why_a_sample_is_unanswered_has_a_number(reason):
     kept = recorded(SampleEntry(SAMPLE, reason, FLAGS, nan, None))
     assert list(kept.messages) == ["/sample"]
-    assert REASONS[kept.rows("/sample")[0]["unanswered"]] == reason.value
+    assert UNANSWERED_CODES[kept.rows("/sample")[0]["unanswered"]] == reason.value
 
 
 @pytest.mark.parametrize(("misfit", "code"), [(Misfit.NOT_NEWER, 1), (Misfit.AHEAD, 2)])
 def test_a_sample_while_the_loop_is_off_and_a_misfit(misfit, code):
     sample, flags = SAMPLE._replace(misfit=misfit), FLAGS._replace(on=False)
     (row,) = recorded(SampleEntry(sample, None, flags, nan, None)).rows("/sample")
-    assert (REASONS[row["unanswered"]], row["misfit"]) == ("control_off", code)
+    assert (UNANSWERED_CODES[row["unanswered"]], row["misfit"]) == ("control_off", code)
 
 
 class Loop:
@@ -195,11 +195,11 @@ def test_the_loop_records_what_it_does_not_answer():
     bench.sample()
     late = SAMPLE._replace(vehicle_time=3.5, age=0.2)
     row, answer = bench.sample(late)
-    assert (REASONS[row["unanswered"]], answer) == ("late", None)
+    assert (UNANSWERED_CODES[row["unanswered"]], answer) == ("late", None)
     assert isnan(row["checked_s"])  # the check of the sample before does not count
     bench.loop.on = False
     row, answer = bench.sample(SAMPLE._replace(vehicle_time=3.75))
-    assert (REASONS[row["unanswered"]], answer) == ("control_off", None)
+    assert (UNANSWERED_CODES[row["unanswered"]], answer) == ("control_off", None)
     bench.loop.is_same_vehicle = lambda: False
     assert bench.sample(late)[0]["same_vehicle"] == 0
 

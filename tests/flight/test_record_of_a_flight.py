@@ -109,8 +109,8 @@ def test_the_motion_is_recorded_from_the_ground_to_the_ground(good):
     assert heights.max() == pytest.approx(2.0, abs=0.2)
     assert heights[-1] == pytest.approx(0.0, abs=0.2)
     assert summary.extent()["tilt_max_deg"] > 5.0
-    takeoff = summary.course.takeoff
-    begun = {name: time for time, name in summary.course.phases}
+    takeoff = summary.facts.takeoff
+    begun = {name: time for time, name in summary.facts.phases}
     assert begun["takeoff"] < takeoff < begun["offboard"]
 
 
@@ -129,12 +129,12 @@ def test_the_state_is_shown_in_every_phase(good):
 
 def test_a_flight_that_a_monitor_ends_says_when_where_and_why(tmp_path):
     summary, observer = flown(tmp_path, safety={"max_body_rate_deg_s": 15.0})
-    end = summary.course.early_end
+    end = summary.facts.early_end
     assert (end.phase, end.maneuver, end.monitor) == ("maneuvers", "steps", "body rate")
     steps = summary.maneuvers()[1]
     assert end.into_maneuver == pytest.approx(steps.duration, abs=0.1)
     assert end.into_maneuver > 1.0  # the rest before the first step
-    assert end.since_takeoff == pytest.approx(end.time - summary.course.takeoff)
+    assert end.since_takeoff == pytest.approx(end.time - summary.facts.takeoff)
     words = closing_words(summary.as_dict(), None)
     assert "safety.max_body_rate_deg_s" in "\n".join(words.lines)
     assert "s into steps" in words.lines[0]
@@ -146,11 +146,11 @@ def test_a_wrong_hover_thrust_is_advised_once_and_not_among_the_events_shown(tmp
     summary, observer = flown(
         tmp_path, thrust={"hover_thrust": 0.35}, flight={"maneuvers": ["hover"]}
     )
-    (sentence,) = summary.course.advice
+    (sentence,) = summary.facts.advice
     assert sentence not in observer.events
     assert [text for _, text in summary.events].count(sentence) == 1
     assert any(text == sentence for _, text in own_texts(summary))
-    value = float(summary.course.settings["thrust.hover_thrust"])
+    value = float(summary.facts.settings["thrust.hover_thrust"])
     assert value == pytest.approx(0.49, abs=0.02)
     assert f"set it to {value:.2f}" in sentence
     assert not summary.as_dict()["verdict"]["good"]

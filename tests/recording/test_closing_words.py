@@ -10,7 +10,7 @@ from companion.config.flight import FlightConfig
 from companion.flight.phases import Exit, exit_phases, flight_phases, ground_phases
 from companion.recording.closing_words import Invocation, closing_words
 from companion.recording.measurements.verdict import LOST_ROWS, checks, is_good
-from companion.recording.what_to_do import BY_MONITOR, BY_PHASE
+from companion.recording.what_to_do import ADVICE_BY_MONITOR, ADVICE_BY_PHASE
 from companion.safety.table import monitors
 from companion.vehicle.registry import AUTOPILOTS
 
@@ -270,7 +270,7 @@ def test_before_take_off_the_doctor_is_next(phase):
     figures = {**GOOD, "result": "no heartbeat", "early_end": end, "maneuvers": []}
     told, text = words(figures, MINE)
     assert f"when: at 33.9 s, in phase `{phase}`, before take-off" in text
-    assert BY_PHASE[phase] in text
+    assert ADVICE_BY_PHASE[phase] in text
     assert told.next_command == ".venv/bin/companion doctor --config 'my own.yaml'"
     assert words(figures)[0].next_command is None  # the bundled vehicle has no doctor
     elsewhere = ["--arm", "--endpoint", "tcp://10.0.0.1:5760", "--set=link.target_system=2"]
@@ -322,7 +322,7 @@ def test_every_combination_has_words_without_gaps():
         {},
         *(
             {"result": "broken", "early_end": {**END, "phase": phase, "monitor": monitor}}
-            for phase in (*BY_PHASE, "go to")
+            for phase in (*ADVICE_BY_PHASE, "go to")
             for monitor in (None, "fence", "unknown")
         ),
     ]
@@ -341,14 +341,14 @@ def test_every_combination_has_words_without_gaps():
 
 
 def test_every_monitor_and_every_phase_has_its_advice():
-    assert {monitor.name for monitor in monitors(Config())} == set(BY_MONITOR)
+    assert {monitor.name for monitor in monitors(Config())} == set(ADVICE_BY_MONITOR)
     config = FlightConfig()
     phases = [*ground_phases(config)]
     for autopilot in AUTOPILOTS:
         phases += flight_phases(config, 1.0, autopilot)
     for way in Exit:
         phases += exit_phases(config, way)
-    assert {phase.name for phase in phases} <= set(BY_PHASE)
+    assert {phase.name for phase in phases} <= set(ADVICE_BY_PHASE)
 
 
 def test_the_checks_are_those_of_the_json():

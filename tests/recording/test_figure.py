@@ -13,7 +13,7 @@ from companion.cli.main import main
 from companion.extras import MissingExtraError
 from companion.recording.figure import FigureError, draw_flight
 from companion.recording.flight_record import RecordError, read_flight
-from companion.recording.history import HEIGHTS, Marks, Span, draw_history, marks_of
+from companion.recording.history import PANEL_HEIGHTS, Marks, Span, draw_history, marks_of
 from companion.recording.mcap_file.channels import MOTION
 from companion.recording.mcap_file.fields import CDR
 from companion.recording.mcap_file.loop_channels import SAMPLE, SETPOINT
@@ -95,7 +95,7 @@ def test_each_panel_has_its_curve_its_unit_and_all_marks():
     motion = np.array([[0.1 * k, 50.0, 0.05 * k, 1.5, 20.0, 0.3] for k in range(100)])
     from matplotlib import pyplot  # noqa: PLC0415  takes a third of a second, in every worker
 
-    figure, panels = pyplot.subplots(len(HEIGHTS), 1)
+    figure, panels = pyplot.subplots(len(PANEL_HEIGHTS), 1)
     try:
         draw_history(panels, motion, MARKS)
         labels = [axes.get_ylabel() for axes in panels]
@@ -171,7 +171,7 @@ def test_a_reason_that_is_too_long_is_cut():
     matplotlib.use("Agg")
     from matplotlib.figure import Figure  # noqa: PLC0415
 
-    axes = list(Figure().subplots(len(HEIGHTS), sharex=True))
+    axes = list(Figure().subplots(len(PANEL_HEIGHTS), sharex=True))
     motion = np.array([[0.0, nan, 0.0, 1.0, 2.0, nan], [8.2, nan, 3.0, 1.0, 2.0, nan]])
     draw_history(axes, motion, replace(MARKS, reason="x" * 500))
     title = axes[0].get_title()

@@ -11,12 +11,12 @@ from zstandard import ZstdError
 from companion.cli.main import main
 from companion.control.loop_record import Unanswered
 from companion.files.yaml_file import ConfigError
-from companion.recording.flight_record import FILE, RecordError, read_flight
+from companion.recording.flight_record import RECORD_FILE, RecordError, read_flight
 from companion.recording.folder import flight_folder
 from companion.recording.mcap_file import cdr, reader, writer
 from companion.recording.mcap_file.batch import _FULL_BATCH, Batch, messages_of
 from companion.recording.mcap_file.channels import CHANNELS, OTHER_CHANNELS, RESOURCES
-from companion.recording.mcap_file.loop_channels import ACTION, INPUT, REASONS, SETPOINT
+from companion.recording.mcap_file.loop_channels import ACTION, INPUT, SETPOINT, UNANSWERED_CODES
 from companion.recording.mcap_file.scene import Entity, scene_message
 from companion.recording.mcap_file.writer import McapWriter
 from companion.recording.measurements.recorded_summary import derived_summary, summary_of
@@ -27,7 +27,7 @@ ROWS = 50
 
 
 def test_the_reasons_are_those_of_the_control_loop():
-    assert REASONS[2:] == tuple(reason.value for reason in Unanswered)
+    assert UNANSWERED_CODES[2:] == tuple(reason.value for reason in Unanswered)
 
 
 def write(folder):
@@ -144,8 +144,8 @@ def test_a_flight_without_its_record_is_no_success(tmp_path, found, capsys):
     """A full disk or a bad copy left `summary.json` alone; its page looked whole."""
     (tmp_path / "config.yaml").write_text("")
     if found == "empty":
-        (tmp_path / FILE).touch()
-    told = f"{tmp_path / FILE} is missing or empty: no sample and no event was recorded"
+        (tmp_path / RECORD_FILE).touch()
+    told = f"{tmp_path / RECORD_FILE} is missing or empty: no sample and no event was recorded"
     for command in ("report", "export --csv", "compare"):
         out = [] if "export" in command else ["--out", str(tmp_path / "page.html")]
         assert main([*command.split(), str(tmp_path), *out]) == 1, command

@@ -6,7 +6,7 @@ import os
 import pytest
 
 from companion.drag import Drag
-from companion.recording.learned_file import LearnedFile, newest
+from companion.recording.learned_file import LearnedFile, newest_learned
 
 DRAG = Drag(0.25, 0.033)
 GOOD = {"drag_per_s": 0.25, "quadratic_drag_per_m": 0.033, "top_speed_m_s": 5.0}
@@ -15,7 +15,7 @@ GOOD = {"drag_per_s": 0.25, "quadratic_drag_per_m": 0.033, "top_speed_m_s": 5.0}
 def test_what_is_saved_is_loaded_and_belongs_to_one_vehicle(tmp_path):
     file = LearnedFile(tmp_path, "4954")
     assert file.load() == (None, None)
-    assert newest(tmp_path) is None
+    assert newest_learned(tmp_path) is None
     file.save(DRAG, 5.0)
     kept, trouble = file.load()
     assert trouble is None
@@ -29,8 +29,8 @@ def test_the_newest_is_the_vehicle_that_flew_last(tmp_path):
         file = LearnedFile(tmp_path, f"{number}")
         file.save(drag, 3.0)
         os.utime(file.path, (0.0, 1000.0 - abs(number - 1)))
-    assert newest(tmp_path).drag == Drag(1.0)
-    assert newest(tmp_path / "absent") is None
+    assert newest_learned(tmp_path).drag == Drag(1.0)
+    assert newest_learned(tmp_path / "absent") is None
 
 
 @pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def test_a_damaged_file_is_told_and_not_used(tmp_path, text):
     kept, trouble = file.load()
     assert kept is None
     assert "learned-4954.json: what earlier flights learned cannot be used" in trouble
-    assert newest(tmp_path) is None
+    assert newest_learned(tmp_path) is None
 
 
 def test_a_pipe_or_a_directory_in_its_place_is_no_file(tmp_path):
@@ -68,7 +68,7 @@ def test_a_pipe_or_a_directory_in_its_place_is_no_file(tmp_path):
         kept, trouble = file.load()
         assert kept is None
         assert "cannot be used" in trouble
-    assert newest(tmp_path) is None
+    assert newest_learned(tmp_path) is None
     with pytest.raises(OSError):  # noqa: PT011  whichever the system names
         folder.save(DRAG, 5.0)
     assert not [path for path in tmp_path.iterdir() if path.suffix not in (".json",)]

@@ -5,7 +5,7 @@ from math import nan
 import numpy as np
 import pytest
 
-from companion.recording.measurements.maneuver_figures import LEFT_OUT, measure_maneuvers
+from companion.recording.measurements.maneuver_figures import SETTLING_TIME, measure_maneuvers
 from companion.recording.trace import ManeuverMark
 
 RATE = 50
@@ -21,7 +21,7 @@ def hover(off):
     return lambda _: (0.0, 0.0, -5.0), lambda time: (off(time), 0.0, -5.1)
 
 
-HOVER = rows(100.0, 10.0, *hover(lambda time: 1.0 if time < LEFT_OUT else 0.03))
+HOVER = rows(100.0, 10.0, *hover(lambda time: 1.0 if time < SETTLING_TIME else 0.03))
 STEPS = rows(
     110.0,
     8.0,
@@ -61,14 +61,14 @@ def test_the_swing_is_measured_but_in_open_loop():
 
 def test_the_beginning_is_left_out_and_told_apart():
     hover, *_ = measure_maneuvers(ALL, RATES, MARKS, 0.0)
-    assert hover.beginning == LEFT_OUT
+    assert hover.settling_time == SETTLING_TIME
     assert (hover.level_rms, hover.level_max) == pytest.approx((0.03, 0.03))
-    assert hover.beginning_max == pytest.approx((1.0 + 0.1**2) ** 0.5)
+    assert hover.settling_max == pytest.approx((1.0 + 0.1**2) ** 0.5)
 
 
 def test_of_a_short_maneuver_a_quarter_is_left_out():
     (short,) = measure_maneuvers(ALL[: 4 * RATE + 1], RATES, MARKS[:1], 0.0)
-    assert short.beginning == pytest.approx(1.0)
+    assert short.settling_time == pytest.approx(1.0)
 
 
 def test_open_loop_has_no_level_error_but_a_drift_and_a_height():

@@ -8,8 +8,8 @@ import pytest
 from rich.console import Console
 
 from companion.attitude import BodyRates, Target
-from companion.recording.measurements.course import Course
 from companion.recording.measurements.dead_time import AxisDeadTime, DeadTimes, SampleAge
+from companion.recording.measurements.flight_facts import FlightFacts
 from companion.recording.measurements.summary import LoopCounts, PredictiveFigures, Summary
 from companion.recording.summary_tables import flight_table
 from companion.recording.trace import FlightTrace
@@ -115,8 +115,8 @@ def test_each_maneuver_has_its_row():
 
 def test_in_lockstep_no_latency_and_no_deadline_is_shown():
     def words(lockstep):
-        course = Course(lockstep=lockstep)
-        summary = Summary("ok", "disarm", "exact", 5.0, COUNTS, {}, FlightTrace(), course=course)
+        facts = FlightFacts(lockstep=lockstep)
+        summary = Summary("ok", "disarm", "exact", 5.0, COUNTS, {}, FlightTrace(), facts=facts)
         out = io.StringIO()
         Console(file=out, width=80).print(flight_table(summary))
         return out.getvalue()

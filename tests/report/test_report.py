@@ -129,7 +129,7 @@ def failed(tmp_path_factory):
     flown.mkdir()
     with mock_vehicle() as mock:
         summary = fly(mock, flown, **SWINGING)
-    assert summary.course.early_end.monitor == "speed"
+    assert summary.facts.early_end.monitor == "speed"
     return flown
 
 

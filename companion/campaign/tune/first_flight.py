@@ -18,7 +18,7 @@ from companion.identification import (
     vehicle_fragment,
 )
 from companion.mavlink.errors import LogError
-from companion.recording.learned_file import newest
+from companion.recording.learned_file import newest_learned
 from companion.vehicle.flight_log import read_flight_log
 
 _DAMPING_KEY = "vehicle.damping"
@@ -68,7 +68,7 @@ def _with_drag(config: Config, case: Case) -> Config:
     with tempfile.TemporaryDirectory(prefix="companion-drag-") as place:
         # A recorded flight keeps what it learned beside its folder.
         CaseFlight(replace(case, fault=None), Path(place)).fly(Path(place) / "flight")
-        learned_file = newest(Path(place))
+        learned_file = newest_learned(Path(place))
     if learned_file is None:
         return config
     drag = {

@@ -1,8 +1,8 @@
 """Messages of `flight.mcap` for the live stream: several in one datagram.
 
 A datagram is a sequence of messages. Each consists of the index of its channel in `TOPICS` (uint8),
-its time in ns since 1970 (in vehicle time: since its boot; uint64), its length (uint32), and its
-bytes.
+its time in ns since 1970 (uint64; in vehicle time: since the vehicle's boot), its length (uint32),
+and its bytes.
 """
 
 import struct
@@ -25,7 +25,7 @@ class StreamedMessage(NamedTuple):
 
     Attributes:
         number: index of its channel in `TOPICS`.
-        time_ns: ns since 1970 (in vehicle time: since its boot).
+        time_ns: time since 1970, ns; in vehicle time since the vehicle's boot.
         data: payload, as in the file.
     """
 

@@ -35,7 +35,7 @@ geometry_msgs/Quaternion orientation
 """
 GEOMETRY = (_TIME, _QUATERNION, _VECTOR, _POINT, _POSE_TYPE)
 """Definitions of the types of time and geometry."""
-_RULE = "=" * 80 + "\n"
+_SEPARATOR = "=" * 80 + "\n"
 
 
 class MessageType(NamedTuple):
@@ -47,7 +47,7 @@ class MessageType(NamedTuple):
 
 def message_type(name: str, *parts: str) -> MessageType:
     """A message type from its own fields and the definitions of the types in it."""
-    return MessageType(name, _RULE.join(parts).encode())
+    return MessageType(name, _SEPARATOR.join(parts).encode())
 
 
 FRAME_TRANSFORM = message_type(
@@ -96,7 +96,7 @@ CHANGE = message_type(
     "# The new values as JSON, by section and key.\nstring values\n",
 )
 Pose = tuple[float, float, float, float, float, float, float]
-"""Position x, y, z (m) and orientation x, y, z, w."""
+"""Position x, y, z (m), and orientation as a quaternion x, y, z, w."""
 
 
 def fields_message(numbers: tuple[float, ...], texts: tuple[str, ...]) -> bytes:
@@ -173,7 +173,7 @@ def stamp(time_ns: int) -> bytes:
 
 
 def _align(message: bytearray) -> None:
-    """Pad to 4 bytes. CDR counts them after the header, whose 4 bytes do not change the padding."""
+    """Pad to a multiple of 4 bytes: CDR counts from the end of its header, which has 4 bytes."""
     message.extend(bytes(-len(message) % 4))
 
 

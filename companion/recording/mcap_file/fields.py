@@ -33,7 +33,7 @@ class Field:
 
 
 @dataclass(frozen=True, slots=True)
-class Code(Field):
+class CodeField(Field):
     """A column of codes: small numbers that each have a name.
 
     Attributes:
@@ -57,7 +57,7 @@ class Channel:
     topic: str
     meaning: str
     numbers: tuple[Field, ...]
-    codes: tuple[Code, ...] = ()
+    codes: tuple[CodeField, ...] = ()
 
     @property
     def name(self) -> str:

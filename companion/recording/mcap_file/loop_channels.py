@@ -2,14 +2,14 @@
 
 This table is the reference of their columns. Times end with `_s`. `time_s` and `received_s` are on
 our clock (event-loop time). `vehicle_time_s` is the vehicle's clock without its jumps. Positions
-are NED in the frame of LOCAL_POSITION_NED, without jumps of the autopilot's estimator; only INPUT
-and ATTITUDE_TARGET hold what was received, with its jumps, and so does the attitude in SAMPLE.
+are NED, in the frame of LOCAL_POSITION_NED. The jumps of the autopilot's estimator are removed,
+except in INPUT, in ATTITUDE_TARGET and in the attitude of SAMPLE, which hold what was received.
 Rates are about the axes of the body (FRD).
 """
 
-from companion.recording.mcap_file.fields import Channel, Code, Field
+from companion.recording.mcap_file.fields import Channel, CodeField, Field
 
-REASONS = (
+UNANSWERED_CODES = (
     "answered",
     "control_off",
     "another_vehicle",
@@ -23,7 +23,7 @@ REASONS = (
     "invalid_setpoint",
     "not_sent",
 )
-"""Why a sample is unanswered, by number: `Unanswered`, after "answered" and "control_off"."""
+"""Names of the codes in the column "unanswered". From 2 on they are the members of `Unanswered`."""
 ACTIONS = (
     "stand_by",
     "hold_here",
@@ -35,7 +35,7 @@ ACTIONS = (
     "drag_prior",
     "stop_turning",
 )
-"""Calls by which a phase controls guidance or the control loop, by number."""
+"""Names of the codes in the column "action": how a phase controls guidance or the control loop."""
 
 
 def _vector(prefix: str, unit: str, meaning: str) -> tuple[Field, ...]:
@@ -67,14 +67,18 @@ SAMPLE = Channel(
         Field("checked_s", "When the age was checked again before sending, on our clock, s."),
     ),
     (
-        Code("unanswered", "Why it is unanswered; 0: it was answered.", REASONS),
-        Code("misfit", "Why its stamp does not fit the clock.", ("none", "not_newer", "ahead")),
-        Code("age_known", "Whether `age_s` is absolute; else relative to the quickest sample."),
-        Code("on", "Whether samples are answered at all."),
-        Code("taking_over", "Whether offboard was requested."),
-        Code("offboard_active", "Whether the autopilot obeys the setpoints."),
-        Code("awaiting_mode", "Whether the mode must be confirmed after a gap."),
-        Code("same_vehicle", "Whether it comes from the vehicle that was checked."),
+        CodeField("unanswered", "Why it is unanswered; 0: it was answered.", UNANSWERED_CODES),
+        CodeField(
+            "misfit", "Why its stamp does not fit the clock.", ("none", "not_newer", "ahead")
+        ),
+        CodeField(
+            "age_known", "Whether `age_s` is absolute; else relative to the quickest sample."
+        ),
+        CodeField("on", "Whether samples are answered at all."),
+        CodeField("taking_over", "Whether offboard was requested."),
+        CodeField("offboard_active", "Whether the autopilot obeys the setpoints."),
+        CodeField("awaiting_mode", "Whether the mode must be confirmed after a gap."),
+        CodeField("same_vehicle", "Whether it comes from the vehicle that was checked."),
     ),
 )
 SETPOINT = Channel(
@@ -100,12 +104,14 @@ SETPOINT = Channel(
         Field("planned_east", "Coefficient that the planner plans for now, east; NaN: no plan."),
     ),
     (
-        Code("tilt_rate_limited", "Whether the roll-pitch rate is at limits.max_tilt_rate_deg_s."),
-        Code("yaw_rate_limited", "Whether the yaw rate is at limits.max_yaw_rate_deg_s."),
-        Code("thrust_limited", "Whether the thrust is at one of its limits."),
-        Code("offboard_active", "Whether the autopilot obeys the setpoints."),
-        Code("is_step", "Whether it is part of an open-loop step whose response is measured."),
-        Code("idle", "Whether it is the idle setpoint on the ground."),
+        CodeField(
+            "tilt_rate_limited", "Whether the roll-pitch rate is at limits.max_tilt_rate_deg_s."
+        ),
+        CodeField("yaw_rate_limited", "Whether the yaw rate is at limits.max_yaw_rate_deg_s."),
+        CodeField("thrust_limited", "Whether the thrust is at one of its limits."),
+        CodeField("offboard_active", "Whether the autopilot obeys the setpoints."),
+        CodeField("is_step", "Whether it is part of an open-loop step whose response is measured."),
+        CodeField("idle", "Whether it is the idle setpoint on the ground."),
     ),
 )
 GUIDANCE = Channel(
@@ -126,13 +132,13 @@ GUIDANCE = Channel(
         Field("quadratic_drag_per_m", "Quadratic drag per mass, as learned so far, 1/m."),
     ),
     (
-        Code("holds_position", "Whether the vehicle should be at the horizontal reference."),
-        Code("holds_height", "Whether the vehicle should be at the height of the reference."),
-        Code(
+        CodeField("holds_position", "Whether the vehicle should be at the horizontal reference."),
+        CodeField("holds_height", "Whether the vehicle should be at the height of the reference."),
+        CodeField(
             "height_steady",
             "Whether the thrust is steady: no doublet, no rates or thrust of a program.",
         ),
-        Code("offboard_active", "Whether the autopilot obeys the setpoints."),
+        CodeField("offboard_active", "Whether the autopilot obeys the setpoints."),
     ),
 )
 TARGET = Channel(
@@ -155,8 +161,8 @@ TARGET = Channel(
         Field("period_s", "Period of guidance, s."),
     ),
     (
-        Code("idle", "Zero rates and zero thrust, on the ground."),
-        Code("is_step", "Whether it is an open-loop step whose response is measured."),
+        CodeField("idle", "Zero rates and zero thrust, on the ground."),
+        CodeField("is_step", "Whether it is an open-loop step whose response is measured."),
     ),
 )
 INPUT = Channel(
@@ -176,11 +182,11 @@ INPUT = Channel(
         Field("height_m", "Height above home, m."),
     ),
     (
-        Code("armed", "Whether the vehicle is armed."),
-        Code("fresh", "Whether the position is fresh."),
-        Code("standing", "Whether the vehicle stands on the ground."),
-        Code("may_idle", "Whether zero thrust is safe."),
-        Code("offboard_active", "Whether the autopilot obeys the setpoints."),
+        CodeField("armed", "Whether the vehicle is armed."),
+        CodeField("fresh", "Whether the position is fresh."),
+        CodeField("standing", "Whether the vehicle stands on the ground."),
+        CodeField("may_idle", "Whether zero thrust is safe."),
+        CodeField("offboard_active", "Whether the autopilot obeys the setpoints."),
     ),
 )
 ATTITUDE_TARGET = Channel(
@@ -203,5 +209,5 @@ ACTION = Channel(
             "Quadratic drag of that flight, 1/m; of `drag_prior` only.",
         ),
     ),
-    (Code("action", "The name of the call.", ACTIONS),),
+    (CodeField("action", "The name of the call.", ACTIONS),),
 )

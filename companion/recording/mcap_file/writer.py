@@ -47,7 +47,7 @@ class McapWriter:
 
         Args:
             topic: topic of the message.
-            time_ns: time since 1970, ns; in a file in vehicle time, since the vehicle's boot.
+            time_ns: time since 1970, ns; in vehicle time since the vehicle's boot.
             data: encoded message.
         """
         if self._batch is not None:
@@ -55,7 +55,7 @@ class McapWriter:
         self._writer.add_message(self._ids[topic], time_ns, data, time_ns)
 
     def stream(self) -> None:
-        """Stream the messages added since the last call."""
+        """Send the messages added since the last call to the live stream, if there is one."""
         if self._batch is not None:
             self._batch.send()
 
@@ -73,7 +73,7 @@ class McapWriter:
         os.fsync(self._file.fileno())
 
     def close(self, *, complete: bool = True) -> None:
-        """Close the file; if `complete`, write its index first. Without that it counts as cut off.
+        """Close the file; if `complete`, write its index first. A file without index is cut off.
 
         Raises:
             OSError: the disk is full, or failed.

@@ -37,8 +37,8 @@ class AxisDeadTime(NamedTuple):
 class SampleAge(NamedTuple):
     """Age of samples at arrival by TIMESYNC, s: the link's share of the dead time.
 
-    TIMESYNC measures only the round trip, so the age is wrong by half the difference between both
-    ways.
+    TIMESYNC measures only the round trip, so the age is wrong by half the difference between the
+    delays in the two directions.
     """
 
     p50: float = nan

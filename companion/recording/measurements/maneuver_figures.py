@@ -1,4 +1,4 @@
-"""Tracking figures of each maneuver: errors of different maneuvers cannot be compared."""
+"""Tracking figures, separately for each maneuver, as their errors cannot be compared."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.recording.measurements.swing import NOT_MEASURED, SHORTEST, Swing, measure_swing
+from companion.recording.measurements.swing import NOT_MEASURED, SHORTEST_PART, Swing, measure_swing
 from companion.recording.trace import ManeuverMark
 
 Floats = NDArray[np.float64]
 
-LEFT_OUT = 2.0
-"""Time left out at the beginning of a maneuver, s, while it comes from the previous one."""
+SETTLING_TIME = 2.0
+"""Time left out at the beginning of a maneuver, s: the vehicle still settles from the last one."""
 _LARGEST_SHARE = 0.25
 """Largest share of a maneuver that is left out."""
 _AT_REST = 0.05
@@ -30,17 +30,17 @@ class ManeuverFigures:
 
     Attributes:
         name: name of the maneuver.
-        begin: its beginning, s since the flight began.
+        begin: beginning of the maneuver, s since the flight began.
         duration: its duration, s.
         open_loop: whether a part of it is open loop.
-        beginning: time left out of RMS and largest errors, s.
+        settling_time: time at the beginning left out of RMS and largest errors, s.
         level_rms: RMS of the horizontal error, m.
         level_max: largest horizontal error, m.
         height_rms: RMS of the height error, m.
         height_max: largest height error, m.
         height_mean: mean height error, m, positive above the reference.
-        beginning_max: largest distance in the part left out, m.
-        drift: largest horizontal distance from its starting point, m.
+        settling_max: largest distance from the reference in that time, m.
+        drift: largest horizontal distance from where the maneuver began, m.
         speed: largest speed of the reference (95th percentile), m/s; NaN without a reference.
         swing: oscillation of roll and pitch; not measured in open loop.
     """
@@ -49,13 +49,13 @@ class ManeuverFigures:
     begin: float
     duration: float
     open_loop: bool
-    beginning: float
+    settling_time: float
     level_rms: float
     level_max: float
     height_rms: float
     height_max: float
     height_mean: float
-    beginning_max: float
+    settling_max: float
     drift: float
     speed: float
     swing: Swing = NOT_MEASURED
@@ -65,13 +65,13 @@ class ManeuverFigures:
         numbers = {
             "begin_s": self.begin,
             "duration_s": self.duration,
-            "beginning_left_out_s": self.beginning,
+            "beginning_left_out_s": self.settling_time,
             "level_rms_m": self.level_rms,
             "level_max_m": self.level_max,
             "height_rms_m": self.height_rms,
             "height_max_m": self.height_max,
             "height_mean_m": self.height_mean,
-            "beginning_max_m": self.beginning_max,
+            "beginning_max_m": self.settling_max,
             "drift_max_m": self.drift,
             "reference_speed_max_m_s": self.speed,
             "swing_rms_deg": degrees(self.swing.rms),
@@ -111,7 +111,7 @@ def settled_parts(rows: Floats, marks: Sequence[ManeuverMark]) -> list[Floats]:
         marks: marks of `FlightTrace.maneuvers`.
     """
     parts = [part for _, part in _flown_maneuvers(rows, marks) if not _is_open_loop(part)]
-    return [part[part[:, 0] >= part[0, 0] + _left_out_time(part)] for part in parts]
+    return [part[part[:, 0] >= part[0, 0] + _settling_time(part)] for part in parts]
 
 
 def in_maneuvers(vehicle_times: Floats, marks: Sequence[ManeuverMark]) -> NDArray[np.bool_]:
@@ -137,19 +137,19 @@ def _is_open_loop(rows: Floats) -> bool:
     return bool(np.isnan(rows[:, 1]).any())
 
 
-def _left_out_time(rows: Floats) -> float:
+def _settling_time(rows: Floats) -> float:
     """Time that is left out at the beginning of a maneuver, s."""
     if _is_open_loop(rows):
         return 0.0
-    return min(LEFT_OUT, _LARGEST_SHARE * float(rows[-1, 0] - rows[0, 0]))
+    return min(SETTLING_TIME, _LARGEST_SHARE * float(rows[-1, 0] - rows[0, 0]))
 
 
 def _swing(figures: ManeuverFigures, rates: Floats, begin: float, end: float) -> Swing:
     """Oscillation of roll and pitch in a maneuver, from `begin` to `end`, s; none in open loop."""
     if figures.open_loop:
         return NOT_MEASURED
-    if figures.duration - figures.beginning >= SHORTEST:
-        begin += figures.beginning
+    if figures.duration - figures.settling_time >= SHORTEST_PART:
+        begin += figures.settling_time
     part = rates[(rates[:, 0] >= begin) & (rates[:, 0] <= end)]
     return measure_swing(part[:, 0], part[:, 1:], at_rest=figures.speed <= _AT_REST)
 
@@ -157,8 +157,8 @@ def _swing(figures: ManeuverFigures, rates: Floats, begin: float, end: float) ->
 def _figures_of(name: str, begin: float, rows: Floats) -> ManeuverFigures:
     time, reference, position = rows[:, 0], rows[:, 1:4], rows[:, 4:7]
     duration = float(time[-1] - time[0])
-    open_loop, beginning = _is_open_loop(rows), _left_out_time(rows)
-    early = time < time[0] + beginning
+    open_loop, settling_time = _is_open_loop(rows), _settling_time(rows)
+    early = time < time[0] + settling_time
     error = position - reference
     level, height = np.hypot(error[:, 0], error[:, 1]), -error[:, 2]
     held = ~np.isnan(height)  # another program may command the thrust
@@ -169,13 +169,13 @@ def _figures_of(name: str, begin: float, rows: Floats) -> ManeuverFigures:
         begin,
         duration,
         open_loop,
-        beginning,
+        settling_time,
         level_rms=nan if open_loop else rms(level[~early]),
         level_max=nan if open_loop else largest(level[~early]),
         height_rms=rms(held_late),
         height_max=largest(np.abs(held_late)),
         height_mean=float(held_late.mean()) if len(held_late) else nan,
-        beginning_max=largest(np.hypot(level, height)[early & held]),
+        settling_max=largest(np.hypot(level, height)[early & held]),
         drift=float(np.hypot(away[:, 0], away[:, 1]).max()),
         speed=_largest_speed(time, reference),
     )

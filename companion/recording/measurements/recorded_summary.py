@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.files.bounded_file import FileRefusedError, read_text
-from companion.recording.flight_record import FlightRecord, as_recorded
-from companion.recording.mcap_file.loop_channels import REASONS
-from companion.recording.measurements.course import Course, EarlyEnd
+from companion.recording.flight_record import FlightRecord, record_errors
+from companion.recording.mcap_file.loop_channels import UNANSWERED_CODES
+from companion.recording.measurements.flight_facts import EarlyEnd, FlightFacts
 from companion.recording.measurements.summary import LoopCounts, Summary
 from companion.recording.trace import FlightTrace
 
@@ -35,8 +35,8 @@ _REQUIRED_KEYS = frozenset(
     )
 )
 """Keys that `summary.json` of this version must have; without them it is not used."""
-_NOT_COUNTED = 2
-"""The first codes of `REASONS` that do not count as unanswered: "answered" and "control_off"."""
+_FIRST_UNANSWERED_CODE = 2
+"""Index in `UNANSWERED_CODES` after "answered" and "control_off"."""
 
 
 def summary_of(record: FlightRecord) -> tuple[dict[str, Any], bool]:
@@ -59,7 +59,7 @@ def derived_summary(record: FlightRecord) -> dict[str, Any]:
     Raises:
         RecordError: the record is not valid.
     """
-    with as_recorded(record.folder):
+    with record_errors(record.folder):
         return _summary_from_record(record).as_dict()
 
 
@@ -82,7 +82,7 @@ def _summary_from_record(record: FlightRecord) -> Summary:
         trace=trace_of(record),
         events=[(event.time, event.text) for event in record.events if event.source != "phase"],
         log=record.folder,
-        course=Course(
+        facts=FlightFacts(
             began=record.began,
             phases=tuple((each.time, each.name) for each in record.phases),
             takeoff=takeoff,
@@ -102,7 +102,7 @@ def trace_of(record: FlightRecord) -> FlightTrace:
     Raises:
         RecordError: the record is not valid.
     """
-    with as_recorded(record.folder):
+    with record_errors(record.folder):
         return _flight_trace(record)
 
 
@@ -155,9 +155,10 @@ def _sample_indices(
 
 def _loop_counts(record: FlightRecord, deadline: float) -> LoopCounts:
     sample, setpoint = record.rows("sample"), record.rows("setpoint")
-    taken = sample[sample["unanswered"] != REASONS.index("control_off")]
-    found = np.bincount(taken["unanswered"], minlength=len(REASONS)).tolist()
-    unanswered = dict(zip(REASONS[_NOT_COUNTED:], found[_NOT_COUNTED:], strict=True))
+    taken = sample[sample["unanswered"] != UNANSWERED_CODES.index("control_off")]
+    found = np.bincount(taken["unanswered"], minlength=len(UNANSWERED_CODES)).tolist()
+    counts = zip(UNANSWERED_CODES, found, strict=True)
+    unanswered = dict(list(counts)[_FIRST_UNANSWERED_CODE:])
     refused = sum(unanswered[name] for name in _REFUSALS)
     return LoopCounts(
         samples=len(taken),
@@ -181,7 +182,7 @@ def _early_end(record: FlightRecord, phase: str, takeoff: float | None) -> Early
 
 
 def _takeoff_time(record: FlightRecord) -> float | None:
-    """See `Course.takeoff`; a vehicle that is taken over in the air has no phase of take-off."""
+    """See `FlightFacts.takeoff`; a takeover in the air has no phase of take-off."""
     read = record.rows("guidance_input")
     flying = ("takeoff", "offboard")
     begun = next((each.time for each in record.phases if each.name in flying), None)

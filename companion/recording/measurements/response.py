@@ -10,14 +10,14 @@ from companion.least_squares import minimise
 from companion.recording.measurements.maneuver_figures import without_nan
 from companion.recording.measurements.second_order import (
     Floats,
-    SecondOrderFit,
+    SecondOrderModel,
     StepRun,
-    longest,
+    largest_norm,
     nearest_second_order,
     step_runs,
 )
 
-_TIME_CONSTANT = (0.02, 2.0)
+_TIME_CONSTANT_RANGE = (0.02, 2.0)
 """Range in which the time constant is searched, s."""
 _MIN_SHARE = 0.1
 """A step counts for an axis (north or east) if its component along the axis is at least this share
@@ -47,7 +47,7 @@ class StepResponse:
     asked_tilt: float
     cross_axis_max: float
     model_deviation_max: float
-    second_order: SecondOrderFit
+    second_order: SecondOrderModel
     second_order_deviation_max: float
 
 
@@ -66,14 +66,14 @@ def measure_response(rows: Floats, gain: float) -> StepResponse | None:
         time_constant_north_s=_time_constant(runs, 0, 1.0 / gain),
         time_constant_east_s=_time_constant(runs, 1, 1.0 / gain),
         step_size=max(run.size for run in runs),
-        asked_tilt=asin(min(1.0, max(longest(run.target) for run in runs))),
+        asked_tilt=asin(min(1.0, max(largest_norm(run.target) for run in runs))),
         cross_axis_max=max(_largest_deviation(step) for run in runs for step in run.steps()),
         model_deviation_max=max(
-            longest(run.measured - first_order(run, 1.0 / gain)) for run in runs
+            largest_norm(run.measured - first_order(run, 1.0 / gain)) for run in runs
         ),
         second_order=second_order,
         second_order_deviation_max=max(
-            longest(run.measured - second_order.path(run)) for run in runs
+            largest_norm(run.measured - second_order.path(run)) for run in runs
         ),
     )
 
@@ -148,6 +148,6 @@ def _time_constant(runs: list[StepRun], axis: int, start: float) -> float:
         paths = np.concatenate([_first_order(each, tau) for each in steps])
         return np.empty(0), (measured - paths).ravel()
 
-    lowest, highest = np.log(_TIME_CONSTANT)
+    lowest, highest = np.log(_TIME_CONSTANT_RANGE)
     found = minimise(residuals, np.log([start]), np.array([lowest]), np.array([highest]))
     return float(np.exp(found.unknown[0]))

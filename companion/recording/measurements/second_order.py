@@ -46,7 +46,7 @@ class StepRun(NamedTuple):
     @property
     def size(self) -> float:
         """Length of the largest of the `changes`."""
-        return longest(self.changes)
+        return largest_norm(self.changes)
 
     @property
     def direction(self) -> Floats:
@@ -69,7 +69,7 @@ class StepRun(NamedTuple):
         return [np.split(column, changes) for column in self]
 
 
-def longest(coefficients: Floats) -> float:
+def largest_norm(coefficients: Floats) -> float:
     """The largest length of coefficients (n, 2)."""
     return float(np.hypot(*coefficients.T).max())
 
@@ -92,7 +92,7 @@ def step_runs(rows: Floats) -> list[StepRun]:
 
 _FITTED_ROWS = 600
 """Approximate number of rows used to find the model."""
-_LAG, _DAMPING, _DEAD_TIME = (0.02, 4.0), (0.2, 10.0), (0.0, 0.5)
+_LAG_RANGE, _DAMPING_RANGE, _DEAD_TIME_RANGE = (0.02, 4.0), (0.2, 10.0), (0.0, 0.5)
 """Ranges in which 2ζ/ω (s), ζ and the dead time (s) are searched. ζ = 10 is almost first order."""
 _TRIED_LAGS, _TRIED_DAMPINGS = np.geomspace(0.05, 1.0, 5), (0.7, 1.5)
 _TRIED_DEAD_TIMES = (0.0, 0.04, 0.1, 0.2)
@@ -102,7 +102,7 @@ in this time give the coefficients and the speed from which the model starts."""
 
 
 @dataclass(frozen=True, slots=True)
-class SecondOrderFit:
+class SecondOrderModel:
     """Second-order model with dead time: c̈ = ω²·(c_d(t − dead time) − c) − 2ζω·ċ.
 
     Attributes:
@@ -121,10 +121,10 @@ class SecondOrderFit:
         It starts with the measured coefficients and speed, and keeps this speed until the first
         target has an effect.
         """
-        return self.along(RunData.of(run, thinning))
+        return self.path_at_rows(RunData.of(run, thinning))
 
-    def along(self, data: "RunData") -> Floats:
-        """(m, 2), coefficients of the model at the rows of a run's data; see `path`."""
+    def path_at_rows(self, data: "RunData") -> Floats:
+        """(m, 2), coefficients of the model at the times in `data`; see `path`."""
         time, effects = data.time, data.changes + self.dead_time
         latest = np.searchsorted(effects, time, side="right") - 1
         acted = np.maximum(time - effects[np.maximum(latest, 0)], 0.0)
@@ -178,15 +178,15 @@ class RunData(NamedTuple):
         return cls(since[::thinning], start, changes, np.array([step.target[0] for step in steps]))
 
 
-def nearest_second_order(runs: list[StepRun]) -> SecondOrderFit:
+def nearest_second_order(runs: list[StepRun]) -> SecondOrderModel:
     """Least squares over ω, ζ and dead time."""
     thinning = 1 + sum(run.time.size for run in runs) // _FITTED_ROWS
     thinned = [RunData.of(run, thinning) for run in runs]
     measured = np.concatenate([run.measured[::thinning] for run in runs])
 
     def residuals(unknown: Floats) -> tuple[Floats, Floats]:
-        fit = _second_order_fit(unknown)
-        paths = np.concatenate([fit.along(data) for data in thinned])
+        fit = _second_order_model(unknown)
+        paths = np.concatenate([fit.path_at_rows(data) for data in thinned])
         return np.empty(0), (measured - paths).ravel()
 
     grid = [
@@ -196,11 +196,11 @@ def nearest_second_order(runs: list[StepRun]) -> SecondOrderFit:
         for dead_time in _TRIED_DEAD_TIMES
     ]
     start = min(grid, key=lambda point: float(np.sum(residuals(point)[1] ** 2)))
-    lowest, highest = np.array([np.log(_LAG), np.log(_DAMPING), _DEAD_TIME]).T
-    return _second_order_fit(minimise(residuals, start, lowest, highest).unknown)
+    lowest, highest = np.array([np.log(_LAG_RANGE), np.log(_DAMPING_RANGE), _DEAD_TIME_RANGE]).T
+    return _second_order_model(minimise(residuals, start, lowest, highest).unknown)
 
 
-def _second_order_fit(unknown: Floats) -> SecondOrderFit:
+def _second_order_model(unknown: Floats) -> SecondOrderModel:
     """The model from (log 2ζ/ω, log ζ, dead time), which are less correlated than ω and ζ."""
     damping = exp(unknown[1])
-    return SecondOrderFit(2.0 * damping / exp(unknown[0]), damping, float(unknown[2]))
+    return SecondOrderModel(2.0 * damping / exp(unknown[0]), damping, float(unknown[2]))

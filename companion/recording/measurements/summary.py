@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from companion.attitude.kinematics import tilt_angle
-from companion.recording.measurements.course import Course
 from companion.recording.measurements.dead_time import DeadTimes
+from companion.recording.measurements.flight_facts import FlightFacts
 from companion.recording.measurements.maneuver_figures import (
     ManeuverFigures,
     in_maneuvers,
@@ -44,7 +44,7 @@ class LoopCounts:
         missed_deadlines: answers that took longer than `deadman.deadline_ms`.
         stale: samples not answered for other reasons than `refused`: the sample or the target was
             too old or out of order, there was no target, the mode was not confirmed after a gap, or
-            it may be another vehicle.
+            the sample may come from another vehicle.
         refused: samples not answered because no valid setpoint could be computed or sent.
         unanswered: unanswered samples, by reason.
         rate_hz: rate of setpoints in vehicle time during the maneuvers, Hz.
@@ -97,7 +97,7 @@ class Summary:
         dead_times: measured and configured.
         predictive: counts of predictive control; None: it did not fly.
         realtime: each real-time request to the operating system: "granted", or the reason why not.
-        course: phases, end, and circumstances of the flight.
+        facts: phases, end, and circumstances of the flight.
     """
 
     result: str
@@ -112,7 +112,7 @@ class Summary:
     dead_times: DeadTimes = field(default_factory=DeadTimes)
     predictive: PredictiveFigures | None = None
     realtime: dict[str, str] = field(default_factory=dict)
-    course: Course = field(default_factory=Course)
+    facts: FlightFacts = field(default_factory=FlightFacts)
 
     def response(self) -> StepResponse | None:
         """The measured step response; None without steps."""
@@ -142,7 +142,7 @@ class Summary:
     def _maneuvers(self) -> tuple[ManeuverFigures, ...]:
         trace = self.trace
         rates = trace.rates_rows()[:, _ROLL_AND_PITCH]
-        return measure_maneuvers(trace.tracking_rows(), rates, trace.maneuvers, self.course.began)
+        return measure_maneuvers(trace.tracking_rows(), rates, trace.maneuvers, self.facts.began)
 
     def extent(self) -> dict[str, float]:
         """The largest height (m), speed (m/s) and tilt (°), and the time under control (s).
@@ -185,7 +185,7 @@ class Summary:
             "nmpc": None if self.predictive is None else self.predictive.as_dict(),
             "realtime": self.realtime,
             "link": self.link,
-            **self.course.as_dict(),
+            **self.facts.as_dict(),
             "events": [{"time_s": round(time, 3), "text": text} for time, text in self.events],
             "log": None if self.log is None else str(self.log),
         }

@@ -19,21 +19,21 @@ class _Rule(NamedTuple):
     """The criteria of a swing.
 
     Attributes:
-        shortest: shortest part of a flight that is judged, s.
+        shortest_part: shortest part of a flight that is judged, s.
         window: length of the moving mean, s; slower motion does not count.
         passes: number of times that the moving mean is removed.
-        longest: longest period, s.
+        longest_period: longest period of a swing, s.
     """
 
-    shortest: float
+    shortest_part: float
     window: float
     passes: int
-    longest: float
+    longest_period: float
 
 
 _LONG_HOVER, _SHORT_HOVER = _Rule(5.0, 2.0, 1, 2.5), _Rule(2.9, 1.0, 1, 1.25)
 _IN_MOTION = _Rule(4.0, 1.0, 2, 1.25)
-SHORTEST = _SHORT_HOVER.shortest
+SHORTEST_PART = _SHORT_HOVER.shortest_part
 """Shortest part of a flight in which a swing can be measured, s."""
 _LONGEST_SAMPLE_PERIOD = 0.05
 """Longest time between samples, s."""
@@ -69,9 +69,9 @@ def measure_swing(time: Floats, rates: Floats, *, at_rest: bool) -> Swing:
         at_rest: whether the reference is at rest; slower motion then also counts as a swing.
     """
     duration = float(time[-1] - time[0]) if len(time) > 1 else 0.0
-    hover = _LONG_HOVER if duration >= _LONG_HOVER.shortest else _SHORT_HOVER
+    hover = _LONG_HOVER if duration >= _LONG_HOVER.shortest_part else _SHORT_HOVER
     rule = hover if at_rest else _IN_MOTION
-    if duration < rule.shortest:
+    if duration < rule.shortest_part:
         return NOT_MEASURED
     step = float(np.median(np.diff(time)))
     count = duration / step if step > 0.0 else np.inf
@@ -86,7 +86,7 @@ def measure_swing(time: Floats, rates: Floats, *, at_rest: bool) -> Swing:
     rms = float(np.sqrt(np.mean(np.sum(angles**2, axis=1))))
     if rms == 0.0:
         return Swing(0.0, nan, 0.0)
-    correlation = _autocorrelation(angles)[: round(rule.longest / step)]
+    correlation = _autocorrelation(angles)[: round(rule.longest_period / step)]
     opposite = np.flatnonzero(correlation < 0.0)
     later = correlation[opposite[0] :] if len(opposite) else correlation[:0]
     if not later.max(initial=-1.0) > 0.0:

@@ -67,9 +67,9 @@ def checks(figures: Figures) -> list[Check]:
 
 
 def is_good(figures: Figures) -> bool:
-    """Whether a flight reached its end, every figure within its limit, and without advice.
+    """Whether a flight reached its end, with all figures within their limits and without advice.
 
-    Advice names what does not fit the vehicle in the configuration, and rows that were lost.
+    Advice says which configuration values do not fit the vehicle, and whether rows were lost.
     """
     good = all(check.good for check in checks(figures))
     return figures["result"] == "ok" and good and not figures["advice"]

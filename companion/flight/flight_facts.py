@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from companion.control.expected_response import gain_warning
 from companion.flight.assembled import Assembled
 from companion.flight.context import FlightContext
-from companion.recording.measurements.course import Course, EarlyEnd
 from companion.recording.measurements.dead_time import DeadTimes
+from companion.recording.measurements.flight_facts import EarlyEnd, FlightFacts
 from companion.recording.trace import ManeuverMark
 
 
@@ -36,13 +36,13 @@ def _learned_settings(context: FlightContext) -> dict[str, str]:
     return settings
 
 
-def course_of(
+def facts_of(
     assembled: Assembled,
     phases: Sequence[tuple[float, str]],
     result: str,
     advised: tuple[str, ...],
-) -> Course:
-    """The course of a finished flight.
+) -> FlightFacts:
+    """The facts of a finished flight.
 
     Args:
         assembled: the flight.
@@ -62,7 +62,7 @@ def course_of(
         marks, breaches = assembled.trace.maneuvers, assembled.ladder.breaches
         failed = flight.failed_in.name
         early_end = _early_end(time, began, takeoff, failed, marks, breaches, result)
-    return Course(
+    return FlightFacts(
         began=began,
         phases=tuple((at - began, name) for at, name in phases),
         takeoff=takeoff,

@@ -11,11 +11,12 @@ class EarlyEnd:
 
     Attributes:
         time: time since the flight began, s.
-        since_takeoff: time since `Course.takeoff`, s; None: the vehicle had not left the ground.
+        since_takeoff: time since `FlightFacts.takeoff`, s; None: the vehicle was on the ground.
         phase: the phase that failed.
-        maneuver: the maneuver that ran, or the last one before a hold; None: another phase ran, or
-            no maneuver had begun.
-        into_maneuver: time from its beginning to this end, or to the hold, s; None: no maneuver.
+        maneuver: the maneuver that ran, or the last one before the vehicle held; None: another
+            phase ran, or no maneuver had begun.
+        into_maneuver: time from the beginning of `maneuver` to the end of the flight, or to the
+            hold, s; None: no maneuver.
         monitor: name of the safety monitor that ended the flight, or None.
     """
 
@@ -39,13 +40,13 @@ class EarlyEnd:
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class FlightFacts:
     """What happened in a flight, besides its figures. Times in s since the flight began.
 
     Attributes:
         began: beginning of the flight, s on our clock.
         phases: beginning and name of each phase.
-        takeoff: time when the vehicle left the ground, or was to be taken over in the air; None:
+        takeoff: time when the vehicle left the ground, or when a takeover in the air began; None:
             neither happened.
         early_end: the early end; None: no phase failed.
         vehicle_uid: hardware id of the vehicle's autopilot; None: unknown.
@@ -85,7 +86,7 @@ class Course:
     changes: tuple[dict[str, Any], ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        """The course as JSON."""
+        """The facts as JSON."""
         begin, end = self.battery
         return {
             "lockstep": self.lockstep,
