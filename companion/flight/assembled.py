@@ -1,4 +1,4 @@
-"""A flight that is ready to run over an open link, and its figures afterwards."""
+"""The parts of one flight, joined to run over an open link, and its figures afterwards."""
 
 from dataclasses import dataclass
 
@@ -7,27 +7,27 @@ from companion.flight.context import FlightContext
 from companion.flight.dead_time_watch import DeadTimeWatch
 from companion.flight.flight import Flight
 from companion.flight.status import StatusReporter
-from companion.flight.vehicle_identity import VehicleMemory
+from companion.flight.vehicle_identity import DragMemory
 from companion.recording.measurements.summary import LoopCounts, PredictiveFigures
 from companion.recording.trace import FlightTrace
 from companion.safety import SafetyLadder
 
 
 @dataclass(frozen=True, slots=True)
-class Assembled:
-    """A flight ready to run over an open link, and its figures afterwards."""
+class AssembledFlight:
+    """The parts of a flight that is ready to run; `assembly.assemble` makes and joins them."""
 
     flight: Flight
     context: FlightContext
     trace: FlightTrace
     dead_time_watch: DeadTimeWatch
-    memory: VehicleMemory
+    drag_memory: DragMemory
     ladder: SafetyLadder
     reporter: StatusReporter
     changes: Changes
 
     def close(self) -> None:
-        """End the process of predictive control."""
+        """End the process of predictive control, if there is one."""
         if self.context.guidance_loop.maker.predictive is not None:
             self.context.guidance_loop.maker.predictive.close()
 

@@ -10,7 +10,7 @@ from companion.config.known_drag import KnownDrag
 from companion.control.ground_contact import GroundContact
 from companion.control.loops import make_loops
 from companion.control.outer_loop import predictive
-from companion.flight.assembled import Assembled
+from companion.flight.assembled import AssembledFlight
 from companion.flight.changes import Changes
 from companion.flight.context import FlightContext
 from companion.flight.dead_time_watch import DeadTimeWatch
@@ -23,7 +23,7 @@ from companion.flight.phases import Phase
 from companion.flight.plan import Plan
 from companion.flight.preflight_checks import PreflightChecks
 from companion.flight.status import StatusReporter
-from companion.flight.vehicle_identity import SameVehicle, VehicleMemory
+from companion.flight.vehicle_identity import DragMemory, SameVehicle
 from companion.flight.watch import RateRequester, Watch
 from companion.guidance.follow import Follow
 from companion.mavlink.frame_filter import Notice
@@ -111,7 +111,7 @@ def assemble(
     plan: Plan,
     environment: Environment = THIS_COMPUTER,
     changes: Changes | None = None,
-) -> Assembled:
+) -> AssembledFlight:
     """Assemble a flight with the phases of `plan` over an open link.
 
     Its records are written to `folder`; None: nothing is written, and nothing is kept for later
@@ -129,16 +129,18 @@ def assemble(
     ladder.note = context.note = context.preflight.note = flight.note
     context.guidance_loop.record.note = rate_requester.note = flight.note
     changes = changes or Changes(config)
-    memory = _vehicle_memory(context, folder, flight.note, changes)
+    memory = _drag_memory(context, folder, flight.note, changes)
     _prepare_trajectories(context, flight.note)
     if record is not None:
-        record.metadata("configuration", flattened(changes.flown.model_dump(mode="json")))
-        record.begin(flight.began, description(changes.flown, plan, real_time=real_time))
+        record.metadata("configuration", flattened(changes.at_flight_start.model_dump(mode="json")))
+        record.begin(flight.began, description(changes.at_flight_start, plan, real_time=real_time))
         ladder.on_change = record.alarm
         memory.on_begin = partial(_record_drag, record, clock)
     dead_time_watch = DeadTimeWatch(trace, config.vehicle.axes, flight.note)
     reporter = _reporter(flight, context, ladder, trace, recorder, real_time=real_time)
-    return Assembled(flight, context, trace, dead_time_watch, memory, ladder, reporter, changes)
+    return AssembledFlight(
+        flight, context, trace, dead_time_watch, memory, ladder, reporter, changes
+    )
 
 
 def _context(
@@ -177,12 +179,12 @@ def _context(
     )
 
 
-def _vehicle_memory(
+def _drag_memory(
     context: FlightContext, folder: Path | None, note: Callable[[str], None], changes: Changes
-) -> VehicleMemory:
-    """Make the `VehicleMemory`, which gives the drag of earlier flights to checks and guidance."""
+) -> DragMemory:
+    """Make the `DragMemory`, by which checks and guidance know the drag of earlier flights."""
     remembered = None if folder is None else folder.parent
-    memory = VehicleMemory(context.config, remembered, context.guidance_loop.estimate.drag, note)
+    memory = DragMemory(context.config, remembered, context.guidance_loop.estimate.drag, note)
     memory.on_known = changes.on_drag
     context.preflight.drag_of = memory.load
     return memory

@@ -28,7 +28,7 @@ def require_moderate(before: Config, after: Config, name: str) -> None:
 
     Args:
         before: the configuration now.
-        after: the wanted one; it differs in keys that may change in flight.
+        after: the wanted configuration; it differs only in keys that may change in flight.
         name: name of the change in error messages.
 
     Raises:
@@ -39,12 +39,12 @@ def require_moderate(before: Config, after: Config, name: str) -> None:
     for each in differences(before, after):
         if (each.section, each.key) not in changeable():
             continue  # such as `include`, which is no value
-        why = _why_not(before, after, each)
+        why = _refusal(before, after, each)
         if why is not None:
             raise ConfigError(f"{name}: {why}")
 
 
-def _why_not(before: Config, after: Config, change: Difference) -> str | None:
+def _refusal(before: Config, after: Config, change: Difference) -> str | None:
     """Why this change is not permitted, as a sentence; None: it is."""
     key = change.name
     if key in _WITHOUT_EFFECT_IN_IDENTIFY and flies_identify(before):

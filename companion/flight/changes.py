@@ -51,16 +51,16 @@ class Change(NamedTuple):
 
 
 class Changes:
-    """The values that may change in flight: those at the start of the flight, and the present ones.
+    """Changes the values of a configuration in flight: checks, slews, undoes and records them.
 
     A change passes the checks that the configuration passed at the start. It takes effect in small
     steps on the event loop, between samples. Monitors, fence and deadman keep their limits.
 
     Attributes:
-        start: the configuration before the first change.
+        start: the configuration before the first change, which may precede the flight.
         wanted: the configuration after the newest change.
         made: all changes, in order.
-        flown: the configuration when the flight began, which its record contains.
+        at_flight_start: the configuration when the flight began; the flight's record contains it.
         note: called with each change in words; a flight replaces it while it runs.
         on_change: called with `wanted` after each change.
         on_drag: called with what is known of the vehicle's drag, once the vehicle is identified;
@@ -73,7 +73,7 @@ class Changes:
     def __init__(self, start: Config) -> None:
         self.wanted = start
         self.made: list[Change] = []
-        self.flown = start
+        self.at_flight_start = start
         self.note: Callable[[str], None] = lambda _: None
         self.on_change: Callable[[Config], None] = lambda _: None
         self.on_drag: Callable[[KnownDrag], None] = lambda _: None
@@ -97,8 +97,8 @@ class Changes:
 
     def begin_flight(self) -> Config:
         """Begin a flight; return the configuration at its start, for its record."""
-        self.flown, self._count_before_flight = self.wanted, len(self.made)
-        return self.flown
+        self.at_flight_start, self._count_before_flight = self.wanted, len(self.made)
+        return self.at_flight_start
 
     def change(self, values: Values, by: str) -> str:
         """Begin to change to these values; return the change in words.
@@ -138,7 +138,7 @@ class Changes:
 
     @contextmanager
     def limited_by(self, refuses: Callable[[Config, Config], str | None]) -> Iterator[None]:
-        """Let `refuses` judge each change and each undo while the block runs.
+        """Let `refuses` judge each change and each undo while the `with` block runs.
 
         Args:
             refuses: called with the present configuration and the wanted one; returns why the
@@ -154,19 +154,19 @@ class Changes:
     def applied_by(
         self, retuning: Retuning, note: Callable[[str], None], record: FlightRecorder | None
     ) -> Iterator[None]:
-        """Apply changes to these loops while the block runs; earlier changes are applied at once.
+        """Apply changes to the loops while the `with` block runs, earlier changes at once.
 
         Args:
-            retuning: applies values to the loops.
-            note: shows a change, and records it in words.
+            retuning: applies values to the control loop and to guidance.
+            note: shows a change to the user, and records it in words.
             record: records the values for a replay, or None.
         """
         self._retuning, self._record = retuning, record
         if self.wanted is not self.start:
             self._slew.jump(self.wanted)
             retuning.apply(tuning(self.wanted))
-        if self.wanted is not self.flown:
-            self._record_change(self.flown, at_once=True)
+        if self.wanted is not self.at_flight_start:
+            self._record_change(self.at_flight_start, at_once=True)
         note_before, self.note = self.note, note
         try:
             with retuning.stepped_by(self.step):
@@ -192,7 +192,7 @@ class Changes:
         """Begin to move from the present values to `wanted`.
 
         Raises:
-            ChangeRefusedError: these loops cannot change, or the values are equal.
+            ChangeRefusedError: nothing can change in this flight, or the values are equal.
         """
         fixed = fixed_because(self.start)
         if fixed is not None:

@@ -21,14 +21,14 @@ _MODE_REPORT_TIMEOUT = 1.0
 """If an accepted mode is not reported within this time, s, the autopilot has left it again."""
 _OFFBOARD_ONLY = frozenset({Role.OFFBOARD})
 
-Done = Callable[[], bool]
+IsDone = Callable[[], bool]
 """Returns whether the vehicle does what was commanded; may raise `FlightEnded` instead."""
 RequireOurs = Callable[[], None]
 """Raises `FlightEnded` if we must not command the vehicle; for example `in_roles`."""
 
 
 def roles_of(link: Link) -> frozenset[Role]:
-    """The present mode's roles in a flight; empty for an unknown mode or one that is not ours."""
+    """The roles of the vehicle's mode; empty if it is unknown or no mode that a flight uses."""
     mode = link.state.mode
     return frozenset() if mode is None else link.autopilot.roles(mode)
 
@@ -63,12 +63,12 @@ def require_role(link: Link, allowed: Set[Role], released_by: str = "") -> None:
 
 
 def in_roles(link: Link, allowed: Set[Role]) -> RequireOurs:
-    """`require_role` as a function without arguments."""
+    """A `RequireOurs` that calls `require_role` with these roles."""
     return lambda: require_role(link, allowed)
 
 
 async def command_if_ours(
-    context: FlightContext, command: Command, require_ours: RequireOurs, done: Done
+    context: FlightContext, command: Command, require_ours: RequireOurs, done: IsDone
 ) -> None:
     """Send a command until it is answered; before each try, check who controls the vehicle.
 
@@ -79,7 +79,7 @@ async def command_if_ours(
         context: context of the flight.
         command: command to send.
         require_ours: called before each try; if it raises, nothing is sent.
-        done: see `Done`; called before a repetition.
+        done: see `IsDone`; called before a repetition.
 
     Raises:
         FlightEnded: somebody else has the vehicle, or another vehicle answers.
@@ -116,7 +116,7 @@ async def command_if_ours(
 
 
 async def change_mode(
-    context: FlightContext, command: Command, require_ours: RequireOurs, done: Done
+    context: FlightContext, command: Command, require_ours: RequireOurs, done: IsDone
 ) -> None:
     """Send a mode command like `command_if_ours`, and wait until the mode is reported.
 
@@ -143,7 +143,7 @@ async def change_mode(
 
 
 async def ask_to_hold(context: FlightContext, require_ours: RequireOurs) -> None:
-    """`change_mode` to the autopilot's hold; raises as it does."""
+    """Change to the autopilot's hold mode; see `change_mode`, also for what is raised."""
     await change_mode(
         context,
         context.link.autopilot.hold(),
@@ -191,7 +191,7 @@ async def leave_offboard(
         ) from error
 
 
-async def _takes_effect(context: FlightContext, done: Done) -> bool:
+async def _takes_effect(context: FlightContext, done: IsDone) -> bool:
     try:
         async with asyncio.timeout(_EFFECT_TIMEOUT):
             await context.until(done)

@@ -22,7 +22,7 @@ from companion.vehicle.link import Link
 from companion.vehicle.records import LocalPosition
 
 INITIAL_HEARTBEAT_LIMIT = 3.0
-"""Largest age of a known mode until the checks have counted the heartbeats, s."""
+"""`FlightContext.heartbeat_limit` until the checks have counted the heartbeats, s."""
 
 _POLL_PERIOD = 0.02
 """Period with which a condition is checked, s; telemetry is slower."""
@@ -45,7 +45,8 @@ class FlightContext:
         known_drag: what was known of the vehicle's drag when the checks ended.
         detail: what the running phase waits for, shown to the user.
         setpoint_rate_hz: rate of setpoints over the maneuvers, Hz.
-        heartbeat_limit: largest age of a known mode, s; the checks set it from the heartbeat rate.
+        heartbeat_limit: with an older report the mode counts as unknown, s; the checks set this
+            limit from the heartbeat rate.
         mode_at_checks: the mode when the checks ended; another one before arming is a takeover.
         must_disarm: whether an end on the ground disarms: we commanded arming or the take-off.
         fence_centre: centre of the fence in an earlier flight, if the vehicle has not been disarmed
@@ -82,7 +83,7 @@ class FlightContext:
     def end_stream(self) -> None:
         """Stop answering samples; if the autopilot obeys us, the last answer has zero body rates.
 
-        It is for ends that we decide. After a takeover or with doubtful data, use `release`.
+        Call this if we end the control. After a takeover or with doubtful data, call `release`.
         """
         self.loop.end_stream()
         self.guidance_loop.stand_by()
@@ -147,7 +148,7 @@ class FlightContext:
 
 
 async def cancel(task: asyncio.Task[Any]) -> None:
-    """Cancel a task and wait until it has ended; its result was read elsewhere."""
+    """Cancel a task and wait until it has ended; ignore its result or exception."""
     task.cancel()
     await asyncio.wait({task})
     if not task.cancelled():

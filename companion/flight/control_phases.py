@@ -6,7 +6,7 @@ from collections.abc import Callable
 from math import degrees
 
 from companion.flight.commands import (
-    Done,
+    IsDone,
     RequireOurs,
     ask_to_hold,
     change_mode,
@@ -28,10 +28,10 @@ _SELF_DISARM_TIMEOUT = 8.0
 """Time allowed for the autopilot to disarm itself after landing, s."""
 
 _MIN_HOLDING_TILT = 5.0
-"""Smallest tilt that the thrust must allow to hold against a breeze, °."""
+"""Tilt that the thrust must at least allow, °: the vehicle must hold against a breeze."""
 
 _MARGIN_WINDOW = 1.0
-"""Time within which the largest tilt counts, s."""
+"""Window over which `_TiltMargin` takes the maximum of the allowed tilt, s."""
 
 _ROLES_BEFORE_LANDING = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
 
@@ -58,7 +58,7 @@ async def fly_maneuvers(context: FlightContext, sequence: ManeuverSequence) -> N
 async def fly_commanded(context: FlightContext, source: Source) -> None:
     """Fly the commands of another program until it ends its control, then brake and hold.
 
-    It waits for the stop, because an autopilot that gets a moving vehicle brakes it harder.
+    The phase waits until the vehicle has stopped: the autopilot would brake it harder.
     """
     await _fly(context, source, lambda: f"commanded by {source.name}")
     context.guidance_loop.hold_here()
@@ -67,10 +67,10 @@ async def fly_commanded(context: FlightContext, source: Source) -> None:
 
 
 async def _fly(context: FlightContext, source: Source, progress: Callable[[], str]) -> None:
-    """Fly a source until it is finished; it begins when the vehicle is at rest.
+    """Wait until the vehicle has stopped, then fly a source until it is finished.
 
     Raises:
-        FlightEnded: guidance gave it up, the source failed, or the thrust is too small to steer.
+        FlightEnded: guidance gave up, the source failed, or the thrust is too small to steer.
     """
     now = asyncio.get_running_loop().time
     await asyncio.sleep(context.guidance_loop.braking_left)
@@ -96,10 +96,10 @@ async def _fly(context: FlightContext, source: Source, progress: Callable[[], st
 
 
 class _TiltMargin:
-    """Checks that the learned hover thrust leaves thrust for the configured tilt.
+    """Checks the largest tilt that `limits.max_thrust` allows at the learned hover thrust.
 
-    The largest tilt within a second counts: a vehicle that does not receive our setpoints for some
-    tenths of a second falls, and seems heavy.
+    The maximum over a second counts, because the learned thrust may be too large for a moment: a
+    vehicle that gets no setpoints for some tenths of a second falls, and seems heavy.
     """
 
     def __init__(self, context: FlightContext) -> None:
@@ -108,7 +108,7 @@ class _TiltMargin:
         self._tilts: deque[tuple[float, float]] = deque()  # s on our clock, °
 
     def check(self) -> None:
-        """Report a smaller tilt limit once.
+        """Report once if the thrust allows less tilt than `limits.max_tilt_deg`.
 
         Raises:
             FlightEnded: the thrust allows less than 5° of tilt.
@@ -214,12 +214,13 @@ def _require_landing(context: FlightContext) -> None:
 
 
 async def _hand_over(
-    context: FlightContext, command: Command, require_ours: RequireOurs, done: Done
+    context: FlightContext, command: Command, require_ours: RequireOurs, done: IsDone
 ) -> None:
-    """Stop the motion, and command a mode until the autopilot has entered it; then release.
+    """Stop the motion, command a mode until the autopilot has entered it, then release control.
 
     A command without an answer is sent again until the phase is over: a vehicle whose uplink loses
-    frames must not be left in the air. It is held where it is then, because it may have drifted.
+    frames must not be left in the air. Before each try the vehicle is held where it is now, because
+    it may have drifted.
     """
     while True:
         _stop_moving(context)

@@ -16,7 +16,7 @@ from companion.safety.actions import fault_message
 _MEASURING_PERIOD = 2.0
 """Time between two measurements, s; the axes take turns."""
 _WINDOW_PERIODS = 4
-"""Length of a measurement, in units of `_MEASURING_PERIOD`; the first one is a period shorter."""
+"""Length of the measured window, in units of `_MEASURING_PERIOD`; at first, one unit less."""
 _MIN_ROW_AGE = 1.5
 """Rows newer than this are not used, s: the autopilot may already have left offboard."""
 _MAX_ROWS = 75_000
@@ -27,11 +27,11 @@ _COMMANDED_COLUMN, _MEASURED_COLUMN, _AGE_COLUMN = 2, 6, 9
 
 
 class DeadTimeWatch:
-    """Correlates commanded and measured rates, and warns once if the configuration is wrong.
+    """Correlates commanded and measured rates; warns once if a configured dead time is wrong.
 
     It measures right after a setpoint was sent, when the time until the next sample is longest. A
-    measurement takes 1 ms (2 to 3 ms with an acceleration limit); in a thread it could delay a
-    sample by 5 ms.
+    measurement takes 1 ms (2 to 3 ms with an acceleration limit). A thread for it could delay the
+    answer to a sample by 5 ms.
 
     Args:
         trace: records of the flight, with the commanded and the measured body rates.
@@ -58,7 +58,7 @@ class DeadTimeWatch:
         dead_time_by_correlation(time, np.sin(time), time, np.sin(time))  # the first use is slow
 
     def after_answer(self, now: float) -> None:
-        """Measure one axis, if `_MEASURING_PERIOD` is over; `now` in s on our clock."""
+        """Measure the next axis, if one is due at `now`, s on our clock."""
         if now < self._due:
             return
         self._due = now + _MEASURING_PERIOD

@@ -15,18 +15,18 @@ from companion.guidance.trajectory.demand import Floats, Motion
 from companion.guidance.trajectory.feasibility import Violation
 
 TRACKING_MARGIN = 0.5
-"""Margin between reference and fence, m, for errors of position and speed and `_POINT_DISTANCE`."""
+"""Margin between reference and fence, m. It covers the tracking error and `_POINT_DISTANCE`."""
 
 _POINT_DISTANCE = 0.25
 """Distance between two checked points of a polygon fence, m."""
 
 _MAX_MOMENTS = 4000
-"""Number of moments checked to find where a breach begins."""
+"""Approximate number of moments of a long motion that are checked to find when a breach begins."""
 
 
 @dataclass(frozen=True, slots=True)
 class FenceCheck:
-    """Checks motions that begin where control begins.
+    """Checks a motion against the fence; its positions are relative to where control begins.
 
     Attributes:
         fence: the fence that the monitors watch in flight.
@@ -70,7 +70,7 @@ class FenceCheck:
         return float(time), breach
 
     def _candidate_indices(self, stops: Floats) -> list[int]:
-        """Indices that contain the worst moment: farthest, highest, lowest, and along a polygon."""
+        """Indices of the stops to judge: farthest, highest and lowest; for a polygon many more."""
         distance = np.hypot(stops[:, 0], stops[:, 1])
         indices = {int(distance.argmax()), int(stops[:, 2].argmin()), int(stops[:, 2].argmax())}
         if self.fence.polygon or (self.fence.places and self.origin):

@@ -61,7 +61,7 @@ class Flight:
     async def run(self) -> str:
         """Fly; returns "ok" or the reason why the flight ended early."""
         helpers = [
-            asyncio.create_task(self._guarded(work))
+            asyncio.create_task(self._run_repeatedly(work))
             for work in (self._context.guidance_loop.run, self._watch_once, self._report_progress)
         ]
         try:
@@ -211,14 +211,14 @@ class Flight:
             await self._fly_exit(next_exit)
 
     async def _user_wants_landing(self) -> bool:
-        """Ask the user whether to land; somebody else may take over meanwhile."""
+        """Ask the user whether to land; False if the flight is ended meanwhile, as by a pilot."""
         self._asking = True
         try:
             return bool(await self._run_until_end(self._ask_landing(), inf))
         finally:
             self._asking = False
 
-    async def _guarded(self, work: Callable[[], Awaitable[None]]) -> None:
+    async def _run_repeatedly(self, work: Callable[[], Awaitable[None]]) -> None:
         """Run a task repeatedly while the phases run; an exception in it ends the flight."""
         while True:
             try:

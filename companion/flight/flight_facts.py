@@ -4,14 +4,14 @@ import asyncio
 from collections.abc import Sequence
 
 from companion.control.expected_response import gain_warning
-from companion.flight.assembled import Assembled
+from companion.flight.assembled import AssembledFlight
 from companion.flight.context import FlightContext
 from companion.recording.measurements.dead_time import DeadTimes
 from companion.recording.measurements.flight_facts import EarlyEnd, FlightFacts
 from companion.recording.trace import ManeuverMark
 
 
-def advice(assembled: Assembled, dead_times: DeadTimes) -> tuple[str, ...]:
+def advice(assembled: AssembledFlight, dead_times: DeadTimes) -> tuple[str, ...]:
     """Advice: what differs from the configuration and which key to set, one sentence each."""
     guidance_loop = assembled.context.guidance_loop
     warnings = (
@@ -37,7 +37,7 @@ def _learned_settings(context: FlightContext) -> dict[str, str]:
 
 
 def facts_of(
-    assembled: Assembled,
+    assembled: AssembledFlight,
     phases: Sequence[tuple[float, str]],
     result: str,
     advised: tuple[str, ...],
@@ -46,7 +46,7 @@ def facts_of(
 
     Args:
         assembled: the flight.
-        phases: begin (s on our clock) and name of each phase.
+        phases: beginning (s on our clock) and name of each phase.
         result: result of the flight.
         advised: advice of the flight; see `advice`.
     """
@@ -84,7 +84,7 @@ def facts_of(
 
 
 def _silence_duration(context: FlightContext, now: float) -> float | None:
-    """How long the vehicle, or its heartbeat, was not heard at `now`, s; None: it is heard."""
+    """How long at `now` the vehicle was silent, or its heartbeat is overdue, s; None: neither."""
     heartbeat = context.link.state.heartbeat
     if heartbeat is None:
         return None
@@ -103,7 +103,7 @@ def _early_end(
 ) -> EarlyEnd:
     """The end of a flight that ended early.
 
-    `time` and `takeoff` are in s since the flight began, `began` in s on our clock.
+    `time` (of the end) and `takeoff` are in s since the flight began, `began` in s on our clock.
     """
     name, maneuver_elapsed = None, None
     if phase == "maneuvers":

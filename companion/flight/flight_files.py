@@ -11,7 +11,7 @@ from companion import realtime
 from companion.config import Config
 from companion.files.write_whole import ReservedSpace, write_with_timeout
 from companion.flight import flown_config
-from companion.flight.assembled import Assembled
+from companion.flight.assembled import AssembledFlight
 from companion.flight.environment import Environment
 from companion.flight.flight_facts import advice, facts_of
 from companion.flight.observer import EventRecorder, Observer
@@ -116,7 +116,7 @@ class FlightFiles:
             self._note(text)
 
     def recorder(self, observer: Observer) -> EventRecorder:
-        """An observer that passes on and records phases and events (STATUSTEXTs of the `.tlog`)."""
+        """An observer that records phases and events (STATUSTEXTs), and passes them on."""
         clock, texts = asyncio.get_running_loop().time, TextFrames(self._config.link.source_system)
 
         def write(words: str) -> None:
@@ -129,13 +129,13 @@ class FlightFiles:
         return EventRecorder(observer, clock, write, self.mcap)
 
     def begin_counting(self, stats: LinkStats) -> None:
-        """Count the link's frames from now on, if the link was already open."""
+        """Count only frames after this call, because the link may have been open before."""
         self._counted_before = _counters(stats)
 
     def summary(
         self,
         stats: LinkStats,
-        assembled: Assembled,
+        assembled: AssembledFlight,
         recorder: EventRecorder,
         result: str,
         grants: tuple[realtime.SettingResult, ...],
@@ -157,7 +157,7 @@ class FlightFiles:
                 continue  # told in flight
             flight.events.append((asyncio.get_running_loop().time() - flight.began, text))
             recorder.write(text)
-        assembled.memory.save()
+        assembled.drag_memory.save()
         self._ended_at = asyncio.get_running_loop().time() - flight.began
         return Summary(
             result=result,

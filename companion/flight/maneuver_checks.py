@@ -56,7 +56,7 @@ def require_flyable(config: Config, part: Maneuver, drag: KnownDrag) -> None:
 def require_inside(
     config: Config, parts: Iterable[Maneuver], origin: Place | None, drag: KnownDrag
 ) -> None:
-    """Check that all maneuvers stay inside the fence, also one in latitude and longitude.
+    """Check that all maneuvers stay inside the fence, also if it is in latitude and longitude.
 
     Args:
         config: configuration of the flight.
@@ -199,7 +199,7 @@ def envelope_of(config: Config, drag: KnownDrag) -> Envelope:
 
 
 def with_reserve(config: Config, envelope: Envelope) -> Envelope:
-    """The limits with less tilt, so that `flight.slow_down_reserve_m_s2` is left."""
+    """The limits with a tilt that keeps `flight.slow_down_reserve_m_s2` of acceleration unused."""
     most = config.limits.largest_horizontal - config.flight.slow_down_reserve_m_s2
     return replace(envelope, max_tilt=atan(most / GRAVITY))
 

@@ -84,8 +84,8 @@ async def decline_landing() -> bool:
 class EventRecorder:
     """An observer that records phases and events, and passes everything to another observer.
 
-    A fault in the other observer must not cost control of the vehicle. So after an exception it
-    receives nothing more, and after an exception in `status` no more states.
+    A fault in the other observer must not cost control of the vehicle. So after an exception that
+    observer receives nothing more; after an exception in its `status`, only no more states.
 
     Attributes:
         phases: (begin in s on our clock, name) of each phase.

@@ -22,7 +22,7 @@ _COMMAND_TIMEOUT = 10.0
 _TAKEOVER_TIMEOUT = 15.0
 """Timeout for the takeover with its preflight checks, whose parameters a bad link may lose, s."""
 _LISTENING_TIMEOUT = 10.0
-"""Time for which a vehicle that is not heard any more is listened for, s."""
+"""Time to wait for a vehicle that is not heard any more, s."""
 
 Work = Callable[[FlightContext], Coroutine[Any, Any, None]]
 
@@ -37,9 +37,9 @@ class Phase:
         work: the coroutine of the phase.
         timeout: time after which the phase has failed, s; may be infinite.
         on_failure: the exit if the phase fails.
-        on_failure_landed: the exit if the vehicle still stands on the ground; None: `on_failure`.
-        modes: roles of the allowed modes; any other mode is a takeover, and an unknown mode counts
-            like one. Empty: any mode.
+        on_failure_on_ground: the exit while the vehicle is on the ground; None: `on_failure`.
+        allowed_roles: roles of the allowed modes; a mode without one of them is a takeover, and so
+            is an unknown mode. Empty: any mode.
         monitored: whether the safety monitors may end the phase. An exit is not monitored, because
             the breach that caused it would end it too.
     """
@@ -49,14 +49,14 @@ class Phase:
     work: Work
     timeout: float
     on_failure: Exit = Exit.LEAVE
-    on_failure_landed: Exit | None = None
-    modes: frozenset[Role] = frozenset()
+    on_failure_on_ground: Exit | None = None
+    allowed_roles: frozenset[Role] = frozenset()
     monitored: bool = False
 
     def exit_on_failure(self, *, standing: bool) -> Exit:
         """The exit if the phase fails; `standing`: the vehicle still stands on the ground."""
-        if self.on_failure_landed is not None and standing:
-            return self.on_failure_landed
+        if self.on_failure_on_ground is not None and standing:
+            return self.on_failure_on_ground
         return self.on_failure
 
 
@@ -82,7 +82,7 @@ def flight_phases(
         control_phases.maneuvers,
         maneuver_duration + _MANEUVER_GRACE,
         Exit.LAND,
-        modes=_OFFBOARD_ROLES,
+        allowed_roles=_OFFBOARD_ROLES,
         monitored=True,
     )
     return (*takeoff_phases(config, autopilot), maneuvers, *landing_phases(config))
@@ -102,8 +102,8 @@ def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, .
             takeoff.takeoff,
             config.takeoff_timeout_s,
             Exit.LAND,
-            on_failure_landed=Exit.DISARM,
-            modes=_TAKEOFF_ROLES,
+            on_failure_on_ground=Exit.DISARM,
+            allowed_roles=_TAKEOFF_ROLES,
         ),
         Phase(
             "offboard",
@@ -111,7 +111,7 @@ def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, .
             takeoff.offboard,
             _TAKEOVER_TIMEOUT,
             Exit.LAND,
-            modes=_TAKEOFF_ROLES | {Role.OFFBOARD},
+            allowed_roles=_TAKEOFF_ROLES | {Role.OFFBOARD},
             monitored=True,
         ),
     )
@@ -134,9 +134,13 @@ def takeoff_for_client_phases(config: FlightConfig, autopilot: Autopilot) -> tup
     return checks, takeoff_phase, _takeover_from_hold_phase()
 
 
-def _checks_phase(config: FlightConfig, ready: str, work: Work, modes: frozenset[Role]) -> Phase:
+def _checks_phase(config: FlightConfig, ready: str, work: Work, roles: frozenset[Role]) -> Phase:
     return Phase(
-        "checks", f"the vehicle to be ready {ready}", work, config.ready_timeout_s, modes=modes
+        "checks",
+        f"the vehicle to be ready {ready}",
+        work,
+        config.ready_timeout_s,
+        allowed_roles=roles,
     )
 
 
@@ -148,7 +152,7 @@ def _takeover_from_hold_phase() -> Phase:
         takeoff.offboard,
         _TAKEOVER_TIMEOUT,
         Exit.HOLD,
-        modes=_TAKEOFF_ROLES | _OFFBOARD_ROLES,
+        allowed_roles=_TAKEOFF_ROLES | _OFFBOARD_ROLES,
         monitored=True,
     )
 
@@ -171,7 +175,7 @@ def program_phase(name: str, waits_for: str, work: Work, duration: float = inf) 
         work,
         duration + _MANEUVER_GRACE,
         Exit.HOLD,
-        modes=_OFFBOARD_ROLES,
+        allowed_roles=_OFFBOARD_ROLES,
         monitored=True,
     )
 
@@ -201,7 +205,7 @@ def hand_back_phase() -> Phase:
         control_phases.hand_back,
         _COMMAND_TIMEOUT,
         Exit.LAND,
-        modes=_AIRBORNE_ROLES | {Role.OFFBOARD},
+        allowed_roles=_AIRBORNE_ROLES | {Role.OFFBOARD},
     )
 
 
@@ -220,7 +224,7 @@ def _land(config: FlightConfig) -> Phase:
         "touchdown",
         control_phases.land,
         config.landing_timeout_s,
-        modes=_AIRBORNE_ROLES | {Role.OFFBOARD, Role.LAND},
+        allowed_roles=_AIRBORNE_ROLES | {Role.OFFBOARD, Role.LAND},
     )
 
 

@@ -32,8 +32,8 @@ class PreflightChecks:
     always the newest. Rates and parameters are measured again if they are more than a second old.
 
     Attributes:
-        note: called once with each message about what does not block the flight: keys of warnings,
-            accepted unsafe findings, rates that were not granted.
+        note: called once with each message on what does not block the flight: warnings, accepted
+            unsafe findings, and rates that were not granted.
         drag_of: called with the vehicle's identity; returns what is known of its drag.
 
     Args:

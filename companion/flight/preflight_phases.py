@@ -47,15 +47,15 @@ async def checks(context: FlightContext) -> None:
     warning = gain_warning(context.config)
     if warning is not None:
         context.note(warning)
-    note_heartbeat_rate(context, evidence)
+    set_heartbeat_limit(context, evidence)
     context.known_drag = evidence.known_drag
     _require_flyable_by_vehicle(context)
     report_offboard_loss(context, evidence.survey.values)
     context.mode_at_checks = context.link.state.mode
 
 
-def note_heartbeat_rate(context: FlightContext, evidence: Evidence) -> None:
-    """Set the largest age of a known mode from the counted heartbeats."""
+def set_heartbeat_limit(context: FlightContext, evidence: Evidence) -> None:
+    """Set `FlightContext.heartbeat_limit` from the counted rate of heartbeats."""
     heartbeats = evidence.streams.get("HEARTBEAT")  # not requested from PX4, whose rate is fixed
     if heartbeats is not None and heartbeats.achieved > 0.0:
         limit = max(_SHORTEST_HEARTBEAT_LIMIT, _HEARTBEATS_MISSED / heartbeats.achieved)
@@ -90,7 +90,7 @@ async def arm(context: FlightContext) -> None:
 async def undo_arming(context: FlightContext) -> None:
     """Disarm if we armed or commanded the take-off; else a vehicle that is armed is left alone.
 
-    A vehicle that the pilot armed would carry out the take-off after the end of this flight.
+    After our take-off command, also a vehicle that the pilot armed could still climb after this.
     """
     context.release()
     if not context.must_disarm:
@@ -148,7 +148,7 @@ def _require_untouched(context: FlightContext) -> None:
 
 
 def _require_flyable_by_vehicle(context: FlightContext) -> None:
-    """Check the maneuvers again, with this vehicle's drag and a fence in latitude and longitude.
+    """Check the maneuvers again, with this vehicle's drag, and its position for a fence in degrees.
 
     Raises:
         FlightEnded: a maneuver leaves the fence or exceeds a limit.

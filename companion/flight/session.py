@@ -5,7 +5,7 @@ from pathlib import Path
 
 from companion import realtime
 from companion.config import Config
-from companion.flight.assembled import Assembled
+from companion.flight.assembled import AssembledFlight
 from companion.flight.assembly import assemble, open_link, realtime_settings
 from companion.flight.changes import Changes
 from companion.flight.context import cancel
@@ -55,7 +55,7 @@ class Session:
         self._ask_landing = ask_landing
         self._plan = plan
         self._environment = environment
-        self._assembled: Assembled | None = None
+        self._assembled: AssembledFlight | None = None
         self._flying: asyncio.Task[str] | None = None
         self._early_notes: list[str] = []
 
@@ -85,7 +85,7 @@ class Session:
 
         Raises:
             ConfigError: a maneuver cannot be flown; nothing was sent.
-            LinkError: the link could not be opened; nothing was sent, in lockstep one heartbeat.
+            LinkError: the link could not be opened; nothing was sent but a heartbeat in lockstep.
             OSError: the folder cannot be written; nothing was sent.
             RealtimeError: the system refused a required `realtime` setting; nothing was sent.
         """
@@ -120,7 +120,7 @@ class Session:
         await asyncio.sleep(0)  # lets a failure of the writing thread arrive
         return record.save(summary)
 
-    async def _fly_connected(self, link: Link, assembled: Assembled) -> str:
+    async def _fly_connected(self, link: Link, assembled: AssembledFlight) -> str:
         flight = assembled.flight
         with connected(link, assembled):
             # In a task of its own: `leave` ends the flight but not the writing of the files.
@@ -135,7 +135,7 @@ class Session:
                 await cancel(reporting)
 
     @staticmethod
-    async def _report_status(assembled: Assembled) -> None:
+    async def _report_status(assembled: AssembledFlight) -> None:
         """Record and show the state of the flight; a fault in it does not end the flight."""
         try:
             await assembled.reporter.run()

@@ -30,8 +30,8 @@ def check_control(config: Config) -> None:
     """Check that the planner and the guidance can be made.
 
     Raises:
-        ConfigError: they do not fit the vehicle or the limits, or one from another
-            package fails.
+        ConfigError: they do not fit the vehicle or the limits, or a planner or guidance
+            of another package raises an exception.
     """
     planner(config)
     make_guidance(config)

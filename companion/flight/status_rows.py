@@ -1,4 +1,4 @@
-"""Records the thrust estimator, the program's resources, the counters of the link, the fence."""
+"""Records the thrust estimator, the program's resources, the link's counters, and the fence."""
 
 import resource
 from collections.abc import Callable
@@ -6,7 +6,7 @@ from math import nan
 from time import process_time
 
 from companion.flight.context import FlightContext
-from companion.flight.fence_rows import FenceRows
+from companion.flight.fence_drawing import FenceDrawing
 from companion.recording.mcap_file.channels import RESOURCES, THRUST
 from companion.recording.recorder import FlightRecorder
 
@@ -27,7 +27,7 @@ class StatusRows:
         self, context: FlightContext, recorder: FlightRecorder | None, clock: Callable[[], float]
     ) -> None:
         self._context, self._recorder, self._clock = context, recorder, clock
-        self._fence = None if recorder is None else FenceRows(context, recorder)
+        self._fence = None if recorder is None else FenceDrawing(context, recorder)
         self._due = self._measured_at = clock()
         self._processor_s = process_time()
 

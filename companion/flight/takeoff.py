@@ -21,13 +21,13 @@ _MAX_OVERSHOOT = 3.0
 """A climb has failed this far above the commanded height, m; PX4 overshoots by some tenths."""
 
 _ARRIVAL_TIME = 2.0
-"""Time allowed to reach altitude after hold mode is shown, s; else something ended the climb."""
+"""Time allowed to reach altitude after hold mode is shown, s; later, the climb was stopped."""
 
 _LARGEST_HELD_SPEED = 3.0
 """Largest horizontal speed of a vehicle that is taken over, m/s."""
 
 _BRAKING_TIME = 5.0
-"""Time allowed for the autopilot to reach this speed and a tilt below limits.max_tilt_deg, s."""
+"""Time for the autopilot to brake to `_LARGEST_HELD_SPEED` and to limits.max_tilt_deg, s."""
 
 
 async def takeoff(context: FlightContext) -> None:
@@ -72,7 +72,7 @@ async def _wait_until_held(context: FlightContext) -> None:
     """Wait until the autopilot holds the vehicle still: it may have to brake first.
 
     Raises:
-        FlightEnded: the vehicle is still tilted or quick, as one that the wind blows away.
+        FlightEnded: after `_BRAKING_TIME` the vehicle is still too tilted or too fast, as in wind.
     """
     try:
         async with asyncio.timeout(_BRAKING_TIME):

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from companion.flight.context import INITIAL_HEARTBEAT_LIMIT, FlightContext
-from companion.flight.preflight_phases import note_heartbeat_rate, report_offboard_loss
+from companion.flight.preflight_phases import report_offboard_loss, set_heartbeat_limit
 from companion.preflight.evidence import Stage
 from companion.safety.actions import Exit, FlightEnded
 
@@ -14,7 +14,7 @@ _ARMED_REPORT_TIMEOUT = 1.5
 
 
 async def check_airborne(context: FlightContext) -> None:
-    """Check a vehicle that already flies; only request telemetry.
+    """Check a vehicle that already flies; command nothing, only request telemetry.
 
     Raises:
         FlightEnded: the vehicle does not fly, or a finding blocks the takeover.
@@ -26,7 +26,7 @@ async def check_airborne(context: FlightContext) -> None:
 async def check_armed_on_ground(context: FlightContext) -> None:
     """Check a vehicle that somebody else armed on the ground; only request telemetry.
 
-    The newest heartbeat may be older than the arming.
+    The newest heartbeat may be older than the arming, so this first waits for one that shows it.
 
     Raises:
         FlightEnded: the vehicle is not armed on the ground, or a finding blocks the take-off.
@@ -55,7 +55,7 @@ async def _check_stage(
     await context.until(lambda: context.fresh_position() is not None, "a fresh position")
     context.detail = "counting telemetry rates and reading the autopilot's parameters"
     evidence = await context.preflight.require(stage)
-    note_heartbeat_rate(context, evidence)
+    set_heartbeat_limit(context, evidence)
     report_offboard_loss(context, evidence.survey.values)
     require(context)
 

@@ -12,9 +12,9 @@ from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.link import Link
 
 LONGEST_SILENCE = 2.0
-"""After a longer silence the vehicle may be another one, s; on the worst permitted link it sends a
-frame earlier."""
-_LONGEST_UPDATE = 0.1
+"""After a longer silence the vehicle may be another one, s. Frames of the same vehicle come sooner,
+even on the worst permitted link."""
+_LONGEST_UPDATE_INTERVAL = 0.1
 """A longer interval between two updates is our own stall and does not count as silence, s."""
 
 
@@ -63,7 +63,7 @@ class SameVehicle:
         now, frames = self._clock(), self._link.stats.frames
         since, self._updated_at = now - self._updated_at, now
         if frames == self._frames:
-            self._silent_for += min(since, _LONGEST_UPDATE)
+            self._silent_for += min(since, _LONGEST_UPDATE_INTERVAL)
             return
         if self._silent_for > LONGEST_SILENCE and not self._committed:
             self._past_silence = self._silent_for
@@ -121,7 +121,7 @@ class SameVehicle:
         return None
 
 
-class VehicleMemory:
+class DragMemory:
     """Starts the drag estimate from the drag that an earlier flight of the vehicle learned.
 
     A configured drag takes precedence. A vehicle without a hardware id is not remembered.
@@ -162,7 +162,7 @@ class VehicleMemory:
         return self._known_drag
 
     def _begin_estimate(self, known: KnownDrag) -> None:
-        """Start the estimate for another vehicle; one without an id changes nothing."""
+        """Restart the estimate if the vehicle has changed; without a hardware id, do nothing."""
         if self._uid is None or self._directory is None:
             return
         file = LearnedFile(self._directory, self._uid)

@@ -17,8 +17,8 @@ from companion.vehicle.link import Link
 from companion.vehicle.records import outdated
 
 _CURRENT_MODE_PERIOD = 0.45
-"""Time since the last CURRENT_MODE below which a new one reports a change, s; PX4 sends one every
-0.5 s.
+"""A CURRENT_MODE that follows the last one sooner than this reports a change, s; without changes
+PX4 sends one every 0.5 s.
 """
 _HEARTBEAT_REQUEST_PERIOD = 0.15
 """Shortest time between two requests for a heartbeat, s."""
@@ -27,7 +27,7 @@ _COUNTING_TIME = 0.1
 
 
 class RateRequester:
-    """Requests telemetry again whose rate became too low, perhaps because of another station.
+    """Requests a message again if its rate has become too low, as another station may cause.
 
     It sends SET_MESSAGE_INTERVAL at most once a flight for each message, and does not block.
 
@@ -104,11 +104,11 @@ class Watch:
         self._context.ground.update()
         self._context.same_vehicle.update()
         self._context.same_vehicle.require()
-        if phase.modes:
-            require_role(self._context.link, phase.modes, self._context.released_by())
+        if phase.allowed_roles:
+            require_role(self._context.link, phase.allowed_roles, self._context.released_by())
         if phase.monitored and self._context.loop.offboard_active:
             self._judge_snapshot(now)
-        if phase.modes:
+        if phase.allowed_roles:
             self._judge_heartbeat()
 
     def on_current_mode(self, phase: Phase) -> None:
@@ -129,7 +129,7 @@ class Watch:
         self.judge(phase)
 
     def ask_mode(self) -> None:
-        """Request the mode, and let the loop resume after a gap if the vehicle still obeys us."""
+        """Request a heartbeat; let the loop resume after a gap if its mode still obeys us."""
         # Without an answer the silence monitor ends the flight.
         self._mode_request = asyncio.create_task(self._confirm_control())
 

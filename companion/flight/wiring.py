@@ -4,14 +4,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from companion.control.retuning import Retuning
-from companion.flight.assembled import Assembled
+from companion.flight.assembled import AssembledFlight
 from companion.flight.observer import StateLogger
 from companion.vehicle.link import Link
 from companion.vehicle.records import AttitudeSample
 
 
 @contextmanager
-def connected(link: Link, assembled: Assembled) -> Iterator[None]:
+def connected(link: Link, assembled: AssembledFlight) -> Iterator[None]:
     """Connect the link and the changes to the flight while the block runs: samples, errors, mode.
 
     Only one flight at a time may be connected to a link.

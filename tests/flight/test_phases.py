@@ -61,7 +61,7 @@ def test_a_mode_that_is_not_the_phases_own_lets_the_vehicle_go(
     autopilot, phase, base_mode, custom_mode, ours
 ):
     vehicle = Vehicle(autopilot, base_mode, custom_mode)
-    allowed = phases(autopilot)[phase].modes
+    allowed = phases(autopilot)[phase].allowed_roles
     if ours:
         require_role(vehicle, allowed)
         return

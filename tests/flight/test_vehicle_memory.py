@@ -9,7 +9,7 @@ from companion.drag import Drag
 from companion.files import bounded_yaml
 from companion.files.yaml_file import ConfigError, parse
 from companion.flight.maneuvers import configured_maneuvers
-from companion.flight.vehicle_identity import VehicleMemory
+from companion.flight.vehicle_identity import DragMemory
 from companion.guidance.drag_estimate import ANY_VEHICLE, DragEstimate
 from companion.preflight.evidence import Identity
 from companion.recording.learned_file import LearnedFile
@@ -28,7 +28,7 @@ def remembered(folder, told=None):
     notes = []
     estimate = DragEstimate(ANY_VEHICLE)
     config = changed(Config(), {"guidance": {"drag_per_s": told}}, "test")
-    return VehicleMemory(config, folder, estimate, notes.append), estimate, notes
+    return DragMemory(config, folder, estimate, notes.append), estimate, notes
 
 
 def test_a_flight_begins_with_what_was_learned_and_leaves_what_it_learned(tmp_path):

@@ -18,8 +18,8 @@ _FENCE_COLOR: Color = (0.9, 0.3, 0.3, 0.6)
 Point = tuple[float, float, float]
 
 
-class FenceRows:
-    """Records the fence as a wireframe, from the beginning of control on.
+class FenceDrawing:
+    """Records the fence as a wireframe, every 10 s from the beginning of control on.
 
     Args:
         context: context of the flight.
