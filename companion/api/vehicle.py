@@ -232,7 +232,7 @@ class Vehicle:
 
     def _require_followable(self, maneuver: Maneuver) -> None:
         context, here = self._context, self._held_pose().position_ned
-        origin = context.snapshot_builder.origin_ned or (0.0, 0.0, 0.0)
+        origin = context.snapshot_builder.fence_centre_ned or (0.0, 0.0, 0.0)
         north, east, down = (place - begin for place, begin in zip(here, origin, strict=True))
         require_followable(context.config, maneuver, (north, east, down), context.known_drag)
 

@@ -32,7 +32,7 @@ from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
 from companion.preflight.parameter_fixes import (
     Answer,
-    Outcome,
+    ChangeOutcome,
     Undo,
     UndoFile,
     apply_fixes,
@@ -41,7 +41,7 @@ from companion.preflight.parameter_fixes import (
 )
 from companion.preflight.parameter_survey import survey
 from companion.preflight.report import as_dict, lists, outcome_as_dict, outcome_line
-from companion.preflight.session import PreflightSession, identify, open_session
+from companion.preflight.session import PreflightSession, open_session, request_identity
 from companion.vehicle.link import Link
 from companion.vehicle.parameter_rules import CheckResult
 
@@ -118,7 +118,7 @@ class _DoctorRun:
 
     def __init__(self, config: Config, console: Console) -> None:
         self._config, self._console = config, console
-        self._outcomes: list[Outcome] = []
+        self._outcomes: list[ChangeOutcome] = []
         self.result: dict[str, Any] = {}
 
     async def run_checks(self, wait: float, *, fix: bool, without_asking: bool) -> int:
@@ -159,7 +159,7 @@ class _DoctorRun:
             if findings:
                 return self._report(findings)
             link = vehicle.link
-            if not undo.meant_for(link, await identify(link)):
+            if not undo.meant_for(link, await request_identity(link)):
                 raise ConfigError(
                     f"{path} was written for another vehicle ({undo.autopilot}, system "
                     f"{undo.system}, hardware id {undo.uid or 'unknown'}); nothing was set; "
@@ -223,7 +223,7 @@ class _DoctorRun:
         self.result = as_dict(self._config, findings)
         return EXIT_OK if self.result["result"] == "ok" else EXIT_FAILURE
 
-    def _note(self, outcome: Outcome) -> None:
+    def _note(self, outcome: ChangeOutcome) -> None:
         self._outcomes.append(outcome)
         self.say(outcome_line(outcome))
 

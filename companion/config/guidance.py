@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from companion import plugins
 from companion.attitude import PLANNER_NAMES
-from companion.config.markers import ANY
+from companion.config.markers import TUNABLE
 from companion.config.units import Si
 from companion.drag import Drag
 from companion.files.yaml_faults import name_hint
@@ -38,9 +38,9 @@ class PlannerConfig(Section):
     `vehicle`. quaternion, so3, euler: the paper's comparison laws. A planner of another package
     is named by its entry point in `companion.planners`.
     """
-    gain_per_s: Annotated[float, Field(gt=0.0, le=20.0, json_schema_extra=ANY)] = 5.0
+    gain_per_s: Annotated[float, Field(gt=0.0, le=20.0, json_schema_extra=TUNABLE)] = 5.0
     """Gain p: the acceleration approaches its target with the time constant 1/p."""
-    yaw_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0, json_schema_extra=ANY)] = 2.0
+    yaw_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0, json_schema_extra=TUNABLE)] = 2.0
     """Gain of the heading: it approaches its target with the time constant 1/yaw_gain. quaternion,
     so3 and euler use gain_per_s instead.
     """
@@ -65,37 +65,38 @@ class GuidanceConfig(Section):
     rate_hz: Annotated[float, Field(ge=10.0, le=100.0)] = 50.0
     """Rate at which guidance computes a new target."""
     position_weight_per_s4: Annotated[float, Field(ge=0.01, le=10000.0)] | None = Field(
-        default=None, json_schema_extra=ANY
+        default=None, json_schema_extra=TUNABLE
     )
     """LQR weight of the horizontal position error relative to acceleration; a larger weight makes a
-    stiffer position hold. null: k/T⁴. k is 2 if dead time + lag/2 + s/2 is at most 65 ms, 1 if
-    it is at least 80 ms or unknown, and interpolated between them. s is the time the rate loop
-    needs to slew to limits.max_tilt_rate_deg_s; 0 without a known slew limit. T is the delay of
-    the attitude behind its target plus half a guidance period, at least 0.275 s. That delay
-    follows from planner.gain_per_s and `vehicle`; an unknown rate loop counts as 0.12 s.
+    stiffer position hold. null: k/T⁴. T is the delay of the attitude behind its target, plus half
+    a guidance period; at least 0.275 s. The delay follows from planner.gain_per_s and `vehicle`;
+    an unknown rate loop counts as 0.12 s. k is 2 for a quick rate loop, whose dead time + lag/2 +
+    s/2 is at most 65 ms. k is 1 from 80 ms on and for an unknown rate loop, and interpolated in
+    between. s is the time to slew to limits.max_tilt_rate_deg_s; 0 without a known slew limit.
     """
     velocity_weight_per_s2: Annotated[float, Field(ge=0.0, le=10000.0)] | None = Field(
-        default=None, json_schema_extra=ANY
+        default=None, json_schema_extra=TUNABLE
     )
     """LQR weight of the horizontal velocity error; a larger weight damps the position hold more.
-    null: 1/T².
+    null: 1/T², T as in position_weight_per_s4.
     """
     disturbance_bandwidth_rad_s: Annotated[float, Field(gt=0.0, le=30.0)] | None = Field(
-        default=None, json_schema_extra=ANY
+        default=None, json_schema_extra=TUNABLE
     )
     """Bandwidth of the wind observer, which compares the vehicle's motion with its tilt.
-    null: 1.5/T; in motion, with a quick rate loop and smooth positions, up to 2.4/T."""
+    null: 1.5/T, T as in position_weight_per_s4; in motion, with a quick rate loop and smooth
+    positions, up to 2.4/T."""
     position_lateness_ms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     """Delay of the autopilot's position beyond what its estimator assumes, for example because of a
     wrong GPS delay parameter. Measure it against an independent position.
     """
-    max_disturbance_m_s2: Annotated[float, Field(ge=0.0, le=20.0, json_schema_extra=ANY)] = 6.0
+    max_disturbance_m_s2: Annotated[float, Field(ge=0.0, le=20.0, json_schema_extra=TUNABLE)] = 6.0
     """Largest acceleration by wind that the observer may estimate."""
     lead: bool = True
     """Lead the targets by the known attitude response, so that the vehicle does not lag."""
-    height_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0, json_schema_extra=ANY)] = 1.5
+    height_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0, json_schema_extra=TUNABLE)] = 1.5
     """Vertical speed commanded per metre of height error."""
-    climb_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0, json_schema_extra=ANY)] = 3.5
+    climb_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0, json_schema_extra=TUNABLE)] = 3.5
     """Vertical acceleration commanded per m/s of vertical speed error."""
     drag_per_s: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
     """Linear drag per mass, for feedforward. null: unknown. A flight estimates it, and the next

@@ -27,7 +27,7 @@ class KnownDrag(NamedTuple):
     Attributes:
         drag: configured or learned drag; None: unknown.
         source: the file of a learned drag; None: configured or unknown.
-        trouble: why the file of a learned drag could not be used; None: it could, or there is none.
+        trouble: why the file of a learned drag could not be used; None: no such fault, or no file.
     """
 
     drag: Drag | None = None
@@ -69,7 +69,7 @@ def of_vehicle(config: Config, directory: Path | None, uid: str | None) -> Known
 
     Args:
         config: configuration of the flight.
-        directory: folder of the flights; None: nothing is remembered.
+        directory: folder of the flights, which has the learned drag; None: no learned drag.
         uid: hardware id (AUTOPILOT_VERSION); None: no id, so no learned drag.
     """
     if config.guidance.drag is not None:

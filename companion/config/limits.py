@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from companion.config.markers import ANY, LOWERED
+from companion.config.markers import LOWERABLE, TUNABLE
 from companion.config.units import Si
 from companion.files.yaml_file import Section
 from companion.guidance.reference import GRAVITY
@@ -16,13 +16,15 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 class LimitsConfig(Section):
     """Limits of what the program commands, and the fence."""
 
-    max_tilt_deg: Annotated[float, Field(ge=1.0, le=60.0, json_schema_extra=LOWERED)] = 35.0
+    max_tilt_deg: Annotated[float, Field(ge=1.0, le=60.0, json_schema_extra=LOWERABLE)] = 35.0
     """Largest tilt of a target. A larger target keeps its direction and is shortened."""
-    max_tilt_rate_deg_s: Annotated[float, Field(ge=1.0, le=1000.0, json_schema_extra=LOWERED)] = (
+    max_tilt_rate_deg_s: Annotated[float, Field(ge=1.0, le=1000.0, json_schema_extra=LOWERABLE)] = (
         90.0
     )
     """Largest total roll and pitch rate: √(roll² + pitch²)."""
-    max_yaw_rate_deg_s: Annotated[float, Field(ge=1.0, le=1000.0, json_schema_extra=LOWERED)] = 60.0
+    max_yaw_rate_deg_s: Annotated[float, Field(ge=1.0, le=1000.0, json_schema_extra=LOWERABLE)] = (
+        60.0
+    )
     """Largest yaw rate."""
     rate_limit: Literal["tight", "paper"] = "tight"
     """tight: limit only where the rate would be exceeded. paper: equation 33, slower."""
@@ -34,9 +36,9 @@ class LimitsConfig(Section):
     """Smallest normalised thrust commanded in flight."""
     max_thrust: Share = 0.9
     """Largest normalised thrust commanded."""
-    max_climb_m_s: Annotated[float, Field(ge=0.1, le=20.0, json_schema_extra=ANY)] = 2.0
+    max_climb_m_s: Annotated[float, Field(ge=0.1, le=20.0, json_schema_extra=TUNABLE)] = 2.0
     """Largest climb rate that height hold commands."""
-    max_descent_m_s: Annotated[float, Field(ge=0.1, le=10.0, json_schema_extra=ANY)] = 1.0
+    max_descent_m_s: Annotated[float, Field(ge=0.1, le=10.0, json_schema_extra=TUNABLE)] = 1.0
     """Largest descent rate that height hold commands."""
     fence_radius_m: Annotated[float, Field(ge=0.1, le=2000.0)] = 50.0
     """Fence: largest horizontal distance from the place where control began. Beyond it,

@@ -1,4 +1,4 @@
-"""Markers of keys: further properties of a key, besides type and range.
+"""Markers of keys: whether and how a key may change in flight.
 
 The JSON Schema holds them as `in_flight`; the live page and the reference read them there.
 """
@@ -11,5 +11,7 @@ IN_FLIGHT = "in_flight"
 UP_TO_START = "up to its value at the start"
 """Permitted change of the limits with which the vehicle was checked before take-off."""
 
-ANY: dict[str, Any] = {IN_FLIGHT: "within its range"}
-LOWERED: dict[str, Any] = {IN_FLIGHT: UP_TO_START}
+TUNABLE: dict[str, Any] = {IN_FLIGHT: "within its range"}
+"""Marker of a key that may take any value of its range in flight."""
+LOWERABLE: dict[str, Any] = {IN_FLIGHT: UP_TO_START}
+"""Marker of a key that may not rise above its value at the start of the flight."""

@@ -1,6 +1,6 @@
 """The typed configuration: all sections, and the rules between them.
 
-The defaults are right for the bundled vehicle.
+The defaults are right for the mock vehicle.
 """
 
 from collections.abc import Mapping

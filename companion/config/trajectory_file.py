@@ -38,7 +38,7 @@ _SMALLEST_NOTED_DETOUR = 0.05
 _SHORTEST_RAMP = 0.05
 """Shortest extra duration by ramps that a note reports, s."""
 _MOST_ROWS_COMPARED = 2000
-"""Largest number of rows of a table that the path is compared with; more are dense anyway."""
+"""Tables with more rows are not compared with the path: they are dense, so it follows them."""
 
 
 class _Shape(Protocol):
@@ -153,7 +153,7 @@ def _detour_notes(
 
     Args:
         trajectory: the trajectory; only a spline has a note.
-        times: (k,), when the spline is at its points, s; None: its knots.
+        times: (k,), times of the points on the spline, s; None: its knots.
         remedy: what to do to fly along the lines.
     """
     if not (isinstance(trajectory, TimedCurve) and isinstance(trajectory.curve, SplineCurve)):

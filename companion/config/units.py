@@ -41,7 +41,7 @@ def seconds(milliseconds: float) -> float:
 
 
 def share(percent: float) -> float:
-    """Percent as a share of 1, computed as for telemetry, so that equal percentages stay equal."""
+    """Percent as a share of 1, by telemetry's formula: equal percentages give equal shares."""
     return percent / 100.0
 
 

@@ -15,7 +15,10 @@ AccelerationLimit = Annotated[float, Field(gt=0.0, le=100_000.0)]
 
 
 class AxisKeys(NamedTuple):
-    """Response of one axis of the rate loop; None: unknown, no limit, or first order."""
+    """Response of one axis of the rate loop, as keys of `vehicle`.
+
+    None: lag or dead time is unknown, there is no slew limit, the response is first order.
+    """
 
     lag_ms: float | None
     dead_time_ms: float | None

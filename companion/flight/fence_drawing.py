@@ -35,7 +35,7 @@ class FenceDrawing:
         """Record the fence if it is due at `now`, s on our clock."""
         snapshots, motion = self._context.snapshot_builder, self._context.guidance_loop.motion
         height, centre = self._context.link.state.height, snapshots.fence_centre
-        origin = snapshots.origin_ned
+        origin = snapshots.fence_centre_ned
         if now < self._due or centre is None or origin is None or motion is None or height is None:
             return
         self._due = now + _DRAWING_PERIOD

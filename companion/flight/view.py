@@ -18,7 +18,7 @@ def view(context: FlightContext, now: float) -> dict[str, Any]:
     """
     loop, guidance_loop, state = context.loop, context.guidance_loop, context.link.state
     shown = {**_attitude(context, now), **_motion_values(context, now)}
-    origin = context.snapshot_builder.origin_ned
+    origin = context.snapshot_builder.fence_centre_ned
     if origin is not None:
         shown.update(_with_axis_names("fence", origin, "m"))
     wind = guidance_loop.estimate.disturbance

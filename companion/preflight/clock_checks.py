@@ -13,7 +13,7 @@ from companion.vehicle.parameter_rules import CheckResult
 SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 
 _UNSAFE_NOT_NEWER_SHARE = 0.2
-"""Largest share of samples stamped no later than the one before that is not unsafe."""
+"""Unsafe above this share of samples whose stamp is not later than that of the sample before."""
 _MIN_SAMPLES = 10
 """Smallest number of samples to judge the rate of the clock."""
 _SHAKING_PRODUCT, _MAYBE_SHAKING_PRODUCT = 0.3, 0.15
@@ -51,9 +51,9 @@ def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
 def round_trip(config: Config, seconds: float) -> Finding:
     """Judge whether the gain is too high for a round trip of this many seconds.
 
-    A setpoint answers an attitude that is older by the round trip. Every round trip is safe in
-    lockstep, where the vehicle waits, and with a planner of another package, whose gain may mean
-    something else.
+    When a setpoint takes effect, the attitude that it answers is as old as the round trip. No round
+    trip counts as too long in lockstep, where the vehicle waits, or with a planner of another
+    package, whose gain may mean something else.
     """
     gain = config.planner.gain_per_s
     gain_matters = config.planner_name in PLANNER_NAMES and not config.link.lockstep
@@ -88,14 +88,16 @@ def clocks(config: Config, evidence: Evidence) -> Iterator[Finding]:
     elif samples.not_newer:
         yield Finding(
             Key.CLOCK,
-            UNSAFE if samples.not_newer > _UNSAFE_NOT_NEWER_SHARE * samples.heard else INEFFECTIVE,
-            f"{samples.not_newer} of {samples.heard} samples are stamped no later than the one "
+            UNSAFE
+            if samples.not_newer > _UNSAFE_NOT_NEWER_SHARE * samples.received
+            else INEFFECTIVE,
+            f"{samples.not_newer} of {samples.received} samples are stamped no later than the one "
             "before",
             "they are not answered, and if that lasts, control is given back",
             "send attitude over one link only; restart the autopilot if its clock stands still",
             source,
         )
-    elif samples.heard >= _MIN_SAMPLES and samples.clock_rate is not None:
+    elif samples.received >= _MIN_SAMPLES and samples.clock_rate is not None:
         yield _clock_rate(config, evidence, samples.clock_rate, source)
 
 

@@ -19,7 +19,7 @@ SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.IN
 
 
 def planner(config: Config, _: Evidence) -> Iterator[Finding]:
-    """Whether `planner.name: auto` chose the planner for an identified vehicle."""
+    """Whether `planner.name: auto` chose first-order, because `vehicle` lacks lag and dead time."""
     name = config.planner_name
     if config.planner.name == AUTO and name == FIRST_ORDER:
         yield Finding(

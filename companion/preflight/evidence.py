@@ -20,7 +20,7 @@ _POSITION_MESSAGES = frozenset(
 
 
 class Stage(Enum):
-    """The next step of the vehicle; the value completes "ready …"."""
+    """The next step of the vehicle; the value completes "ready …", as in "ready to take off"."""
 
     GROUND = "to be armed"
     """The vehicle stands on the ground, disarmed."""
@@ -79,17 +79,17 @@ class SampleTimes(NamedTuple):
     """Times of the attitude samples received, by both clocks.
 
     Attributes:
-        heard: Number of samples.
+        received: Number of samples.
         longest_pause: Longest time between two samples by our clock, s.
         not_newer: Number of samples stamped no later than the one before.
         clock_rate: Vehicle seconds per second of ours; `None` for too few samples.
-        age: Median of their ages at arrival, s; `None`: unknown (`VehicleClock`).
+        age: Median age of the samples at arrival, s; `None`: unknown (`VehicleClock`).
         clock_change: Description of a jump or restart of the vehicle's clock; empty: none.
         unusable: Number of samples that are not a unit quaternion or not finite.
         rate: Effective rate, Hz, lowered by bursts (`IntervalSums`); `None` for too few samples.
     """
 
-    heard: int = 0
+    received: int = 0
     longest_pause: float = 0.0
     not_newer: int = 0
     clock_rate: float | None = None
@@ -106,13 +106,14 @@ class OtherNodes(NamedTuple):
         sources: (system, component) of every node that was heard.
         companions: Nodes whose heartbeat has the type onboard controller.
         steering: Nodes that sent setpoints.
-        echo: Whether ATTITUDE_TARGET shows rates or thrust although the vehicle is disarmed.
+        foreign_target: Whether ATTITUDE_TARGET shows rates or thrust while the vehicle is disarmed,
+            so that another node must have sent setpoints.
     """
 
     sources: frozenset[tuple[int, int]] = frozenset()
     companions: frozenset[tuple[int, int]] = frozenset()
     steering: frozenset[tuple[int, int]] = frozenset()
-    echo: bool = False
+    foreign_target: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +133,7 @@ class Evidence:
         resets: Number of estimator resets.
         identity: The autopilot's version and hardware.
         stage: The next step of the vehicle.
-        words: The autopilot's texts of severity warning or worse.
+        warnings: The autopilot's texts of severity warning or worse.
         maneuvers: The planned maneuvers; `None`: no maneuvers.
         known_drag: What is known of this vehicle's drag.
     """
@@ -149,7 +150,7 @@ class Evidence:
     resets: int
     identity: Identity
     stage: Stage = Stage.GROUND
-    words: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
     maneuvers: ManeuverSequence | None = None
     known_drag: KnownDrag = field(default_factory=KnownDrag)
 

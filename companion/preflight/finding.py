@@ -58,7 +58,7 @@ class Key(StrEnum):
     BODY_RATE = "safety.max_body_rate_deg_s"
 
 
-class Change(NamedTuple):
+class ParameterChange(NamedTuple):
     """A parameter to set.
 
     Attributes:
@@ -94,7 +94,7 @@ class Finding:
     because: str = ""
     fix: str = ""
     source: str = ""
-    change: Change | None = None
+    change: ParameterChange | None = None
 
     def sentence(self) -> str:
         """The finding without its source, for the user."""

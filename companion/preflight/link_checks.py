@@ -14,7 +14,7 @@ from companion.vehicle.streams import StreamRate
 SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 
 _MIN_RATE_SHARE = 0.7
-"""Smallest share of the requested rate; PX4 sends 197 Hz of 250 requested (measured)."""
+"""Share of a requested rate that must be granted and arrive; PX4 sends 197 Hz of 250 (measured)."""
 _MIN_EXPECTED_COUNT = 5.0
 """A rate is judged by counting only if at least this many messages are expected."""
 _SENT_ON_CHANGE = {"CURRENT_MODE": 2.0}
@@ -212,7 +212,7 @@ def signing_findings(
 
 
 def other_nodes(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Other nodes that talk to the vehicle."""
+    """Whether other nodes use our ids, are companion computers, or send setpoints."""
     link, others = config.link, evidence.other_nodes
     ours = link.source_system, link.source_component
     if ours in others.sources:
@@ -234,7 +234,7 @@ def other_nodes(config: Config, evidence: Evidence) -> Iterator[Finding]:
             "HEARTBEAT of type onboard controller",
         )
     steering = sorted(others.steering)
-    if steering or others.echo:
+    if steering or others.foreign_target:
         who = ", ".join(f"{system}/{component}" for system, component in steering)
         yield Finding(
             Key.OTHER_SETPOINTS,

@@ -31,7 +31,7 @@ _MIN_SAMPLES = 10
 
 
 class LinkListener:
-    """Listens while its `with` block runs.
+    """Collects what comes over the link while its `with` block runs.
 
     Args:
         link: Link to listen on. The block replaces its `on_foreign`.
@@ -51,7 +51,7 @@ class LinkListener:
         self._sources: set[tuple[int, int]] = set()
         self._companions: set[tuple[int, int]] = set()
         self._steering: set[tuple[int, int]] = set()
-        self._echo = False
+        self._foreign_target = False
         self._resets_before: int | None = None
         self.resets = 0
 
@@ -81,7 +81,7 @@ class LinkListener:
         for earlier, later in pairs:
             arrivals.add(later[0] - earlier[0])
         return SampleTimes(
-            heard=len(self._stamps),
+            received=len(self._stamps),
             longest_pause=max(later[0] - earlier[0] for earlier, later in pairs),
             not_newer=sum(later[1] <= earlier[1] for earlier, later in pairs),
             unusable=self._unusable,
@@ -98,7 +98,7 @@ class LinkListener:
             frozenset(self._sources),
             frozenset(self._companions),
             frozenset(self._steering),
-            self._echo,
+            self._foreign_target,
         )
 
     def _on_foreign(self, frame: Frame) -> None:
@@ -125,7 +125,7 @@ class LinkListener:
     def _on_target(self, message: Message) -> None:
         rates = message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate
         moving = any(abs(value) > _MAX_IDLE_TARGET for value in (*rates, message.thrust))
-        self._echo = self._echo or (moving and self._link.state.armed is False)
+        self._foreign_target = self._foreign_target or (moving and self._link.state.armed is False)
 
     def _on_odometry(self, message: Message) -> None:
         before, self._resets_before = self._resets_before, message.reset_counter

@@ -36,12 +36,12 @@ _START_POSE = Pose((0.0, 0.0, 0.0), 0.0)
 
 
 class WorstReach(NamedTuple):
-    """The largest reach over the maneuvers.
+    """How far the vehicle can be carried if setpoints stop at the worst moment of the maneuvers.
 
     Attributes:
-        away, up, down: Distance from where the setpoints stopped, m.
+        away, up, down: Largest horizontal distance, climb and fall from where they stopped, m.
         breach: The first breach of the fence, as the end of a sentence; `None`: none.
-        time: When the setpoints would have to stop to cause that breach, s after control begins.
+        time: When setpoints must stop to cause `breach`, s after control begins.
     """
 
     away: float = 0.0
@@ -85,7 +85,7 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
 def worst_reach(
     config: Config, maneuvers: ManeuverSequence, hold_time: float, drag: Drag, *, brakes: bool
 ) -> WorstReach:
-    """The largest reach over the maneuvers.
+    """How far the vehicle can be carried over all moments at which setpoints may stop.
 
     `LossFailsafe` describes `hold_time`, `drag` and `brakes`.
     """
@@ -188,7 +188,7 @@ def _motions(
 def _tilt_step(
     reference: Reference, tilt: tuple[float, float], gain: float, period: float
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Follow the tilt of an open-loop step for one period (s).
+    """Follow `tilt` (coefficients north, east) in an open-loop step for one `period` (s).
 
     Returns:
         Rates of change of the acceleration coefficients (north, east) now, 1/s; and the

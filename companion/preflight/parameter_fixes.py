@@ -15,7 +15,7 @@ from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError, Section
 from companion.mavlink.errors import LinkError, ParameterError
 from companion.preflight.evidence import Identity
-from companion.preflight.finding import Change, Finding
+from companion.preflight.finding import Finding, ParameterChange
 from companion.vehicle.link import Link
 
 ShortText = Annotated[str, Field(max_length=100)]
@@ -117,7 +117,7 @@ class Answer(Enum):
 Ask = Callable[[Finding], Awaitable[Answer]]
 
 
-class Outcome(NamedTuple):
+class ChangeOutcome(NamedTuple):
     """The outcome of a change.
 
     Attributes:
@@ -125,7 +125,7 @@ class Outcome(NamedTuple):
         refusal: Why it was not made; empty if it was made.
     """
 
-    change: Change
+    change: ParameterChange
     refusal: str = ""
 
 
@@ -138,7 +138,7 @@ async def apply_fixes(
     findings: Iterable[Finding],
     ask: Ask,
     undo: UndoFile,
-    report: Callable[[Outcome], None],
+    report: Callable[[ChangeOutcome], None],
 ) -> None:
     """Propose each change, and make those that the user accepts.
 
@@ -170,7 +170,7 @@ async def apply_fixes(
         report(await _set_and_read_back(link, change))
 
 
-async def restore(link: Link, undo: Undo, report: Callable[[Outcome], None]) -> None:
+async def restore(link: Link, undo: Undo, report: Callable[[ChangeOutcome], None]) -> None:
     """Restore the values of the undo file, the last change first.
 
     Args:
@@ -187,9 +187,9 @@ async def restore(link: Link, undo: Undo, report: Callable[[Outcome], None]) -> 
         try:
             now = float(await link.read_parameter(parameter))
         except ParameterError as error:
-            report(Outcome(Change(parameter, old, old, reboot=False), str(error)))
+            report(ChangeOutcome(ParameterChange(parameter, old, old, reboot=False), str(error)))
             continue
-        report(await _set_and_read_back(link, Change(parameter, now, old, reboot=False)))
+        report(await _set_and_read_back(link, ParameterChange(parameter, now, old, reboot=False)))
 
 
 def require_disarmed(link: Link) -> None:
@@ -211,16 +211,16 @@ def require_disarmed(link: Link) -> None:
         )
 
 
-async def _set_and_read_back(link: Link, change: Change) -> Outcome:
+async def _set_and_read_back(link: Link, change: ParameterChange) -> ChangeOutcome:
     """Set a parameter and read it back. Raises `LinkLost`."""
     try:
         await link.write_parameter(change.parameter, change.new)
         value_read = await link.read_parameter(change.parameter)
     except ParameterError as error:
-        return Outcome(change, str(error))
+        return ChangeOutcome(change, str(error))
     if isclose(value_read, change.new, rel_tol=_FLOAT32_RESOLUTION, abs_tol=_FLOAT32_RESOLUTION):
-        return Outcome(change)
-    return Outcome(
+        return ChangeOutcome(change)
+    return ChangeOutcome(
         change,
         f"{change.parameter}: {value_read:g} was read back instead of {change.new:g}; "
         "set it with a ground station, and check again",

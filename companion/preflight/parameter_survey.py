@@ -43,8 +43,8 @@ class Survey(NamedTuple):
     Attributes:
         values: Values by newest name.
         names: Name of each parameter in this autopilot, by newest name.
-        unread: Newest names of the parameters without a value that the autopilot did not report as
-            unknown, so it may have them.
+        unread: Newest names of the parameters without a value that the autopilot may have: it did
+            not report them as unknown.
         lossy: Whether the link lost frames during the survey, in either direction.
     """
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from companion.config import Config
 from companion.mavlink.stats import TOLERABLE_LOSS
 from companion.preflight.evidence import Evidence
-from companion.preflight.finding import Change, Finding, Key
+from companion.preflight.finding import Finding, Key, ParameterChange
 from companion.preflight.parameter_survey import Survey
 from companion.vehicle.parameter_rules import (
     CheckResult,
@@ -102,7 +102,7 @@ def _may_exist_unread(rule: ParameterRule, survey: Survey) -> bool:
 def _finding(found: ParameterFinding, name: str) -> Finding:
     change, fix = None, ""
     if found.set_to is not None:
-        change = Change(name, found.value, found.set_to, found.rule.reboot)
+        change = ParameterChange(name, found.value, found.set_to, found.rule.reboot)
         fix = f"set {name} to {found.set_to:g}"
         if found.rule.reboot:
             fix += " and restart the autopilot"

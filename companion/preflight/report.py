@@ -10,7 +10,7 @@ from rich.text import Text
 from companion.config import Config
 from companion.preflight.all_checks import not_accepted, overall_result, unsafe
 from companion.preflight.finding import Finding
-from companion.preflight.parameter_fixes import Outcome
+from companion.preflight.parameter_fixes import ChangeOutcome
 from companion.vehicle.parameter_rules import CheckResult
 
 _GROUP_TITLES = {
@@ -83,7 +83,7 @@ def _last_line(config: Config, findings: Sequence[Finding]) -> Text:
     return Text(f"nothing unsafe was found{ending}", style="bold green")
 
 
-def outcome_line(outcome: Outcome) -> str:
+def outcome_line(outcome: ChangeOutcome) -> str:
     """The outcome of a change, in one line."""
     change = outcome.change
     if outcome.refusal:
@@ -105,7 +105,7 @@ def as_dict(config: Config, findings: Sequence[Finding]) -> dict[str, Any]:
     }
 
 
-def outcome_as_dict(outcome: Outcome) -> dict[str, Any]:
+def outcome_as_dict(outcome: ChangeOutcome) -> dict[str, Any]:
     """The outcome of a change for JSON."""
     return {**outcome.change._asdict(), "refusal": outcome.refusal or None}
 

@@ -74,7 +74,7 @@ async def gather(
         parameters_read, achieved, identity = await asyncio.gather(
             survey(link, link.autopilot.parameters, before=known),
             link.measure_rates(granted, seconds),
-            _identity_and_texts(link) if thorough else identify(link),
+            _identity_and_texts(link) if thorough else request_identity(link),
         )
     counts = link.stats.by_message
     return Evidence(
@@ -90,17 +90,17 @@ async def gather(
         resets=listener.resets,
         identity=identity,
         stage=stage,
-        words=_warnings(link, began),
+        warnings=_warnings(link, began),
     )
 
 
 def _warnings(link: Link, since: float) -> tuple[str, ...]:
-    """The autopilot's texts of severity warning or worse since this time, s."""
+    """The autopilot's texts of severity warning or worse since this time, s on our clock."""
     texts = (text for text in link.state.texts if text.severity <= _WARNING_SEVERITY)
     return tuple(text.text for text in texts if text.time >= since)
 
 
-async def identify(link: Link) -> Identity:
+async def request_identity(link: Link) -> Identity:
     """Request AUTOPILOT_VERSION; return an empty `Identity` if it does not come.
 
     Raises:
@@ -125,7 +125,7 @@ async def _identity_and_texts(link: Link) -> Identity:
         # ArduPilot sends these texts by itself only every 30 s.
         with suppress(CommandRefused, LinkTimeout):
             await link.command(dialect.MAV_CMD_RUN_PREARM_CHECKS, retries=1)
-    return await identify(link)
+    return await request_identity(link)
 
 
 def _link_quality(link: Link, before: LinkStats, notices: tuple[str, ...]) -> LinkQuality:

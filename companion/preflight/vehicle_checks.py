@@ -101,7 +101,7 @@ def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
     if stage is Stage.AIRBORNE:  # the pre-arm checks no longer apply
         ready = ready._replace(prearm_good=True)
     missing = evidence.autopilot.not_ready(ready)
-    texts = "; ".join(dict.fromkeys(evidence.words))
+    texts = "; ".join(dict.fromkeys(evidence.warnings))
     if missing is not None:
         silent = evidence.awaited
         unsent = f", and does not send {', '.join(silent)} yet" if silent else ""
@@ -170,8 +170,8 @@ def attitude(_: Config, evidence: Evidence) -> Iterator[Finding]:
     if samples.unusable:
         yield Finding(
             Key.ATTITUDE,
-            UNSAFE if samples.unusable > _MAX_UNUSABLE_SHARE * samples.heard else INEFFECTIVE,
-            f"{samples.unusable} of {samples.heard} attitude samples are no unit quaternion of "
+            UNSAFE if samples.unusable > _MAX_UNUSABLE_SHARE * samples.received else INEFFECTIVE,
+            f"{samples.unusable} of {samples.received} attitude samples are no unit quaternion of "
             "finite numbers",
             "they are not answered, and if that lasts, control is given back",
             "wait until the estimator has settled; if this goes on, do not fly",

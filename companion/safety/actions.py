@@ -23,7 +23,7 @@ class Action(Enum):
     LAND = "land"
     """Command the autopilot to land, and end offboard control."""
     LISTEN = "listen"
-    """Stop sending setpoints; if the vehicle still obeys us once it is heard, command a hold."""
+    """Stop sending setpoints; if the vehicle is heard again and still obeys us, command a hold."""
     RELEASE = "release"
     """Stop sending setpoints: the pilot or the autopilot's failsafe flies the vehicle."""
 

@@ -1,4 +1,7 @@
-"""Judges of the autopilot's own status: arming, failsafe, battery, GPS and estimator."""
+"""Judges of the autopilot's own status: arming, failsafe, battery, GPS and estimator.
+
+The docstring of each judge states its breach.
+"""
 
 from math import degrees
 
@@ -8,7 +11,7 @@ from companion.vehicle.records import gps_fault, outdated
 
 ATTITUDE_FLAG, VELOCITY_FLAGS = 0x1, 0x2 | 0x4
 HORIZONTAL_POSITION_FLAGS = 0x8 | 0x10
-"""Bits of ESTIMATOR_STATUS_FLAGS; the position is valid with either bit of the last."""
+"""Bits of ESTIMATOR_STATUS_FLAGS. The horizontal position is valid if either of its bits is set."""
 
 
 def disarmed(snapshot: Snapshot, _: bool) -> str | None:
@@ -76,7 +79,7 @@ def estimator_flags(snapshot: Snapshot, _: bool) -> str | None:
 
 
 def any_estimator_reset(snapshot: Snapshot, _: bool) -> str | None:
-    """The estimator was reset in the last 30 s; only a warning, as references move with it."""
+    """The estimator was reset in the last 30 s; only a warning: references move with a reset."""
     found = snapshot.resets
     if found.recent == 0:
         return None

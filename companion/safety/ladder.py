@@ -26,7 +26,7 @@ class SafetyLadder:
     """Escalates to the action of the most severe breach, and never de-escalates.
 
     The action HOLD gives up the maneuver. If all breaches with this action end within `hold_time`,
-    the vehicle lands. Otherwise the most severe action `then` of their monitors follows.
+    the vehicle lands. Otherwise the most severe `Monitor.then` of those that last follows.
 
     Args:
         monitors: the table; among equally severe breaches the first row decides.
@@ -34,9 +34,9 @@ class SafetyLadder:
 
     Attributes:
         note: called with a message when an alarm is raised or ended.
-        on_change: called at the same time with: whether it is raised, the name of the monitor, the
-            reason, the action; reason and action are empty if it has ended.
-        breaches: descriptions of all breaches so far -> name of the monitor.
+        on_change: called at the same time with: whether the alarm is raised, the name of the
+            monitor, the reason, the action; reason and action are empty if the alarm has ended.
+        breaches: name of the monitor by description of the breach, for all breaches so far.
     """
 
     def __init__(self, monitors: Sequence[Monitor], hold_time: float) -> None:

@@ -1,4 +1,7 @@
-"""Judges of the data flow: silence, the vehicle's clock, the link, and this computer."""
+"""Judges of the data flow: silence, the vehicle's clock, the link, and this computer.
+
+The docstring of each judge states its breach.
+"""
 
 from companion.control.loop_record import Unanswered
 from companion.safety.monitor import Judge, minimum_with_hysteresis, with_hysteresis
@@ -17,7 +20,10 @@ def silence(limit: float, *, heard: bool) -> Judge:
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
         now, control = snapshot.now, snapshot.control
-        if now - control.answered <= limit or (now - control.heard < UNHEARD_S) is not heard:
+        if (
+            now - control.last_answer <= limit
+            or (now - control.last_heard < UNHEARD_S) is not heard
+        ):
             return None
         return _silence_cause(now, control, limit)
 
@@ -25,14 +31,14 @@ def silence(limit: float, *, heard: bool) -> Judge:
 
 
 def _silence_cause(now: float, control: Control, limit: float) -> str:
-    if control.stalled > _STALL_SHARE * (now - control.answered):
+    if control.stalled > _STALL_SHARE * (now - control.last_answer):
         # Data that came during the stall were read late, so they only seem old.
         still = control.stalled
         return f"this program did not run for {still:.1f} s (computer overloaded or suspended)"
-    if now - control.sampled > limit:
+    if now - control.last_sample > limit:
         if control.attitude_not_finite:
             return "the vehicle's attitude is not finite (NaN or infinity)"
-        return f"no attitude from the vehicle for {now - control.sampled:.1f} s"
+        return f"no attitude from the vehicle for {now - control.last_sample:.1f} s"
     reason = control.reason
     if reason in (Unanswered.NO_TARGET, Unanswered.OLD_TARGET):
         return _missing_command_cause(now, control, limit)
@@ -40,7 +46,7 @@ def _silence_cause(now: float, control: Control, limit: float) -> str:
 
 
 def _missing_command_cause(now: float, control: Control, limit: float) -> str:
-    if now - control.placed > limit:
+    if now - control.last_position > limit:
         if control.position_not_finite:
             return "the vehicle's position is not finite (NaN or infinity)"
         return "no position from the vehicle"
@@ -87,8 +93,8 @@ def round_trip(most: float) -> Judge:
 def late_setpoints(stale: float) -> Judge:
     """Each round trip of the last 0.7 s takes longer than 1.5 times `stale`, s.
 
-    A sample may be `stale` old when it is answered. If its setpoint takes as long again, the
-    vehicle tilts in growing swings, while all telemetry still looks good.
+    `stale` is the largest age of a sample that is answered. If its setpoint takes as long again,
+    the vehicle tilts in growing swings, while all telemetry still looks good.
     """
     most = 1.5 * stale
 

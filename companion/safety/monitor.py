@@ -29,7 +29,7 @@ def minimum_with_hysteresis(limit: float, raised: bool) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Monitor:
-    """A row of the table.
+    """One monitor: a row of `companion.safety.table`.
 
     Attributes:
         name: name in the documentation and in messages.

@@ -1,5 +1,7 @@
 """Judges of the motion: tilt, body rates, speed, tracking error, thrust, and the fence.
 
+The docstring of each judge states its breach.
+
 The judge `braking` acts before the vehicle leaves the fence. It judges where the vehicle would stop
 with the deceleration `safety.braking_m_s2`, if it still accelerates for the reaction time
 (`Fence.stop`).
@@ -89,7 +91,7 @@ def thrust(lowest: float, highest: float) -> Judge:
 
 
 def outside(fence: Fence) -> Judge:
-    """The vehicle has left the fence, or a fence in latitude and longitude has no known place."""
+    """The vehicle is outside the fence, or the place of a fence in degrees is unknown."""
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
         motion = snapshot.motion

@@ -11,8 +11,8 @@ from companion.vehicle.records import Battery, Estimator, Gps
 from companion.vehicle.uplink import Uplink
 
 UNHEARD_S = 0.3
-"""Time without a frame, s, after which the vehicle counts as not heard: a takeover would not be
-noticed either."""
+"""Time without a frame, s, after which the vehicle counts as not heard. From then on a takeover
+could go unnoticed."""
 
 
 class Autopilot(NamedTuple):
@@ -30,16 +30,16 @@ class Motion(NamedTuple):
     """Motion of the vehicle, in the frame without estimator resets.
 
     Attributes:
-        q: attitude as the autopilot reports it, with estimator resets, or None.
-        body_rates: rad/s.
+        q: attitude (w, x, y, z) as the autopilot reports it, with estimator resets, or None.
+        body_rates: measured rates about the body axes, rad/s.
         offset: position relative to the fence's centre, which is usually where control began, m, or
             None.
         velocity: m/s.
         height: height above home, m, or None; in the autopilot's frame, with estimator resets.
         tracking_error: distance from the reference, m; None without a reference.
-        thrust: thrust last sent, 0..1, or None.
+        thrust: thrust last sent, 0..1; None while guidance idles.
         origin: latitude and longitude of the fence's centre, or None if they are unknown.
-        acceleration: horizontal acceleration, m/s², NED.
+        acceleration: estimated horizontal acceleration, m/s², NED.
     """
 
     q: Quaternion | None = None
@@ -54,31 +54,31 @@ class Motion(NamedTuple):
 
 
 class Control(NamedTuple):
-    """When data last arrived and a setpoint was last sent, and why none is sent at present.
+    """When data last arrived, which sample was last answered, and why the newest one is not.
 
     Times are in s of event-loop time. A sample is answered when a setpoint is sent for it.
 
     Attributes:
-        answered: arrival of the last answered sample.
-        sampled: arrival of the last usable attitude sample.
+        last_answer: arrival of the last answered sample.
+        last_sample: arrival of the last usable attitude sample.
         attitude_not_finite: whether the newest attitude was refused for a NaN or infinity.
         reason: why the newest sample is unanswered, or None.
-        placed: arrival of the last position that was newer than all before.
+        last_position: arrival of the last position that was newer than all before.
         position_not_finite: whether the newest position was refused for a NaN or infinity.
-        heard: when the arrival of a frame of any kind from the vehicle was last noticed.
+        last_heard: when the arrival of a frame of any kind from the vehicle was last noticed.
         position_fresh: whether the newest position is fresh.
         clock_change: latest jump, stop or restart of the vehicle's clock since control began, in
             words, or None.
         stalled: time for which this program did not run since the last answer, s.
     """
 
-    answered: float = inf
-    sampled: float = inf
+    last_answer: float = inf
+    last_sample: float = inf
     attitude_not_finite: bool = False
     reason: Unanswered | None = None
-    placed: float = inf
+    last_position: float = inf
     position_not_finite: bool = False
-    heard: float = inf
+    last_heard: float = inf
     position_fresh: bool = True
     clock_change: str | None = None
     stalled: float = 0.0

@@ -37,7 +37,7 @@ _RESET_COUNTING_TIME = 30.0
 
 
 class _Counters(NamedTuple):
-    """Counters at one call of `listen`; `late` is the delay of that call, s."""
+    """Counters at one call of `listen`; `late`: by how much that call was too late, s."""
 
     now: float
     frames: int
@@ -104,7 +104,7 @@ class SnapshotBuilder:
         return FenceCentre(minus(self._fence_centre_ned, back), self._fence_place)
 
     @property
-    def origin_ned(self) -> Vector | None:
+    def fence_centre_ned(self) -> Vector | None:
         """Centre of the fence in the frame without estimator resets, m NED; None: not known.
 
         It is where control began, unless `begin` got another centre.
@@ -178,7 +178,7 @@ class SnapshotBuilder:
     def stall_time(self, since: float) -> float:
         """Total time, s, of the stalls that ended after `since`, s of event-loop time.
 
-        Only stalls of the last second count, and the latest one.
+        Stalls that ended more than about a second ago are forgotten.
         """
         return sum(counted.late for counted in self._counted if counted.now > since)
 

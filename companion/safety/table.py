@@ -120,5 +120,5 @@ def _link_monitors(config: Config) -> tuple[Monitor, ...]:
 
 
 def fence_of(config: Config) -> Fence:
-    """The fence from the sections `limits` and `safety`; it allows for a late estimate."""
+    """The fence of `limits` and `safety`, for a motion known `_ESTIMATE_DELAY` too late."""
     return replace(config.fence, estimate_delay=_ESTIMATE_DELAY)

@@ -180,7 +180,7 @@ def test_the_vehicles_clock_goes_on_as_ours_does(samples, expected):
             {Key.SECOND_COMPANION: INEFFECTIVE},
         ),
         (OtherNodes(steering=frozenset({(255, 190)})), {Key.OTHER_SETPOINTS: UNSAFE}),
-        (OtherNodes(echo=True), {Key.OTHER_SETPOINTS: UNSAFE}),
+        (OtherNodes(foreign_target=True), {Key.OTHER_SETPOINTS: UNSAFE}),
     ],
 )
 def test_others_on_the_link(other_nodes, expected):

@@ -9,7 +9,7 @@ import yaml
 from companion.files.yaml_file import ConfigError, load
 from companion.mavlink.errors import ParameterRefused, UnknownParameter
 from companion.preflight.evidence import Identity
-from companion.preflight.finding import Change, Finding
+from companion.preflight.finding import Finding, ParameterChange
 from companion.preflight.parameter_fixes import (
     Answer,
     Undo,
@@ -51,7 +51,7 @@ class FakeLink:
 
 
 def finding(parameter, old, new):
-    change = Change(parameter, old, new, reboot=False)
+    change = ParameterChange(parameter, old, new, reboot=False)
     return Finding(parameter, CheckResult.UNSAFE, f"{parameter} is {old:g}", change=change)
 
 

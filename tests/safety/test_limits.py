@@ -190,7 +190,12 @@ def test_lost_velocity_and_lost_position_are_told_together():
 
 def silent(reason=None, **changes):
     """Unanswered for 0.75 s, 0.5 s of them without an attitude: all exact in binary."""
-    stages = {"answered": NOW - 0.75, "sampled": NOW - 0.5, "placed": NOW - 0.5, "reason": reason}
+    stages = {
+        "last_answer": NOW - 0.75,
+        "last_sample": NOW - 0.5,
+        "last_position": NOW - 0.5,
+        "reason": reason,
+    }
     return at(control=Control(**{**stages, **changes}))
 
 
@@ -202,12 +207,12 @@ def silent(reason=None, **changes):
         (silent(Unanswered.LATE, stalled=0.375), Unanswered.LATE.words),
         (silent(Unanswered.OLD_TARGET), Unanswered.OLD_TARGET.words),
         (
-            silent(sampled=NOW - 0.6, attitude_not_finite=True),
+            silent(last_sample=NOW - 0.6, attitude_not_finite=True),
             "the vehicle's attitude is not finite (NaN or infinity)",
         ),
-        (silent(Unanswered.NO_TARGET, placed=NOW - 0.6), "no position from the vehicle"),
+        (silent(Unanswered.NO_TARGET, last_position=NOW - 0.6), "no position from the vehicle"),
         (
-            silent(Unanswered.NO_TARGET, placed=NOW - 0.6, position_not_finite=True),
+            silent(Unanswered.NO_TARGET, last_position=NOW - 0.6, position_not_finite=True),
             "the vehicle's position is not finite (NaN or infinity)",
         ),
         (
@@ -222,10 +227,10 @@ def test_silence_tells_the_stage_that_failed_for_longer_than_its_limit(snapshot,
 
 def test_exactly_the_limit_of_silence_is_none_and_a_vehicle_not_heard_cannot_be_asked():
     assert silence(0.75, heard=True)(silent(), False) is None
-    unheard = silent(heard=NOW - 0.75)
+    unheard = silent(last_heard=NOW - 0.75)
     assert silence(0.5, heard=True)(unheard, False) is None
     assert silence(0.5, heard=False)(unheard, False)
-    at_the_limit = Snapshot(0.3, control=Control(answered=-1.0, heard=0.0))
+    at_the_limit = Snapshot(0.3, control=Control(last_answer=-1.0, last_heard=0.0))
     assert silence(0.5, heard=False)(at_the_limit, False)
     verdict = SafetyLadder(monitors(Config()), 1.0).step(unheard)
     assert (verdict.action, verdict.stream) == (Action.LISTEN, Stream.STOPS)

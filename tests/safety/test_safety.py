@@ -59,16 +59,22 @@ def control(**changes):
 
 
 def unanswered(reason, **changes):
-    return control(answered=OLD, reason=reason, **changes)
+    return control(last_answer=OLD, reason=reason, **changes)
 
 
 OLD = NOW - 0.6
-SILENT = {"answered": OLD, "sampled": OLD}
+SILENT = {"last_answer": OLD, "last_sample": OLD}
 WARN, HOLD, HAND_BACK, LAND, LISTEN, RELEASE = Action
 STALLED = "this program did not run for 0.4 s (computer overloaded or suspended)"
 TILTED = "the vehicle tilts by 57°, more than limits.max_tilt_deg + safety.tilt_margin_deg = 55"
 BREACHES = [
-    ("unheard", control(**SILENT, heard=OLD), LISTEN, 0.0, "no attitude from the vehicle for 0.6"),
+    (
+        "unheard",
+        control(**SILENT, last_heard=OLD),
+        LISTEN,
+        0.0,
+        "no attitude from the vehicle for 0.6",
+    ),
     ("silence", control(**SILENT), HAND_BACK, 0.0, "no attitude"),
     ("silence", unanswered(Unanswered.NOT_NEWER), HAND_BACK, 0.0, "clock stands still"),
     ("silence", unanswered(Unanswered.AHEAD), HAND_BACK, 0.0, "stamped far ahead"),
@@ -76,8 +82,14 @@ BREACHES = [
     ("silence", unanswered(Unanswered.LATE, stalled=0.2), HAND_BACK, 0.0, "stale_ms"),
     ("silence", unanswered(Unanswered.LATE, stalled=0.4), HAND_BACK, 0.0, STALLED),
     ("silence", unanswered(Unanswered.AWAITING_MODE, stalled=0.4), HAND_BACK, 0.0, STALLED),
-    ("unheard", control(**SILENT, heard=OLD, stalled=0.4), LISTEN, 0.0, STALLED),
-    ("silence", unanswered(Unanswered.OLD_TARGET, placed=OLD), HAND_BACK, 0.0, "no position"),
+    ("unheard", control(**SILENT, last_heard=OLD, stalled=0.4), LISTEN, 0.0, STALLED),
+    (
+        "silence",
+        unanswered(Unanswered.OLD_TARGET, last_position=OLD),
+        HAND_BACK,
+        0.0,
+        "no position",
+    ),
     (
         "silence",
         unanswered(Unanswered.OLD_TARGET, position_fresh=False),
