@@ -160,7 +160,7 @@ def test_how_old_attitude_is_when_it_arrives(age, other_clock, expected):
         ({"clock_rate": 0.97}, {Key.CLOCK: UNSAFE}),
         ({"clock_rate": 0.97, "longest_pause": 0.1}, {Key.CLOCK: INEFFECTIVE}),
         ({"clock_change": "the vehicle's clock jumped"}, {Key.CLOCK: UNSAFE}),
-        ({"heard": 9, "clock_rate": 0.5}, {}),
+        ({"received": 9, "clock_rate": 0.5}, {}),
         ({"not_newer": 40}, {Key.CLOCK: INEFFECTIVE}),
         ({"not_newer": 41}, {Key.CLOCK: UNSAFE}),
     ],

@@ -111,9 +111,9 @@ def test_pauses_and_stamps_of_the_samples():
         assert listener.samples.clock_rate is None
         for stamp in (0, 100, 100, 90, *(400 + 200 * n for n in range(1, 8))):
             callbacks["ATTITUDE_QUATERNION"](attitude(stamp))
-    heard, pause, not_newer, rate, age, change, unusable, even = listener.samples
+    received, pause, not_newer, rate, age, change, unusable, even = listener.samples
     assert abs(even - 10 / 1.2) < 1e-9
     assert (age, change) == (None, "")
-    assert (heard, not_newer, unusable) == (11, 2, 0)
+    assert (received, not_newer, unusable) == (11, 2, 0)
     assert abs(pause - 0.3) < 1e-9
     assert abs(rate - 1.8 / 1.2) < 1e-9
