@@ -14,7 +14,7 @@ from companion.attitude import PLANNER_NAMES
 from companion.cli.exit_codes import EXIT_FAILURE, EXIT_OK
 from companion.cli.terminal import read_line
 from companion.config import Config
-from companion.config.files import assigned, changed, load
+from companion.config.files import changed, load, parse_assignments
 from companion.config.known_drag import KnownDrag, of_vehicle
 from companion.control.expected_response import expected_response, hold_sentence
 from companion.files.yaml_file import ConfigError
@@ -40,7 +40,7 @@ from companion.preflight.parameter_fixes import (
     restore,
 )
 from companion.preflight.parameter_survey import survey
-from companion.preflight.report import as_dict, lists, outcome_as_dict, outcome_line
+from companion.preflight.report import as_dict, findings_lists, outcome_as_dict, outcome_line
 from companion.preflight.session import PreflightSession, open_session, request_identity
 from companion.vehicle.link import Link
 from companion.vehicle.parameter_rules import CheckResult
@@ -82,7 +82,7 @@ def _with_options(config: Config, options: argparse.Namespace) -> Config:
         MissingExtraError: the package of the link's backend is not installed.
         SigningError: the signing key cannot be used.
     """
-    config = changed(config, assigned(options.set), "--set")
+    config = changed(config, parse_assignments(options.set), "--set")
     link: dict[str, Any] = {"endpoint": options.endpoint} if options.endpoint else {}
     if options.lockstep:
         link["lockstep"] = True
@@ -132,7 +132,7 @@ class _DoctorRun:
             try:
                 evidence = await vehicle.gather(wait)
             except (LinkTimeout, LinkLost) as error:
-                return self._report(vehicle.unanswered(error))
+                return self._report(vehicle.unanswered_findings(error))
             drag = of_vehicle(config, config.recording.directory, evidence.identity.uid)
             flown, refusals = _maneuvers(config, drag)
             evidence = replace(evidence, maneuvers=flown, known_drag=drag)
@@ -219,7 +219,7 @@ class _DoctorRun:
                 return answer
 
     def _report(self, findings: list[Finding]) -> int:
-        self._console.print(lists(self._config, findings))
+        self._console.print(findings_lists(self._config, findings))
         self.result = as_dict(self._config, findings)
         return EXIT_OK if self.result["result"] == "ok" else EXIT_FAILURE
 

@@ -14,7 +14,7 @@ from companion.cli.helper_process import environment, helper_process
 from companion.cli.signals import fly_interruptibly
 from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
-from companion.config.files import assigned, changed, load
+from companion.config.files import changed, load, parse_assignments
 from companion.extras import MissingExtraError
 from companion.files.os_errors import reason_of
 from companion.files.yaml_file import ConfigError
@@ -59,7 +59,7 @@ def with_options(config: Config, options: argparse.Namespace, planner: str | Non
     if options.arm:
         flight["arm"] = True
     changes = {"link": link, "flight": flight, "planner": {"name": planner} if planner else {}}
-    flown_config = changed(config, assigned(options.set), "--set")
+    flown_config = changed(config, parse_assignments(options.set), "--set")
     flown_config = changed(flown_config, changes, "the command line")
     if options.slow_down and "trajectory" not in flown_config.flight.maneuvers:
         raise ConfigError("--slow-down needs a trajectory; add --trajectory FILE")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from companion.cli.exit_codes import EXIT_FAILURE, EXIT_OK
 from companion.cli.output_file import require_writable
-from companion.config.files import assigned, changed, load
+from companion.config.files import changed, load, parse_assignments
 from companion.files.yaml_file import ConfigError
 from companion.recording.flight_record import FlightRecord, read_flight
 
@@ -91,7 +91,7 @@ def replay(options: argparse.Namespace) -> int:
     own_config = options.config is None and not options.set
     config = load(options.config or options.folder / "config.yaml")
     if options.set:
-        config = changed(config, assigned(options.set), "--set")
+        config = changed(config, parse_assignments(options.set), "--set")
     replayed = Replay(record, config)
     samples = replayed.run()
     whole = _is_whole(record)

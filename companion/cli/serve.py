@@ -12,7 +12,7 @@ from companion.cli.helper_process import environment, helper_process
 from companion.cli.signals import SECOND_CTRL_C_AFTER, hangup_signal
 from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
-from companion.config.files import assigned, changed, load
+from companion.config.files import changed, load, parse_assignments
 from companion.extras import require
 from companion.files.yaml_file import ConfigError
 from companion.flight.observer import SeveralObservers
@@ -110,7 +110,7 @@ def _with_options(config: Config, options: argparse.Namespace) -> Config:
         MissingExtraError: an extra that the configuration needs is not installed.
         SigningError: the signing key cannot be used.
     """
-    served_config = changed(config, assigned(options.set), "--set")
+    served_config = changed(config, parse_assignments(options.set), "--set")
     link = {"endpoint": options.endpoint} if options.endpoint else {}
     clients = {"clients": options.client} if options.client else {}
     served_config = changed(served_config, {"link": link, "serve": clients}, "the command line")

@@ -198,7 +198,7 @@ def changed(config: Config, changes: Mapping[str, Mapping[str, Any]], name: str)
     return yaml_file.validated(data, name, Config)
 
 
-def assigned(texts: Sequence[str]) -> dict[str, dict[str, Any]]:
+def parse_assignments(texts: Sequence[str]) -> dict[str, dict[str, Any]]:
     """Parse texts such as `limits.max_tilt_deg=20`, with values in YAML, to changes for `changed`.
 
     Raises:

@@ -87,7 +87,7 @@ class PreflightChecks:
                 self._granted,
                 _COUNTING_TIME,
                 stage=stage,
-                known=None if before is None else before.survey,
+                earlier_survey=None if before is None else before.survey,
             )
             self._evidence, self._gathered_at = evidence, self._clock()
             self._same_vehicle.note_identity(evidence.identity)

@@ -59,8 +59,8 @@ async def survey(
     rules: Iterable[ParameterRule],
     *,
     before: Survey | None = None,
-    at_first: RetryPolicy = _FIRST_ROUND,
-    once_more: RetryPolicy = _SECOND_ROUND,
+    first_round: RetryPolicy = _FIRST_ROUND,
+    second_round: RetryPolicy = _SECOND_ROUND,
 ) -> Survey:
     """Read the rules' parameters, several at a time; ask again if the link loses frames.
 
@@ -73,8 +73,8 @@ async def survey(
         rules: Rules of its autopilot.
         before: An earlier survey of the same vehicle. Parameters without a value in it are not
             requested again, because each costs seconds on a link that loses frames.
-        at_first: Policy of the first round of requests.
-        once_more: Policy of the second round.
+        first_round: Policy of the first round of requests.
+        second_round: Policy of the second round.
 
     Raises:
         LinkLost: The connection was lost.
@@ -87,10 +87,10 @@ async def survey(
         requests.leave_out(
             name for rule in rules for name in rule.names if name != before.names[rule.name]
         )
-    await requests.ask(rules, at_first)
+    await requests.ask(rules, first_round)
     # An autopilot that answered nothing at all is a finding of its own.
     if requests.values and requests.lossy:
-        await requests.ask(requests.unread(rules), once_more)
+        await requests.ask(requests.unread(rules), second_round)
     return Survey(
         requests.values,
         requests.names,

@@ -29,7 +29,7 @@ _RESULT_WORDS = {
 }
 
 
-def lists(config: Config, findings: Sequence[Finding]) -> RenderableType:
+def findings_lists(config: Config, findings: Sequence[Finding]) -> RenderableType:
     """A list for each result that occurred, the safe ones first, and a summary line.
 
     The worst findings stand last, beside the summary line, where a terminal shows them.

@@ -50,9 +50,9 @@ async def gather(
     seconds: float,
     *,
     stage: Stage = Stage.GROUND,
-    thorough: bool = False,
+    prearm_checks: bool = False,
     notices: Sequence[str] = (),
-    known: Survey | None = None,
+    earlier_survey: Survey | None = None,
 ) -> Evidence:
     """Listen for `seconds`, and read the parameters at the same time.
 
@@ -61,9 +61,9 @@ async def gather(
         granted: The message rates that were requested and granted, by message.
         seconds: Time for counting messages, s.
         stage: The next step of the vehicle.
-        thorough: Also run the pre-arm checks, so that the autopilot says what forbids arming.
+        prearm_checks: Also run the autopilot's pre-arm checks, so that it says what forbids arming.
         notices: Notices of the link; they are read at the end.
-        known: The same vehicle's parameters, if they were read before.
+        earlier_survey: The same vehicle's parameters, if they were read before.
 
     Raises:
         LinkLost: The connection was lost.
@@ -72,9 +72,9 @@ async def gather(
     before, began = replace(link.stats), loop.time()
     with LinkListener(link, loop.time) as listener:
         parameters_read, achieved, identity = await asyncio.gather(
-            survey(link, link.autopilot.parameters, before=known),
+            survey(link, link.autopilot.parameters, before=earlier_survey),
             link.measure_rates(granted, seconds),
-            _identity_and_texts(link) if thorough else request_identity(link),
+            _identity_and_texts(link) if prearm_checks else request_identity(link),
         )
     counts = link.stats.by_message
     return Evidence(
@@ -165,12 +165,12 @@ class PreflightSession:
         try:
             await self.link.wait_connected(self._config.flight.connect_timeout_s)
         except LinkTimeout as error:
-            return self.unanswered(error)
+            return self.unanswered_findings(error)
         except UnsupportedAutopilot as error:
             return [_from_error(Key.SUPPORTED, CheckResult.UNSAFE, error)]
         return []
 
-    def unanswered(self, error: LinkError) -> list[Finding]:
+    def unanswered_findings(self, error: LinkError) -> list[Finding]:
         """Findings about a vehicle that does not answer, the likely cause first."""
         hints = signing_findings(self._notices, CheckResult.NOT_CONNECTED)
         state = self.link.state
@@ -192,8 +192,8 @@ class PreflightSession:
         """Request telemetry, wait up to `ready_within` s for readiness, and listen.
 
         Raises:
-            CommandTimeout: The vehicle does not answer commands; see `unanswered`.
-            LinkLost: The connection was lost; see `unanswered`.
+            CommandTimeout: The vehicle does not answer commands; see `unanswered_findings`.
+            LinkLost: The connection was lost; see `unanswered_findings`.
         """
         link = self.link
         granted = await link.set_rates(wanted_rates(self._config, link), window_s=0.1)
@@ -201,7 +201,9 @@ class PreflightSession:
             async with asyncio.timeout(ready_within):
                 while self._is_waiting():  # noqa: ASYNC110 - telemetry sets no events
                     await asyncio.sleep(_POLL_PERIOD)
-        return await gather(link, granted, _LISTENING_TIME, thorough=True, notices=self._notices)
+        return await gather(
+            link, granted, _LISTENING_TIME, prearm_checks=True, notices=self._notices
+        )
 
     def _is_waiting(self) -> bool:
         state = self.link.state

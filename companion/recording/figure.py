@@ -1,4 +1,4 @@
-"""A flight as a picture: response, straightness, ground track and history; extra `plot`."""
+"""A flight as a picture: response, straightness, ground track, history. Needs the extra `plot`."""
 
 from collections.abc import Callable
 from math import inf

@@ -19,7 +19,7 @@ _MOST_SPEED = 1000.0
 """Upper bound of a learned top speed, m/s."""
 
 
-class Learned(NamedTuple):
+class LearnedDrag(NamedTuple):
     """Drag of a vehicle, learned in earlier flights.
 
     Attributes:
@@ -44,7 +44,7 @@ class LearnedFile:
     def __init__(self, directory: Path, uid: str) -> None:
         self.path = directory / f"learned-{uid}.json"
 
-    def load(self) -> tuple[Learned | None, str | None]:
+    def load(self) -> tuple[LearnedDrag | None, str | None]:
         """The learned values, and a warning if the file cannot be read. Never raises."""
         try:
             return _parsed(self.path), None
@@ -73,7 +73,7 @@ class LearnedFile:
         write_whole(self.path, text + "\n")
 
 
-def newest_learned(directory: Path) -> Learned | None:
+def newest_learned(directory: Path) -> LearnedDrag | None:
     """Learned drag of the vehicle whose file in `directory` was saved last. Never raises.
 
     None: there is no file, the newest is damaged, or there are more than `_MOST_FILES` files.
@@ -85,9 +85,9 @@ def newest_learned(directory: Path) -> Learned | None:
         return None
 
 
-def _parsed(path: Path) -> Learned:
+def _parsed(path: Path) -> LearnedDrag:
     values = json.loads(read_text(path, _MOST_BYTES))
-    return Learned(
+    return LearnedDrag(
         Drag(
             _number(values["drag_per_s"], _MOST_LINEAR),
             _number(values["quadratic_drag_per_m"], _MOST_QUADRATIC),

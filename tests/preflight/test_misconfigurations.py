@@ -139,7 +139,9 @@ async def _visit(folder, mock):
             mock.inject(fault)
             # Not before what was known is replaced: the autopilot tells its checks at 5 Hz.
             await asyncio.sleep(0.25)
-            spoilt = run_checks(config, await gather(link, evidence.streams, 0.7, thorough=True))
+            spoilt = run_checks(
+                config, await gather(link, evidence.streams, 0.7, prearm_checks=True)
+            )
             found[str(fault)] = amiss(spoilt)
             mock.clear_faults()
             if fault["kind"] == "refuse_arming":

@@ -27,7 +27,7 @@ def test_an_old_version_answers_to_the_old_names():
     async def scene():
         async with linked() as (link, vehicle):
             vehicle.answers["PARAM_REQUEST_READ"] = answer
-            return await survey(link, rules, at_first=RetryPolicy(0.05, 1))
+            return await survey(link, rules, first_round=RetryPolicy(0.05, 1))
 
     values, names, untold, lossy = asyncio.run(scene())
     assert (untold, lossy) == ({"ARMING_SKIPCHK"}, False)
@@ -101,8 +101,8 @@ class Lossy:
                 vehicle.answers["PARAM_REQUEST_READ"] = lambda request: self.answer(
                     vehicle, request
                 )
-                patience = {"at_first": RetryPolicy(0.05, 2), "once_more": RetryPolicy(0.05, 3)}
-                return await survey(link, rules, **patience)
+                first, second = RetryPolicy(0.05, 2), RetryPolicy(0.05, 3)
+                return await survey(link, rules, first_round=first, second_round=second)
 
         return asyncio.run(scene())
 

@@ -7,7 +7,7 @@ from rich.console import Console
 from companion.config import Config
 from companion.config.files import changed
 from companion.preflight.finding import Finding, Key
-from companion.preflight.report import lists
+from companion.preflight.report import findings_lists
 from companion.vehicle.parameter_rules import CheckResult
 
 FINE = Finding(Key.BATTERY, CheckResult.SAFE, "battery at 90 %", source="BATTERY_STATUS")
@@ -17,7 +17,7 @@ BAD = Finding(Key.LOSS, CheckResult.UNSAFE, "20 % lost " * 9, "late", "a better 
 
 def shown(findings: list[Finding], config: Config | None = None) -> list[str]:
     console = Console(width=80, record=True, file=StringIO())
-    console.print(lists(Config() if config is None else config, findings))
+    console.print(findings_lists(Config() if config is None else config, findings))
     return [line.rstrip() for line in console.export_text().splitlines()]
 
 
