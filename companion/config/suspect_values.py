@@ -14,7 +14,7 @@ _USUAL_VALUES = {"_deg_s2": 1000.0, "_ms": 50.0}
 _MAX_SUSPECT_SHARE = 1.0 / 20.0
 """A value may be in the wrong unit if it is below this share of the usual value."""
 _MIN_MEANT_SHARE = 1.0 / 5.0
-"""Second condition for this: converted from the other unit, it is above this share of the usual."""
+"""Second condition: converted from the other unit, the value is above this share of the usual."""
 
 
 class SuspectValue(NamedTuple):

@@ -38,7 +38,7 @@ _SMALLEST_NOTED_DETOUR = 0.05
 _SHORTEST_RAMP = 0.05
 """Shortest extra duration by ramps that a note reports, s."""
 _MOST_ROWS_COMPARED = 2000
-"""Tables with more rows are not compared with the path: they are dense, so it follows them."""
+"""Tables with more rows are not compared with the path, because their rows are dense."""
 
 
 class _Shape(Protocol):

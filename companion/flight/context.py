@@ -45,8 +45,8 @@ class FlightContext:
         known_drag: what was known of the vehicle's drag when the checks ended.
         detail: what the running phase waits for, shown to the user.
         setpoint_rate_hz: rate of setpoints over the maneuvers, Hz.
-        heartbeat_limit: with an older report the mode counts as unknown, s; the checks set this
-            limit from the heartbeat rate.
+        heartbeat_limit: largest age of the last report of the mode, s, before it counts as unknown;
+            the checks set this limit from the heartbeat rate.
         mode_at_checks: the mode when the checks ended; another one before arming is a takeover.
         must_disarm: whether an end on the ground disarms: we commanded arming or the take-off.
         fence_centre: centre of the fence in an earlier flight, if the vehicle has not been disarmed

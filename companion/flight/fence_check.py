@@ -26,7 +26,7 @@ _MAX_MOMENTS = 4000
 
 @dataclass(frozen=True, slots=True)
 class FenceCheck:
-    """Checks a motion against the fence; its positions are relative to where control begins.
+    """Checks a motion, whose positions are relative to where control begins, against the fence.
 
     Attributes:
         fence: the fence that the monitors watch in flight.
@@ -70,7 +70,7 @@ class FenceCheck:
         return float(time), breach
 
     def _candidate_indices(self, stops: Floats) -> list[int]:
-        """Indices of the stops to judge: farthest, highest and lowest; for a polygon many more."""
+        """Indices of stops to judge: farthest, highest, lowest; for a polygon, along the path."""
         distance = np.hypot(stops[:, 0], stops[:, 1])
         indices = {int(distance.argmax()), int(stops[:, 2].argmin()), int(stops[:, 2].argmax())}
         if self.fence.polygon or (self.fence.places and self.origin):

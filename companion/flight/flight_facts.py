@@ -84,7 +84,7 @@ def facts_of(
 
 
 def _silence_duration(context: FlightContext, now: float) -> float | None:
-    """How long at `now` the vehicle was silent, or its heartbeat is overdue, s; None: neither."""
+    """Time since the last heartbeat if it is overdue, else since the last frame, s; None: heard."""
     heartbeat = context.link.state.heartbeat
     if heartbeat is None:
         return None

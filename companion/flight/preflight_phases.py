@@ -90,7 +90,7 @@ async def arm(context: FlightContext) -> None:
 async def undo_arming(context: FlightContext) -> None:
     """Disarm if we armed or commanded the take-off; else a vehicle that is armed is left alone.
 
-    After our take-off command, also a vehicle that the pilot armed could still climb after this.
+    After our take-off command, a vehicle that the pilot armed is disarmed, too: it may still climb.
     """
     context.release()
     if not context.must_disarm:
@@ -148,7 +148,7 @@ def _require_untouched(context: FlightContext) -> None:
 
 
 def _require_flyable_by_vehicle(context: FlightContext) -> None:
-    """Check the maneuvers again, with this vehicle's drag, and its position for a fence in degrees.
+    """Check the maneuvers again: with this vehicle's drag, and a fence in latitude and longitude.
 
     Raises:
         FlightEnded: a maneuver leaves the fence or exceeds a limit.

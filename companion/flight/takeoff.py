@@ -21,7 +21,7 @@ _MAX_OVERSHOOT = 3.0
 """A climb has failed this far above the commanded height, m; PX4 overshoots by some tenths."""
 
 _ARRIVAL_TIME = 2.0
-"""Time allowed to reach altitude after hold mode is shown, s; later, the climb was stopped."""
+"""Time allowed to reach altitude after hold mode is shown, s; then the climb counts as stopped."""
 
 _LARGEST_HELD_SPEED = 3.0
 """Largest horizontal speed of a vehicle that is taken over, m/s."""

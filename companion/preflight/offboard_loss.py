@@ -36,10 +36,10 @@ _START_POSE = Pose((0.0, 0.0, 0.0), 0.0)
 
 
 class WorstReach(NamedTuple):
-    """How far the vehicle can be carried if setpoints stop at the worst moment of the maneuvers.
+    """How far the vehicle can be carried if our setpoints stop at any moment of the maneuvers.
 
     Attributes:
-        away, up, down: Largest horizontal distance, climb and fall from where they stopped, m.
+        away, up, down: Largest horizontal distance, climb and fall from where it was then, m.
         breach: The first breach of the fence, as the end of a sentence; `None`: none.
         time: When setpoints must stop to cause `breach`, s after control begins.
     """
@@ -85,7 +85,7 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
 def worst_reach(
     config: Config, maneuvers: ManeuverSequence, hold_time: float, drag: Drag, *, brakes: bool
 ) -> WorstReach:
-    """How far the vehicle can be carried over all moments at which setpoints may stop.
+    """The `WorstReach` over all checked moments of the maneuvers.
 
     `LossFailsafe` describes `hold_time`, `drag` and `brakes`.
     """

@@ -22,7 +22,7 @@ _INTERRUPTED = ("interrupted by ", LEFT_BY_USER)
 
 
 class Invocation(NamedTuple):
-    """The command line that started the program; the suggested next command resembles it.
+    """The command line of the program, from which the suggested next command is made.
 
     Attributes:
         program: name or path by which a shell finds the program.

@@ -159,7 +159,7 @@ def _draw_steps(axes: "Axes", runs: list[StepRun], gain: float) -> None:
 
 
 def _draw_plane(axes: "Axes", runs: list[StepRun]) -> None:
-    """All doublets, east over north coefficient: a linear response moves on straight lines."""
+    """All doublets, north over east coefficient: a linear response moves on straight lines."""
     for number, run in enumerate(runs):
         style = _STYLES[number % len(_STYLES)]
         north, east = run.measured.T

@@ -45,7 +45,7 @@ class RecordError(Exception):
 
 @contextmanager
 def record_errors(folder: Path) -> Iterator[None]:
-    """Turn errors of the `with` block into RecordError, with the `folder` of the flight.
+    """Turn errors of the `with` block into RecordError, whose message names `folder`.
 
     Raises:
         RecordError: the block read an invalid value from the record.

@@ -91,7 +91,7 @@ def thrust(lowest: float, highest: float) -> Judge:
 
 
 def outside(fence: Fence) -> Judge:
-    """The vehicle is outside the fence, or the place of a fence in degrees is unknown."""
+    """The vehicle is outside the fence, or, for one in latitude and longitude, that is unknown."""
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
         motion = snapshot.motion

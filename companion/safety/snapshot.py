@@ -37,7 +37,7 @@ class Motion(NamedTuple):
         velocity: m/s.
         height: height above home, m, or None; in the autopilot's frame, with estimator resets.
         tracking_error: distance from the reference, m; None without a reference.
-        thrust: thrust last sent, 0..1; None while guidance idles.
+        thrust: thrust last sent, 0..1; None while idle on the ground and without a command.
         origin: latitude and longitude of the fence's centre, or None if they are unknown.
         acceleration: estimated horizontal acceleration, m/s², NED.
     """

@@ -46,8 +46,8 @@ class FlightFacts:
     Attributes:
         began: beginning of the flight, s on our clock.
         phases: beginning and name of each phase.
-        takeoff: time when the vehicle left the ground, or when a takeover in the air began; None:
-            neither happened.
+        takeoff: time when the vehicle left the ground, or when the checks for a takeover in the air
+            passed; None: neither happened.
         early_end: the early end; None: no phase failed.
         vehicle_uid: hardware id of the vehicle's autopilot; None: unknown.
         armed: whether the vehicle is armed at the end; None: unknown.
