@@ -29,9 +29,10 @@ from companion.guidance.finite import finite_number, finite_vector
 from companion.guidance.follow import Follow, HeldHeadingManeuver, hover
 from companion.guidance.reference import Vector, minus
 from companion.guidance.source import CommandedSource
-from companion.guidance.trajectory import Hover, Trajectory, line, require_trajectory
+from companion.guidance.trajectory import Hover, Trajectory, line
 from companion.guidance.trajectory.sample import SMALLEST_DISTANCE
 from companion.guidance.trajectory.timed_curve import FixedHeading
+from companion.guidance.trajectory.user_trajectory import checked_trajectory
 from companion.recording.measurements.summary import Summary
 from companion.safety.actions import Exit, FlightEnded
 
@@ -42,9 +43,8 @@ _START_TIMEOUT = 1.0
 class Vehicle:
     """One vehicle for one flight; `companion.connect` makes it.
 
-    Every coroutine raises `FlightEnded` once the flight has ended early: a pilot took over, a
-    safety monitor ended it, or the vehicle refused. It is then handed back or landed already.
-    While one call runs, another raises `RuntimeError`.
+    Every coroutine raises `FlightEnded` once the flight has ended early, as by a pilot or a safety
+    monitor. The vehicle is then handed back or landed. During a call another raises `RuntimeError`.
 
     Args:
         program: the flight's plan, which takes the requests.
@@ -154,12 +154,13 @@ class Vehicle:
                 Also, for an object: `companion.guidance.trajectory.require_trajectory` refuses it.
             FlightEnded: the vehicle is not under the program's control.
             TypeError: the object is no trajectory.
+            UserCodeError: the object raised while it was checked; nothing was flown.
         """
         if isinstance(trajectory, Path | str):
             trajectory = await call_in_thread(trajectory_file.load, Path(trajectory))
         else:
             with naming_trajectory_errors(str(getattr(trajectory, "name", ""))):
-                await call_in_thread(require_trajectory, trajectory)
+                trajectory = await call_in_thread(checked_trajectory, trajectory)
         await self._fly(Follow(trajectory, self._context.config.limits.max_yaw_rate))
 
     @asynccontextmanager

@@ -3,17 +3,14 @@
 from math import isfinite
 
 from companion.attitude.limits import Limits
-from companion.attitude.planner import Planner
+from companion.attitude.planner import LawPlanner, Planner
 from companion.attitude.rotation import limit_rates
 from companion.attitude.types import AttitudeError, BodyRates, Quaternion, Target
+from companion.user_code import naming_user_code
 
 
 class InvalidRatesError(AttitudeError):
     """A planner of another package returned body rates that are not finite."""
-
-
-class PlannerFaultError(Exception):
-    """A planner of another package raised an error; the message is for the user."""
 
 
 class PluginPlanner:
@@ -26,6 +23,7 @@ class PluginPlanner:
 
     def __init__(self, planner: Planner, limits: Limits) -> None:
         self._planner = planner
+        self._code = planner.law if isinstance(planner, LawPlanner) else planner
         self._tilt_rate, self._yaw_rate = limits.tilt_rate, limits.yaw_rate
 
     def rates(
@@ -36,23 +34,21 @@ class PluginPlanner:
         Raises:
             InvalidRatesError: the planner's rates are not finite.
             AttitudeError: the planner cannot use this attitude or target.
-            PlannerFaultError: the planner raised another error, or did not return three numbers.
+            UserCodeError: the planner raised another error, or did not return three numbers.
         """
-        try:
+        with naming_user_code("planner", self._code, AttitudeError):
             roll, pitch, yaw = self._planner.rates(q, target, dt, body_rates)
             finite = isfinite(roll) and isfinite(pitch) and isfinite(yaw)
-        except AttitudeError:
-            raise
-        except (Exception, SystemExit) as error:  # sys.exit must not end a flight
-            raise PlannerFaultError(f"the planner of another package failed: {error!r}") from error
         if not finite:
             raise InvalidRatesError(f"the planner returned {(roll, pitch, yaw)}")
         return BodyRates(*limit_rates(roll, pitch, yaw, self._tilt_rate, self._yaw_rate))
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
-        """See `Planner.note_attitude_target`."""
-        self._planner.note_attitude_target(q, age)
+        """See `Planner.note_attitude_target`; raises UserCodeError if the planner raises."""
+        with naming_user_code("planner", self._code):
+            self._planner.note_attitude_target(q, age)
 
     def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
-        """See `Planner.reset`."""
-        self._planner.reset(q, body_rates)
+        """See `Planner.reset`; raises UserCodeError if the planner raises."""
+        with naming_user_code("planner", self._code):
+            self._planner.reset(q, body_rates)

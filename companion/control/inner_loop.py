@@ -7,13 +7,14 @@ from companion import plugins
 from companion.attitude import PLANNER_NAMES, Constants, Limits, Planner, Target, make_planner
 from companion.attitude.limits import make_constants
 from companion.attitude.planner import MODEL_FOLLOWING
-from companion.attitude.plugin_planner import PlannerFaultError, PluginPlanner
+from companion.attitude.plugin_planner import PluginPlanner
 from companion.attitude.reference_model import model_lag, model_response
 from companion.attitude.types import AttitudeError
 from companion.config import Config
 from companion.config.known_drag import drag_prior
 from companion.files.yaml_file import ConfigError
 from companion.guidance import GRAVITY, HoverThrust, InnerResponse, ThrustSettings
+from companion.user_code import UserCodeError
 
 _TRIAL_INPUT = (1.0, 0.0, 0.0, 0.0), Target(0.1, 0.1, 0.0), 0.004
 """Attitude, target and sample period of the trial that a planner of another package must pass: a
@@ -51,7 +52,7 @@ def planner(config: Config) -> Planner:
         raise ConfigError(f"planner.name: {name} cannot be made: {error!r}") from error
     try:
         tried.rates(*_TRIAL_INPUT)
-    except (AttitudeError, PlannerFaultError) as error:
+    except (AttitudeError, UserCodeError) as error:
         raise ConfigError(
             f"planner.name: {name} cannot be flown: {error}; "
             "`companion.testing.check_planner` tries more attitudes"

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from math import isfinite
-from typing import cast
 
 from companion import plugins
 from companion.attitude.reference_model import model_lag
@@ -34,6 +33,7 @@ from companion.guidance import (
 )
 from companion.guidance.follow import Follow
 from companion.guidance.linear import Guidance
+from companion.guidance.plugin_guidance import PluginGuidance
 from companion.guidance.position_correction import PositionCorrection
 from companion.nmpc import Settings, Solver
 
@@ -65,7 +65,7 @@ def make_guidance(config: Config) -> Guidance:
     except Exception as error:
         raise ConfigError(f"guidance.kind: {kind} cannot be made: {error!r}") from error
     _require_command(kind, tried, thrust_limits(config))
-    return cast(Guidance, flown)
+    return PluginGuidance(flown)
 
 
 def _require_command(kind: str, guidance: Guidance, thrust: tuple[float, float]) -> None:

@@ -87,12 +87,12 @@ class Flight:
 
         An exit that is under way continues without our setpoints, which may have caused the fault.
         """
-        reason = fault_message(error)
         if self.failed_in is None:
-            self.end(FlightEnded(reason))
+            self.end(FlightEnded(fault_message(error, self._usual_exit())))
             return
         self._context.end_stream()
-        if all(text != reason for _, text in self.events):
+        reason = fault_message(error)
+        if not any(text.startswith(reason) for _, text in self.events):
             self.note(reason)
 
     def interrupt(self, reason: str) -> None:
@@ -142,7 +142,7 @@ class Flight:
             except FlightEnded:
                 raise
             except Exception as error:  # of the plan: the vehicle must not be left to nobody
-                raise FlightEnded(fault_message(error)) from error
+                raise FlightEnded(fault_message(error, self._usual_exit())) from error
             else:
                 return
         raise FlightEnded(
@@ -180,7 +180,7 @@ class Flight:
         except LinkError as error:
             raise FlightEnded(str(error)) from error
         except Exception as error:
-            raise FlightEnded(fault_message(error)) from error
+            raise FlightEnded(fault_message(error, self._usual_exit())) from error
         finally:
             await cancel(task)
 

@@ -122,7 +122,8 @@ def _extent_line(figures: Figures) -> str:
 def _ended_early(figures: Figures) -> tuple[str, list[str]]:
     end = figures["early_end"]
     interrupted = figures["result"].startswith(_INTERRUPTED)
-    remedy = "nothing needs fixing" if interrupted else what_to_do(end["monitor"], end["phase"])
+    advice = what_to_do(end["monitor"], end["phase"], figures["result"])
+    remedy = "nothing needs fixing" if interrupted else advice
     if figures["at_the_end"]["armed"]:
         on_ground = end["since_takeoff_s"] is None  # or the take-off was not heard
         what = "disarm it, or take it over if it flies" if on_ground else "take it over or land it"

@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping
 
+from companion.user_code import MESSAGE_START
+
 ADVICE_BY_MONITOR: Mapping[str, str] = {
     "unheard": "check cable, radio and power: the vehicle was not heard any more",
     "silence": "fix the cause named above: the telemetry, its values, or this computer",
@@ -48,9 +50,19 @@ ADVICE_BY_PHASE: Mapping[str, str] = {
 }
 """Advice by the name of the phase."""
 
+_USER_CODE = "mend the code named above, and fly it on the mock vehicle (`companion demo`) first"
 
-def what_to_do(monitor: str | None, phase: str) -> str:
-    """Advice as one sentence without a full stop."""
+
+def what_to_do(monitor: str | None, phase: str, result: str = "") -> str:
+    """Advice as one sentence without a full stop.
+
+    Args:
+        monitor: the monitor that ended the flight, or None.
+        phase: the phase in which it ended.
+        result: why it ended.
+    """
+    if result.startswith(MESSAGE_START):
+        return _USER_CODE
     if monitor is not None and monitor in ADVICE_BY_MONITOR:
         return ADVICE_BY_MONITOR[monitor]
     return ADVICE_BY_PHASE.get(phase, "read the events before the end")

@@ -2,7 +2,7 @@
 
 from enum import Enum
 
-from companion.attitude.plugin_planner import PlannerFaultError
+from companion.user_code import UserCodeError
 
 
 class Action(Enum):
@@ -100,8 +100,14 @@ class ControlReleased(FlightEnded):
         return "ok"
 
 
-def fault_message(error: Exception) -> str:
-    """The message for an unexpected exception: a fault of this program or of a planner."""
-    if isinstance(error, PlannerFaultError):
-        return str(error)
-    return f"internal error: {error!r}"
+def fault_message(error: Exception, exit_: Exit = Exit.LEAVE) -> str:
+    """The message for an unexpected exception: a fault of this program or of user code.
+
+    Args:
+        error: the exception.
+        exit_: what the flight does with the vehicle because of it.
+    """
+    if not isinstance(error, UserCodeError):
+        return f"internal error: {error!r}"
+    handed_back = exit_ in (Exit.HOLD, Exit.LAND)
+    return f"{error}; the vehicle is handed back" if handed_back else str(error)

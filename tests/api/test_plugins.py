@@ -18,6 +18,7 @@ from companion.testing import check_guidance, check_planner, conformance, fly
 from tests.flight.fly import QUICK_FLIGHT, QuickVehicle, merged
 
 CODE = """
+import sys
 from companion.attitude.first_order import first_order
 from companion.guidance.linear import LinearGuidance
 
@@ -77,6 +78,29 @@ class Drifting(LinearGuidance):
             return reference._replace(position_ned=(north + 3.0, east, down))
         return super().command(aside, time, inputs)
 
+class Forgetful(Remembering):
+    def rates(self, q, target, dt, body_rates=None):
+        self.made += 1
+        return first_order(q, target, dt, self.constants)
+    def reset(self, q, body_rates=None):
+        raise OSError("no memory")
+
+class Stumbling(LinearGuidance):
+    def command(self, reference_at, time, inputs):
+        if inputs.now.position_ned[0] > 0.5:
+            return self.direction()
+        return super().command(reference_at, time, inputs)
+    def direction(self):
+        return {}["north"]
+
+class Quitting(Stumbling):
+    def direction(self):
+        sys.exit()
+
+class Vanishing(Stumbling):
+    def direction(self):
+        return None
+
 class Half:
     def __init__(self, settings):
         pass
@@ -108,6 +132,7 @@ wild = theirs:wild
 lazy = theirs:lazy
 one-sided = theirs:one_sided
 remembering = theirs:Remembering
+forgetful = theirs:Forgetful
 missing = theirs:not_there
 
 [companion.guidance]
@@ -115,6 +140,9 @@ calm = theirs:Calm
 drifting = theirs:Drifting
 number = theirs:number
 broken = theirs:Broken
+stumbling = theirs:Stumbling
+quitting = theirs:Quitting
+vanishing = theirs:Vanishing
 half = theirs:Half
 empty = theirs:Empty
 nowhere = theirs:Nowhere
@@ -133,6 +161,17 @@ def installed(tmp_path, monkeypatch):
     invalidate_caches()
     yield
     sys.modules.pop("theirs", None)
+
+
+def told(role, name, raised, line):
+    """The result of a flight that an error of `theirs.py` ended; `line` of it, empty for none."""
+    path = sys.modules["theirs"].__file__
+    number = next((k for k, text in enumerate(CODE.splitlines(), 1) if text.strip() == line), 0)
+    place = f" ({path}:{number})" if line else ""
+    return (
+        f"an error outside this program: the {role} {name} of the module theirs raised {raised}"
+        f"{place}; the vehicle is handed back"
+    )
 
 
 def config(text):
@@ -193,7 +232,7 @@ def quick(monkeypatch):
 
 @pytest.mark.usefixtures("quick")
 def test_guidance_of_another_package_flies_by_its_name():
-    assert type(make_guidance(config("guidance: {kind: calm}"))).__name__ == "Calm"
+    assert type(make_guidance(config("guidance: {kind: calm}")).guidance).__name__ == "Calm"
     check_guidance("calm")
 
 
@@ -220,7 +259,10 @@ def test_a_plug_in_that_cannot_be_loaded_is_one_sentence():
     [
         ("planner: {name: nothing}", r"the planner returned \(nan"),
         ("planner: {name: pair}", r"returned \(0.0, 0.0\), not three"),
-        ("planner: {name: raising}", r"failed: RuntimeError\('no'\); `companion.testing.check_pl"),
+        (
+            "planner: {name: raising}",
+            r"RuntimeError: no \(.*theirs.py:16\); `companion.testing.check_pl",
+        ),
         ("planner: {name: number}", "unknown planner 5"),
         ("guidance: {kind: number}", "guidance.kind: number cannot be made: TypeError"),
         ("guidance: {kind: half}", "half cannot be flown: AttributeError.*linear.Guidance"),
@@ -237,15 +279,48 @@ def test_what_cannot_fly_is_found_before_the_vehicle_is_asked(text, why, tmp_pat
 
 
 @pytest.mark.parametrize(
-    ("name", "why"),
-    [("later", "RuntimeError('not at this roll')"), ("leaving", "SystemExit(3)")],
+    ("name", "raised", "line"),
+    [
+        ("later", "RuntimeError: not at this roll", 'raise RuntimeError("not at this roll")'),
+        ("leaving", "SystemExit: 3", "raise SystemExit(3)"),
+    ],
 )
-def test_a_planner_that_fails_in_flight_is_named_and_the_vehicle_is_landed(name, why):
+def test_a_planner_that_fails_in_flight_is_named_and_the_vehicle_is_landed(name, raised, line):
     vehicle = QuickVehicle("px4")
     flight = {"planner": {"name": name}, "flight": {"maneuvers": ["steps"]}}
     summary = fly(merged(QUICK_FLIGHT, flight), vehicle)
-    assert summary.result == f"the planner of another package failed: {why}"
+    assert summary.result == told("planner", name, raised, line)
     assert not vehicle.state()["crashed"]
+
+
+def test_a_planner_that_fails_before_take_off_is_named_and_nothing_is_handed_back():
+    vehicle = QuickVehicle("px4")
+    summary = fly(merged(QUICK_FLIGHT, {"planner": {"name": "forgetful"}}), vehicle)
+    line = 'raise OSError("no memory")'
+    assert f"{summary.result}; the vehicle is handed back" == told(
+        "planner", "Forgetful", "OSError: no memory", line
+    )
+    assert vehicle.state()["on_ground"]
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+@pytest.mark.parametrize(
+    ("kind", "raised", "line"),
+    [
+        ("stumbling", "KeyError: 'north'", 'return {}["north"]'),
+        ("quitting", "SystemExit", "sys.exit()"),
+        ("vanishing", "TypeError: cannot unpack non-iterable NoneType object", ""),
+    ],
+)
+def test_guidance_that_fails_in_flight_is_named_and_the_vehicle_is_handed_back(
+    autopilot, kind, raised, line
+):
+    vehicle = QuickVehicle(autopilot)
+    flight = {"guidance": {"kind": kind}, "flight": {"maneuvers": ["circle"]}}
+    summary = fly(merged(QUICK_FLIGHT, flight), vehicle)
+    assert summary.result == told("guidance", kind.capitalize(), raised, line)
+    assert not any("internal error" in text for _, text in summary.events)
+    assert (vehicle.state()["armed"], vehicle.state()["crashed"]) == (False, False)  # landed
 
 
 @pytest.mark.parametrize("name", ["first-order", "exact", "quaternion", "mine", "remembering"])

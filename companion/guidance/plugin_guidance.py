@@ -1,0 +1,35 @@
+"""Guidance of another package: what its code raises is named as an error of that package."""
+
+from companion.attitude import Target
+from companion.guidance.linear import Guidance, GuidanceInput, LinearCommand
+from companion.guidance.reference import ReferenceAt
+from companion.user_code import naming_user_code
+
+
+class PluginGuidance:
+    """Calls the guidance of another package.
+
+    Attributes:
+        guidance: the guidance of another package.
+    """
+
+    def __init__(self, guidance: Guidance) -> None:
+        self.guidance = guidance
+
+    @property
+    def acts_after(self) -> float:
+        """See `Guidance.acts_after`; raises as `command`."""
+        with naming_user_code("guidance", self.guidance):
+            return float(self.guidance.acts_after)
+
+    def command(
+        self, reference_at: ReferenceAt, time: float, inputs: GuidanceInput
+    ) -> LinearCommand:
+        """See `LinearGuidance.command`.
+
+        Raises:
+            UserCodeError: the guidance raised, or did not return what a `LinearCommand` holds.
+        """
+        with naming_user_code("guidance", self.guidance):
+            target, later, down = self.guidance.command(reference_at, time, inputs)
+            return LinearCommand(Target(*target), Target(*later), float(down))
