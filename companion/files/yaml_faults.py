@@ -16,6 +16,9 @@ _MIN_SIMILARITY = 0.5
 _MIN_SIMILARITY_ELSEWHERE = 0.75
 """Smallest `_similarity` at which a key of another section is suggested."""
 
+_LARGEST_HINTED = 1e12
+"""Beyond it a value has no hint of another unit; it may be too large for a float."""
+
 _NUMBER_AND_UNIT = re.compile(r"([-+]?[0-9]+(?:[.,][0-9]+)?(?:[eE][-+]?[0-9]+)?)\s*(\D*)")
 
 _MISTAKEN_UNITS: tuple[tuple[str, str, Callable[[float], float]], ...] = (
@@ -166,10 +169,10 @@ def _unit_hint(detail: Any, where: str) -> str:
     """A hint if the value is in range once converted from the unit often mistaken for the key's."""
     bound = detail.get("ctx", {})
     value = detail["input"]
-    if not isinstance(value, int | float) or not value:
+    if not isinstance(value, int | float) or not 0.0 < abs(value) < _LARGEST_HINTED:
         return ""
     unit, converted = mistaken_unit(where, value)
-    if unit == "%" and bound.get("le", bound.get("lt", inf)) > 1.0:
+    if unit == "%" and (value <= 1.0 or bound.get("le", bound.get("lt", inf)) > 1.0):
         return ""  # only a share of 1 is confused with a percentage
     in_range = [
         satisfies(converted, bound[name]) for name, satisfies in _BOUNDS.items() if name in bound

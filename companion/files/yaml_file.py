@@ -3,7 +3,16 @@
 from collections.abc import Mapping
 from os.path import expanduser
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar, get_args, get_origin
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    ClassVar,
+    NamedTuple,
+    TypeVar,
+    get_args,
+    get_origin,
+)
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 
@@ -44,6 +53,22 @@ class Section(BaseModel):
     model_config = ConfigDict(
         extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
     )
+
+    if not TYPE_CHECKING:  # a type checker shall see the keys as arguments
+
+        def __init__(self, /, **keys: Any) -> None:
+            """Check the keys, as those of a file.
+
+            Raises:
+                ConfigError: an unknown key or a bad value.
+            """
+            try:
+                self.__pydantic_validator__.validate_python(keys, self_instance=self)
+            except ValidationError as error:
+                raise _config_error(error, type(self).__name__, type(self), {}) from error
+
+        # Pydantic shall not call it for sections inside of others: their errors are collected.
+        __init__.__pydantic_base_init__ = True
 
     @field_validator("*", mode="before")
     @classmethod
@@ -191,19 +216,26 @@ def validated(
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        details = without_consequences(error.errors(include_url=False))
-        faults, previous_place = [], Place("")
-        for detail in details[:_MOST_FAULTS_SHOWN]:
-            place = place_of(detail["loc"], places or {}, name)
-            where = f"{place}: "
-            if place == previous_place:
-                where = ""
-            elif place.file == previous_place.file and place.line:
-                where = f"line {place.line}: "
-            faults.append(where + explained(detail, model, model.former_keys))
-            previous_place = place
-        more = len(details) - _MOST_FAULTS_SHOWN
-        raise ConfigError("; ".join(faults) + (f"; and {more} more" if more > 0 else "")) from error
+        raise _config_error(error, name, model, places or {}) from error
+
+
+def _config_error(
+    error: ValidationError, name: str, model: type[Section], places: Mapping[Where, Place]
+) -> ConfigError:
+    """The error of `validated` for an error of pydantic."""
+    details = without_consequences(error.errors(include_url=False))
+    faults, previous_place = [], Place("")
+    for detail in details[:_MOST_FAULTS_SHOWN]:
+        place = place_of(detail["loc"], places, name)
+        where = f"{place}: "
+        if place == previous_place:
+            where = ""
+        elif place.file == previous_place.file and place.line:
+            where = f"line {place.line}: "
+        faults.append(where + explained(detail, model, model.former_keys))
+        previous_place = place
+    more = len(details) - _MOST_FAULTS_SHOWN
+    return ConfigError("; ".join(faults) + (f"; and {more} more" if more > 0 else ""))
 
 
 def place_of(where: Where, places: Mapping[Where, Place], name: str) -> Place:
