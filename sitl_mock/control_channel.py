@@ -18,7 +18,7 @@ from typing import Any, TypedDict
 from pydantic import ValidationError
 
 from sitl_mock.config.faults import Fault, fault_adapter
-from sitl_mock.config.section import ConfigError, wrong_member
+from sitl_mock.config.section import ConfigError, wrong_member, wrong_value
 from sitl_mock.physics.quaternion import Quaternion, Vector
 from sitl_mock.simulation import Simulation
 
@@ -82,7 +82,7 @@ def add_fault(simulation: Simulation, fault: Mapping[str, Any]) -> None:
     except ValidationError as error:
         detail = error.errors()[0]
         where = ".".join(str(part) for part in detail["loc"])
-        refused = wrong_member(detail, Fault) or f" {where}: {detail['msg']}"
+        refused = wrong_member(detail, Fault) or f" {where}{wrong_value(error)}"
         raise ConfigError(f"fault{refused}") from error
     simulation.faults.add(valid, simulation.time_us)
 

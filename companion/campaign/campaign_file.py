@@ -1,15 +1,26 @@
 """The YAML file of a campaign: base configuration, swept keys, faults, limits and search."""
 
+import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from companion.campaign.swept import Swept
 from companion.files.yaml_file import PathKey, Section
 
+
+def _require_plain(name: str) -> str:
+    """The name, if it can begin the name of a folder."""
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name):
+        raise ValueError(
+            "must begin with a letter or a digit, and have only these, `-` and `_` after it"
+        )
+    return name
+
+
 CampaignName = Annotated[
-    str, Field(min_length=1, max_length=60, pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")
+    str, Field(min_length=1, max_length=60), AfterValidator(_require_plain)
 ]
 ScenarioName = Annotated[str, Field(min_length=1, max_length=60)]
 Ending = Literal["ground", "ok", "landed", "held", "pilot"]

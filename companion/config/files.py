@@ -13,7 +13,8 @@ from companion.config.root import MOST_INCLUDED
 from companion.config.trajectory_file import is_table
 from companion.files import bounded_yaml, yaml_file
 from companion.files.bounded_yaml import Where
-from companion.files.yaml_faults import dotted_keys, shortened
+from companion.files.value_faults import shortened
+from companion.files.yaml_faults import dotted_keys
 from companion.files.yaml_file import ConfigError, Contents, UnreadableFileError
 
 _INCLUDE = "include"

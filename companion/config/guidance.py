@@ -9,7 +9,7 @@ from companion.attitude import PLANNER_NAMES
 from companion.config.markers import TUNABLE
 from companion.config.units import Si
 from companion.drag import Drag
-from companion.files.yaml_faults import name_hint
+from companion.files.similar_names import name_hint
 from companion.files.yaml_file import Section
 
 AUTO = "auto"

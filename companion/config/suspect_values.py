@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from companion.config.reference import keys
 from companion.config.root import Config
-from companion.files.yaml_faults import mistaken_unit
+from companion.files.value_faults import mistaken_unit
 
 BODY_RATE = "safety.max_body_rate_deg_s"
 _USUAL_VALUES = {"_deg_s2": 1000.0, "_ms": 50.0}

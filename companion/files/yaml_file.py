@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationIn
 from companion.files import bounded_yaml
 from companion.files.bounded_file import FileRefusedError, read_text
 from companion.files.bounded_yaml import MOST_BYTES, Where, YamlError
-from companion.files.yaml_faults import explained, kinds_in, without_consequences
+from companion.files.yaml_faults import explained, kinds_in, told_details
 
 Model = TypeVar("Model", bound="Section")
 
@@ -223,7 +223,7 @@ def _config_error(
     error: ValidationError, name: str, model: type[Section], places: Mapping[Where, Place]
 ) -> ConfigError:
     """The error of `validated` for an error of pydantic."""
-    details = without_consequences(error.errors(include_url=False))
+    details = told_details(error.errors(include_url=False))
     faults, previous_place = [], Place("")
     for detail in details[:_MOST_FAULTS_SHOWN]:
         place = place_of(detail["loc"], places, name)

@@ -14,6 +14,28 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 _MOST_NAMES_LISTED = 20
 """Largest number of known names that a message lists."""
+_MUST = {
+    "greater_than_equal": "must be at least {ge:.12g}",
+    "greater_than": "must be more than {gt:.12g}",
+    "less_than_equal": "must be at most {le:.12g}",
+    "less_than": "must be less than {lt:.12g}",
+    "finite_number": "must be a finite number",
+    "float_type": "must be a number",
+    "int_type": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "bool_type": "must be true or false",
+    "bool_parsing": "must be true or false",
+    "string_type": "must be a text",
+    "path_type": "must name a file",
+    "tuple_type": "must be a list",
+    "too_long": "has {actual_length} values and takes at most {max_length}",
+    "too_short": "has {actual_length} values and needs at least {min_length}",
+    "extra_forbidden": "is not a known key",
+    "dict_type": "must be a mapping of keys to values",
+    "model_type": "must be a mapping of keys to values",
+    "model_attributes_type": "must be a mapping of keys to values",
+}
+"""What a value must be, by the type of pydantic's error; ``{...}`` is filled in from the error."""
 _NUMBER_AND_UNIT = re.compile(r"([-+]?[0-9]+(?:[.,][0-9]+)?)\s*(\D*)")
 
 
@@ -80,12 +102,27 @@ def explain(error: ValidationError, model: type[BaseModel]) -> str:
         return f"{where} must be a number: {_number_advice(str(detail['input']))}"
     if fault := wrong_member(detail, model):
         return f"{where}{fault}"
-    if detail["type"] == "tuple_type":
-        return f"{where} must be a list (got {detail['input']!r:.60})"
-    message = detail["msg"].removeprefix("Value error, ")
+    return f"{where}{wrong_value(error)} (got {detail['input']!r:.60})"
+
+
+def wrong_value(error: ValidationError) -> str:
+    """Return what is wrong with the value of the first error, to be put after its path."""
+    details = error.errors()
+    kind, path, context = details[0]["type"], details[0]["loc"], details[0].get("ctx", {})
+    if kind == "missing" and isinstance(details[0]["input"], list | tuple):
+        count = len(details[0]["input"])
+        missing = [each for each in details if each["loc"][:-1] == path[:-1]]
+        return f" is missing: the list has {count} values and needs {count + len(missing)}"
+    if kind == "missing":
+        return " is missing"
+    if kind == "literal_error":
+        return f" must be {context['expected'].replace(chr(39), '')}"
+    if kind in _MUST:
+        return f" {_MUST[kind].format(**context)}"
+    message = details[0]["msg"].removeprefix("Value error, ")
     if message[1:2].islower():
         message = message[0].lower() + message[1:]
-    return f"{where}: {message} (got {detail['input']!r:.60})"
+    return f": {message}"
 
 
 def wrong_member(detail: Any, annotation: Any) -> str:

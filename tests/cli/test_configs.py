@@ -238,7 +238,7 @@ def test_a_refused_path_names_the_key_that_every_command_takes(tmp_path, capsys)
         ("mock.wind.speed_m_s=5", "of your own: `companion init mock` writes one for --config"),
         ("limits.max_tild_deg=20", "did you mean `max_tilt_deg`?"),
         ("limits.max_tilt_deg=[", "not valid YAML"),
-        ("limits.max_tilt_deg=99", "less than or equal to 60"),
+        ("limits.max_tilt_deg=99", "at most 60"),
     ],
 )
 def test_a_wrong_set_is_refused_in_a_sentence(text, words, capsys):

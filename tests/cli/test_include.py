@@ -91,7 +91,7 @@ def test_the_command_line_and_the_record_of_a_flight_see_the_merged_keys(files):
             "vehicel: {lag_ms: 5}",
             "a.yaml, line 1: `vehicel` is not a known key; did you mean `vehicle`?",
         ),
-        ("vehicle: {lag_ms: -5}", "a.yaml, line 1: `vehicle.lag_ms`: input should be greater"),
+        ("vehicle: {lag_ms: -5}", "a.yaml, line 1: `vehicle.lag_ms` must be at least 0"),
         ("vehicle: 3", "a.yaml: `vehicle` must hold keys, not 3"),
         ("- vehicle", "a.yaml: expected keys such as"),
         ("vehicle: {lag_ms: 1, lag_ms: 2}", "a.yaml, line 1: not valid YAML"),

@@ -1,12 +1,17 @@
 """What a configuration's commonest mistakes are told: one sentence with file, line and remedy."""
 
+import re
+from math import inf, nan
+
 import pytest
 
+from companion.campaign.campaign_file import CampaignFile, FaultScenario
 from companion.config import Config
 from companion.config.files import load, parse_assignments
 from companion.config.reference import keys
+from companion.config.trajectory_file import TrajectoryFile
 from companion.files import bounded_yaml
-from companion.files.yaml_file import ConfigError
+from companion.files.yaml_file import ConfigError, Section, validated
 
 
 def told(tmp_path, text):
@@ -33,7 +38,10 @@ def told(tmp_path, text):
         ("limits: {max_tilt_deg: '20'}", "write 20 without quotation marks (got '20')"),
         ("limits: {max_tilt_deg: '20,5'}", "write 20.5, with a point for decimals"),
         ("limits: {max_tilt_deg: steep}", "write digits, with a point for decimals"),
-        ("limits:\n\n  max_tilt_deg: 0.35\n", "line 3: `limits.max_tilt_deg`: input should be"),
+        (
+            "limits:\n\n  max_tilt_deg: 0.35\n",
+            "line 3: `limits.max_tilt_deg` must be at least 1 (got",
+        ),
         ("limits: {max_tilt_deg: 0.35}", "(got 0.35); if it is in rad, write 20.05"),
         ("deadman: {telemetry_stale_ms: 0.1}", "if it is in s, write 100"),
         ("thrust: {hover_thrust: 49}", "if it is in %, write 0.49"),
@@ -49,18 +57,79 @@ def told(tmp_path, text):
         ("limits:\n  max_tilt_deg:20\n", "each as `key: value`"),
         ("flight: {maneuvers: hover}", "is a list: write `maneuvers: [hover]`"),
         ("flight: {maneuvers: []}", "`flight.maneuvers` has 0 values; it needs at least 1"),
-        ("safety: {fence_polygon_m: [[0, 0], [5, 0], [5]]}", "has too few values (got [5])"),
-        ("safety: {fence_polygon_m: [[0, 0, 0]]}", "_m.0` has 3 values; it takes at most 2"),
+        (
+            "safety: {fence_polygon_m: [[0, 0], [5, 0], [5]]}",
+            "_m.2` has 1 value; it needs 2 (got [5])",
+        ),
+        ("safety: {fence_polygon_m: [[0, 0, 0]]}", "_m.0` has 3 values; it needs 2 (got"),
         (
             "recording: {directory: 5}",
-            "`recording.directory`: must name a file or a folder (got 5)",
+            "`recording.directory` must name a file or a folder (got 5)",
         ),
+        ("limits: {rate_limit: tigt}", "must be tight or paper (got 'tigt'); did you mean tight?"),
+        ("limits: {max_tilt_deg: .nan}", "`limits.max_tilt_deg` must be a finite number (got nan)"),
+        ("limits: {max_tilt_deg: [20]}", "`limits.max_tilt_deg` must be a number (got [20])"),
+        ("thrust: {hover_thrust: 0.95}", "`thrust.hover_thrust` must be less than 0.95 (got 0.95)"),
+        ("link: {target_system: 1.5}", "`link.target_system` must be a whole number (got 1.5)"),
+        ("link: {endpoint: 5}", "`link.endpoint` must be a text (got 5)"),
+        ("vehicle: {identified: ''}", "`vehicle.identified` must not be empty (got '')"),
+        ("safety: {fence_polygon_m: [5]}", "`safety.fence_polygon_m.0` is a list: write `[5]`"),
+        ("safety: {fence_polygon_m: {a: 5}}", "_polygon_m` must be a list (got a section)"),
         ("limits.max_tilt_deg: 20", "contains a dot; write `limits: {max_tilt_deg: 20}`"),
         ("deadman: {stale_ms: 100}", "did you mean `telemetry_stale_ms`?"),
     ],
 )
 def test_a_mistake_is_told_with_its_line_and_its_remedy(tmp_path, text, sentence):
     assert sentence in told(tmp_path, text)
+
+
+VALUES = (
+    None, True, -1, 0, 1.5, 1e9, nan, inf, "", "x", "x" * 2000, "20 ms", [], [1], [[1]], [1, 2, 3],
+    ["a"], [None], {}, {"a": 1}, [{}], [[1, 2], [3]], [[1, 2, 3]], 10**400,
+)  # fmt: skip
+PYDANTIC = re.compile(r"[Ii]nput |[Ff]ield required|valid|tuple|constrained|literal|pattern|pydant")
+
+
+def sections(section=Section):
+    for each in section.__subclasses__():
+        yield each
+        yield from sections(each)
+
+
+SECTIONS = [Config, TrajectoryFile, CampaignFile, *sections()]
+
+
+@pytest.mark.parametrize("section", SECTIONS, ids=lambda section: section.__name__)
+def test_no_value_of_any_key_is_refused_in_the_words_of_pydantic(section):
+    refused = 0
+    for key in section.model_fields:
+        for value in VALUES:
+            try:
+                validated({key: value}, "a file", section)
+            except ConfigError as error:
+                refused += 1
+                said = str(error).replace(repr(value), "").replace("x" * 60, "")
+                assert not PYDANTIC.search(said.replace("invalid", "")), said
+    assert refused
+
+
+def test_an_error_in_one_of_several_forms_is_told_once():
+    """`ends` of a campaign's fault is a list, or a section by phase."""
+    for value, words in (
+        ("ok", "`ends` is a list: write `ends: [ok]`"),
+        (["okay"], "`ends.0` must be ground, ok, landed, held or pilot (got 'okay')"),
+        ({"land": ["okay"]}, "`ends.land.0` must be ground, ok, landed, held or pilot"),
+    ):
+        with pytest.raises(ConfigError) as error:
+            validated({"inject": [], "ends": value}, "a file", FaultScenario)
+        assert words in str(error.value)
+        assert str(error.value).count("`ends") == 1 + str(error.value).count("`ends: [")
+
+
+def test_a_short_list_is_told_once_with_how_many_values_it_needs():
+    with pytest.raises(ConfigError) as error:
+        validated({"line": {"to_m": [1.0], "speed_m_s": 1.0}}, "a file", TrajectoryFile)
+    assert str(error.value) == "a file: `line.to_m` has 1 value; it needs 3 (got [1.0])"
 
 
 def test_what_is_no_share_of_1_is_no_percentage(tmp_path):

@@ -56,7 +56,7 @@ def test_edits_of_the_file_reach_the_flight(tmp_path):
     async def edit():
         await until("edits of flown.yaml are applied from now on")
         path.write_text("planner: {gain_per_s: 50.0}\n")
-        await until("input should be less than or equal to 20")
+        await until("must be at most 20")
         path.write_text("planner: {gain_per_s: 4.0}\n")
         await until("planner.gain_per_s from 5 to 4")
 

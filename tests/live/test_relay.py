@@ -62,7 +62,7 @@ def test_a_change_is_checked_and_then_asked_of_the_flight():
     async def use(relay, flight):
         assert await relay.change(SLOWER, "a test") == "done"
         assert flight.told == [{"kind": "change", "values": SLOWER, "by": "a test", "id": 0}]
-        with pytest.raises(ConfigError, match="less than or equal to 20"):
+        with pytest.raises(ConfigError, match="at most 20"):
             await relay.change({"planner": {"gain_per_s": 50.0}}, "a test")
         assert len(flight.told) == 1
         flight.answer = {"refusal": "not while landing"}

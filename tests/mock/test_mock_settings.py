@@ -23,7 +23,7 @@ MISTAKES = {
     "wind:\n    speed_m_s: fast": ("line 3: mock.wind.speed_m_s must be a number: write digits",),
     "wind:\n\tspeed_m_s: 2": ("line 3: a tab is used where YAML requires spaces",),
     "speed: fast": ("mock.speed", "number"),
-    "speed: -1": ("mock.speed", "greater than"),
+    "speed: -1": ("mock.speed", "at least 0.01"),
     "faults: [{kind: drop, probabilty: 1}]": ("did you mean probability?",),
     "faults: [{kind: dropp}]": (
         "line 2: mock.faults.0: there is no kind 'dropp'; did you mean drop?; "
@@ -33,6 +33,15 @@ MISTAKES = {
     "faults: [{at_s: 3}]": ("mock.faults.0 needs a kind; kinds are drop, delay, ",),
     "faults: [drop]": ("mock.faults.0 must be a mapping of keys to values (got 'drop')",),
     "faults: {kind: drop}": ("mock.faults must be a list (got {'kind': 'drop'})",),
+    "lockstep: {bundle: maybe}": ("mock.lockstep.bundle must be true or false (got 'maybe')",),
+    "signing: {passphrase_file: 5}": ("mock.signing.passphrase_file must name a file (got 5)",),
+    "signing: {link_id: 5}": ("mock.signing.passphrase_file is missing",),
+    "seed: 1.5": ("mock.seed must be a whole number (got 1.5)",),
+    "wind: {speed_m_s: [1]}": ("mock.wind.speed_m_s must be a number (got [1])",),
+    "autopilot: px5": ("mock.autopilot must be px4 or ardupilot (got 'px5')",),
+    "airframe: {inertia_kg_m2: [1]}": ("the list has 1 values and needs 3 (got [1])",),
+    "airframe: {inertia_kg_m2: [1, 1, 1, 1]}": ("mock.airframe.inertia_kg_m2 has 4 values",),
+    "battery: 5": ("mock.battery must be a mapping of keys to values (got 5)",),
     "lockstep: 5": ("mock.lockstep",),
     "airframe: heavy": ("mock.airframe", "sih, unlike-axes"),
     "rate_loop: {roll: {proportional: 1}}": ("mock.rate_loop.roll",),
@@ -46,6 +55,7 @@ def test_mistakes(text, words, tmp_path, capsys):
     assert main(["--config", str(path), "--check"]) == 2
     errors = capsys.readouterr().err
     assert errors.count("\n") == 1
+    assert "nput " not in errors, "the words of pydantic"
     assert str(path) in errors
     for word in words:
         assert word in errors

@@ -249,7 +249,7 @@ def test_a_case_with_the_inner_loop_and_the_limit_of_equation_33(tmp_path, capsy
         ({"seconds": 0.001}, "`seconds`"),
         ({"rates_hz": [100, 100]}, "has the same value twice"),
         ({"rates_hz": [1000], "seconds": 60, "headings_deg": list(range(360))}, "fit into memory"),
-        ({"rates_hz": [0]}, "`rates_hz.0`: input should be greater than or equal to 10 (got 0)"),
+        ({"rates_hz": [0]}, "`rates_hz.0` must be at least 10 (got 0)"),
         ({"methods": "so3"}, "is a list"),
         ({"inner_loop": True, "transport_delay_ms": 0.5}, "`transport_delay_ms`"),
         ({"quickness": 3}, "needs inner_loop"),

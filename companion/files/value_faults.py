@@ -1,0 +1,154 @@
+"""Error messages about one value of a YAML file: what it must be, and what to write instead."""
+
+import re
+from collections.abc import Callable, Mapping
+from math import degrees, inf, radians
+from typing import Any
+
+from companion.files.similar_names import name_hint
+
+_LONGEST_SHOWN = 60
+_LARGEST_HINTED = 1e12
+"""Beyond it a value has no hint of another unit; it may be too large for a float."""
+
+_NUMBER_AND_UNIT = re.compile(r"([-+]?[0-9]+(?:[.,][0-9]+)?(?:[eE][-+]?[0-9]+)?)\s*(\D*)")
+
+_MISTAKEN_UNITS: tuple[tuple[str, str, Callable[[float], float]], ...] = (
+    ("_deg_s2", "rad/s²", degrees),
+    ("_deg_s", "rad/s", degrees),
+    ("_deg", "rad", degrees),
+    ("_rad_s", "°/s", radians),
+    ("_ms", "s", lambda value: 1000.0 * value),
+    ("_m_s", "km/h", lambda value: value / 3.6),
+    ("_per_s", "%", lambda value: 0.01 * value),
+    ("_s", "ms", lambda value: 0.001 * value),
+    ("_percent", "parts of 1", lambda value: 100.0 * value),
+    ("", "%", lambda value: 0.01 * value),
+)
+"""Suffix of a key, the unit often mistaken for the key's unit, and the conversion from the mistaken
+unit to the key's unit. The first suffix that fits is used.
+"""
+_BOUNDS: dict[str, Callable[[float, float], bool]] = {
+    "ge": lambda value, bound: value >= bound,
+    "gt": lambda value, bound: value > bound,
+    "le": lambda value, bound: value <= bound,
+    "lt": lambda value, bound: value < bound,
+}
+_MUST: Mapping[str, str] = {
+    "greater_than_equal": "must be at least {ge:.12g}",
+    "greater_than": "must be more than {gt:.12g}",
+    "less_than_equal": "must be at most {le:.12g}",
+    "less_than": "must be less than {lt:.12g}",
+    "finite_number": "must be a finite number",
+    "float_type": "must be a number",
+    "int_type": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "string_type": "must be a text",
+    "string_too_short": "must not be empty",
+    "string_too_long": "must have at most {max_length} characters",
+    "string_pattern_mismatch": "must have the form {pattern}",
+    "tuple_type": "must be a list",
+    "path_type": "must name a file or a folder",
+}
+"""What a value must be, by the type of pydantic's error; `{…}` is filled in from the error."""
+
+
+def shortened(value: Any) -> str:
+    """A value as shown in an error message."""
+    text = repr(value)
+    return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
+
+
+def mistaken_unit(key: str, value: float) -> tuple[str, float]:
+    """The unit often mistaken for the key's unit; the value converted from it to the key's unit."""
+    unit, convert = next(
+        (unit, convert) for end, unit, convert in _MISTAKEN_UNITS if key.endswith(end)
+    )
+    return unit, convert(value)
+
+
+def value_fault(detail: Any, key: str | int) -> str:
+    """What is wrong with a value, as the end of a sentence that begins with its key.
+
+    Args:
+        detail: error reported by pydantic, about the value and not about its key.
+        key: the last key that leads to the value, or its place in a list.
+    """
+    if remedy := _remedy(detail, key):
+        return remedy
+    kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
+    got = f" (got {'a section' if isinstance(value, dict) else shortened(value)})"
+    if kind == "value_error":  # of a validator of ours, which says what must be
+        got = "" if isinstance(value, dict) else got
+        return f": {_own_message(detail)}{got}"
+    if kind == "literal_error":
+        choices = re.findall(r"'([^']*)'", context["expected"])
+        return f" must be {_alternatives(choices)}{got}{name_hint(value, choices)}"
+    must = _MUST.get(kind, "has a value that cannot be used here").format(**context)
+    return f" {must}{got}{_unit_hint(detail, str(key))}"
+
+
+def _own_message(detail: Any) -> str:
+    """The message of a validator of ours, in small letters."""
+    message: str = detail["msg"].removeprefix("Value error, ")
+    return f"{message[:1].lower()}{message[1:]}"
+
+
+def _alternatives(choices: list[str]) -> str:
+    *others, last = choices
+    return f"{', '.join(others)} or {last}" if others else last
+
+
+def _remedy(detail: Any, key: str | int) -> str:
+    """What to write instead of a value of the wrong type; empty if that is not known."""
+    kind, value = detail["type"], detail["input"]
+    must_be_number = kind == "value_error" and _own_message(detail).startswith("must be a number")
+    if kind in ("float_parsing", "int_parsing") or (must_be_number and isinstance(value, str)):
+        text = value if isinstance(value, str) else str(value)
+        return f" must be a number: {_number_advice(str(key), text)} (got {shortened(value)})"
+    if value is None and kind in ("float_type", "int_type", "string_type", "tuple_type"):
+        return " has no value; write one, or take the key out"
+    if kind in ("model_type", "dict_type", "model_attributes_type"):
+        return (
+            " is a section: write its keys on the lines below it, indented by two spaces, each as "
+            f"`key: value` (got {shortened(value)})"
+        )
+    one_value = kind == "tuple_type" and isinstance(value, str | int | float)
+    if not one_value or len(str(value)) > _LONGEST_SHOWN:
+        return ""
+    return (
+        f" is a list: write `[{value}]`"
+        if isinstance(key, int)
+        else (f" is a list: write `{key}: [{value}]`")
+    )
+
+
+def _number_advice(key: str, text: str) -> str:
+    """What to write instead of a text where a number is needed."""
+    match = _NUMBER_AND_UNIT.fullmatch(text.strip())
+    if match is None:
+        return "write digits, with a point for decimals"
+    number, unit = match[1].replace(",", "."), match[2].strip()
+    confused_unit, converted = mistaken_unit(key, float(number))
+    if unit == confused_unit:
+        return f"write {converted:.4g}"
+    if unit:
+        return f"write {number} without {unit!r}, because the key's name gives the unit"
+    if "," in match[1]:
+        return f"write {number}, with a point for decimals"
+    return f"write {number} without quotation marks"
+
+
+def _unit_hint(detail: Any, key: str) -> str:
+    """A hint if the value is in range once converted from the unit often mistaken for the key's."""
+    bound = detail.get("ctx", {})
+    value = detail["input"]
+    if not isinstance(value, int | float) or not 0.0 < abs(value) < _LARGEST_HINTED:
+        return ""
+    unit, converted = mistaken_unit(key, value)
+    if unit == "%" and (value <= 1.0 or bound.get("le", bound.get("lt", inf)) > 1.0):
+        return ""  # only a share of 1 is confused with a percentage
+    in_range = [
+        satisfies(converted, bound[name]) for name, satisfies in _BOUNDS.items() if name in bound
+    ]
+    return f"; if it is in {unit}, write {converted:.4g}" if in_range and all(in_range) else ""
