@@ -11,6 +11,7 @@ from typing import Any
 
 from companion.cli import flying
 from companion.cli.exit_codes import EXIT_FAILURE, EXIT_OK
+from companion.cli.log_choice import LOG, log_of
 from companion.cli.output_file import require_writable
 from companion.cli.terminal import FlightConsole
 from companion.config.files import load
@@ -37,17 +38,16 @@ _MANEUVER = "identify"
 _PLANNER = "first-order"
 """Planner for the flight: it needs no knowledge of the vehicle's response."""
 _LONGEST_NAME = 200
-_LOG, _FRAGMENT, _CONFIG = "flight.tlog", "vehicle.yaml", "config.yaml"
+_FRAGMENT, _CONFIG = "vehicle.yaml", "config.yaml"
 
 
 def identify(options: argparse.Namespace) -> int:
     """Fly and fit, or fit a recorded flight; write the fit if it is usable."""
     console = FlightConsole(stderr=options.json, highlight=False)
     if options.log is not None:
-        log = options.log / _LOG if options.log.is_dir() else options.log
+        log = log_of(options.log)
         out = options.out or log.with_name(_FRAGMENT)
-        if log.exists():  # else report the missing log, not the output file
-            require_writable(out, "--out", force=options.force)
+        require_writable(out, "--out", force=options.force)
         return _fit(log, out, options, console)
     if options.out is not None:
         require_writable(options.out, "--out", force=options.force)
@@ -55,7 +55,7 @@ def identify(options: argparse.Namespace) -> int:
     if summary.result != "ok" or summary.log is None:
         _print_json(options, {"result": summary.result, "log": str(summary.log)})
         return EXIT_FAILURE
-    log = summary.log / _LOG
+    log = summary.log / LOG
     out = options.out or log.with_name(_FRAGMENT)
     try:
         return _fit(log, out, options, console)
@@ -122,7 +122,7 @@ def _configured_axes(log: Path) -> dict[str, AxisKeys]:
 def _flight_name(log: Path) -> str:
     """The name of a flight's folder, or of another program's log; `?` for what is not UTF-8."""
     path = log.resolve()
-    name = path.parent.name if path.name == _LOG else path.name
+    name = path.parent.name if path.name == LOG else path.name
     return name.encode("utf-8", "replace").decode("utf-8")[:_LONGEST_NAME]
 
 

@@ -148,9 +148,36 @@ def test_a_file_that_is_no_log_is_refused_as_usage(capsys, tmp_path):
     code, _, err = run(capsys, "--log", path)
     assert code == 2
     assert f"{path}: not a .tlog" in err
-    code, _, err = run(capsys, "--log", tmp_path)
-    assert code == 2
-    assert "flight.tlog: cannot read the log" in err
+
+
+TAKES = "--log takes the folder of a flight, or a MAVLink log such as the flight.tlog in it"
+
+
+def test_what_is_no_log_is_answered_with_the_log_that_would_do(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for k, name in enumerate(("older", "newest")):
+        flight = Path("flights", name)
+        flight.mkdir(parents=True)
+        for file in ("flight.tlog", "flight.mcap"):
+            (flight / file).write_bytes(b"")
+            os.utime(flight / file, (k, k))
+    Path("other").mkdir()
+    for given, words in (
+        ("flights", f"flights holds no flight.tlog: {TAKES}; write --log flights/newest"),
+        (
+            "flights/older/flight.mcap",
+            f"is no MAVLink log: {TAKES}; write --log flights/older/flight.tlog",
+        ),
+        ("flights/newest/flight.log", f"does not exist: {TAKES}; write --log flights/newest/fl"),
+        ("flight.mcap", f"flight.mcap does not exist: {TAKES}"),
+        ("other", f"other holds no flight.tlog: {TAKES}"),
+    ):
+        code, out, err = run(capsys, "--log", given)
+        assert (code, out) == (2, "")
+        assert words in err
+    Path("other", "a b.tlog").write_bytes(b"")
+    _, _, err = run(capsys, "--log", "other")
+    assert err.endswith("; write --log 'other/a b.tlog'")
 
 
 @pytest.mark.parametrize(
@@ -180,7 +207,7 @@ def test_a_place_that_cannot_be_written_is_told_before_flying(
 def test_a_log_in_a_folder_that_is_not_there_is_what_is_blamed(capsys, tmp_path):
     code, _, err = run(capsys, "--log", tmp_path / "no" / "x.tlog")
     assert code == 2
-    assert f"{tmp_path}/no/x.tlog: cannot read the log: No such file" in err
+    assert f"{tmp_path}/no/x.tlog does not exist: {TAKES}" in err
 
 
 GOOD = FitQuality(
