@@ -21,6 +21,7 @@ from companion.campaign.campaign_file import (
 from companion.campaign.keys import check_key, with_keys
 from companion.campaign.swept import Swept
 from companion.config import Config, trajectory_file
+from companion.config.file_kinds import FileKind, require_kind
 from companion.config.files import load as load_config
 from companion.files import yaml_file
 from companion.files.yaml_file import ConfigError, place_of, validated
@@ -52,6 +53,7 @@ class _CampaignReader:
     def __init__(self, path: Path) -> None:
         self._path, self._folder = path, path.parent
         contents = yaml_file.read(path, CampaignFile)
+        require_kind(path, contents.keys, FileKind.CAMPAIGN)
         self._places = contents.places
         self._file = validated(contents.keys, str(path), CampaignFile, contents.places)
         self._files: dict[str, str] = {}

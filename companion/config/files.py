@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.config import Config
+from companion.config.file_kinds import FileKind, require_kind
 from companion.config.root import MOST_INCLUDED
 from companion.config.trajectory_file import is_table
 from companion.files import bounded_yaml, yaml_file
@@ -44,6 +45,7 @@ def load(path: Path | str) -> Config:
             f"{path} is a table of a trajectory, not a configuration; fly it with --trajectory"
         )
     own = _read(path)
+    require_kind(path, own.keys, FileKind.CONFIG)
     merged = Contents({}, {})
     _IncludeReader(merged).add_included((path,), own.keys)
     _merge(merged, own)

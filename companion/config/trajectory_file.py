@@ -5,6 +5,7 @@ from typing import Annotated, Literal, NamedTuple, Protocol
 
 from pydantic import Field, model_validator
 
+from companion.config.file_kinds import FileKind, require_kind
 from companion.config.trajectory_shapes import (
     Acceleration,
     CircleShape,
@@ -204,6 +205,18 @@ def is_table(path: Path) -> bool:
     return path.suffix.lower() == ".csv"
 
 
+def load_shape(path: Path) -> TrajectoryFile:
+    """Load the shape that a YAML file describes.
+
+    Raises:
+        ConfigError: the file cannot be read, is of another kind, or holds an unknown key or a bad
+            value.
+    """
+    contents = yaml_file.read(path, TrajectoryFile)
+    require_kind(path, contents.keys, FileKind.TRAJECTORY)
+    return yaml_file.validated(contents.keys, str(path), TrajectoryFile, contents.places)
+
+
 def load(path: Path | str) -> Trajectory:
     """Load the trajectory of a file; see `read`.
 
@@ -225,7 +238,7 @@ def read(path: Path) -> LoadedTrajectory:
             loaded = (
                 CsvShape(file=Path(path.name)).read(path.parent)
                 if is_table(path)
-                else yaml_file.load(path, TrajectoryFile).read(path.parent)
+                else load_shape(path).read(path.parent)
             )
             loaded.trajectory.check_times()  # this may overflow, too
             return loaded

@@ -8,11 +8,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from companion.config import Config
+from companion.config import Config, trajectory_file
 from companion.config.files import FILE_KEYS
 from companion.config.known_drag import KnownDrag
-from companion.config.trajectory_file import TrajectoryFile, is_table
-from companion.files import bounded_yaml, yaml_file
+from companion.config.trajectory_file import is_table
+from companion.files import bounded_yaml
 from companion.files.write_whole import write_whole
 from companion.flight.plan import ConfiguredPlan, Plan
 
@@ -114,7 +114,7 @@ def copy_trajectory(path: Path, folder: Path) -> str:
     """
     folder.mkdir()
     copy = folder / path.name
-    shape = None if is_table(path) else yaml_file.load(path, TrajectoryFile)
+    shape = None if is_table(path) else trajectory_file.load_shape(path)
     if shape is None or shape.csv is None:
         shutil.copyfile(path, copy)
         return copy.name

@@ -1,0 +1,55 @@
+"""Which kind of YAML file a user gave where another kind is wanted, and which command takes it."""
+
+from collections.abc import Iterable, Mapping
+from enum import Enum
+from pathlib import Path
+
+from companion.config.root import Config
+from companion.files.yaml_file import ConfigError
+
+
+class FileKind(Enum):
+    """The kinds of YAML files; the value is how messages call it."""
+
+    CONFIG = "a configuration"
+    TRAJECTORY = "a trajectory file"
+    CAMPAIGN = "a campaign file"
+
+
+CAMPAIGN_KEYS = (
+    "name", "kind", "config", "seed", "samples", "sampling", "same_seeds", "set", "sweep", "faults",
+    "limits", "tune",
+)  # fmt: skip
+"""The keys of a campaign file. Its model is in a room above this one."""
+TRAJECTORY_KEYS = ("hover", "line", "circle", "helix", "figure_eight", "waypoints", "csv")
+"""The keys of a trajectory file. Its model uses this module."""
+_KEYS: Mapping[FileKind, Iterable[str]] = {
+    FileKind.CONFIG: Config.model_fields,
+    FileKind.TRAJECTORY: TRAJECTORY_KEYS,
+    FileKind.CAMPAIGN: CAMPAIGN_KEYS,
+}
+_TAKEN_BY: Mapping[FileKind, str] = {
+    FileKind.CONFIG: "`companion fly --config` flies it, and the key `config` of a campaign file "
+    "names it",
+    FileKind.TRAJECTORY: "`companion fly --trajectory` flies it",
+    FileKind.CAMPAIGN: "`companion campaign run` flies it, and `campaign tune` its search; the key "
+    "`config` in it names the configuration",
+}
+
+
+def require_kind(path: Path | str, keys: Iterable[str], wanted: FileKind) -> None:
+    """Refuse a file whose top-level keys are rather those of another kind of file.
+
+    Args:
+        path: path of the file.
+        keys: its keys at the top level.
+        wanted: the kind of file that the user was to give.
+
+    Raises:
+        ConfigError: it is another kind of file; the message says what takes that kind.
+    """
+    given = set(keys)
+    found = {kind: len(given.intersection(known)) for kind, known in _KEYS.items()}
+    likely = max(found, key=lambda kind: (found[kind], kind is wanted))
+    if likely is not wanted:
+        raise ConfigError(f"{path} is {likely.value}, not {wanted.value}; {_TAKEN_BY[likely]}")
