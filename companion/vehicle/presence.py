@@ -158,6 +158,11 @@ def no_heartbeat_message(settings: LinkSettings, stats: LinkStats, timeout_s: fl
             f"{opening}, but {stats.bad_crc} damaged frames; is the baud rate right? "
             "(link.endpoint)"
         )
+    if settings.endpoint.startswith("serial:"):
+        return (
+            f"{opening} on {settings.endpoint}; is the vehicle running, does its port send "
+            "MAVLink at this baud rate, and are TX and RX crossed?"
+        )
     return f"{opening} on {settings.endpoint}; is the vehicle running and sending to this address?"
 
 

@@ -78,6 +78,13 @@ _BAUD = "write serial:///dev/ttyACM0:BAUD with the baud rate of the autopilot's 
         ("ttyACM0:57600", "write serial:///dev/ttyACM0:57600"),
         ("serial:///dev/ttyACM0", _BAUD),
         ("serial://ttyACM0:57600", "write serial:///dev/ttyACM0:57600"),
+        ("serial:///dev/ttyACM0:0", _BAUD),
+        ("serial:///dev/ttyACM0:fast", _BAUD),
+        ("serial:///dev/ttyACM0:", _BAUD),
+        (
+            "serial:///tmp/port",
+            "write serial:///tmp/port:BAUD with the baud rate of the autopilot's",
+        ),
         ("serial:/dev/ttyACM0:57600", "write serial:///dev/ttyACM0:57600"),
         ("COM3", "write serial://COM3:BAUD"),
         ("udp:127.0.0.1:14550", "write udpin://127.0.0.1:14550"),

@@ -284,9 +284,11 @@ def test_a_device_in_use_by_another_program_is_said(run):
         (PermissionError(errno.EACCES, "Permission denied"), "add yourself to its group"),
         (PermissionError(errno.EPERM, "Operation not permitted"), "add yourself to its group"),
         (OSError(errno.EBUSY, "Device or resource busy"), "in use by another program"),
-        (OSError(errno.EIO, "Input/output error"), "at 57600 baud cannot be opened: .*Input"),
-        (termios.error(errno.EIO, "Input/output error"), "at 57600 baud cannot be .*Input"),
-        (ValueError("no such rate"), "at 57600 baud cannot be opened: no such rate"),
+        (OSError(errno.EIO, "Input/output error"), "no hardware answers under this name"),
+        (termios.error(errno.EIO, "Input/output error"), "no hardware answers under this name"),
+        (ValueError("no such rate"), "does not take 57600 baud; .* such as 57600 or 921600$"),
+        (OSError(errno.ENOSPC, "x"), "at 57600 baud cannot be opened: No space left on device$"),
+        (OSError("nothing known"), "at 57600 baud cannot be opened$"),
     ],
 )
 def test_why_a_device_cannot_be_opened_is_said(run, monkeypatch, fault, words):
@@ -299,6 +301,25 @@ def test_why_a_device_cannot_be_opened_is_said(run, monkeypatch, fault, words):
         with pytest.raises(EndpointError, match=f"serial /dev/ttyUSB7.*{words}"):
             async with Link(LinkSettings(endpoint="serial:///dev/ttyUSB7:57600")):
                 pass
+
+    run(scene())
+
+
+@pytest.mark.parametrize(
+    ("device", "words"),
+    [
+        ("/tmp", "a folder, not a serial device; `ls /dev/serial/by-id`"),
+        ("/dev/null", "not a serial device; `ls /dev/serial/by-id`"),
+        ("/dev/nothing", "there is no such device; is it plugged in?"),
+    ],
+)
+def test_what_is_no_serial_device_is_said_without_the_text_of_a_library(run, device, words):
+    async def scene():
+        with pytest.raises(EndpointError) as caught:
+            async with Link(LinkSettings(endpoint=f"serial://{device}:57600")):
+                pass
+        assert str(caught.value).startswith(f"serial {device}: {words}")
+        assert "Errno" not in str(caught.value)
 
     run(scene())
 

@@ -158,9 +158,19 @@ def is_host(text: str) -> bool:
 
 def _serial(text: str, rest: str) -> SerialPort:
     match = _SERIAL_PATTERN.fullmatch(rest)
-    if match is None:
-        raise EndpointError(f"endpoint {text!r} needs DEVICE:BAUD: {_remedy(text)}")
+    if match is None or int(match[2]) == 0:
+        device, colon, _ = rest.partition(":")
+        known = device.startswith("/") and (colon or not _DEVICE_PATTERN.fullmatch(text))
+        remedy = _baud_remedy(device) if known else _remedy(text)
+        raise EndpointError(f"endpoint {text!r} needs DEVICE:BAUD: {remedy}")
     return SerialPort(match[1], int(match[2]))
+
+
+def _baud_remedy(path: str) -> str:
+    return (
+        f"write serial://{path}:BAUD with the baud rate of the autopilot's port, such as "
+        f"serial://{path}:921600"
+    )
 
 
 def _remedy(text: str) -> str:
@@ -172,10 +182,7 @@ def _remedy(text: str) -> str:
         path = name if name.startswith("COM") else f"/dev/{base_name}"
         if baud:
             return f"write serial://{path}:{baud}"
-        return (
-            f"write serial://{path}:BAUD with the baud rate of the autopilot's port, such as "
-            f"serial://{path}:921600"
-        )
+        return _baud_remedy(path)
     if address := _ADDRESS_PATTERN.fullmatch(text):
         scheme, host, port = address[1], address[2], address[3]
         kind = _NETWORK_KINDS.get(scheme or "")

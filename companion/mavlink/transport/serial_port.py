@@ -15,6 +15,23 @@ from companion.mavlink.transport.endpoint import SerialPort
 
 _READ_BYTES = 4096
 
+_NO_PERMISSION = "not permitted; add yourself to its group: sudo adduser $USER dialout"
+_IN_USE = "in use by another program (a ground station?); end that first"
+_NO_HARDWARE = "no hardware answers under this name; is it plugged in and enabled?"
+_OPEN_FAULTS: dict[int | None, str] = {
+    errno.ENOENT: "there is no such device; is it plugged in? `ls /dev/serial/by-id` helps",
+    errno.EACCES: _NO_PERMISSION,
+    errno.EPERM: _NO_PERMISSION,
+    errno.EBUSY: _IN_USE,
+    errno.EAGAIN: _IN_USE,
+    errno.EISDIR: "a folder, not a serial device; `ls /dev/serial/by-id` lists the devices",
+    errno.ENOTTY: "not a serial device; `ls /dev/serial/by-id` lists those plugged in",
+    errno.EIO: _NO_HARDWARE,
+    errno.ENXIO: _NO_HARDWARE,
+    errno.ENODEV: _NO_HARDWARE,
+}
+"""Why a device cannot be opened, and what to do, by the system's error number."""
+
 
 class SerialTransport:
     """A serial port, read and written without blocking.
@@ -105,12 +122,23 @@ class SerialTransport:
 
 
 def _open_error(endpoint: SerialPort, error: Exception) -> str:
-    where = f"serial {endpoint.device}"
-    number = getattr(error, "errno", None)
-    if number == errno.ENOENT:
-        return f"{where}: there is no such device; is it plugged in? `ls /dev/serial/by-id` helps"
-    if number in (errno.EACCES, errno.EPERM):
-        return f"{where}: not permitted; add yourself to its group: sudo adduser $USER dialout"
-    if number in (errno.EBUSY, errno.EAGAIN):
-        return f"{where}: in use by another program (a ground station?); end that first"
-    return f"{where} at {endpoint.baud} baud cannot be opened: {error}"
+    number = _error_number(error)
+    if number in _OPEN_FAULTS:
+        return f"serial {endpoint.device}: {_OPEN_FAULTS[number]}"
+    if number == errno.EINVAL or isinstance(error, ValueError):
+        return (
+            f"serial {endpoint.device}: the device does not take {endpoint.baud} baud; write the "
+            "baud rate of the autopilot's port in link.endpoint, such as 57600 or 921600"
+        )
+    reason = "" if number is None else f": {os.strerror(number)}"
+    return f"serial {endpoint.device} at {endpoint.baud} baud cannot be opened{reason}"
+
+
+def _error_number(error: BaseException | None) -> int | None:
+    """The system's error number: pyserial hides some in the text of an error that it raises."""
+    while error is not None:
+        number = error.args[0] if isinstance(error, termios.error) else getattr(error, "errno", 0)
+        if number:
+            return int(number)
+        error = error.__context__
+    return None
