@@ -3,7 +3,13 @@
 from collections.abc import Callable, Iterable, Iterator
 
 from companion.config import Config
-from companion.preflight import clock_checks, configuration_checks, link_checks, vehicle_checks
+from companion.preflight import (
+    clock_checks,
+    configuration_checks,
+    link_checks,
+    stream_checks,
+    vehicle_checks,
+)
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding
 from companion.preflight.offboard_loss import offboard_loss
@@ -34,7 +40,7 @@ CHECKS: tuple[Check, ...] = (
     vehicle_checks.estimator,
     vehicle_checks.fence,
     link_checks.other_nodes,
-    link_checks.streams,
+    stream_checks.streams,
     link_checks.losses,
     link_checks.delays,
     clock_checks.age,

@@ -1,4 +1,4 @@
-"""Checks of the link: message rates, losses, delays, signing, and other nodes on it."""
+"""Checks of the link: losses, delays, signing, and other nodes on it."""
 
 from collections.abc import Iterable, Iterator
 
@@ -9,96 +9,11 @@ from companion.preflight import clock_checks
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
 from companion.vehicle.parameter_rules import CheckResult
-from companion.vehicle.streams import StreamRate
 
 SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 
-_MIN_RATE_SHARE = 0.7
-"""Share of a requested rate that must be granted and arrive; PX4 sends 197 Hz of 250 (measured)."""
-_MIN_EXPECTED_COUNT = 5.0
-"""A rate is judged by counting only if at least this many messages are expected."""
-_SENT_ON_CHANGE = {"CURRENT_MODE": 2.0}
-"""Messages that PX4 sends on change, and otherwise at this rate, Hz, whatever rate is requested.
-"""
-_RATE_KEYS = {
-    "ATTITUDE_QUATERNION": "link.attitude_rate_hz",
-    "LOCAL_POSITION_NED": "link.position_rate_hz",
-}
 _UNSAFE_LOSS_SHARE = 0.2
 _MAX_DAMAGED_SHARE = 0.01
-
-
-def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether the requested telemetry arrives at the requested rates."""
-    link = config.link
-    minimum_rates = {
-        "ATTITUDE_QUATERNION": ("min_attitude_rate_hz", link.min_attitude_rate_hz),
-        "LOCAL_POSITION_NED": ("min_position_rate_hz", link.min_position_rate_hz),
-    }
-    good_rates = []
-    for name, rate in evidence.streams.items():
-        fault = _rate_fault(name, rate, evidence)
-        if name in evidence.awaited and rate.granted >= _MIN_RATE_SHARE * rate.asked:
-            continue  # `readiness` reports it
-        effective = _effective_rate(name, rate, evidence)
-        if name in minimum_rates and effective < minimum_rates[name][1]:
-            key, limit = minimum_rates[name]
-            uneven = effective < _MIN_RATE_SHARE * rate.achieved
-            arrives = f"arrives at {effective:.0f} Hz"
-            if uneven:
-                arrives = (
-                    f"arrives in bursts: {rate.achieved:.0f} Hz on average, but its gaps are as "
-                    f"long as at {effective:.0f} Hz"
-                )
-            yield Finding(
-                f"link.{key}",
-                UNSAFE,
-                f"{name} {arrives}, less than link.{key} = {limit:g}",
-                "the flight would be controlled with data that is too old",
-                fault[1] if fault else "raise the link's speed",
-                source="counted",
-            )
-        elif fault is not None:
-            found, fix = fault
-            because = "what depends on this message is delayed or does not work"
-            yield Finding(
-                f"{Key.STREAMS}.{name}", INEFFECTIVE, found, because, fix, source="counted"
-            )
-        else:
-            good_rates.append(f"{name} {rate.achieved:.0f} of {rate.asked:g}")
-    if good_rates:
-        found = f"telemetry arrives, Hz: {', '.join(good_rates)}"
-        yield Finding(Key.STREAMS, SAFE, found, source="counted")
-
-
-def _effective_rate(name: str, rate: StreamRate, evidence: Evidence) -> float:
-    """The effective rate, Hz: for attitudes, the pauses between bursts lower it."""
-    sample_rate = evidence.samples.rate
-    if name != "ATTITUDE_QUATERNION" or sample_rate is None:
-        return rate.achieved
-    return min(rate.achieved, sample_rate)
-
-
-def _rate_fault(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, str] | None:
-    """The fault of a message's rate, and the remedy; None: no fault."""
-    asked, achieved = rate.asked, rate.achieved
-    key, faster_loop = _RATE_KEYS.get(name), "raise the rate of the autopilot's loop"
-    if rate.refusal:
-        return f"{name} is refused ({rate.refusal})", "a newer version of the autopilot may send it"
-    if rate.granted < _MIN_RATE_SHARE * asked:
-        return (
-            f"{name}: asked for {asked:g} Hz, granted {rate.granted:g} Hz",
-            f"lower {key}, or {faster_loop}" if key else faster_loop,
-        )
-    asked = min(asked, _SENT_ON_CHANGE.get(name, asked))
-    countable = asked * evidence.window >= _MIN_EXPECTED_COUNT
-    if achieved >= _MIN_RATE_SHARE * asked if countable else evidence.received[name] > 0:
-        return None
-    return (
-        f"{name} arrives at {achieved:.0f} Hz, asked for {asked:g} Hz",
-        "raise the link's speed, lower link.attitude_rate_hz and link.position_rate_hz, or end "
-        "other programs on this computer if it is busy",
-    )
 
 
 def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:

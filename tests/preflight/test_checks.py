@@ -9,7 +9,13 @@ import pytest
 
 from companion.config import Config
 from companion.config.files import changed
-from companion.preflight import clock_checks, configuration_checks, link_checks, vehicle_checks
+from companion.preflight import (
+    clock_checks,
+    configuration_checks,
+    link_checks,
+    stream_checks,
+    vehicle_checks,
+)
 from companion.preflight.all_checks import blocking, overall_result, run_checks
 from companion.preflight.evidence import Evidence, Identity, LinkQuality, OtherNodes, SampleTimes
 from companion.preflight.finding import Key
@@ -192,20 +198,36 @@ def test_rates_that_are_refused_cut_or_not_reached():
         return replace(GOOD, streams={**GOOD.streams, **changes})
 
     cut = streams(ATTITUDE_QUATERNION=StreamRate(500.0, 250.0, 250.0))
-    assert found(link_checks.streams, cut) == {"link.streams.ATTITUDE_QUATERNION": INEFFECTIVE}
+    assert found(stream_checks.streams, cut) == {"link.streams.ATTITUDE_QUATERNION": INEFFECTIVE}
     slow = streams(ATTITUDE_QUATERNION=StreamRate(250.0, 250.0, 49.0))
-    assert found(link_checks.streams, slow) == {"link.min_attitude_rate_hz": UNSAFE}
+    assert found(stream_checks.streams, slow) == {"link.min_attitude_rate_hz": UNSAFE}
     refused = streams(HOME_POSITION=StreamRate(1.0, 0.0, 0.0, "UNSUPPORTED"))
-    assert found(link_checks.streams, refused) == {"link.streams.HOME_POSITION": INEFFECTIVE}
+    assert found(stream_checks.streams, refused) == {"link.streams.HOME_POSITION": INEFFECTIVE}
     never = replace(GOOD, received={**GOOD.received, "HOME_POSITION": 0})
-    assert found(link_checks.streams, never) == {"link.streams.HOME_POSITION": INEFFECTIVE}
+    assert found(stream_checks.streams, never) == {"link.streams.HOME_POSITION": INEFFECTIVE}
+
+
+def test_a_rate_below_the_requested_one_that_is_safe_says_why():
+    streams = {
+        **GOOD.streams,  # 197 Hz of 250; 50 of 50; a HOME_POSITION, which did not come
+        "CURRENT_MODE": StreamRate(20.0, 20.0, 2.0),
+    }
+    evidence = replace(GOOD, streams=streams, window=4.0)
+    evidence = replace(evidence, received={**GOOD.received, "CURRENT_MODE": 8})
+    (finding,) = stream_checks.streams(CONFIG, evidence)
+    assert finding.result is CheckResult.SAFE
+    assert finding.found == (
+        "telemetry arrives, Hz: ATTITUDE_QUATERNION 197 of 250 (70 % suffices), "
+        "LOCAL_POSITION_NED 50 of 50, HOME_POSITION (asked for 1, too seldom to be counted here), "
+        "CURRENT_MODE on change, and at 2 Hz between"
+    )
 
 
 def test_bursts_are_judged_on_the_ground_as_in_flight():
     """The monitor `answer rate` would hand such a vehicle back two seconds after the take-over."""
     bursts = replace(GOOD, samples=GOOD.samples._replace(rate=41.0))
-    assert found(link_checks.streams, bursts) == {"link.min_attitude_rate_hz": UNSAFE}
-    (finding, _) = link_checks.streams(CONFIG, bursts)
+    assert found(stream_checks.streams, bursts) == {"link.min_attitude_rate_hz": UNSAFE}
+    (finding, _) = stream_checks.streams(CONFIG, bursts)
     assert "in bursts: 197 Hz on average, but its gaps are as long as at 41 Hz" in finding.found
 
 
@@ -277,12 +299,12 @@ def test_a_position_that_will_never_come_is_not_hidden_by_not_being_ready():
     """Refused, granted too seldom, or silent although the estimator has one."""
     for rate in (StreamRate(50.0, 0.0, 0.0, "UNSUPPORTED"), StreamRate(50.0, 5.0, 0.0)):
         evidence = without_position(BOOTING, LOCAL_POSITION_NED=rate)
-        assert found(link_checks.streams, evidence)["link.min_position_rate_hz"] is UNSAFE
+        assert found(stream_checks.streams, evidence)["link.min_position_rate_hz"] is UNSAFE
     evidence = without_position(READY._replace(prearm_good=False))
-    assert found(link_checks.streams, evidence)["link.min_position_rate_hz"] is UNSAFE
+    assert found(stream_checks.streams, evidence)["link.min_position_rate_hz"] is UNSAFE
     slow = StreamRate(250.0, 250.0, 3.0)
     evidence = without_position(BOOTING, ATTITUDE_QUATERNION=slow)
-    assert found(link_checks.streams, evidence) == {"link.min_attitude_rate_hz": UNSAFE}
+    assert found(stream_checks.streams, evidence) == {"link.min_attitude_rate_hz": UNSAFE}
 
 
 def test_no_remedy_is_to_lower_a_safety_limit():
@@ -290,7 +312,9 @@ def test_no_remedy_is_to_lower_a_safety_limit():
     slow = {name: StreamRate(50.0, 50.0, 1.0) for name in GOOD.streams}
     evidence = replace(GOOD, streams=slow)
     remedies = [
-        finding.fix for finding in link_checks.streams(CONFIG, evidence) if finding.result is UNSAFE
+        finding.fix
+        for finding in stream_checks.streams(CONFIG, evidence)
+        if finding.result is UNSAFE
     ]
     assert len(remedies) == 2
     for remedy in remedies:

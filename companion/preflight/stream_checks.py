@@ -1,0 +1,116 @@
+"""Checks of the rates at which the requested telemetry arrives."""
+
+from collections.abc import Iterator
+
+from companion.config import Config
+from companion.preflight.evidence import Evidence
+from companion.preflight.finding import Finding, Key
+from companion.vehicle.parameter_rules import CheckResult
+from companion.vehicle.streams import StreamRate
+
+SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.INEFFECTIVE
+
+_MIN_RATE_SHARE = 0.7
+"""Smallest share of the requested rate; PX4 sends 197 Hz of 250 requested (measured)."""
+_FULL_RATE_SHARE = 0.95
+"""Share of the requested rate from which a rate counts as reached."""
+_MIN_EXPECTED_COUNT = 5.0
+"""A rate is judged by counting only if at least this many messages are expected."""
+_SENT_ON_CHANGE = {"CURRENT_MODE": 2.0}
+"""Messages that PX4 sends on change, and otherwise at this rate, Hz, whatever rate is requested.
+"""
+_RATE_KEYS = {
+    "ATTITUDE_QUATERNION": "link.attitude_rate_hz",
+    "LOCAL_POSITION_NED": "link.position_rate_hz",
+}
+
+
+def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether the requested telemetry arrives at the requested rates."""
+    link = config.link
+    minimum_rates = {
+        "ATTITUDE_QUATERNION": ("min_attitude_rate_hz", link.min_attitude_rate_hz),
+        "LOCAL_POSITION_NED": ("min_position_rate_hz", link.min_position_rate_hz),
+    }
+    good_rates = []
+    for name, rate in evidence.streams.items():
+        fault = _rate_fault(name, rate, evidence)
+        if name in evidence.awaited and rate.granted >= _MIN_RATE_SHARE * rate.asked:
+            continue  # `readiness` reports it
+        effective = _effective_rate(name, rate, evidence)
+        if name in minimum_rates and effective < minimum_rates[name][1]:
+            key, limit = minimum_rates[name]
+            uneven = effective < _MIN_RATE_SHARE * rate.achieved
+            arrives = f"arrives at {effective:.0f} Hz"
+            if uneven:
+                arrives = (
+                    f"arrives in bursts: {rate.achieved:.0f} Hz on average, but its gaps are as "
+                    f"long as at {effective:.0f} Hz"
+                )
+            yield Finding(
+                f"link.{key}",
+                UNSAFE,
+                f"{name} {arrives}, less than link.{key} = {limit:g}",
+                "the flight would be controlled with data that is too old",
+                fault[1] if fault else "raise the link's speed",
+                source="counted",
+            )
+        elif fault is not None:
+            found, fix = fault
+            because = "what depends on this message is delayed or does not work"
+            yield Finding(
+                f"{Key.STREAMS}.{name}", INEFFECTIVE, found, because, fix, source="counted"
+            )
+        else:
+            good_rates.append(_good_rate(name, rate, evidence))
+    if good_rates:
+        found = f"telemetry arrives, Hz: {', '.join(good_rates)}"
+        yield Finding(Key.STREAMS, SAFE, found, source="counted")
+
+
+def _effective_rate(name: str, rate: StreamRate, evidence: Evidence) -> float:
+    """The effective rate, Hz: for attitudes, the pauses between bursts lower it."""
+    sample_rate = evidence.samples.rate
+    if name != "ATTITUDE_QUATERNION" or sample_rate is None:
+        return rate.achieved
+    return min(rate.achieved, sample_rate)
+
+
+def _rate_fault(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, str] | None:
+    """The fault of a message's rate, and the remedy; None: no fault."""
+    asked, achieved = rate.asked, rate.achieved
+    key, faster_loop = _RATE_KEYS.get(name), "raise the rate of the autopilot's loop"
+    if rate.refusal:
+        return f"{name} is refused ({rate.refusal})", "a newer version of the autopilot may send it"
+    if rate.granted < _MIN_RATE_SHARE * asked:
+        return (
+            f"{name}: asked for {asked:g} Hz, granted {rate.granted:g} Hz",
+            f"lower {key}, or {faster_loop}" if key else faster_loop,
+        )
+    countable = _is_countable(name, rate, evidence)
+    asked = min(asked, _SENT_ON_CHANGE.get(name, asked))
+    if achieved >= _MIN_RATE_SHARE * asked if countable else evidence.received[name] > 0:
+        return None
+    return (
+        f"{name} arrives at {achieved:.0f} Hz, asked for {asked:g} Hz",
+        "raise the link's speed, lower link.attitude_rate_hz and link.position_rate_hz, or end "
+        "other programs on this computer if it is busy",
+    )
+
+
+def _is_countable(name: str, rate: StreamRate, evidence: Evidence) -> bool:
+    """Whether enough messages are expected to judge the rate by counting them."""
+    expected = min(rate.asked, _SENT_ON_CHANGE.get(name, rate.asked))
+    return expected * evidence.window >= _MIN_EXPECTED_COUNT
+
+
+def _good_rate(name: str, rate: StreamRate, evidence: Evidence) -> str:
+    """A rate without a fault, in words; one below the requested rate says why it suffices."""
+    if name in _SENT_ON_CHANGE:
+        return f"{name} on change, and at {_SENT_ON_CHANGE[name]:g} Hz between"
+    if not _is_countable(name, rate, evidence):
+        return f"{name} (asked for {rate.asked:g}, too seldom to be counted here)"
+    share = f"{name} {rate.achieved:.0f} of {rate.asked:g}"
+    if rate.achieved >= _FULL_RATE_SHARE * rate.asked:
+        return share
+    return f"{share} ({100.0 * _MIN_RATE_SHARE:.0f} % suffices)"
