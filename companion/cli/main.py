@@ -11,6 +11,7 @@ import sys
 
 from companion.cli import interrupts
 from companion.cli.exit_codes import EXIT_FAILURE
+from companion.cli.utf8_names import use_utf8_names
 
 TYPE_CHECKING = False  # type checkers take it for typing's, whose import would cost 5 ms
 if TYPE_CHECKING:
@@ -23,6 +24,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Args:
         arguments: arguments of the command line; None: those of this process.
     """
+    if arguments is None:
+        use_utf8_names()
     our_signals = interrupts.unhandled()
     interrupts.leave_at_once(our_signals)
     try:

@@ -89,6 +89,24 @@ def test_refusals_are_told_on_any_terminal(tmp_path):
     assert_said(companion(tmp_path, {}, "check-config", b"\xff\xc3.yaml"), 2, b"cannot read")
 
 
+@pytest.mark.parametrize("environment", [ASCII, C_LOCALE, {**C_LOCALE, **ASCII}])
+def test_files_whose_names_are_not_ascii_are_found_in_any_locale(tmp_path, environment):
+    folder = tmp_path / "flüge"
+    folder.mkdir()
+    (folder / "grün.yaml").write_text("limits: {max_tilt_deg: 21}\n")
+    (folder / "höhe.yaml").write_text("hover: {duration_s: 1}\n")
+    (folder / "übung.yaml").write_text(
+        "include: grün.yaml\nflight: {maneuvers: [trajectory], trajectory: höhe.yaml}\n",
+        encoding="utf-8",
+    )
+    done = companion(tmp_path, environment, "check-config", "flüge/übung.yaml")
+    assert_said(done, 0, b"bung.yaml: ok")
+    assert done.stdout.isascii()
+    done = companion(folder, environment, "config", "übung.yaml", "--get", "limits.max_tilt_deg")
+    assert_said(done, 0, b"21")
+    assert_said(companion(folder, environment, "check-config", "nö.yaml"), 2, b"cannot read it")
+
+
 def test_help_and_the_schema_are_told_on_any_terminal(tmp_path):
     assert_said(companion(tmp_path, ASCII, "identify", "--help"), 0, b"of tilt")
     schema = companion(tmp_path, C_LOCALE, "config", "--schema")
