@@ -19,9 +19,7 @@ def _require_plain(name: str) -> str:
     return name
 
 
-CampaignName = Annotated[
-    str, Field(min_length=1, max_length=60), AfterValidator(_require_plain)
-]
+CampaignName = Annotated[str, Field(min_length=1, max_length=60), AfterValidator(_require_plain)]
 ScenarioName = Annotated[str, Field(min_length=1, max_length=60)]
 Ending = Literal["ground", "ok", "landed", "held", "pilot"]
 FaultPhase = Literal["stream", "arm", "takeoff", "offboard", "maneuvers", "hand back", "land"]

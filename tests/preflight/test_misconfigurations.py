@@ -30,6 +30,7 @@ PARAMETERS = {
         ("MAV_FWDEXTSP", 0, INEFFECTIVE),
         ("NAV_DLL_ACT", 5, UNSAFE),
         ("NAV_RCL_ACT", 6, UNSAFE),
+        ("NAV_RCL_ACT", 7, INEFFECTIVE),
         ("COM_RCL_EXCEPT", 4, INEFFECTIVE),
         ("MPC_THR_HOVER", 0.2, INEFFECTIVE),
         ("MC_BAT_SCALE_EN", 1, INEFFECTIVE),

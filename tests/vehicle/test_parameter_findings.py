@@ -13,7 +13,9 @@ from companion.vehicle.registry import AUTOPILOTS
 from tests.vehicle.test_parameter_rules import PX4_SETUP
 
 KEPT = Path(__file__).with_name("parameter_findings.txt")
-VALUES = (-1.0, 0.0, 0.25, 0.5, 1.0, 1.9, 2.0, 3.0, 4.0, 5.0, 8.0, 45.0, 250.0, 400.0, 1145.0)
+VALUES = (
+    -1.0, 0.0, 0.25, 0.5, 1.0, 1.9, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 45.0, 250.0, 400.0, 1145.0,
+)  # fmt: skip
 PLAIN = PX4_SETUP._replace(silence_limit=0.25, hover_thrust=0.5, battery_exponent=0.0, max_tilt=0.6)
 """No limits, and nothing is compensated."""
 OTHER = CompanionSettings(

@@ -33,6 +33,7 @@ _MEASURED = "measured on PX4 main, 2026"
 _STOPS_MOTORS = "the motors stop in the air"
 _LINK_LOSS_ACTIONS = (0.0, 1.0, 2.0, 3.0)
 _ACTIONS = "(0 nothing, 1 hold, 2 return, 3 land)"
+_LOST_PILOT_IGNORED = "in OFFBOARD nothing is done about a lost transmitter"
 _STICKS_DO_NOTHING = "moving the sticks does not end offboard; only the mode switch does"
 
 PX4_PARAMETERS: tuple[ParameterRule, ...] = (
@@ -100,15 +101,21 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ),
     ParameterRule(
         ("NAV_RCL_ACT",),
-        f"what PX4 does when the pilot's transmitter is lost {_ACTIONS}",
-        safe_action(_LINK_LOSS_ACTIONS, {5.0: _STOPS_MOTORS, 6.0: _STOPS_MOTORS}, set_to=2.0),
-        _REFERENCE,
+        "what PX4 does when the pilot's transmitter is lost (0 nothing, 1 hold, 2 return, 3 land, "
+        "7 hold, but only in a pilot's modes)",
+        first_problem(
+            safe_action(
+                (*_LINK_LOSS_ACTIONS, 7.0), {5.0: _STOPS_MOTORS, 6.0: _STOPS_MOTORS}, set_to=2.0
+            ),
+            forbidden(INEFFECTIVE, {0.0: _LOST_PILOT_IGNORED, 7.0: _LOST_PILOT_IGNORED}, 2.0),
+        ),
+        f"{_REFERENCE}; PX4's failsafe.cpp",
         universal=True,
     ),
     ParameterRule(
         ("COM_RCL_EXCEPT",),
         "in which modes a lost transmitter is ignored",
-        bit_clear(INEFFECTIVE, 4, "in OFFBOARD nothing is done about a lost transmitter"),
+        bit_clear(INEFFECTIVE, 4, _LOST_PILOT_IGNORED),
         _REFERENCE,
     ),
     ParameterRule(
