@@ -1,4 +1,4 @@
-"""Planners and guidance of other packages, found by their entry points."""
+"""Planners, guidance and monitors of other packages, found by their entry points."""
 
 from collections.abc import Sequence
 from importlib.metadata import EntryPoint, entry_points
@@ -11,6 +11,10 @@ argument, `companion.attitude.Constants`.
 GUIDANCE = "companion.guidance"
 """Entry points of guidance: a class with the Protocol `companion.guidance.linear.Guidance` and one
 argument, `LinearSettings`.
+"""
+MONITORS = "companion.monitors"
+"""Entry points of monitors: a function of the configuration (`companion.config.Config`) that makes
+a `companion.safety.monitor.Monitor`.
 """
 
 

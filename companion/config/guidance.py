@@ -17,7 +17,7 @@ LINEAR = "linear"
 GUIDANCE_NAMES = (LINEAR, "nmpc")
 
 
-def _require_known(kind: str, name: str, our_names: tuple[str, ...], group: str) -> None:
+def require_known(kind: str, name: str, our_names: tuple[str, ...], group: str) -> None:
     """Raise `ValueError` unless the name is ours or that of an installed plug-in."""
     if name not in our_names and name not in (installed := plugins.names(group)):
         known = (*our_names, *installed)
@@ -47,7 +47,7 @@ class PlannerConfig(Section):
 
     @model_validator(mode="after")
     def _known_name(self) -> "PlannerConfig":
-        _require_known("planner", self.name, (AUTO, *PLANNER_NAMES), plugins.PLANNERS)
+        require_known("planner", self.name, (AUTO, *PLANNER_NAMES), plugins.PLANNERS)
         return self
 
 
@@ -111,7 +111,7 @@ class GuidanceConfig(Section):
 
     @model_validator(mode="after")
     def _known_kind(self) -> "GuidanceConfig":
-        _require_known("guidance", self.kind, GUIDANCE_NAMES, plugins.GUIDANCE)
+        require_known("guidance", self.kind, GUIDANCE_NAMES, plugins.GUIDANCE)
         return self
 
     @property

@@ -9,6 +9,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from companion import plugins
+from companion.config.guidance import require_known
 from companion.config.units import Si
 from companion.files.yaml_file import Section
 from companion.guidance.fence import inside
@@ -23,6 +25,8 @@ Longitude = Annotated[float, Field(ge=-180.0, le=180.0)]
 AlarmShare = Annotated[float, Field(ge=0.0, le=0.9)]
 """Limit of a share; a limit of 1 could never be exceeded."""
 MOST_CORNERS = 200
+MonitorName = Annotated[str, Field(min_length=1, max_length=50)]
+MOST_MONITORS = 20
 
 
 class SafetyConfig(Section):
@@ -92,6 +96,9 @@ class SafetyConfig(Section):
     """CPU starvation: largest share of a second by which our timer may be late."""
     computer_action: AnyAction = "hand_back"
     """Action if max_missed or max_starved is exceeded for 1.5 s."""
+    monitors: Annotated[tuple[MonitorName, ...], Field(max_length=MOST_MONITORS)] = ()
+    """Monitors of other packages that run beside these, named by their entry points in
+    `companion.monitors`. If one fails in flight, the vehicle is handed back."""
 
     max_reset_angle = Si("max_reset_deg")
     tilt_margin = Si("tilt_margin_deg")
@@ -100,6 +107,8 @@ class SafetyConfig(Section):
 
     @model_validator(mode="after")
     def _consistent(self) -> "SafetyConfig":
+        for name in self.monitors:
+            require_known("monitor", name, (), plugins.MONITORS)
         if self.fence_polygon_m and self.fence_polygon_deg:
             raise ValueError("give fence_polygon_m or fence_polygon_deg, not both")
         for corners in (self.fence_polygon_m, self.fence_polygon_deg):

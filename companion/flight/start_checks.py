@@ -8,6 +8,7 @@ from companion.files.yaml_file import ConfigError
 from companion.flight.assembly import link_settings
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.transport.endpoint import parse_endpoint
+from companion.safety.plugin_monitors import plugin_monitors
 
 
 def check_link(config: Config) -> None:
@@ -27,7 +28,7 @@ def check_link(config: Config) -> None:
 
 
 def check_control(config: Config) -> None:
-    """Check that the planner and the guidance can be made.
+    """Check that the planner, the guidance and the monitors of other packages can be made.
 
     Raises:
         ConfigError: they do not fit the vehicle or the limits, or a planner or guidance
@@ -35,6 +36,7 @@ def check_control(config: Config) -> None:
     """
     planner(config)
     make_guidance(config)
+    plugin_monitors(config)
     if config.guidance.kind == "nmpc":
         predictive_settings(config)
 

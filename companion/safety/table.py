@@ -11,6 +11,7 @@ from companion.guidance.fence import Fence
 from companion.safety import autopilot_judges, link_judges, motion_judges
 from companion.safety.actions import Action, Stream
 from companion.safety.monitor import Monitor
+from companion.safety.plugin_monitors import plugin_monitors
 
 _BACKLOG_TIME = 0.2
 """Time after a stall in which queued telemetry is read, s; until then it looks old."""
@@ -31,12 +32,16 @@ def monitors(config: Config) -> tuple[Monitor, ...]:
 
     The table does not contain a takeover by the pilot or an unknown mode: `companion.flight.watch`
     detects both, and releases control.
+
+    Raises:
+        ConfigError: a monitor of another package cannot be used; see `plugin_monitors`.
     """
     return (
         *_fixed_monitors(config),
         *_autopilot_monitors(config),
         *_motion_monitors(config),
         *_link_monitors(config),
+        *plugin_monitors(config),
     )
 
 

@@ -1,0 +1,158 @@
+"""Monitors of another package: they run beside ours, and none can stop or soften the others."""
+
+import sys
+from importlib import invalidate_caches
+
+import pytest
+
+from companion.cli.main import main
+from companion.config import Config
+from companion.files.yaml_file import ConfigError
+from companion.safety import Action, SafetyLadder, monitors
+from companion.safety.actions import Stream
+from companion.safety.snapshot import Autopilot, Motion, Snapshot
+from companion.testing import fly
+from tests.flight.fly import QUICK_FLIGHT, QuickVehicle, merged
+from tests.test_extending import block
+
+CODE = """
+
+import sys
+from companion.safety.actions import Stream
+
+def made(config, judge, action=Action.WARN, **rest):
+    return Monitor("theirs", judge, action, **rest)
+
+def high(config):
+    def judge(snapshot, raised):
+        height = snapshot.motion.height
+        if height is not None and height > 1.0:
+            raise ArithmeticError("too thin an air")
+    return made(config, judge)
+
+def leaving(config):
+    def judge(snapshot, raised):
+        if snapshot.motion.height is not None and snapshot.motion.height > 1.0:
+            sys.exit(1)
+    return made(config, judge)
+
+def silent(config):
+    return made(config, lambda snapshot, raised: None, stream=Stream.STOPS)
+
+def raising(config):
+    return made(config, lambda snapshot, raised: snapshot.motion.height + 1.0)
+
+def counting(config):
+    return made(config, lambda snapshot, raised: 5)
+
+def releasing(config):
+    return made(config, lambda snapshot, raised: None, Action.RELEASE)
+
+def unmade(config):
+    raise OSError("no file")
+
+def nothing(config):
+    return None
+"""
+NAMES = ("sinking", "high", "leaving", "silent", "raising", "counting", "releasing", "unmade",
+         "nothing")  # fmt: skip
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+
+
+@pytest.fixture(autouse=True)
+def installed(tmp_path, monkeypatch):
+    """A package with the monitor of docs/extending.md and others, installed as pip does."""
+    (tmp_path / "my_monitors.py").write_text(block("my_monitors.py") + CODE, "utf-8")
+    info = tmp_path / "my_monitors-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-monitors\nVersion: 1.0\n")
+    entries = "".join(f"{name} = my_monitors:{name}\n" for name in NAMES)
+    (info / "entry_points.txt").write_text(f"[companion.monitors]\n{entries}")
+    monkeypatch.syspath_prepend(tmp_path)
+    invalidate_caches()
+    yield
+    sys.modules.pop("my_monitors", None)
+
+
+def configured(*names):
+    return Config(safety={"monitors": names})
+
+
+def test_the_monitor_of_the_page_flies_and_raises_its_alarm():
+    config = merged(QUICK_FLIGHT, {"safety": {"monitors": ["sinking"]}})
+    summary = fly(config, QuickVehicle("px4"))
+    assert summary.result == "ok", summary.events
+    ladder = SafetyLadder(monitors(configured("sinking")), 3.0)
+    moving = Snapshot(10.0, motion=Motion(LEVEL, velocity=(0.0, 0.0, 2.5), height=5.0))
+    ladder.step(moving)
+    ladder.step(moving._replace(now=10.31))
+    assert "sinking" in ladder.raised
+    assert ladder.breaches["the vehicle sinks at 2.5 m/s"] == "sinking"
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+@pytest.mark.parametrize(
+    ("name", "raised", "line"),
+    [
+        ("high", "ArithmeticError: too thin an air", 'raise ArithmeticError("too thin an air")'),
+        ("leaving", "SystemExit: 1", "sys.exit(1)"),
+    ],
+)
+def test_a_judge_that_raises_hands_the_vehicle_back_and_is_named(autopilot, name, raised, line):
+    vehicle = QuickVehicle(autopilot)
+    config = merged(QUICK_FLIGHT, {"safety": {"monitors": [name, "silent"]}})
+    summary = fly(config, vehicle)
+    path = sys.modules["my_monitors"].__file__
+    code = (block("my_monitors.py") + CODE).splitlines()
+    number = next(k for k, text in enumerate(code, 1) if text.strip() == line)
+    assert summary.result == (
+        f"an error outside this program: the judge {name}.<locals>.judge of the module my_monitors "
+        f"raised {raised} ({path}:{number}); the vehicle is handed back"
+    )
+    assert vehicle.state()["mode"] == {"px4": "LOITER", "ardupilot": "BRAKE"}[autopilot]
+    assert not vehicle.state()["crashed"]
+    assert not any("internal error" in text for _, text in summary.events)
+
+
+def test_a_judge_that_raises_is_asked_once_and_stops_no_other_monitor():
+    ladder = SafetyLadder(monitors(configured("high")), 3.0)
+    rolled = Snapshot(
+        10.0, Autopilot(armed=False), Motion((0.0, 1.0, 0.0, 0.0), height=9.0)
+    )  # upside down and disarmed
+    ladder.step(rolled)
+    assert {"high (its fault)", "disarmed"} <= set(ladder.raised)
+    ladder.step(rolled._replace(now=10.5))
+    assert "tilt" in ladder.raised
+
+
+def test_it_can_only_choose_among_the_actions():
+    (row,) = (each for each in monitors(configured("silent")) if each.name == "silent")
+    assert (row.action, row.stream) == (Action.WARN, Stream.CONTINUES)
+    ours = monitors(Config())
+    beside = monitors(configured("silent"))[: len(ours)]
+    assert [each.name for each in beside] == [each.name for each in ours]
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("raising", "cannot be used where a value is not known: .* raised TypeError: unsupported"),
+        ("counting", "it returned 5, which is neither a text nor None"),
+        ("releasing", "its action must be WARN, HOLD, HAND_BACK or LAND"),
+        ("unmade", "the monitor unmade of the module my_monitors raised OSError: no file"),
+        ("nothing", "made no companion.safety.monitor.Monitor but None"),
+        ("sinkin", "unknown monitor 'sinkin'; known: .*; did you mean sinking?"),
+    ],
+)
+def test_what_cannot_watch_is_refused_before_the_vehicle_is_asked(name, why, tmp_path, capsys):
+    path = tmp_path / "c.yaml"
+    path.write_text(f"safety: {{monitors: [{name}]}}")
+    assert main(["check-config", str(path)]) == 2
+    error = " ".join(capsys.readouterr().err.split())
+    with pytest.raises(AssertionError, match=why):
+        raise AssertionError(error)
+
+
+def test_an_unknown_monitor_is_a_config_error():
+    with pytest.raises(ConfigError, match="unknown monitor 'none'"):
+        configured("none")
