@@ -150,8 +150,7 @@ class Vehicle:
             trajectory: a trajectory, or the path of its file (the format of `flight.trajectory`).
 
         Raises:
-            ConfigError: the trajectory cannot be read or computed, breaks a limit or the fence, or
-                `companion.guidance.trajectory.require_trajectory` refuses it.
+            ConfigError: the trajectory is unreadable, inconsistent, or breaks a limit or the fence.
             FlightEnded: the vehicle is not under the program's control.
             TypeError: the object is no trajectory.
             UserCodeError: the object raised while it was checked; nothing was flown.
