@@ -98,8 +98,8 @@ def fly_course(config: Config, course: Course, autopilot: str, seed: int = 3) ->
     """Fly a course on the mock vehicle, with this configuration's gains, lag and dead time.
 
     The configured limits of tilt and tilt rate apply. The course is slowed down if it would exceed
-    them, with a reserve for feedback and wind. Thrust, take-off height and fence are not the
-    configured ones, but suit the mock vehicle and the course. No message is signed.
+    them, with a reserve for feedback and wind. Thrust, drag, take-off height and fence are not
+    the configured ones, but suit the mock vehicle and the course. No message is signed.
 
     Args:
         config: the configuration.
@@ -191,6 +191,10 @@ def _flight_config(config: Config, course: Course, mock: Config) -> Config:
         {
             "link": {"signing_key_file": None},
             "thrust": mock.thrust.model_dump(),
+            "guidance": {
+                "drag_per_s": mock.guidance.drag_per_s,
+                "quadratic_drag_per_m": mock.guidance.quadratic_drag_per_m,
+            },
             "limits": {
                 "max_thrust": _MAX_THRUST,
                 "fence_radius_m": _FENCE_SIZE,
