@@ -87,16 +87,19 @@ def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
 
 def worse_sentence(flights: Flights) -> str | None:
     """A warning if a test course failed or was flown worse with the proposal; else None."""
-    worse = [
-        f"{name} {after.result}"
-        if not after.ok
-        else f"{name} {before.true:.3f} -> {after.true:.3f} m"
-        for name, (before, after) in flights.items()
-        if not after.ok or after.true > max(_WORSE_FACTOR * before.true, before.true + _WORSE_BY)
-    ]
-    if not worse:
+    failed_as_before: list[str] = []
+    worse: list[str] = []
+    for name, (before, after) in flights.items():
+        if not after.ok:
+            (worse if before.ok else failed_as_before).append(f"{name} {after.result}")
+        elif after.true > max(_WORSE_FACTOR * before.true, before.true + _WORSE_BY):
+            worse.append(f"{name} {before.true:.3f} -> {after.true:.3f} m")
+    faults = [f"flew worse: {'; '.join(worse)}"] if worse else []
+    if failed_as_before:
+        faults.append(f"failed as without it: {'; '.join(failed_as_before)}")
+    if not faults:
         return None
-    return f"DO NOT USE IT: with the proposal the mock vehicle flew worse: {'; '.join(worse)}"
+    return f"DO NOT USE IT: with the proposal the mock vehicle {', and '.join(faults)}"
 
 
 def _comparison_lines(before: Expectation, after: Expectation) -> list[str]:
