@@ -122,6 +122,7 @@ async def change_mode(
 
     Raises:
         FlightEnded: somebody else has the vehicle, or left the accepted mode at once.
+        CommandUnfinished: the autopilot accepted the mode, but still obeys our setpoints.
         CommandRefused, CommandTimeout, LinkLost: see `command_if_ours`.
     """
     await command_if_ours(context, command, require_ours, done)
@@ -132,6 +133,11 @@ async def change_mode(
         if done():
             return True
         if state.mode_received > accepted_at + _MODE_REPORT_TIMEOUT:
+            if in_role(context.link, Role.OFFBOARD):
+                raise CommandUnfinished(
+                    f"{command_name(command.command)}: the autopilot accepted it, but still obeys "
+                    f"our setpoints in mode {state.mode}"
+                )
             raise FlightEnded(
                 "the autopilot accepted the change of mode, but reports a mode that we did not "
                 f"command: {state.mode}",

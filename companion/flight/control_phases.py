@@ -6,10 +6,7 @@ from collections.abc import Callable
 from math import degrees
 
 from companion.flight.commands import (
-    IsDone,
-    RequireOurs,
     ask_to_hold,
-    change_mode,
     command_if_ours,
     in_role,
     in_roles,
@@ -17,11 +14,11 @@ from companion.flight.commands import (
     require_role,
 )
 from companion.flight.context import FlightContext
+from companion.flight.hand_over import hand_over, hand_over_to_landing
 from companion.guidance import ManeuverSequence
 from companion.guidance.source import ManeuverSource, Source
-from companion.mavlink.commands import Command
-from companion.mavlink.errors import CommandTimeout
-from companion.safety.actions import Exit, FlightEnded, fault_message
+from companion.mavlink.errors import CommandTimeout, LinkLost
+from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import Role
 
 _SELF_DISARM_TIMEOUT = 8.0
@@ -138,7 +135,7 @@ async def hand_back(context: FlightContext) -> None:
     """Stop the motion, and send setpoints until the autopilot holds by itself."""
     context.detail = "the autopilot to hold"
     require_ours = in_roles(context.link, _ROLES_BEFORE_LANDING)
-    await _hand_over(
+    await hand_over(
         context,
         context.link.autopilot.hold(),
         require_ours,
@@ -161,7 +158,13 @@ async def hold_when_heard(context: FlightContext) -> None:
         return
     context.note(f"the vehicle is heard again, still in {mode}: asking it to hold")
     context.detail = "its report that it holds"
-    await ask_to_hold(context, in_roles(context.link, {Role.OFFBOARD}))
+    while True:
+        try:
+            await ask_to_hold(context, in_roles(context.link, {Role.OFFBOARD}))
+        except (CommandTimeout, LinkLost) as error:
+            context.detail = str(error)
+        else:
+            return
 
 
 async def land(context: FlightContext) -> None:
@@ -172,7 +175,7 @@ async def land(context: FlightContext) -> None:
         return in_role(context.link, Role.LAND) or not context.armed()
 
     require_ours = in_roles(context.link, _ROLES_BEFORE_LANDING | {Role.LAND})
-    await _hand_over(context, context.link.autopilot.land(), require_ours, landing)
+    await hand_over_to_landing(context, require_ours, landing)
 
     def down() -> bool:
         height = context.link.state.height
@@ -211,34 +214,3 @@ def _require_landing(context: FlightContext) -> None:
     """
     if context.armed() and context.link.state.heartbeat_is_newest:
         require_role(context.link, {Role.LAND})
-
-
-async def _hand_over(
-    context: FlightContext, command: Command, require_ours: RequireOurs, done: IsDone
-) -> None:
-    """Stop the motion, command a mode until the autopilot has entered it, then release control.
-
-    A command without an answer is sent again until the phase is over: a vehicle whose uplink loses
-    frames must not be left in the air. Before each try the vehicle is held where it is now, because
-    it may have drifted.
-    """
-    while True:
-        _stop_moving(context)
-        try:
-            await change_mode(context, command, require_ours, done)
-        except CommandTimeout as error:
-            context.detail = str(error)
-        else:
-            break
-    context.release()
-
-
-def _stop_moving(context: FlightContext) -> None:
-    if not context.loop.offboard_active:
-        return
-    try:
-        context.loop.restart_planner()  # the estimator may have been reset
-        context.guidance_loop.hold_here()
-    except Exception as error:  # the exit must go on whatever fails in guidance
-        context.note(fault_message(error))
-        context.end_stream()

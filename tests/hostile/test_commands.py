@@ -103,6 +103,68 @@ TAKE_OFFS = (
 )
 
 
+def left_holding(flown):
+    assert flown.autopilot.vehicle.mode == "HOLD", flown.events
+
+
+def not_left_to_our_rates(flown):
+    assert flown.autopilot.vehicle.mode != "RATES", flown.events
+
+
+def endings(kind):
+    """Commands of an exit that have no effect for a while, or for ever."""
+    landing = kinds.SET_MODE if kind.enters_by_setpoint else kinds.LAND
+    patient = {"flight": {"landing_timeout_s": 15.0}}
+    empty = actions.BATTERY_EMPTY
+    for how, demand in (
+        ("refuses it", on_the_ground),
+        ("accepts it and does nothing", not_left_to_our_rates),
+        ("never hears it", on_the_ground),
+    ):
+        yield Scenario(
+            f"the battery is empty, and for 3 s the vehicle, asked to land, {how}",
+            (
+                ("in control", 0.7, actions.together(empty, acks(landing, how))),
+                ("in control", 3.7, acks(landing, "honest")),
+            ),
+            (failed, demand),
+            (kind,),
+            changes=patient,
+        )
+    yield Scenario(
+        "the vehicle, asked to land after its hold, refuses it for 2 s",
+        (
+            ("holding", 0.0, acks(landing, "refuses it")),
+            ("holding", 2.0, acks(landing, "honest")),
+        ),
+        (ok,),
+        (kind,),
+        changes=patient,
+    )
+    yield Scenario(
+        "the vehicle, asked to hold, accepts it, and does so when asked again",
+        (
+            ("in control", 0.7, acks(kinds.SET_MODE, "accepts it and does nothing")),
+            ("in control", 5.0, acks(kinds.SET_MODE, "honest")),
+        ),
+        (ok,),
+        (kind,),
+    )
+
+
+FOR_EVER = Scenario(
+    "the battery is empty, and PX4 refuses to land for ever",
+    (("in control", 0.7, actions.together(actions.BATTERY_EMPTY, acks(kinds.LAND, "refuses it"))),),
+    (failed, left_holding),
+    (PX4,),
+)
+
+
+@flights((*in_turn(endings), FOR_EVER))
+def test_a_command_of_an_exit_has_no_effect(scenario, kind, tmp_path):
+    scenario.fly(kind, tmp_path)
+
+
 @flights(in_turn(answered))
 def test_a_command_is_not_answered_as_it_is_done(scenario, kind, tmp_path):
     scenario.fly(kind, tmp_path)
