@@ -52,7 +52,7 @@ class GroundContact:
             self._landed_since = None
         elif self._landed_since is None:
             self._landed_since = self._clock()
-        if self.takeoff_commanded and (state.flying or self._lifted()):
+        if self.takeoff_commanded and (state.flying or self._climbed()):
             self._left_ground = True
 
     @property
@@ -66,8 +66,12 @@ class GroundContact:
 
         After a take-off command the vehicle has lifted off as soon as it rises.
         """
-        rising = self.takeoff_commanded and self._vertical_speed() < -_STILL_SPEED
-        return self._state.landed and not self._left_ground and not rising
+        return self._state.landed and not self._left_ground and not self._rising()
+
+    @property
+    def lifted(self) -> bool:
+        """Whether flag, height or climb say that the vehicle has left the ground."""
+        return self._state.flying or self._left_ground or self._rising()
 
     @property
     def touched_down(self) -> bool:
@@ -82,7 +86,10 @@ class GroundContact:
         high = height is not None and abs(height) > GROUND_HEIGHT
         return not high and abs(self._vertical_speed()) < _STILL_SPEED
 
-    def _lifted(self) -> bool:
+    def _rising(self) -> bool:
+        return self.takeoff_commanded and self._vertical_speed() < -_STILL_SPEED
+
+    def _climbed(self) -> bool:
         height, start = self._state.height, self._start_height
         return height is not None and start is not None and height - start > _LIFTED_HEIGHT
 

@@ -194,14 +194,22 @@ async def disarm(context: FlightContext) -> None:
         _require_landing(context)
         return not context.armed()
 
+    def require_ours() -> None:
+        require_role(context.link, {Role.LAND})
+        if not context.ground.touched_down:  # the autopilot's flag may have been wrong before
+            raise FlightEnded("the vehicle reports that it flies again, so it is not disarmed")
+
     try:
         async with asyncio.timeout(_SELF_DISARM_TIMEOUT):
             await context.until(disarmed)
     except TimeoutError:
-        context.detail = "the autopilot to accept disarming"
-        await command_if_ours(
-            context, context.link.autopilot.disarm(), in_roles(context.link, {Role.LAND}), disarmed
+        await context.until(
+            lambda: disarmed() or context.ground.touched_down, "touchdown: it reports that it flies"
         )
+        if context.armed():
+            context.detail = "the autopilot to accept disarming"
+            command = context.link.autopilot.disarm()
+            await command_if_ours(context, command, require_ours, disarmed)
         await context.until(disarmed)
     await context.fresh_heartbeat()
     await leave_offboard(context)

@@ -6,7 +6,6 @@ from companion.files.yaml_file import ConfigError
 from companion.flight.commands import (
     command_if_ours,
     in_role,
-    in_roles,
     leave_offboard,
     require_role,
 )
@@ -96,8 +95,13 @@ async def undo_arming(context: FlightContext) -> None:
     if not context.must_disarm:
         return
     context.detail = "the autopilot to accept disarming"
+
+    def require_ours() -> None:
+        require_role(context.link, {Role.READY, Role.TAKEOFF})
+        if context.ground.lifted:  # while the tries before were lost
+            raise FlightEnded("the vehicle has left the ground, so it is not disarmed", Exit.LAND)
+
     # Sent even if the newest heartbeat says disarmed: it may be older than our arming.
-    require_ours = in_roles(context.link, {Role.READY, Role.TAKEOFF})
     await command_if_ours(
         context, context.link.autopilot.disarm(), require_ours, lambda: not context.armed()
     )

@@ -107,6 +107,17 @@ def test_it_has_lifted_off_once_it_is_a_metre_higher_than_at_the_command():
     assert not vehicle.tell(height=1.0).standing
 
 
+def test_one_sign_is_enough_to_have_lifted_off():
+    vehicle = Vehicle()
+    assert not vehicle.tell(sinks=-1.0).lifted, "nothing was commanded: the estimate drifts"
+    vehicle.ground.command_takeoff()
+    assert not vehicle.tell(sinks=-0.4).lifted
+    assert vehicle.tell(sinks=-0.6).lifted
+    assert not vehicle.tell(sinks=0.0).lifted
+    assert vehicle.tell(height=2.0).lifted
+    assert vehicle.tell(height=0.0).lifted, "it has been in the air"
+
+
 def test_a_vertical_speed_lasts_half_a_second():
     vehicle = Vehicle()
     vehicle.tell(sinks=1.0)

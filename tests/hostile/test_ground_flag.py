@@ -1,7 +1,9 @@
 """EXTENDED_SYS_STATE lies: a vehicle that flies is called landed, one that stands is not."""
 
-from tests.hostile.actions import IN_AIR, ON_GROUND, flaps, says, stops, streams
+from tests.hostile import personality as kinds
+from tests.hostile.actions import IN_AIR, ON_GROUND, flaps, says, sets, stops, streams
 from tests.hostile.endings import failed, never_armed, ok, on_the_ground
+from tests.hostile.judge import commands
 from tests.hostile.personality import ARDUPILOT, PX4
 from tests.hostile.scenario import Scenario, flights
 
@@ -9,7 +11,24 @@ FLAG = "EXTENDED_SYS_STATE"
 IN_A_MOMENT = says(FLAG, seconds=0.25, **ON_GROUND)
 FIVE_METRES = {"flight": {"takeoff_height_m": 5.0}}
 SLOW_HEARTBEAT = ("start", 0.0, streams("HEARTBEAT", 1.0, fixed=True))
+
+
+def never_disarmed_in_the_air(flown):
+    """No disarming was asked for in the air: only the autopilot's refusal would prevent a fall."""
+    asked = [sent for sent in commands(flown, kinds.ARM) if sent.message.param1 < 0.5]
+    assert not [sent for sent in asked if sent.in_air], flown.events
+
+
 SCENARIOS = (
+    Scenario(
+        "ON_GROUND for a second in a slow landing at 5 m",
+        (
+            ("in control", 0.0, sets(descent=0.3)),
+            ("landing", 0.5, says(FLAG, seconds=1.0, **ON_GROUND)),
+        ),
+        (never_disarmed_in_the_air,),
+        changes=FIVE_METRES,
+    ),
     Scenario(
         "one false ON_GROUND after the OFFBOARD command, before the heartbeat that confirms it",
         (("SET_MODE RATES", 0.0, IN_A_MOMENT),),

@@ -22,6 +22,7 @@ class Vehicle:
         climbs_to: height of the take-off instead of the one asked for, or None.
         ignores_takeoff: it accepts a take-off and stays on the ground.
         keeps_armed: it does not disarm by itself after a landing.
+        descent: speed of a landing, m/s.
     """
 
     def __init__(self, kind, mode):
@@ -29,6 +30,7 @@ class Vehicle:
         self.t, self.armed, self.critical, self.healthy = 0.0, False, False, True
         self.setpoint, self.setpoint_at = ((0.0, 0.0, 0.0), 0.0), -inf
         self.climbs_to, self.ignores_takeoff, self.keeps_armed = None, False, False
+        self.descent = _DESCENT_M_S
         self._height, self._since, self._down_since = 0.0, 0.0, -inf
         self._land_from, self._lost_stream = mode, False
 
@@ -138,7 +140,7 @@ class Vehicle:
         elif self.mode == "TAKEOFF":
             self._climb(dt)
         elif self.mode in ("LAND", "RETURN"):
-            self.body.fly_velocity(dt, (0.0, 0.0, _DESCENT_M_S))
+            self.body.fly_velocity(dt, (0.0, 0.0, self.descent))
         elif self.body.in_air:
             self.body.fly_velocity(dt, (0.0, 0.0, 0.0))
 

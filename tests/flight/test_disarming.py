@@ -1,0 +1,46 @@
+"""Disarming is asked for on the ground only, however late or lost the answers are."""
+
+import pytest
+
+from sitl_mock.link.framing import decode
+from tests.flight.fly import QuickVehicle, run, session_for
+
+ARM = 400
+LOST_S = 6.0
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_a_vehicle_that_took_off_meanwhile_is_landed_and_not_asked_to_disarm_again(autopilot):
+    """Ctrl-C comes just after the take-off was accepted, and the uplink loses what we ask for."""
+    mock = QuickVehicle(autopilot, lockstep=False)
+    asked, lost_until = [], []
+
+    def uplink(datagram):
+        if any(disarms(message) for message in decode(datagram)):
+            asked.append(-mock.state()["position"][2])
+            if mock.time < lost_until[0]:
+                return ()
+        return (datagram,)
+
+    def interrupt():
+        mock.from_companion = uplink
+        lost_until.append(mock.time + LOST_S)
+        session.interrupt("Ctrl-C")
+
+    session = session_for(mock, flight={"takeoff_height_m": 10.0})
+    mock.when(lambda: mock.state()["mode"] == "TAKEOFF" or climbing(mock), interrupt)
+    summary = run(mock, session.fly())
+    state = mock.state()
+    assert asked, summary.events
+    assert max(asked) < 0.5, f"asked to disarm at these heights: {asked}; {summary.events}"
+    assert (state["armed"], state["on_ground"], state["crashed"]) == (False, True, False)
+
+
+def disarms(message):
+    is_command = message.get_type() == "COMMAND_LONG"
+    return is_command and (message.command, message.param1) == (ARM, 0.0)
+
+
+def climbing(mock):
+    """Whether an ArduPilot vehicle, which stays in GUIDED, has accepted the take-off."""
+    return mock.autopilot == "ardupilot" and mock.state()["velocity"][2] < -0.01
