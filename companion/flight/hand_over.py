@@ -10,14 +10,14 @@ from companion.flight.commands import (
     in_role,
     in_roles,
 )
-from companion.flight.context import FlightContext
+from companion.flight.context import FlightContext, cancel
 from companion.mavlink.commands import Command
 from companion.mavlink.errors import CommandRefused, CommandTimeout, LinkLost
 from companion.safety.actions import FlightEnded, fault_message
 from companion.vehicle.autopilot import Role
 
-_REFUSAL_PAUSE = 1.0
-"""Time from a refused landing to the next request, s: the reason may be gone by then."""
+_REPETITION_PAUSE = 1.0
+"""Time from a landing that failed to the next request, s: the reason may be gone by then."""
 
 _OBEYS_OR_LANDS = frozenset({Role.OFFBOARD, Role.LAND})
 
@@ -61,27 +61,48 @@ async def hand_over_to_landing(
     Raises:
         FlightEnded: somebody else has the vehicle.
     """
-    reported, may_land = False, require_ours
+    _stop_moving(context)
+    try:
+        await change_mode(context, context.link.autopilot.land(), require_ours, landing)
+    except (CommandTimeout, CommandRefused, LinkLost) as error:
+        context.detail = str(error)
+        if isinstance(error, CommandRefused):
+            context.note(f"{error}; the landing is requested again every second")
+    else:
+        context.release()
+        return
+    watching = asyncio.create_task(_release_once_left(context))
+    try:
+        await _repeat_landing(context, require_ours, landing)
+    finally:
+        await cancel(watching)
+    context.release()
+
+
+async def _repeat_landing(context: FlightContext, require_ours: RequireOurs, landing: Done) -> None:
+    """Request the landing until it is accepted, and before each request a hold."""
     while True:
-        _stop_moving(context)
-        try:
-            await change_mode(context, context.link.autopilot.land(), may_land, landing)
-            break
-        except (CommandTimeout, LinkLost) as error:
-            context.detail = str(error)
-        except CommandRefused as error:
-            context.detail = str(error)
-            if not reported:
-                reported = True
-                context.note(f"{error}; the landing is requested again every second")
-            await asyncio.sleep(_REFUSAL_PAUSE)
+        obeyed = in_role(context.link, Role.OFFBOARD)
+        await asyncio.sleep(_REPETITION_PAUSE)
         if landing():  # it refused, and lands all the same
-            break
-        if in_role(context.link, Role.OFFBOARD):
+            return
+        if obeyed:
             await _ask_to_hold(context, landing)
+            _stop_moving(context)
         obeys = in_role(context.link, Role.OFFBOARD)
         may_land = in_roles(context.link, _OBEYS_OR_LANDS) if obeys else require_ours
-    context.release()
+        try:
+            await change_mode(context, context.link.autopilot.land(), may_land, landing)
+            return
+        except (CommandTimeout, CommandRefused, LinkLost) as error:
+            context.detail = str(error)
+
+
+async def _release_once_left(context: FlightContext) -> None:
+    """Stop the setpoints as soon as the autopilot does not obey them, whoever changed its mode."""
+    if in_role(context.link, Role.OFFBOARD):
+        await context.until(lambda: not in_role(context.link, Role.OFFBOARD))
+        context.release()
 
 
 async def _ask_to_hold(context: FlightContext, landing: IsDone) -> None:

@@ -152,6 +152,25 @@ def endings(kind):
     )
 
 
+def holds_in_between(kind):
+    """A pilot who switches to hold is not overruled by the next request to land."""
+    empty, landing = (
+        actions.BATTERY_EMPTY,
+        kinds.SET_MODE if kind.enters_by_setpoint else kinds.LAND,
+    )
+    refusals = [acks(command, "refuses it") for command in {landing, kinds.SET_MODE}]
+    yield Scenario(
+        "the vehicle refuses to land and to hold, and the pilot switches to hold",
+        (
+            ("in control", 0.7, actions.together(empty, *refusals)),
+            ("in control", 3.2, actions.takes("HOLD")),
+        ),
+        (failed, left_holding),
+        (kind,),
+        changes={"flight": {"landing_timeout_s": 15.0}},
+    )
+
+
 FOR_EVER = Scenario(
     "the battery is empty, and PX4 refuses to land for ever",
     (("in control", 0.7, actions.together(actions.BATTERY_EMPTY, acks(kinds.LAND, "refuses it"))),),
@@ -160,7 +179,7 @@ FOR_EVER = Scenario(
 )
 
 
-@flights((*in_turn(endings), FOR_EVER))
+@flights((*in_turn(endings), *in_turn(holds_in_between), FOR_EVER))
 def test_a_command_of_an_exit_has_no_effect(scenario, kind, tmp_path):
     scenario.fly(kind, tmp_path)
 
