@@ -79,7 +79,9 @@ async def hand_over_to_landing(
     context.release()
 
 
-async def _repeat_landing(context: FlightContext, require_ours: RequireOurs, landing: Done) -> None:
+async def _repeat_landing(
+    context: FlightContext, require_ours: RequireOurs, landing: IsDone
+) -> None:
     """Request the landing until it is accepted, and before each request a hold."""
     while True:
         obeyed = in_role(context.link, Role.OFFBOARD)
