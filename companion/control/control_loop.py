@@ -198,7 +198,7 @@ class ControlLoop:
         self, sample: AttitudeSample, command: GuidanceCommand, rates: BodyRates, thrust: float
     ) -> None:
         record, deadlines = self.record, self._deadlines
-        record.note_answer(sample.received, thrust, deadlines.telemetry_stale)
+        record.note_answer(sample.received, rates, thrust, deadlines.telemetry_stale)
         latency = record.latency_ns = self._clock_ns() - sample.received_ns
         record.missed_deadlines += latency > deadlines.deadline * 1e9
         self._trace.add_latency(latency)

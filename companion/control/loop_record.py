@@ -5,9 +5,12 @@ from dataclasses import dataclass, field
 from enum import Enum
 from math import inf
 
+from companion.attitude import BodyRates
 from companion.vehicle.interval_sums import IntervalSums
 from companion.vehicle.records import AttitudeSample
 
+_KEPT_SETPOINTS = 512
+"""Number of latest setpoints that are kept; at 400 Hz more than a second."""
 _KEPT_GAPS = 32
 """Number of latest gaps that are kept; far fewer gaps end a flight."""
 
@@ -90,6 +93,7 @@ class LoopRecord:
         reason: why the newest sample is unanswered, or None.
         latency_ns: time from the arrival of the last answered sample to its setpoint, ns.
         thrust: thrust last sent, 0..1.
+        sent: body rates (rad/s) and thrust of the latest setpoints, the newest last.
         last_sample: when the newest sample arrived.
         last_vehicle_time: vehicle time of the newest usable sample, s.
         last_answer: when the newest answered sample arrived.
@@ -108,6 +112,9 @@ class LoopRecord:
     reason: Unanswered | None = None
     latency_ns: int = 0
     thrust: float = 0.0
+    sent: deque[tuple[BodyRates, float]] = field(
+        default_factory=lambda: deque(maxlen=_KEPT_SETPOINTS)
+    )
     last_sample: float = -inf
     last_vehicle_time: float = -inf
     last_answer: float = -inf
@@ -123,16 +130,20 @@ class LoopRecord:
             self.last_vehicle_time = sample.vehicle_time
         return period
 
-    def note_answer(self, received: float, thrust: float, telemetry_stale: float) -> None:
+    def note_answer(
+        self, received: float, rates: BodyRates, thrust: float, telemetry_stale: float
+    ) -> None:
         """Note that a setpoint was sent.
 
         Args:
             received: when its sample arrived, s of event-loop time.
+            rates: body rates of the setpoint, rad/s.
             thrust: thrust of the setpoint, 0..1.
             telemetry_stale: a longer interval between setpoints is a gap, s.
         """
         self.setpoints += 1
         self.thrust = thrust
+        self.sent.append((rates, thrust))
         interval = received - self.last_answer
         if interval <= telemetry_stale:
             self.setpoint_intervals.add(interval)

@@ -1,11 +1,13 @@
 """Connects the link's callbacks and changes in flight to a flight."""
 
+import asyncio
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 from companion.control.retuning import Retuning
 from companion.flight.assembled import AssembledFlight
 from companion.flight.observer import StateLogger
+from companion.mavlink.messages import Message
 from companion.vehicle.link import Link
 from companion.vehicle.records import AttitudeSample
 
@@ -18,6 +20,7 @@ def connected(link: Link, assembled: AssembledFlight) -> Iterator[None]:
     """
     flight, context = assembled.flight, assembled.context
     loop, guidance_loop = context.loop, context.guidance_loop
+    time = asyncio.get_running_loop().time
     dead_time_watch = assembled.dead_time_watch
 
     def on_attitude(sample: AttitudeSample) -> None:
@@ -36,12 +39,16 @@ def connected(link: Link, assembled: AssembledFlight) -> Iterator[None]:
         state_logger.log_changes()
         flight.on_current_mode()
 
+    def on_attitude_target(message: Message) -> None:
+        context.snapshot_builder.echo.take(message, time())
+
     link.on_attitude = on_attitude
     link.on_error = flight.fail
     on_event, link.clock.on_event = link.clock.on_event, flight.note
     ends = (
         link.subscribe("HEARTBEAT", on_heartbeat),
         link.subscribe("CURRENT_MODE", on_current_mode),
+        link.subscribe("ATTITUDE_TARGET", on_attitude_target),
     )
     try:
         retuning, record = Retuning(loop, guidance_loop), assembled.trace.recorder

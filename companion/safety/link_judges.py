@@ -129,6 +129,21 @@ def lost_setpoints(most: int) -> Judge:
     return judge
 
 
+def foreign_setpoints(most: int) -> Judge:
+    """The autopilot reported more than `most` setpoints of another program within 5 s."""
+
+    def judge(snapshot: Snapshot, _: bool) -> str | None:
+        found = snapshot.health.foreign
+        if found <= most:
+            return None
+        return (
+            "another program sends setpoints to the vehicle: within 5 s the autopilot reported "
+            f"{found} that this program did not send (ATTITUDE_TARGET)"
+        )
+
+    return judge
+
+
 def deadlines(most: float) -> Judge:
     """More than the share `most` of the setpoints misses deadman.deadline_ms."""
 

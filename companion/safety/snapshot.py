@@ -95,6 +95,8 @@ class Health(NamedTuple):
         answer_rate: effective rate of setpoints, Hz (`IntervalSums`).
         gaps: number of gaps in the setpoints within the last 5 s.
         position_rate: rate of positions, Hz.
+        foreign: number of reports of the last 5 s in which the autopilot obeyed another program's
+            setpoint (`SetpointEcho`).
         uplink: the way to the vehicle, over the last moments.
     """
 
@@ -106,6 +108,7 @@ class Health(NamedTuple):
     gaps: int = 0
     position_rate: float | None = None
     uplink: Uplink = Uplink()
+    foreign: int = 0
 
 
 class Resets(NamedTuple):

@@ -10,6 +10,7 @@ from companion.control.guidance_loop import GuidanceLoop
 from companion.guidance.fence import FenceCentre, Place
 from companion.guidance.reference import Vector, minus
 from companion.mavlink.stats import share_lost
+from companion.safety.setpoint_echo import SetpointEcho
 from companion.safety.snapshot import (
     UNHEARD_S,
     Autopilot,
@@ -52,6 +53,9 @@ class _Counters(NamedTuple):
 class SnapshotBuilder:
     """Collects the data that the monitors judge.
 
+    Attributes:
+        echo: takes each ATTITUDE_TARGET.
+
     Args:
         link: link to the vehicle.
         loop: the control loop, which answers the samples.
@@ -64,6 +68,7 @@ class SnapshotBuilder:
     ) -> None:
         self._link, self._loop, self._guidance_loop = link, loop, guidance_loop
         self._real_time = real_time
+        self.echo = SetpointEcho(loop.record.sent)
         self._counted: deque[_Counters] = deque()
         self._frames_heard = 0
         self._heard_at = 0.0
@@ -94,6 +99,7 @@ class SnapshotBuilder:
         self._good_flags = 0 if state.estimator is None else state.estimator.flags
         self._clock_changes = self._link.clock.changes
         self._counted.clear()
+        self.echo.begin()
 
     @property
     def fence_centre(self) -> FenceCentre | None:
@@ -206,26 +212,24 @@ class SnapshotBuilder:
         since = max(self._began_at, now - _GAP_COUNTING_TIME)
         gaps = sum(at > since for at in self._loop.record.gaps)
         first, last, timesync = self._counted[0], self._counted[-1], self._link.timesync
+        health = Health(
+            round_trip=timesync.round_trip_s,
+            gaps=gaps,
+            uplink=timesync.uplink,
+            foreign=self.echo.foreign_reports(now),
+        )
         span = last.now - first.now
         if span < _FILLED_SHARE * _AVERAGING_TIME:
-            return Health(
-                round_trip=timesync.round_trip_s,
-                gaps=gaps,
-                uplink=timesync.uplink,
-            )
+            return health
         late = sum(counted.late for counted in self._counted) - first.late
+        missed = (last.missed - first.missed) / max(1, last.setpoints - first.setpoints)
         lost = last.lost - first.lost
-        return Health(
-            share_lost(last.frames - first.frames, lost),
-            timesync.round_trip_s,
-            (last.missed - first.missed) / max(1, last.setpoints - first.setpoints)
-            if self._real_time
-            else None,
-            late / span,
-            last.setpoint_intervals.rate_since(first.setpoint_intervals),
-            gaps,
-            (last.positions - first.positions) / span,
-            timesync.uplink,
+        return health._replace(
+            lost=share_lost(last.frames - first.frames, lost),
+            missed=missed if self._real_time else None,
+            starved=late / span,
+            answer_rate=last.setpoint_intervals.rate_since(first.setpoint_intervals),
+            position_rate=(last.positions - first.positions) / span,
         )
 
     def _resets(self, now: float) -> Resets:

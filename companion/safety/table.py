@@ -21,6 +21,8 @@ _MAX_UNANSWERED = 7
 """Largest number of TIMESYNC probes in a row that the vehicle may leave unanswered; they are sent
 every 0.1 s. If single ones are lost at random, eight in a row are lost once in 50 s at a loss of
 50 %, in 36 min at 30 %, in 13 h at 20 %."""
+_MAX_FOREIGN = 2
+"""Largest number of foreign setpoints that the autopilot may report within 5 s."""
 _ESTIMATE_DELAY = 0.08
 """Time by which the estimated horizontal motion is behind the vehicle, s. Measured on accelerating
 mock vehicles: ArduPilot's position 0.055 s and velocity up to 0.09 s, PX4's 0.02 s."""
@@ -107,6 +109,7 @@ def _link_monitors(config: Config) -> tuple[Monitor, ...]:
     answers = link_judges.answer_rate(config.link.min_attitude_rate_hz)
     positions = link_judges.position_rate(config.link.min_position_rate_hz)
     late = link_judges.late_setpoints(config.deadman.telemetry_stale)
+    foreign = link_judges.foreign_setpoints(_MAX_FOREIGN)
     lost = link_judges.lost_setpoints(_MAX_UNANSWERED)
     return (
         # The vehicle keeps turning at the last rate until the next setpoint. A low rate of
@@ -116,6 +119,9 @@ def _link_monitors(config: Config) -> tuple[Monitor, ...]:
         Monitor("position rate", positions, _HAND_BACK, lasts=1.0),
         Monitor("late setpoints", late, _HAND_BACK, stream=Stream.ENDS),
         Monitor("lost setpoints", lost, _HAND_BACK, stream=Stream.ENDS),
+        # In a mode of the pilot the autopilot reports its own setpoints; `lasts` leaves time for
+        # the heartbeat that tells the mode.
+        Monitor("foreign setpoints", foreign, _HAND_BACK, lasts=1.5),
         Monitor("link loss", link_judges.loss(safety.max_loss), link, lasts=2.0, calm=2.0),
         Monitor("round trip", trip, link, lasts=5.0, calm=5.0),
         # `lasts` exceeds the averaging window of 1 s, so one stall of the computer is no breach.
