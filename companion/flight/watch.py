@@ -122,11 +122,16 @@ class Watch:
         """
         now = self._clock()
         early, self._status_at = now - self._status_at < _CURRENT_MODE_PERIOD, now
+        if early:
+            self._request_heartbeat(now)
+        self.judge(phase)
+
+    def _request_heartbeat(self, now: float) -> None:
+        """Request a heartbeat, unless one was requested within `_HEARTBEAT_REQUEST_PERIOD`."""
         asking = self._heartbeat_request is not None and not self._heartbeat_request.done()
-        if early and not asking and now - self._heartbeat_asked_at >= _HEARTBEAT_REQUEST_PERIOD:
+        if not asking and now - self._heartbeat_asked_at >= _HEARTBEAT_REQUEST_PERIOD:
             self._heartbeat_asked_at = now
             self._heartbeat_request = asyncio.create_task(self._context.fresh_heartbeat())
-        self.judge(phase)
 
     def ask_mode(self) -> None:
         """Request a heartbeat; let the loop resume after a gap if its mode still obeys us."""
@@ -148,6 +153,8 @@ class Watch:
         """Give the ladder a snapshot and carry out its verdict."""
         self._context.link.timesync.probe()
         snapshot = self._context.snapshot_builder.snapshot(now)
+        if snapshot.health.foreign:  # it may also be the autopilot's own setpoint, in a new mode
+            self._request_heartbeat(now)
         self._rate_requester.check(snapshot.health)
         verdict = self._ladder.step(snapshot)
         if verdict is None:

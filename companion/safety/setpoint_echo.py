@@ -1,23 +1,26 @@
 """Finds setpoints of another program, in what the autopilot reports that it obeys."""
 
 from collections import deque
+from math import isfinite
 
 from companion.attitude import BodyRates
 from companion.mavlink.messages import Message
+from companion.vehicle.autopilot import Autopilot
 
 _COUNTING_TIME = 5.0
 _KEPT_REPORTS = 256
-_TOLERANCE = 1e-5
-"""Largest difference from a setpoint of ours, rad/s or share of the full thrust: ATTITUDE_TARGET
-has numbers of single precision."""
+_THRUST_ROUNDING, _RATE_ROUNDING = 1e-7, 1e-6
+"""Largest difference from a setpoint of ours: ATTITUDE_TARGET has numbers of single precision.
+Thrust is a share of the full thrust, rates up to 10 rad/s."""
 
 
 class SetpointEcho:
     """Compares the autopilot's ATTITUDE_TARGET with the setpoints that this program sent.
 
-    While an autopilot obeys body rates, PX4 reports the rates of the newest setpoint, and
-    ArduPilot its thrust. In eight flights of each real autopilot every report did. So a report that
-    fits neither shows that another program sends setpoints, too: the autopilots obey whoever sends.
+    While an autopilot obeys body rates, it reports the rates of the newest setpoint (PX4) or its
+    thrust (ArduPilot). In recorded flights of both real autopilots every report did. So one that
+    fits no setpoint of ours shows that another program sends setpoints, too: an autopilot obeys
+    whoever sends.
 
     Args:
         sent: the latest setpoints of this program, the newest last; they are appended elsewhere.
@@ -25,11 +28,13 @@ class SetpointEcho:
 
     def __init__(self, sent: deque[tuple[BodyRates, float]]) -> None:
         self._sent = sent
+        self._by_thrust = False
         self._echoes = False
         self._foreign: deque[float] = deque(maxlen=_KEPT_REPORTS)
 
-    def begin(self) -> None:
-        """Note that control begins: earlier reports do not count."""
+    def begin(self, autopilot: Autopilot) -> None:
+        """Note that control of this autopilot begins: earlier reports do not count."""
+        self._by_thrust = autopilot.rates_about_target_axes  # it then reports the target's rates
         self._echoes = False
         self._foreign.clear()
 
@@ -38,7 +43,7 @@ class SetpointEcho:
         rates = BodyRates(message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate)
         if self._is_ours(rates, message.thrust):
             self._echoes = True
-        elif self._echoes:
+        elif self._echoes and isfinite(sum(rates) + message.thrust):
             self._foreign.append(now)
 
     def foreign_reports(self, now: float) -> int:
@@ -49,11 +54,10 @@ class SetpointEcho:
         return sum(now - at <= _COUNTING_TIME for at in self._foreign)
 
     def _is_ours(self, rates: BodyRates, thrust: float) -> bool:
+        newest_first = reversed(self._sent)
+        if self._by_thrust:
+            return any(abs(thrust - sent) <= _THRUST_ROUNDING for _, sent in newest_first)
         return any(
-            abs(thrust - sent_thrust) <= _TOLERANCE or _near(rates, sent_rates)
-            for sent_rates, sent_thrust in reversed(self._sent)
+            all(abs(a - b) <= _RATE_ROUNDING for a, b in zip(rates, sent, strict=True))
+            for sent, _ in newest_first
         )
-
-
-def _near(first: BodyRates, second: BodyRates) -> bool:
-    return all(abs(a - b) <= _TOLERANCE for a, b in zip(first, second, strict=True))

@@ -99,7 +99,7 @@ class SnapshotBuilder:
         self._good_flags = 0 if state.estimator is None else state.estimator.flags
         self._clock_changes = self._link.clock.changes
         self._counted.clear()
-        self.echo.begin()
+        self.echo.begin(self._link.autopilot)
 
     @property
     def fence_centre(self) -> FenceCentre | None:

@@ -120,8 +120,8 @@ def _link_monitors(config: Config) -> tuple[Monitor, ...]:
         Monitor("late setpoints", late, _HAND_BACK, stream=Stream.ENDS),
         Monitor("lost setpoints", lost, _HAND_BACK, stream=Stream.ENDS),
         # In a mode of the pilot the autopilot reports its own setpoints; `lasts` leaves time for
-        # the heartbeat that tells the mode.
-        Monitor("foreign setpoints", foreign, _HAND_BACK, lasts=1.5),
+        # the requested heartbeat, which tells the mode.
+        Monitor("foreign setpoints", foreign, _HAND_BACK, lasts=0.3),
         Monitor("link loss", link_judges.loss(safety.max_loss), link, lasts=2.0, calm=2.0),
         Monitor("round trip", trip, link, lasts=5.0, calm=5.0),
         # `lasts` exceeds the averaging window of 1 s, so one stall of the computer is no breach.

@@ -151,7 +151,7 @@ def test_a_recording_folder_that_cannot_be_made_is_named(capsys, tmp_path):
 def test_an_unknown_maneuver_names_the_known(capsys, tmp_path):
     code, _, err = run(capsys, "fly", "--config", config(tmp_path, ""), "--maneuvers", "loop")
     assert code == 2
-    assert "'hover', 'steps', 'circle'" in err
+    assert "must be hover, steps, circle, corners, identify or trajectory (got 'loop')" in err
 
 
 def test_check_config_refuses_what_a_flight_would_refuse(capsys, tmp_path):

@@ -45,7 +45,7 @@ FAULTS = [
     (
         "drop uplink",
         {"kind": "drop", "direction": "from_companion"},
-        "the autopilot's failsafe took over",
+        "setpoints do not reach the vehicle",
         HANDED_BACK,
         1.3,
     ),

@@ -21,7 +21,7 @@ from companion.mavlink.transport.endpoint import SerialPort
 from companion.mavlink.transport.serial_port import SerialTransport
 from companion.vehicle import connection as connection_module
 from companion.vehicle.link import Link
-from companion.vehicle.presence import no_heartbeat
+from companion.vehicle.presence import no_heartbeat_message
 from tests.mavlink.fakes import FakeVehicle, attitude, frames_of, heartbeat, linked, until
 
 LEVEL = BodyRates(0.0, 0.0, 0.0)
@@ -327,12 +327,14 @@ def test_what_is_no_serial_device_is_said_without_the_text_of_a_library(run, dev
 
 
 def test_silence_on_a_serial_port_asks_for_the_baud_rate():
-    said = no_heartbeat(LinkSettings(endpoint="serial:///dev/ttyACM0:57600"), LinkStats(), 5.0)
+    said = no_heartbeat_message(
+        LinkSettings(endpoint="serial:///dev/ttyACM0:57600"), LinkStats(), 5.0
+    )
     assert said.endswith(
         "within 5 s on serial:///dev/ttyACM0:57600; is the vehicle running, does its port send "
         "MAVLink at this baud rate, and are TX and RX crossed?"
     )
-    said = no_heartbeat(LinkSettings(endpoint="udpin://0.0.0.0:14540"), LinkStats(), 5.0)
+    said = no_heartbeat_message(LinkSettings(endpoint="udpin://0.0.0.0:14540"), LinkStats(), 5.0)
     assert "baud" not in said
 
 

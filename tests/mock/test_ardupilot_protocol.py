@@ -94,7 +94,7 @@ def test_a_second_vehicle_has_its_own_system_id():
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("{autopilot: ardupilott}", ("mock.autopilot", "'ardupilot'")),
+        ("{autopilot: ardupilott}", ("mock.autopilot", "px4 or ardupilot")),
         ("{autopilot: ardupilot, parameters: {COM_OF_LOSS_T: 1}}", ("COM_OF_LOSS_T",)),
         ("{autopilot: ardupilot, parameters: {GUID_OPTION: 8}}", ("did you mean GUID_OPTIONS?",)),
         ("{autopilot: ardupilot, airframe: 3}", ("mock.airframe",)),

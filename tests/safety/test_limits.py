@@ -157,6 +157,12 @@ SAID = [
         "answered",
     ),
     (
+        lambda: link_judges.foreign_setpoints(2),
+        at(health=Health(foreign=3)),
+        "another program sends setpoints to the vehicle: within 5 s the autopilot reported 3 that "
+        "this program did not send (ATTITUDE_TARGET)",
+    ),
+    (
         lambda: link_judges.deadlines(0.2),
         at(health=Health(missed=0.6)),
         "60 % of the setpoints miss deadman.deadline_ms, more than safety.max_missed = 0.2 (20 %)",

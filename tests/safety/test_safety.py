@@ -134,6 +134,7 @@ BREACHES = [
     ("position rate", health(position_rate=9.0), HAND_BACK, 1.0, "come at 9 Hz, below link.min"),
     ("late setpoints", health(uplink=Uplink(0.16)), HAND_BACK, 0.0, "160 ms, longer than 1.5"),
     ("lost setpoints", health(uplink=Uplink(0.01, 8)), HAND_BACK, 0.0, "the last 8 TIMESYNC"),
+    ("foreign setpoints", health(foreign=3), HAND_BACK, 0.3, "another program sends setpoints"),
     ("link loss", health(lost=0.45), WARN, 2.0, "45 % of the vehicle's frames"),
     ("round trip", health(round_trip=0.2), WARN, 5.0, "200 ms"),
     ("deadlines", health(missed=0.3), HAND_BACK, 1.5, "30 % of the setpoints"),

@@ -39,6 +39,7 @@ class Flight:
             state=self.state,
             clock=self.clock,
             stats=self.stats,
+            autopilot=SimpleNamespace(rates_about_target_axes=False),
             timesync=SimpleNamespace(round_trip_s=0.04, uplink=Uplink(0.05, 1)),
         )
         self.resets = SimpleNamespace(

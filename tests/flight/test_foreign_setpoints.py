@@ -1,0 +1,55 @@
+"""Another program sends setpoints to the same vehicle, as a forgotten MAVROS would."""
+
+import asyncio
+
+import pytest
+from pymavlink.dialects.v20 import common as dialect
+
+from tests.flight.fly import fly, mock_vehicle
+from tests.flight.others import When
+
+OTHER_PROGRAM = (1, 192)
+HELD = {"px4": "LOITER", "ardupilot": "BRAKE"}
+HOVER_THRUST = {"px4": 0.49, "ardupilot": 0.36}
+HOVER = {"flight": {"takeoff_height_m": 6.0}, "hover": {"duration_s": 12.0}}
+AFTER_OURS_S = 0.003
+BODY_RATES = 128
+"""Type mask: body rates and thrust, no attitude."""
+
+
+def flown(autopilot, thrust, rates, every):
+    """A hover in which another program answers every nth step, just after our setpoint."""
+    with mock_vehicle(autopilot=autopilot) as mock:
+        steps, lowest = 0, 100.0
+        setpoint = dialect.MAVLink_set_attitude_target_message(
+            0, 1, 1, BODY_RATES, (1.0, 0.0, 0.0, 0.0), *rates, thrust
+        )
+
+        def send():
+            nonlocal steps, lowest
+            steps += 1
+            lowest = min(lowest, -mock.state()["position"][2])
+            if steps % every == 0:
+                loop = asyncio.get_running_loop()
+                loop.call_later(AFTER_OURS_S, mock.transmit, setpoint, OTHER_PROGRAM)
+
+        begin = When("maneuvers", lambda: mock.after_step.append(send), after=1.0)
+        summary = fly(mock, None, begin, **HOVER)
+        return summary, mock.state(), lowest
+
+
+@pytest.mark.parametrize("every", [1, 3, 7])
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_the_flight_is_handed_back_when_another_program_sends_too(autopilot, every):
+    summary, truth, lowest = flown(autopilot, HOVER_THRUST[autopilot], (0.4, 0.0, 0.0), every)
+    assert "another program sends setpoints to the vehicle" in summary.result, summary.events
+    assert (truth["mode"], truth["crashed"]) == (HELD[autopilot], False)
+    assert lowest > 4.0
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_a_program_that_cuts_the_thrust_is_noticed_before_the_ground(autopilot):
+    summary, truth, lowest = flown(autopilot, 0.0, (0.1, 0.0, 0.0), 1)
+    assert "another program sends setpoints to the vehicle" in summary.result, summary.events
+    assert not truth["crashed"]
+    assert lowest > 0.5
