@@ -1,4 +1,4 @@
-"""Ends the worker processes of a command with the command, even if it is killed."""
+"""Ends the worker processes of a command when the command ends, even if it is killed."""
 
 import ctypes
 import signal

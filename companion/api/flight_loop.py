@@ -173,7 +173,8 @@ class OwnThreadLoop:
 
 _switch_interval_lock = threading.Lock()
 _intervals_before: list[float] = []
-"""One entry for each running flight; the first is Python's interval before any of them, s."""
+"""`sys.getswitchinterval()` at the start of each running flight, s. The first value is set again
+after the last flight."""
 
 
 @contextmanager

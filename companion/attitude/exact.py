@@ -25,7 +25,8 @@ LONGEST_PERIOD = 1.0
 _SETTLED_CHANGE = 1e-14
 """The fixed-point iteration ends when its factor changes by less than this."""
 _MAX_ITERATIONS = 20
-"""Largest number of fixed-point iterations; 4 are usual, each leaves about θ²/12 of the error."""
+"""Largest number of fixed-point iterations in `_rotation`. Usually 4 suffice: each multiplies the
+error by about θ²/12, where θ (rad) is the angle of the rotation in a sample period."""
 
 
 def exact(

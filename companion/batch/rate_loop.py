@@ -80,8 +80,8 @@ def _rate_loop(axes: Sequence[AxisResponse]) -> tuple[Array, NDArray[np.int64]]:
     """The rate loop of a vehicle as arrays.
 
     Returns:
-        (3, 7), for each axis: lag (s), σ (s²), largest change of the acting command per step
-        (rad/s), and the 2x2 transition matrix of `Lag.transition`, row by row;
+        (3, 7), for each axis: lag (s) and σ (s²) of `Lag`, largest change of the acting command per
+        step (rad/s), and the 2x2 transition matrix of `Lag.transition`, row by row;
         (3,), dead times in steps.
     """
     rows = []

@@ -55,7 +55,7 @@ class _Fleet(NamedTuple):
 
 
 def run(seconds: float, as_json: bool) -> dict[str, Any]:
-    """Measure every planner without memory, interleaved with the baselines.
+    """Measure every planner that keeps no state, interleaved with the baselines.
 
     Args:
         seconds: Duration of the measurement without compilation, s; at least one round is measured.
@@ -65,13 +65,13 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
         - `compiled`: whether numba compiled the batches.
         - `flight_ns`: time of a step of `planner.rates` on plain floats, by planner; its `baseline`
           is a Python function that returns its argument.
-        - `new_target_ns`: the same with another target at each step, which must be checked.
+        - `new_target_ns`: the same, but each step has a new target, which the planner checks.
         - `batch_ns`: time of a step in `batch.rates` with its checks, by planner and number of
           vehicles; its `baseline` is a copy of the same attitudes and targets.
         - `flight_ratio`, `new_target_ratio`, `batch_ratio`: the same divided by the baseline.
         - `simulated`: `step_ns`, time of a step of one vehicle with `first-order`, by
-          `batch.advance`; `seconds_per_second`, simulated time per computing time of `vehicles` at
-          `rate_hz`.
+          `batch.advance`; `seconds_per_second`, simulated time per computing time, for the
+          number `vehicles` of vehicles and the sample rate `rate_hz`.
     """
     compiled = batch.can_compile()
     cases = [*_flight_cases(), *_batch_cases(compiled), _advance_case(compiled)]

@@ -20,7 +20,7 @@ CAMPAIGN_KEYS = (
     "name", "kind", "config", "seed", "samples", "sampling", "same_seeds", "set", "sweep", "faults",
     "limits", "tune",
 )  # fmt: skip
-"""The keys of a campaign file. Its model is in a room above this one."""
+"""The keys of a campaign file. Its model, in `companion.campaign`, may not be imported here."""
 TRAJECTORY_KEYS = ("hover", "line", "circle", "helix", "figure_eight", "waypoints", "csv")
 """The keys of a trajectory file. Its model uses this module."""
 _KEYS: Mapping[FileKind, Iterable[str]] = {

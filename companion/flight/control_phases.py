@@ -218,7 +218,8 @@ async def disarm(context: FlightContext) -> None:
 def _require_landing(context: FlightContext) -> None:
     """Release control if the pilot ends the landing; a disarmed vehicle may be in any mode.
 
-    PX4 changes its mode when it disarms, and reports the mode before it reports disarmed.
+    PX4 changes its mode when it disarms, and reports the new mode first. So a mode counts only
+    together with a heartbeat, which tells both.
     """
     if context.armed() and context.link.state.heartbeat_is_newest:
         require_role(context.link, {Role.LAND})

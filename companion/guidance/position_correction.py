@@ -11,7 +11,7 @@ _LONGEST_WINDOW = 0.1
 """Time constant of each low-pass filter for noisy positions while the vehicle moves, s; smooth
 positions need a shorter one (`CorrectionSettings.filter_time`)."""
 _WINDOW_PER_NOISE = 0.1
-"""Growth of this time constant with the noise of r (see `PositionCorrection`), s per m/s."""
+"""Growth of `filter_time` with the noise of r, s per m/s; r is defined in `PositionCorrection`."""
 _SMOOTH_BELOW, _NOISY_ABOVE = 0.2, 0.6
 """Noise of r below which positions count as smooth, and above which as noisy, m/s. It is at most
 0.1 m/s on PX4 and ArduPilot; white noise of 3 mm at 50 Hz makes 0.5 m/s."""

@@ -98,7 +98,7 @@ class SecondOrderFit:
         misfit: RMS of the part of the residual that the commands explain, as a share of the
             standard deviation of the measurements.
         dead_time_error: standard error of the dead time due to noise, s.
-        lag_error: standard error of `lag` due to noise, s.
+        lag_error: standard error of the property `lag` due to noise, s.
     """
 
     frequency: float

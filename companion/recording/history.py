@@ -68,7 +68,7 @@ class Marks:
 
 
 def marks_of(summary: Any) -> Marks:
-    """The marks in a `summary.json`.
+    """The phases, maneuvers and early end in a `summary.json`, to be marked in the plots.
 
     Raises:
         ValueError: the summary is not valid.

@@ -25,8 +25,9 @@ class Verdict(NamedTuple):
 class SafetyLadder:
     """Escalates to the action of the most severe breach, and never de-escalates.
 
-    The action HOLD gives up the maneuver. If all breaches with this action end within `hold_time`,
-    the vehicle lands. Otherwise the most severe `Monitor.then` of those that last follows.
+    The action HOLD gives up the maneuver, and the flight with it. If all breaches with this action
+    end within `hold_time`, the vehicle lands. Otherwise the action `Monitor.then` of a breach that
+    has not ended follows, the most severe one of several.
 
     Args:
         monitors: the table; among equally severe breaches the first row decides.

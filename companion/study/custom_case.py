@@ -34,7 +34,7 @@ class Case(Section):
     """A step of the acceleration coefficients, the methods that fly it, and the conditions."""
 
     start: Pair
-    """Acceleration coefficients [north, east] at the start; their length is sin(tilt)."""
+    """Acceleration coefficients [north, east] at the start; √(north² + east²) is sin(tilt)."""
     target: Pair
     """Acceleration coefficients [north, east] of the target."""
     headings_deg: Annotated[

@@ -13,7 +13,8 @@ from companion.child_process import end_with_parent
 from companion.study.outcome import Outcome, Tick
 
 RunStudy = Callable[[str, Tick], Outcome]
-"""Runs the study of a name and writes its files. Workers import the function, by its own name."""
+"""Runs the study with the given name, and writes its files. Workers import the function, so it must
+be defined at the top of a module."""
 
 _POLL_S = 0.05
 """Time between two reads of the workers' progress, s."""

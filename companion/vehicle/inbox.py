@@ -47,7 +47,8 @@ class Inbox:
         on_frame: Called with each frame of the peer, from any system and of any message, after the
             control loop and all subscribers. Beacons, and frames of the vehicle with a refused
             signature, are left out.
-        lockstep: Handles beacons in lockstep; None without lockstep.
+        lockstep: Handles beacons, with which the vehicle begins each step of lockstep
+            (SYSTEM_TIME without the time of day); None without lockstep.
     """
 
     def __init__(

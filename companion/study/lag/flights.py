@@ -138,8 +138,8 @@ class Example(NamedTuple):
 
     Attributes:
         free: responses of every method by sample rate (Hz), without limits.
-        limited: responses of model-following with the limit W_M, by sample rate (Hz).
-        by_error: as in `Comparison`, at `EXAMPLE_ERRORS_HZ`; includes `NO_ERROR`.
+        limited: responses of model-following with tilt rates up to W_M, by sample rate (Hz).
+        by_error: as in `Comparison`, at the sample rate `EXAMPLE_ERRORS_HZ`; includes `NO_ERROR`.
     """
 
     free: dict[float, dict[Method, Response]]
