@@ -14,6 +14,8 @@ _WATCHED_S = 12.0
 _BATTERY = {"px4": 75.0, "ardupilot": 96.0}
 """Below this limit a simulated battery comes within a minute, %."""
 _LANDED_S = 120.0
+_RIVAL_THRUST = {"px4": 0.7, "ardupilot": 0.35}
+"""About what a hover needs."""
 
 
 def kill(vehicle: Vehicle, folder: Path) -> dict:
@@ -38,6 +40,16 @@ def takeover(vehicle: Vehicle, folder: Path) -> dict:
     )
 
 
+def rival(vehicle: Vehicle, folder: Path) -> dict:
+    """Another program sends setpoints, too, 100 times a second, until ours hands back."""
+    flight = hovering(vehicle, folder)
+    event = time.monotonic()
+    while flight.process.poll() is None and time.monotonic() < event + _WATCHED_S:
+        vehicle.station.send_rates((0.2, 0.0, 0.0), _RIVAL_THRUST[vehicle.autopilot])
+        time.sleep(0.01)
+    return {"result": flight.finish()["result"]} | _watched(vehicle, event)
+
+
 def ladder(vehicle: Vehicle, folder: Path) -> dict:
     """The program lands the vehicle itself, for its battery is below the limit."""
     if vehicle.autopilot == "px4":
@@ -58,7 +70,9 @@ def calm(vehicle: Vehicle, folder: Path) -> dict:
     return {"result": flight.finish().get("result")}
 
 
-INCIDENTS = {"kill": kill, "takeover": takeover, "ladder": ladder, "calm": calm}
+INCIDENTS = {
+    "kill": kill, "takeover": takeover, "ladder": ladder, "calm": calm, "rival": rival
+}  # fmt: skip
 TEN = (
     "kill", "takeover", "ladder", "kill", "takeover", "ladder", "calm", "takeover", "calm", "calm"
 )  # fmt: skip

@@ -15,6 +15,8 @@ from tests.real.truth import north_east
 
 _UNREAD = (30, 31, 32, 33, 36, 65, 83, 85, 100)
 """What PX4 sends a ground station 50 times a second; to decode it takes this computer's time."""
+_ONLY_RATES = 128
+"""ATTITUDE_TARGET_TYPEMASK: no attitude."""
 _INT32 = 6
 """MAV_PARAM_TYPE_INT32."""
 
@@ -96,6 +98,12 @@ class Station:
         if self.autopilot == "px4":
             return self.command(176, 1, *PX4_MODES[name])
         return self.command(176, 1, ARDUPILOT_MODES[name])
+
+    def send_rates(self, rates: tuple[float, float, float], thrust: float) -> None:
+        """Send a setpoint of body rates (rad/s) and thrust, as another program would."""
+        self._links[0].mav.set_attitude_target_send(
+            0, 1, 1, _ONLY_RATES, (1.0, 0.0, 0.0, 0.0), *rates, thrust
+        )
 
     def set_parameter(self, name: str, value: float) -> None:
         """Set a parameter, whatever its type; PX4 wants the bytes of an integer as they are."""
