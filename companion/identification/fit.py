@@ -61,8 +61,7 @@ class LagFit:
     Attributes:
         dead_time: dead time, s.
         lag: lag, s.
-        gain: measured per commanded value. It is fitted even if lag and dead time were found with a
-            gain that the caller gave.
+        gain: measured per commanded value; fitted anew if lag and dead time are for a given one.
         offset: measurement at a command of zero.
         slew: slew limit of the command, per second; None: no sign of a limit.
         explained: R².

@@ -174,7 +174,7 @@ def test_a_false_landing_in_control_is_not_made_true(tmp_path):
 
 
 def test_a_mode_that_is_not_told_any_more_lets_the_vehicle_go(tmp_path):
-    silent = ["HEARTBEAT", "CURRENT_MODE"]
+    silent = ["HEARTBEAT", "CURRENT_MODE", "ATTITUDE_TARGET"]
     fault = {"kind": "stop_telemetry", "messages": silent, "after_offboard_s": 2.0}
     takeover = {"kind": "pilot_takeover", "mode": "POSCTL", "after_offboard_s": 2.5}
     with mock_vehicle(tmp_path, faults=[fault, takeover]) as mock:
@@ -186,6 +186,19 @@ def test_a_mode_that_is_not_told_any_more_lets_the_vehicle_go(tmp_path):
     )
     took_over = next(at for at, text in summary.events if text == "mode OFFBOARD")
     assert {command for at, command, _ in commands(summary) if at > took_over + 1.0} <= {512}
+
+
+def test_a_takeover_that_is_not_told_shows_in_the_setpoints_that_the_autopilot_obeys():
+    """The program then requests a heartbeat, long before it would miss one."""
+    silent = ["HEARTBEAT", "CURRENT_MODE"]
+    fault = {"kind": "stop_telemetry", "messages": silent, "after_offboard_s": 2.0}
+    takeover = {"kind": "pilot_takeover", "mode": "POSCTL", "after_offboard_s": 2.5}
+    with mock_vehicle(faults=[fault, takeover]) as mock:
+        summary = fly(mock, hover={"duration_s": 5.0})
+        assert mock.state()["mode"] == "POSCTL"
+    assert summary.result == "the pilot or another station took over: mode POSCTL"
+    offboard_at = next(at for at, text in summary.events if text == "mode OFFBOARD")
+    assert summary.events[-1][0] < offboard_at + 3.0
 
 
 def test_without_heartbeats_no_setpoint_is_sent_though_the_mode_is_told():
