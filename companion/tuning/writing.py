@@ -125,8 +125,9 @@ def _error_text(error: ModelError) -> str:
 def _flight_line(name: str, before: CourseResult, after: CourseResult) -> str:
     if not (before.ok and after.ok):
         return f"{name}: {before.result} -> {after.result}"
+    wind = f" in wind of {after.wind:.1f} m/s" if after.wind else ""
     return (
-        f"{name}, flown at up to {after.speed:.1f} m/s: "
+        f"{name}, flown at up to {after.speed:.1f} m/s{wind}: "
         f"reported {before.reported:.3f} -> {after.reported:.3f}, true "
         f"{before.true:.3f} -> {after.true:.3f} (estimate off by {after.estimate:.3f}), "
         f"rates {degrees(before.rate):.0f} -> {degrees(after.rate):.0f} °/s"

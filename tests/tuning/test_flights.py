@@ -83,6 +83,11 @@ def test_a_configuration_without_drag_leaves_the_tilt_that_the_mock_vehicles_dra
     flight = fly_course(config, CIRCLE, "px4")
     assert flight.ok, flight
     assert flight.reported < 0.1
+    in_gusts = fly_course(config, CIRCLE_IN_GUSTS, "px4")
+    assert in_gusts.ok, in_gusts
+    assert 1.5 < in_gusts.wind < 3.0  # 25 degrees do not hold against gusts of 5 m/s
+    assert in_gusts.reported < 0.3
+    assert in_gusts.speed < 5.1
 
 
 def test_the_mock_vehicle_is_like_the_identified_one():
