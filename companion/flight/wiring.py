@@ -40,7 +40,8 @@ def connected(link: Link, assembled: AssembledFlight) -> Iterator[None]:
         flight.on_current_mode()
 
     def on_attitude_target(message: Message) -> None:
-        context.snapshot_builder.echo.take(message, time())
+        if loop.offboard_active:
+            context.snapshot_builder.echo.take(message, time())
 
     link.on_attitude = on_attitude
     link.on_error = flight.fail
