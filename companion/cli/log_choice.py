@@ -16,14 +16,14 @@ def log_of(given: Path) -> Path:
         LogError: there is none; the message names the log that was probably meant.
     """
     log = given / LOG if given.is_dir() else given
+    if log.is_file() and log.suffix != ".mcap":
+        return log
     if given.is_dir():
         fault, meant = f"holds no {LOG}", _suggestion(given)
     elif not given.exists():
         fault, meant = "does not exist", _suggestion(given.parent)
     else:
         fault, meant = "is no MAVLink log", _suggestion(given.parent)
-    if log.is_file() and log.suffix != ".mcap":
-        return log
     raise LogError(
         f"{given} {fault}: --log takes the folder of a flight, or a MAVLink log such as the "
         f"flight.tlog in it{meant}"

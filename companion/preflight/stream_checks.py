@@ -88,7 +88,7 @@ def _rate_fault(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, s
             f"lower {key}, or {faster_loop}" if key else faster_loop,
         )
     countable = _is_countable(name, rate, evidence)
-    asked = min(asked, _SENT_ON_CHANGE.get(name, asked))
+    asked = _expected_rate(name, rate)
     if achieved >= _MIN_RATE_SHARE * asked if countable else evidence.received[name] > 0:
         return None
     return (
@@ -100,8 +100,12 @@ def _rate_fault(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, s
 
 def _is_countable(name: str, rate: StreamRate, evidence: Evidence) -> bool:
     """Whether enough messages are expected to judge the rate by counting them."""
-    expected = min(rate.asked, _SENT_ON_CHANGE.get(name, rate.asked))
-    return expected * evidence.window >= _MIN_EXPECTED_COUNT
+    return _expected_rate(name, rate) * evidence.window >= _MIN_EXPECTED_COUNT
+
+
+def _expected_rate(name: str, rate: StreamRate) -> float:
+    """The rate to expect of a message, Hz: the requested one, unless it is sent on change."""
+    return min(rate.asked, _SENT_ON_CHANGE.get(name, rate.asked))
 
 
 def _good_rate(name: str, rate: StreamRate, evidence: Evidence) -> str:

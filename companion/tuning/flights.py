@@ -118,23 +118,23 @@ def fly_course(config: Config, course: Course, autopilot: str, seed: int = 3) ->
     """
     mock = load(shipped(f"mock-{autopilot}.yaml"))
     parameters = (mock.mock or {}).get("parameters", {})
-    wind = _tolerable_wind(config, course, mock)
+    course = replace(course, wind=_tolerable_wind(config, course, mock))
     vehicle = MockVehicle(
         autopilot,
         lockstep=False,
         delay_s=_DATAGRAM_DELAY_S,
         prearm_delay_s=0.2,
         seed=seed,
-        wind=dict(wind),
+        wind=dict(course.wind),
         parameters={**parameters, **_QUICK_TAKEOFF_AND_LANDING[autopilot]},
     )
-    flown_config = _flight_config(config, replace(course, wind=wind), mock)
+    flown_config = _flight_config(config, course, mock)
     with _recorded_truth(vehicle) as rows:
         summary = fly(flown_config, vehicle)
     if summary.result != "ok":
         return CourseResult(summary.result)
     result = _tracking(summary.trace.tracking_rows(), np.array(rows), vehicle, flown_config)
-    return replace(result, wind=wind.get("speed_m_s", 0.0))
+    return replace(result, wind=course.wind.get("speed_m_s", 0.0))
 
 
 def _tracking(
