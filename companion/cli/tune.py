@@ -11,6 +11,7 @@ from typing import Any
 from rich.console import Console
 
 from companion.cli.exit_codes import EXIT_FAILURE, EXIT_OK
+from companion.cli.log_choice import LOG
 from companion.cli.output_file import require_writable
 from companion.config import Config
 from companion.config.files import changed, load
@@ -23,7 +24,7 @@ from companion.tuning.flights import COURSES, CourseResult, autopilot_like, fly_
 from companion.tuning.noise import measured_disturbances
 from companion.tuning.writing import proposal_text, summary_lines, worse_sentence
 
-_VEHICLE, _CONFIG, _LOG = "vehicle.yaml", "config.yaml", "flight.tlog"
+_VEHICLE, _CONFIG = "vehicle.yaml", "config.yaml"
 _OUTPUT_NAME = "tuned.yaml"
 _VEHICLE_SECTIONS = ("vehicle", "thrust")
 """The sections in a vehicle file."""
@@ -38,7 +39,7 @@ def tune(options: argparse.Namespace) -> int:
     config, included = _configuration(source, vehicle, options.config)
     require_writable(output, "--out", force=options.force)
     config = _with_learned_drag(config, source)
-    log = source / _LOG
+    log = source / LOG
     disturbances = Disturbances()
     if source.is_dir() and log.exists():
         disturbances = measured_disturbances(log, drag_prior(config).drag.linear, disturbances)

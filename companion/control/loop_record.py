@@ -92,7 +92,6 @@ class LoopRecord:
         unanswered: unanswered samples, by reason.
         reason: why the newest sample is unanswered, or None.
         latency_ns: time from the arrival of the last answered sample to its setpoint, ns.
-        thrust: thrust last sent, 0..1.
         sent: body rates (rad/s) and thrust of the latest setpoints, the newest last.
         last_sample: when the newest sample arrived.
         last_vehicle_time: vehicle time of the newest usable sample, s.
@@ -111,7 +110,6 @@ class LoopRecord:
     unanswered: dict[Unanswered, int] = field(default_factory=lambda: dict.fromkeys(Unanswered, 0))
     reason: Unanswered | None = None
     latency_ns: int = 0
-    thrust: float = 0.0
     sent: deque[tuple[BodyRates, float]] = field(
         default_factory=lambda: deque(maxlen=_KEPT_SETPOINTS)
     )
@@ -142,12 +140,16 @@ class LoopRecord:
             telemetry_stale: a longer interval between setpoints is a gap, s.
         """
         self.setpoints += 1
-        self.thrust = thrust
         self.sent.append((rates, thrust))
         interval = received - self.last_answer
         if interval <= telemetry_stale:
             self.setpoint_intervals.add(interval)
         self.last_answer = self.gap_from = received
+
+    @property
+    def thrust(self) -> float:
+        """The thrust last sent, 0..1; 0 before the first setpoint."""
+        return self.sent[-1][1] if self.sent else 0.0
 
     @property
     def stale(self) -> int:

@@ -1,10 +1,12 @@
 """What the monitors are shown: every value is that of its source, since control began."""
 
+from collections import deque
 from math import inf
 from types import SimpleNamespace
 
 import pytest
 
+from companion.attitude import BodyRates
 from companion.control.loop_record import LoopRecord, Unanswered
 from companion.guidance.fence import Place
 from companion.safety.snapshot import Autopilot, Health, Motion, Resets
@@ -50,7 +52,7 @@ class Flight:
             largest_tilt_jump=0.7,
             on_counter=lambda *seen: self.counted.append(seen),
         )
-        self.record = LoopRecord(thrust=0.45)
+        self.record = LoopRecord(sent=deque([(BodyRates(0.0, 0.0, 0.0), 0.45)]))
         command = SimpleNamespace(idle=False)
         self.loop = SimpleNamespace(resets=self.resets, record=self.record, command=command)
         self.course = SimpleNamespace(position_ned=(5.0, -6.0, -7.0), velocity=(1.0, 2.0, 0.5))
