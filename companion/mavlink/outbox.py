@@ -6,10 +6,13 @@ from math import inf
 from companion.attitude.types import BodyRates
 from companion.mavlink.codec import SYSTEM_TIME, SetpointEncoder, encode_system_time
 from companion.mavlink.framing import build_frame
-from companion.mavlink.messages import CRC_EXTRA, Message, encode
+from companion.mavlink.messages import CRC_EXTRA, Message, dialect, encode
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.transport.base import Tap, Transport
+
+_MAVLINK_VERSION = 3
+"""Field `mavlink_version` of HEARTBEAT in MAVLink 1 and 2."""
 
 
 class Outbox:
@@ -72,6 +75,19 @@ class Outbox:
             self._send_frame(
                 self._frame(SYSTEM_TIME, encode_system_time(time_boot_ms)), record=False
             )
+
+    def send_heartbeat(self) -> None:
+        """Send one HEARTBEAT of the configured type, with the state active."""
+        self.send(
+            dialect.MAVLink_heartbeat_message(
+                type=self._settings.heartbeat_type,
+                autopilot=dialect.MAV_AUTOPILOT_INVALID,
+                base_mode=0,
+                custom_mode=0,
+                system_status=dialect.MAV_STATE_ACTIVE,
+                mavlink_version=_MAVLINK_VERSION,
+            )
+        )
 
     def send(self, message: Message) -> bool:
         """Send a pymavlink message; return False if it could not be sent."""

@@ -8,7 +8,7 @@ from companion.control.loop_record import Unanswered
 from companion.guidance.fence import Place
 from companion.guidance.reference import Horizontal, Vector
 from companion.vehicle.records import Battery, Estimator, Gps
-from companion.vehicle.uplink import Uplink
+from companion.vehicle.timesync import Uplink
 
 UNHEARD_S = 0.3
 """Time without a frame, s, after which the vehicle counts as not heard. From then on a takeover

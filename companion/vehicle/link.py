@@ -24,15 +24,9 @@ from companion.vehicle.client import VehicleClient
 from companion.vehicle.clock import VehicleClock
 from companion.vehicle.connection import Connection
 from companion.vehicle.inbox import Inbox
-from companion.vehicle.presence import (
-    TimeSync,
-    no_beacon_message,
-    no_heartbeat_message,
-    send_heartbeat,
-    send_heartbeats,
-    synchronise,
-)
 from companion.vehicle.records import AttitudeSample, Heartbeat
+from companion.vehicle.silence import no_beacon_message, no_heartbeat_message
+from companion.vehicle.timesync import TimeSync
 
 _LOG = logging.getLogger(__name__)
 
@@ -104,8 +98,8 @@ class Link(VehicleClient):
         if self._stamp_writer is not None:
             self._stamp_writer.start()
         self._inbox.tell_remarks()
-        self._start(send_heartbeats(self.settings, self._outbox))
-        self._start(synchronise(self.timesync, self.clock))
+        self._start(self._send_heartbeats())
+        self._start(self.timesync.run())
         return self
 
     async def __aexit__(self, *_: object) -> None:
@@ -240,9 +234,15 @@ class Link(VehicleClient):
         if isinstance(error, Exception):
             self._router.report(error)
 
+    async def _send_heartbeats(self) -> None:
+        """Send heartbeats until cancelled. No setpoint depends on them."""
+        while True:
+            self._outbox.send_heartbeat()
+            await asyncio.sleep(1.0 / self.settings.heartbeat_rate_hz)
+
     async def _first_beacon(self, lockstep: LockstepClient) -> None:
         # Some vehicles wait for a first message before they send (udpout, TCP).
-        send_heartbeat(self.settings, self._outbox)
+        self._outbox.send_heartbeat()
         try:
             async with asyncio.timeout(self.settings.first_beacon_timeout_s):
                 await lockstep.first_beacon

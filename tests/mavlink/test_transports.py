@@ -21,7 +21,7 @@ from companion.mavlink.transport.endpoint import SerialPort
 from companion.mavlink.transport.serial_port import SerialTransport
 from companion.vehicle import connection as connection_module
 from companion.vehicle.link import Link
-from companion.vehicle.presence import no_heartbeat_message
+from companion.vehicle.silence import no_heartbeat_message
 from tests.mavlink.fakes import FakeVehicle, attitude, frames_of, heartbeat, linked, until
 
 LEVEL = BodyRates(0.0, 0.0, 0.0)

@@ -22,7 +22,7 @@ from companion.safety.motion_judges import braking
 from companion.safety.snapshot import Autopilot, Control, Health, Motion, Resets, Snapshot
 from companion.safety.table import monitors
 from companion.vehicle.records import Battery, Estimator
-from companion.vehicle.uplink import Uplink
+from companion.vehicle.timesync import Uplink
 
 NOW = 100.0
 OLD = NOW - 6.0

@@ -14,7 +14,7 @@ from companion.safety.monitor import Alarm, Monitor
 from companion.safety.snapshot import Autopilot, Control, Health, Motion, Resets, Snapshot
 from companion.safety.snapshot_builder import SnapshotBuilder
 from companion.vehicle.records import Battery, Estimator, Gps
-from companion.vehicle.uplink import Uplink
+from companion.vehicle.timesync import Uplink
 
 CONFIG = Config.model_validate({"limits": {"fence_radius_m": 60.0}})
 NOW = 100.0

@@ -11,7 +11,7 @@ from companion.control.loop_record import LoopRecord, Unanswered
 from companion.guidance.fence import Place
 from companion.safety.snapshot import Autopilot, Health, Motion, Resets
 from companion.safety.snapshot_builder import SnapshotBuilder
-from companion.vehicle.uplink import Uplink
+from companion.vehicle.timesync import Uplink
 
 Q = (0.6, 0.0, 0.8, 0.0)
 
