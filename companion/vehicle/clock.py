@@ -48,14 +48,13 @@ class VehicleClock:
         restarts: Counts restarts of the autopilot, after which its time since boot continues from a
             smaller value.
         last_change: The newest change counted in `changes`, in words; empty before the first.
-        outliers: Number of single samples dropped because they were stamped far ahead.
         on_event: Called with a sentence for the user.
     """
 
     def __init__(self, *, lockstep: bool = False) -> None:
         self.rate = ClockRate(fixed=lockstep)
         self.delay = TelemetryDelay()
-        self.changes = self.restarts = self.outliers = 0
+        self.changes = self.restarts = 0
         self.last_change = ""
         self.on_event: Callable[[str], None] = lambda _: None
         self._lockstep = lockstep
@@ -105,16 +104,13 @@ class VehicleClock:
         time = time_boot_ms / 1000.0 + self._shift
         ahead = time - received
         quickest = self._quickest + self.rate.slowest * (received - self._received)
-        if time <= self._newest or ahead > quickest + SMALLEST_JUMP:
-            misfit = self._judge_misfit(time_boot_ms, Stamp(time, ahead, received), quickest)
+        fits = time > self._newest and ahead <= quickest + SMALLEST_JUMP
+        if not fits or self._misfits.stamps:
+            misfit = self._adapt_to(Stamp(time, ahead, received), time_boot_ms, quickest)
             if misfit is not None:
                 return SampleTiming(time, nan, misfit)
             time = time_boot_ms / 1000.0 + self._shift
             ahead, quickest = time - received, self._quickest
-        elif self._misfits.stamps:
-            self._end_misfits(time_boot_ms, quickest - ahead)
-            time = time_boot_ms / 1000.0 + self._shift
-            ahead = time - received
         late = quickest - ahead
         if late < 0.0:
             quickest, late = ahead, 0.0
@@ -172,31 +168,26 @@ class VehicleClock:
         else:
             self.on_event("the age of telemetry is known by TIMESYNC")
 
-    def _judge_misfit(self, time_boot_ms: int, stamp: Stamp, quickest: float) -> Misfit | None:
-        """Why `stamp` does not fit the clock; None if it fits, or if a jump is accepted now."""
+    def _adapt_to(self, stamp: Stamp, time_boot_ms: int, quickest: float) -> Misfit | None:
+        """Take a misfit, or the first stamp that fits again; return why it is not used, or None."""
         if self._began == inf:
             self._began = self._received = stamp.received
             self._quickest = 0.0 if self._lockstep else stamp.ahead
-            return None
-        is_ahead = stamp.time > self._newest
-        drift = self.rate.spread(stamp.received - self._received)
-        if is_ahead and stamp.ahead <= quickest + SMALLEST_JUMP + drift:
+        elif self._drift_explains(stamp, quickest):
             self._quickest = quickest
+            self._end_misfits(time_boot_ms, quickest - stamp.ahead)
+        elif self._link_got_quicker(stamp, quickest):
+            self._quickest = quickest
+            self.delay.shorten(stamp.ahead - quickest, stamp.received)
             self._drop_misfits()
-            return None
-        if is_ahead and self._link_got_quicker(stamp, quickest):
-            return None
-        if not self._misfits.continued_by(stamp):
-            self._drop_misfits()
-        self._misfits.stamps.append(stamp)
-        if not self._misfits.confirmed(quickest):
-            return Misfit.AHEAD if is_ahead else Misfit.NOT_NEWER
-        jump = self._misfits.most_ahead() - quickest
-        self._misfits.stamps.clear()
-        self._quickest = quickest
-        self._newest = -inf
-        self._accept_jump(jump, time_boot_ms, set_back=jump < 0.0)
+        else:
+            return self._take_misfit(stamp, time_boot_ms, quickest)
         return None
+
+    def _drift_explains(self, stamp: Stamp, quickest: float) -> bool:
+        """Whether `stamp` is newer, and ahead of the clock by no more than the largest drift."""
+        drift = self.rate.spread(stamp.received - self._received)
+        return stamp.time > self._newest and stamp.ahead <= quickest + SMALLEST_JUMP + drift
 
     def _link_got_quicker(self, stamp: Stamp, quickest: float) -> bool:
         """Whether `stamp` seems ahead only because the link has become quicker.
@@ -205,19 +196,29 @@ class VehicleClock:
         Exchanges after the last sample that fitted do not count, because the clock may have jumped
         before them.
         """
-        lead = stamp.ahead - quickest
-        if lead > self.delay.largest_possible(before=self._received - SAME_CLOCK_SPREAD):
-            return False
-        self._quickest = quickest
-        self.delay.shorten(lead, stamp.received)
-        self._drop_misfits()
-        return True
+        most = self.delay.largest_possible(before=self._received - SAME_CLOCK_SPREAD)
+        return stamp.time > self._newest and stamp.ahead - quickest <= most
+
+    def _take_misfit(self, stamp: Stamp, time_boot_ms: int, quickest: float) -> Misfit | None:
+        """Add a misfit to the others; if they show a jump of the clock, accept it, return None."""
+        if not self._misfits.continued_by(stamp):
+            self._drop_misfits()
+        self._misfits.stamps.append(stamp)
+        if not self._misfits.confirmed(quickest):
+            return Misfit.AHEAD if stamp.time > self._newest else Misfit.NOT_NEWER
+        jump = self._misfits.most_ahead() - quickest
+        self._misfits.stamps.clear()
+        self._quickest, self._newest = quickest, -inf
+        self._accept_jump(jump, time_boot_ms, set_back=jump < 0.0)
+        return None
 
     def _end_misfits(self, time_boot_ms: int, late: float) -> None:
-        """Take the first sample whose stamp fits the clock again; it came `late` seconds late.
+        """End the misfits with a sample that fits the clock; it came `late` seconds late.
 
         If all misfits before it repeated the newest stamp that fitted, the clock stood still.
         """
+        if not self._misfits.stamps:
+            return
         clock_stopped = self._misfits.clock_stopped(self._newest)
         lasted = self._misfits.stamps[-1].received - self._received
         self._drop_misfits()
@@ -225,8 +226,8 @@ class VehicleClock:
             self._accept_jump(-late, time_boot_ms, set_back=False)
 
     def _drop_misfits(self) -> None:
-        """Drop the misfits; those that were stamped ahead of the clock count as outliers."""
-        ahead = sum(stamp.time > self._newest for stamp in self._misfits.stamps)
+        """Drop the misfits; the first time that one was stamped ahead of the clock, report it."""
+        ahead = any(stamp.time > self._newest for stamp in self._misfits.stamps)
         if ahead and not self._reported_outlier:
             self._reported_outlier = True
             lead = self._misfits.most_ahead() - self._quickest
@@ -234,7 +235,6 @@ class VehicleClock:
                 f"a sample stamped {lead:.1f} s ahead of the vehicle's clock was dropped; such "
                 "samples are counted"
             )
-        self.outliers += ahead
         self._misfits.stamps.clear()
 
     def _accept_jump(self, jump: float, time_boot_ms: int, *, set_back: bool) -> None:

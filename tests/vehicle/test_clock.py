@@ -164,7 +164,7 @@ def test_one_sample_stamped_far_ahead_is_dropped_counted_and_named(by):
     for _ in range(3):
         assert link.arrive(link.vehicle + by).misfit is Misfit.AHEAD
         link.run(1.0)
-    assert (link.clock.outliers, link.clock.changes, len(link.misfits)) == (3, 0, 3)
+    assert (link.clock.changes, len(link.misfits)) == (0, 3)
     (told,) = link.told
     assert "was dropped" in told
     assert max(link.ages) < STALE
