@@ -14,7 +14,7 @@ from companion.flight.commands import (
     require_role,
 )
 from companion.flight.context import FlightContext
-from companion.flight.hand_over import hand_over, hand_over_to_landing
+from companion.flight.hand_over import hand_over_to_hold, hand_over_to_landing
 from companion.guidance import ManeuverSequence
 from companion.guidance.source import ManeuverSource, Source
 from companion.mavlink.errors import CommandTimeout, LinkLost
@@ -29,8 +29,6 @@ _MIN_HOLDING_TILT = 5.0
 
 _MARGIN_WINDOW = 1.0
 """Window over which `_TiltMargin` takes the maximum of the allowed tilt, s."""
-
-_ROLES_BEFORE_LANDING = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
 
 
 async def maneuvers(context: FlightContext) -> None:
@@ -134,13 +132,7 @@ class _TiltMargin:
 async def hand_back(context: FlightContext) -> None:
     """Stop the motion, and send setpoints until the autopilot holds by itself."""
     context.detail = "the autopilot to hold"
-    require_ours = in_roles(context.link, _ROLES_BEFORE_LANDING)
-    await hand_over(
-        context,
-        context.link.autopilot.hold(),
-        require_ours,
-        lambda: in_role(context.link, Role.HOLD),
-    )
+    await hand_over_to_hold(context)
 
 
 async def hold_when_heard(context: FlightContext) -> None:
@@ -170,12 +162,7 @@ async def hold_when_heard(context: FlightContext) -> None:
 async def land(context: FlightContext) -> None:
     """Command the landing, send setpoints until the autopilot lands, and wait for touchdown."""
     context.detail = "the autopilot to accept the landing"
-
-    def landing() -> bool:
-        return in_role(context.link, Role.LAND) or not context.armed()
-
-    require_ours = in_roles(context.link, _ROLES_BEFORE_LANDING | {Role.LAND})
-    await hand_over_to_landing(context, require_ours, landing)
+    await hand_over_to_landing(context)
 
     def down() -> bool:
         height = context.link.state.height

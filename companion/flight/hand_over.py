@@ -1,6 +1,7 @@
 """Hands the vehicle over to its autopilot, which then holds it or lands it."""
 
 import asyncio
+from collections.abc import Awaitable, Callable
 
 from companion.flight.commands import (
     IsDone,
@@ -12,92 +13,99 @@ from companion.flight.commands import (
 )
 from companion.flight.context import FlightContext, cancel
 from companion.mavlink.commands import Command
-from companion.mavlink.errors import CommandRefused, CommandTimeout, LinkLost
+from companion.mavlink.errors import CommandRefused, CommandTimeout, LinkError, LinkLost
 from companion.safety.actions import FlightEnded, fault_message
 from companion.vehicle.autopilot import Role
 
 _REPETITION_PAUSE = 1.0
 """Time from a landing that failed to the next request, s: the reason may be gone by then."""
 
+ROLES_BEFORE_LANDING = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
+"""Roles of the modes in which a vehicle that we have flown may be commanded to hold or to land."""
+
 _OBEYS_OR_LANDS = frozenset({Role.OFFBOARD, Role.LAND})
 
+_PrepareRepetition = Callable[[LinkError], Awaitable[RequireOurs]]
+"""Called with the error of a request; raises it, or returns whose vehicle the next one requires."""
 
-async def hand_over(
-    context: FlightContext, command: Command, require_ours: RequireOurs, done: IsDone
-) -> None:
-    """Stop the motion, and command a mode until the autopilot has entered it; then release.
 
-    A command that has no effect is sent again until the phase is over: a vehicle whose uplink loses
-    frames must not be left in the air. It is held where it is then, because it may have drifted.
+async def hand_over_to_hold(context: FlightContext) -> None:
+    """Ask the autopilot to hold until it does; then release.
 
     Raises:
         FlightEnded: somebody else has the vehicle.
         CommandRefused: the autopilot refused.
     """
-    while True:
-        _stop_moving(context)
-        try:
-            await change_mode(context, command, require_ours, done)
-        except (CommandTimeout, LinkLost) as error:
-            context.detail = str(error)
-        else:
-            break
-    context.release()
+    require_ours = in_roles(context.link, ROLES_BEFORE_LANDING)
+
+    def holding() -> bool:
+        return in_role(context.link, Role.HOLD)
+
+    async def prepare(error: LinkError) -> RequireOurs:
+        if isinstance(error, CommandRefused):
+            raise error
+        return require_ours
+
+    await _hand_over(context, context.link.autopilot.hold(), require_ours, holding, prepare)
 
 
-async def hand_over_to_landing(
-    context: FlightContext, require_ours: RequireOurs, landing: IsDone
-) -> None:
-    """Like `hand_over`, for the landing; one that is refused is requested again, too.
+async def hand_over_to_landing(context: FlightContext) -> None:
+    """Ask the autopilot to land until it does, even if it refuses; then release.
 
-    Whenever a request has failed, a vehicle that still obeys us is asked to hold: ArduPilot would
-    not hold its position after our last setpoint. A hold that others command then is respected.
-
-    Args:
-        context: context of the flight.
-        require_ours: raises if the vehicle must not be commanded to land.
-        landing: returns whether it lands.
+    Before each repetition, a vehicle that still obeys us is asked to hold: ArduPilot would not hold
+    its position after our last setpoint. A hold that others command then is respected.
 
     Raises:
         FlightEnded: somebody else has the vehicle.
     """
-    _stop_moving(context)
-    try:
-        await change_mode(context, context.link.autopilot.land(), require_ours, landing)
-    except (CommandTimeout, CommandRefused, LinkLost) as error:
-        context.detail = str(error)
-        if isinstance(error, CommandRefused):
+    require_ours = in_roles(context.link, ROLES_BEFORE_LANDING | {Role.LAND})
+    refused = False
+
+    def landing() -> bool:
+        return in_role(context.link, Role.LAND) or not context.armed()
+
+    async def prepare(error: LinkError) -> RequireOurs:
+        nonlocal refused
+        if isinstance(error, CommandRefused) and not refused:
+            refused = True
             context.note(f"{error}; the landing is requested again every second")
-    else:
-        context.release()
-        return
-    watching = asyncio.create_task(_release_once_left(context))
-    try:
-        await _repeat_landing(context, require_ours, landing)
-    finally:
-        await cancel(watching)
-    context.release()
-
-
-async def _repeat_landing(
-    context: FlightContext, require_ours: RequireOurs, landing: IsDone
-) -> None:
-    """Request the landing until it is accepted, and before each request a hold."""
-    while True:
         obeyed = in_role(context.link, Role.OFFBOARD)
         await asyncio.sleep(_REPETITION_PAUSE)
-        if landing():  # it refused, and lands all the same
-            return
-        if obeyed:
-            await _ask_to_hold(context, landing)
-            _stop_moving(context)
+        if obeyed and not landing():
+            await _hold_meanwhile(context, landing)
         obeys = in_role(context.link, Role.OFFBOARD)
-        may_land = in_roles(context.link, _OBEYS_OR_LANDS) if obeys else require_ours
-        try:
-            await change_mode(context, context.link.autopilot.land(), may_land, landing)
-            return
-        except (CommandTimeout, CommandRefused, LinkLost) as error:
-            context.detail = str(error)
+        return in_roles(context.link, _OBEYS_OR_LANDS) if obeys else require_ours
+
+    await _hand_over(context, context.link.autopilot.land(), require_ours, landing, prepare)
+
+
+async def _hand_over(
+    context: FlightContext,
+    command: Command,
+    require_ours: RequireOurs,
+    done: IsDone,
+    prepare_repetition: _PrepareRepetition,
+) -> None:
+    """Stop the motion, and command a mode until the autopilot has entered it; then release.
+
+    A command that has no effect is sent again until the phase is over: a vehicle whose uplink loses
+    frames must not be left in the air. It is held where it is then, because it may have drifted.
+    """
+    releasing = asyncio.create_task(_release_once_left(context))
+    try:
+        while True:
+            _stop_moving(context)
+            try:
+                await change_mode(context, command, require_ours, done)
+                break
+            except (CommandTimeout, CommandRefused, LinkLost) as error:
+                context.detail = str(error)
+                require_ours = await prepare_repetition(error)
+            if done():
+                break
+    finally:
+        await cancel(releasing)
+    context.release()
 
 
 async def _release_once_left(context: FlightContext) -> None:
@@ -107,7 +115,7 @@ async def _release_once_left(context: FlightContext) -> None:
         context.release()
 
 
-async def _ask_to_hold(context: FlightContext, landing: IsDone) -> None:
+async def _hold_meanwhile(context: FlightContext, landing: IsDone) -> None:
     """Ask the autopilot to hold; go on without it if it does not, or if it lands meanwhile."""
     try:
         await ask_to_hold(context, in_roles(context.link, {Role.OFFBOARD}))
