@@ -8,12 +8,12 @@ from typing import Any
 from companion.config.flight import FlightConfig
 from companion.flight import control_phases, preflight_phases, takeoff, takeover
 from companion.flight.context import FlightContext
+from companion.flight.hand_over import ROLES_BEFORE_LANDING
 from companion.safety.actions import Exit
 from companion.vehicle.autopilot import Autopilot, ControlEntry, Role
 
 _TAKEOFF_ROLES = frozenset({Role.TAKEOFF, Role.READY})
 _ARMED_ON_GROUND_ROLES = frozenset({Role.READY})
-_AIRBORNE_ROLES = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD})
 _OFFBOARD_ROLES = frozenset({Role.OFFBOARD})
 _MANEUVER_GRACE = 10.0
 """Time that the maneuvers may take beyond their duration, s."""
@@ -96,45 +96,24 @@ def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, .
         Phase(
             "arm", "the vehicle to arm", preflight_phases.arm, config.arming_timeout_s, Exit.DISARM
         ),
-        Phase(
-            "takeoff",
-            "the height",
-            takeoff.takeoff,
-            config.takeoff_timeout_s,
-            Exit.LAND,
-            on_failure_on_ground=Exit.DISARM,
-            allowed_roles=_TAKEOFF_ROLES,
-        ),
-        Phase(
-            "offboard",
-            "the autopilot to obey our rates",
-            takeoff.offboard,
-            _TAKEOVER_TIMEOUT,
-            Exit.LAND,
-            allowed_roles=_TAKEOFF_ROLES | {Role.OFFBOARD},
-            monitored=True,
-        ),
+        _takeoff(config),
+        _takeover(Exit.LAND),
     )
 
 
 def takeover_phases(config: FlightConfig) -> tuple[Phase, ...]:
     """The phases that take over a vehicle which its autopilot holds in the air."""
-    checks = _checks_phase(config, "to be taken over", takeover.check_airborne, _TAKEOFF_ROLES)
-    return checks, _takeover_from_hold_phase()
+    checks = _checks(config, "to be taken over", takeover.check_airborne, _TAKEOFF_ROLES)
+    return checks, _takeover(Exit.HOLD)
 
 
-def takeoff_for_client_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, ...]:
+def takeoff_for_client_phases(config: FlightConfig) -> tuple[Phase, ...]:
     """The phases that take off a vehicle which somebody else armed, and take it over."""
-    checks = _checks_phase(
-        config, "to take off", takeover.check_armed_on_ground, _ARMED_ON_GROUND_ROLES
-    )
-    (takeoff_phase,) = (
-        phase for phase in takeoff_phases(config, autopilot) if phase.name == "takeoff"
-    )
-    return checks, takeoff_phase, _takeover_from_hold_phase()
+    checks = _checks(config, "to take off", takeover.check_armed_on_ground, _ARMED_ON_GROUND_ROLES)
+    return checks, _takeoff(config), _takeover(Exit.HOLD)
 
 
-def _checks_phase(config: FlightConfig, ready: str, work: Work, roles: frozenset[Role]) -> Phase:
+def _checks(config: FlightConfig, ready: str, work: Work, roles: frozenset[Role]) -> Phase:
     return Phase(
         "checks",
         f"the vehicle to be ready {ready}",
@@ -144,14 +123,26 @@ def _checks_phase(config: FlightConfig, ready: str, work: Work, roles: frozenset
     )
 
 
-def _takeover_from_hold_phase() -> Phase:
-    """The takeover of a vehicle that holds in the air; if it fails, the autopilot keeps holding."""
+def _takeoff(config: FlightConfig) -> Phase:
+    return Phase(
+        "takeoff",
+        "the height",
+        takeoff.takeoff,
+        config.takeoff_timeout_s,
+        Exit.LAND,
+        on_failure_on_ground=Exit.DISARM,
+        allowed_roles=_TAKEOFF_ROLES,
+    )
+
+
+def _takeover(on_failure: Exit) -> Phase:
+    """The takeover; after a failure the vehicle lands, or its autopilot keeps holding it."""
     return Phase(
         "offboard",
         "the autopilot to obey our rates",
-        takeoff.offboard,
+        takeover.offboard,
         _TAKEOVER_TIMEOUT,
-        Exit.HOLD,
+        on_failure,
         allowed_roles=_TAKEOFF_ROLES | _OFFBOARD_ROLES,
         monitored=True,
     )
@@ -205,7 +196,7 @@ def hand_back_phase() -> Phase:
         control_phases.hand_back,
         _COMMAND_TIMEOUT,
         Exit.LAND,
-        allowed_roles=_AIRBORNE_ROLES | {Role.OFFBOARD},
+        allowed_roles=ROLES_BEFORE_LANDING,
     )
 
 
@@ -224,7 +215,7 @@ def _land(config: FlightConfig) -> Phase:
         "touchdown",
         control_phases.land,
         config.landing_timeout_s,
-        allowed_roles=_AIRBORNE_ROLES | {Role.OFFBOARD, Role.LAND},
+        allowed_roles=ROLES_BEFORE_LANDING | {Role.LAND},
     )
 
 

@@ -83,11 +83,8 @@ class TakeoverPlan:
         config = context.config.flight
         connect, *_ = ground_phases(config)
         yield connect
-        if self._from_ground:
-            phases = takeoff_for_client_phases(config, context.link.autopilot)
-        else:
-            phases = takeover_phases(config)
-        for phase in phases:
+        first_phases = takeoff_for_client_phases if self._from_ground else takeover_phases
+        for phase in first_phases(config):
             yield phase
         work = partial(fly_commanded, source=self._source)
         yield program_phase("control", f"{self._source.name} to end its control", work)

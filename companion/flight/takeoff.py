@@ -1,18 +1,12 @@
-"""The phases from the ground to control by our body rates, one coroutine each."""
+"""The phase in which the autopilot takes off."""
 
 import asyncio
-from math import degrees, hypot
 
-from companion.attitude.kinematics import tilt_angle
-from companion.flight.commands import change_mode, command_if_ours, in_role, in_roles, require_role
+from companion.flight.commands import command_if_ours, in_role, require_role
 from companion.flight.context import FlightContext
-from companion.flight.preflight_phases import stream
 from companion.preflight.evidence import Stage
 from companion.safety.actions import Exit, FlightEnded
-from companion.vehicle.autopilot import ControlEntry, Role
-
-_SETTLE_TIME = 1.0
-"""Hold in offboard before the maneuvers begin, s, so that the takeover does not disturb them."""
+from companion.vehicle.autopilot import Role
 
 _MAX_UNDERSHOOT = 0.5
 """A climb may end this far below the commanded height, m."""
@@ -22,12 +16,6 @@ _MAX_OVERSHOOT = 3.0
 
 _ARRIVAL_TIME = 2.0
 """Time allowed to reach altitude after hold mode is shown, s; then the climb counts as stopped."""
-
-_LARGEST_HELD_SPEED = 3.0
-"""Largest horizontal speed of a vehicle that is taken over, m/s."""
-
-_BRAKING_TIME = 5.0
-"""Time for the autopilot to brake to `_LARGEST_HELD_SPEED` and to limits.max_tilt_deg, s."""
 
 
 async def takeoff(context: FlightContext) -> None:
@@ -53,46 +41,6 @@ async def takeoff(context: FlightContext) -> None:
     await command_if_ours(context, command, ready, lambda: not state.landed)
     climb = _Climb(context, height)
     await context.until(climb.is_over)
-
-
-async def offboard(context: FlightContext) -> None:
-    """Check the vehicle again, take over, and settle."""
-    context.detail = "the preflight checks before the takeover"
-    await context.preflight.require(Stage.AIRBORNE)
-    await _wait_until_held(context)
-    context.guidance_loop.hold_here()
-    context.snapshot_builder.begin(asyncio.get_running_loop().time(), context.fence_centre)
-    await _take_over(context)
-    context.guidance_loop.hold_here()
-    context.loop.offboard_active, context.loop.taking_over = True, False
-    await asyncio.sleep(_SETTLE_TIME)
-
-
-async def _wait_until_held(context: FlightContext) -> None:
-    """Wait until the autopilot holds the vehicle still: it may have to brake first.
-
-    Raises:
-        FlightEnded: after `_BRAKING_TIME` the vehicle is still too tilted or too fast, as in wind.
-    """
-    try:
-        async with asyncio.timeout(_BRAKING_TIME):
-            await context.until(lambda: _is_held(context), "the autopilot to hold the vehicle")
-    except TimeoutError:
-        raise FlightEnded(
-            f"not taken over: waited {_BRAKING_TIME:g} s for {context.detail}; fly in less wind, "
-            "or take over a vehicle that hovers"
-        ) from None
-
-
-def _is_held(context: FlightContext) -> bool:
-    sample, position = context.loop.resets.newest, context.fresh_position()
-    if sample is None or position is None:
-        return False
-    tilt, speed = tilt_angle(sample.q[1], sample.q[2]), hypot(*position.velocity_ned[:2])
-    context.detail = (
-        f"the autopilot to hold the vehicle (tilt {degrees(tilt):.0f}°, speed {speed:.1f} m/s)"
-    )
-    return tilt <= context.config.limits.max_tilt and speed <= _LARGEST_HELD_SPEED
 
 
 class _Climb:
@@ -140,31 +88,6 @@ def _require_ground(context: FlightContext) -> None:
         raise FlightEnded("the vehicle is no longer armed on the ground", Exit.RELEASE)
     if not state.landed:
         raise FlightEnded("the autopilot no longer reports that it is on the ground")
-
-
-async def _take_over(context: FlightContext) -> None:
-    """Take over, by a command or by the first setpoint, as the autopilot needs."""
-    # An idle command from the ground, obeyed in the air, would let the vehicle fall.
-    await context.until(lambda: _commands_flight(context), "a target from guidance")
-    autopilot = context.link.autopilot
-    if autopilot.control_entry is ControlEntry.BY_COMMAND and not context.loop.on:
-        await stream(context)
-    context.detail = "the autopilot to obey our rates"
-    context.loop.taking_over = True
-    if autopilot.control_entry is ControlEntry.BY_FIRST_SETPOINT:
-        # The known mode may be a second old, and a pilot may have taken over since.
-        await context.fresh_heartbeat()
-        require_role(context.link, {Role.READY})
-        context.loop.on = True
-        await context.until(lambda: in_role(context.link, Role.OFFBOARD))
-        return
-    require_ours = in_roles(context.link, {Role.READY})
-    command = autopilot.set_mode(autopilot.offboard_mode)
-    await change_mode(context, command, require_ours, lambda: in_role(context.link, Role.OFFBOARD))
-
-
-def _commands_flight(context: FlightContext) -> bool:
-    return context.loop.command is not None and not context.loop.command.idle
 
 
 def _home_altitude(context: FlightContext) -> float:

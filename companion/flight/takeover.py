@@ -1,16 +1,29 @@
-"""The phases before a takeover: somebody else armed the vehicle; it flies or is on the ground."""
+"""The takeover, and the checks before it of a vehicle that somebody else armed."""
 
 import asyncio
 from collections.abc import Callable
 from contextlib import suppress
+from math import degrees, hypot
 
+from companion.attitude.kinematics import tilt_angle
+from companion.flight.commands import change_mode, in_role, in_roles, require_role
 from companion.flight.context import INITIAL_HEARTBEAT_LIMIT, FlightContext
-from companion.flight.preflight_phases import report_offboard_loss, set_heartbeat_limit
+from companion.flight.preflight_phases import report_offboard_loss, set_heartbeat_limit, stream
 from companion.preflight.evidence import Stage
 from companion.safety.actions import Exit, FlightEnded
+from companion.vehicle.autopilot import ControlEntry, Role
 
 _ARMED_REPORT_TIMEOUT = 1.5
 """Longest time from arming to the heartbeat that shows it, s: PX4 sends one a second."""
+
+_LARGEST_HELD_SPEED = 3.0
+"""Largest horizontal speed of a vehicle that is taken over, m/s."""
+
+_BRAKING_TIME = 5.0
+"""Time for the autopilot to brake to `_LARGEST_HELD_SPEED` and to limits.max_tilt_deg, s."""
+
+_SETTLE_TIME = 1.0
+"""Hold in offboard before the maneuvers begin, s, so that the takeover does not disturb them."""
 
 
 async def check_airborne(context: FlightContext) -> None:
@@ -70,3 +83,68 @@ def _require_armed_on_ground(context: FlightContext) -> None:
         raise FlightEnded("the vehicle is not armed: arm it first", Exit.LEAVE)
     if not context.link.state.landed:
         raise FlightEnded("the vehicle has left the ground: request control again", Exit.LEAVE)
+
+
+async def offboard(context: FlightContext) -> None:
+    """Check the vehicle again, take over, and settle."""
+    context.detail = "the preflight checks before the takeover"
+    await context.preflight.require(Stage.AIRBORNE)
+    await _wait_until_held(context)
+    context.guidance_loop.hold_here()
+    context.snapshot_builder.begin(asyncio.get_running_loop().time(), context.fence_centre)
+    await _take_over(context)
+    context.guidance_loop.hold_here()
+    context.loop.offboard_active, context.loop.taking_over = True, False
+    await asyncio.sleep(_SETTLE_TIME)
+
+
+async def _wait_until_held(context: FlightContext) -> None:
+    """Wait until the autopilot holds the vehicle still: it may have to brake first.
+
+    Raises:
+        FlightEnded: after `_BRAKING_TIME` the vehicle is still too tilted or too fast, as in wind.
+    """
+    try:
+        async with asyncio.timeout(_BRAKING_TIME):
+            await context.until(lambda: _is_held(context), "the autopilot to hold the vehicle")
+    except TimeoutError:
+        raise FlightEnded(
+            f"not taken over: waited {_BRAKING_TIME:g} s for {context.detail}; fly in less wind, "
+            "or take over a vehicle that hovers"
+        ) from None
+
+
+def _is_held(context: FlightContext) -> bool:
+    sample, position = context.loop.resets.newest, context.fresh_position()
+    if sample is None or position is None:
+        return False
+    tilt, speed = tilt_angle(sample.q[1], sample.q[2]), hypot(*position.velocity_ned[:2])
+    context.detail = (
+        f"the autopilot to hold the vehicle (tilt {degrees(tilt):.0f}°, speed {speed:.1f} m/s)"
+    )
+    return tilt <= context.config.limits.max_tilt and speed <= _LARGEST_HELD_SPEED
+
+
+async def _take_over(context: FlightContext) -> None:
+    """Take over, by a command or by the first setpoint, as the autopilot needs."""
+    # An idle command from the ground, obeyed in the air, would let the vehicle fall.
+    await context.until(lambda: _commands_flight(context), "a target from guidance")
+    autopilot = context.link.autopilot
+    if autopilot.control_entry is ControlEntry.BY_COMMAND and not context.loop.on:
+        await stream(context)
+    context.detail = "the autopilot to obey our rates"
+    context.loop.taking_over = True
+    if autopilot.control_entry is ControlEntry.BY_FIRST_SETPOINT:
+        # The known mode may be a second old, and a pilot may have taken over since.
+        await context.fresh_heartbeat()
+        require_role(context.link, {Role.READY})
+        context.loop.on = True
+        await context.until(lambda: in_role(context.link, Role.OFFBOARD))
+        return
+    require_ours = in_roles(context.link, {Role.READY})
+    command = autopilot.set_mode(autopilot.offboard_mode)
+    await change_mode(context, command, require_ours, lambda: in_role(context.link, Role.OFFBOARD))
+
+
+def _commands_flight(context: FlightContext) -> bool:
+    return context.loop.command is not None and not context.loop.command.idle
