@@ -1,15 +1,13 @@
-"""Builds the snapshots from the newest telemetry and from counters over the last second."""
+"""Builds the snapshots from the newest telemetry, and from counters since control began."""
 
-from collections import deque
 from math import dist, inf
-from typing import NamedTuple
 
 from companion.attitude.representation import wrap_angle
 from companion.control.control_loop import ControlLoop
 from companion.control.guidance_loop import GuidanceLoop
 from companion.guidance.fence import FenceCentre, Place
 from companion.guidance.reference import Vector, minus
-from companion.mavlink.stats import share_lost
+from companion.safety.counter_window import CounterWindow
 from companion.safety.setpoint_echo import SetpointEcho
 from companion.safety.snapshot import (
     UNHEARD_S,
@@ -20,34 +18,14 @@ from companion.safety.snapshot import (
     Resets,
     Snapshot,
 )
-from companion.vehicle.interval_sums import IntervalSums
 from companion.vehicle.link import Link
 
-_AVERAGING_TIME = 1.0
-"""Averaging time of shares and rates, s."""
-_FILLED_SHARE = 0.9
-"""Share of the window that must be filled before shares and rates are known."""
-_LONGEST_LISTENING_INTERVAL = 0.03
-"""A longer interval between two calls of `listen` is a stall, s; the timer's period is 0.02 s."""
 _MAX_PLACE_AGE = 1.0
 """Largest age of the GLOBAL_POSITION_INT that tells where control begins, s."""
 _GAP_COUNTING_TIME = 5.0
 """Time over which gaps in the setpoints are counted, s."""
 _RESET_COUNTING_TIME = 30.0
 """Time over which estimator resets are counted, s."""
-
-
-class _Counters(NamedTuple):
-    """Counters at one call of `listen`; `late`: by how much that call was too late, s."""
-
-    now: float
-    frames: int
-    lost: int
-    setpoints: int
-    missed: int
-    late: float
-    setpoint_intervals: IntervalSums
-    positions: int
 
 
 class SnapshotBuilder:
@@ -67,9 +45,8 @@ class SnapshotBuilder:
         self, link: Link, loop: ControlLoop, guidance_loop: GuidanceLoop, *, real_time: bool
     ) -> None:
         self._link, self._loop, self._guidance_loop = link, loop, guidance_loop
-        self._real_time = real_time
         self.echo = SetpointEcho(loop.record.sent)
-        self._counted: deque[_Counters] = deque()
+        self._window = CounterWindow(link, loop.record, real_time=real_time)
         self._frames_heard = 0
         self._heard_at = 0.0
         self._fence_centre_ned: Vector | None = None
@@ -98,7 +75,7 @@ class SnapshotBuilder:
         resets.largest_tilt_jump = 0.0
         self._good_flags = 0 if state.estimator is None else state.estimator.flags
         self._clock_changes = self._link.clock.changes
-        self._counted.clear()
+        self._window.clear()
         self.echo.begin(self._link.autopilot)
 
     @property
@@ -125,26 +102,11 @@ class SnapshotBuilder:
 
     def listen(self, now: float) -> None:
         """Take the counters at `now`; the watch calls this at least 50 times a second."""
-        stats, loop, record = self._link.stats, self._loop, self._loop.record
-        if stats.frames != self._frames_heard:
-            self._frames_heard, self._heard_at = stats.frames, now
-        loop.resets.on_counter(self._link.state.reset_counter, now)
-        counted = self._counted
-        late = max(0.0, now - counted[-1].now - _LONGEST_LISTENING_INTERVAL) if counted else 0.0
-        counted.append(
-            _Counters(
-                now,
-                stats.frames,
-                stats.lost,
-                record.setpoints,
-                record.missed_deadlines,
-                late,
-                record.setpoint_intervals.copy(),
-                self._link.state.position_count,
-            )
-        )
-        while len(counted) > 2 and now - counted[1].now >= _AVERAGING_TIME:
-            counted.popleft()
+        frames = self._link.stats.frames
+        if frames != self._frames_heard:
+            self._frames_heard, self._heard_at = frames, now
+        self._loop.resets.on_counter(self._link.state.reset_counter, now)
+        self._window.read(now)
 
     def snapshot(self, now: float) -> Snapshot:
         """The snapshot at `now`, s of event-loop time; call `listen` before."""
@@ -173,20 +135,13 @@ class SnapshotBuilder:
                 self._heard_at,
                 self._guidance_loop.fresh_position() is not None,
                 None if clock.changes == self._clock_changes else clock.last_change,
-                self.stall_time(since=record.last_answer),
+                self._window.stall_time(since=record.last_answer),
             ),
             self._health(now),
             self._resets(now),
             state.gps_was_good,
             self._good_flags,
         )
-
-    def stall_time(self, since: float) -> float:
-        """Total time, s, of the stalls that ended after `since`, s of event-loop time.
-
-        Stalls that ended more than about a second ago are forgotten.
-        """
-        return sum(counted.late for counted in self._counted if counted.now > since)
 
     def _motion(self) -> Motion:
         guidance_loop, loop, start = self._guidance_loop, self._loop, self._fence_centre_ned
@@ -210,26 +165,12 @@ class SnapshotBuilder:
 
     def _health(self, now: float) -> Health:
         since = max(self._began_at, now - _GAP_COUNTING_TIME)
-        gaps = sum(at > since for at in self._loop.record.gaps)
-        first, last, timesync = self._counted[0], self._counted[-1], self._link.timesync
-        health = Health(
+        timesync = self._link.timesync
+        return self._window.health()._replace(
             round_trip=timesync.round_trip_s,
-            gaps=gaps,
+            gaps=sum(at > since for at in self._loop.record.gaps),
             uplink=timesync.uplink,
             foreign=self.echo.foreign_reports(now),
-        )
-        span = last.now - first.now
-        if span < _FILLED_SHARE * _AVERAGING_TIME:
-            return health
-        late = sum(counted.late for counted in self._counted) - first.late
-        missed = (last.missed - first.missed) / max(1, last.setpoints - first.setpoints)
-        lost = last.lost - first.lost
-        return health._replace(
-            lost=share_lost(last.frames - first.frames, lost),
-            missed=missed if self._real_time else None,
-            starved=late / span,
-            answer_rate=last.setpoint_intervals.rate_since(first.setpoint_intervals),
-            position_rate=(last.positions - first.positions) / span,
         )
 
     def _resets(self, now: float) -> Resets:

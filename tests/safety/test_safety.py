@@ -10,9 +10,9 @@ from companion.control.loop_record import LoopRecord, Unanswered
 from companion.guidance.fence import Place, inside, local_polygon
 from companion.safety import Action, SafetyLadder, monitors
 from companion.safety.actions import Stream
+from companion.safety.counter_window import CounterWindow
 from companion.safety.monitor import Alarm, Monitor
 from companion.safety.snapshot import Autopilot, Control, Health, Motion, Resets, Snapshot
-from companion.safety.snapshot_builder import SnapshotBuilder
 from companion.vehicle.records import Battery, Estimator, Gps
 from companion.vehicle.timesync import Uplink
 
@@ -162,19 +162,17 @@ class Climb:
 
 
 def test_a_stall_of_our_own_is_counted_from_the_last_setpoint():
-    """`listen` is called every 20 ms; a call that is less than 10 ms late is no stall."""
-    state = SimpleNamespace(reset_counter=None, position_count=0)
+    """The counters are read every 20 ms; a reading that is less than 10 ms late is no stall."""
+    state = SimpleNamespace(position_count=0)
     link = SimpleNamespace(state=state, stats=SimpleNamespace(frames=0, lost=0))
-    resets = SimpleNamespace(on_counter=lambda *_: None)
-    loop = SimpleNamespace(resets=resets, record=LoopRecord())
-    snapshot_builder = SnapshotBuilder(link, loop, None, real_time=True)
+    window = CounterWindow(link, LoopRecord(), real_time=True)
     for now in (0.0, 0.02, 0.05, 0.48, 0.5):
-        snapshot_builder.listen(now)
-    assert snapshot_builder.stall_time(since=0.02) == pytest.approx(0.4)
-    assert snapshot_builder.stall_time(since=0.49) == 0.0
-    snapshot_builder.listen(3.53)
-    assert snapshot_builder.stall_time(since=0.49) == pytest.approx(3.0)
-    assert snapshot_builder.stall_time(since=3.53) == 0.0
+        window.read(now)
+    assert window.stall_time(since=0.02) == pytest.approx(0.4)
+    assert window.stall_time(since=0.49) == 0.0
+    window.read(3.53)
+    assert window.stall_time(since=0.49) == pytest.approx(3.0)
+    assert window.stall_time(since=3.53) == 0.0
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,91 @@
+"""Shares and rates over the last second, from the counters of the link and of the control loop."""
+
+from collections import deque
+from typing import NamedTuple
+
+from companion.control.loop_record import LoopRecord
+from companion.mavlink.stats import share_lost
+from companion.safety.snapshot import Health
+from companion.vehicle.interval_sums import IntervalSums
+from companion.vehicle.link import Link
+
+_AVERAGING_TIME = 1.0
+"""Averaging time of shares and rates, s."""
+_FILLED_SHARE = 0.9
+"""Share of the window that must be filled before shares and rates are known."""
+_LONGEST_READING_INTERVAL = 0.03
+"""A longer interval between two readings is a stall, s; the timer's period is 0.02 s."""
+
+
+class _Counters(NamedTuple):
+    """The counters at one reading; `late`: by how much that reading was too late, s."""
+
+    now: float
+    frames: int
+    lost: int
+    setpoints: int
+    missed: int
+    late: float
+    setpoint_intervals: IntervalSums
+    positions: int
+
+
+class CounterWindow:
+    """The readings of the counters over the last second.
+
+    Args:
+        link: link to the vehicle.
+        record: record of the control loop.
+        real_time: whether deadlines count; in lockstep they do not, because the vehicle waits.
+    """
+
+    def __init__(self, link: Link, record: LoopRecord, *, real_time: bool) -> None:
+        self._link, self._record, self._real_time = link, record, real_time
+        self._readings: deque[_Counters] = deque()
+
+    def clear(self) -> None:
+        """Forget all readings."""
+        self._readings.clear()
+
+    def read(self, now: float) -> None:
+        """Read the counters at `now`, s of event-loop time."""
+        readings, stats, record = self._readings, self._link.stats, self._record
+        late = max(0.0, now - readings[-1].now - _LONGEST_READING_INTERVAL) if readings else 0.0
+        readings.append(
+            _Counters(
+                now,
+                stats.frames,
+                stats.lost,
+                record.setpoints,
+                record.missed_deadlines,
+                late,
+                record.setpoint_intervals.copy(),
+                self._link.state.position_count,
+            )
+        )
+        while len(readings) > 2 and now - readings[1].now >= _AVERAGING_TIME:
+            readings.popleft()
+
+    def stall_time(self, since: float) -> float:
+        """Total time, s, of the stalls that ended after `since`, s of event-loop time.
+
+        Stalls that ended more than about a second ago are forgotten.
+        """
+        return sum(reading.late for reading in self._readings if reading.now > since)
+
+    def health(self) -> Health:
+        """The shares and rates of a `Health`; all are unknown until the window is filled."""
+        first, last = self._readings[0], self._readings[-1]
+        span = last.now - first.now
+        if span < _FILLED_SHARE * _AVERAGING_TIME:
+            return Health()
+        late = sum(reading.late for reading in self._readings) - first.late
+        missed = (last.missed - first.missed) / max(1, last.setpoints - first.setpoints)
+        lost = last.lost - first.lost
+        return Health(
+            lost=share_lost(last.frames - first.frames, lost),
+            missed=missed if self._real_time else None,
+            starved=late / span,
+            answer_rate=last.setpoint_intervals.rate_since(first.setpoint_intervals),
+            position_rate=(last.positions - first.positions) / span,
+        )
