@@ -31,6 +31,7 @@ from companion.vehicle.link import Link
 
 if TYPE_CHECKING:
     from companion.serve.control import ServedControl
+    from companion.serve.flights import ServedFlights
 
 Note = Callable[[str], None]
 
@@ -51,7 +52,8 @@ class ServeSession:
     Attributes:
         changes: changes of configuration values in flight, in force for the next flight too.
         network: network of the clients, once it is open.
-        control: control by clients' setpoints, once the link is open, if `serve.control` is true.
+        flights: flights under a client's control, once the link is open, if `serve.control` is
+            true.
         records: records of the flights under a client's control.
     """
 
@@ -70,7 +72,7 @@ class ServeSession:
         self.changes.note = note
         self._stop = asyncio.Event()
         self.network: Network | None = None
-        self.control: ServedControl | None = None
+        self.flights: ServedFlights | None = None
 
     def stop(self) -> None:
         """End the session; a vehicle under control is handed back first."""
@@ -78,8 +80,8 @@ class ServeSession:
 
     def leave(self) -> None:
         """Stop sending setpoints at once, and end the session."""
-        if self.control is not None:
-            self.control.leave()
+        if self.flights is not None:
+            self.flights.leave()
         self._stop.set()
 
     async def run(self) -> dict[str, Any]:
@@ -123,23 +125,13 @@ class ServeSession:
         component = Component(link.settings, network, link.send)
         permission = Permission(self._config.serve.trusted, link.settings.signing)
         background: list[Coroutine[Any, Any, None]] = [component.run(), self._tell_silence(link)]
+        control = None
         if self._config.serve.control:
-            from companion.serve.control import ServedControl  # noqa: PLC0415  needs the extra
-
             keeper = SituationKeeper(link, network)
-            self.control = ServedControl(
-                self._config,
-                link,
-                component,
-                keeper,
-                self._observer,
-                self._environment,
-                self.records,
-                self.changes,
-            )
+            control = self._control(link, component, keeper)
             background.append(keeper.keep_telemetry(lambda: wanted_rates(self._config, link)))
         gate = _FrameInterceptor(
-            permission, component, self.control, network.routing, link.settings.target_system
+            permission, component, control, network.routing, link.settings.target_system
         )
         network.routing.on_own_frame = gate.on_own_frame
         network.routing.intercept = gate.intercept
@@ -150,11 +142,29 @@ class ServeSession:
         try:
             await self._stop.wait()
         finally:
-            if self.control is not None:
-                await self.control.close("companion serve is stopped")
+            if self.flights is not None:
+                await self.flights.close("companion serve is stopped")
             for task in tasks:
                 await cancel(task)
         return _counters(link, network)
+
+    def _control(
+        self, link: Link, component: Component, keeper: SituationKeeper
+    ) -> "ServedControl":
+        """Let clients command the vehicle."""
+        from companion.serve.control import ServedControl  # noqa: PLC0415  needs the extra
+        from companion.serve.flights import ServedFlights  # noqa: PLC0415  the same
+
+        self.flights = ServedFlights(
+            self._config,
+            link,
+            component,
+            self._observer,
+            self._environment,
+            self.records,
+            self.changes,
+        )
+        return ServedControl(self._config, link, component, keeper, self.flights)
 
     async def _tell_silence(self, link: Link) -> None:
         """Say once that no vehicle is heard; clients are served all the same."""

@@ -43,17 +43,17 @@ class Scene:
 
     def __init__(self, vehicle, session, autopilot, ground, judge):
         self.vehicle, self.session, self.autopilot = vehicle, session, autopilot
-        self.ground, self.judge, self.control = ground, judge, session.control
+        self.ground, self.judge, self.flights = ground, judge, session.flights
         self.script = MemoryClient().connect(session)
         self.home = self.place
 
     @property
     def place(self):
-        return self.control._link.state.position.position_ned
+        return self.flights._link.state.position.position_ned
 
     @property
     def speed(self):
-        return math.hypot(*self.control._link.state.position.velocity_ned)
+        return math.hypot(*self.flights._link.state.position.velocity_ned)
 
     @property
     def mode(self):
@@ -69,7 +69,7 @@ class Scene:
 
     async def recover(self):
         """The script is in control, and the vehicle is at home."""
-        if not self.control.in_control:
+        if not self.flights.in_control:
             if self.autopilot == "ardupilot":
                 self.ground.command(176, 1, 4)
                 await asyncio.sleep(AT_ONCE)
@@ -82,18 +82,18 @@ class Scene:
     async def is_handed_back(self):
         """Nobody commands any more: held first, then the autopilot holds."""
         await asyncio.sleep(TIMEOUT + 0.7 * HOLD)
-        assert self.control.in_control
+        assert self.flights.in_control
         await asyncio.sleep(0.3 * HOLD + HAND_BACK + 0.5)
         assert self.mode == AUTOPILOT_HOLDS[self.autopilot]
-        assert not self.control.in_control
+        assert not self.flights.in_control
         assert self.speed < 0.5
         return HANDED_BACK
 
     async def is_flown(self, seconds=TIMEOUT + 0.2):
         """The script's own setpoints are still flown."""
         await stream(seconds, self.hover)
-        assert self.control.in_control
-        assert self.control.ownership.owner.client is self.script
+        assert self.flights.in_control
+        assert self.flights.ownership.owner.client is self.script
         assert math.dist(self.place, self.home) < 0.4
         return FLOWN
 
@@ -126,7 +126,7 @@ async def frozen_velocity(scene):
     """hangs while MAVSDK repeats a velocity"""
     await stream(3.0, lambda _: scene.local(VELOCITY, velocity=(-1.5, 0.0, 0.0)), 0.05)
     assert scene.speed == pytest.approx(1.5, abs=0.3)
-    assert scene.control.in_control
+    assert scene.flights.in_control
     return "flown on, up to the fence"
 
 
@@ -154,7 +154,7 @@ async def reconnects_all_the_time(scene):
         scene.session.network.detach(scene.script)
         scene.script = MemoryClient(f"script {number}").connect(scene.session)
         await stream(0.2, scene.hover)
-        assert scene.control.in_control
+        assert scene.flights.in_control
     await asyncio.sleep(0.1)
     return await scene.is_flown()
 
@@ -283,7 +283,7 @@ async def all_kinds(scene):
         lambda: scene.local(VELOCITY, velocity=(0.5, 0.0, 0.0), frame=8),
     )
     await stream(3.0, lambda time: kinds[round(time / 0.02) % len(kinds)]())
-    assert scene.control.in_control
+    assert scene.flights.in_control
     assert math.dist(scene.place, scene.home) < 3.0
     await scene.recover()
     return await scene.is_flown()
@@ -330,7 +330,7 @@ async def two_at_once(scene):
     rival = MemoryClient("rival", (246, 190)).connect(scene.session)
     stranger = MemoryClient("stranger", (250, 1), host="192.0.2.7").connect(scene.session)
     away = (scene.home[0] + 20.0, *scene.home[1:])
-    forwarded = scene.control._link.stats.forwarded
+    forwarded = scene.flights._link.stats.forwarded
 
     def both(_):
         scene.hover()
@@ -341,7 +341,7 @@ async def two_at_once(scene):
     scene.is_said("is in control", rival)
     scene.is_said("read-only", stranger)
     await scene.is_flown()
-    assert scene.control._link.stats.forwarded == forwarded, "no setpoint is forwarded"
+    assert scene.flights._link.stats.forwarded == forwarded, "no setpoint is forwarded"
     scene.session.network.detach(rival)
     scene.session.network.detach(stranger)
     return REFUSED
@@ -413,7 +413,7 @@ async def mode_fight(scene):
         scene.ground.command(*STATION_HOLDS[scene.autopilot])
         scene.judge.ended()
         await stream(1.5, lambda _: scene.script.local(ALL, scene.home))
-        assert not scene.control.in_control
+        assert not scene.flights.in_control
         assert scene.mode == "LOITER"
         scene.is_said("took over")
         if scene.autopilot == "px4":  # ArduPilot's GUIDED is the station's to command
@@ -434,7 +434,7 @@ async def other_system(scene):
         send(dialect.MAVLink_command_long_message(7, 0, 176, 0, 1, 6, 0, 0, 0, 0, 0))
         await asyncio.sleep(0.2)
     await asyncio.sleep(2.0)
-    assert not scene.control.in_control
+    assert not scene.flights.in_control
     assert scene.mode == "LOITER"
     return NOT_IN_CONTROL
 

@@ -61,7 +61,7 @@ def test_a_client_that_asks_again_does_not_take_the_fence_along(autopilot):
             await stream(5.0, to(6.0), 0.1)
             script.command(*HOLD[autopilot])
             await asyncio.sleep(1.5)
-            assert not session.control.in_control
+            assert not session.flights.in_control
             assert distance() == pytest.approx(6.0, abs=0.4)
             if autopilot == "ardupilot":
                 ground.command(*GUIDED)
@@ -76,7 +76,7 @@ def test_a_client_that_asks_again_does_not_take_the_fence_along(autopilot):
 
             vehicle.after_step.append(note)
             async with asyncio.timeout(20.0):
-                while session.control.in_control:
+                while session.flights.in_control:
                     await stream(0.1, to(5000.0), 0.05)
             if autopilot == "px4":
                 asked = asyncio.ensure_future(script.offboard())

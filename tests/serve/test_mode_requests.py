@@ -19,8 +19,8 @@ from companion.mavlink.messages import CRC_EXTRA
 from companion.recording import recorder
 from companion.recording.measurements.summary import LoopCounts, Summary
 from companion.recording.trace import FlightTrace
-from companion.serve.control import ServedControl
 from companion.serve.flight_records import FlightRecords
+from companion.serve.flights import ServedFlights
 from companion.serve.mode_requests import (
     asks_for_control,
     reduces_telemetry,
@@ -187,13 +187,13 @@ def test_garbage_is_collected_only_between_flights(monkeypatch, freeze_gc, next_
         return True
 
     async def save():
-        control._flight = next_flight
+        flights.current = next_flight
 
-    control = SimpleNamespace(
+    flights = SimpleNamespace(
         ownership=SimpleNamespace(release=lambda: None),
         _fence=SimpleNamespace(keep=lambda centre: None),
         _config=changed(Config(), {"realtime": {"freeze_gc": freeze_gc}}, "test"),
     )
     flight = SimpleNamespace(run=run, save=save, fence_centre=None)
-    asyncio.run(ServedControl._fly(control, flight, None))
+    asyncio.run(ServedFlights._fly(flights, flight, None))
     assert len(collected) == times

@@ -35,7 +35,7 @@ def test_a_mode_change_in_a_served_flight_is_told_once(autopilot, monkeypatch):
             await begin_control(session, script, autopilot, lambda _: script.local(POSITION, place))
             script.command(*HOLD[autopilot])
             async with asyncio.timeout(10.0):
-                while session.control.in_control:  # noqa: ASYNC110  it sets no event
+                while session.flights.in_control:  # noqa: ASYNC110  it sets no event
                     await asyncio.sleep(0.1)
             await asyncio.sleep(3.0)
 

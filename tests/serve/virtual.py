@@ -121,7 +121,7 @@ async def begin_control(session, script, autopilot, hold):
     await stream(0.3, hold)
     asked = asyncio.ensure_future(script.offboard()) if autopilot == "px4" else None
     async with asyncio.timeout(15.0):
-        while not session.control.in_control:
+        while not session.flights.in_control:
             await stream(0.2, hold)
     while asked is not None and not asked.done():
         await stream(0.1, hold)

@@ -1,0 +1,131 @@
+"""The flights under a client's control, one at a time: begins them, and completes their records."""
+
+import asyncio
+import gc
+
+from companion.config import Config
+from companion.flight.changes import Changes
+from companion.flight.environment import Environment
+from companion.flight.observer import Observer
+from companion.serve.component import Component
+from companion.serve.flight_records import FlightRecords
+from companion.serve.kept_fence import KeptFence
+from companion.serve.ownership import Ownership
+from companion.serve.programs import Program
+from companion.serve.served_flight import ControlRequest, ServedFlight
+from companion.serve.setpoints.request import Request
+from companion.vehicle.link import Link
+
+_RETRY_PAUSE = 2.0
+"""Time after a failed takeover during which setpoints alone do not begin another takeover, s."""
+
+
+class ServedFlights:
+    """Begins the flights, and ends the owner's control with each of them.
+
+    Args:
+        config: configuration of the vehicle and of `serve`.
+        link: open link to the vehicle.
+        component: sends answers to clients and texts to pilots.
+        observer: receives phases and events of each flight.
+        environment: environment of the flights.
+        records: makes the records of the flights.
+        changes: changes of configuration values in flight.
+
+    Attributes:
+        ownership: determines whose requests are flown.
+        current: the flight that runs, or None.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        link: Link,
+        component: Component,
+        observer: Observer,
+        environment: Environment,
+        records: FlightRecords,
+        changes: Changes,
+    ) -> None:
+        self.ownership = Ownership(config.serve.setpoint_timeout, config.serve.hold_s)
+        self.current: ServedFlight | None = None
+        self._config, self._link, self._component = config, link, component
+        self._observer, self._environment = observer, environment
+        self._records, self._changes = records, changes
+        self._fence = KeptFence(config, link)
+        self._clock, self._retry_time = asyncio.get_running_loop().time, 0.0
+        self._task: asyncio.Task[None] | None = None
+        self._unfinished: set[asyncio.Task[None]] = set()
+
+    @property
+    def in_control(self) -> bool:
+        """Whether the autopilot obeys setpoints that this program sends for a client."""
+        return self.current is not None and self.current.in_control
+
+    @property
+    def may_retry(self) -> bool:
+        """Whether setpoints alone may begin a takeover: none has failed a short time ago."""
+        return self._clock() >= self._retry_time
+
+    def fence_refusal(self) -> str | None:
+        """Why the fence of the first flight forbids another one, or None."""
+        return self._fence.refusal()
+
+    def begin(
+        self, owner: Program, request: Request, command: ControlRequest | None, *, from_ground: bool
+    ) -> None:
+        """Begin a flight.
+
+        Args:
+            owner: the program in control.
+            request: the first request to fly.
+            command: the command that requested control, to be answered; None: setpoints did.
+            from_ground: whether the vehicle stands armed, and takes off first.
+
+        Raises:
+            UnplannableError: no motion leads to the request.
+        """
+        self.current = flight = ServedFlight(
+            str(owner),
+            self._config,
+            self._link,
+            self._component,
+            self.ownership,
+            self._observer,
+            self._environment,
+            self._records,
+            self._changes,
+            self._fence.centre,
+            from_ground=from_ground,
+        )
+        flight.give(request)
+        self._task = task = asyncio.create_task(self._fly(flight, command))
+        self._unfinished.add(task)
+        task.add_done_callback(self._unfinished.discard)
+
+    async def close(self, reason: str) -> None:
+        """Hand the vehicle back if a client has it; wait until that is done and recorded."""
+        if self.current is not None:
+            self.current.interrupt(reason)
+        if self._unfinished:
+            await asyncio.wait(self._unfinished)
+
+    def leave(self) -> None:
+        """Stop sending setpoints at once."""
+        if self._task is not None:
+            self._task.cancel()
+
+    async def _fly(self, flight: ServedFlight, command: ControlRequest | None) -> None:
+        """Fly, then release control; complete the record, while the next flight may begin."""
+        begun = False
+        try:
+            begun = await flight.run(command)
+        finally:
+            self.ownership.release()
+            self._fence.keep(flight.fence_centre)
+            self.current = self._task = None
+            if not begun:
+                self._retry_time = self._clock() + _RETRY_PAUSE
+            await flight.save()
+            if self.current is None and self._config.realtime.freeze_gc:  # between flights
+                gc.collect()
