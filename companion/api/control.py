@@ -1,7 +1,8 @@
 """Command the vehicle from a coroutine: accelerations, references, attitudes or body rates."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator, AsyncIterator
+from contextlib import asynccontextmanager
 from math import inf, isnan
 
 from companion.api.commanded import copied
@@ -184,3 +185,35 @@ class Control:
         if self._control_end.done():
             self._control_end.result()
             raise FlightEnded("the program has ended its control")
+
+
+@asynccontextmanager
+async def commanding(
+    program: ProgramPlan,
+    context: FlightContext,
+    newest: NewestState,
+    loop: FlightLoop,
+    source: CommandedSource,
+    control_end: asyncio.Future[None],
+) -> AsyncGenerator[Control, None]:
+    """Let the program command the vehicle while the block runs; arguments as for `Control`.
+
+    Raises:
+        FlightEnded: the flight ended before control began, or control ended early.
+    """
+    try:
+        while source.pose is None:  # guidance does not fly it yet
+            done, _ = await asyncio.wait({control_end}, timeout=0.01)
+            if done:
+                control_end.result()
+        yield Control(program, context, newest, loop, source, control_end)
+    except BaseException as error:
+        if not isinstance(error, FlightEnded):
+            loop.post(source.fail, f"{source.name} raised {error!r}")
+        raise
+    finally:
+        loop.post(source.end)
+        await asyncio.wait({control_end})
+        if not control_end.cancelled():
+            control_end.exception()
+    control_end.result()

@@ -8,7 +8,7 @@ from functools import partial
 from math import hypot, tau
 from pathlib import Path
 
-from companion.api.control import Control
+from companion.api.control import Control, commanding
 from companion.api.flight_loop import FlightLoop
 from companion.api.in_thread import call_in_thread
 from companion.api.program import ProgramPlan
@@ -180,21 +180,10 @@ class Vehicle:
         work = partial(fly_commanded, source=source)
         phase = program_phase("control", f"{name} to end its control", work)
         control_end = self._request(lambda _: (phase,))
-        try:
-            await self._wait_begun(source, control_end)
-            yield Control(
-                self._program, self._context, self._newest, self._loop, source, control_end
-            )
-        except BaseException as error:
-            if not isinstance(error, FlightEnded):
-                self._loop.post(source.fail, f"{name} raised {error!r}")
-            raise
-        finally:
-            self._loop.post(source.end)
-            await asyncio.wait({control_end})
-            if not control_end.cancelled():
-                control_end.exception()
-        control_end.result()
+        async with commanding(
+            self._program, self._context, self._newest, self._loop, source, control_end
+        ) as control:
+            yield control
 
     async def land(self) -> None:
         """Let the autopilot land where the vehicle is; after touchdown the flight ends."""
@@ -209,17 +198,6 @@ class Vehicle:
     ) -> asyncio.Future[None]:
         """Request phases; the future is done when they have ended."""
         return self._loop.start(self._program.request(phases, last=last))
-
-    async def _wait_begun(self, source: CommandedSource, control_end: asyncio.Future[None]) -> None:
-        """Wait until guidance flies the source.
-
-        Raises:
-            FlightEnded: the flight ended before.
-        """
-        while source.pose is None:
-            done, _ = await asyncio.wait({control_end}, timeout=0.01)
-            if done:
-                control_end.result()
 
     async def _fly(self, maneuver: Maneuver) -> None:
         self._held_pose()  # raises if the vehicle is not under our control
