@@ -32,33 +32,39 @@ async def connect(context: FlightContext) -> None:
 async def checks(context: FlightContext) -> None:
     """Request telemetry, wait until the vehicle is ready, and run the preflight checks."""
     context.same_vehicle.begin()
-    context.heartbeat_limit = INITIAL_HEARTBEAT_LIMIT
-    context.detail = "requesting telemetry"
-    await context.preflight.ask_for_telemetry()
+    await request_telemetry(context)
     if context.config.flight.arm:  # a pilot who arms may have chosen the mode by a switch
         await leave_offboard(context, context.link.autopilot.cannot_arm_in)
     else:
         await leave_offboard(context)
     await context.until(lambda: _ready(context))
     # Positions are sent only once the estimator has one, so the rates are counted now.
-    context.detail = "counting telemetry rates and reading the autopilot's parameters"
-    evidence = await context.preflight.require(Stage.GROUND)
+    evidence = await judge_vehicle(context, Stage.GROUND)
     warning = gain_warning(context.config)
     if warning is not None:
         context.note(warning)
-    set_heartbeat_limit(context, evidence)
     context.known_drag = evidence.known_drag
     _require_flyable_by_vehicle(context)
     report_offboard_loss(context, evidence.survey.values)
     context.mode_at_checks = context.link.state.mode
 
 
-def set_heartbeat_limit(context: FlightContext, evidence: Evidence) -> None:
-    """Set `FlightContext.heartbeat_limit` from the counted rate of heartbeats."""
+async def request_telemetry(context: FlightContext) -> None:
+    """Request the telemetry that a flight needs."""
+    context.heartbeat_limit = INITIAL_HEARTBEAT_LIMIT
+    context.detail = "requesting telemetry"
+    await context.preflight.ask_for_telemetry()
+
+
+async def judge_vehicle(context: FlightContext, stage: Stage) -> Evidence:
+    """Run the preflight checks; set `FlightContext.heartbeat_limit` from the rate they counted."""
+    context.detail = "counting telemetry rates and reading the autopilot's parameters"
+    evidence = await context.preflight.require(stage)
     heartbeats = evidence.streams.get("HEARTBEAT")  # not requested from PX4, whose rate is fixed
     if heartbeats is not None and heartbeats.achieved > 0.0:
         limit = max(_SHORTEST_HEARTBEAT_LIMIT, _HEARTBEATS_MISSED / heartbeats.achieved)
         context.heartbeat_limit = limit
+    return evidence
 
 
 async def stream(context: FlightContext) -> None:

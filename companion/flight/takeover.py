@@ -7,8 +7,13 @@ from math import degrees, hypot
 
 from companion.attitude.kinematics import tilt_angle
 from companion.flight.commands import change_mode, in_role, in_roles, require_role
-from companion.flight.context import INITIAL_HEARTBEAT_LIMIT, FlightContext
-from companion.flight.preflight_phases import report_offboard_loss, set_heartbeat_limit, stream
+from companion.flight.context import FlightContext
+from companion.flight.preflight_phases import (
+    judge_vehicle,
+    report_offboard_loss,
+    request_telemetry,
+    stream,
+)
 from companion.preflight.evidence import Stage
 from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import ControlEntry, Role
@@ -57,18 +62,14 @@ async def _check_stage(
     """Run the checks of a stage; before and after them, `require` raises if the state is wrong."""
     context.same_vehicle.begin()
     context.same_vehicle.commit()
-    context.heartbeat_limit = INITIAL_HEARTBEAT_LIMIT
-    context.detail = "requesting telemetry"
-    await context.preflight.ask_for_telemetry()
+    await request_telemetry(context)
     state = context.link.state
     await context.until(
         lambda: state.landed or state.flying, "the vehicle to report landed or flying"
     )
     require(context)
     await context.until(lambda: context.fresh_position() is not None, "a fresh position")
-    context.detail = "counting telemetry rates and reading the autopilot's parameters"
-    evidence = await context.preflight.require(stage)
-    set_heartbeat_limit(context, evidence)
+    evidence = await judge_vehicle(context, stage)
     report_offboard_loss(context, evidence.survey.values)
     require(context)
 
