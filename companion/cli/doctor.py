@@ -19,8 +19,8 @@ from companion.config.known_drag import KnownDrag, of_vehicle
 from companion.control.expected_response import expected_response, hold_sentence
 from companion.files.yaml_file import ConfigError
 from companion.files.yaml_file import load as load_yaml
-from companion.flight.assembly import open_link
 from companion.flight.maneuvers import configured_maneuvers
+from companion.flight.opening import open_link
 from companion.flight.start_checks import check_link, require_backend
 from companion.guidance import ManeuverSequence
 from companion.mavlink import lockstep

@@ -24,7 +24,7 @@ _OFFBOARD_ONLY = frozenset({Role.OFFBOARD})
 IsDone = Callable[[], bool]
 """Returns whether the vehicle does what was commanded; may raise `FlightEnded` instead."""
 RequireOurs = Callable[[], None]
-"""Raises `FlightEnded` if we must not command the vehicle; for example `in_roles`."""
+"""Raises `FlightEnded` if we must not command the vehicle; for example `requiring_roles`."""
 
 
 def roles_of(link: Link) -> frozenset[Role]:
@@ -62,7 +62,7 @@ def require_role(link: Link, allowed: Set[Role], released_by: str = "") -> None:
     raise FlightEnded(f"{who}: mode {link.state.mode}", Exit.RELEASE)
 
 
-def in_roles(link: Link, allowed: Set[Role]) -> RequireOurs:
+def requiring_roles(link: Link, allowed: Set[Role]) -> RequireOurs:
     """A `RequireOurs` that calls `require_role` with these roles."""
     return lambda: require_role(link, allowed)
 

@@ -9,9 +9,9 @@ from companion.flight.commands import (
     ask_to_hold,
     command_if_ours,
     in_role,
-    in_roles,
     leave_offboard,
     require_role,
+    requiring_roles,
 )
 from companion.flight.context import FlightContext
 from companion.flight.hand_over import hand_over_to_hold, hand_over_to_landing
@@ -152,7 +152,7 @@ async def hold_when_heard(context: FlightContext) -> None:
     context.detail = "its report that it holds"
     while True:
         try:
-            await ask_to_hold(context, in_roles(context.link, {Role.OFFBOARD}))
+            await ask_to_hold(context, requiring_roles(context.link, {Role.OFFBOARD}))
         except (CommandTimeout, LinkLost) as error:
             context.detail = str(error)
         else:

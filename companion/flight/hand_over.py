@@ -9,7 +9,7 @@ from companion.flight.commands import (
     ask_to_hold,
     change_mode,
     in_role,
-    in_roles,
+    requiring_roles,
 )
 from companion.flight.context import FlightContext, cancel
 from companion.mavlink.commands import Command
@@ -36,7 +36,7 @@ async def hand_over_to_hold(context: FlightContext) -> None:
         FlightEnded: somebody else has the vehicle.
         CommandRefused: the autopilot refused.
     """
-    require_ours = in_roles(context.link, ROLES_BEFORE_LANDING)
+    require_ours = requiring_roles(context.link, ROLES_BEFORE_LANDING)
 
     def holding() -> bool:
         return in_role(context.link, Role.HOLD)
@@ -58,7 +58,7 @@ async def hand_over_to_landing(context: FlightContext) -> None:
     Raises:
         FlightEnded: somebody else has the vehicle.
     """
-    require_ours = in_roles(context.link, ROLES_BEFORE_LANDING | {Role.LAND})
+    require_ours = requiring_roles(context.link, ROLES_BEFORE_LANDING | {Role.LAND})
     refused = False
 
     def landing() -> bool:
@@ -74,7 +74,7 @@ async def hand_over_to_landing(context: FlightContext) -> None:
         if obeyed and not landing():
             await _hold_meanwhile(context, landing)
         obeys = in_role(context.link, Role.OFFBOARD)
-        return in_roles(context.link, _OBEYS_OR_LANDS) if obeys else require_ours
+        return requiring_roles(context.link, _OBEYS_OR_LANDS) if obeys else require_ours
 
     await _hand_over(context, context.link.autopilot.land(), require_ours, landing, prepare)
 
@@ -118,7 +118,7 @@ async def _release_once_left(context: FlightContext) -> None:
 async def _hold_meanwhile(context: FlightContext, landing: IsDone) -> None:
     """Ask the autopilot to hold; go on without it if it does not, or if it lands meanwhile."""
     try:
-        await ask_to_hold(context, in_roles(context.link, {Role.OFFBOARD}))
+        await ask_to_hold(context, requiring_roles(context.link, {Role.OFFBOARD}))
     except (CommandRefused, CommandTimeout, LinkLost):
         return
     except FlightEnded:

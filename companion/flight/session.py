@@ -6,13 +6,14 @@ from pathlib import Path
 from companion import realtime
 from companion.config import Config
 from companion.flight.assembled import AssembledFlight
-from companion.flight.assembly import assemble, open_link, realtime_settings
+from companion.flight.assembly import assemble
 from companion.flight.changes import Changes
 from companion.flight.context import cancel
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.flight import AskLanding
 from companion.flight.flight_files import FlightFiles
 from companion.flight.observer import Observer
+from companion.flight.opening import open_link, realtime_settings
 from companion.flight.plan import ConfiguredPlan, Plan
 from companion.flight.wiring import connected
 from companion.realtime import RealtimeSettings

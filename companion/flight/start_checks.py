@@ -5,7 +5,7 @@ from companion.control.inner_loop import planner
 from companion.control.outer_loop import make_guidance, predictive_settings
 from companion.extras import require
 from companion.files.yaml_file import ConfigError
-from companion.flight.assembly import link_settings
+from companion.flight.opening import link_settings
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.transport.endpoint import parse_endpoint
 from companion.safety.plugin_monitors import plugin_monitors

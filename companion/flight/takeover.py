@@ -6,7 +6,7 @@ from contextlib import suppress
 from math import degrees, hypot
 
 from companion.attitude.kinematics import tilt_angle
-from companion.flight.commands import change_mode, in_role, in_roles, require_role
+from companion.flight.commands import change_mode, in_role, require_role, requiring_roles
 from companion.flight.context import FlightContext
 from companion.flight.preflight_phases import (
     judge_vehicle,
@@ -142,7 +142,7 @@ async def _take_over(context: FlightContext) -> None:
         context.loop.on = True
         await context.until(lambda: in_role(context.link, Role.OFFBOARD))
         return
-    require_ours = in_roles(context.link, {Role.READY})
+    require_ours = requiring_roles(context.link, {Role.READY})
     command = autopilot.set_mode(autopilot.offboard_mode)
     await change_mode(context, command, require_ours, lambda: in_role(context.link, Role.OFFBOARD))
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from companion import realtime
 from companion.config import Config
-from companion.flight.assembly import open_link, realtime_settings
 from companion.flight.changes import Changes
 from companion.flight.context import cancel
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.observer import Observer, SilentObserver, StateLogger
+from companion.flight.opening import open_link, realtime_settings
 from companion.mavlink.errors import LinkError
 from companion.mavlink.framing import Frame
 from companion.mavlink.peer import HEARTBEAT

@@ -7,8 +7,9 @@ import pytest
 
 from companion.config import Config
 from companion.config.files import changed
-from companion.flight.assembly import assemble, link_settings
+from companion.flight.assembly import assemble
 from companion.flight.observer import EventRecorder, SilentObserver
+from companion.flight.opening import link_settings
 from companion.flight.plan import TakeoverPlan
 from companion.flight.wiring import connected
 from companion.guidance import Reference

@@ -18,8 +18,9 @@ from companion.config.files import load
 from companion.control.inner_loop import planner, rate_limits
 from companion.control.outer_loop import predictive_settings
 from companion.files.yaml_file import ConfigError
-from companion.flight.assembly import assemble, link_settings
+from companion.flight.assembly import assemble
 from companion.flight.observer import EventRecorder, SilentObserver
+from companion.flight.opening import link_settings
 from companion.flight.plan import ConfiguredPlan
 from companion.vehicle.link import Link
 from tests.fuzz import trajectories

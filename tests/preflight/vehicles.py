@@ -6,7 +6,7 @@ import yaml
 
 from companion.config.files import load
 from companion.files import bounded_yaml
-from companion.flight.assembly import open_link
+from companion.flight.opening import open_link
 from companion.mavlink.transport.opening import open_transport
 from companion.preflight.session import open_session
 from companion.vehicle.parameter_rules import CheckResult
