@@ -26,7 +26,7 @@ ROLES_BEFORE_LANDING = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFB
 _OBEYS_OR_LANDS = frozenset({Role.OFFBOARD, Role.LAND})
 
 _PrepareRepetition = Callable[[LinkError], Awaitable[RequireOurs]]
-"""Called with the error of a request; raises it, or returns whose vehicle the next one requires."""
+"""Called with the error of a request: raises it, or returns the `RequireOurs` of the next one."""
 
 
 async def hand_over_to_hold(context: FlightContext) -> None:
