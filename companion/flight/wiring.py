@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 from companion.control.retuning import Retuning
 from companion.flight.assembled import AssembledFlight
-from companion.flight.observer import StateLogger
+from companion.flight.state_logger import StateLogger
 from companion.mavlink.messages import Message
 from companion.vehicle.link import Link
 from companion.vehicle.records import AttitudeSample
