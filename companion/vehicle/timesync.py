@@ -24,8 +24,9 @@ _NS_PER_S, _S_PER_NS = 1e9, 1e-9
 _PROBE_PERIOD = 0.1 * _NS_PER_S
 _UPLINK_WINDOW = 0.7 * _NS_PER_S
 """Only probes answered within this time count, ns. A link that becomes slow is noticed after about
-this time; a single late answer has no effect."""
-_MIN_PROBE_ANSWERS = 4
+this time: until then the answers from before still count."""
+_MIN_PROBES = 6
+"""Fewer probes sent in this time say nothing: probing has just begun, or begun again."""
 _KEPT_REQUESTS = 16
 """Number of unanswered requests of each kind that are kept, and of round trips."""
 
@@ -34,8 +35,8 @@ class Uplink(NamedTuple):
     """Present delay and loss on the link to the vehicle.
 
     Attributes:
-        round_trip: Shortest round trip of the probes answered in the last 0.7 s, s; None: fewer
-            than four.
+        round_trip: Shortest round trip of the probes answered in the last 0.7 s, s; None: none was,
+            or fewer than six were sent.
         unanswered: Number of probes sent since the newest request that was answered, at most 16;
             None: the vehicle has not answered any TIMESYNC request.
     """
@@ -70,6 +71,11 @@ class _Requests:
     def unanswered_since(self, stamp: int) -> int:
         """Number of unanswered requests sent after `stamp`."""
         return sum(sent > stamp for sent in self._unanswered)
+
+    def sent(self, since: float) -> int:
+        """Number of requests sent at `since` or later."""
+        answered = sum(ended - trip >= since for ended, trip in self._round_trips)
+        return answered + sum(stamp >= since for stamp in self._unanswered)
 
     def round_trips(self, since: float) -> list[float]:
         """The round trips that ended at `since` or later, s."""
@@ -142,10 +148,11 @@ class TimeSync:
         If the link becomes slow, `Uplink.round_trip` shows it within a second, `round_trip_s` only
         after 16 s.
         """
-        trips = self._probes.round_trips(since=self._now_ns() - _UPLINK_WINDOW)
+        since = self._now_ns() - _UPLINK_WINDOW
+        judged = self._probes.sent(since) >= _MIN_PROBES
         answered = self._newest_answered
         return Uplink(
-            min(trips) if len(trips) >= _MIN_PROBE_ANSWERS else None,
+            min(self._probes.round_trips(since), default=None) if judged else None,
             None if answered is None else self._probes.unanswered_since(answered),
         )
 

@@ -29,22 +29,27 @@ class Bench:
         self.answer(round_trip)
 
 
-def test_the_present_round_trip_is_the_shortest_of_the_last_moments_and_needs_four_answers():
+def test_the_present_round_trip_is_the_shortest_of_the_last_moments_and_needs_six_probes():
     bench = Bench()
-    for trip in (0.05, 0.03, 0.05):
+    for trip in (0.005, 0.003, 0.005, 0.005, 0.005):
         bench.probe(trip)
         assert bench.timesync.uplink.round_trip is None
-    bench.probe(0.05)
-    assert bench.timesync.uplink.round_trip == pytest.approx(0.03)
-    bench.now += 0.4
-    for sent in range(4):
-        bench.timesync.probe()
+    bench.probe(0.005)
+    assert bench.timesync.uplink.round_trip == pytest.approx(0.003)
+
+
+def test_one_late_answer_tells_of_a_slow_link_once_no_quick_one_is_left():
+    bench = Bench()
+    for _ in range(8):
+        bench.probe(0.005)
+    for _ in range(6):  # not answered yet
         bench.now += 0.1
-        assert len(bench.sent) == 5 + sent
-    bench.now += 0.2
-    for request in bench.sent[-4:]:
-        bench.timesync._on_timesync(SimpleNamespace(tc1=7 * 10**9, ts1=request.ts1))
-    assert bench.timesync.uplink.round_trip == pytest.approx(0.3)
+        bench.timesync.probe()
+    assert bench.timesync.uplink.round_trip == pytest.approx(0.005)
+    bench.now += 0.11
+    oldest = bench.sent[8].ts1
+    bench.timesync._on_timesync(SimpleNamespace(tc1=7 * 10**9, ts1=oldest))
+    assert bench.timesync.uplink.round_trip == pytest.approx(0.61)
     bench.now += 0.8
     assert bench.timesync.uplink.round_trip is None
 
