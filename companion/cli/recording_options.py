@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from companion.cli.shared_options import add_set
-from companion.cli.tool_options import Commands
+from companion.cli.options import Commands, add_flag, add_flight_folder, add_path, add_set
 
 
 def add_recordings(commands: Commands) -> None:
@@ -21,10 +20,8 @@ def _add_plot(commands: Commands) -> None:
         description="Draw a recorded flight as a picture: its path, its steps, and error, speed, "
         "tilt and height over time, with the place and the reason of an early end.",
     )
-    plot.add_argument("folder", type=Path, metavar="FOLDER", help="the flight's folder")
-    plot.add_argument(
-        "--out", type=Path, metavar="FILE", help="picture (default: FOLDER/flight.png)"
-    )
+    add_flight_folder(plot)
+    add_path(plot, "--out", "picture (default: FOLDER/flight.png)")
     plot.set_defaults(run="recordings.plot")
 
 
@@ -34,15 +31,11 @@ def _add_export(commands: Commands) -> None:
         help="write a recorded flight as CSV or Parquet",
         description="Write the tables of a recorded flight: samples, setpoints, guidance, events.",
     )
-    export.add_argument("folder", type=Path, metavar="FOLDER", help="the flight's folder")
+    add_flight_folder(export)
     kind = export.add_mutually_exclusive_group(required=True)
-    kind.add_argument("--csv", action="store_true", help="one CSV file for each channel")
-    kind.add_argument(
-        "--parquet", action="store_true", help="one Parquet file for each channel (extra `export`)"
-    )
-    export.add_argument(
-        "--into", type=Path, metavar="FOLDER", help="folder for the files (default: FOLDER/export)"
-    )
+    add_flag(kind, "--csv", "one CSV file for each channel")
+    add_flag(kind, "--parquet", "one Parquet file for each channel (extra `export`)")
+    add_path(export, "--into", "folder for the files (default: FOLDER/export)", "FOLDER")
     export.set_defaults(run="recordings.export")
 
 
@@ -54,14 +47,10 @@ def _add_replay(commands: Commands) -> None:
         "and compare each setpoint. With the flight's own configuration, all setpoints must be "
         "equal to the bit. With another one, the command shows what would have been sent.",
     )
-    replay.add_argument("folder", type=Path, metavar="FOLDER", help="the flight's folder")
-    replay.add_argument(
-        "--config", type=Path, metavar="FILE", help="configuration that replaces the flight's own"
-    )
+    add_flight_folder(replay)
+    add_path(replay, "--config", "configuration that replaces the flight's own")
     add_set(replay, "planner.gain_per_s=4")
-    replay.add_argument(
-        "--csv", type=Path, metavar="FILE", help="write both setpoints for each sample to this file"
-    )
+    add_path(replay, "--csv", "write both setpoints for each sample to this file")
     replay.set_defaults(run="recordings.replay")
 
 
@@ -71,12 +60,8 @@ def _add_reports(commands: Commands) -> None:
         help="one HTML page about a flight, or about any .tlog (extra `report`)",
         description="Write one HTML page, without other files, about a flight or any .tlog.",
     )
-    report.add_argument(
-        "flight", type=Path, metavar="FOLDER", help="the flight's folder, or a .tlog of any program"
-    )
-    report.add_argument(
-        "--out", type=Path, metavar="FILE", help="page (default: FOLDER/report.html)"
-    )
+    add_path(report, "flight", "the flight's folder, or a .tlog of any program", "FOLDER")
+    add_path(report, "--out", "page (default: FOLDER/report.html)")
     report.set_defaults(run="recordings.report")
     compare = commands.add_parser(
         "compare",
@@ -84,14 +69,6 @@ def _add_reports(commands: Commands) -> None:
         description="Write one HTML page that shows the motions of flights, and the "
         "configuration keys and figures in which they differ.",
     )
-    compare.add_argument(
-        "flights", type=Path, nargs="+", metavar="FOLDER", help="folders of flights, or .tlog files"
-    )
-    compare.add_argument(
-        "--out",
-        type=Path,
-        default=Path("compare.html"),
-        metavar="FILE",
-        help="page (default: compare.html)",
-    )
+    add_path(compare, "flights", "folders of flights, or .tlog files", "FOLDER", nargs="+")
+    add_path(compare, "--out", "page (default: compare.html)", default=Path("compare.html"))
     compare.set_defaults(run="recordings.compare")
