@@ -11,7 +11,6 @@ from typing import Any
 from rich.console import Console
 
 from companion.cli.exit_codes import EXIT_FAILURE, EXIT_OK
-from companion.cli.log_choice import LOG
 from companion.cli.output_file import require_writable
 from companion.config import Config
 from companion.config.files import changed, load
@@ -19,6 +18,7 @@ from companion.config.known_drag import drag_prior
 from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
 from companion.recording.learned_file import newest_learned
+from companion.recording.tlog import TLOG_FILE
 from companion.tuning import Disturbances, Proposal, propose
 from companion.tuning.flights import COURSES, CourseResult, autopilot_like, fly_course
 from companion.tuning.noise import measured_disturbances
@@ -39,7 +39,7 @@ def tune(options: argparse.Namespace) -> int:
     config, included = _configuration(source, vehicle, options.config)
     require_writable(output, "--out", force=options.force)
     config = _with_learned_drag(config, source)
-    log = source / LOG
+    log = source / TLOG_FILE
     disturbances = Disturbances()
     if source.is_dir() and log.exists():
         disturbances = measured_disturbances(log, drag_prior(config).drag.linear, disturbances)

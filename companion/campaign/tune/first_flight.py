@@ -19,6 +19,7 @@ from companion.identification import (
 )
 from companion.mavlink.errors import LogError
 from companion.recording.learned_file import newest_learned
+from companion.recording.tlog import TLOG_FILE
 from companion.vehicle.flight_log import read_flight_log
 
 _DAMPING_KEY = "vehicle.damping"
@@ -52,7 +53,7 @@ def _identified(config: Config, case: Case, *, damped: bool) -> Config:
         folder, fragment = Path(place) / "flight", Path(place) / "vehicle.yaml"
         CaseFlight(replace(case, config=doublets, fault=None), Path(place)).fly(folder)
         try:
-            rows = read_flight_log(folder / "flight.tlog")
+            rows = read_flight_log(folder / TLOG_FILE)
             vehicle = identify_vehicle(rows.setpoints, rows.rates, rows.specific_thrust)
             axes = config.vehicle.axes
             text = vehicle_fragment(vehicle, GRAVITY, axes, second_order=damped)
