@@ -1,16 +1,16 @@
 """Stores the results of a campaign: one Parquet file for each unit of work, whole or not at all."""
 
 import json
-import os
 from collections.abc import Mapping, Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from companion.campaign.campaign_file import CampaignFile
-from companion.campaign.outcomes import FLOAT_OUTCOMES
+from companion.campaign.outcomes import OUTCOME_LABELS
 from companion.campaign.swept import Value
 from companion.config.units import unit_of
-from companion.files.write_whole import sync_folder, write_whole
+from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ _OUTCOMES = {
         ("phase", "string"),
         ("crashed", "bool"),
         ("as_documented", "bool"),
-        *((name, "float64") for name in FLOAT_OUTCOMES),
+        *((name, "float64") for name in OUTCOME_LABELS),
         ("setpoints", "int64"),
         ("digest", "string"),
     ),
@@ -110,18 +110,9 @@ def write_unit(
 
     path = unit_path(folder, number)
     write_whole(path.with_suffix(".json"), json.dumps(timing) + "\n")
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        pq.write_table(table(file, rows), temporary)
-        descriptor = os.open(temporary, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
-        temporary.replace(path)
-        sync_folder(path.parent)
-    finally:
-        temporary.unlink(missing_ok=True)
+    parquet = BytesIO()
+    pq.write_table(table(file, rows), parquet)
+    write_whole(path, parquet.getvalue())
 
 
 def unit_path(folder: Path, number: int) -> Path:

@@ -89,11 +89,7 @@ def _with_learned_drag(config: Config, source: Path) -> Config:
     learned = newest_learned(source.resolve().parent) if source.is_dir() else None
     if config.guidance.drag is not None or learned is None:
         return config
-    drag = {
-        "drag_per_s": learned.drag.linear,
-        "quadratic_drag_per_m": learned.drag.quadratic,
-    }
-    return changed(config, {"guidance": drag}, str(learned.path))
+    return changed(config, learned.as_keys(), str(learned.path))
 
 
 def _flyable(config: Config) -> Config:

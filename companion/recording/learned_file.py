@@ -32,6 +32,15 @@ class LearnedDrag(NamedTuple):
     top_speed: float
     path: Path
 
+    def as_keys(self) -> dict[str, dict[str, float]]:
+        """The drag as keys of the configuration, by section."""
+        return {
+            "guidance": {
+                "drag_per_s": self.drag.linear,
+                "quadratic_drag_per_m": self.drag.quadratic,
+            }
+        }
+
 
 class LearnedFile:
     """The file `learned-UID.json` in the folder of the flights.

@@ -80,9 +80,9 @@ def kept_indices(values: Floats) -> Any:
     return np.array(sorted(kept))
 
 
-def even_indices(count: int) -> Any:
-    """Indices (M,) of evenly chosen points of a track, few enough for a small page."""
-    return np.unique(np.linspace(0, count - 1, min(count, _MAX_POINTS)).astype(int))
+def even_indices(count: int, most: int = _MAX_POINTS) -> Any:
+    """Indices (M,) of at most `most` of `count` points or rows, at even distances."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
 
 
 def numbers(values: Floats) -> list[float | None]:

@@ -1,10 +1,10 @@
 """`companion campaign report`: the page about a campaign, and its results in one table."""
 
 import argparse
-import os
 import shlex
 from collections import Counter
 from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -82,12 +82,9 @@ def write_tables(table: "pa.Table", folder: Path) -> None:
         (PARQUET, pyarrow.parquet.write_table),
         (CSV, pyarrow.csv.write_csv),
     ):
-        temporary = folder / f".{name}.{os.getpid()}"
-        try:
-            write(table, temporary)
-            temporary.replace(folder / name)
-        finally:
-            temporary.unlink(missing_ok=True)
+        content = BytesIO()
+        write(table, content)
+        write_whole(folder / name, content.getvalue())
 
 
 def page_text(results: Results, campaign: Campaign) -> str:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.campaign.report.results import Column, Floats, Results
+from companion.report.plots import even_indices
 
 FEWEST = 100
 """Smallest number of cases for useful indices."""
@@ -45,7 +46,7 @@ def influences(results: Results, outcome: str) -> list[Influence]:
     """
     values = np.array(results.columns[outcome], dtype=float)
     rows = np.flatnonzero(np.isfinite(values))
-    rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _MOST_CASES)).astype(int))]
+    rows = rows[even_indices(len(rows), _MOST_CASES)]
     values = values[rows]
     columns = {name: _as_numbers(results.columns[name][rows], values) for name in results.factors}
     columns = {name: column for name, column in columns.items() if np.ptp(column) > 0.0}

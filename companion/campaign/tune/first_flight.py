@@ -72,8 +72,4 @@ def _with_drag(config: Config, case: Case) -> Config:
         learned_file = newest_learned(Path(place))
     if learned_file is None:
         return config
-    drag = {
-        "drag_per_s": learned_file.drag.linear,
-        "quadratic_drag_per_m": learned_file.drag.quadratic,
-    }
-    return changed(config, {"guidance": drag}, "the drag that a flight learned")
+    return changed(config, learned_file.as_keys(), "the drag that a flight learned")

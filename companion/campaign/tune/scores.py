@@ -45,18 +45,11 @@ class Score(NamedTuple):
 
     def first(self, count: int) -> "Score":
         """The score on the first `count` cases alone."""
-        return Score(
-            self.true[:count], self.estimated[:count], self.estimate[:count], self.inside[:count]
-        )
+        return Score._make(each[:count] for each in self)
 
     def combined_with(self, rest: "Score") -> "Score":
         """The score on these cases and those of `rest` together."""
-        return Score(
-            self.true + rest.true,
-            self.estimated + rest.estimated,
-            self.estimate + rest.estimate,
-            self.inside + rest.inside,
-        )
+        return Score._make(ours + theirs for ours, theirs in zip(self, rest, strict=True))
 
     def as_attributes(self) -> dict[str, Any]:
         """The score as JSON; an infinite number is null."""
