@@ -42,17 +42,14 @@ class ClusterError(Exception):
 
 
 class EndedUnit(NamedTuple):
-    """A unit of work that was run or given up.
-
-    Attributes:
-        number: number of the unit.
-        result: rows and wall times; None: the unit was given up.
-        reason: why the unit was given up.
-    """
+    """A unit of work that was run or given up."""
 
     number: int
+    """Number of the unit."""
     result: UnitResult | None
+    """Rows and wall times; None: the unit was given up."""
     reason: str = ""
+    """Why the unit was given up."""
 
 
 def require_packages() -> None:

@@ -17,17 +17,14 @@ _LARGEST_SEED = 2**63 - 1
 
 @dataclass(frozen=True, slots=True)
 class PlannedCase:
-    """The factor values and the seed of one case; `Campaign.case` builds the case from them.
-
-    Attributes:
-        index: number of the case, from 0.
-        seed: seed of noise and gusts.
-        values: value of each factor as written in the campaign file.
-    """
+    """The factor values and the seed of one case; `Campaign.case` builds the case from them."""
 
     index: int
+    """Number of the case, from 0."""
     seed: int
+    """Seed of noise and gusts."""
     values: dict[str, Any]
+    """Value of each factor as written in the campaign file."""
 
 
 def number_of_cases(file: CampaignFile) -> int:

@@ -28,15 +28,12 @@ if TYPE_CHECKING:
 
 @dataclass
 class Progress:
-    """Progress of a campaign.
-
-    Attributes:
-        flown: number of cases in the results, including those of earlier runs.
-        lost: for each unit of work that was given up, a sentence with its cases and the reason.
-    """
+    """Progress of a campaign."""
 
     flown: int = 0
+    """Number of cases in the results, including those of earlier runs."""
     lost: list[str] = field(default_factory=list)
+    """For each unit of work that was given up, a sentence with its cases and the reason."""
 
 
 def run(

@@ -31,27 +31,24 @@ _SIZE_LIMITS = ("max_cases", "max_hours")  # keys of the section `limits`
 
 @dataclass(frozen=True)
 class Description:
-    """Description of a campaign: the content of `campaign.json`.
-
-    Attributes:
-        name: name of the campaign.
-        kind: "flights" or "batch".
-        seed: seed of the campaign.
-        cases: number of cases.
-        unit: number of cases in each unit of work; the last unit may have fewer.
-        case_s: wall time of a case, measured before the campaign began, s; None: not measured.
-        versions: versions of the program and of the packages that the results depend on.
-        began: time at which the folder was made, ISO 8601, UTC.
-    """
+    """Description of a campaign: the content of `campaign.json`."""
 
     name: str
+    """Name of the campaign."""
     kind: str
+    """"flights" or "batch"."""
     seed: int
+    """Seed of the campaign."""
     cases: int
+    """Number of cases."""
     unit: int
+    """Number of cases in each unit of work; the last unit may have fewer."""
     case_s: float | None
+    """Wall time of a case, measured before the campaign began, s; None: not measured."""
     versions: Versions
+    """Versions of the program and of the packages that the results depend on."""
     began: str
+    """Time at which the folder was made, ISO 8601, UTC."""
 
 
 def describe(campaign: Campaign, unit: int, case_s: float | None) -> Description:

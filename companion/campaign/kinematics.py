@@ -174,16 +174,13 @@ def _targets(config: Config, longest_target: float, heading: float) -> Array:
 
 
 class _Pattern(NamedTuple):
-    """A maneuver from its first open-loop step to the end of the last, level between the steps.
-
-    Attributes:
-        samples: number of samples.
-        parts: for each step and each level part: its first sample, the sample after its last, and
-            its acceleration coefficients.
-    """
+    """A maneuver from its first open-loop step to the end of the last, level between the steps."""
 
     samples: int
+    """Number of samples."""
     parts: tuple[tuple[int, int, Coefficients], ...]
+    """For each step and each level part: its first sample, the sample after its last, and its
+    acceleration coefficients."""
 
 
 @lru_cache(maxsize=64)

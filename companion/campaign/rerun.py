@@ -18,20 +18,17 @@ _CASES_FOLDER = "cases"
 
 
 class Rerun(NamedTuple):
-    """A case that was flown again.
-
-    Attributes:
-        row: results of the repeated flight, as one row.
-        folder: folder of its recording.
-        identical: whether the row equals the stored row to the bit. A case that has no stored row
-            yet counts as identical.
-        lines: messages for the user, a line each.
-    """
+    """A case that was flown again."""
 
     row: dict[str, Value]
+    """Results of the repeated flight, as one row."""
     folder: Path
+    """Folder of its recording."""
     identical: bool
+    """Whether the row equals the stored row to the bit. A case that has no stored row yet counts as
+    identical."""
     lines: tuple[str, ...]
+    """Messages for the user, a line each."""
 
 
 def rerun(campaign_folder: Path, index: int) -> Rerun:

@@ -26,17 +26,14 @@ limits the units instead, and there are more of them.
 
 
 class UnitResult(NamedTuple):
-    """The result that a worker returns for a unit.
-
-    Attributes:
-        rows: one row for each case, in order.
-        wall_s: wall time of each flight, s; of a batch, a single number for all cases together.
-        worker: address of the Dask worker.
-    """
+    """The result that a worker returns for a unit."""
 
     rows: list[Row]
+    """One row for each case, in order."""
     wall_s: list[float]
+    """Wall time of each flight, s; of a batch, a single number for all cases together."""
     worker: str
+    """Address of the Dask worker."""
 
 
 def fly_planned_cases(

@@ -19,19 +19,16 @@ _RELEASE_TIMEOUT = 8.0
 
 
 class PageSocket(NamedTuple):
-    """The listening socket of the live page, and the token that admits users.
-
-    Attributes:
-        host: IP address of the socket.
-        port: number of the port.
-        token: required to change something, and to watch from another computer.
-        listening: the listening socket.
-    """
+    """The listening socket of the live page, and the token that admits users."""
 
     host: str
+    """IP address of the socket."""
     port: int
+    """Number of the port."""
     token: str
+    """Required to change something, and to watch from another computer."""
     listening: socket.socket
+    """The listening socket."""
 
     def address_text(self) -> str:
         """A line for the user: address of the page, and the token."""
@@ -45,15 +42,12 @@ class PageSocket(NamedTuple):
 
 
 class StreamAddress(NamedTuple):
-    """Address of the live stream.
-
-    Attributes:
-        host: IP address.
-        port: number of the port.
-    """
+    """Address of the live stream."""
 
     host: str
+    """IP address."""
     port: int
+    """Number of the port."""
 
     def address_text(self) -> str:
         """A line for the user: address of the stream, and how to open it."""

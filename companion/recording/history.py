@@ -38,33 +38,26 @@ _COLUMNS = (
 
 
 class Span(NamedTuple):
-    """A maneuver, a phase or a mode.
-
-    Attributes:
-        begin, end: time since the flight began, s.
-        name: shown to the user.
-    """
+    """A maneuver, a phase or a mode; times in s since the flight began."""
 
     begin: float
     end: float
     name: str
+    """Shown to the user."""
 
 
 @dataclass(frozen=True, slots=True)
 class Marks:
-    """The marks in the panels; times in s since the flight began.
-
-    Attributes:
-        phases: beginning and name of each phase.
-        maneuvers: the maneuvers, in order.
-        end: time when the flight ended early, or None.
-        reason: why the flight ended, if it ended early; else its result.
-    """
+    """The marks in the panels; times in s since the flight began."""
 
     phases: Sequence[tuple[float, str]] = ()
+    """Beginning and name of each phase."""
     maneuvers: Sequence[Span] = ()
+    """The maneuvers, in order."""
     end: float | None = None
+    """Time when the flight ended early, or None."""
     reason: str = ""
+    """Why the flight ended, if it ended early; else its result."""
 
 
 def marks_of(summary: Any) -> Marks:

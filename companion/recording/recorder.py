@@ -26,17 +26,14 @@ time: since the vehicle's boot); the values."""
 
 
 class Entry(NamedTuple):
-    """One entry, from which the thread makes messages.
-
-    Attributes:
-        time: time on our clock, s.
-        encoder: makes the messages.
-        values: arguments of the encoder; they must not change any more.
-    """
+    """One entry, from which the thread makes messages."""
 
     time: float
+    """Time on our clock, s."""
     encoder: Encoder
+    """Makes the messages."""
     values: Any
+    """Arguments of the encoder; they must not change any more."""
 
 
 class FlightRecorder(BackgroundFile[Entry]):

@@ -34,52 +34,43 @@ class Setpoint(NamedTuple):
 
 
 class RecordedSample(NamedTuple):
-    """An attitude sample, and the flight's answer to it.
-
-    Attributes:
-        sample: the sample; `received_ns`, from which latencies are computed, is 0.
-        flags: state of the control loop when the sample arrived.
-        checked: time of the last check of the sample's age, before sending, s on our clock; NaN:
-            not checked.
-        reason: "answered", or why it is unanswered; one of `UNANSWERED_CODES`.
-        setpoint: setpoint that was sent; None: none was sent.
-    """
+    """An attitude sample, and the flight's answer to it."""
 
     sample: AttitudeSample
+    """The sample; `received_ns`, from which latencies are computed, is 0."""
     flags: LoopFlags
+    """State of the control loop when the sample arrived."""
     checked: float
+    """Time of the last check of the sample's age, before sending, s on our clock; NaN: not
+    checked."""
     reason: str
+    """"answered", or why it is unanswered; one of `UNANSWERED_CODES`."""
     setpoint: Setpoint | None
+    """Setpoint that was sent; None: none was sent."""
 
 
 class RecordedStep(NamedTuple):
-    """A step of the guidance loop.
-
-    Attributes:
-        inputs: inputs of the step.
-        command: command that the step gave to the control loop; None: it gave none.
-        reference: reference that the step followed; None: it had none.
-    """
+    """A step of the guidance loop."""
 
     inputs: StepInput
+    """Inputs of the step."""
     command: GuidanceCommand | None
+    """Command that the step gave to the control loop; None: it gave none."""
     reference: Reference | None
+    """Reference that the step followed; None: it had none."""
 
 
 class RecordedAction(NamedTuple):
-    """A call by which a phase of the flight controlled guidance or the control loop.
-
-    Attributes:
-        time: time of the call, s on our clock.
-        name: name of the call, one of `ACTIONS`.
-        clock_offset: vehicle time minus our time, s; None: unknown.
-        drag: drag learned in an earlier flight, for the action `drag_prior`; None: there is none.
-    """
+    """A call by which a phase of the flight controlled guidance or the control loop."""
 
     time: float
+    """Time of the call, s on our clock."""
     name: str
+    """Name of the call, one of `ACTIONS`."""
     clock_offset: float | None
+    """Vehicle time minus our time, s; None: unknown."""
     drag: Drag | None
+    """Drag learned in an earlier flight, for the action `drag_prior`; None: there is none."""
 
 
 def recorded_sample(row: Row, sent: Row | None) -> RecordedSample:

@@ -33,23 +33,20 @@ from companion.replay.vehicle import ReplayedVehicle
 
 
 class ReplayedSample(NamedTuple):
-    """The answers to one sample, in the flight and in the replay.
-
-    Attributes:
-        received: arrival of the sample, s on our clock.
-        vehicle_time: time stamp of the sample, s.
-        recorded: setpoint of the flight; None: no setpoint.
-        replayed: setpoint of the replay; None: no setpoint.
-        recorded_reason: "answered", or why the flight did not answer; one of `UNANSWERED_CODES`.
-        replayed_reason: "answered", or why the replay did not answer; one of `UNANSWERED_CODES`.
-    """
+    """The answers to one sample, in the flight and in the replay."""
 
     received: float
+    """Arrival of the sample, s on our clock."""
     vehicle_time: float
+    """Time stamp of the sample, s."""
     recorded: Setpoint | None
+    """Setpoint of the flight; None: no setpoint."""
     replayed: Setpoint | None
+    """Setpoint of the replay; None: no setpoint."""
     recorded_reason: str
+    """"answered", or why the flight did not answer; one of `UNANSWERED_CODES`."""
     replayed_reason: str
+    """"answered", or why the replay did not answer; one of `UNANSWERED_CODES`."""
 
     @property
     def same(self) -> bool:

@@ -25,54 +25,48 @@ Floats = NDArray[np.float64]
 
 
 class Curve(NamedTuple):
-    """Values over time.
-
-    Attributes:
-        time: (N,), time since the flight began, s.
-        values: (N, columns).
-    """
+    """Values over time."""
 
     time: Floats
+    """(N,), time since the flight began, s."""
     values: Floats
+    """(N, columns)."""
 
 
 @dataclass(frozen=True)
 class FlightData:
-    """One flight, from its own record or from a `.tlog`.
-
-    Attributes:
-        name: name of the folder or of the log.
-        curves: curves by name, without those that were not recorded. Columns: "position",
-            "reference": north, east, height, m. "error": tracking error, m. "motion": height in m,
-            speed in m/s, tilt in °. "coefficients", "target": north, east. "commanded", "measured":
-            roll, pitch, yaw rate, °/s. "thrust": sent, 0..1. "hover_thrust": as learned, 0..1.
-            "latency": from a sample's arrival to its setpoint, ms.
-        figures: the content of `summary.json`, or derived from the record; None for a `.tlog`.
-        provisional: whether the flight wrote no summary, so that the figures come from its record.
-        fault: why not all of the record could be read, as a sentence; None: all was read.
-        phases: the phases, in order; empty for a `.tlog`.
-        modes: the autopilot's modes, in order, for a `.tlog`.
-        maneuvers: the maneuvers, in order.
-        events: the events, in order.
-        differences: keys of the configuration that are not the default; None: unknown.
-        runs: the doublets in open loop, in vehicle time.
-        gain: p of the planner, 1/s; NaN: unknown.
-        end: the early end of the flight; None: none, or unknown.
-    """
+    """One flight, from its own record or from a `.tlog`."""
 
     name: str
+    """Name of the folder or of the log."""
     curves: Mapping[str, Curve]
+    """Curves by name, without those that were not recorded. Columns: "position", "reference":
+    north, east, height, m. "error": tracking error, m. "motion": height in m, speed in m/s, tilt in
+    °. "coefficients", "target": north, east. "commanded", "measured": roll, pitch, yaw rate, °/s.
+    "thrust": sent, 0..1. "hover_thrust": as learned, 0..1. "latency": from a sample's arrival to
+    its setpoint, ms."""
     figures: Mapping[str, Any] | None = None
+    """The content of `summary.json`, or derived from the record; None for a `.tlog`."""
     provisional: bool = False
+    """Whether the flight wrote no summary, so that the figures come from its record."""
     fault: str | None = None
+    """Why not all of the record could be read, as a sentence; None: all was read."""
     phases: tuple[Span, ...] = ()
+    """The phases, in order; empty for a `.tlog`."""
     modes: tuple[Span, ...] = ()
+    """The autopilot's modes, in order, for a `.tlog`."""
     maneuvers: tuple[Span, ...] = ()
+    """The maneuvers, in order."""
     events: tuple[Event, ...] = ()
+    """The events, in order."""
     differences: tuple[ConfigKey, ...] | None = None
+    """Keys of the configuration that are not the default; None: unknown."""
     runs: list[StepRun] = field(default_factory=list)
+    """The doublets in open loop, in vehicle time."""
     gain: float = float("nan")
+    """p of the planner, 1/s; NaN: unknown."""
     end: EndMark | None = None
+    """The early end of the flight; None: none, or unknown."""
 
     @property
     def end_time(self) -> float | None:

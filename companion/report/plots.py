@@ -27,21 +27,18 @@ _SIGNIFICANT_DIGITS = 5
 
 @dataclass(frozen=True)
 class Plot:
-    """One plot of the page.
-
-    Attributes:
-        title: shown above it.
-        note: text above the plot: the quantities shown, and how a good flight looks.
-        traces: Plotly's traces.
-        layout: Plotly's layout; the page adds fonts and colours.
-        height: height, px.
-    """
+    """One plot of the page."""
 
     title: str
+    """Shown above it."""
     note: str
+    """Text above the plot: the quantities shown, and how a good flight looks."""
     traces: list[dict[str, Any]]
+    """Plotly's traces."""
     layout: dict[str, Any] = field(default_factory=dict)
+    """Plotly's layout; the page adds fonts and colours."""
     height: int = 320
+    """Height, px."""
 
 
 def line(name: str, x: Floats, y: Floats, colour: str, **more: Any) -> dict[str, Any]:

@@ -18,17 +18,14 @@ _PORT_AT_END = re.compile(r":\d+$")
 
 
 class Table(NamedTuple):
-    """A table of texts.
-
-    Attributes:
-        title: shown above it.
-        header: names of the columns.
-        rows: one text for each column.
-    """
+    """A table of texts."""
 
     title: str
+    """Shown above it."""
     header: tuple[str, ...]
+    """Names of the columns."""
     rows: Sequence[tuple[str, ...]]
+    """One text for each column."""
 
 
 def flight_tables(flight: FlightData) -> list[Table]:

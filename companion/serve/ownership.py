@@ -20,15 +20,12 @@ class ControlState(Enum):
 
 @dataclass
 class _Stream:
-    """The setpoints of one client.
-
-    Attributes:
-        newest: arrival of the newest setpoint, s.
-        previous: arrival of the setpoint before the newest, s.
-    """
+    """The setpoints of one client."""
 
     newest: float = -inf
+    """Arrival of the newest setpoint, s."""
     previous: float = -inf
+    """Arrival of the setpoint before the newest, s."""
 
 
 class Ownership:

@@ -39,23 +39,20 @@ def label(name: str) -> str:
 
 @dataclass(frozen=True)
 class Results:
-    """The cases of a campaign that have been flown.
-
-    Attributes:
-        folder: folder of the campaign.
-        name: name of the campaign.
-        kind: flights or batch.
-        planned: number of cases of the whole campaign, flown or not.
-        factors: metadata of each swept key, by name.
-        table: all rows, as returned by `store.read`.
-    """
+    """The cases of a campaign that have been flown."""
 
     folder: Path
+    """Folder of the campaign."""
     name: str
+    """Name of the campaign."""
     kind: str
+    """Flights or batch."""
     planned: int
+    """Number of cases of the whole campaign, flown or not."""
     factors: Mapping[str, Any]
+    """Metadata of each swept key, by name."""
     table: "pa.Table"
+    """All rows, as returned by `store.read`."""
 
     @classmethod
     def read(cls, folder: Path) -> "Results":

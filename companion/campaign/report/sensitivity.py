@@ -21,17 +21,14 @@ _SEED = 1
 
 
 class Influence(NamedTuple):
-    """The first-order Sobol index of a factor on an outcome.
-
-    Attributes:
-        factor: name of the factor.
-        share: the index, 0..1.
-        confidence: half width of its 95 % interval, by bootstrap; NaN where it cannot be found.
-    """
+    """The first-order Sobol index of a factor on an outcome."""
 
     factor: str
+    """Name of the factor."""
     share: float
+    """The index, 0..1."""
     confidence: float
+    """Half width of its 95 % interval, by bootstrap; NaN where it cannot be found."""
 
 
 def influences(results: Results, outcome: str) -> list[Influence]:

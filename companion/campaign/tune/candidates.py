@@ -33,15 +33,12 @@ With `loguniform` the range is that of the logarithm.
 
 
 class Start(NamedTuple):
-    """A candidate with which the search starts.
-
-    Attributes:
-        name: source of its values, such as `companion tune`.
-        values: values of the searched keys. Optuna draws the value of a missing key.
-    """
+    """A candidate with which the search starts."""
 
     name: str
+    """Source of its values, such as `companion tune`."""
     values: Values
+    """Values of the searched keys. Optuna draws the value of a missing key."""
 
 
 def tune_section(campaign: Campaign) -> Tune:

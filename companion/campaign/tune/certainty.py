@@ -24,28 +24,23 @@ class Interval(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """Two configurations compared on the same cases, with the same noise and gusts.
-
-    Attributes:
-        before: RMS horizontal distance of the true position from the reference, m, with the
-            configuration before the search.
-        after: the same distance with the result of the search, m.
-        ratio: after / before.
-        estimated: RMS horizontal distance of the estimated position from the reference, m, before
-            and after.
-        estimate: RMS horizontal distance of the estimated from the true position, m, before and
-            after.
-        better: number of samples in which the result has the smaller RMS error.
-        samples: number of samples that were compared.
-    """
+    """Two configurations compared on the same cases, with the same noise and gusts."""
 
     before: Interval
+    """RMS horizontal distance of the true position from the reference, m, with the configuration
+    before the search."""
     after: Interval
+    """The same distance with the result of the search, m."""
     ratio: Interval
+    """After / before."""
     estimated: tuple[float, float]
+    """RMS horizontal distance of the estimated position from the reference, m, before and after."""
     estimate: tuple[float, float]
+    """RMS horizontal distance of the estimated from the true position, m, before and after."""
     better: int
+    """Number of samples in which the result has the smaller RMS error."""
     samples: int
+    """Number of samples that were compared."""
 
 
 def compared(before: Score, after: Score, samples: int) -> Comparison | None:

@@ -16,22 +16,19 @@ _ERROR_NAMES = "true", "estimated", "estimate"
 
 
 class Score(NamedTuple):
-    """The score of a candidate; each attribute has an entry for each case.
-
-    Attributes:
-        true: RMS horizontal distance of the true position from the reference, m; infinite where a
-            case was not flown to its end, or had no closed-loop maneuver.
-        estimated: RMS horizontal distance of the estimated position from the reference, m; infinite
-            where `true` is.
-        estimate: RMS horizontal distance of the estimated from the true position, m; infinite where
-            `true` is.
-        inside: whether the case was flown to its end and stayed inside the envelope.
-    """
+    """The score of a candidate; each attribute has an entry for each case."""
 
     true: tuple[float, ...]
+    """RMS horizontal distance of the true position from the reference, m; infinite where a case was
+    not flown to its end, or had no closed-loop maneuver."""
     estimated: tuple[float, ...]
+    """RMS horizontal distance of the estimated position from the reference, m; infinite where
+    `true` is."""
     estimate: tuple[float, ...]
+    """RMS horizontal distance of the estimated from the true position, m; infinite where `true`
+    is."""
     inside: tuple[bool, ...]
+    """Whether the case was flown to its end and stayed inside the envelope."""
 
     @property
     def rms(self) -> float:

@@ -51,35 +51,29 @@ _VALUES, _SCORE, _VIOLATION, _COMPLETE = "values", "score", "missed", "whole"
 
 @dataclass(frozen=True)
 class Candidate:
-    """A candidate that has flown all its cases.
-
-    Attributes:
-        number: number of the trial.
-        values: values of the searched keys.
-        score: score on the cases of the search.
-    """
+    """A candidate that has flown all its cases."""
 
     number: int
+    """Number of the trial."""
     values: Values
+    """Values of the searched keys."""
     score: Score
+    """Score on the cases of the search."""
 
 
 @dataclass
 class SearchResults:
-    """The results of a search so far.
-
-    Attributes:
-        tried: number of all candidates, including those of `stopped_early`.
-        stopped_early: number of candidates that were abandoned, or whose keys were refused.
-        best: candidate with the smallest error of those that met the constraint, `inside_share`;
-            None: none met it.
-        near: the best tenth, or at least the best three, of those that met it; the best first.
-    """
+    """The results of a search so far."""
 
     tried: int = 0
+    """Number of all candidates, including those of `stopped_early`."""
     stopped_early: int = 0
+    """Number of candidates that were abandoned, or whose keys were refused."""
     best: Candidate | None = None
+    """Candidate with the smallest error of those that met the constraint, `inside_share`; None:
+    none met it."""
     near: list[Candidate] = field(default_factory=list)
+    """The best tenth, or at least the best three, of those that met it; the best first."""
 
 
 class Search:

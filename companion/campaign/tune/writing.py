@@ -17,23 +17,20 @@ _EDGE_SHARE = 0.02
 
 
 class CheckedResult(NamedTuple):
-    """The result of a search, checked on unseen cases.
-
-    Attributes:
-        campaign: the campaign, with its section `tune`.
-        found: results of the search.
-        best: the candidate that is proposed.
-        before: score of the configuration before the search, on the unseen cases.
-        after: score of `best`, on the unseen cases.
-        comparison: `after` compared with `before`; None: too few samples were flown to their end.
-    """
+    """The result of a search, checked on unseen cases."""
 
     campaign: Campaign
+    """The campaign, with its section `tune`."""
     found: SearchResults
+    """Results of the search."""
     best: Candidate
+    """The candidate that is proposed."""
     before: Score
+    """Score of the configuration before the search, on the unseen cases."""
     after: Score
+    """Score of `best`, on the unseen cases."""
     comparison: Comparison | None
+    """`after` compared with `before`; None: too few samples were flown to their end."""
 
 
 def summary_lines(result: CheckedResult) -> list[str]:

@@ -21,17 +21,14 @@ SendBatch = Callable[[bytes], None]
 
 
 class StreamedMessage(NamedTuple):
-    """A message of the live stream.
-
-    Attributes:
-        number: index of its channel in `TOPICS`.
-        time_ns: time since 1970, ns; in vehicle time since the vehicle's boot.
-        data: payload, as in the file.
-    """
+    """A message of the live stream."""
 
     number: int
+    """Index of its channel in `TOPICS`."""
     time_ns: int
+    """Time since 1970, ns; in vehicle time since the vehicle's boot."""
     data: bytes
+    """Payload, as in the file."""
 
 
 class Batch:

@@ -93,17 +93,14 @@ OTHER_CHANNELS = {
 
 
 class Topic(NamedTuple):
-    """A channel as the file and the live stream announce it.
-
-    Attributes:
-        name: with a slash in front.
-        type_name: ROS 2 name of the message type.
-        schema: its definition (ros2msg).
-    """
+    """A channel as the file and the live stream announce it."""
 
     name: str
+    """With a slash in front."""
     type_name: str
+    """ROS 2 name of the message type."""
     schema: bytes
+    """Its definition (ros2msg)."""
 
 
 TOPICS = (

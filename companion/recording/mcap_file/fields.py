@@ -21,43 +21,34 @@ Rows = NDArray[np.void]
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One column of a channel.
-
-    Attributes:
-        name: name, which ends with the unit if there is one.
-        meaning: description of the column.
-    """
+    """One column of a channel."""
 
     name: str
+    """Name, which ends with the unit if there is one."""
     meaning: str
+    """Description of the column."""
 
 
 @dataclass(frozen=True, slots=True)
 class CodeField(Field):
-    """A column of codes: small numbers that each have a name.
-
-    Attributes:
-        names: the name of each number; the first is that of 0.
-    """
+    """A column of codes: small numbers that each have a name."""
 
     names: tuple[str, ...] = ("no", "yes")
+    """The name of each number; the first is that of 0."""
 
 
 @dataclass(frozen=True)
 class Channel:
-    """A channel of numbers.
-
-    Attributes:
-        topic: name in the file, with a leading slash.
-        meaning: description of a message.
-        numbers: the float64 columns. NaN: unknown or not applicable.
-        codes: the uint8 columns.
-    """
+    """A channel of numbers."""
 
     topic: str
+    """Name in the file, with a leading slash."""
     meaning: str
+    """Description of a message."""
     numbers: tuple[Field, ...]
+    """The float64 columns. NaN: unknown or not applicable."""
     codes: tuple[CodeField, ...] = ()
+    """The uint8 columns."""
 
     @property
     def name(self) -> str:

@@ -45,31 +45,25 @@ class Cylinder(NamedTuple):
 
 
 class Line(NamedTuple):
-    """A line, 2 pixels thick.
-
-    Attributes:
-        points: x, y and z of each point, m.
-        color: color of the whole line.
-        pairs: True: each pair of points is a separate line. False: all points form one line.
-    """
+    """A line, 2 pixels thick."""
 
     points: Sequence[tuple[float, float, float]]
+    """X, y and z of each point, m."""
     color: Color
+    """Color of the whole line."""
     pairs: bool = False
+    """True: each pair of points is a separate line. False: all points form one line."""
 
 
 class Entity(NamedTuple):
-    """Shapes that are replaced together.
-
-    Attributes:
-        name: id of the entity.
-        frame: frame of the shapes.
-        follows: whether they move with the frame until they are replaced.
-    """
+    """Shapes that are replaced together."""
 
     name: str
+    """Id of the entity."""
     frame: str
+    """Frame of the shapes."""
     follows: bool = False
+    """Whether they move with the frame until they are replaced."""
     arrows: Sequence[Arrow] = ()
     cubes: Sequence[Cube] = ()
     cylinders: Sequence[Cylinder] = ()

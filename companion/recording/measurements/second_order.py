@@ -25,17 +25,14 @@ _COMPASS = (
 
 
 class StepRun(NamedTuple):
-    """Steps flown without a pause between them, such as a doublet.
-
-    Attributes:
-        time: (n,), vehicle time, s, rising.
-        measured: (n, 2), coefficients north and east.
-        target: (n, 2), target coefficients when the sample of that row was answered.
-    """
+    """Steps flown without a pause between them, such as a doublet."""
 
     time: Floats
+    """(n,), vehicle time, s, rising."""
     measured: Floats
+    """(n, 2), coefficients north and east."""
     target: Floats
+    """(n, 2), target coefficients when the sample of that row was answered."""
 
     @property
     def changes(self) -> Floats:
@@ -103,17 +100,14 @@ in this time give the coefficients and the speed from which the model starts."""
 
 @dataclass(frozen=True, slots=True)
 class SecondOrderModel:
-    """Second-order model with dead time: c̈ = ω²·(c_d(t − dead time) − c) − 2ζω·ċ.
-
-    Attributes:
-        frequency: ω, rad/s.
-        damping: ζ.
-        dead_time: time from the sample at which the target changed to the first effect, s.
-    """
+    """Second-order model with dead time: c̈ = ω²·(c_d(t − dead time) − c) − 2ζω·ċ."""
 
     frequency: float
+    """Ω, rad/s."""
     damping: float
+    """Ζ."""
     dead_time: float
+    """Time from the sample at which the target changed to the first effect, s."""
 
     def path(self, run: StepRun, thinning: int = 1) -> Floats:
         """(n, 2) coefficients of the model at every `thinning`-th row of `run`.
@@ -153,19 +147,16 @@ class SecondOrderModel:
 
 
 class RunData(NamedTuple):
-    """The data of a run that a model needs.
-
-    Attributes:
-        time: (m,), times of the rows since the first row of the run, s.
-        start: (2, 2), coefficients and their speed (1/s), measured before the first step acts.
-        changes: (s,), when each target came into force, on the same clock; the first one is 0.
-        targets: (s, 2), coefficients of each target.
-    """
+    """The data of a run that a model needs."""
 
     time: Floats
+    """(m,), times of the rows since the first row of the run, s."""
     start: Floats
+    """(2, 2), coefficients and their speed (1/s), measured before the first step acts."""
     changes: Floats
+    """(s,), when each target came into force, on the same clock; the first one is 0."""
     targets: Floats
+    """(s, 2), coefficients of each target."""
 
     @classmethod
     def of(cls, run: StepRun, thinning: int = 1) -> "RunData":

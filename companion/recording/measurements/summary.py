@@ -36,42 +36,36 @@ _HEIGHT, _SPEED, _TILT = 2, 3, 4
 
 @dataclass(frozen=True, slots=True)
 class LoopCounts:
-    """Counts of the control loop.
-
-    Attributes:
-        samples: attitude samples received while control was switched on.
-        setpoints: setpoints sent.
-        missed_deadlines: answers that took longer than `deadman.deadline_ms`.
-        stale: samples not answered for other reasons than `refused`: the sample or the target was
-            too old or out of order, there was no target, the mode was not confirmed after a gap, or
-            the sample may come from another vehicle.
-        refused: samples not answered because no valid setpoint could be computed or sent.
-        unanswered: unanswered samples, by reason.
-        rate_hz: rate of setpoints in vehicle time during the maneuvers, Hz.
-    """
+    """Counts of the control loop."""
 
     samples: int = 0
+    """Attitude samples received while control was switched on."""
     setpoints: int = 0
+    """Setpoints sent."""
     missed_deadlines: int = 0
+    """Answers that took longer than `deadman.deadline_ms`."""
     stale: int = 0
+    """Samples not answered for other reasons than `refused`: the sample or the target was too old
+    or out of order, there was no target, the mode was not confirmed after a gap, or the sample may
+    come from another vehicle."""
     refused: int = 0
+    """Samples not answered because no valid setpoint could be computed or sent."""
     rate_hz: float = 0.0
+    """Rate of setpoints in vehicle time during the maneuvers, Hz."""
     unanswered: dict[str, int] = field(default_factory=dict)
+    """Unanswered samples, by reason."""
 
 
 @dataclass(frozen=True, slots=True)
 class PredictiveFigures:
-    """Counts and times of predictive control.
-
-    Attributes:
-        flown: answers that were flown.
-        troubles: answers that were not flown, by reason.
-        seconds: computing time of each flown answer in the solver's process.
-    """
+    """Counts and times of predictive control."""
 
     flown: int
+    """Answers that were flown."""
     troubles: dict[str, int]
+    """Answers that were not flown, by reason."""
     seconds: tuple[float, ...]
+    """Computing time of each flown answer in the solver's process."""
 
     def as_dict(self) -> dict[str, Any]:
         """The figures as JSON, in milliseconds."""
@@ -82,37 +76,34 @@ class PredictiveFigures:
 
 @dataclass(frozen=True)
 class Summary:
-    """The summary of a finished flight.
-
-    Attributes:
-        result: "ok", or the reason why it ended early.
-        phase: the phase that failed, else the last one.
-        planner: name of the planner that flew.
-        gain: gain p of the planner, 1/s.
-        counts: counters of the control loop.
-        link: frames received, lost, damaged and so on, by name.
-        trace: recorded rows.
-        events: (s since the flight began, text) of each event.
-        log: the flight's folder.
-        dead_times: measured and configured.
-        predictive: counts of predictive control; None: it did not fly.
-        realtime: each real-time request to the operating system: "granted", or the reason why not.
-        facts: phases, end, and circumstances of the flight.
-    """
+    """The summary of a finished flight."""
 
     result: str
+    """"ok", or the reason why it ended early."""
     phase: str
+    """The phase that failed, else the last one."""
     planner: str
+    """Name of the planner that flew."""
     gain: float
+    """Gain p of the planner, 1/s."""
     counts: LoopCounts
+    """Counters of the control loop."""
     link: dict[str, int]
+    """Frames received, lost, damaged and so on, by name."""
     trace: FlightTrace
+    """Recorded rows."""
     events: list[tuple[float, str]] = field(default_factory=list)
+    """(s since the flight began, text) of each event."""
     log: Path | None = None
+    """The flight's folder."""
     dead_times: DeadTimes = field(default_factory=DeadTimes)
+    """Measured and configured."""
     predictive: PredictiveFigures | None = None
+    """Counts of predictive control; None: it did not fly."""
     realtime: dict[str, str] = field(default_factory=dict)
+    """Each real-time request to the operating system: "granted", or the reason why not."""
     facts: FlightFacts = field(default_factory=FlightFacts)
+    """Phases, end, and circumstances of the flight."""
 
     def response(self) -> StepResponse | None:
         """The measured step response; None without steps."""

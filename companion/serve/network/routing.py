@@ -39,22 +39,19 @@ Intercept = Callable[[Channel, Frame], bool]
 
 @dataclass
 class RoutingStats:
-    """Counters of forwarded and dropped frames.
-
-    Attributes:
-        to_clients: frames of the vehicle that were queued for clients, counted for each client.
-        to_vehicle: clients' frames that were queued for the vehicle.
-        between_clients: clients' frames that were queued for other clients.
-        looped: frames of clients and of other components that were dropped, because they were
-            repetitions, came from a client that had gone, or had our or the autopilot's address.
-        no_route: frames dropped because their target was never heard.
-    """
+    """Counters of forwarded and dropped frames."""
 
     to_clients: int = 0
+    """Frames of the vehicle that were queued for clients, counted for each client."""
     to_vehicle: int = 0
+    """clients' frames that were queued for the vehicle."""
     between_clients: int = 0
+    """clients' frames that were queued for other clients."""
     looped: int = 0
+    """Frames of clients and of other components that were dropped, because they were repetitions,
+    came from a client that had gone, or had our or the autopilot's address."""
     no_route: int = 0
+    """Frames dropped because their target was never heard."""
 
 
 class Routing:

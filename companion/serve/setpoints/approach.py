@@ -18,19 +18,16 @@ class AxisState(NamedTuple):
 
 
 class AxisLimits(NamedTuple):
-    """Limits of a motion along one axis, in SI units or radians.
-
-    Attributes:
-        velocity: largest velocity along the axis.
-        backward: largest speed against the axis.
-        acceleration: largest acceleration in both directions.
-        jerk: largest jerk in both directions.
-    """
+    """Limits of a motion along one axis, in SI units or radians."""
 
     velocity: float
+    """Largest velocity along the axis."""
     backward: float
+    """Largest speed against the axis."""
     acceleration: float
+    """Largest acceleration in both directions."""
     jerk: float
+    """Largest jerk in both directions."""
 
 
 class UnplannableError(ValueError):

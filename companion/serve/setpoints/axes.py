@@ -40,15 +40,12 @@ _MIN_LIMIT_SHARE = 0.25
 
 
 class Continuity(NamedTuple):
-    """Largest jump of a stream that is still followed directly.
-
-    Attributes:
-        position: m or rad.
-        velocity: m/s or rad/s.
-    """
+    """Largest jump of a stream that is still followed directly."""
 
     position: float
+    """m or rad."""
     velocity: float
+    """m/s or rad/s."""
 
 
 class CommandFollower:

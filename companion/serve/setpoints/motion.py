@@ -25,25 +25,20 @@ _MAX_STREAM_PERIOD = 0.25
 
 
 class MotionLimits(NamedTuple):
-    """Limits of motions after a jump of the setpoints.
-
-    Attributes:
-        speed: largest horizontal speed, m/s.
-        acceleration: largest acceleration, m/s²; vertically at most `_VERTICAL_ACCELERATION`.
-        jerk: largest jerk, m/s³; vertically at most `_VERTICAL_JERK`.
-        climb, descent: largest vertical speeds, m/s.
-        yaw_rate: largest yaw rate, rad/s.
-        timeout: time for which a request repeated unchanged is extrapolated, s. After it, a
-            commanded position stands still, and a commanded velocity stays constant.
-    """
+    """Limits of motions after a jump of the setpoints; SI units and radians."""
 
     speed: float
+    """Largest horizontal speed."""
     acceleration: float
+    """Largest acceleration; vertically at most `_VERTICAL_ACCELERATION`."""
     jerk: float
+    """Largest jerk; vertically at most `_VERTICAL_JERK`."""
     climb: float
     descent: float
     yaw_rate: float
     timeout: float
+    """Time for which a request repeated unchanged is extrapolated. After it, a commanded position
+    stands still, and a commanded velocity stays constant."""
 
 
 class CommandedMotion:

@@ -31,17 +31,14 @@ _MAX_POSITION, _MAX_SPEED, _MAX_ACCELERATION, _MAX_YAW_RATE = 10_000.0, 100.0, 1
 
 
 class _Frame(NamedTuple):
-    """A coordinate frame of SET_POSITION_TARGET_LOCAL_NED.
-
-    Attributes:
-        offset: whether positions are relative to the vehicle.
-        body: whether directions are relative to the vehicle's heading.
-        same_position: whether a position in this frame means the same to PX4 and ArduPilot.
-    """
+    """A coordinate frame of SET_POSITION_TARGET_LOCAL_NED."""
 
     offset: bool
+    """Whether positions are relative to the vehicle."""
     body: bool
+    """Whether directions are relative to the vehicle's heading."""
     same_position: bool = True
+    """Whether a position in this frame means the same to PX4 and ArduPilot."""
 
 
 _LOCAL_FRAMES = {
