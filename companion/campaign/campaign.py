@@ -85,11 +85,7 @@ class Campaign:
         )
 
     def _new_value(self, name: str, key: str, value: Any) -> Any:
-        """The value that a key gets: `value`, times the value in `base` if `times_base` is true.
-
-        Raises:
-            ConfigError: the base holds no number to multiply.
-        """
+        """The value that a key gets: `value`, times the value in `base` if `times_base` is true."""
         if not self.file.sweep[name].times_base or value is None:
             return value
         base = self._base_value(key)

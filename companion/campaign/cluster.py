@@ -169,9 +169,6 @@ def _compare_versions(client: "Client") -> None:
     """Require that the scheduler and the workers have the versions of this process.
 
     For the scheduler, only Python's minor version and the version of Dask are compared.
-
-    Raises:
-        VersionError: names the process, and the versions that differ.
     """
     dask_versions = client.get_versions()
     ours, scheduler = (_dask_and_python(dask_versions[side]) for side in ("client", "scheduler"))
@@ -194,11 +191,8 @@ def _dask_and_python(process: Mapping[str, Any]) -> dict[str, str]:
 def run_tasks(client: "Client", tasks: Mapping[int, tuple[Any, ...]]) -> Iterator[EndedUnit]:
     """Run one task for each unit of work; yield each unit when it ends, in any order.
 
-    Dask queues and sends the tasks, and repeats a task whose worker died.
-
-    Args:
-        client: client of the cluster.
-        tasks: unit number -> function and its arguments; the function returns `UnitResult`.
+    Dask queues and sends the tasks, and repeats a task whose worker died. Each of `tasks` is a
+    function, which returns `UnitResult`, and its arguments, by the number of its unit.
 
     Raises:
         ClusterError: the connection to the scheduler is lost.
@@ -219,13 +213,7 @@ def run_tasks(client: "Client", tasks: Mapping[int, tuple[Any, ...]]) -> Iterato
 
 
 def _ended_unit(number: int, future: "Future") -> EndedUnit:
-    """Convert a future that has ended into its unit.
-
-    Raises:
-        ClusterError: the connection to the scheduler is lost.
-        ConfigError: see `run_tasks`.
-        VersionError: see `run_tasks`.
-    """
+    """Convert a future that has ended into its unit."""
     try:
         if future.status == "finished":
             return EndedUnit(number, future.result())

@@ -43,17 +43,11 @@ def run(
     folder: Path,
     on_unit: Callable[[Progress], None] = lambda _: None,
 ) -> Progress:
-    """Run the units of work whose results are missing in the folder.
+    """Run the units of work whose results are missing in the folder, which exists and is locked.
 
     The results of each unit are written when it ends, completely or not at all. If this function is
-    interrupted, only the units that are running are lost.
-
-    Args:
-        client: client of the cluster.
-        campaign: the campaign.
-        description: content of the folder's `campaign.json`.
-        folder: folder of the campaign; it exists and is locked.
-        on_unit: called once before the first unit, and after each unit.
+    interrupted, only the units that are running are lost. `on_unit` is called before the first unit
+    and after each unit.
 
     Raises:
         ClusterError: the connection to the scheduler is lost.
@@ -102,11 +96,7 @@ def internal_errors(folder: Path, file: CampaignFile) -> Counter[str]:
 def run_on_cluster(client: "Client", kind: str, cases: Sequence[Case], case_s: float) -> list[Row]:
     """Run any cases on the cluster; return their rows in order. Nothing is stored.
 
-    Args:
-        client: client of the cluster.
-        kind: "flights" or "batch".
-        cases: cases to be flown.
-        case_s: time that a case takes, s; see `companion.campaign.estimate.case_time`.
+    `case_s` is the wall time that a case takes, s.
 
     Raises:
         ClusterError: the connection to the scheduler is lost, or a unit was given up.

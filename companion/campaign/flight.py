@@ -38,9 +38,7 @@ _PILOT_MODES = (  # of PX4 and ArduPilot
 def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
     """Fly one case; equal cases give equal rows, to the bit.
 
-    Args:
-        case: the case to fly.
-        folder: folder for the files of a fully recorded flight; None: nothing is written.
+    A fully recorded flight writes its files into `folder`; without one nothing is written.
 
     Returns:
         One row of the results: `case`, `seed`, the factors, and the outcomes. If the case raises an
@@ -58,11 +56,7 @@ def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
 
 
 class CaseFlight:
-    """The flight of one case.
-
-    Args:
-        case: the case to fly.
-        files_folder: a new folder; the files that the flight reads are written into it.
+    """The flight of one case; the files that it reads are written into a new folder.
 
     Raises:
         ConfigError: the configuration cannot be flown.
@@ -82,11 +76,7 @@ class CaseFlight:
         self._time_limit_reached = False
 
     def fly(self, folder: Path | None) -> dict[str, Value]:
-        """Fly the case; return its outcomes.
-
-        Args:
-            folder: folder for the files of a fully recorded flight; None: nothing is written.
-        """
+        """Fly the case; return its outcomes. `folder`: see `fly_case`."""
         vehicle, case = self._vehicle, self._case
         vehicle.after_step.append(self._record_truth)
         fault = _FaultInjector(vehicle, case.fault)
@@ -117,13 +107,9 @@ class CaseFlight:
     ) -> dict[str, Value]:
         """The outcomes of the flight.
 
-        Args:
-            summary: the program's summary.
-            truth_at_end: true state of the vehicle when the program ended.
-            truth_afterwards: true state of the vehicle when it disarmed, or
-                `_WATCHED_AFTERWARDS_S` after the program ended.
-            flight_s: time from boot to the end of the program, s.
-            begun: whether the phase in which the fault begins was reached.
+        The two true states are those when the program ended, `flight_s` s after boot, and when the
+        vehicle disarmed, or `_WATCHED_AFTERWARDS_S` later. `begun`: the phase in which the fault
+        begins was reached.
         """
         figures, setpoints = summary.as_dict(), self._vehicle.setpoints
         crashed, fault = truth_afterwards["crashed"], self._case.fault

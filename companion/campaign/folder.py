@@ -52,13 +52,7 @@ class Description:
 
 
 def describe(campaign: Campaign, unit: int, case_s: float | None) -> Description:
-    """The description of a campaign that begins now.
-
-    Args:
-        campaign: the campaign.
-        unit: number of cases in each unit of work.
-        case_s: wall time of a case, s; None: not measured.
-    """
+    """The description of a campaign that begins now; see the fields of `Description`."""
     file, now = campaign.file, datetime.now(UTC).isoformat(timespec="seconds")
     cases = campaign.number_of_cases
     return Description(file.name, file.kind, file.seed, cases, unit, case_s, versions(), now)
@@ -136,11 +130,7 @@ def resume(folder: Path, campaign: Campaign) -> Description:
 
 
 def _require_same(folder: Path, campaign: Campaign) -> None:
-    """Refuse a folder with another campaign; only the limits on the campaign's size may differ.
-
-    Raises:
-        ConfigError: says what differs, or that the campaign's file is damaged.
-    """
+    """Refuse a folder with another campaign; only the limits on the campaign's size may differ."""
     path = folder / CAMPAIGN_FILE_NAME
     try:
         before = bounded_yaml.parse(read_text(path, _LARGEST_FILE_BYTES))

@@ -73,9 +73,8 @@ def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
 def _horizontal_errors(estimated: Floats, true: Floats) -> dict[str, float]:
     """RMS horizontal distances of true position, estimated position and reference, in pairs, m.
 
-    Args:
-        estimated: (N, 7), rows of `FlightTrace.tracking`.
-        true: (N, 7), the same rows with the true position instead of the estimated one.
+    `estimated` are (N, 7) rows of `FlightTrace.tracking`; `true` are the same rows with the true
+    position instead of the estimated one.
     """
     known = np.isfinite(true[:, 1])
     true_position, reference = true[known, 4:6], true[known, 1:3]

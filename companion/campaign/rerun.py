@@ -32,11 +32,7 @@ class Rerun(NamedTuple):
 
 
 def rerun(campaign_folder: Path, index: int) -> Rerun:
-    """Fly a case again, with full recording, and compare it with its stored row.
-
-    Args:
-        campaign_folder: folder of the campaign.
-        index: number of the case.
+    """Fly case number `index` again, with full recording, and compare it with its stored row.
 
     Raises:
         ConfigError: there is no such campaign or case, the case is not a flight, the results are

@@ -94,14 +94,9 @@ def write_unit(
     rows: Sequence[Mapping[str, Value]],
     timing: Mapping[str, Any],
 ) -> None:
-    """Write the rows of a unit of work; when this returns, they are on the disk.
+    """Write the rows of a unit of work, in order; when this returns, they are on the disk.
 
-    Args:
-        folder: folder of the campaign.
-        file: content of the campaign file.
-        number: number of the unit.
-        rows: one row for each case, in order.
-        timing: wall times and worker, for a separate file, because they differ between runs.
+    `timing` (wall times and worker) gets a file of its own, because it differs between runs.
 
     Raises:
         OSError: a file cannot be written; no results of the unit are left.

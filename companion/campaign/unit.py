@@ -39,12 +39,7 @@ class UnitResult(NamedTuple):
 def fly_planned_cases(
     campaign: Campaign, planned: Sequence[PlannedCase], expected: Versions
 ) -> UnitResult:
-    """Build planned cases, and fly them.
-
-    Args:
-        campaign: the campaign.
-        planned: the planned cases.
-        expected: versions of the client, which this process must have, too.
+    """Build planned cases, and fly them; `expected` are the versions of the client.
 
     Raises:
         ConfigError: a case is refused.
@@ -61,12 +56,7 @@ def fly_cases(kind: str, cases: Sequence[Case], expected: Versions) -> UnitResul
 
 
 def run_cases(kind: str, cases: Sequence[Case]) -> list[Row]:
-    """Run cases in this process; return their rows in order.
-
-    Args:
-        kind: "flights" or "batch".
-        cases: cases to be flown.
-    """
+    """Run cases in this process; return their rows in order."""
     if kind == "flights":
         return [fly_case(case) for case in cases]
     from companion.campaign import kinematics  # noqa: PLC0415  imports much
@@ -109,12 +99,9 @@ def _worker_address() -> str:
 
 
 def size_of_units(cases: int, case_s: float, workers: int) -> int:
-    """The number of cases in a unit of work.
+    """The number of cases in a unit of work, if a case takes `case_s` s of wall time.
 
-    Args:
-        cases: number of all cases.
-        case_s: wall time that a case takes, s.
-        workers: number of workers; 0, while the first is awaited, counts as 1.
+    0 workers, while the first is awaited, count as 1.
     """
     by_time = int(LONGEST_UNIT_S / max(case_s, 1e-6))
     by_share = -(-cases // (_UNITS_PER_WORKER * max(1, workers)))
@@ -122,10 +109,5 @@ def size_of_units(cases: int, case_s: float, workers: int) -> int:
 
 
 def unit_ranges(cases: int, size: int) -> list[range]:
-    """The case numbers of each unit of work, in order.
-
-    Args:
-        cases: number of all cases.
-        size: number of cases in a unit; the last unit may have fewer.
-    """
+    """The case numbers of each unit of work, in order; the last unit may be shorter than `size`."""
     return [range(first, min(first + size, cases)) for first in range(0, cases, size)]

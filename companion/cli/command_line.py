@@ -27,8 +27,7 @@ _PACKAGE = "mavlink-companion"
 def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     """Read the command line; ends the program for `--help`, `--version` and wrong usage.
 
-    Args:
-        arguments: arguments of the command line; None: those of this process.
+    Without arguments those of this process are read.
 
     Returns:
         The options; their attribute `typed` holds the arguments as typed.

@@ -41,11 +41,7 @@ def show(options: argparse.Namespace) -> int:
 
 
 def _named_keys(config: Config, name: str) -> list[ConfigKey]:
-    """The key with that name, or all keys of a section.
-
-    Raises:
-        ConfigError: there is no such key.
-    """
+    """The key with that name, or all keys of a section."""
     known = list(keys(config))
     matching = [key for key in known if name in (key.section, f"{key.section}.{key.name}")]
     if not matching:

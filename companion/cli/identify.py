@@ -72,11 +72,7 @@ def identify(options: argparse.Namespace) -> int:
 
 
 def _log_of(given: Path) -> Path:
-    """The log that `--log` names: a file, or the log in the folder of a flight.
-
-    Raises:
-        LogError: there is none; the message names the log that was probably meant.
-    """
+    """The log that `--log` names: a file, or the log in the folder of a flight."""
     log = given / TLOG_FILE if given.is_dir() else given
     if log.is_file() and log.suffix != ".mcap":
         return log

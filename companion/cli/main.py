@@ -18,11 +18,7 @@ if TYPE_CHECKING:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit code.
-
-    Args:
-        arguments: arguments of the command line; None: those of this process.
-    """
+    """Run one command; returns the exit code. Without arguments those of this process are used."""
     if arguments is None:
         _use_utf8_names()
     our_signals = interrupts.unhandled()

@@ -62,11 +62,7 @@ def tune(options: argparse.Namespace) -> int:
 
 
 def _configuration(source: Path, vehicle: Path, base: Path | None) -> tuple[Config, bool]:
-    """The configuration to tune, and whether the vehicle's response comes from a vehicle file.
-
-    Raises:
-        ConfigError: a file cannot be read, or holds no response of the vehicle.
-    """
+    """The configuration to tune, and whether the vehicle's response comes from a vehicle file."""
     recorded = source / _CONFIG
     if base is None and source.is_dir() and recorded.exists():
         base = recorded

@@ -19,9 +19,6 @@ class Channel:
         dropped: number of messages that could not be sent. The buffer was full, the message was too
             large, or the other end was found to be closed; messages after that are not counted.
         open: whether the other end existed at the last attempt.
-
-    Args:
-        end: a non-blocking or blocking SEQPACKET socket.
     """
 
     def __init__(self, end: socket.socket) -> None:
@@ -104,9 +101,6 @@ class Feed:
 
     Attributes:
         dropped: number of datagrams that were not sent: the buffer was full, or the process gone.
-
-    Args:
-        end: a SEQPACKET socket.
     """
 
     def __init__(self, end: socket.socket) -> None:

@@ -29,10 +29,6 @@ class ChangeChecks:
     Attributes:
         start: the configuration with which the flight began.
         now: the configuration after the newest change.
-
-    Args:
-        start: configuration with which the flight began.
-        flies_maneuvers: whether the flight flies the maneuvers of its configuration.
     """
 
     def __init__(self, start: Config, *, flies_maneuvers: bool) -> None:
@@ -87,11 +83,7 @@ class ChangeChecks:
 
 
 def _require_margins(start: Config, wanted: Config, name: str) -> None:
-    """Check the stability margins of the wanted control loop, computed for the configured vehicle.
-
-    Raises:
-        ConfigError: the loop would be unstable, or a margin too small.
-    """
+    """Check the stability margins of the wanted control loop with the configured vehicle."""
     before, after = stability(start), stability(wanted)
     if not after.stable:
         raise ConfigError(f"{name}: with these values the control loop is unstable")

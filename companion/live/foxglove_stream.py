@@ -44,10 +44,6 @@ class _Subscriptions(ServerListener):
 class Stream:
     """A server with the channels of `flight.mcap`.
 
-    Args:
-        host: IP address to listen at.
-        port: number of the port.
-
     Raises:
         RuntimeError: the port cannot be used.
     """
@@ -104,9 +100,7 @@ class Stream:
 async def serve_stream(relay: Relay, feed: socket.socket) -> None:
     """Serve the stream of a flight until the flight has ended and `until_unused` has returned.
 
-    Args:
-        relay: receives messages of the flight.
-        feed: socket on which the records of the flight arrive.
+    The records of the flight arrive on the socket `feed`.
     """
     host, port = str(relay.first["stream_host"]), int(relay.first["stream_port"])
     try:

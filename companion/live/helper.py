@@ -43,10 +43,6 @@ class HelperTasks(NamedTuple):
 class Helper:
     """An observer that passes phases, events and states on to the helper process without waiting.
 
-    Args:
-        tasks: tasks of the process.
-        config: configuration of the flight.
-
     Attributes:
         changes: makes the changes that the process requests. Replace it by the session's `changes`
             before the flight begins.

@@ -32,10 +32,6 @@ class Relay:
         first: the first message of the flight: configuration and tasks (`HelperTasks`).
         checks: checks requested changes.
         over: set when the flight has ended.
-
-    Args:
-        channel: channel to the flight.
-        first: first message of the flight.
     """
 
     def __init__(self, channel: Channel, first: Message) -> None:

@@ -99,11 +99,7 @@ def _panels(record: FlightRecord, trace: FlightTrace) -> "list[Callable[[Axes], 
 
 
 def _checked_rows(record: FlightRecord, name: str, series: Series) -> Floats | None:
-    """The rows of a series; None if it has none.
-
-    Raises:
-        RecordError: a number is too large to be valid.
-    """
+    """The rows of a series; None if it has none."""
     rows = series.rows()
     # NaN means that there is no value.
     if np.abs(rows[~np.isnan(rows)]).max(initial=0.0) > _LARGEST_VALID:

@@ -120,11 +120,9 @@ class FlightRecorder(BackgroundFile[Entry]):
         self.row(time, ACTION, (time, offset, *drag, ACTIONS.index(name)))
 
     def change(self, values: Mapping[str, Mapping[str, Any]], *, at_once: bool) -> None:
-        """Record that values of the configuration begin to change now.
+        """Record that values of the configuration, by section and key, begin to change now.
 
-        Args:
-            values: new values, by section and key.
-            at_once: whether the values change at once, without slewing.
+        `at_once`: they change without slewing.
         """
         now = self._clock()
         self.add(now, _write_fields, ("/change", (now, float(at_once)), (json.dumps(values),)))
@@ -141,13 +139,7 @@ class FlightRecorder(BackgroundFile[Entry]):
 
 
 class _McapEntries:
-    """Writes entries to a `.mcap`.
-
-    Args:
-        writer: writer of the file.
-        epoch: see `FlightRecorder`.
-        drop: called with the reason why an entry cannot be recorded.
-    """
+    """Writes entries to a `.mcap`; calls `drop` with the reason why an entry cannot be recorded."""
 
     def __init__(self, writer: McapWriter, epoch: float, drop: Callable[[Exception], None]) -> None:
         self._writer, self._count_dropped = writer, drop

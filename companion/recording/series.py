@@ -31,8 +31,7 @@ _MOST_WAITING = 64
 class SpooledFile:
     """A temporary file of doubles, created at the first write and deleted with its owner.
 
-    Args:
-        folder: folder of the file; None: in memory.
+    It is in `folder`; without one it is in memory.
     """
 
     def __init__(self, folder: Path | None) -> None:
@@ -68,10 +67,9 @@ _Work = tuple[SpooledFile, bytes] | threading.Event | None
 
 
 class Spool:
-    """Writes chunks to their files, in a thread that starts with the first chunk.
+    """Writes chunks to their files in `folder`, in a thread that starts with the first chunk.
 
-    Args:
-        folder: folder of the files; None: in memory, without a thread.
+    Without a folder they stay in memory, and there is no thread.
     """
 
     def __init__(self, folder: Path | None = None) -> None:

@@ -94,12 +94,9 @@ def recorded_sample(row: Row, sent: Row | None) -> RecordedSample:
 
 
 def recorded_step(row: Row, target: Row | None, guidance: Row | None) -> RecordedStep:
-    """The step in a row of `INPUT`.
+    """The step in a row of `INPUT`, with its rows of `TARGET` and `GUIDANCE`.
 
-    Args:
-        row: row of `INPUT`.
-        target: row of `TARGET` of this step; None: the step gave no command.
-        guidance: row of `GUIDANCE` of this step; None: the step had no reference.
+    None: the step gave no command, or had no reference.
     """
     position = None
     if not isnan(row["position_received_s"]):

@@ -57,10 +57,6 @@ class ReplayedSample(NamedTuple):
 class Replay:
     """Replays a flight with its own configuration or another one.
 
-    Args:
-        record: record of the flight.
-        config: configuration for the replay.
-
     Attributes:
         follows_record: whether the commands of guidance are those of the record.
 

@@ -23,10 +23,7 @@ def result_lines(
 ) -> list[str]:
     """Sentences on what is equal and what differs between flight and replay.
 
-    Args:
-        samples: result of the replay.
-        began: time at which the flight began, s on our clock.
-        follows_record: whether the commands of guidance are those of the record; see `Replay`.
+    The flight began at the time `began` on our clock, s. `follows_record`: see `Replay`.
     """
     recorded = sum(each.recorded is not None for each in samples)
     different = [each for each in samples if not each.same]

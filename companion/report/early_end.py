@@ -53,10 +53,7 @@ def early_end(
 ) -> EndMark | None:
     """The early end of a flight; None if it was flown to its end.
 
-    Args:
-        figures: the content of `summary.json`.
-        record: record of the flight.
-        config: configuration of the flight; None: unknown.
+    `figures` are the content of `summary.json`. The configuration is None if it is unknown.
     """
     end = figures["early_end"]
     if end is None:

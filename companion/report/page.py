@@ -95,11 +95,7 @@ def _read_all(paths: Sequence[Path], on_fault: Callable[[str], object] | None) -
 
 @contextmanager
 def _explain_other_version(*paths: Path) -> Iterator[None]:
-    """Turn errors caused by a summary of another version into a `RecordError` for the user.
-
-    Raises:
-        RecordError: a figure is missing or of another type.
-    """
+    """Turn errors caused by a summary of another version into a `RecordError` for the user."""
     try:
         yield
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:

@@ -54,10 +54,9 @@ class FlightRecords:
             self._tap(time, frame)
 
     def new_record(self, config: Config) -> FlightFiles:
-        """The open record of a new flight; a record without folder if none can be created.
+        """The open record of a new flight, which begins with this configuration.
 
-        Args:
-            config: configuration at the beginning of the flight.
+        It is a record without folder if none can be created.
         """
         folder = None
         if self._directory is not None:

@@ -63,9 +63,7 @@ class Ownership:
     def withdraw(self, client: Hashable, owner_before: Hashable | None) -> None:
         """Withdraw the setpoint that was noted last, because it cannot be flown.
 
-        Args:
-            client: sender of the setpoint.
-            owner_before: client in control before the setpoint.
+        `owner_before` was in control before the setpoint.
         """
         self.owner = owner_before
         stream = self._streams[client]

@@ -40,10 +40,6 @@ factor needs the second number for its influence to be separated from that of ot
 def run(options: argparse.Namespace) -> int:
     """Write the page and the tables of a campaign; returns the exit code.
 
-    Args:
-        options: `folder` of the campaign, and `out`: path of the page; None: `report.html` in the
-            folder.
-
     Raises:
         ConfigError: the folder holds no campaign or no results yet, or a file in it is damaged, or
             the page cannot be written.
@@ -88,12 +84,7 @@ def write_tables(table: "pa.Table", folder: Path) -> None:
 
 
 def page_text(results: Results, campaign: Campaign) -> str:
-    """The HTML of the page.
-
-    Args:
-        results: results of the campaign.
-        campaign: the campaign as stored in the folder.
-    """
+    """The HTML of the page about a campaign as stored in its folder."""
     by_outcome = {
         name: each
         for name in (results.error_outcome, RATES, "ok")
@@ -154,9 +145,7 @@ def missing_cases_note(results: Results) -> list[str]:
 def what_to_look_at(results: Results, by_outcome: dict[str, list[Influence]]) -> Iterator[str]:
     """The sentences at the head of the page: what was swept, and the most important results.
 
-    Args:
-        results: results of the campaign.
-        by_outcome: the influences of the factors on each outcome, the largest first.
+    `by_outcome` holds the influences of the factors on each outcome, the largest first.
     """
     yield f"Swept: {', '.join(results.factors) or 'nothing but noise and gusts'}."
     if crashed := results.true_cases("crashed"):

@@ -34,12 +34,7 @@ _BINS = 40
 
 
 def success(results: Results, order: Sequence[str]) -> Iterator[Plot]:
-    """Success rate at each level of a factor, a plot for each of the most influential factors.
-
-    Args:
-        results: results of the campaign.
-        order: names of the factors, the most influential first.
-    """
+    """Success rate at each level of a factor; `order` names the most influential factors first."""
     for name in order[:_MOST_FACTORS]:
         groups = levels(results.columns[name])
         shares = [share_of(results.good[level.cases]) for level in groups]

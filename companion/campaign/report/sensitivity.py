@@ -32,14 +32,10 @@ class Influence(NamedTuple):
 
 
 def influences(results: Results, outcome: str) -> list[Influence]:
-    """The influence of each factor on an outcome, the largest first.
+    """The influence of each factor on an outcome (a column of numbers, or `ok`), the largest first.
 
     Factors with a single value are left out. The list is empty if no factor is left, if fewer than
     `FEWEST` cases were measured, or if the outcome is always the same.
-
-    Args:
-        results: results of the campaign.
-        outcome: a column of numbers, or `ok`.
     """
     values = np.array(results.columns[outcome], dtype=float)
     rows = np.flatnonzero(np.isfinite(values))
@@ -67,14 +63,11 @@ def influences(results: Results, outcome: str) -> list[Influence]:
 
 
 def _as_numbers(column: Column, values: Floats) -> Floats:
-    """A factor as numbers; texts and booleans are numbered in the order of their mean outcome.
+    """A factor (cases,) as numbers, for an outcome (cases,).
 
-    In another order, texts with different outcomes could share a class, and their difference would
-    be lost. A null among numbers becomes a number below all others.
-
-    Args:
-        column: (cases,) values of the factor.
-        values: (cases,) values of the outcome.
+    Texts and booleans are numbered in the order of their mean outcome. In another order, texts with
+    different outcomes could share a class, and their difference would be lost. A null among numbers
+    becomes a number below all others.
     """
     if column.dtype == float:
         return np.where(np.isfinite(column), column, np.nanmin(column, initial=0.0) - 1.0)

@@ -77,12 +77,7 @@ def cases(campaign: Campaign, values: Values) -> list[Case]:
 
 
 def unseen_campaign(campaign: Campaign, samples: int) -> Campaign:
-    """The campaign with another seed, so that samples, noise and gusts differ from the search's.
-
-    Args:
-        campaign: the campaign.
-        samples: number of samples.
-    """
+    """The campaign with another seed, so that samples, noise and gusts differ from the search's."""
     update = {"seed": campaign.file.seed + _UNSEEN_SEED_OFFSET, "samples": samples}
     return replace(campaign, file=campaign.file.model_copy(update=update))
 
@@ -103,14 +98,9 @@ def suggested(trial: "Trial", search: Mapping[str, Swept]) -> dict[str, Any]:
 def starts(campaign: Campaign, tune: Tune, learned: Config | None = None) -> Iterator[Start]:
     """The starts: the present configuration, `learned`, and the proposal of `companion tune`.
 
+    `learned` is the configuration with the values that first flights measured; None: no such
+    flights. The proposal is computed from `learned` or, without it, from the present configuration.
     There is no proposal if the rate loop is not known.
-
-    Args:
-        campaign: its base is the present configuration.
-        tune: section `tune` of the campaign.
-        learned: the configuration with the values that first flights measured; None: no such
-            flights. The proposal is computed from `learned` or, without it, from the present
-            configuration.
     """
     yield Start(
         "the configuration",
@@ -138,12 +128,6 @@ def starts_near(
     """Candidates around a start: each number is moved by a normally distributed share of its range.
 
     The optimum is likelier near a reasonable start than elsewhere in the ranges.
-
-    Args:
-        start: the start.
-        search: range or choice of each searched key.
-        count: number of candidates.
-        seed: seed of the random numbers.
     """
     rng = np.random.default_rng(seed)
     for _ in range(count):

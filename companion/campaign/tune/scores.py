@@ -67,11 +67,10 @@ class Score(NamedTuple):
 
 
 def scored(rows: Sequence[Row], envelope: float | None) -> Score:
-    """The score computed from rows of results.
+    """The score computed from rows of results, one for each case.
 
-    Args:
-        rows: one row for each case.
-        envelope: largest true distance from the reference inside the envelope, m; None: no limit.
+    `envelope` is the largest true distance from the reference inside the envelope, m; None: no
+    limit.
     """
     return Score(
         tuple(_number(row, "level_rms_m") for row in rows),

@@ -197,13 +197,7 @@ class Search:
         self._study.tell(trial, _capped_rms(score))
 
     def _stop(self, trial: "Trial", error: float, violation: float) -> None:
-        """End a candidate before all of its cases were flown.
-
-        Args:
-            trial: the candidate.
-            error: RMS error so far, m.
-            violation: `_shortfall` of the candidate.
-        """
+        """End a candidate before all of its cases were flown, with its RMS error so far, m."""
         self._set_violation(trial, violation)
         trial.report(error, 0)
         self._study.tell(trial, state=self._optuna.trial.TrialState.PRUNED)

@@ -89,9 +89,8 @@ def _certainty_lines(result: CheckedResult) -> Iterator[str]:
 def result_text(result: CheckedResult, present: Mapping[str, Any]) -> str:
     """The text of the result file.
 
-    Args:
-        result: result of the search.
-        present: values of the searched keys before the search; a key that was not set is missing.
+    `present` holds the values of the searched keys before the search, without keys that were not
+    set.
     """
     tune = result.campaign.file.tune
     assert tune is not None
@@ -126,14 +125,7 @@ def _values_lines(values: Values, reasons: Mapping[str, str]) -> Iterator[str]:
 
 
 def _reason(key: str, swept: Swept, result: CheckedResult, before: Any) -> str:
-    """Text about the value of a key: the value before, and those of the best candidates.
-
-    Args:
-        key: the key.
-        swept: range or choice of the key in the search.
-        result: result of the search.
-        before: value before the search; None: the key was not set.
-    """
+    """Text about a value: what it was before (None: not set), and those of the best candidates."""
     before_text = "not set before" if before is None else f"before {_value_text(before)}"
     near = [each.values[key] for each in result.found.near if key in each.values]
     pair = swept.uniform or swept.loguniform

@@ -32,11 +32,7 @@ class StreamedMessage(NamedTuple):
 
 
 class Batch:
-    """Collects messages and sends them together. Only one thread may use it.
-
-    Args:
-        send: takes the datagrams.
-    """
+    """Collects messages and passes them to `send` together. Only one thread may use it."""
 
     def __init__(self, send: SendBatch) -> None:
         self._send = send

@@ -150,8 +150,7 @@ def log_of(message: bytes) -> tuple[int, str, str]:
 class PoseEncoder:
     """Encodes messages of type FRAME_TRANSFORM (two frames) or POSE_IN_FRAME (one frame).
 
-    Args:
-        frames: names of the frames, which are the same in all messages.
+    All messages have the same names of frames.
     """
 
     def __init__(self, *frames: str) -> None:

@@ -91,10 +91,7 @@ class Channel:
         )
 
     def rows(self, messages: list[bytes]) -> Rows:
-        """All messages of the channel as a structured array.
-
-        Args:
-            messages: messages in the order of the file.
+        """All messages of the channel, in the order of the file, as a structured array.
 
         Raises:
             ValueError: a message has another length, or a code without a name.

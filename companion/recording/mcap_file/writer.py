@@ -43,13 +43,7 @@ class McapWriter:
         self._ids[topic] = self._writer.register_channel(topic, ENCODING, self._schemas[name])
 
     def message(self, topic: str, time_ns: int, data: bytes) -> None:
-        """Add a message.
-
-        Args:
-            topic: topic of the message.
-            time_ns: time since 1970, ns; in vehicle time since the vehicle's boot.
-            data: encoded message.
-        """
+        """Add a message; its time counts from 1970, in vehicle time from the vehicle's boot."""
         if self._batch is not None:
             self._batch.add(topic, time_ns, data)
         self._writer.add_message(self._ids[topic], time_ns, data, time_ns)

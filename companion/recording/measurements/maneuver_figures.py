@@ -104,9 +104,7 @@ def measure_maneuvers(
 def settled_parts(rows: Floats, marks: Sequence[ManeuverMark]) -> list[Floats]:
     """The rows of each maneuver in closed loop, without the time left out at its beginning.
 
-    Args:
-        rows: (N, 7), rows of `FlightTrace.tracking`.
-        marks: marks of `FlightTrace.maneuvers`.
+    `rows` are the (N, 7) rows of `FlightTrace.tracking`.
     """
     parts = [part for _, part in _flown_maneuvers(rows, marks) if not _is_open_loop(part)]
     return [part[part[:, 0] >= part[0, 0] + _settling_time(part)] for part in parts]

@@ -51,9 +51,7 @@ class StepResponse:
 def measure_response(rows: Floats, gain: float) -> StepResponse | None:
     """Measure the rows (N, 7) of `FlightTrace.response`; None without steps.
 
-    Args:
-        rows: vehicle time s, quaternion w x y z, target north, target east.
-        gain: p of the ideal model, 1/s.
+    `gain` is p of the ideal model, 1/s.
     """
     runs = step_runs(rows)
     if not runs:

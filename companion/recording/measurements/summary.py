@@ -191,10 +191,7 @@ class Summary:
 def tracking_errors(rows: "np.ndarray[Any, np.dtype[np.float64]]") -> dict[str, float]:
     """Position error of the rows with a whole reference, height error of those with a height, m.
 
-    NaN: there are no such rows.
-
-    Args:
-        rows: (N, 7), rows of `FlightTrace.tracking`.
+    `rows` are the (N, 7) rows of `FlightTrace.tracking`. NaN: there are no such rows.
     """
     error = rows[:, 4:7] - rows[:, 1:4]
     distance = np.linalg.norm(error[~np.isnan(error).any(axis=1)], axis=1)

@@ -94,10 +94,7 @@ class Client(ABC):
         """Send queued frames without blocking; called only if some are queued."""
 
     def _dequeue(self, max_bytes: int) -> tuple[bytes, int]:
-        """Remove whole frames from the queue, at least one.
-
-        Args:
-            max_bytes: largest total number of bytes, if there are several frames.
+        """Remove whole frames: at least one, or several with at most `max_bytes` together.
 
         Returns:
             The bytes, and the number of frames in them.

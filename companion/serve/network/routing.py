@@ -184,9 +184,6 @@ class _Repeats:
 
     Sequence number and checksum distinguish a frame from its sender's next 255 frames. If a sender
     never increases its sequence number, equal frames are forwarded only once in 0.2 s.
-
-    Args:
-        clock: returns the event-loop time, s.
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:

@@ -35,14 +35,9 @@ class UnplannableError(ValueError):
 
 
 class Approach:
-    """A time-optimal motion of an error to zero.
+    """A time-optimal motion of an error to zero from the time `begin_time`, s.
 
-    Args:
-        error: initial error.
-        limits: limits of each axis.
-        begin_time: time when the motion begins, s.
-        by_velocity: whether only the velocity error must become zero, and the position error need
-            not.
+    `by_velocity`: only the velocity error must become zero, and the position error need not.
 
     Raises:
         UnplannableError: no such motion exists.

@@ -90,10 +90,7 @@ class CommandFollower:
     def stop(self, now: float, actual: AxisMotion | None = None) -> None:
         """Come to rest within limits, and stay there.
 
-        Args:
-            now: present time, s.
-            actual: motion of the vehicle; if the state is too far from it, the stop begins at the
-                vehicle.
+        If the state is too far from `actual`, the motion of the vehicle, the stop begins there.
         """
         if actual is not None:
             current = self.at(now)
@@ -105,13 +102,9 @@ class CommandFollower:
         self.command(AxisDemand(None, self._zero, None), now)
 
     def command(self, demand: AxisDemand, now: float, actual: AxisMotion | None = None) -> None:
-        """Follow a new command.
+        """Follow a new command at the time `now`, s.
 
-        Args:
-            demand: the command.
-            now: present time, s.
-            actual: motion of the vehicle; without a commanded position, the state stays close to
-                the vehicle's.
+        Without a commanded position, the state stays close to `actual`, the motion of the vehicle.
 
         Raises:
             UnplannableError: no motion leads to it; the previous command stays in force.

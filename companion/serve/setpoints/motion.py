@@ -45,9 +45,6 @@ class CommandedMotion:
     """Turns requests into a reference that jumps by `Continuity` at most.
 
     Positions of requests and of the reference are in the same local frame.
-
-    Args:
-        limits: limits of the motion from one request to the next.
     """
 
     def __init__(self, limits: MotionLimits) -> None:
