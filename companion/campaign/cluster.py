@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 WORKER_DEATHS_TO_GIVE_UP = 3
 """A unit of work is given up at this number of deaths of workers on which it ran or was queued.
 
-An existing cluster follows its own setting, `distributed.scheduler.allowed-failures`.
-"""
+An existing cluster follows its own setting, `distributed.scheduler.allowed-failures`."""
 _CONNECTION_LOST = "the connection to the Dask scheduler is lost"
 _CONNECT_TIMEOUT_S = 10.0
 _CLOSE_TIMEOUT_S = 5.0

@@ -17,8 +17,7 @@ _MEASURED_FLIGHTS = 3
 _MEASURED_VEHICLES = 64
 """Largest number of vehicles in the measured batch.
 
-They share one planner, because compiling a planner takes 2 s.
-"""
+They share one planner, because compiling a planner takes 2 s."""
 
 
 def case_time(kind: str, cases: Sequence[Case]) -> float:

@@ -38,8 +38,7 @@ OUTCOME_LABELS = {
 """The outcomes of a flight that are numbers, null where they were not measured, and their texts."""
 _SATURATED_FROM = 0.99
 """A setpoint counts as saturated if its rate or thrust is at least this share of the upper limit,
-or its thrust is at most the lower limit divided by this share.
-"""
+or its thrust is at most the lower limit divided by this share."""
 
 
 def tracking(summary: Summary, truth: Floats) -> dict[str, float]:

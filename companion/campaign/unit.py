@@ -15,14 +15,12 @@ Row = dict[str, Value]
 LONGEST_UNIT_S = 2.5
 """Longest planned wall time of a unit with several cases, s.
 
-It is long compared with the time to send a unit, and so short that a lost unit costs little.
-"""
+It is long compared with the time to send a unit, and so short that a lost unit costs little."""
 _UNITS_PER_WORKER = 4
 """Number of units for each worker where there are few cases, before rounding.
 
 With several units each, all workers end at about the same time. With many cases `LONGEST_UNIT_S`
-limits the units instead, and there are more of them.
-"""
+limits the units instead, and there are more of them."""
 
 
 class UnitResult(NamedTuple):

@@ -17,8 +17,7 @@ from companion.tuning import stability
 
 _LEAST_GAIN_DB, _LEAST_PHASE_DEG = 4.0, 20.0
 """Smallest gain and phase margin that a change may leave. If the loop had less when the flight
-began, a change must not reduce that margin.
-"""
+began, a change must not reduce that margin."""
 _ROUNDING = 1e-3
 """Relative error of computed margins that is ignored."""
 

@@ -33,8 +33,7 @@ PARQUET, CSV = "results.parquet", "results.csv"
 _DONE = 0  # exit code
 _GRID_LIKE, _FEW_SAMPLES = 12, 60
 """Number of different values of a factor: up to the first number it counts as a grid; a sampled
-factor needs the second number for its influence to be separated from that of other factors.
-"""
+factor needs the second number for its influence to be separated from that of other factors."""
 
 
 def run(options: argparse.Namespace) -> int:

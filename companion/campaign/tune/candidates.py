@@ -28,8 +28,7 @@ _UNSEEN_SEED_OFFSET = 1_000_003
 _NEARBY_DEVIATION = 0.15
 """Standard deviation of the values around a start, as a share of the range of the key.
 
-With `loguniform` the range is that of the logarithm.
-"""
+With `loguniform` the range is that of the logarithm."""
 
 
 class Start(NamedTuple):

@@ -41,8 +41,7 @@ _FIRST_DIVISOR = 4
 _FEWEST_FIRST_CASES = 2
 _HOPELESS_FACTOR = 1.3
 """A candidate is abandoned when its error on the first cases is more than this factor times that of
-the best candidate on the same cases.
-"""
+the best candidate on the same cases."""
 _LARGEST_ERROR = 10.0
 """Larger errors are reported to Optuna as this one, m, and so are flights that ended early."""
 _VALUES, _SCORE, _VIOLATION, _COMPLETE = "values", "score", "missed", "whole"

@@ -109,13 +109,13 @@ class SecondOrderModel:
     dead_time: float
     """Time from the sample at which the target changed to the first effect, s."""
 
-    def path(self, run: StepRun, thinning: int = 1) -> Floats:
-        """(n, 2) coefficients of the model at every `thinning`-th row of `run`.
+    def path(self, run: StepRun) -> Floats:
+        """(n, 2) coefficients of the model at the rows of `run`.
 
         It starts with the measured coefficients and speed, and keeps this speed until the first
         target has an effect.
         """
-        return self.path_at_rows(RunData.of(run, thinning))
+        return self.path_at_rows(RunData.of(run))
 
     def path_at_rows(self, data: "RunData") -> Floats:
         """(m, 2), coefficients of the model at the times in `data`; see `path`."""

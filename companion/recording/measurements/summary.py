@@ -2,7 +2,7 @@
 
 import json
 import math
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -36,7 +36,7 @@ _HEIGHT, _SPEED, _TILT = 2, 3, 4
 
 @dataclass(frozen=True, slots=True)
 class LoopCounts:
-    """Counts of the control loop."""
+    """Counts of the control loop, under the names of `--json`."""
 
     samples: int = 0
     """Attitude samples received while control was switched on."""
@@ -50,10 +50,10 @@ class LoopCounts:
     come from another vehicle."""
     refused: int = 0
     """Samples not answered because no valid setpoint could be computed or sent."""
-    rate_hz: float = 0.0
-    """Rate of setpoints in vehicle time during the maneuvers, Hz."""
     unanswered: dict[str, int] = field(default_factory=dict)
     """Unanswered samples, by reason."""
+    rate_hz: float = 0.0
+    """Rate of setpoints in vehicle time during the maneuvers, Hz."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,13 +160,7 @@ class Summary:
             "phase": self.phase,
             "planner": self.planner,
             "gain_per_s": self.gain,
-            "samples": self.counts.samples,
-            "setpoints": self.counts.setpoints,
-            "missed_deadlines": self.counts.missed_deadlines,
-            "stale": self.counts.stale,
-            "refused": self.counts.refused,
-            "unanswered": self.counts.unanswered,
-            "rate_hz": self.counts.rate_hz,
+            **asdict(self.counts),
             "latency_us": without_nan(self.latency_us()),
             "response": response_as_dict(self.response()),
             "dead_time_s": _dead_times_as_dict(self.dead_times),

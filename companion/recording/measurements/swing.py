@@ -36,8 +36,7 @@ _LONGEST_SAMPLE_PERIOD = 0.05
 """Longest time between samples, s."""
 _PEAK_SHARE = 0.9
 """The first peak of at least this share of the highest one gives the period, because multiples of
-the period also have peaks.
-"""
+the period also have peaks."""
 
 
 class Swing(NamedTuple):

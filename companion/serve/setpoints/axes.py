@@ -32,8 +32,7 @@ _MAX_LEAD_DISTANCE = 1.5
 """Largest distance between reference and vehicle if no position is commanded, m."""
 _MAX_LEAD_SPEED = 2.0
 """Largest difference between the velocities of reference and vehicle if only accelerations are
-commanded, m/s.
-"""
+commanded, m/s."""
 
 _MIN_LIMIT_SHARE = 0.25
 """Smallest share of its limits that an axis gets, even if the motion is perpendicular to it."""

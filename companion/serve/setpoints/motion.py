@@ -15,8 +15,7 @@ _VERTICAL_CONTINUITY = Continuity(0.3, 0.4)
 _HEADING_CONTINUITY = Continuity(0.2, 1.0)
 _VERTICAL_ACCELERATION, _VERTICAL_JERK = 2.0, 6.0
 """Largest vertical acceleration, m/s², and jerk, m/s³: thrust used for climbing is not available
-for tilt.
-"""
+for tilt."""
 _YAW_ACCELERATION, _YAW_JERK = 2.0, 10.0
 """Largest yaw acceleration, rad/s², and jerk, rad/s³, after a jump of the yaw; yaw responds slowly.
 """
