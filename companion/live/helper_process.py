@@ -155,7 +155,7 @@ async def _serve(descriptor: int, listening: int, feed: int) -> None:
             stream; −1: no live stream.
     """
     channel = Channel(socket.socket(fileno=descriptor))
-    first = channel.receive()
+    first = next(channel.arrived(1))
     if first is None:
         return
     os.set_blocking(descriptor, False)
