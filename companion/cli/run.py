@@ -16,15 +16,15 @@ from companion.files.os_errors import reason_of
 from companion.files.yaml_file import ConfigError
 from companion.mavlink.errors import EndpointError, LinkError, LogError, SigningError
 from companion.realtime import RealtimeError
-from companion.recording.figure import FigureError
 from companion.recording.flight_record import RecordError
+from companion.report import PictureError
 
 _USAGE_ERRORS = (
     ConfigError,
     EndpointError,
-    FigureError,
     LogError,
     MissingExtraError,
+    PictureError,
     RealtimeError,
     RecordError,
     SigningError,

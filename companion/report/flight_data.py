@@ -1,6 +1,7 @@
 """The data of one flight for a page, read from its folder."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -13,8 +14,7 @@ from companion.config import Config
 from companion.config.files import load
 from companion.config.reference import ConfigKey, changed_keys
 from companion.files.yaml_file import ConfigError
-from companion.recording.flight_record import FlightRecord, read_flight
-from companion.recording.history import Span
+from companion.recording.flight_record import FlightRecord, RecordError, read_flight
 from companion.recording.mcap_file.fields import Rows
 from companion.recording.mcap_file.flight_events import Event
 from companion.recording.measurements.recorded_summary import summary_of, trace_of
@@ -22,6 +22,15 @@ from companion.recording.measurements.second_order import StepRun, step_runs
 from companion.report.early_end import EndMark, early_end
 
 Floats = NDArray[np.float64]
+
+
+class Span(NamedTuple):
+    """A maneuver, a phase or a mode; times in s since the flight began."""
+
+    begin: float
+    end: float
+    name: str
+    """Shown to the user."""
 
 
 class Curve(NamedTuple):
@@ -73,6 +82,18 @@ class FlightData:
         """End of the last phase or mode, s since the flight began; None: there are none."""
         sections = self.phases or self.modes
         return sections[-1].end if sections else None
+
+
+@contextmanager
+def explain_other_version(*paths: Path) -> Iterator[None]:
+    """Turn errors caused by a summary of another version into a `RecordError` for the user."""
+    try:
+        yield
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        raise RecordError(
+            f"{' or '.join(map(str, paths))}: recorded by another version, or damaged ({error!r}); "
+            "rename its summary.json, and the figures are computed from flight.mcap"
+        ) from error
 
 
 def recorded(folder: Path) -> FlightData:

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from companion.recording.history import Span
 from companion.report.early_end import EndMark
-from companion.report.flight_data import Curve, FlightData, Floats
+from companion.report.flight_data import Curve, FlightData, Floats, Span
 
 MEASURED, REFERENCE, IDEAL, NEAREST = "#0072b2", "#d55e00", "#999999", "#009e73"
 CROSSED = "#c1121f"

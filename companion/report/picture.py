@@ -1,26 +1,21 @@
 """A flight as a picture: response, straightness, ground track, history. Needs the extra `plot`."""
 
 from collections.abc import Callable
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from companion.extras import require
-from companion.recording.flight_record import FlightRecord, RecordError, read_flight
-from companion.recording.history import PANEL_HEIGHTS, Marks, draw_history, marks_of
-from companion.recording.measurements.recorded_summary import summary_of, trace_of
+from companion.recording.flight_record import RecordError
 from companion.recording.measurements.response import first_order
-from companion.recording.measurements.second_order import StepRun, nearest_second_order, step_runs
-from companion.recording.series import Series
-from companion.recording.trace import FlightTrace
+from companion.recording.measurements.second_order import nearest_second_order
+from companion.report import PictureError
+from companion.report.flight_data import FlightData, explain_other_version, recorded
+from companion.report.picture_history import PANEL_HEIGHTS, draw_history
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-Floats = NDArray[np.float64]
 
 # Readable by the colour-blind.
 _MEASURED, _IDEAL, _NEAREST, _TARGET = "#0072b2", "#d55e00", "#009e73", "#999999"
@@ -33,10 +28,6 @@ _ROOM_FOR_LEGEND = 0.2
 """Room above the curves, as a share of their height."""
 
 
-class FigureError(Exception):
-    """The picture cannot be drawn; the message says why and what to do."""
-
-
 def draw_flight(folder: Path, out: Path) -> str | None:
     """Draw the flight recorded in `folder` into the file `out`.
 
@@ -45,7 +36,7 @@ def draw_flight(folder: Path, out: Path) -> str | None:
 
     Raises:
         MissingExtraError: matplotlib is missing.
-        FigureError: there is nothing to draw, or the suffix of `out` is unknown.
+        PictureError: there is nothing to draw, or the suffix of `out` is unknown.
         RecordError: there is no readable record, or it or its summary has invalid values.
         OSError: the picture cannot be written.
     """
@@ -55,14 +46,13 @@ def draw_flight(folder: Path, out: Path) -> str | None:
     mpl.use("Agg")
     from matplotlib import pyplot as plt  # noqa: PLC0415
 
-    record = read_flight(folder)
-    trace = trace_of(record)
-    panels, motion = _panels(record, trace), _checked_rows(record, "motion", trace.motion)
-    if not panels and motion is None:
-        raise FigureError(f"{folder}: no flight with anything to draw is recorded there")
-    marks = Marks() if motion is None else _marks(record)
-    above, below = bool(panels) * _HEIGHT, 0.0 if motion is None else _HISTORY_HEIGHT
-    heights = [height for height in (above, below) if height]
+    with explain_other_version(folder):
+        flight = recorded(folder)
+        _check_numbers(flight, folder)
+        panels, history = _panels(flight), "motion" in flight.curves
+    if not panels and not history:
+        raise PictureError(f"{folder}: no flight with anything to draw is recorded there")
+    heights = [_HEIGHT] * bool(panels) + [_HISTORY_HEIGHT] * history
     figure = plt.figure(figsize=(_WIDTH, sum(heights)), layout="constrained")
     try:
         parts = iter(figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0])
@@ -70,79 +60,56 @@ def draw_flight(folder: Path, out: Path) -> str | None:
             grid = next(parts).subplots(1, len(panels), squeeze=False)
             for axes, draw in zip(grid[0], panels, strict=True):
                 draw(axes)
-        if motion is not None:
+        if history:
             grid = next(parts).subplots(
                 len(PANEL_HEIGHTS), 1, sharex=True, height_ratios=PANEL_HEIGHTS
             )
-            draw_history(grid, motion, marks)
+            draw_history(grid, flight)
         # Without a format matplotlib would add a suffix to a name that has none.
         figure.savefig(out, dpi=120, format=out.suffix[1:] or "png")
     except ValueError as error:  # a suffix that matplotlib does not know
-        raise FigureError(f"{out}: {error}") from error
+        raise PictureError(f"{out}: {error}") from error
     finally:
         plt.close(figure)
-    return record.fault
+    return flight.fault
 
 
-def _panels(record: FlightRecord, trace: FlightTrace) -> "list[Callable[[Axes], None]]":
+def _check_numbers(flight: FlightData, folder: Path) -> None:
+    """Refuse a record with a number that is too large to be valid; NaN means that there is none."""
+    for name, curve in flight.curves.items():
+        for values in curve:
+            if np.abs(values[~np.isnan(values)]).max(initial=0.0) > _LARGEST_VALID:
+                raise RecordError(
+                    f"{folder}: {name}: not a valid record of a flight: a number is above "
+                    f"{_LARGEST_VALID:g}"
+                )
+
+
+def _panels(flight: FlightData) -> "list[Callable[[Axes], None]]":
     """Functions that draw the upper panels."""
-    response = _checked_rows(record, "response", trace.response)
-    tracking = _checked_rows(record, "tracking", trace.tracking)
     panels: list[Callable[[Axes], None]] = []
-    runs = [] if response is None else step_runs(response)
-    if runs:
-        gain = _gain(record)
-        panels += [lambda axes: _draw_steps(axes, runs, gain), lambda axes: _draw_plane(axes, runs)]
-    if tracking is not None:
-        panels.append(lambda axes: _draw_ground(axes, tracking))
+    if flight.runs:
+        ideal = 1.0 / flight.gain
+        panels += [
+            lambda axes: _draw_steps(axes, flight, ideal),
+            lambda axes: _draw_plane(axes, flight),
+        ]
+    if "position" in flight.curves:
+        panels.append(lambda axes: _draw_ground(axes, flight))
     return panels
 
 
-def _checked_rows(record: FlightRecord, name: str, series: Series) -> Floats | None:
-    """The rows of a series; None if it has none."""
-    rows = series.rows()
-    # NaN means that there is no value.
-    if np.abs(rows[~np.isnan(rows)]).max(initial=0.0) > _LARGEST_VALID:
-        raise RecordError(
-            f"{record.folder}: {name}: not a valid record of a flight: a number is above "
-            f"{_LARGEST_VALID:g}"
-        )
-    return rows if len(rows) else None
+def _draw_steps(axes: "Axes", flight: FlightData, ideal: float) -> None:
+    """The first doublet along its direction, with the nearest and the ideal model.
 
-
-def _gain(record: FlightRecord) -> float:
-    try:
-        gain = float(record.metadata["flight"]["gain_per_s"])
-        if not 0.0 < gain < inf:
-            raise ValueError(f"gain_per_s is {gain:g}")
-        return gain
-    except (ValueError, KeyError) as error:
-        raise RecordError(f"{record.folder}: not a valid record of a flight: {error}") from error
-
-
-def _marks(record: FlightRecord) -> Marks:
-    """The phases, the maneuvers and the end that the panels of the history mark."""
-    summary, _ = summary_of(record)
-    try:
-        return marks_of(summary)
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
-        path = record.folder / "summary.json"
-        raise RecordError(f"{path}: not a valid summary of a flight: {error}") from error
-
-
-def _draw_steps(axes: "Axes", runs: list[StepRun], gain: float) -> None:
-    """The first doublet along its direction, with the ideal and the nearest second-order model."""
-    run, model = runs[0], nearest_second_order(runs)
+    `ideal` is the time constant of the ideal model, s.
+    """
+    run, model = flight.runs[0], nearest_second_order(flight.runs)
     along, time = run.direction, run.time - run.time[0]
     nearest = f"second order, {1e3 * model.dead_time:.0f} ms dead time"
     axes.plot(time, run.target @ along, color=_TARGET, label="target")
-    axes.plot(
-        time,
-        first_order(run, 1.0 / gain) @ along,
-        "--",
-        color=_IDEAL,
-        label=f"ideal, 1/p = {1 / gain:.2g} s",
-    )
+    exact = first_order(run, ideal) @ along
+    axes.plot(time, exact, "--", color=_IDEAL, label=f"ideal, 1/p = {ideal:.2g} s")
     axes.plot(time, run.measured @ along, color=_MEASURED, label="measured")
     axes.plot(time, model.path(run) @ along, ":", color=_NEAREST, label=nearest)
     axes.set(
@@ -154,9 +121,9 @@ def _draw_steps(axes: "Axes", runs: list[StepRun], gain: float) -> None:
     axes.grid(alpha=0.3)
 
 
-def _draw_plane(axes: "Axes", runs: list[StepRun]) -> None:
+def _draw_plane(axes: "Axes", flight: FlightData) -> None:
     """All doublets, north over east coefficient: a linear response moves on straight lines."""
-    for number, run in enumerate(runs):
+    for number, run in enumerate(flight.runs):
         style = _STYLES[number % len(_STYLES)]
         north, east = run.measured.T
         axes.plot(east, north, style, color=_MEASURED, label=run.compass)
@@ -167,13 +134,19 @@ def _draw_plane(axes: "Axes", runs: list[StepRun]) -> None:
     axes.grid(alpha=0.3)
 
 
-def _draw_ground(axes: "Axes", tracking: Floats) -> None:
+def _draw_ground(axes: "Axes", flight: FlightData) -> None:
     """The ground track, and its reference, which has gaps in open-loop steps."""
-    if not np.isnan(tracking[:, 1]).all():
-        north, east = tracking[:, 1], tracking[:, 2]
+    position, reference = flight.curves["position"].values, flight.curves["reference"].values
+    if not np.isnan(reference[:, 0]).all():
         # On top, and thin: a good flight would hide it.
-        axes.plot(east, north, "--", color=_IDEAL, linewidth=1.0, zorder=3, label="reference")
-    axes.plot(tracking[:, 5], tracking[:, 4], color=_MEASURED, label="flown")
+        axes.plot(
+            *(reference[:, 1], reference[:, 0], "--"),
+            color=_IDEAL,
+            linewidth=1.0,
+            zorder=3,
+            label="reference",
+        )
+    axes.plot(position[:, 1], position[:, 0], color=_MEASURED, label="flown")
     axes.set(title="Ground track", xlabel="east, m", ylabel="north, m")
     axes.set_aspect("equal", adjustable="datalim")
     axes.legend(loc="center", fontsize="small")
