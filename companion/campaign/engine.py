@@ -13,13 +13,7 @@ from companion.campaign.case import Case
 from companion.campaign.cluster import ClusterError, EndedUnit, number_of_workers, run_tasks
 from companion.campaign.flight import INTERNAL_ERROR
 from companion.campaign.folder import Description
-from companion.campaign.unit import (
-    Row,
-    fly_cases,
-    fly_planned_cases,
-    size_of_units,
-    unit_ranges,
-)
+from companion.campaign.unit import Row, fly_cases, fly_planned_cases, size_of_units, unit_ranges
 from companion.campaign.versions import versions
 
 if TYPE_CHECKING:

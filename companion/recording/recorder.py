@@ -168,9 +168,7 @@ def _metadata(writer: McapWriter, _: int, values: tuple[str, Mapping[str, str]])
 
 
 def _write_fields(
-    writer: McapWriter,
-    time_ns: int,
-    values: tuple[str, tuple[float, ...], tuple[str, ...]],
+    writer: McapWriter, time_ns: int, values: tuple[str, tuple[float, ...], tuple[str, ...]]
 ) -> None:
     topic, numbers, texts = values
     writer.message(topic, time_ns, cdr.fields_message(numbers, texts))

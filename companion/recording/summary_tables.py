@@ -94,9 +94,7 @@ def _dead_times(summary: Summary) -> list[RenderableType]:
     age = found.sample_age
     if not isnan(age.p50):
         table.add_row(
-            "of which sample age (p50, p99)",
-            f"{1e3 * age.p50:.1f}, {1e3 * age.p99:.1f} ms",
-            "",
+            "of which sample age (p50, p99)", f"{1e3 * age.p50:.1f}, {1e3 * age.p99:.1f} ms", ""
         )
     return [table]
 
@@ -120,10 +118,7 @@ def _tracking(summary: Summary) -> RenderableType:
         level = (
             ("open loop", f"{flown.drift:.2f} m away")
             if flown.open_loop
-            else (
-                _with_unit(flown.level_rms, "m", 2),
-                _with_unit(flown.level_max, "m", 2),
-            )
+            else (_with_unit(flown.level_rms, "m", 2), _with_unit(flown.level_max, "m", 2))
         )
         heights = _with_unit(flown.height_rms, "m", 2), _with_unit(flown.height_max, "m", 2)
         table.add_row(flown.name, *level, *heights)

@@ -93,10 +93,7 @@ def write_csv(samples: Sequence[ReplayedSample], path: Path) -> None:
         file.write(",".join(_COLUMNS) + "\n")
         for each in samples:
             row = [repr(each.received), repr(each.vehicle_time)]
-            answers = (
-                (each.recorded, each.recorded_reason),
-                (each.replayed, each.replayed_reason),
-            )
+            answers = ((each.recorded, each.recorded_reason), (each.replayed, each.replayed_reason))
             for setpoint, reason in answers:
                 sent = [""] * 4 if setpoint is None else [*setpoint.rates, setpoint.thrust]
                 row += [str(value) for value in sent] + [reason]

@@ -1,12 +1,7 @@
 """The vehicle as guidance sees it in a replay: the recorded inputs of each guidance step."""
 
 from companion.control.step_rows import StepInput
-from companion.vehicle.records import (
-    AttitudeTarget,
-    AttitudeTargetThrust,
-    Battery,
-    LocalPosition,
-)
+from companion.vehicle.records import AttitudeTarget, AttitudeTargetThrust, Battery, LocalPosition
 
 
 class ReplayedVehicle:

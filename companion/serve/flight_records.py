@@ -37,10 +37,7 @@ class FlightRecords:
     """
 
     def __init__(
-        self,
-        directory: Path | None,
-        environment: Environment,
-        note: Callable[[str], None],
+        self, directory: Path | None, environment: Environment, note: Callable[[str], None]
     ) -> None:
         self.grants: tuple[realtime.SettingResult, ...] = ()
         self.on_recorded: Callable[[Path], str | None] = lambda _: None

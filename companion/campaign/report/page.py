@@ -73,10 +73,7 @@ def write_tables(table: "pa.Table", folder: Path) -> None:
     import pyarrow.csv  # noqa: PLC0415  an extra
     import pyarrow.parquet  # noqa: PLC0415
 
-    for name, write in (
-        (PARQUET, pyarrow.parquet.write_table),
-        (CSV, pyarrow.csv.write_csv),
-    ):
+    for name, write in ((PARQUET, pyarrow.parquet.write_table), (CSV, pyarrow.csv.write_csv)):
         content = BytesIO()
         write(table, content)
         write_whole(folder / name, content.getvalue())

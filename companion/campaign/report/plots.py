@@ -7,13 +7,7 @@ import numpy as np
 
 from companion.campaign.report.results import RATES, THRUST, Floats, Results, label
 from companion.campaign.report.sensitivity import Influence
-from companion.campaign.report.statistics import (
-    choices,
-    levels,
-    median,
-    pareto_front,
-    share_of,
-)
+from companion.campaign.report.statistics import choices, levels, median, pareto_front, share_of
 from companion.report.plots import IDEAL, MEASURED, NEAREST, REFERENCE, Plot, axes, numbers
 
 _MOST_FACTORS = 6

@@ -12,11 +12,7 @@ from companion.config import Config
 from companion.config.files import changed, load
 from companion.files.yaml_file import ConfigError
 from companion.guidance.reference import GRAVITY
-from companion.identification import (
-    BadFitError,
-    identify_vehicle,
-    vehicle_fragment,
-)
+from companion.identification import BadFitError, identify_vehicle, vehicle_fragment
 from companion.mavlink.errors import LogError
 from companion.recording.learned_file import newest_learned
 from companion.recording.tlog import TLOG_FILE

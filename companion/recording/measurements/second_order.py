@@ -77,11 +77,7 @@ def step_runs(rows: Floats) -> list[StepRun]:
         return []
     parts = np.split(rows, np.flatnonzero(np.diff(rows[:, 0]) > _LONGEST_GAP) + 1)
     return [
-        StepRun(
-            part[:, 0],
-            np.array([coefficients(tuple(row[1:5])) for row in part]),
-            part[:, 5:7],
-        )
+        StepRun(part[:, 0], np.array([coefficients(tuple(row[1:5])) for row in part]), part[:, 5:7])
         for part in parts
         if len(part) > _TOO_FEW
     ]

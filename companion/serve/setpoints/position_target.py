@@ -171,9 +171,7 @@ def _shifted(values: _Values, start: Vector) -> _Values:
 
 
 def _request(
-    groups: tuple[_Values, _Values, _Values],
-    yaw: float | None,
-    yaw_rate: float | None,
+    groups: tuple[_Values, _Values, _Values], yaw: float | None, yaw_rate: float | None
 ) -> MotionRequest:
     return MotionRequest(
         _demand(groups, _HORIZONTAL_AXES, "horizontal"),
