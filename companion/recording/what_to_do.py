@@ -51,7 +51,7 @@ ADVICE_BY_PHASE: Mapping[str, str] = {
 }
 """Advice by the name of the phase."""
 
-_USER_CODE = "mend the code named above, and fly it on the mock vehicle (`companion demo`) first"
+_USER_CODE = "fix the code named above, and fly it on the mock vehicle (`companion demo`) first"
 
 
 def what_to_do(monitor: str | None, phase: str, result: str = "") -> str:
