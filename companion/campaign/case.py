@@ -13,7 +13,6 @@ class Fault:
     """A fault scenario of one flight."""
 
     name: str
-    """Name of the scenario."""
     inject: tuple[Mapping[str, Any], ...]
     """Entries as in `mock.faults`."""
     phase: str

@@ -44,7 +44,6 @@ class EndedUnit(NamedTuple):
     """A unit of work that was run or given up."""
 
     number: int
-    """Number of the unit."""
     result: UnitResult | None
     """Rows and wall times; None: the unit was given up."""
     reason: str = ""

@@ -34,13 +34,10 @@ class Description:
     """Description of a campaign: the content of `campaign.json`."""
 
     name: str
-    """Name of the campaign."""
     kind: str
     """"flights" or "batch"."""
     seed: int
-    """Seed of the campaign."""
     cases: int
-    """Number of cases."""
     unit: int
     """Number of cases in each unit of work; the last unit may have fewer."""
     case_s: float | None

@@ -171,7 +171,6 @@ class _Pattern(NamedTuple):
     """A maneuver from its first open-loop step to the end of the last, level between the steps."""
 
     samples: int
-    """Number of samples."""
     parts: tuple[tuple[int, int, Coefficients], ...]
     """For each step and each level part: its first sample, the sample after its last, and its
     acceleration coefficients."""

@@ -22,13 +22,10 @@ class PageSocket(NamedTuple):
     """The listening socket of the live page, and the token that admits users."""
 
     host: str
-    """IP address of the socket."""
     port: int
-    """Number of the port."""
     token: str
     """Required to change something, and to watch from another computer."""
     listening: socket.socket
-    """The listening socket."""
 
     def address_text(self) -> str:
         """A line for the user: address of the page, and the token."""
@@ -47,7 +44,6 @@ class StreamAddress(NamedTuple):
     host: str
     """IP address."""
     port: int
-    """Number of the port."""
 
     def address_text(self) -> str:
         """A line for the user: address of the stream, and how to open it."""

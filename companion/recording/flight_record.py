@@ -63,9 +63,7 @@ class FlightRecord:
     """A recorded flight. Its properties raise RecordError if a message is not valid."""
 
     folder: Path
-    """Folder of the flight."""
     content: McapContent
-    """Messages of `flight.mcap`."""
     complete: bool
     """Whether the recording was closed. False: power failed, the process was killed, or the disk
     was full; up to a second may then be missing at the end."""

@@ -23,11 +23,9 @@ class LearnedDrag(NamedTuple):
     """Drag of a vehicle, learned in earlier flights."""
 
     drag: Drag
-    """Drag of the vehicle."""
     top_speed: float
     """Largest speed at which the drag was learned, m/s."""
     path: Path
-    """Path of the file."""
 
     def as_keys(self) -> dict[str, dict[str, float]]:
         """The drag as keys of the configuration, by section."""

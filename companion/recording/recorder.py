@@ -31,7 +31,6 @@ class Entry(NamedTuple):
     time: float
     """Time on our clock, s."""
     encoder: Encoder
-    """Makes the messages."""
     values: Any
     """Arguments of the encoder; they must not change any more."""
 

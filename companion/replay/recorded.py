@@ -53,7 +53,6 @@ class RecordedStep(NamedTuple):
     """A step of the guidance loop."""
 
     inputs: StepInput
-    """Inputs of the step."""
     command: GuidanceCommand | None
     """Command that the step gave to the control loop; None: it gave none."""
     reference: Reference | None

@@ -39,7 +39,6 @@ class EndMark:
     time: float
     """Time since the flight began, s."""
     reason: str
-    """Reason as shown to the user."""
     limit: CrossedLimit | None = None
     """Limit that was crossed; None if no plot shows it."""
 

@@ -65,9 +65,7 @@ class FlightData:
     modes: tuple[Span, ...] = ()
     """The autopilot's modes, in order, for a `.tlog`."""
     maneuvers: tuple[Span, ...] = ()
-    """The maneuvers, in order."""
     events: tuple[Event, ...] = ()
-    """The events, in order."""
     differences: tuple[ConfigKey, ...] | None = None
     """Keys of the configuration that are not the default; None: unknown."""
     runs: list[StepRun] = field(default_factory=list)

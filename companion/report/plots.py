@@ -33,7 +33,6 @@ class Plot:
     note: str
     """Text above the plot: the quantities shown, and how a good flight looks."""
     traces: list[dict[str, Any]]
-    """Plotly's traces."""
     layout: dict[str, Any] = field(default_factory=dict)
     """Plotly's layout; the page adds fonts and colours."""
     height: int = 320

@@ -23,7 +23,6 @@ class Table(NamedTuple):
     title: str
     """Shown above it."""
     header: tuple[str, ...]
-    """Names of the columns."""
     rows: Sequence[tuple[str, ...]]
     """One text for each column."""
 

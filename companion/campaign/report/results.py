@@ -42,11 +42,9 @@ class Results:
     """The cases of a campaign that have been flown."""
 
     folder: Path
-    """Folder of the campaign."""
     name: str
-    """Name of the campaign."""
     kind: str
-    """Flights or batch."""
+    """flights or batch."""
     planned: int
     """Number of cases of the whole campaign, flown or not."""
     factors: Mapping[str, Any]

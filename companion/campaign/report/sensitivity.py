@@ -24,7 +24,6 @@ class Influence(NamedTuple):
     """The first-order Sobol index of a factor on an outcome."""
 
     factor: str
-    """Name of the factor."""
     share: float
     """The index, 0..1."""
     confidence: float

@@ -31,11 +31,10 @@ class Share(NamedTuple):
     total: int
     """Number of all cases."""
     share: float
-    """Chosen / total; NaN for no case."""
+    """`chosen` / `total`; NaN for no case."""
     low: float
-    """Lower end of the interval."""
+    """The interval, from here to `high`."""
     high: float
-    """Upper end."""
 
     def __str__(self) -> str:
         return f"{_percent(self.share)} % ({_percent(self.low)} to {_percent(self.high)} %)"

@@ -32,7 +32,7 @@ class Comparison(NamedTuple):
     after: Interval
     """The same distance with the result of the search, m."""
     ratio: Interval
-    """After / before."""
+    """`after` / `before`."""
     estimated: tuple[float, float]
     """RMS horizontal distance of the estimated position from the reference, m, before and after."""
     estimate: tuple[float, float]
@@ -40,7 +40,6 @@ class Comparison(NamedTuple):
     better: int
     """Number of samples in which the result has the smaller RMS error."""
     samples: int
-    """Number of samples that were compared."""
 
 
 def compared(before: Score, after: Score, samples: int) -> Comparison | None:

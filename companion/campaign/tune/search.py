@@ -55,7 +55,6 @@ class Candidate:
     number: int
     """Number of the trial."""
     values: Values
-    """Values of the searched keys."""
     score: Score
     """Score on the cases of the search."""
 

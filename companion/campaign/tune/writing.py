@@ -22,7 +22,6 @@ class CheckedResult(NamedTuple):
     campaign: Campaign
     """The campaign, with its section `tune`."""
     found: SearchResults
-    """Results of the search."""
     best: Candidate
     """The candidate that is proposed."""
     before: Score

@@ -26,7 +26,6 @@ class Field:
     name: str
     """Name, which ends with the unit if there is one."""
     meaning: str
-    """Description of the column."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +43,6 @@ class Channel:
     topic: str
     """Name in the file, with a leading slash."""
     meaning: str
-    """Description of a message."""
     numbers: tuple[Field, ...]
     """The float64 columns. NaN: unknown or not applicable."""
     codes: tuple[CodeField, ...] = ()

@@ -9,7 +9,6 @@ class Phase(NamedTuple):
     time: float
     """Its beginning, s since the flight began."""
     name: str
-    """Shown to the user."""
     waits_for: str
     """The condition that ends it."""
 
@@ -20,7 +19,6 @@ class Event(NamedTuple):
     time: float
     """Time since the flight began, s."""
     text: str
-    """Text as shown to the user."""
     level: int
     """As in foxglove_msgs/msg/Log: 2 (information), 3 (warning) or 4 (error). A recorded flight has
     3 for the source "safety", else 2. A `.tlog` has the autopilot's severity."""
@@ -34,7 +32,7 @@ class AlarmChange(NamedTuple):
     time: float
     """Time since the flight began, s."""
     raised: bool
-    """true: the alarm was raised. False: it ended."""
+    """True: the alarm was raised. False: it ended."""
     monitor: str
     """Name of the monitor in `companion.safety.table`."""
     reason: str

@@ -46,9 +46,8 @@ class Line(NamedTuple):
     """A line, 2 pixels thick."""
 
     points: Sequence[tuple[float, float, float]]
-    """X, y and z of each point, m."""
+    """(x, y, z) of each point, m."""
     color: Color
-    """Color of the whole line."""
     pairs: bool = False
     """True: each pair of points is a separate line. False: all points form one line."""
 
@@ -57,9 +56,7 @@ class Entity(NamedTuple):
     """Shapes that are replaced together."""
 
     name: str
-    """Id of the entity."""
     frame: str
-    """Frame of the shapes."""
     follows: bool = False
     """Whether they move with the frame until they are replaced."""
     arrows: Sequence[Arrow] = ()

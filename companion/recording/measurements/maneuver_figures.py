@@ -30,7 +30,6 @@ class ManeuverFigures:
     """
 
     name: str
-    """Name of the maneuver."""
     begin: float
     """Beginning of the maneuver, s since the flight began."""
     duration: float

@@ -39,7 +39,7 @@ class StepResponse:
     asked_tilt: float
     """Largest tilt of a target, rad, before the tilt limit of the planner."""
     cross_axis_max: float
-    """straightness: largest distance from the line of a step."""
+    """Straightness: largest distance from the line of a step."""
     model_deviation_max: float
     """Largest distance from the ideal model ċ = p·(c_d − c)."""
     second_order: SecondOrderModel

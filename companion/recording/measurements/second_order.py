@@ -99,9 +99,9 @@ class SecondOrderModel:
     """Second-order model with dead time: c̈ = ω²·(c_d(t − dead time) − c) − 2ζω·ċ."""
 
     frequency: float
-    """Ω, rad/s."""
+    """ω, rad/s."""
     damping: float
-    """Ζ."""
+    """ζ."""
     dead_time: float
     """Time from the sample at which the target changed to the first effect, s."""
 

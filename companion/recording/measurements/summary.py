@@ -83,27 +83,22 @@ class Summary:
     phase: str
     """The phase that failed, else the last one."""
     planner: str
-    """Name of the planner that flew."""
     gain: float
     """Gain p of the planner, 1/s."""
     counts: LoopCounts
-    """Counters of the control loop."""
     link: dict[str, int]
     """Frames received, lost, damaged and so on, by name."""
     trace: FlightTrace
-    """Recorded rows."""
     events: list[tuple[float, str]] = field(default_factory=list)
     """(s since the flight began, text) of each event."""
     log: Path | None = None
     """The flight's folder."""
     dead_times: DeadTimes = field(default_factory=DeadTimes)
-    """Measured and configured."""
     predictive: PredictiveFigures | None = None
     """Counts of predictive control; None: it did not fly."""
     realtime: dict[str, str] = field(default_factory=dict)
     """Each real-time request to the operating system: "granted", or the reason why not."""
     facts: FlightFacts = field(default_factory=FlightFacts)
-    """Phases, end, and circumstances of the flight."""
 
     def response(self) -> StepResponse | None:
         """The measured step response; None without steps."""

@@ -29,9 +29,9 @@ class RoutingStats:
     to_clients: int = 0
     """Frames of the vehicle that were queued for clients, counted for each client."""
     to_vehicle: int = 0
-    """clients' frames that were queued for the vehicle."""
+    """Clients' frames that were queued for the vehicle."""
     between_clients: int = 0
-    """clients' frames that were queued for other clients."""
+    """Clients' frames that were queued for other clients."""
     looped: int = 0
     """Frames of clients and of other components that were dropped, because they were repetitions,
     came from a client that had gone, or had our or the autopilot's address."""
