@@ -49,7 +49,8 @@ def rerun(campaign_folder: Path, index: int) -> Rerun:
     case = campaign.case(next(islice(campaign.planned_cases(), index, None)))
     recording = flight_folder(campaign_folder / _CASES_FOLDER / f"case-{index:05d}")
     row = fly_case(case, recording)
-    lines = [f"{case.described()}: {_verdict_text(row)}"]
+    verdict = "good" if row["ok"] else f"not good: {row['failed_checks'] or row['result']}"
+    lines = [f"{case.described()}: {verdict}"]
     if other := difference(description.versions, versions()):
         lines.append(f"The campaign was flown by another version: this one has {other}.")
     stored = _stored_row(campaign_folder, campaign, description, index)
@@ -62,13 +63,6 @@ def rerun(campaign_folder: Path, index: int) -> Rerun:
         else f"It is bit-identical to the campaign's flight: digest {row['digest']}."
     )
     return Rerun(row, recording, not changed, tuple(lines))
-
-
-def _verdict_text(row: dict[str, Value]) -> str:
-    """Whether a flight was good and, if not, why."""
-    if row["ok"]:
-        return "good"
-    return f"not good: {row['failed_checks'] or row['result']}"
 
 
 def _stored_row(

@@ -45,9 +45,14 @@ def tune(options: argparse.Namespace) -> int:
         disturbances = measured_disturbances(log, drag_prior(config).drag.linear, disturbances)
     proposal = propose(config, disturbances)
     flights = {} if options.no_flights else _fly_courses(proposal, console)
-    vehicle_source = (
-        _include_path(vehicle, output) if included else _vehicle_section(proposal.tuned)
-    )
+    vehicle_source: Path | dict[str, Any]
+    if included:
+        vehicle_source = Path(os.path.relpath(vehicle.resolve(), output.resolve().parent))
+    else:
+        values = proposal.tuned.vehicle.model_dump(
+            mode="json", exclude_none=True, exclude_defaults=True
+        )
+        vehicle_source = {"vehicle": values}
     console.print("\n".join(summary_lines(proposal, flights)))  # kept if the disk is full
     write_whole(output, proposal_text(proposal, vehicle_source, flights, source.name))
     load(output)
@@ -93,17 +98,6 @@ def _flyable(config: Config) -> Config:
     return changed(
         config, {"planner": {"name": "auto"}, "flight": {"maneuvers": ("hover",)}}, "tune"
     )
-
-
-def _vehicle_section(config: Config) -> dict[str, Any]:
-    """The section `vehicle` as YAML keys, without null and default values."""
-    values = config.vehicle.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
-    return {"vehicle": values}
-
-
-def _include_path(vehicle: Path, output: Path) -> Path:
-    """The path of the vehicle file, relative to the folder of the output."""
-    return Path(os.path.relpath(vehicle.resolve(), output.resolve().parent))
 
 
 def _fly_courses(

@@ -106,15 +106,13 @@ def _page(
         title,
         plots,
         words=words,
-        words_by_flight=_words_by_flight(flights),
+        words_by_flight=[
+            (flight.name, closing_words(flight.figures, None))
+            for flight in flights
+            if flight.figures is not None  # else it is a .tlog
+        ],
         flights=flights,
         tables=tables,
         settings=settings,
         telemetry_extremes=extremes(flights[0]),
     )
-
-
-def _words_by_flight(flights: Sequence[FlightData]) -> list[tuple[str, ClosingWords]]:
-    """Name and closing words of each flight that is no `.tlog`."""
-    known = [(flight.name, flight.figures) for flight in flights if flight.figures is not None]
-    return [(name, closing_words(figures, None)) for name, figures in known]

@@ -135,10 +135,16 @@ class Search:
     def results(self) -> SearchResults:
         """The results of all trials so far, including those of earlier runs."""
         complete = [each for each in self._ended_trials() if each.user_attrs.get(_COMPLETE)]
-        good = sorted(
-            (self._candidate(each) for each in complete if not self._violates(each)),
-            key=lambda each: each.score.rms,
-        )
+        found = [
+            Candidate(
+                each.number,
+                each.user_attrs[_VALUES],
+                Score.from_attributes(each.user_attrs[_SCORE]),
+            )
+            for each in complete
+            if each.user_attrs[_VIOLATION] <= 0.0
+        ]
+        good = sorted(found, key=lambda each: each.score.rms)
         tried = len(self._ended_trials())
         near = good[: max(3, len(good) // 10)]
         return SearchResults(tried, tried - len(complete), good[0] if good else None, near)
@@ -219,15 +225,6 @@ class Search:
         return (
             best is not None
             and score.rms > _HOPELESS_FACTOR * best.score.first(len(score.true)).rms
-        )
-
-    def _violates(self, trial: "FrozenTrial") -> bool:
-        return float(trial.user_attrs[_VIOLATION]) > 0.0
-
-    def _candidate(self, trial: "FrozenTrial") -> Candidate:
-        attributes = trial.user_attrs
-        return Candidate(
-            trial.number, attributes[_VALUES], Score.from_attributes(attributes[_SCORE])
         )
 
 

@@ -59,11 +59,9 @@ class StepRun(NamedTuple):
 
     def steps(self) -> list["StepRun"]:
         """The single steps: each from one change of the target to the next."""
-        return [StepRun(*parts) for parts in zip(*self._by_target(), strict=True)]
-
-    def _by_target(self) -> list[list[Floats]]:
         changes = np.flatnonzero(np.any(np.diff(self.target, axis=0), axis=1)) + 1
-        return [np.split(column, changes) for column in self]
+        columns = [np.split(column, changes) for column in self]
+        return [StepRun(*parts) for parts in zip(*columns, strict=True)]
 
 
 def largest_norm(coefficients: Floats) -> float:
