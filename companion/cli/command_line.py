@@ -19,7 +19,6 @@ from companion.cli.options import (
     add_set,
     number,
 )
-from companion.cli.recording_options import add_recordings
 
 _PACKAGE = "mavlink-companion"
 
@@ -56,7 +55,7 @@ def _parser() -> argparse.ArgumentParser:
     tool_options.add_benches(commands)
     tool_options.add_study(commands)
     add_campaign(commands)
-    add_recordings(commands)
+    tool_options.add_recordings(commands)
     tool_options.add_config(commands)
     return parser
 

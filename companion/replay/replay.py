@@ -28,8 +28,13 @@ from companion.recording.mcap_file.flight_events import ValuesChange
 from companion.recording.mcap_file.loop_channels import UNANSWERED_CODES
 from companion.recording.trace import FlightTrace
 from companion.replay.entries import recorded_inputs
-from companion.replay.recorded import RecordedAction, RecordedSample, RecordedStep, Setpoint
-from companion.replay.vehicle import ReplayedVehicle
+from companion.replay.recorded import (
+    RecordedAction,
+    RecordedSample,
+    RecordedStep,
+    ReplayedVehicle,
+    Setpoint,
+)
 
 
 class ReplayedSample(NamedTuple):
