@@ -54,14 +54,12 @@ class Stream:
         self._subscriptions = _Subscriptions()
         self._channels = [
             foxglove.Channel(
-                topic.name,
-                schema=foxglove.Schema(
-                    name=topic.type_name, encoding=SCHEMA_ENCODING, data=topic.schema
-                ),
+                topic,
+                schema=foxglove.Schema(name=kind.name, encoding=SCHEMA_ENCODING, data=kind.schema),
                 message_encoding=ENCODING,
                 context=self._context,
             )
-            for topic in TOPICS
+            for topic, kind in TOPICS.items()
         ]
         self._server = foxglove.start_server(
             name="companion",

@@ -15,7 +15,7 @@ from companion.recording.flight_record import RECORD_FILE, RecordError, read_fli
 from companion.recording.folder import flight_folder
 from companion.recording.mcap_file import cdr, reader, writer
 from companion.recording.mcap_file.batch import _FULL_BATCH, Batch, messages_of
-from companion.recording.mcap_file.channels import CHANNELS, OTHER_CHANNELS, RESOURCES
+from companion.recording.mcap_file.channels import CHANNELS, RESOURCES, TOPICS
 from companion.recording.mcap_file.loop_channels import ACTION, INPUT, SETPOINT, UNANSWERED_CODES
 from companion.recording.mcap_file.scene import Entity, scene_message
 from companion.recording.mcap_file.writer import McapWriter
@@ -89,12 +89,12 @@ def test_what_is_written_is_read_again_by_both_readers(tmp_path):
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         for schema, channel, _, message in reader.iter_decoded_messages():
             official.setdefault(channel.topic, []).append((schema.name, message))
-    assert set(official) == {*(channel.topic for channel in CHANNELS), *OTHER_CHANNELS}
+    assert set(official) == set(TOPICS)
     for channel in CHANNELS:
         newest = official[channel.topic][-1][1]
         for name in channel.dtype.names:
             assert getattr(newest, name) == record.rows(channel.name)[name][-1]
-        assert official[channel.topic][0][0] == channel.schema_name
+        assert official[channel.topic][0][0] == channel.type.name
     assert official["/log"][0][1].message == "armed"
     assert official["/tf"][0][1].child_frame_id == "vehicle"
     assert official["/tf"][0][1].translation.z == 3.0

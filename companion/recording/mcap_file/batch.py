@@ -12,7 +12,7 @@ from typing import NamedTuple
 from companion.recording.mcap_file.channels import TOPICS
 
 _HEAD = struct.Struct("<BQI")
-_TOPIC_NUMBERS = {topic.name: number for number, topic in enumerate(TOPICS)}
+_TOPIC_NUMBERS = {topic: number for number, topic in enumerate(TOPICS)}
 _FULL_BATCH = 32_000
 """Length above which a batch is sent, bytes; well below the buffer of a socket."""
 

@@ -4,9 +4,8 @@ Foxglove, Lichtblick and PlotJuggler recognise these types by name and draw them
 """
 
 import struct
-from typing import NamedTuple
 
-from companion.recording.mcap_file.fields import CDR, PACKAGE
+from companion.recording.mcap_file.fields import CDR, PACKAGE, MessageType
 
 _POSE = struct.Struct("<7d")
 _STAMP = struct.Struct("<iI")
@@ -36,13 +35,6 @@ geometry_msgs/Quaternion orientation
 GEOMETRY = (_TIME, _QUATERNION, _VECTOR, _POINT, _POSE_TYPE)
 """Definitions of the types of time and geometry."""
 _SEPARATOR = "=" * 80 + "\n"
-
-
-class MessageType(NamedTuple):
-    """A message type: its ROS 2 name and its definition (ros2msg)."""
-
-    name: str
-    schema: bytes
 
 
 def message_type(name: str, *parts: str) -> MessageType:

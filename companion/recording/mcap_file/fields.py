@@ -7,6 +7,7 @@ fields. So every message of a channel has the same length, and NumPy reads many 
 import struct
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,13 @@ PACKAGE = "companion_msgs/msg"
 
 Rows = NDArray[np.void]
 """A structured array: one row per message, one named field per column."""
+
+
+class MessageType(NamedTuple):
+    """A message type: its ROS 2 name and its definition (ros2msg)."""
+
+    name: str
+    schema: bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,14 +62,9 @@ class Channel:
         return self.topic[1:]
 
     @property
-    def schema_name(self) -> str:
-        """The ROS 2 name of the message type."""
+    def type(self) -> MessageType:
+        """The message type, in whose definition the names of codes are constants."""
         words = "".join(word.capitalize() for word in self.name.split("_"))
-        return f"{PACKAGE}/{words}"
-
-    @cached_property
-    def schema(self) -> bytes:
-        """The message definition (ros2msg), in which the names of codes are constants."""
         lines = [f"# {self.meaning}"]
         for field in self.numbers:
             lines += [f"# {field.meaning}", f"float64 {field.name}"]
@@ -73,7 +76,7 @@ class Channel:
                     for number, name in enumerate(code.names)
                 ]
             lines.append(f"uint8 {code.name}")
-        return ("\n".join(lines) + "\n").encode()
+        return MessageType(f"{PACKAGE}/{words}", ("\n".join(lines) + "\n").encode())
 
     @cached_property
     def packing(self) -> struct.Struct:

@@ -94,7 +94,7 @@ def changed_topic(content: McapContent) -> str | None:
 
     Names of codes that this version has added since the recording do not count as a change.
     """
-    ours = {topic.name: _columns(topic.schema) for topic in TOPICS}
+    ours = {topic: _columns(kind.schema) for topic, kind in TOPICS.items()}
     for topic, schema in content.schemas.items():
         recorded = _columns(schema)
         known = (line for line in ours.get(topic, recorded) if line in recorded or b"=" not in line)

@@ -33,8 +33,8 @@ class McapWriter:
         self._writer.start("ros2", "mavlink-companion")
         self._ids: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
-        for topic in TOPICS:
-            self._register(*topic)
+        for topic, kind in TOPICS.items():
+            self._register(topic, *kind)
         self._batch = None if stream is None else Batch(stream)
 
     def _register(self, topic: str, name: str, schema: bytes) -> None:
