@@ -9,6 +9,7 @@ from companion.attitude.kinematics import tilt_angle
 from companion.batch import can_compile
 from companion.campaign import outcomes
 from companion.campaign.case import Case, Fault
+from companion.campaign.keys import replaced
 from companion.campaign.swept import Value
 from companion.config import Config
 from companion.files.yaml_file import ConfigError
@@ -191,9 +192,9 @@ def _with_paths_in(config: Config, files_folder: Path) -> Config:
 
     There, `recording.directory` is empty, so the flight uses no values learned by earlier flights.
     """
-    recording = config.recording.model_copy(update={"directory": files_folder / "learned"})
     path = config.flight.trajectory
-    flight = config.flight.model_copy(
-        update={"trajectory": None if path is None else files_folder / path}
+    return replaced(
+        config,
+        recording={"directory": files_folder / "learned"},
+        flight={"trajectory": None if path is None else files_folder / path},
     )
-    return config.model_copy(update={"recording": recording, "flight": flight})

@@ -89,3 +89,11 @@ def with_keys(base: Config, changes: Mapping[str, Any]) -> Config:
         data[section][name] = value
     config = validated(data, "the configuration", Config)
     return config.model_copy(update={"mock": mock_with(base.mock or {}, mock)})
+
+
+def replaced(config: Config, **sections: dict[str, Any]) -> Config:
+    """The configuration with new values by section and key, which are not checked."""
+    changed = {
+        name: getattr(config, name).model_copy(update=values) for name, values in sections.items()
+    }
+    return config.model_copy(update=changed)

@@ -18,7 +18,7 @@ from companion.campaign.campaign_file import (
     CampaignFile,
     FaultPhase,
 )
-from companion.campaign.keys import check_key, with_keys
+from companion.campaign.keys import check_key, replaced, with_keys
 from companion.campaign.swept import Swept
 from companion.config import Config, trajectory_file
 from companion.config.file_kinds import FileKind, require_kind
@@ -90,7 +90,9 @@ class _CampaignReader:
         if isinstance(given_config, Mapping):
             config = validated(dict(given_config), f"{self._path}: config", Config)
             path = config.flight.trajectory
-            return config if path is None else _with_trajectory(config, self._folder / path)
+            if path is None:
+                return config
+            return replaced(config, flight={"trajectory": self._folder / path})
         return load_config(self._folder / given_config)
 
     def _flyable(self, base: Config) -> Config:
@@ -102,10 +104,9 @@ class _CampaignReader:
                 f"{self._path}: campaigns fly without signing: take out link.signing_key_file and "
                 "mock.signing"
             )
-        armed = base.flight.model_copy(update={"arm": True})
-        base = base.model_copy(update={"flight": armed})
         path = base.flight.trajectory
-        return base if path is None else _with_trajectory(base, self._collect(path))
+        copy = None if path is None else self._collect(path)
+        return replaced(base, flight={"arm": True, "trajectory": copy})
 
     def _with_files(self, name: str, swept: Swept) -> Swept:
         """The factor, with each path of a trajectory file replaced by that of its copy."""
@@ -173,11 +174,6 @@ class _CampaignReader:
                     f"{self._path}: sweep.{key}: there is no {name!r:.60}; known: "
                     f"{', '.join(known)}"
                 )
-
-
-def _with_trajectory(config: Config, path: Path) -> Config:
-    flight = config.flight.model_copy(update={"trajectory": path})
-    return config.model_copy(update={"flight": flight})
 
 
 def resolved_keys(campaign: Campaign) -> dict[str, Any]:

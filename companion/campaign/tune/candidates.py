@@ -9,7 +9,7 @@ import numpy as np
 from companion.campaign.campaign import Campaign
 from companion.campaign.campaign_file import Tune
 from companion.campaign.case import Case
-from companion.campaign.keys import with_keys
+from companion.campaign.keys import replaced, with_keys
 from companion.campaign.swept import Swept
 from companion.config import Config
 from companion.config.flight import OPEN_LOOP
@@ -110,7 +110,7 @@ def starts(campaign: Campaign, tune: Tune, learned: Config | None = None) -> Ite
     if learned is not None:
         yield Start("a first flight", clamped_to_search(present, tune.search))
     try:
-        changes = propose(_analysed(known)).changes
+        changes = propose(replaced(known, planner={"name": "auto"})).changes
     except ConfigError:
         return  # its rate loop is not known, or the linear analysis does not cover it
     proposed = {
@@ -140,12 +140,6 @@ def starts_near(
                 low, high = swept.uniform
                 moved[key] = value + (high - low) * float(rng.normal(0.0, _NEARBY_DEVIATION))
         yield Start(f"near {start.name}", clamped_to_search(moved, search))
-
-
-def _analysed(config: Config) -> Config:
-    """The configuration with `planner.name: auto`, for the analysis of `companion tune`."""
-    planner = config.planner.model_copy(update={"name": "auto"})
-    return config.model_copy(update={"planner": planner})
 
 
 def _present_values(config: Config, keys: Collection[str]) -> dict[str, Any]:

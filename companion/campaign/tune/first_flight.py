@@ -8,6 +8,7 @@ from companion.attitude.planner import FIRST_ORDER
 from companion.campaign.campaign import Campaign
 from companion.campaign.case import Case
 from companion.campaign.flight import CaseFlight
+from companion.campaign.keys import replaced
 from companion.config import Config
 from companion.config.files import changed, load
 from companion.files.yaml_file import ConfigError
@@ -42,9 +43,11 @@ def _identified(config: Config, case: Case, *, damped: bool) -> Config:
 
     It is unchanged if the response cannot be identified.
     """
-    planner = case.config.planner.model_copy(update={"name": FIRST_ORDER})
-    flight = case.config.flight.model_copy(update={"maneuvers": ("identify",), "trajectory": None})
-    doublets = case.config.model_copy(update={"planner": planner, "flight": flight})
+    doublets = replaced(
+        case.config,
+        planner={"name": FIRST_ORDER},
+        flight={"maneuvers": ("identify",), "trajectory": None},
+    )
     with tempfile.TemporaryDirectory(prefix="companion-identify-") as place:
         folder, fragment = Path(place) / "flight", Path(place) / "vehicle.yaml"
         CaseFlight(replace(case, config=doublets, fault=None), Path(place)).fly(folder)
