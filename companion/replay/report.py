@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from math import degrees
 from pathlib import Path
 
+import numpy as np
+
 from companion.replay.replay import ReplayedSample
 
 _COLUMNS = (
@@ -50,22 +52,19 @@ def result_lines(
 
 
 def _largest_differences(both_answered: Sequence[ReplayedSample], began: float) -> str:
-    def distances(each: ReplayedSample) -> list[float]:
-        assert each.recorded is not None
-        assert each.replayed is not None
-        pairs = zip(
-            (*each.recorded.rates, each.recorded.thrust),
-            (*each.replayed.rates, each.replayed.thrust),
-            strict=True,
-        )
-        return [abs(before - after) for before, after in pairs]
-
+    answers = np.array(  # (N, 2, 4)
+        [
+            [(*each.rates, each.thrust) for each in (sample.recorded, sample.replayed) if each]
+            for sample in both_answered
+        ]
+    )
+    distances = np.abs(answers[:, 1] - answers[:, 0])
     differences = []
     for index, name in enumerate(("roll", "pitch", "yaw", "thrust")):
-        worst = max(both_answered, key=lambda each: distances(each)[index])
-        value = distances(worst)[index]
+        worst = int(distances[:, index].argmax())
+        value = distances[worst, index]
         number = f"{value:.4f}" if name == "thrust" else f"{degrees(value):.2f} °/s"
-        differences.append(f"{name} {number} at {worst.received - began:.2f} s")
+        differences.append(f"{name} {number} at {both_answered[worst].received - began:.2f} s")
     return f"{len(both_answered)} setpoints differ, at most by: {', '.join(differences)}."
 
 
