@@ -202,22 +202,21 @@ def test_what_the_decompression_raises_is_damage(tmp_path, monkeypatch, error):
 
 
 def test_other_columns_are_refused_with_the_channel_and_the_version(tmp_path, monkeypatch):
-    now = McapWriter._register
+    def change(before, after):
+        schemas = {
+            topic: kind._replace(schema=kind.schema.replace(before, after))
+            for topic, kind in TOPICS.items()
+        }
+        monkeypatch.setattr(writer, "TOPICS", schemas)
 
-    def register(self, topic, name, schema):
-        now(self, topic, name, schema.replace(*self.changed))
-
-    monkeypatch.setattr(writer.McapWriter, "_register", register)
-    monkeypatch.setattr(writer.McapWriter, "changed", (b"# When", b"# At what time"), raising=False)
+    change(b"# When", b"# At what time")
     assert write_one(tmp_path, "/action", row(ACTION, 1.0, 0)).rows("action")["time_s"] == 1.0
-    without_last = (b"uint8 ACTION_STOP_TURNING=8\n", b"")  # as before this action existed
-    monkeypatch.setattr(writer.McapWriter, "changed", without_last)
+    change(b"uint8 ACTION_STOP_TURNING=8\n", b"")  # as before this action existed
     assert write_one(tmp_path, "/action", row(ACTION, 1.0, 0)).rows("action")["time_s"] == 1.0
-    other_meaning = (b"ACTION_FOLLOW=4", b"ACTION_FOLLOW=5")
-    monkeypatch.setattr(writer.McapWriter, "changed", other_meaning)
+    change(b"ACTION_FOLLOW=4", b"ACTION_FOLLOW=5")  # another meaning
     with pytest.raises(RecordError, match="of /action have other columns"):
         write_one(tmp_path, "/action", row(ACTION, 1.0, 0))
-    monkeypatch.setattr(writer.McapWriter, "changed", (b"float64 age_s", b"float64 age_ms"))
+    change(b"float64 age_s", b"float64 age_ms")
     with pytest.raises(RecordError, match=r"of /sample have other columns .* companion 0\.0\.7"):
         write_one(tmp_path, "/action", row(ACTION, 1.0, 0))
 
