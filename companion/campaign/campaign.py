@@ -25,20 +25,17 @@ from companion.files.yaml_file import ConfigError
 
 @dataclass(frozen=True)
 class Campaign:
-    """A campaign: what to fly, and the files that the flights read.
-
-    Attributes:
-        file: content of the campaign file. The trajectories in its `sweep` are keys of `files`.
-        base: configuration that the swept keys change; the keys of `set` are already applied. Its
-            `flight.trajectory`, if any, is a key of `files`.
-        files: the text of each file that a flight reads, by its path in the campaign's folder.
-        name: path of the campaign file, for messages.
-    """
+    """A campaign: what to fly, and the files that the flights read."""
 
     file: CampaignFile
+    """Content of the campaign file. The trajectories in its `sweep` are keys of `files`."""
     base: Config
+    """Configuration that the swept keys change; the keys of `set` are already applied. Its
+    `flight.trajectory`, if any, is a key of `files`."""
     files: Mapping[str, str] = field(default_factory=dict)
+    """The text of each file that a flight reads, by its path in the campaign's folder."""
     name: str = "the campaign"
+    """Path of the campaign file, for messages."""
 
     @property
     def number_of_cases(self) -> int:
@@ -88,11 +85,7 @@ class Campaign:
         )
 
     def _new_value(self, name: str, key: str, value: Any) -> Any:
-        """The value that a key gets: `value`, times the value in `base` if `times_base` is true.
-
-        Raises:
-            ConfigError: the base holds no number to multiply.
-        """
+        """The value that a key gets: `value`, times the value in `base` if `times_base` is true."""
         if not self.file.sweep[name].times_base or value is None:
             return value
         base = self._base_value(key)

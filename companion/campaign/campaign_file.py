@@ -56,8 +56,7 @@ class FaultScenario(Section):
     after_s: Annotated[float, Field(ge=0.0, le=3600.0)] | None = None
     """Time from the beginning of the phase to the faults. The factor fault.after_s replaces this
     key. null: 0 s in stream and arm, 0.8 s in takeoff, 1.3 s in offboard, 0.3 s in maneuvers and
-    land, 0.02 s in hand back.
-    """
+    land, 0.02 s in hand back."""
     ends: (
         Annotated[tuple[Ending, ...], Field(min_length=1)]
         | dict[FaultPhase, Annotated[tuple[Ending, ...], Field(min_length=1)]]
@@ -65,8 +64,7 @@ class FaultScenario(Section):
     """Permitted endings of the flight (docs/safety.md): a list for all phases, or a list for each
     phase. ground: the vehicle never left the ground. ok: as without the fault. landed: our program
     landed the vehicle and says why. held: the autopilot flies on, by our command or its own
-    failsafe. pilot: the pilot has taken over.
-    """
+    failsafe. pilot: the pilot has taken over."""
 
     def after(self, phase: str) -> float:
         """Time from the beginning of a phase to the fault, s."""
@@ -103,8 +101,7 @@ class Tune(Section):
     """Number of candidates that are tried; `--trials` replaces it."""
     envelope_m: Annotated[float, Field(gt=0.0, le=1000.0)] | None = 1.0
     """A flight counts as inside the envelope if it reaches its end and its largest true distance
-    from the reference (`position_max_m` of the results) is at most this. null: any distance.
-    """
+    from the reference (`position_max_m` of the results) is at most this. null: any distance."""
     inside_share: Annotated[float, Field(gt=0.0, le=1.0)] = 0.999
     """Smallest share of the flights that must stay inside the envelope, 0..1."""
     check_samples: Annotated[int, Field(ge=2, le=10_000)] = 8
@@ -136,8 +133,7 @@ class CampaignFile(Section):
     only the attitude kinematics of a vehicle in each case."""
     config: PathKey | dict[str, Any]
     """Base configuration of every case, including its section `mock`. Either the path of a file,
-    relative to this file, or the keys themselves.
-    """
+    relative to this file, or the keys themselves."""
     seed: Annotated[int, Field(ge=0, lt=2**53)] = 1
     """Seed of the samples, and of the noise and gusts of every flight."""
     samples: Annotated[int, Field(ge=1, le=10_000_000)] = 1

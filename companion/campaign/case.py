@@ -10,45 +10,38 @@ from companion.config import Config
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A fault scenario of one flight.
-
-    Attributes:
-        name: name of the scenario.
-        inject: entries as in `mock.faults`.
-        phase: phase of the flight in which the faults begin.
-        after: time from the beginning of the phase to the faults, s.
-        ends: permitted endings; see `FaultScenario.ends`.
-    """
+    """A fault scenario of one flight."""
 
     name: str
     inject: tuple[Mapping[str, Any], ...]
+    """Entries as in `mock.faults`."""
     phase: str
+    """Phase of the flight in which the faults begin."""
     after: float
+    """Time from the beginning of the phase to the faults, s."""
     ends: tuple[str, ...]
+    """Permitted endings; see `FaultScenario.ends`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One case, ready to be flown in any process on any computer.
-
-    Attributes:
-        index: number in the campaign, from 0.
-        seed: seed of noise and gusts.
-        factors: value of each swept key, as the results hold it.
-        config: configuration of the program, and in its section `mock` that of the mock vehicle. If
-            a trajectory is flown, `flight.trajectory` is a key of `files`.
-        fault: fault scenario; None: no fault.
-        files: the text of each file that the flight reads, by its path in the campaign's folder.
-        flight_s: longest flight, s of vehicle time.
-    """
+    """One case, ready to be flown in any process on any computer."""
 
     index: int
+    """Number in the campaign, from 0."""
     seed: int
+    """Seed of noise and gusts."""
     factors: Mapping[str, Value]
+    """Value of each swept key, as the results hold it."""
     config: Config
+    """Configuration of the program, and in its section `mock` that of the mock vehicle. If a
+    trajectory is flown, `flight.trajectory` is a key of `files`."""
     fault: Fault | None
+    """Fault scenario; None: no fault."""
     files: Mapping[str, str]
+    """The text of each file that the flight reads, by its path in the campaign's folder."""
     flight_s: float
+    """Longest flight, s of vehicle time."""
 
     @property
     def mock(self) -> Mapping[str, Any]:

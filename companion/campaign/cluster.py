@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 WORKER_DEATHS_TO_GIVE_UP = 3
 """A unit of work is given up at this number of deaths of workers on which it ran or was queued.
 
-An existing cluster follows its own setting, `distributed.scheduler.allowed-failures`.
-"""
+An existing cluster follows its own setting, `distributed.scheduler.allowed-failures`."""
 _CONNECTION_LOST = "the connection to the Dask scheduler is lost"
 _CONNECT_TIMEOUT_S = 10.0
 _CLOSE_TIMEOUT_S = 5.0
@@ -42,17 +41,13 @@ class ClusterError(Exception):
 
 
 class EndedUnit(NamedTuple):
-    """A unit of work that was run or given up.
-
-    Attributes:
-        number: number of the unit.
-        result: rows and wall times; None: the unit was given up.
-        reason: why the unit was given up.
-    """
+    """A unit of work that was run or given up."""
 
     number: int
     result: UnitResult | None
+    """Rows and wall times; None: the unit was given up."""
     reason: str = ""
+    """Why the unit was given up."""
 
 
 def require_packages() -> None:
@@ -172,9 +167,6 @@ def _compare_versions(client: "Client") -> None:
     """Require that the scheduler and the workers have the versions of this process.
 
     For the scheduler, only Python's minor version and the version of Dask are compared.
-
-    Raises:
-        VersionError: names the process, and the versions that differ.
     """
     dask_versions = client.get_versions()
     ours, scheduler = (_dask_and_python(dask_versions[side]) for side in ("client", "scheduler"))
@@ -197,11 +189,8 @@ def _dask_and_python(process: Mapping[str, Any]) -> dict[str, str]:
 def run_tasks(client: "Client", tasks: Mapping[int, tuple[Any, ...]]) -> Iterator[EndedUnit]:
     """Run one task for each unit of work; yield each unit when it ends, in any order.
 
-    Dask queues and sends the tasks, and repeats a task whose worker died.
-
-    Args:
-        client: client of the cluster.
-        tasks: unit number -> function and its arguments; the function returns `UnitResult`.
+    Dask queues and sends the tasks, and repeats a task whose worker died. Each of `tasks` is a
+    function, which returns `UnitResult`, and its arguments, by the number of its unit.
 
     Raises:
         ClusterError: the connection to the scheduler is lost.
@@ -222,13 +211,7 @@ def run_tasks(client: "Client", tasks: Mapping[int, tuple[Any, ...]]) -> Iterato
 
 
 def _ended_unit(number: int, future: "Future") -> EndedUnit:
-    """Convert a future that has ended into its unit.
-
-    Raises:
-        ClusterError: the connection to the scheduler is lost.
-        ConfigError: see `run_tasks`.
-        VersionError: see `run_tasks`.
-    """
+    """Convert a future that has ended into its unit."""
     try:
         if future.status == "finished":
             return EndedUnit(number, future.result())

@@ -17,17 +17,14 @@ _LARGEST_SEED = 2**63 - 1
 
 @dataclass(frozen=True, slots=True)
 class PlannedCase:
-    """The factor values and the seed of one case; `Campaign.case` builds the case from them.
-
-    Attributes:
-        index: number of the case, from 0.
-        seed: seed of noise and gusts.
-        values: value of each factor as written in the campaign file.
-    """
+    """The factor values and the seed of one case; `Campaign.case` builds the case from them."""
 
     index: int
+    """Number of the case, from 0."""
     seed: int
+    """Seed of noise and gusts."""
     values: dict[str, Any]
+    """Value of each factor as written in the campaign file."""
 
 
 def number_of_cases(file: CampaignFile) -> int:
@@ -80,9 +77,7 @@ def planned_cases(file: CampaignFile) -> Iterator[PlannedCase]:
 def seed_of(campaign_seed: int, number: int) -> int:
     """Seed of a case, 0 to 2⁶³ − 1; the same on every computer.
 
-    Args:
-        campaign_seed: seed of the campaign.
-        number: number of the case, or of its sample if samples share their seed.
+    `number` is that of the case, or of its sample if samples share their seed.
     """
     digest = hashlib.sha256(f"{campaign_seed}:{number}".encode()).digest()
     return int.from_bytes(digest[:8], "big") & _LARGEST_SEED

@@ -13,13 +13,7 @@ from companion.campaign.case import Case
 from companion.campaign.cluster import ClusterError, EndedUnit, number_of_workers, run_tasks
 from companion.campaign.flight import INTERNAL_ERROR
 from companion.campaign.folder import Description
-from companion.campaign.unit import (
-    Row,
-    fly_cases,
-    fly_planned_cases,
-    size_of_units,
-    unit_ranges,
-)
+from companion.campaign.unit import Row, fly_cases, fly_planned_cases, size_of_units, unit_ranges
 from companion.campaign.versions import versions
 
 if TYPE_CHECKING:
@@ -28,15 +22,12 @@ if TYPE_CHECKING:
 
 @dataclass
 class Progress:
-    """Progress of a campaign.
-
-    Attributes:
-        flown: number of cases in the results, including those of earlier runs.
-        lost: for each unit of work that was given up, a sentence with its cases and the reason.
-    """
+    """Progress of a campaign."""
 
     flown: int = 0
+    """Number of cases in the results, including those of earlier runs."""
     lost: list[str] = field(default_factory=list)
+    """For each unit of work that was given up, a sentence with its cases and the reason."""
 
 
 def run(
@@ -46,17 +37,11 @@ def run(
     folder: Path,
     on_unit: Callable[[Progress], None] = lambda _: None,
 ) -> Progress:
-    """Run the units of work whose results are missing in the folder.
+    """Run the units of work whose results are missing in the folder, which exists and is locked.
 
     The results of each unit are written when it ends, completely or not at all. If this function is
-    interrupted, only the units that are running are lost.
-
-    Args:
-        client: client of the cluster.
-        campaign: the campaign.
-        description: content of the folder's `campaign.json`.
-        folder: folder of the campaign; it exists and is locked.
-        on_unit: called once before the first unit, and after each unit.
+    interrupted, only the units that are running are lost. `on_unit` is called before the first unit
+    and after each unit.
 
     Raises:
         ClusterError: the connection to the scheduler is lost.
@@ -105,11 +90,7 @@ def internal_errors(folder: Path, file: CampaignFile) -> Counter[str]:
 def run_on_cluster(client: "Client", kind: str, cases: Sequence[Case], case_s: float) -> list[Row]:
     """Run any cases on the cluster; return their rows in order. Nothing is stored.
 
-    Args:
-        client: client of the cluster.
-        kind: "flights" or "batch".
-        cases: cases to be flown.
-        case_s: time that a case takes, s; see `companion.campaign.estimate.case_time`.
+    `case_s` is the wall time that a case takes, s.
 
     Raises:
         ClusterError: the connection to the scheduler is lost, or a unit was given up.

@@ -17,18 +17,13 @@ _MEASURED_FLIGHTS = 3
 _MEASURED_VEHICLES = 64
 """Largest number of vehicles in the measured batch.
 
-They share one planner, because compiling a planner takes 2 s.
-"""
+They share one planner, because compiling a planner takes 2 s."""
 
 
 def case_time(kind: str, cases: Sequence[Case]) -> float:
-    """Measure the mean wall time that a case takes in this process, s.
+    """Measure the mean wall time that a case takes in this process, s, on some of the cases.
 
     A first run, which imports and compiles, is not measured. For flights it is 1 s of vehicle time.
-
-    Args:
-        kind: "flights" or "batch".
-        cases: cases of the campaign; some of them are run.
     """
     if kind == "batch":
         planner = cases[0].config.planner_name
@@ -44,12 +39,7 @@ def case_time(kind: str, cases: Sequence[Case]) -> float:
 
 
 def check_size(campaign: Campaign, case_s: float, workers: int) -> None:
-    """Refuse a campaign that is larger than its limits.
-
-    Args:
-        campaign: the campaign.
-        case_s: wall time that a case takes, s.
-        workers: number of workers.
+    """Refuse a campaign that is larger than its limits, if a case takes `case_s` s of wall time.
 
     Raises:
         ConfigError: says the number of cases, the time they would take, and which key allows more.

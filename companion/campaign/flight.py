@@ -9,6 +9,7 @@ from companion.attitude.kinematics import tilt_angle
 from companion.batch import can_compile
 from companion.campaign import outcomes
 from companion.campaign.case import Case, Fault
+from companion.campaign.keys import replaced
 from companion.campaign.swept import Value
 from companion.config import Config
 from companion.files.yaml_file import ConfigError
@@ -38,9 +39,7 @@ _PILOT_MODES = (  # of PX4 and ArduPilot
 def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
     """Fly one case; equal cases give equal rows, to the bit.
 
-    Args:
-        case: the case to fly.
-        folder: folder for the files of a fully recorded flight; None: nothing is written.
+    A fully recorded flight writes its files into `folder`; without one nothing is written.
 
     Returns:
         One row of the results: `case`, `seed`, the factors, and the outcomes. If the case raises an
@@ -58,11 +57,7 @@ def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
 
 
 class CaseFlight:
-    """The flight of one case.
-
-    Args:
-        case: the case to fly.
-        files_folder: a new folder; the files that the flight reads are written into it.
+    """The flight of one case; the files that it reads are written into a new folder.
 
     Raises:
         ConfigError: the configuration cannot be flown.
@@ -82,11 +77,7 @@ class CaseFlight:
         self._time_limit_reached = False
 
     def fly(self, folder: Path | None) -> dict[str, Value]:
-        """Fly the case; return its outcomes.
-
-        Args:
-            folder: folder for the files of a fully recorded flight; None: nothing is written.
-        """
+        """Fly the case; return its outcomes. `folder`: see `fly_case`."""
         vehicle, case = self._vehicle, self._case
         vehicle.after_step.append(self._record_truth)
         fault = _FaultInjector(vehicle, case.fault)
@@ -117,13 +108,9 @@ class CaseFlight:
     ) -> dict[str, Value]:
         """The outcomes of the flight.
 
-        Args:
-            summary: the program's summary.
-            truth_at_end: true state of the vehicle when the program ended.
-            truth_afterwards: true state of the vehicle when it disarmed, or
-                `_WATCHED_AFTERWARDS_S` after the program ended.
-            flight_s: time from boot to the end of the program, s.
-            begun: whether the phase in which the fault begins was reached.
+        The two true states are those when the program ended, `flight_s` s after boot, and when the
+        vehicle disarmed, or `_WATCHED_AFTERWARDS_S` later. `begun`: the phase in which the fault
+        begins was reached.
         """
         figures, setpoints = summary.as_dict(), self._vehicle.setpoints
         crashed, fault = truth_afterwards["crashed"], self._case.fault
@@ -205,9 +192,9 @@ def _with_paths_in(config: Config, files_folder: Path) -> Config:
 
     There, `recording.directory` is empty, so the flight uses no values learned by earlier flights.
     """
-    recording = config.recording.model_copy(update={"directory": files_folder / "learned"})
     path = config.flight.trajectory
-    flight = config.flight.model_copy(
-        update={"trajectory": None if path is None else files_folder / path}
+    return replaced(
+        config,
+        recording={"directory": files_folder / "learned"},
+        flight={"trajectory": None if path is None else files_folder / path},
     )
-    return config.model_copy(update={"recording": recording, "flight": flight})

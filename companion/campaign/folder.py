@@ -31,37 +31,25 @@ _SIZE_LIMITS = ("max_cases", "max_hours")  # keys of the section `limits`
 
 @dataclass(frozen=True)
 class Description:
-    """Description of a campaign: the content of `campaign.json`.
-
-    Attributes:
-        name: name of the campaign.
-        kind: "flights" or "batch".
-        seed: seed of the campaign.
-        cases: number of cases.
-        unit: number of cases in each unit of work; the last unit may have fewer.
-        case_s: wall time of a case, measured before the campaign began, s; None: not measured.
-        versions: versions of the program and of the packages that the results depend on.
-        began: time at which the folder was made, ISO 8601, UTC.
-    """
+    """Description of a campaign: the content of `campaign.json`."""
 
     name: str
     kind: str
+    """"flights" or "batch"."""
     seed: int
     cases: int
     unit: int
+    """Number of cases in each unit of work; the last unit may have fewer."""
     case_s: float | None
+    """Wall time of a case, measured before the campaign began, s; None: not measured."""
     versions: Versions
+    """Versions of the program and of the packages that the results depend on."""
     began: str
+    """Time at which the folder was made, ISO 8601, UTC."""
 
 
 def describe(campaign: Campaign, unit: int, case_s: float | None) -> Description:
-    """The description of a campaign that begins now.
-
-    Args:
-        campaign: the campaign.
-        unit: number of cases in each unit of work.
-        case_s: wall time of a case, s; None: not measured.
-    """
+    """The description of a campaign that begins now; see the fields of `Description`."""
     file, now = campaign.file, datetime.now(UTC).isoformat(timespec="seconds")
     cases = campaign.number_of_cases
     return Description(file.name, file.kind, file.seed, cases, unit, case_s, versions(), now)
@@ -139,11 +127,7 @@ def resume(folder: Path, campaign: Campaign) -> Description:
 
 
 def _require_same(folder: Path, campaign: Campaign) -> None:
-    """Refuse a folder with another campaign; only the limits on the campaign's size may differ.
-
-    Raises:
-        ConfigError: says what differs, or that the campaign's file is damaged.
-    """
+    """Refuse a folder with another campaign; only the limits on the campaign's size may differ."""
     path = folder / CAMPAIGN_FILE_NAME
     try:
         before = bounded_yaml.parse(read_text(path, _LARGEST_FILE_BYTES))

@@ -29,12 +29,9 @@ _SIGNING_KEYS = ("link.signing_key_file", "mock.signing")
 
 
 def check_key(key: str, base: Config, where: str) -> None:
-    """Check that a dotted key exists, and that a campaign can change it.
+    """Check that a dotted key exists in `base`, and that a campaign can change it.
 
-    Args:
-        key: dotted key.
-        base: configuration that the key belongs to.
-        where: file, line and section of the key, for messages.
+    `where` is file, line and section of the key, for messages.
 
     Raises:
         ConfigError: the key is not SECTION.KEY, does not exist, has no effect in a campaign, or
@@ -92,3 +89,11 @@ def with_keys(base: Config, changes: Mapping[str, Any]) -> Config:
         data[section][name] = value
     config = validated(data, "the configuration", Config)
     return config.model_copy(update={"mock": mock_with(base.mock or {}, mock)})
+
+
+def replaced(config: Config, **sections: dict[str, Any]) -> Config:
+    """The configuration with new values by section and key, which are not checked."""
+    changed = {
+        name: getattr(config, name).model_copy(update=values) for name, values in sections.items()
+    }
+    return config.model_copy(update=changed)

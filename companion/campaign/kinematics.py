@@ -98,13 +98,7 @@ def _run_case(case: Case) -> dict[str, Value]:
 
 
 def _outcomes(flight: StepFlight, figures: StepFigures, longest_target: float) -> dict[str, Value]:
-    """The outcomes of a case.
-
-    Args:
-        flight: the simulated flight.
-        figures: its measured figures.
-        longest_target: largest horizontal length of the acceleration targets.
-    """
+    """The outcomes of a case, whose longest target has the horizontal length `longest_target`."""
     time_constants = [each for each in figures[-2:] if isfinite(each)]  # north and east
     values = {
         "cross_axis_max": figures.cross_axis_max,
@@ -174,16 +168,12 @@ def _targets(config: Config, longest_target: float, heading: float) -> Array:
 
 
 class _Pattern(NamedTuple):
-    """A maneuver from its first open-loop step to the end of the last, level between the steps.
-
-    Attributes:
-        samples: number of samples.
-        parts: for each step and each level part: its first sample, the sample after its last, and
-            its acceleration coefficients.
-    """
+    """A maneuver from its first open-loop step to the end of the last, level between the steps."""
 
     samples: int
     parts: tuple[tuple[int, int, Coefficients], ...]
+    """For each step and each level part: its first sample, the sample after its last, and its
+    acceleration coefficients."""
 
 
 @lru_cache(maxsize=64)

@@ -18,7 +18,7 @@ from companion.campaign.campaign_file import (
     CampaignFile,
     FaultPhase,
 )
-from companion.campaign.keys import check_key, with_keys
+from companion.campaign.keys import check_key, replaced, with_keys
 from companion.campaign.swept import Swept
 from companion.config import Config, trajectory_file
 from companion.config.file_kinds import FileKind, require_kind
@@ -44,11 +44,7 @@ def load(path: Path) -> Campaign:
 
 
 class _CampaignReader:
-    """Reads one campaign file.
-
-    Args:
-        path: path of the campaign file.
-    """
+    """Reads one campaign file."""
 
     def __init__(self, path: Path) -> None:
         self._path, self._folder = path, path.parent
@@ -60,11 +56,7 @@ class _CampaignReader:
         self._collected: dict[Path, Path] = {}
 
     def campaign(self) -> Campaign:
-        """Check all keys, collect the trajectory files, and return the campaign.
-
-        Raises:
-            ConfigError: a file cannot be read or is wrong; see `load`.
-        """
+        """Check all keys, collect the trajectory files, and return the campaign."""
         file, base = self._file, self._base()
         for key in file.set:
             check_key(key, base, self._at("set", key))
@@ -98,16 +90,13 @@ class _CampaignReader:
         if isinstance(given_config, Mapping):
             config = validated(dict(given_config), f"{self._path}: config", Config)
             path = config.flight.trajectory
-            return config if path is None else _with_trajectory(config, self._folder / path)
+            if path is None:
+                return config
+            return replaced(config, flight={"trajectory": self._folder / path})
         return load_config(self._folder / given_config)
 
     def _flyable(self, base: Config) -> Config:
-        """The base with `flight.arm: true`, and with the path of its trajectory's copy.
-
-        Raises:
-            ConfigError: the configuration needs the MAVSDK link or signing, or its trajectory
-                cannot be read.
-        """
+        """The base with `flight.arm: true`, and with the path of its trajectory's copy."""
         if base.link.backend != "direct":
             raise ConfigError(f"{self._path}: link.backend must be direct in a campaign")
         if base.link.signing_key_file is not None or (base.mock or {}).get("signing"):
@@ -115,17 +104,12 @@ class _CampaignReader:
                 f"{self._path}: campaigns fly without signing: take out link.signing_key_file and "
                 "mock.signing"
             )
-        armed = base.flight.model_copy(update={"arm": True})
-        base = base.model_copy(update={"flight": armed})
         path = base.flight.trajectory
-        return base if path is None else _with_trajectory(base, self._collect(path))
+        copy = None if path is None else self._collect(path)
+        return replaced(base, flight={"arm": True, "trajectory": copy})
 
     def _with_files(self, name: str, swept: Swept) -> Swept:
-        """The factor, with each path of a trajectory file replaced by that of its copy.
-
-        Raises:
-            ConfigError: a value names no trajectory that can be read.
-        """
+        """The factor, with each path of a trajectory file replaced by that of its copy."""
         if TRAJECTORY not in swept.changed_keys(name):
             return swept
         listed = swept.values or swept.choice or ()
@@ -139,9 +123,6 @@ class _CampaignReader:
 
         Returns:
             path of the copy in the campaign's folder.
-
-        Raises:
-            ConfigError: the file cannot be read, or holds no trajectory.
         """
         if path in self._collected:
             return self._collected[path]
@@ -181,11 +162,7 @@ class _CampaignReader:
             raise ConfigError(f"{name}: sweep.{FAULT_AFTER}: each value must be a number")
 
     def _check_names(self, key: str, known: tuple[str, ...]) -> None:
-        """Check that a fault factor, if it is swept, lists only known names.
-
-        Raises:
-            ConfigError: the factor has no list of values, or an unknown name among them.
-        """
+        """Check that a fault factor, if it is swept, lists only known names."""
         swept = self._file.sweep.get(key)
         if swept is None:
             return
@@ -197,11 +174,6 @@ class _CampaignReader:
                     f"{self._path}: sweep.{key}: there is no {name!r:.60}; known: "
                     f"{', '.join(known)}"
                 )
-
-
-def _with_trajectory(config: Config, path: Path) -> Config:
-    flight = config.flight.model_copy(update={"trajectory": path})
-    return config.model_copy(update={"flight": flight})
 
 
 def resolved_keys(campaign: Campaign) -> dict[str, Any]:

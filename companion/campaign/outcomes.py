@@ -17,29 +17,28 @@ from companion.testing import ReceivedSetpoint, Truth
 
 Floats = NDArray[np.float64]
 
-FLOAT_OUTCOMES = (
-    "position_rms_m",
-    "position_max_m",
-    "height_rms_m",
-    "estimated_rms_m",
-    "level_rms_m",
-    "estimated_level_rms_m",
-    "estimate_level_rms_m",
-    "cross_axis_max",
-    "model_deviation_max",
-    "time_constant_s",
-    "rate_rms_rad_s",
-    "rate_max_rad_s",
-    "thrust_rms",
-    "saturated_share",
-    "max_tilt_rad",
-    "flight_s",
-)
-"""Outcomes of a flight that are numbers; null where they were not measured."""
+OUTCOME_LABELS = {
+    "position_rms_m": "true position error, RMS",
+    "position_max_m": "true position error, largest",
+    "height_rms_m": "true height error, RMS",
+    "estimated_rms_m": "estimated position error, RMS",
+    "level_rms_m": "true horizontal error, RMS",
+    "estimated_level_rms_m": "estimated horizontal error, RMS",
+    "estimate_level_rms_m": "horizontal error of the estimate itself, RMS",
+    "cross_axis_max": "distance from the line of a step",
+    "model_deviation_max": "distance from the first-order model",
+    "time_constant_s": "time constant",
+    "rate_rms_rad_s": "commanded roll-pitch rate, RMS",
+    "rate_max_rad_s": "commanded roll-pitch rate, largest",
+    "thrust_rms": "thrust, deviation from its mean, RMS",
+    "saturated_share": "share of setpoints at a limit",
+    "max_tilt_rad": "largest true tilt",
+    "flight_s": "flight time",
+}
+"""The outcomes of a flight that are numbers, null where they were not measured, and their texts."""
 _SATURATED_FROM = 0.99
 """A setpoint counts as saturated if its rate or thrust is at least this share of the upper limit,
-or its thrust is at most the lower limit divided by this share.
-"""
+or its thrust is at most the lower limit divided by this share."""
 
 
 def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
@@ -73,9 +72,8 @@ def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
 def _horizontal_errors(estimated: Floats, true: Floats) -> dict[str, float]:
     """RMS horizontal distances of true position, estimated position and reference, in pairs, m.
 
-    Args:
-        estimated: (N, 7), rows of `FlightTrace.tracking`.
-        true: (N, 7), the same rows with the true position instead of the estimated one.
+    `estimated` are (N, 7) rows of `FlightTrace.tracking`; `true` are the same rows with the true
+    position instead of the estimated one.
     """
     known = np.isfinite(true[:, 1])
     true_position, reference = true[known, 4:6], true[known, 1:3]
@@ -155,7 +153,7 @@ def of_error(result: str) -> dict[str, Value]:
         "phase": "",
         "crashed": False,
         "as_documented": None,
-        **dict.fromkeys(FLOAT_OUTCOMES),
+        **dict.fromkeys(OUTCOME_LABELS),
         "setpoints": 0,
         "digest": "",
     }
@@ -172,6 +170,6 @@ def failed_checks(figures: Mapping[str, Any]) -> str:
 
 
 def without_nan(values: Mapping[str, float]) -> dict[str, Value]:
-    """All of `FLOAT_OUTCOMES`; a missing or non-finite value is None."""
-    outcomes = {name: values.get(name, nan) for name in FLOAT_OUTCOMES}
+    """All of `OUTCOME_LABELS`; a missing or non-finite value is None."""
+    outcomes = {name: values.get(name, nan) for name in OUTCOME_LABELS}
     return {name: value if isfinite(value) else None for name, value in outcomes.items()}

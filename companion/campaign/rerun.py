@@ -18,28 +18,21 @@ _CASES_FOLDER = "cases"
 
 
 class Rerun(NamedTuple):
-    """A case that was flown again.
-
-    Attributes:
-        row: results of the repeated flight, as one row.
-        folder: folder of its recording.
-        identical: whether the row equals the stored row to the bit. A case that has no stored row
-            yet counts as identical.
-        lines: messages for the user, a line each.
-    """
+    """A case that was flown again."""
 
     row: dict[str, Value]
+    """Results of the repeated flight, as one row."""
     folder: Path
+    """Folder of its recording."""
     identical: bool
+    """Whether the row equals the stored row to the bit. A case that has no stored row yet counts as
+    identical."""
     lines: tuple[str, ...]
+    """Messages for the user, a line each."""
 
 
 def rerun(campaign_folder: Path, index: int) -> Rerun:
-    """Fly a case again, with full recording, and compare it with its stored row.
-
-    Args:
-        campaign_folder: folder of the campaign.
-        index: number of the case.
+    """Fly case number `index` again, with full recording, and compare it with its stored row.
 
     Raises:
         ConfigError: there is no such campaign or case, the case is not a flight, the results are
@@ -56,7 +49,8 @@ def rerun(campaign_folder: Path, index: int) -> Rerun:
     case = campaign.case(next(islice(campaign.planned_cases(), index, None)))
     recording = flight_folder(campaign_folder / _CASES_FOLDER / f"case-{index:05d}")
     row = fly_case(case, recording)
-    lines = [f"{case.described()}: {_verdict_text(row)}"]
+    verdict = "good" if row["ok"] else f"not good: {row['failed_checks'] or row['result']}"
+    lines = [f"{case.described()}: {verdict}"]
     if other := difference(description.versions, versions()):
         lines.append(f"The campaign was flown by another version: this one has {other}.")
     stored = _stored_row(campaign_folder, campaign, description, index)
@@ -69,13 +63,6 @@ def rerun(campaign_folder: Path, index: int) -> Rerun:
         else f"It is bit-identical to the campaign's flight: digest {row['digest']}."
     )
     return Rerun(row, recording, not changed, tuple(lines))
-
-
-def _verdict_text(row: dict[str, Value]) -> str:
-    """Whether a flight was good and, if not, why."""
-    if row["ok"]:
-        return "good"
-    return f"not good: {row['failed_checks'] or row['result']}"
 
 
 def _stored_row(

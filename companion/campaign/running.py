@@ -76,14 +76,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 class _Run:
-    """One run of a campaign.
-
-    Args:
-        campaign: the campaign to run.
-        campaign_folder: folder of the campaign.
-        options: options of the command line.
-        console: console for messages.
-    """
+    """One run of a campaign."""
 
     def __init__(
         self,
@@ -121,11 +114,7 @@ class _Run:
             return self._stopped(str(error))
 
     def _check_all_cases(self) -> float | None:
-        """Check every case; return the wall time that a case takes, s; None: not measured.
-
-        Raises:
-            ConfigError: a case is refused, or the campaign is larger than its limits.
-        """
+        """Check every case; return the wall time that a case takes, s; None: not measured."""
         campaign, kind = self._campaign, self._campaign.file.kind
         workers = self._options.workers or local_workers()
         if campaign.number_of_cases > estimate.most_cases(campaign) and not self._options.yes:
@@ -144,9 +133,7 @@ class _Run:
     def _open_folder(self, case_s: float | None, workers: int) -> Description:
         """Continue the campaign in its folder, or write the folder of a new one.
 
-        Args:
-            case_s: wall time that a case takes, s; None: it was not measured.
-            workers: number of workers.
+        `case_s` is the wall time that a case takes, s; None: it was not measured.
         """
         if folder.holds_campaign(self._folder):
             return folder.resume(self._folder, self._campaign)

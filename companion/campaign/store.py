@@ -1,16 +1,16 @@
 """Stores the results of a campaign: one Parquet file for each unit of work, whole or not at all."""
 
 import json
-import os
 from collections.abc import Mapping, Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from companion.campaign.campaign_file import CampaignFile
-from companion.campaign.outcomes import FLOAT_OUTCOMES
+from companion.campaign.outcomes import OUTCOME_LABELS
 from companion.campaign.swept import Value
 from companion.config.units import unit_of
-from companion.files.write_whole import sync_folder, write_whole
+from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ _OUTCOMES = {
         ("phase", "string"),
         ("crashed", "bool"),
         ("as_documented", "bool"),
-        *((name, "float64") for name in FLOAT_OUTCOMES),
+        *((name, "float64") for name in OUTCOME_LABELS),
         ("setpoints", "int64"),
         ("digest", "string"),
     ),
@@ -94,14 +94,9 @@ def write_unit(
     rows: Sequence[Mapping[str, Value]],
     timing: Mapping[str, Any],
 ) -> None:
-    """Write the rows of a unit of work; when this returns, they are on the disk.
+    """Write the rows of a unit of work, in order; when this returns, they are on the disk.
 
-    Args:
-        folder: folder of the campaign.
-        file: content of the campaign file.
-        number: number of the unit.
-        rows: one row for each case, in order.
-        timing: wall times and worker, for a separate file, because they differ between runs.
+    `timing` (wall times and worker) gets a file of its own, because it differs between runs.
 
     Raises:
         OSError: a file cannot be written; no results of the unit are left.
@@ -110,18 +105,9 @@ def write_unit(
 
     path = unit_path(folder, number)
     write_whole(path.with_suffix(".json"), json.dumps(timing) + "\n")
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        pq.write_table(table(file, rows), temporary)
-        descriptor = os.open(temporary, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
-        temporary.replace(path)
-        sync_folder(path.parent)
-    finally:
-        temporary.unlink(missing_ok=True)
+    parquet = BytesIO()
+    pq.write_table(table(file, rows), parquet)
+    write_whole(path, parquet.getvalue())
 
 
 def unit_path(folder: Path, number: int) -> Path:

@@ -15,39 +15,29 @@ Row = dict[str, Value]
 LONGEST_UNIT_S = 2.5
 """Longest planned wall time of a unit with several cases, s.
 
-It is long compared with the time to send a unit, and so short that a lost unit costs little.
-"""
+It is long compared with the time to send a unit, and so short that a lost unit costs little."""
 _UNITS_PER_WORKER = 4
 """Number of units for each worker where there are few cases, before rounding.
 
 With several units each, all workers end at about the same time. With many cases `LONGEST_UNIT_S`
-limits the units instead, and there are more of them.
-"""
+limits the units instead, and there are more of them."""
 
 
 class UnitResult(NamedTuple):
-    """The result that a worker returns for a unit.
-
-    Attributes:
-        rows: one row for each case, in order.
-        wall_s: wall time of each flight, s; of a batch, a single number for all cases together.
-        worker: address of the Dask worker.
-    """
+    """The result that a worker returns for a unit."""
 
     rows: list[Row]
+    """One row for each case, in order."""
     wall_s: list[float]
+    """Wall time of each flight, s; of a batch, a single number for all cases together."""
     worker: str
+    """Address of the Dask worker."""
 
 
 def fly_planned_cases(
     campaign: Campaign, planned: Sequence[PlannedCase], expected: Versions
 ) -> UnitResult:
-    """Build planned cases, and fly them.
-
-    Args:
-        campaign: the campaign.
-        planned: the planned cases.
-        expected: versions of the client, which this process must have, too.
+    """Build planned cases, and fly them; `expected` are the versions of the client.
 
     Raises:
         ConfigError: a case is refused.
@@ -64,12 +54,7 @@ def fly_cases(kind: str, cases: Sequence[Case], expected: Versions) -> UnitResul
 
 
 def run_cases(kind: str, cases: Sequence[Case]) -> list[Row]:
-    """Run cases in this process; return their rows in order.
-
-    Args:
-        kind: "flights" or "batch".
-        cases: cases to be flown.
-    """
+    """Run cases in this process; return their rows in order."""
     if kind == "flights":
         return [fly_case(case) for case in cases]
     from companion.campaign import kinematics  # noqa: PLC0415  imports much
@@ -112,12 +97,9 @@ def _worker_address() -> str:
 
 
 def size_of_units(cases: int, case_s: float, workers: int) -> int:
-    """The number of cases in a unit of work.
+    """The number of cases in a unit of work, if a case takes `case_s` s of wall time.
 
-    Args:
-        cases: number of all cases.
-        case_s: wall time that a case takes, s.
-        workers: number of workers; 0, while the first is awaited, counts as 1.
+    0 workers, while the first is awaited, count as 1.
     """
     by_time = int(LONGEST_UNIT_S / max(case_s, 1e-6))
     by_share = -(-cases // (_UNITS_PER_WORKER * max(1, workers)))
@@ -125,10 +107,5 @@ def size_of_units(cases: int, case_s: float, workers: int) -> int:
 
 
 def unit_ranges(cases: int, size: int) -> list[range]:
-    """The case numbers of each unit of work, in order.
-
-    Args:
-        cases: number of all cases.
-        size: number of cases in a unit; the last unit may have fewer.
-    """
+    """The case numbers of each unit of work, in order; the last unit may be shorter than `size`."""
     return [range(first, min(first + size, cases)) for first in range(0, cases, size)]

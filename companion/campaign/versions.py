@@ -71,12 +71,7 @@ def difference(ours: Versions, others: Versions) -> str:
 
 
 def require_equal(ours: Versions, others: Versions, who: str) -> None:
-    """Refuse another process with different versions.
-
-    Args:
-        ours: required versions.
-        others: versions of the other process.
-        who: name of the other process; begins the message.
+    """Refuse another process with different versions; `who` names it in the message.
 
     Raises:
         VersionError: says what differs.

@@ -2,9 +2,8 @@
 
 import argparse
 from collections.abc import Sequence
-from pathlib import Path
 
-from companion.cli.tool_options import Commands, whole_number
+from companion.cli.options import Commands, add_flag, add_path, whole_number
 
 _CAMPAIGN, _RUN = "campaign", "run"
 _SUB_COMMANDS = (_RUN, "report", "rerun", "tune", "-h", "--help")
@@ -39,28 +38,19 @@ def add_campaign(commands: Commands) -> None:
 
 def _add_run(kinds: Commands) -> None:
     run = kinds.add_parser(_RUN, help="run a campaign; the word `run` may be left out")
-    run.add_argument(
-        "file",
-        type=Path,
-        metavar="FILE",
-        help="the campaign's file, or the folder of a campaign that was stopped",
-    )
-    run.add_argument(
+    add_path(run, "file", "the campaign's file, or the folder of a campaign that was stopped")
+    add_path(
+        run,
         "--out",
-        type=Path,
-        metavar="FOLDER",
-        help="folder for the results (runs/campaigns/NAME-TIME); a campaign in it is continued",
+        "folder for the results (runs/campaigns/NAME-TIME); a campaign in it is continued",
+        "FOLDER",
     )
-    add_cluster_options(run)
-    run.add_argument(
-        "--yes",
-        action="store_true",
-        help="run it regardless of its number of cases and its duration",
-    )
+    _add_cluster_options(run)
+    add_flag(run, "--yes", "run it regardless of its number of cases and its duration")
     run.set_defaults(run="campaign.run")
 
 
-def add_cluster_options(command: argparse.ArgumentParser) -> None:
+def _add_cluster_options(command: argparse.ArgumentParser) -> None:
     """Add `--scheduler` and `--workers`."""
     cluster_or_workers = command.add_mutually_exclusive_group()
     cluster_or_workers.add_argument(
@@ -83,7 +73,7 @@ def _add_rerun(kinds: Commands) -> None:
         description="Fly one case of a campaign again, record it as `companion fly` does, write "
         "its report, and check that it is the same flight to the bit. Exit code 1: it differs.",
     )
-    rerun.add_argument("folder", type=Path, metavar="FOLDER", help="the campaign's folder")
+    add_path(rerun, "folder", "the campaign's folder", "FOLDER")
     rerun.add_argument(
         "case", type=int, metavar="CASE", help="number of the case (column `case` of the results)"
     )
@@ -97,8 +87,8 @@ def _add_report(kinds: Commands) -> None:
         description="Write report.html with success rates, worst cases, sensitivity, Pareto front "
         "and distributions, and all results as results.parquet and results.csv in the folder.",
     )
-    report.add_argument("folder", type=Path, metavar="FOLDER", help="the campaign's folder")
-    report.add_argument("--out", type=Path, metavar="FILE", help="the page (FOLDER/report.html)")
+    add_path(report, "folder", "the campaign's folder", "FOLDER")
+    add_path(report, "--out", "the page (FOLDER/report.html)")
     report.set_defaults(run="campaign.report")
 
 
@@ -111,18 +101,13 @@ def _add_tune(kinds: Commands) -> None:
         "has not seen, and write the result as YAML with its reasons. The command continues a "
         "search that was stopped.",
     )
-    tune.add_argument("file", type=Path, metavar="FILE", help="a campaign's file with `tune:`")
-    tune.add_argument(
-        "--out",
-        type=Path,
-        metavar="FOLDER",
-        help="folder for the search (runs/campaigns/NAME-tune)",
-    )
+    add_path(tune, "file", "a campaign's file with `tune:`")
+    add_path(tune, "--out", "folder for the search (runs/campaigns/NAME-tune)", "FOLDER")
     tune.add_argument(
         "--trials",
         type=whole_number(1, 100_000),
         metavar="NUMBER",
         help="number of trials; replaces tune.trials of the file",
     )
-    add_cluster_options(tune)
+    _add_cluster_options(tune)
     tune.set_defaults(run="campaign.tune")

@@ -6,10 +6,19 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 
-from companion.cli import shared_options, tool_options
+from companion.cli import tool_options
 from companion.cli.campaign_options import add_campaign, with_campaign_command
-from companion.cli.recording_options import add_recordings
-from companion.cli.tool_options import Commands, number
+from companion.cli.options import (
+    Commands,
+    add_endpoint,
+    add_flag,
+    add_json,
+    add_live,
+    add_path,
+    add_required_config,
+    add_set,
+    number,
+)
 
 _PACKAGE = "mavlink-companion"
 
@@ -17,8 +26,7 @@ _PACKAGE = "mavlink-companion"
 def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     """Read the command line; ends the program for `--help`, `--version` and wrong usage.
 
-    Args:
-        arguments: arguments of the command line; None: those of this process.
+    Without arguments those of this process are read.
 
     Returns:
         The options; their attribute `typed` holds the arguments as typed.
@@ -36,9 +44,7 @@ def _parser() -> argparse.ArgumentParser:
             "Fly a PX4 or ArduPilot multirotor by body rates, with a linear acceleration response."
         ),
     )
-    parser.add_argument(
-        "--debug", action="store_true", help="show where an internal error happened"
-    )
+    add_flag(parser, "--debug", "show where an internal error happened")
     parser.add_argument("--version", action="version", version=f"companion {version(_PACKAGE)}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     _add_flights(commands)
@@ -49,7 +55,7 @@ def _parser() -> argparse.ArgumentParser:
     tool_options.add_benches(commands)
     tool_options.add_study(commands)
     add_campaign(commands)
-    add_recordings(commands)
+    tool_options.add_recordings(commands)
     tool_options.add_config(commands)
     return parser
 
@@ -61,7 +67,7 @@ def _add_flights(commands: Commands) -> None:
         description="Check the vehicle, wait until it is armed, take off, fly the maneuvers, and "
         "land. Ctrl-C hands the vehicle back. The flight is recorded in a folder of its own.",
     )
-    shared_options.add_required_config(fly)
+    add_required_config(fly)
     _add_link_options(fly)
     fly.set_defaults(run="flights.fly")
     demo = commands.add_parser(
@@ -69,15 +75,8 @@ def _add_flights(commands: Commands) -> None:
         help="start the bundled vehicle and fly it",
         description="Start the bundled mock vehicle, arm it, and fly it like `companion fly`.",
     )
-    demo.add_argument(
-        "--config",
-        type=Path,
-        metavar="FILE",
-        help="configuration (default: the shipped mock-px4.yaml)",
-    )
-    demo.add_argument(
-        "--open", action="store_true", help="open the report in the browser after the flight"
-    )
+    add_path(demo, "--config", "configuration (default: the shipped mock-px4.yaml)")
+    add_flag(demo, "--open", "open the report in the browser after the flight")
     demo.set_defaults(run="flights.demo")
     for command in (fly, demo):
         command.add_argument(
@@ -87,19 +86,18 @@ def _add_flights(commands: Commands) -> None:
             help="maneuvers that replace flight.maneuvers: hover, steps, circle, corners, or "
             "trajectory if flight.trajectory is set",
         )
-        command.add_argument(
+        add_path(
+            command,
             "--trajectory",
-            type=Path,
-            metavar="FILE",
-            help="fly only this trajectory: a YAML file such as configs/trajectories/figure8.yaml, "
+            "fly only this trajectory: a YAML file such as configs/trajectories/figure8.yaml, "
             "or a CSV table",
         )
-        command.add_argument(
+        add_flag(
+            command,
             "--slow-down",
-            action="store_true",
-            help="slow down a trajectory that exceeds the limits, instead of refusing it",
+            "slow down a trajectory that exceeds the limits, instead of refusing it",
         )
-        shared_options.add_live(command)
+        add_live(command)
         _add_flight_options(command)
 
 
@@ -114,8 +112,8 @@ def _add_doctor(commands: Commands) -> None:
         "flight.accept names them. Exit code 1: something is unsafe and not in "
         "flight.accept, the vehicle is not ready, or it does not answer.",
     )
-    shared_options.add_required_config(command)
-    shared_options.add_endpoint(command)
+    add_required_config(command)
+    add_endpoint(command)
     command.add_argument(
         "--wait",
         type=number(0.01, 3600.0),
@@ -124,15 +122,13 @@ def _add_doctor(commands: Commands) -> None:
         help="longest wait until the vehicle is ready (10)",
     )
     fix_or_undo = command.add_mutually_exclusive_group()
-    fix_or_undo.add_argument(
+    add_flag(
+        fix_or_undo,
         "--fix",
-        action="store_true",
-        help="write an undo file, then set the proposed parameters, asking before each",
+        "write an undo file, then set the proposed parameters, asking before each",
     )
-    fix_or_undo.add_argument(
-        "--undo", type=Path, metavar="FILE", help="only restore the parameters in an undo file"
-    )
-    command.add_argument("--yes", action="store_true", help="with --fix: set all without asking")
+    add_path(fix_or_undo, "--undo", "only restore the parameters in an undo file")
+    add_flag(command, "--yes", "with --fix: set all without asking")
     _add_flight_options(command)
     command.set_defaults(run="doctor.doctor")
 
@@ -147,30 +143,22 @@ def _add_identify(commands: Commands) -> None:
         "values of the flight's configuration.",
     )
     flight_source = command.add_mutually_exclusive_group(required=True)
-    flight_source.add_argument(
-        "--config", type=Path, metavar="FILE", help="fly the vehicle of this configuration"
-    )
-    flight_source.add_argument(
+    add_path(flight_source, "--config", "fly the vehicle of this configuration")
+    add_path(
+        flight_source,
         "--bundled",
-        type=Path,
-        metavar="FILE",
+        "start and fly the bundled vehicle (default: the shipped mock-px4.yaml)",
         nargs="?",
         const=Path(),  # the configuration that ships
-        help="start and fly the bundled vehicle (default: the shipped mock-px4.yaml)",
     )
-    flight_source.add_argument(
+    add_path(
+        flight_source,
         "--log",
-        type=Path,
-        metavar="PATH",
-        help="identify from a recorded flight's folder or any .tlog, without flying",
+        "identify from a recorded flight's folder or any .tlog, without flying",
+        "PATH",
     )
-    command.add_argument(
-        "--out",
-        type=Path,
-        metavar="FILE",
-        help="result (default: vehicle.yaml beside the flight's log)",
-    )
-    command.add_argument("--force", action="store_true", help="replace FILE if it exists")
+    add_path(command, "--out", "result (default: vehicle.yaml beside the flight's log)")
+    add_flag(command, "--force", "replace FILE if it exists")
     _add_link_options(command)
     _add_flight_options(command)
     command.set_defaults(
@@ -184,15 +172,11 @@ def _add_identify(commands: Commands) -> None:
 
 
 def _add_link_options(command: argparse.ArgumentParser) -> None:
-    shared_options.add_endpoint(command)
-    command.add_argument(
-        "--arm", action="store_true", help="let the program arm the vehicle, like flight.arm: true"
-    )
+    add_endpoint(command)
+    add_flag(command, "--arm", "let the program arm the vehicle, like flight.arm: true")
 
 
 def _add_flight_options(command: argparse.ArgumentParser) -> None:
-    shared_options.add_set(command, "limits.max_tilt_deg=20")
-    command.add_argument(
-        "--lockstep", action="store_true", help="run on the mock vehicle's clock, step by step"
-    )
-    command.add_argument("--json", action="store_true", help="print the result as one line of JSON")
+    add_set(command, "limits.max_tilt_deg=20")
+    add_flag(command, "--lockstep", "run on the mock vehicle's clock, step by step")
+    add_json(command)

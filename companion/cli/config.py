@@ -1,7 +1,6 @@
 """`companion config`, `companion init` and `companion check-config`."""
 
 import argparse
-import difflib
 import sys
 from pathlib import Path
 from shlex import quote
@@ -15,6 +14,7 @@ from companion.config.suspect_values import suspect_values
 from companion.control.expected_response import expectations
 from companion.demo import check_mock
 from companion.extras import MissingExtraError
+from companion.files.similar_names import MIN_SIMILARITY, nearest
 from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
 from companion.flight.maneuvers import configured_maneuvers
@@ -41,11 +41,7 @@ def show(options: argparse.Namespace) -> int:
 
 
 def _named_keys(config: Config, name: str) -> list[ConfigKey]:
-    """The key with that name, or all keys of a section.
-
-    Raises:
-        ConfigError: there is no such key.
-    """
+    """The key with that name, or all keys of a section."""
     known = list(keys(config))
     matching = [key for key in known if name in (key.section, f"{key.section}.{key.name}")]
     if not matching:
@@ -65,8 +61,8 @@ def _suggestions(known: list[ConfigKey], name: str) -> list[str]:
     for each, key in dotted.items():
         candidates[each] = [each]
         candidates.setdefault(key.name, []).append(each)  # several sections may have such a key
-    nearest = difflib.get_close_matches(name, candidates, n=1)
-    return candidates[nearest[0]] if nearest else []
+    near = nearest(name, candidates, MIN_SIMILARITY)
+    return [] if near is None else candidates[near]
 
 
 def init(options: argparse.Namespace) -> int:

@@ -75,13 +75,7 @@ def doctor(options: argparse.Namespace) -> int:
 
 
 def _with_options(config: Config, options: argparse.Namespace) -> Config:
-    """The configuration as changed by the options of the command line.
-
-    Raises:
-        ConfigError: an option or an endpoint is wrong.
-        MissingExtraError: the package of the link's backend is not installed.
-        SigningError: the signing key cannot be used.
-    """
+    """The configuration as changed by the options of the command line."""
     config = changed(config, parse_assignments(options.set), "--set")
     link: dict[str, Any] = {"endpoint": options.endpoint} if options.endpoint else {}
     if options.lockstep:

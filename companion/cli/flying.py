@@ -6,7 +6,6 @@ import sys
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import Any
 
 from companion import demo
 from companion.cli import interrupts
@@ -44,21 +43,20 @@ def with_options(config: Config, options: argparse.Namespace, planner: str | Non
     """
     if options.maneuvers and options.trajectory:
         raise ConfigError("--trajectory flies only its file; leave out --maneuvers")
-    link: dict[str, Any] = {}
-    flight: dict[str, Any] = {}
-    if options.endpoint:
-        link["endpoint"] = options.endpoint
-    if options.lockstep:
-        link["lockstep"] = True
-    if options.maneuvers:
-        flight["maneuvers"] = options.maneuvers
-    if options.trajectory:
-        flight["maneuvers"], flight["trajectory"] = ("trajectory",), options.trajectory
-    if options.slow_down:
-        flight["slow_down"] = True
-    if options.arm:
-        flight["arm"] = True
-    changes = {"link": link, "flight": flight, "planner": {"name": planner} if planner else {}}
+    keys = {
+        "link": {"endpoint": options.endpoint, "lockstep": options.lockstep},
+        "flight": {
+            "maneuvers": ("trajectory",) if options.trajectory else options.maneuvers,
+            "trajectory": options.trajectory,
+            "slow_down": options.slow_down,
+            "arm": options.arm,
+        },
+        "planner": {"name": planner},
+    }
+    changes = {
+        section: {key: value for key, value in values.items() if value}  # else it is not given
+        for section, values in keys.items()
+    }
     flown_config = changed(config, parse_assignments(options.set), "--set")
     flown_config = changed(flown_config, changes, "the command line")
     if options.slow_down and "trajectory" not in flown_config.flight.maneuvers:

@@ -11,7 +11,6 @@ from typing import Any
 
 from companion.cli import flying
 from companion.cli.exit_codes import EXIT_FAILURE, EXIT_OK
-from companion.cli.log_choice import LOG, log_of
 from companion.cli.output_file import require_writable
 from companion.cli.terminal import FlightConsole
 from companion.config.files import load
@@ -28,8 +27,10 @@ from companion.identification import (
     vehicle_fragment,
     vehicle_table,
 )
+from companion.mavlink.errors import LogError
 from companion.recording.folder import flight_folder
 from companion.recording.measurements.summary import Summary
+from companion.recording.tlog import TLOG_FILE
 from companion.vehicle.flight_log import read_flight_log
 
 SHIPPED = Path()
@@ -45,7 +46,7 @@ def identify(options: argparse.Namespace) -> int:
     """Fly and fit, or fit a recorded flight; write the fit if it is usable."""
     console = FlightConsole(stderr=options.json, highlight=False)
     if options.log is not None:
-        log = log_of(options.log)
+        log = _log_of(options.log)
         out = options.out or log.with_name(_FRAGMENT)
         require_writable(out, "--out", force=options.force)
         return _fit(log, out, options, console)
@@ -55,7 +56,7 @@ def identify(options: argparse.Namespace) -> int:
     if summary.result != "ok" or summary.log is None:
         _print_json(options, {"result": summary.result, "log": str(summary.log)})
         return EXIT_FAILURE
-    log = summary.log / LOG
+    log = summary.log / TLOG_FILE
     out = options.out or log.with_name(_FRAGMENT)
     try:
         return _fit(log, out, options, console)
@@ -68,6 +69,34 @@ def identify(options: argparse.Namespace) -> int:
             console.print(reason, soft_wrap=True)
         _print_json(options, {"result": reason, "log": str(log)})
         return EXIT_FAILURE
+
+
+def _log_of(given: Path) -> Path:
+    """The log that `--log` names: a file, or the log in the folder of a flight."""
+    log = given / TLOG_FILE if given.is_dir() else given
+    if log.is_file() and log.suffix != ".mcap":
+        return log
+    if given.is_dir():
+        fault, meant = f"holds no {TLOG_FILE}", _suggestion(given)
+    elif not given.exists():
+        fault, meant = "does not exist", _suggestion(given.parent)
+    else:
+        fault, meant = "is no MAVLink log", _suggestion(given.parent)
+    raise LogError(
+        f"{given} {fault}: --log takes the folder of a flight, or a MAVLink log such as the "
+        f"flight.tlog in it{meant}"
+    )
+
+
+def _suggestion(folder: Path) -> str:
+    """The end of a message: the log in a folder, else the newest flight in a folder of flights."""
+    if (folder / TLOG_FILE).is_file():
+        return f"; write --log {shlex.quote(str(folder / TLOG_FILE))}"
+    flights = sorted(folder.glob(f"*/{TLOG_FILE}"), key=lambda log: log.stat().st_mtime)
+    if flights:
+        return f"; write --log {shlex.quote(str(flights[-1].parent))}"
+    others = sorted(folder.glob("*.tlog"))
+    return f"; write --log {shlex.quote(str(others[0]))}" if others else ""
 
 
 def _fly_doublets(options: argparse.Namespace, console: FlightConsole) -> Summary:
@@ -122,7 +151,7 @@ def _configured_axes(log: Path) -> dict[str, AxisKeys]:
 def _flight_name(log: Path) -> str:
     """The name of a flight's folder, or of another program's log; `?` for what is not UTF-8."""
     path = log.resolve()
-    name = path.parent.name if path.name == LOG else path.name
+    name = path.parent.name if path.name == TLOG_FILE else path.name
     return name.encode("utf-8", "replace").decode("utf-8")[:_LONGEST_NAME]
 
 

@@ -79,9 +79,6 @@ class LiveLines:
     """Status lines that stay at the bottom while other text scrolls above them.
 
     Each change is one write, so nothing flickers. Lines are cut to the terminal's width.
-
-    Args:
-        file: the terminal.
     """
 
     def __init__(self, file: IO[str]) -> None:
@@ -91,12 +88,7 @@ class LiveLines:
         self._lines: list[str] = []
 
     def show(self, lines: Sequence[str], *, alarm: bool = False) -> None:
-        """Replace the lines.
-
-        Args:
-            lines: the new lines, from top to bottom.
-            alarm: whether the last line shows an alarm.
-        """
+        """Replace the lines; with `alarm`, the last one shows an alarm."""
         go_back, columns = self._to_first_line(), self._columns()
         plain = lines if self._is_unicode else [ascii_for(line) for line in lines]
         self._lines = [line[: columns - 1] for line in plain]

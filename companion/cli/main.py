@@ -11,7 +11,6 @@ import sys
 
 from companion.cli import interrupts
 from companion.cli.exit_codes import EXIT_FAILURE
-from companion.cli.utf8_names import use_utf8_names
 
 TYPE_CHECKING = False  # type checkers take it for typing's, whose import would cost 5 ms
 if TYPE_CHECKING:
@@ -19,13 +18,9 @@ if TYPE_CHECKING:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit code.
-
-    Args:
-        arguments: arguments of the command line; None: those of this process.
-    """
+    """Run one command; returns the exit code. Without arguments those of this process are used."""
     if arguments is None:
-        use_utf8_names()
+        _use_utf8_names()
     our_signals = interrupts.unhandled()
     interrupts.leave_at_once(our_signals)
     try:
@@ -41,6 +36,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
         interrupts.restore(our_signals)
         if arguments is None and signal.SIGINT in our_signals:  # Ctrl-C may end Python's shutdown
             signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def _use_utf8_names() -> None:
+    """Start this process again in Python's UTF-8 mode if its locale knows only ASCII file names.
+
+    With `LC_ALL=C`, `PYTHONCOERCECLOCALE=0` and `PYTHONUTF8=0`, as some service managers and shells
+    set them, Python cannot name a file `flüge` that a configuration names. The encoding of the
+    output stays. If the process cannot be started again, it goes on.
+    """
+    if sys.getfilesystemencoding() not in ("ascii", "us-ascii") or not sys.executable:
+        return
+    encoding = os.environ.get("PYTHONIOENCODING") or getattr(sys.stdout, "encoding", None)
+    environment = {**os.environ, "PYTHONUTF8": "1", "PYTHONIOENCODING": encoding or "ascii"}
+    try:
+        os.execve(sys.executable, [sys.executable, "-X", "utf8", *sys.orig_argv[1:]], environment)
+    except OSError:
+        return
 
 
 def _load_command(arguments: Sequence[str] | None) -> Callable[[], int]:

@@ -7,12 +7,9 @@ from companion.files.yaml_file import ConfigError
 
 
 def require_writable(output: Path, option: str, *, force: bool) -> None:
-    """Refuse an output file that cannot be written.
+    """Refuse an output file that cannot be written; `option` names it in the message.
 
-    Args:
-        output: the file.
-        option: the option that names it, for the message.
-        force: whether an existing file may be replaced.
+    An existing file may be replaced only with `force`.
 
     Raises:
         ConfigError: the file cannot be written; the message says why.

@@ -13,7 +13,7 @@ from companion.recording.flight_record import FlightRecord, read_flight
 
 def plot(options: argparse.Namespace) -> int:
     """Draw a recorded flight."""
-    from companion.recording.figure import draw_flight  # noqa: PLC0415  no other command needs it
+    from companion.report.picture import draw_flight  # noqa: PLC0415  no other command needs it
 
     out = options.out or options.folder / "flight.png"
     try:

@@ -16,15 +16,15 @@ from companion.files.os_errors import reason_of
 from companion.files.yaml_file import ConfigError
 from companion.mavlink.errors import EndpointError, LinkError, LogError, SigningError
 from companion.realtime import RealtimeError
-from companion.recording.figure import FigureError
 from companion.recording.flight_record import RecordError
+from companion.report import PictureError
 
 _USAGE_ERRORS = (
     ConfigError,
     EndpointError,
-    FigureError,
     LogError,
     MissingExtraError,
+    PictureError,
     RealtimeError,
     RecordError,
     SigningError,
@@ -71,17 +71,12 @@ def run(command: Command, options: argparse.Namespace) -> int:
     lost = lost_output()
     # An error without a file may be that of standard output, which is reported below.
     if os_error is not None and (lost is None or os_error.filename is not None):
-        _print_error(_os_error_text(os_error))
+        file = "" if os_error.filename is None else f"{os_error.filename}: "
+        _print_error(f"{file}{reason_of(os_error)}")
     if lost:
         _print_error(f"standard output cannot be written: {lost}")
         return code or EXIT_FAILURE
     return code
-
-
-def _os_error_text(error: OSError) -> str:
-    """The reason that the system gives, after the name of the file if there is one."""
-    reason = reason_of(error)
-    return reason if error.filename is None else f"{error.filename}: {reason}"
 
 
 def _print_error(text: str) -> None:

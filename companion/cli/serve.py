@@ -103,13 +103,7 @@ async def _until_stopped(session: ServeSession, pages: ReportPages) -> dict[str,
 
 
 def _with_options(config: Config, options: argparse.Namespace) -> Config:
-    """The configuration as changed by the options of the command line.
-
-    Raises:
-        ConfigError: options and configuration contradict each other.
-        MissingExtraError: an extra that the configuration needs is not installed.
-        SigningError: the signing key cannot be used.
-    """
+    """The configuration as changed by the options of the command line."""
     served_config = changed(config, parse_assignments(options.set), "--set")
     link = {"endpoint": options.endpoint} if options.endpoint else {}
     clients = {"clients": options.client} if options.client else {}

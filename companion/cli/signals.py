@@ -22,11 +22,6 @@ class SignalHandler:
 
     A terminal that closes sends several: the shell and the kernel each send SIGHUP, and SIGTERM may
     follow. So a repeated SIGHUP or SIGTERM changes nothing. Only a second Ctrl-C ends a hand-back.
-
-    Args:
-        session: the session that flies.
-        give_up: ends the session while there is no flight to interrupt.
-        clock: returns wall time, not vehicle time, s.
     """
 
     def __init__(

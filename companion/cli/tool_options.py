@@ -1,15 +1,23 @@
 """The options of the commands that do not fly."""
 
 import argparse
-from collections.abc import Callable
-from math import nan
 from pathlib import Path
-from typing import TypeAlias
 
-from companion.cli.shared_options import add_endpoint, add_live, add_required_config, add_set
+from companion.cli.options import (
+    Commands,
+    add_endpoint,
+    add_flag,
+    add_flight_folder,
+    add_json,
+    add_live,
+    add_path,
+    add_required_config,
+    add_set,
+    number,
+    whole_number,
+)
 from companion.study import registry
 
-Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 STARTING_FILES = {"px4": "px4", "ardupilot": "ardupilot", "mock": "mock-px4"}
 """Name that the user gives to `init` -> shipped file from which `init` makes a new one."""
 
@@ -33,9 +41,7 @@ def add_serve(commands: Commands) -> None:
         help="replaces serve.clients, such as udpin://127.0.0.1:14551; may be repeated",
     )
     add_set(serve, "link.target_system=2")
-    serve.add_argument(
-        "--json", action="store_true", help="print the counters at the end as one line of JSON"
-    )
+    add_json(serve, "print the counters at the end as one line of JSON")
     add_live(serve)
     serve.set_defaults(run="serve.serve")
 
@@ -52,17 +58,10 @@ def add_tune(commands: Commands) -> None:
         "what it computes. Exit code 1: with the new values a course failed or was flown worse; "
         "the first line says which.",
     )
-    tune.add_argument(
-        "vehicle",
-        type=Path,
-        metavar="PATH",
-        help="vehicle.yaml of `companion identify`, or the folder of its flight",
-    )
-    tune.add_argument(
-        "--config",
-        type=Path,
-        metavar="FILE",
-        help="configuration to tune (default: that of the flight, or the defaults)",
+    source = "vehicle.yaml of `companion identify`, or the folder of its flight"
+    add_path(tune, "vehicle", source, "PATH")
+    add_path(
+        tune, "--config", "configuration to tune (default: that of the flight, or the defaults)"
     )
     tune.add_argument(
         "--out",
@@ -72,11 +71,9 @@ def add_tune(commands: Commands) -> None:
         metavar="FILE",
         help="result (default: tuned.yaml beside the vehicle file)",
     )
-    tune.add_argument("--force", action="store_true", help="replace FILE if it exists")
-    tune.add_argument(
-        "--no-flights", action="store_true", help="do not fly the values on the mock vehicle"
-    )
-    tune.add_argument("--json", action="store_true", help="print the result as one line of JSON")
+    add_flag(tune, "--force", "replace FILE if it exists")
+    add_flag(tune, "--no-flights", "do not fly the values on the mock vehicle")
+    add_json(tune)
     tune.set_defaults(run="tune.tune")
 
 
@@ -87,43 +84,39 @@ def add_benches(commands: Commands) -> None:
     link = benches.add_parser(
         "link", help="latency from sample to setpoint: ours, echo, pymavlink, MAVSDK"
     )
-    link.set_defaults(run="tools.bench_link")
     serve = benches.add_parser(
         "serve", help="latency from sample to setpoint, with three clients on the link and without"
     )
-    serve.set_defaults(run="tools.bench_serve")
     for each in (link, serve):
+        _add_seconds(each, 0.1, 20.0, "duration for each program")
         each.add_argument(
-            "--seconds",
-            type=number(0.1, 3600.0),
-            default=20.0,
-            help="duration for each program (20)",
-        )
-        each.add_argument(
-            "--rate", type=number(1.0, 2000.0), default=250.0, help="samples per second (250)"
+            "--rate",
+            dest="rate_hz",
+            type=number(1.0, 2000.0),
+            default=250.0,
+            metavar="RATE",
+            help="samples per second (250)",
         )
     step_bench = benches.add_parser(
         "planner", help="time of one step of each planner, in a flight and in batches"
     )
-    step_bench.add_argument(
-        "--seconds", type=number(0.001, 3600.0), default=5.0, help="duration of the measurement (5)"
-    )
-    step_bench.set_defaults(run="tools.bench_planner")
+    _add_seconds(step_bench, 0.001, 5.0, "duration of the measurement")
     flight = benches.add_parser(
         "flight", help="speed of whole flights in one process, as a multiple of real time"
     )
-    flight.add_argument(
-        "--seconds",
-        type=number(0.1, 3600.0),
-        default=20.0,
-        help="duration of the hover in each flight (20)",
+    _add_seconds(flight, 0.1, 20.0, "duration of the hover in each flight")
+    add_flag(flight, "--profile", "also show the processor time of each part")
+    for name, each in benches.choices.items():
+        add_json(each, "print the figures as one JSON line")
+        each.set_defaults(run="tools.bench", bench=name)
+
+
+def _add_seconds(
+    bench: argparse.ArgumentParser, least: float, default: float, meaning: str
+) -> None:
+    bench.add_argument(
+        "--seconds", type=number(least, 3600.0), default=default, help=f"{meaning} ({default:g})"
     )
-    flight.add_argument(
-        "--profile", action="store_true", help="also show the processor time of each part"
-    )
-    flight.set_defaults(run="tools.bench_flight")
-    for each in (link, serve, step_bench, flight):
-        each.add_argument("--json", action="store_true", help="print the figures as one JSON line")
 
 
 def add_study(commands: Commands) -> None:
@@ -137,30 +130,17 @@ def add_study(commands: Commands) -> None:
     study.add_argument(
         "name", choices=registry.choices(), metavar="NAME", help="a study, see below"
     )
-    study.add_argument(
-        "--case",
-        type=Path,
-        metavar="FILE",
-        help=f"case for {registry.names_with_case()}, such as configs/study-case.yaml",
-    )
-    study.add_argument(
-        "--out",
-        type=Path,
-        default=Path("study"),
-        metavar="DIR",
-        help="folder for the results (default: study)",
-    )
+    case = f"case for {registry.names_with_case()}, such as configs/study-case.yaml"
+    add_path(study, "--case", case)
+    results = "folder for the results (default: study)"
+    add_path(study, "--out", results, "DIR", default=Path("study"))
     study.add_argument(
         "--workers",
         type=whole_number(1, 256),
         metavar="N",
         help="processes for `study all`; default: one for each core",
     )
-    study.add_argument(
-        "--json",
-        action="store_true",
-        help=f"for {registry.names_with_json()}: print its rows as one JSON list",
-    )
+    add_json(study, f"for {registry.names_with_json()}: print its rows as one JSON list")
     study.set_defaults(run="tools.study")
 
 
@@ -171,31 +151,20 @@ def add_config(commands: Commands) -> None:
         help="print the configuration: every key, its default, unit, range and meaning",
         description="Print every key as commented YAML, with the values of FILE or the defaults.",
     )
-    show.add_argument("file", type=Path, nargs="?", metavar="FILE", help="configuration")
+    add_path(show, "file", "configuration", nargs="?")
     selection = show.add_mutually_exclusive_group()
-    selection.add_argument(
-        "--diff", type=Path, metavar="FILE", help="print only the keys that FILE changes"
-    )
+    add_path(selection, "--diff", "print only the keys that FILE changes")
     selection.add_argument(
         "--get", metavar="KEY", help="print only this key, such as limits.max_tilt_deg"
     )
-    selection.add_argument(
-        "--schema", action="store_true", help="print the JSON Schema, for editors"
-    )
-    selection.add_argument(
-        "--markdown", action="store_true", help="print tables, as in docs/configuration.md"
-    )
+    add_flag(selection, "--schema", "print the JSON Schema, for editors")
+    add_flag(selection, "--markdown", "print tables, as in docs/configuration.md")
     show.set_defaults(run="config.show")
 
     start = commands.add_parser("init", help="write a commented starting configuration")
     start.add_argument("name", choices=list(STARTING_FILES), help="vehicle of the configuration")
-    start.add_argument(
-        "--out",
-        type=Path,
-        default=Path("companion.yaml"),
-        metavar="FILE",
-        help="file to write (default: companion.yaml); an existing file is never replaced",
-    )
+    out = "file to write (default: companion.yaml); an existing file is never replaced"
+    add_path(start, "--out", out, default=Path("companion.yaml"))
     start.set_defaults(run="config.init")
 
     check = commands.add_parser(
@@ -210,27 +179,70 @@ def add_config(commands: Commands) -> None:
     check.set_defaults(run="config.check")
 
 
-def number(least: float, most: float) -> Callable[[str], float]:
-    """Make a parser for a number within bounds; it refuses NaN."""
-
-    def read(text: str) -> float:
-        try:
-            value = float(text)
-        except ValueError:
-            value = nan
-        if not least <= value <= most:
-            raise argparse.ArgumentTypeError(f"must be a number from {least:g} to {most:g}")
-        return value
-
-    return read
+def add_recordings(commands: Commands) -> None:
+    """Add `plot`, `report`, `compare`, `export` and `replay`."""
+    _add_plot(commands)
+    _add_reports(commands)
+    _add_export(commands)
+    _add_replay(commands)
 
 
-def whole_number(least: int, most: int) -> Callable[[str], int]:
-    """Make a parser for a whole number within bounds."""
+def _add_plot(commands: Commands) -> None:
+    plot = commands.add_parser(
+        "plot",
+        help="draw a recorded flight (extra `plot`)",
+        description="Draw a recorded flight as a picture: its path, its steps, and error, speed, "
+        "tilt and height over time, with the place and the reason of an early end.",
+    )
+    add_flight_folder(plot)
+    add_path(plot, "--out", "picture (default: FOLDER/flight.png)")
+    plot.set_defaults(run="recordings.plot")
 
-    def read(text: str) -> int:
-        if not (text.isascii() and text.isdigit()) or not least <= int(text) <= most:
-            raise argparse.ArgumentTypeError(f"must be a whole number from {least} to {most}")
-        return int(text)
 
-    return read
+def _add_export(commands: Commands) -> None:
+    export = commands.add_parser(
+        "export",
+        help="write a recorded flight as CSV or Parquet",
+        description="Write the tables of a recorded flight: samples, setpoints, guidance, events.",
+    )
+    add_flight_folder(export)
+    kind = export.add_mutually_exclusive_group(required=True)
+    add_flag(kind, "--csv", "one CSV file for each channel")
+    add_flag(kind, "--parquet", "one Parquet file for each channel (extra `export`)")
+    add_path(export, "--into", "folder for the files (default: FOLDER/export)", "FOLDER")
+    export.set_defaults(run="recordings.export")
+
+
+def _add_replay(commands: Commands) -> None:
+    replay = commands.add_parser(
+        "replay",
+        help="run the control loops again on the inputs of a recorded flight",
+        description="Run the control loop and guidance again on the recorded inputs of a flight, "
+        "and compare each setpoint. With the flight's own configuration, all setpoints must be "
+        "equal to the bit. With another one, the command shows what would have been sent.",
+    )
+    add_flight_folder(replay)
+    add_path(replay, "--config", "configuration that replaces the flight's own")
+    add_set(replay, "planner.gain_per_s=4")
+    add_path(replay, "--csv", "write both setpoints for each sample to this file")
+    replay.set_defaults(run="recordings.replay")
+
+
+def _add_reports(commands: Commands) -> None:
+    report = commands.add_parser(
+        "report",
+        help="one HTML page about a flight, or about any .tlog (extra `report`)",
+        description="Write one HTML page, without other files, about a flight or any .tlog.",
+    )
+    add_path(report, "flight", "the flight's folder, or a .tlog of any program", "FOLDER")
+    add_path(report, "--out", "page (default: FOLDER/report.html)")
+    report.set_defaults(run="recordings.report")
+    compare = commands.add_parser(
+        "compare",
+        help="one HTML page that compares flights (extra `report`)",
+        description="Write one HTML page that shows the motions of flights, and the "
+        "configuration keys and figures in which they differ.",
+    )
+    add_path(compare, "flights", "folders of flights, or .tlog files", "FOLDER", nargs="+")
+    add_path(compare, "--out", "page (default: compare.html)", default=Path("compare.html"))
+    compare.set_defaults(run="recordings.compare")

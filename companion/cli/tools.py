@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from importlib import import_module
 
 from rich.console import Console
 
@@ -10,41 +11,15 @@ from companion.files.yaml_file import ConfigError
 from companion.study import registry
 
 
-def bench_link(options: argparse.Namespace) -> int:
-    """Measure the latency of our link and of others."""
-    from companion.bench import link  # noqa: PLC0415  no other command needs it
-
-    figures = link.run(options.seconds, options.rate, options.json)
-    if options.json:
-        print(json.dumps(figures))
-    return EXIT_OK
-
-
-def bench_serve(options: argparse.Namespace) -> int:
-    """Measure the latency of our link with and without other programs on it."""
-    from companion.bench import serve  # noqa: PLC0415  no other command needs it
-
-    figures = serve.run(options.seconds, options.rate, options.json)
-    if options.json:
-        print(json.dumps(figures))
-    return EXIT_OK
-
-
-def bench_planner(options: argparse.Namespace) -> int:
-    """Measure the time of one step of each planner."""
-    from companion.bench import planner  # noqa: PLC0415  no other command needs it
-
-    figures = planner.run(options.seconds, options.json)
-    if options.json:
-        print(json.dumps(figures))
-    return EXIT_OK
-
-
-def bench_flight(options: argparse.Namespace) -> int:
-    """Measure how fast one core flies."""
-    from companion.bench import flight  # noqa: PLC0415  no other command needs it
-
-    figures = flight.run(options.seconds, options.json, profile=options.profile)
+def bench(options: argparse.Namespace) -> int:
+    """Run the benchmark `options.bench`, a module in `companion.bench`."""
+    settings = {
+        name: getattr(options, name)
+        for name in ("seconds", "rate_hz", "profile")
+        if hasattr(options, name)
+    }
+    measured = import_module(f"companion.bench.{options.bench}")
+    figures = measured.run(**settings, as_json=options.json)
     if options.json:
         print(json.dumps(figures))
     return EXIT_OK

@@ -11,7 +11,6 @@ from typing import Any
 from rich.console import Console
 
 from companion.cli.exit_codes import EXIT_FAILURE, EXIT_OK
-from companion.cli.log_choice import LOG
 from companion.cli.output_file import require_writable
 from companion.config import Config
 from companion.config.files import changed, load
@@ -19,6 +18,7 @@ from companion.config.known_drag import drag_prior
 from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
 from companion.recording.learned_file import newest_learned
+from companion.recording.tlog import TLOG_FILE
 from companion.tuning import Disturbances, Proposal, propose
 from companion.tuning.flights import COURSES, CourseResult, autopilot_like, fly_course
 from companion.tuning.noise import measured_disturbances
@@ -39,15 +39,20 @@ def tune(options: argparse.Namespace) -> int:
     config, included = _configuration(source, vehicle, options.config)
     require_writable(output, "--out", force=options.force)
     config = _with_learned_drag(config, source)
-    log = source / LOG
+    log = source / TLOG_FILE
     disturbances = Disturbances()
     if source.is_dir() and log.exists():
         disturbances = measured_disturbances(log, drag_prior(config).drag.linear, disturbances)
     proposal = propose(config, disturbances)
     flights = {} if options.no_flights else _fly_courses(proposal, console)
-    vehicle_source = (
-        _include_path(vehicle, output) if included else _vehicle_section(proposal.tuned)
-    )
+    vehicle_source: Path | dict[str, Any]
+    if included:
+        vehicle_source = Path(os.path.relpath(vehicle.resolve(), output.resolve().parent))
+    else:
+        values = proposal.tuned.vehicle.model_dump(
+            mode="json", exclude_none=True, exclude_defaults=True
+        )
+        vehicle_source = {"vehicle": values}
     console.print("\n".join(summary_lines(proposal, flights)))  # kept if the disk is full
     write_whole(output, proposal_text(proposal, vehicle_source, flights, source.name))
     load(output)
@@ -62,11 +67,7 @@ def tune(options: argparse.Namespace) -> int:
 
 
 def _configuration(source: Path, vehicle: Path, base: Path | None) -> tuple[Config, bool]:
-    """The configuration to tune, and whether the vehicle's response comes from a vehicle file.
-
-    Raises:
-        ConfigError: a file cannot be read, or holds no response of the vehicle.
-    """
+    """The configuration to tune, and whether the vehicle's response comes from a vehicle file."""
     recorded = source / _CONFIG
     if base is None and source.is_dir() and recorded.exists():
         base = recorded
@@ -89,11 +90,7 @@ def _with_learned_drag(config: Config, source: Path) -> Config:
     learned = newest_learned(source.resolve().parent) if source.is_dir() else None
     if config.guidance.drag is not None or learned is None:
         return config
-    drag = {
-        "drag_per_s": learned.drag.linear,
-        "quadratic_drag_per_m": learned.drag.quadratic,
-    }
-    return changed(config, {"guidance": drag}, str(learned.path))
+    return changed(config, learned.as_keys(), str(learned.path))
 
 
 def _flyable(config: Config) -> Config:
@@ -101,17 +98,6 @@ def _flyable(config: Config) -> Config:
     return changed(
         config, {"planner": {"name": "auto"}, "flight": {"maneuvers": ("hover",)}}, "tune"
     )
-
-
-def _vehicle_section(config: Config) -> dict[str, Any]:
-    """The section `vehicle` as YAML keys, without null and default values."""
-    values = config.vehicle.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
-    return {"vehicle": values}
-
-
-def _include_path(vehicle: Path, output: Path) -> Path:
-    """The path of the vehicle file, relative to the folder of the output."""
-    return Path(os.path.relpath(vehicle.resolve(), output.resolve().parent))
 
 
 def _fly_courses(

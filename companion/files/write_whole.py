@@ -56,15 +56,15 @@ def write_with_timeout(path: Path, text: str) -> str | None:
     return outcome[0]
 
 
-def write_whole(path: Path, text: str, mode: int = 0o666) -> None:
-    """Write or replace a file; when this returns, its text and its name are on the disk.
+def write_whole(path: Path, content: str | bytes, mode: int = 0o666) -> None:
+    """Write or replace a file; when this returns, its content and its name are on the disk.
 
-    The text goes to a temporary file in the same folder, which then takes the file's name.
+    The content goes to a temporary file in the same folder, which then takes the file's name.
 
     Args:
         path: path of the file; its folder exists.
-        text: the complete text; it is written in UTF-8, with `?` for what UTF-8 cannot encode, such
-            as bytes of a file name in another encoding.
+        content: the complete content; a text is written in UTF-8, with `?` for what UTF-8 cannot
+            encode, such as bytes of a file name in another encoding.
         mode: permissions of the file, less the process's umask.
 
     Raises:
@@ -73,14 +73,15 @@ def write_whole(path: Path, text: str, mode: int = 0o666) -> None:
     if not path.name:  # `.` and `/`
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    data = content.encode("utf-8", "replace") if isinstance(content, str) else content
     try:
         descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, mode)
-        with os.fdopen(descriptor, "w", encoding="utf-8", errors="replace") as file:
-            file.write(text)
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(data)
             file.flush()
             os.fsync(file.fileno())
         temporary.replace(path)
-        sync_folder(path.parent)
+        _sync_folder(path.parent)
     except OSError as error:  # it names the temporary file, or no file
         raise OSError(error.errno, error.strerror, str(path)) from error
     finally:
@@ -88,7 +89,7 @@ def write_whole(path: Path, text: str, mode: int = 0o666) -> None:
             temporary.unlink()
 
 
-def sync_folder(folder: Path) -> None:
+def _sync_folder(folder: Path) -> None:
     """Write the folder's entries to the disk, if the file system supports it."""
     with suppress(OSError):  # some network file systems refuse; the file itself is whole
         descriptor = os.open(folder, os.O_RDONLY)

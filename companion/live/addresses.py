@@ -19,18 +19,12 @@ _RELEASE_TIMEOUT = 8.0
 
 
 class PageSocket(NamedTuple):
-    """The listening socket of the live page, and the token that admits users.
-
-    Attributes:
-        host: IP address of the socket.
-        port: number of the port.
-        token: required to change something, and to watch from another computer.
-        listening: the listening socket.
-    """
+    """The listening socket of the live page, and the token that admits users."""
 
     host: str
     port: int
     token: str
+    """Required to change something, and to watch from another computer."""
     listening: socket.socket
 
     def address_text(self) -> str:
@@ -45,14 +39,10 @@ class PageSocket(NamedTuple):
 
 
 class StreamAddress(NamedTuple):
-    """Address of the live stream.
-
-    Attributes:
-        host: IP address.
-        port: number of the port.
-    """
+    """Address of the live stream."""
 
     host: str
+    """IP address."""
     port: int
 
     def address_text(self) -> str:
@@ -97,12 +87,7 @@ def stream_address(address: str) -> StreamAddress:
 
 
 def _listen(address: str, option: str, default_port: int) -> tuple[str, socket.socket]:
-    """Listen at the address given to an option; return host and socket.
-
-    Raises:
-        ConfigError: the address is not valid or not of this computer, or the port is in use or
-            not permitted.
-    """
+    """Listen at the address given to an option; return host and socket."""
     host, port = _host_and_port(address, option, default_port)
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listening = socket.socket(family, socket.SOCK_STREAM)
@@ -122,11 +107,7 @@ def _listen(address: str, option: str, default_port: int) -> tuple[str, socket.s
 
 
 def _host_and_port(address: str, option: str, default_port: int) -> tuple[str, int]:
-    """Host and port of an address.
-
-    Raises:
-        ConfigError: the address is not valid.
-    """
+    """Host and port of an address."""
     host, colon, port = address.rpartition(":")
     if not colon and not address.isdigit():
         host, port = address, str(default_port)
@@ -145,11 +126,7 @@ def _host_and_port(address: str, option: str, default_port: int) -> tuple[str, i
 
 
 def _bind(listening: socket.socket, host: str, port: int) -> None:
-    """Bind the socket; the page or the stream of an ended flight first releases the port.
-
-    Raises:
-        OSError: another program uses the port.
-    """
+    """Bind the socket; the page or the stream of an ended flight first releases the port."""
     deadline, leaving = time.monotonic() + _ANSWER_TIMEOUT, False
     while True:
         try:

@@ -19,10 +19,6 @@ async def until_unused(port: int, is_open: Callable[[], bool]) -> None:
     """Wait until nobody has the page or stream open any more, or the next flight needs its port.
 
     Wait at most an hour.
-
-    Args:
-        port: port of the page or stream.
-        is_open: returns whether somebody has it open.
     """
     async with _leave_request(port) as leave_requested:
         quiet = 0.0

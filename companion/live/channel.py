@@ -2,8 +2,8 @@
 
 import json
 import socket
+import sys
 from collections.abc import Iterator
-from math import inf
 from typing import Any
 
 _LARGEST_MESSAGE = 200_000
@@ -19,9 +19,6 @@ class Channel:
         dropped: number of messages that could not be sent. The buffer was full, the message was too
             large, or the other end was found to be closed; messages after that are not counted.
         open: whether the other end existed at the last attempt.
-
-    Args:
-        end: a non-blocking or blocking SEQPACKET socket.
     """
 
     def __init__(self, end: socket.socket) -> None:
@@ -59,39 +56,18 @@ class Channel:
             return False
         return True
 
-    def receive(self) -> Message | None:
-        """The next message; None if the other end is closed.
-
-        Raises:
-            BlockingIOError: the socket is non-blocking and there is no message.
-        """
-        try:
-            data = self._end.recv(_LARGEST_MESSAGE)
-        except BlockingIOError:
-            raise
-        except OSError:
-            data = b""
-        if not data:
-            self.open = False
-            return None
-        message = json.loads(data)
-        return message if isinstance(message, dict) else {}
-
-    def arrived(self, max_count: float = inf) -> Iterator[Message | None]:
+    def arrived(self, max_count: int = sys.maxsize) -> Iterator[Message | None]:
         """Yield up to `max_count` arrived messages, and None if the other end is closed.
 
-        The socket must be non-blocking.
+        A blocking socket waits for them.
         """
-        taken = 0
-        while taken < max_count:
-            taken += 1
-            try:
-                message = self.receive()
-            except BlockingIOError:
+        for data in datagrams(self._end, max_count):
+            if not data:
+                self.open = False
+                yield None
                 return
-            yield message
-            if message is None:
-                return
+            message = json.loads(data)
+            yield message if isinstance(message, dict) else {}
 
     def close(self) -> None:
         """Close our end."""
@@ -104,9 +80,6 @@ class Feed:
 
     Attributes:
         dropped: number of datagrams that were not sent: the buffer was full, or the process gone.
-
-    Args:
-        end: a SEQPACKET socket.
     """
 
     def __init__(self, end: socket.socket) -> None:
@@ -132,7 +105,7 @@ class Feed:
 
 
 def datagrams(end: socket.socket, max_count: int) -> Iterator[bytes]:
-    """Yield at most `max_count` datagrams of a non-blocking socket, and b"" if it was closed."""
+    """Yield at most `max_count` arrived datagrams, and b"" if the other end was closed."""
     for _ in range(max_count):
         try:
             datagram = end.recv(_LARGEST_MESSAGE)

@@ -17,8 +17,7 @@ from companion.tuning import stability
 
 _LEAST_GAIN_DB, _LEAST_PHASE_DEG = 4.0, 20.0
 """Smallest gain and phase margin that a change may leave. If the loop had less when the flight
-began, a change must not reduce that margin.
-"""
+began, a change must not reduce that margin."""
 _ROUNDING = 1e-3
 """Relative error of computed margins that is ignored."""
 
@@ -29,10 +28,6 @@ class ChangeChecks:
     Attributes:
         start: the configuration with which the flight began.
         now: the configuration after the newest change.
-
-    Args:
-        start: configuration with which the flight began.
-        flies_maneuvers: whether the flight flies the maneuvers of its configuration.
     """
 
     def __init__(self, start: Config, *, flies_maneuvers: bool) -> None:
@@ -87,11 +82,7 @@ class ChangeChecks:
 
 
 def _require_margins(start: Config, wanted: Config, name: str) -> None:
-    """Check the stability margins of the wanted control loop, computed for the configured vehicle.
-
-    Raises:
-        ConfigError: the loop would be unstable, or a margin too small.
-    """
+    """Check the stability margins of the wanted control loop with the configured vehicle."""
     before, after = stability(start), stability(wanted)
     if not after.stable:
         raise ConfigError(f"{name}: with these values the control loop is unstable")

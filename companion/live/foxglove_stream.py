@@ -44,10 +44,6 @@ class _Subscriptions(ServerListener):
 class Stream:
     """A server with the channels of `flight.mcap`.
 
-    Args:
-        host: IP address to listen at.
-        port: number of the port.
-
     Raises:
         RuntimeError: the port cannot be used.
     """
@@ -58,14 +54,12 @@ class Stream:
         self._subscriptions = _Subscriptions()
         self._channels = [
             foxglove.Channel(
-                topic.name,
-                schema=foxglove.Schema(
-                    name=topic.type_name, encoding=SCHEMA_ENCODING, data=topic.schema
-                ),
+                topic,
+                schema=foxglove.Schema(name=kind.name, encoding=SCHEMA_ENCODING, data=kind.schema),
                 message_encoding=ENCODING,
                 context=self._context,
             )
-            for topic in TOPICS
+            for topic, kind in TOPICS.items()
         ]
         self._server = foxglove.start_server(
             name="companion",
@@ -104,9 +98,7 @@ class Stream:
 async def serve_stream(relay: Relay, feed: socket.socket) -> None:
     """Serve the stream of a flight until the flight has ended and `until_unused` has returned.
 
-    Args:
-        relay: receives messages of the flight.
-        feed: socket on which the records of the flight arrive.
+    The records of the flight arrive on the socket `feed`.
     """
     host, port = str(relay.first["stream_host"]), int(relay.first["stream_port"])
     try:

@@ -24,31 +24,24 @@ _MOST_PER_TURN = 10
 
 
 class HelperTasks(NamedTuple):
-    """The tasks of the helper process.
-
-    Attributes:
-        watch: configuration file whose edits are applied in flight, or None.
-        config_as_read: configuration as read from its file for the flight, before options.
-        page: listening socket of the live page, or None.
-        stream: address of the live stream, or None.
-        flies_maneuvers: whether the flight flies the maneuvers of its configuration.
-        folder: folder of the flight, for `live.log` and saved values; None: there is none.
-    """
+    """The tasks of the helper process."""
 
     watch: Path | None
+    """Configuration file whose edits are applied in flight, or None."""
     config_as_read: Config
+    """Configuration as read from its file for the flight, before options."""
     page: PageSocket | None
+    """Listening socket of the live page, or None."""
     stream: StreamAddress | None
+    """Address of the live stream, or None."""
     flies_maneuvers: bool
+    """Whether the flight flies the maneuvers of its configuration."""
     folder: Path | None
+    """Folder of the flight, for `live.log` and saved values; None: there is none."""
 
 
 class Helper:
     """An observer that passes phases, events and states on to the helper process without waiting.
-
-    Args:
-        tasks: tasks of the process.
-        config: configuration of the flight.
 
     Attributes:
         changes: makes the changes that the process requests. Replace it by the session's `changes`

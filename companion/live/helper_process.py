@@ -32,10 +32,6 @@ class Relay:
         first: the first message of the flight: configuration and tasks (`HelperTasks`).
         checks: checks requested changes.
         over: set when the flight has ended.
-
-    Args:
-        channel: channel to the flight.
-        first: first message of the flight.
     """
 
     def __init__(self, channel: Channel, first: Message) -> None:
@@ -159,7 +155,7 @@ async def _serve(descriptor: int, listening: int, feed: int) -> None:
             stream; −1: no live stream.
     """
     channel = Channel(socket.socket(fileno=descriptor))
-    first = channel.receive()
+    first = next(channel.arrived(1))
     if first is None:
         return
     os.set_blocking(descriptor, False)

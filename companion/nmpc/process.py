@@ -43,7 +43,7 @@ class Trouble(Enum):
     """No answer came within the deadline, or before the next request."""
     FAILED = "failed"
     """The answer says that the problem was not solved."""
-    IMPLAUSIBLE = "absurd"
+    IMPLAUSIBLE = "implausible"
     """The answer has a number that is not finite, or exceeds the limits of tilt or thrust."""
 
 

@@ -117,7 +117,7 @@ def _finding_as_dict(config: Config, finding: Finding) -> dict[str, Any]:
         "accepted": finding.key in config.flight.accept,
         "found": finding.found,
         "because": finding.because,
-        "mend": finding.fix,
+        "fix": finding.fix,
         "source": finding.source,
         "change": None if finding.change is None else finding.change._asdict(),
     }

@@ -66,10 +66,7 @@ class BackgroundFile(ABC, Generic[T]):
     """
 
     def __init__(
-        self,
-        path: Path,
-        most_waiting: int,
-        on_failure: Callable[[str], None] | None = None,
+        self, path: Path, most_waiting: int, on_failure: Callable[[str], None] | None = None
     ) -> None:
         self.path = path
         self.dropped = 0

@@ -22,35 +22,29 @@ _INTERRUPTED = ("interrupted by ", LEFT_BY_USER)
 
 
 class Invocation(NamedTuple):
-    """The command line of the program, from which the suggested next command is made.
-
-    Attributes:
-        program: name or path by which a shell finds the program.
-        arguments: arguments of the command that flew.
-        config: configuration file of the flight; None: the demo's own.
-    """
+    """The command line of the program, from which the suggested next command is made."""
 
     program: str
+    """Name or path by which a shell finds the program."""
     arguments: Sequence[str]
+    """Arguments of the command that flew."""
     config: str | None
+    """Configuration file of the flight; None: the demo's own."""
 
 
 class ClosingWords(NamedTuple):
-    """The summary in words.
-
-    Attributes:
-        headline: what flew, and whether it was good.
-        lines: the figures and advice behind the headline, or how and why the flight ended early.
-        next_command: suggested next command line, or None.
-        good: whether the flight was good; see `is_good`.
-        flown: whether the maneuvers were flown to their end.
-    """
+    """The summary in words."""
 
     headline: str
+    """What flew, and whether it was good."""
     lines: tuple[str, ...]
+    """The figures and advice behind the headline, or how and why the flight ended early."""
     next_command: str | None
+    """Suggested next command line, or None."""
     good: bool
+    """Whether the flight was good; see `is_good`."""
     flown: bool
+    """Whether the maneuvers were flown to their end."""
 
 
 def closing_words(figures: Figures, invocation: Invocation | None) -> ClosingWords:

@@ -60,26 +60,21 @@ def record_errors(folder: Path) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class FlightRecord:
-    """A recorded flight. Its properties raise RecordError if a message is not valid.
-
-    Attributes:
-        folder: folder of the flight.
-        content: messages of `flight.mcap`.
-        complete: whether the recording was closed. False: power failed, the process was killed, or
-            the disk was full; up to a second may then be missing at the end.
-        damage: why reading ended before the end of the file, or None.
-        began: time when the flight began, s on our clock.
-        epoch: Unix time at which our clock read 0, s; 0 if our clock is the vehicle's.
-        metadata: "flight" (versions, start, seed and so on) and others, by name.
-    """
+    """A recorded flight. Its properties raise RecordError if a message is not valid."""
 
     folder: Path
     content: McapContent
     complete: bool
+    """Whether the recording was closed. False: power failed, the process was killed, or the disk
+    was full; up to a second may then be missing at the end."""
     damage: str | None
+    """Why reading ended before the end of the file, or None."""
     began: float
+    """Time when the flight began, s on our clock."""
     epoch: float
+    """Unix time at which our clock read 0, s; 0 if our clock is the vehicle's."""
     metadata: Mapping[str, Mapping[str, str]]
+    """"flight" (versions, start, seed and so on) and others, by name."""
 
     def rows(self, name: str) -> Rows:
         """All rows of a channel of numbers, such as "sample" or "guidance", in the file's order.

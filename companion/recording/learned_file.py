@@ -20,17 +20,21 @@ _MOST_SPEED = 1000.0
 
 
 class LearnedDrag(NamedTuple):
-    """Drag of a vehicle, learned in earlier flights.
-
-    Attributes:
-        drag: drag of the vehicle.
-        top_speed: largest speed at which the drag was learned, m/s.
-        path: path of the file.
-    """
+    """Drag of a vehicle, learned in earlier flights."""
 
     drag: Drag
     top_speed: float
+    """Largest speed at which the drag was learned, m/s."""
     path: Path
+
+    def as_keys(self) -> dict[str, dict[str, float]]:
+        """The drag as keys of the configuration, by section."""
+        return {
+            "guidance": {
+                "drag_per_s": self.drag.linear,
+                "quadratic_drag_per_m": self.drag.quadratic,
+            }
+        }
 
 
 class LearnedFile:

@@ -26,17 +26,13 @@ time: since the vehicle's boot); the values."""
 
 
 class Entry(NamedTuple):
-    """One entry, from which the thread makes messages.
-
-    Attributes:
-        time: time on our clock, s.
-        encoder: makes the messages.
-        values: arguments of the encoder; they must not change any more.
-    """
+    """One entry, from which the thread makes messages."""
 
     time: float
+    """Time on our clock, s."""
     encoder: Encoder
     values: Any
+    """Arguments of the encoder; they must not change any more."""
 
 
 class FlightRecorder(BackgroundFile[Entry]):
@@ -123,11 +119,9 @@ class FlightRecorder(BackgroundFile[Entry]):
         self.row(time, ACTION, (time, offset, *drag, ACTIONS.index(name)))
 
     def change(self, values: Mapping[str, Mapping[str, Any]], *, at_once: bool) -> None:
-        """Record that values of the configuration begin to change now.
+        """Record that values of the configuration, by section and key, begin to change now.
 
-        Args:
-            values: new values, by section and key.
-            at_once: whether the values change at once, without slewing.
+        `at_once`: they change without slewing.
         """
         now = self._clock()
         self.add(now, _write_fields, ("/change", (now, float(at_once)), (json.dumps(values),)))
@@ -144,13 +138,7 @@ class FlightRecorder(BackgroundFile[Entry]):
 
 
 class _McapEntries:
-    """Writes entries to a `.mcap`.
-
-    Args:
-        writer: writer of the file.
-        epoch: see `FlightRecorder`.
-        drop: called with the reason why an entry cannot be recorded.
-    """
+    """Writes entries to a `.mcap`; calls `drop` with the reason why an entry cannot be recorded."""
 
     def __init__(self, writer: McapWriter, epoch: float, drop: Callable[[Exception], None]) -> None:
         self._writer, self._count_dropped = writer, drop
@@ -179,9 +167,7 @@ def _metadata(writer: McapWriter, _: int, values: tuple[str, Mapping[str, str]])
 
 
 def _write_fields(
-    writer: McapWriter,
-    time_ns: int,
-    values: tuple[str, tuple[float, ...], tuple[str, ...]],
+    writer: McapWriter, time_ns: int, values: tuple[str, tuple[float, ...], tuple[str, ...]]
 ) -> None:
     topic, numbers, texts = values
     writer.message(topic, time_ns, cdr.fields_message(numbers, texts))

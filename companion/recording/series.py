@@ -12,7 +12,6 @@ import threading
 import weakref
 from array import array
 from collections import deque
-from io import BytesIO
 from pathlib import Path
 from queue import SimpleQueue
 from typing import IO
@@ -29,13 +28,9 @@ _MOST_WAITING = 64
 
 
 class SpooledFile:
-    """A temporary file of doubles, created at the first write and deleted with its owner.
+    """A temporary file of doubles in `folder`, made at the first write, deleted with its owner."""
 
-    Args:
-        folder: folder of the file; None: in memory.
-    """
-
-    def __init__(self, folder: Path | None) -> None:
+    def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._file: IO[bytes] | None = None
 
@@ -46,11 +41,8 @@ class SpooledFile:
             OSError: the chunk could not be written completely.
         """
         if self._file is None:
-            # Closed when this object goes.
-            self._file = (
-                BytesIO()
-                if self._folder is None
-                else tempfile.TemporaryFile(dir=self._folder, buffering=0)  # noqa: SIM115
+            self._file = tempfile.TemporaryFile(  # noqa: SIM115  closed when this object goes
+                dir=self._folder, buffering=0
             )
         if self._file.write(chunk) != len(chunk):
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -68,11 +60,7 @@ _Work = tuple[SpooledFile, bytes] | threading.Event | None
 
 
 class Spool:
-    """Writes chunks to their files, in a thread that starts with the first chunk.
-
-    Args:
-        folder: folder of the files; None: in memory, without a thread.
-    """
+    """Writes chunks to their files, in a thread that starts with the first chunk."""
 
     def __init__(self, folder: Path | None = None) -> None:
         self.folder = folder
@@ -87,9 +75,6 @@ class Spool:
 
     def put(self, file: SpooledFile, chunk: bytes) -> bool:
         """Take a chunk; return false if it cannot be kept."""
-        if self.folder is None:
-            file.append(chunk)
-            return True
         if self._failures or self._queue.qsize() >= _MOST_WAITING:
             return False
         if not self._begun:
@@ -140,10 +125,12 @@ class Series:
         self.columns = columns
         self.lost = 0
         self._spool = spool
-        self._file = SpooledFile(spool.folder)
+        # Without a folder all rows stay in memory.
+        self._file = None if spool.folder is None else SpooledFile(spool.folder)
         self._full = _CHUNK_ROWS * len(columns)
         self._chunk = array("d")
-        self._recent: deque[array[float]] = deque(maxlen=-(-kept // _CHUNK_ROWS))
+        most = None if self._file is None else -(-kept // _CHUNK_ROWS)
+        self._recent: deque[array[float]] = deque(maxlen=most)
         self._put_count = 0
 
     def __len__(self) -> int:
@@ -170,7 +157,7 @@ class Series:
                 break
             parts.insert(0, chunk)
             have += len(chunk)
-        if have < wanted and self._spool.flush():
+        if self._file is not None and have < wanted and self._spool.flush():
             numbers = np.concatenate([self._file.read(len(self.columns)), self._chunk])
         else:  # in memory, or all that there is while the disk does not answer
             self.lost = max(self.lost, (wanted - have) // len(self.columns))
@@ -181,5 +168,5 @@ class Series:
         chunk, self._chunk = self._chunk, array("d")
         self._put_count += _CHUNK_ROWS
         self._recent.append(chunk)
-        if not self._spool.put(self._file, chunk.tobytes()):
+        if self._file is not None and not self._spool.put(self._file, chunk.tobytes()):
             self.lost += _CHUNK_ROWS

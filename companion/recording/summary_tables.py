@@ -7,7 +7,6 @@ from rich.table import Table
 from rich.text import Text
 
 from companion.recording.closing_words import ClosingWords
-from companion.recording.measurements.dead_time import AxisDeadTime
 from companion.recording.measurements.summary import PredictiveFigures, Summary
 
 
@@ -62,49 +61,39 @@ def _response(summary: Summary) -> RenderableType:
         found = "not flown" if isnan(value) else f"{value:.3f} s"
         table.add_row(f"time constant {axis}", found, f"{ideal:.3f} s")
     table.add_row(
-        "largest deviation from ċ = p(c_d − c)", _coefficient(response.model_deviation_max), "0"
+        "largest deviation from ċ = p(c_d − c)", f"{response.model_deviation_max:.4f}", "0"
     )
     table.add_row(
-        "straightness: largest distance from a step's line",
-        _coefficient(response.cross_axis_max),
-        "0",
+        "straightness: largest distance from a step's line", f"{response.cross_axis_max:.4f}", "0"
     )
     model = response.second_order
     table.add_section()
     table.add_row("nearest second order: frequency ω", f"{model.frequency:.1f} rad/s", "")
     table.add_row("damping ζ", f"{model.damping:.2f}", "")
     table.add_row("dead time", f"{1e3 * model.dead_time:.0f} ms", "")
-    table.add_row(
-        "largest deviation from it", _coefficient(response.second_order_deviation_max), "0"
-    )
+    table.add_row("largest deviation from it", f"{response.second_order_deviation_max:.4f}", "0")
     return table
 
 
 def _dead_times(summary: Summary) -> list[RenderableType]:
     """Measured and configured dead times."""
-    found = summary.dead_times
-    if not found.lag_known:
+    dead_times = summary.dead_times
+    if not dead_times.lag_known:
         words = "dead time not measured: vehicle.lag_ms is not set (`companion identify` finds it)"
         return [Text(words, style="dim")]
     table = _empty_table(
         "Dead time, from a sample to the effect of its setpoint", "measured", "configured"
     )
-    for name, axis in found.axes.items():
-        table.add_row(name, _dead_time_text(axis), _milliseconds(axis.configured))
-    age = found.sample_age
+    for name, axis in dead_times.axes.items():
+        too_little = axis.measured is None
+        found = "not enough rotation to measure" if too_little else _milliseconds(axis.measured)
+        table.add_row(name, found, _milliseconds(axis.configured))
+    age = dead_times.sample_age
     if not isnan(age.p50):
         table.add_row(
-            "of which sample age (p50, p99)",
-            f"{1e3 * age.p50:.1f}, {1e3 * age.p99:.1f} ms",
-            "",
+            "of which sample age (p50, p99)", f"{1e3 * age.p50:.1f}, {1e3 * age.p99:.1f} ms", ""
         )
     return [table]
-
-
-def _dead_time_text(axis: AxisDeadTime) -> str:
-    return (
-        "not enough rotation to measure" if axis.measured is None else _milliseconds(axis.measured)
-    )
 
 
 def _milliseconds(value: float | None) -> str:
@@ -120,10 +109,7 @@ def _tracking(summary: Summary) -> RenderableType:
         level = (
             ("open loop", f"{flown.drift:.2f} m away")
             if flown.open_loop
-            else (
-                _with_unit(flown.level_rms, "m", 2),
-                _with_unit(flown.level_max, "m", 2),
-            )
+            else (_with_unit(flown.level_rms, "m", 2), _with_unit(flown.level_max, "m", 2))
         )
         heights = _with_unit(flown.height_rms, "m", 2), _with_unit(flown.height_max, "m", 2)
         table.add_row(flown.name, *level, *heights)
@@ -165,11 +151,6 @@ def _loop_words(summary: Summary) -> Text:
         f"{counts.stale} stale, {counts.refused} refused; link: {link.get('lost', 0)} lost, "
         f"{link.get('bad_crc', 0)} damaged, {link.get('non_finite', 0)} not finite{unanswered}"
     )
-
-
-def _coefficient(value: float) -> str:
-    """A coefficient, which has no unit, as text."""
-    return f"{value:.4f}"
 
 
 def _with_unit(value: float, unit: str, digits: int) -> str:

@@ -11,6 +11,8 @@ from pathlib import Path
 
 from companion.recording.background_file import BackgroundFile
 
+TLOG_FILE = "flight.tlog"
+"""Name of the log in the folder of a flight."""
 _MOST_WAITING = 20_000
 """Largest number of frames that wait to be written."""
 _STAMP = struct.Struct(">Q")

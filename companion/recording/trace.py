@@ -34,17 +34,14 @@ _MOTION = ("time_s", "vehicle_time_s", "height_m", "speed_m_s", "tilt_deg", "err
 
 
 class ManeuverMark(NamedTuple):
-    """The beginning of a maneuver, or the end of the last one.
-
-    Attributes:
-        time: time on our clock, s.
-        vehicle_time: time on the vehicle's clock, s.
-        name: name of the maneuver; None: the last one has ended.
-    """
+    """The beginning of a maneuver, or the end of the last one."""
 
     time: float
+    """Time on our clock, s."""
     vehicle_time: float
+    """Time on the vehicle's clock, s."""
     name: str | None
+    """Name of the maneuver; None: the last one has ended."""
 
 
 class FlightTrace:

@@ -51,16 +51,14 @@ ADVICE_BY_PHASE: Mapping[str, str] = {
 }
 """Advice by the name of the phase."""
 
-_USER_CODE = "mend the code named above, and fly it on the mock vehicle (`companion demo`) first"
+_USER_CODE = "fix the code named above, and fly it on the mock vehicle (`companion demo`) first"
 
 
 def what_to_do(monitor: str | None, phase: str, result: str = "") -> str:
     """Advice as one sentence without a full stop.
 
-    Args:
-        monitor: the monitor that ended the flight, or None.
-        phase: the phase in which it ended.
-        result: why it ended.
+    It depends on the monitor that ended the flight (None: no monitor), else on the phase, and on
+    the `result`, the reason.
     """
     if result.startswith(MESSAGE_START):
         return _USER_CODE

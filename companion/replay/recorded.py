@@ -1,4 +1,4 @@
-"""Converts rows of `flight.mcap` to the inputs and outputs of the loops."""
+"""Rows of `flight.mcap` as the inputs and outputs of the loops, and the vehicle that they show."""
 
 from math import isnan
 from typing import Any, NamedTuple
@@ -34,52 +34,78 @@ class Setpoint(NamedTuple):
 
 
 class RecordedSample(NamedTuple):
-    """An attitude sample, and the flight's answer to it.
-
-    Attributes:
-        sample: the sample; `received_ns`, from which latencies are computed, is 0.
-        flags: state of the control loop when the sample arrived.
-        checked: time of the last check of the sample's age, before sending, s on our clock; NaN:
-            not checked.
-        reason: "answered", or why it is unanswered; one of `UNANSWERED_CODES`.
-        setpoint: setpoint that was sent; None: none was sent.
-    """
+    """An attitude sample, and the flight's answer to it."""
 
     sample: AttitudeSample
+    """The sample; `received_ns`, from which latencies are computed, is 0."""
     flags: LoopFlags
+    """State of the control loop when the sample arrived."""
     checked: float
+    """Time of the last check of the sample's age, before sending, s on our clock; NaN: not
+    checked."""
     reason: str
+    """"answered", or why it is unanswered; one of `UNANSWERED_CODES`."""
     setpoint: Setpoint | None
+    """Setpoint that was sent; None: none was sent."""
 
 
 class RecordedStep(NamedTuple):
-    """A step of the guidance loop.
-
-    Attributes:
-        inputs: inputs of the step.
-        command: command that the step gave to the control loop; None: it gave none.
-        reference: reference that the step followed; None: it had none.
-    """
+    """A step of the guidance loop."""
 
     inputs: StepInput
     command: GuidanceCommand | None
+    """Command that the step gave to the control loop; None: it gave none."""
     reference: Reference | None
+    """Reference that the step followed; None: it had none."""
 
 
 class RecordedAction(NamedTuple):
-    """A call by which a phase of the flight controlled guidance or the control loop.
-
-    Attributes:
-        time: time of the call, s on our clock.
-        name: name of the call, one of `ACTIONS`.
-        clock_offset: vehicle time minus our time, s; None: unknown.
-        drag: drag learned in an earlier flight, for the action `drag_prior`; None: there is none.
-    """
+    """A call by which a phase of the flight controlled guidance or the control loop."""
 
     time: float
+    """Time of the call, s on our clock."""
     name: str
+    """Name of the call, one of `ACTIONS`."""
     clock_offset: float | None
+    """Vehicle time minus our time, s; None: unknown."""
     drag: Drag | None
+    """Drag learned in an earlier flight, for the action `drag_prior`; None: there is none."""
+
+
+class ReplayedVehicle:
+    """Telemetry, ground contact and clock of a recorded vehicle, as guidance reads them.
+
+    The attributes are those of `Telemetry`, `Ground` and `Clock` in `companion.control.telemetry`.
+
+    Attributes:
+        attitude_target: the newest ATTITUDE_TARGET; None: there was none yet.
+    """
+
+    def __init__(self) -> None:
+        self.position: LocalPosition | None = None
+        self.battery: Battery | None = None
+        self.attitude_target_thrust: AttitudeTargetThrust | None = None
+        self.attitude_target: AttitudeTarget | None = None
+        self.height: float | None = None
+        self.armed: bool | None = None
+        self.standing = self.may_idle = False
+        self.offset: float | None = None
+
+    def take(self, inputs: StepInput) -> None:
+        """Set the attributes to the inputs of the next guidance step.
+
+        A position that was stale in the flight is set to None, so that the replay does not use it.
+        """
+        self.position = inputs.position if inputs.flags.fresh else None
+        self.battery = inputs.battery
+        self.attitude_target_thrust = inputs.autopilot_thrust
+        self.height, self.armed = inputs.height, inputs.armed
+        self.standing, self.may_idle = inputs.flags.standing, inputs.flags.may_idle
+        self.offset = inputs.clock_offset
+
+    def age(self, vehicle_time: float, now: float) -> float | None:
+        """Always None, unknown: `take` has already left out every position that is stale."""
+        return None
 
 
 def recorded_sample(row: Row, sent: Row | None) -> RecordedSample:
@@ -103,12 +129,9 @@ def recorded_sample(row: Row, sent: Row | None) -> RecordedSample:
 
 
 def recorded_step(row: Row, target: Row | None, guidance: Row | None) -> RecordedStep:
-    """The step in a row of `INPUT`.
+    """The step in a row of `INPUT`, with its rows of `TARGET` and `GUIDANCE`.
 
-    Args:
-        row: row of `INPUT`.
-        target: row of `TARGET` of this step; None: the step gave no command.
-        guidance: row of `GUIDANCE` of this step; None: the step had no reference.
+    None: the step gave no command, or had no reference.
     """
     position = None
     if not isnan(row["position_received_s"]):

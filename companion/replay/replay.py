@@ -28,28 +28,30 @@ from companion.recording.mcap_file.flight_events import ValuesChange
 from companion.recording.mcap_file.loop_channels import UNANSWERED_CODES
 from companion.recording.trace import FlightTrace
 from companion.replay.entries import recorded_inputs
-from companion.replay.recorded import RecordedAction, RecordedSample, RecordedStep, Setpoint
-from companion.replay.vehicle import ReplayedVehicle
+from companion.replay.recorded import (
+    RecordedAction,
+    RecordedSample,
+    RecordedStep,
+    ReplayedVehicle,
+    Setpoint,
+)
 
 
 class ReplayedSample(NamedTuple):
-    """The answers to one sample, in the flight and in the replay.
-
-    Attributes:
-        received: arrival of the sample, s on our clock.
-        vehicle_time: time stamp of the sample, s.
-        recorded: setpoint of the flight; None: no setpoint.
-        replayed: setpoint of the replay; None: no setpoint.
-        recorded_reason: "answered", or why the flight did not answer; one of `UNANSWERED_CODES`.
-        replayed_reason: "answered", or why the replay did not answer; one of `UNANSWERED_CODES`.
-    """
+    """The answers to one sample, in the flight and in the replay."""
 
     received: float
+    """Arrival of the sample, s on our clock."""
     vehicle_time: float
+    """Time stamp of the sample, s."""
     recorded: Setpoint | None
+    """Setpoint of the flight; None: no setpoint."""
     replayed: Setpoint | None
+    """Setpoint of the replay; None: no setpoint."""
     recorded_reason: str
+    """"answered", or why the flight did not answer; one of `UNANSWERED_CODES`."""
     replayed_reason: str
+    """"answered", or why the replay did not answer; one of `UNANSWERED_CODES`."""
 
     @property
     def same(self) -> bool:
@@ -59,10 +61,6 @@ class ReplayedSample(NamedTuple):
 
 class Replay:
     """Replays a flight with its own configuration or another one.
-
-    Args:
-        record: record of the flight.
-        config: configuration for the replay.
 
     Attributes:
         follows_record: whether the commands of guidance are those of the record.

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from math import degrees
 from pathlib import Path
 
+import numpy as np
+
 from companion.replay.replay import ReplayedSample
 
 _COLUMNS = (
@@ -23,10 +25,7 @@ def result_lines(
 ) -> list[str]:
     """Sentences on what is equal and what differs between flight and replay.
 
-    Args:
-        samples: result of the replay.
-        began: time at which the flight began, s on our clock.
-        follows_record: whether the commands of guidance are those of the record; see `Replay`.
+    The flight began at the time `began` on our clock, s. `follows_record`: see `Replay`.
     """
     recorded = sum(each.recorded is not None for each in samples)
     different = [each for each in samples if not each.same]
@@ -53,22 +52,19 @@ def result_lines(
 
 
 def _largest_differences(both_answered: Sequence[ReplayedSample], began: float) -> str:
-    def distances(each: ReplayedSample) -> list[float]:
-        assert each.recorded is not None
-        assert each.replayed is not None
-        pairs = zip(
-            (*each.recorded.rates, each.recorded.thrust),
-            (*each.replayed.rates, each.replayed.thrust),
-            strict=True,
-        )
-        return [abs(before - after) for before, after in pairs]
-
+    answers = np.array(  # (N, 2, 4)
+        [
+            [(*each.rates, each.thrust) for each in (sample.recorded, sample.replayed) if each]
+            for sample in both_answered
+        ]
+    )
+    distances = np.abs(answers[:, 1] - answers[:, 0])
     differences = []
     for index, name in enumerate(("roll", "pitch", "yaw", "thrust")):
-        worst = max(both_answered, key=lambda each: distances(each)[index])
-        value = distances(worst)[index]
+        worst = int(distances[:, index].argmax())
+        value = distances[worst, index]
         number = f"{value:.4f}" if name == "thrust" else f"{degrees(value):.2f} °/s"
-        differences.append(f"{name} {number} at {worst.received - began:.2f} s")
+        differences.append(f"{name} {number} at {both_answered[worst].received - began:.2f} s")
     return f"{len(both_answered)} setpoints differ, at most by: {', '.join(differences)}."
 
 
@@ -96,10 +92,7 @@ def write_csv(samples: Sequence[ReplayedSample], path: Path) -> None:
         file.write(",".join(_COLUMNS) + "\n")
         for each in samples:
             row = [repr(each.received), repr(each.vehicle_time)]
-            answers = (
-                (each.recorded, each.recorded_reason),
-                (each.replayed, each.replayed_reason),
-            )
+            answers = ((each.recorded, each.recorded_reason), (each.replayed, each.replayed_reason))
             for setpoint, reason in answers:
                 sent = [""] * 4 if setpoint is None else [*setpoint.rates, setpoint.thrust]
                 row += [str(value) for value in sent] + [reason]

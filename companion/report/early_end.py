@@ -18,36 +18,29 @@ _CORNERS_OF_CIRCLE = 72
 
 @dataclass(frozen=True)
 class CrossedLimit:
-    """The limit whose monitor ended the flight.
-
-    Attributes:
-        curve: name of the curve that the limit bounds: "speed", "tilt", "error", "rate", "thrust",
-            "latency", "height" or "track".
-        key: configuration key of the limit.
-        levels: values of the limit, in the curve's unit. The curve must not cross them, except
-            "latency", which must not do so often.
-        outline: fence around the track, (N, 2) north and east, m; empty for other curves.
-    """
+    """The limit whose monitor ended the flight."""
 
     curve: str
+    """Name of the curve that the limit bounds: "speed", "tilt", "error", "rate", "thrust",
+    "latency", "height" or "track"."""
     key: str
+    """Configuration key of the limit."""
     levels: tuple[float, ...] = ()
+    """Values of the limit, in the curve's unit. The curve must not cross them, except "latency",
+    which must not do so often."""
     outline: tuple[tuple[float, float], ...] = ()
+    """Fence around the track, (N, 2) north and east, m; empty for other curves."""
 
 
 @dataclass(frozen=True)
 class EndMark:
-    """The early end of a flight, as the plots mark it.
-
-    Attributes:
-        time: time since the flight began, s.
-        reason: reason as shown to the user.
-        limit: limit that was crossed; None if no plot shows it.
-    """
+    """The early end of a flight, as the plots mark it."""
 
     time: float
+    """Time since the flight began, s."""
     reason: str
     limit: CrossedLimit | None = None
+    """Limit that was crossed; None if no plot shows it."""
 
     def sentence(self) -> str:
         """Time and reason, for the user."""
@@ -59,10 +52,7 @@ def early_end(
 ) -> EndMark | None:
     """The early end of a flight; None if it was flown to its end.
 
-    Args:
-        figures: the content of `summary.json`.
-        record: record of the flight.
-        config: configuration of the flight; None: unknown.
+    `figures` are the content of `summary.json`. The configuration is None if it is unknown.
     """
     end = figures["early_end"]
     if end is None:

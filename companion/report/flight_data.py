@@ -1,6 +1,7 @@
 """The data of one flight for a page, read from its folder."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -13,8 +14,7 @@ from companion.config import Config
 from companion.config.files import load
 from companion.config.reference import ConfigKey, changed_keys
 from companion.files.yaml_file import ConfigError
-from companion.recording.flight_record import FlightRecord, read_flight
-from companion.recording.history import Span
+from companion.recording.flight_record import FlightRecord, RecordError, read_flight
 from companion.recording.mcap_file.fields import Rows
 from companion.recording.mcap_file.flight_events import Event
 from companion.recording.measurements.recorded_summary import summary_of, trace_of
@@ -24,61 +24,74 @@ from companion.report.early_end import EndMark, early_end
 Floats = NDArray[np.float64]
 
 
-class Curve(NamedTuple):
-    """Values over time.
+class Span(NamedTuple):
+    """A maneuver, a phase or a mode; times in s since the flight began."""
 
-    Attributes:
-        time: (N,), time since the flight began, s.
-        values: (N, columns).
-    """
+    begin: float
+    end: float
+    name: str
+    """Shown to the user."""
+
+
+class Curve(NamedTuple):
+    """Values over time."""
 
     time: Floats
+    """(N,), time since the flight began, s."""
     values: Floats
+    """(N, columns)."""
 
 
 @dataclass(frozen=True)
 class FlightData:
-    """One flight, from its own record or from a `.tlog`.
-
-    Attributes:
-        name: name of the folder or of the log.
-        curves: curves by name, without those that were not recorded. Columns: "position",
-            "reference": north, east, height, m. "error": tracking error, m. "motion": height in m,
-            speed in m/s, tilt in °. "coefficients", "target": north, east. "commanded", "measured":
-            roll, pitch, yaw rate, °/s. "thrust": sent, 0..1. "hover_thrust": as learned, 0..1.
-            "latency": from a sample's arrival to its setpoint, ms.
-        figures: the content of `summary.json`, or derived from the record; None for a `.tlog`.
-        provisional: whether the flight wrote no summary, so that the figures come from its record.
-        fault: why not all of the record could be read, as a sentence; None: all was read.
-        phases: the phases, in order; empty for a `.tlog`.
-        modes: the autopilot's modes, in order, for a `.tlog`.
-        maneuvers: the maneuvers, in order.
-        events: the events, in order.
-        differences: keys of the configuration that are not the default; None: unknown.
-        runs: the doublets in open loop, in vehicle time.
-        gain: p of the planner, 1/s; NaN: unknown.
-        end: the early end of the flight; None: none, or unknown.
-    """
+    """One flight, from its own record or from a `.tlog`."""
 
     name: str
+    """Name of the folder or of the log."""
     curves: Mapping[str, Curve]
+    """Curves by name, without those that were not recorded. Columns: "position", "reference":
+    north, east, height, m. "error": tracking error, m. "motion": height in m, speed in m/s, tilt in
+    °. "coefficients", "target": north, east. "commanded", "measured": roll, pitch, yaw rate, °/s.
+    "thrust": sent, 0..1. "hover_thrust": as learned, 0..1. "latency": from a sample's arrival to
+    its setpoint, ms."""
     figures: Mapping[str, Any] | None = None
+    """The content of `summary.json`, or derived from the record; None for a `.tlog`."""
     provisional: bool = False
+    """Whether the flight wrote no summary, so that the figures come from its record."""
     fault: str | None = None
+    """Why not all of the record could be read, as a sentence; None: all was read."""
     phases: tuple[Span, ...] = ()
+    """The phases, in order; empty for a `.tlog`."""
     modes: tuple[Span, ...] = ()
+    """The autopilot's modes, in order, for a `.tlog`."""
     maneuvers: tuple[Span, ...] = ()
     events: tuple[Event, ...] = ()
     differences: tuple[ConfigKey, ...] | None = None
+    """Keys of the configuration that are not the default; None: unknown."""
     runs: list[StepRun] = field(default_factory=list)
+    """The doublets in open loop, in vehicle time."""
     gain: float = float("nan")
+    """p of the planner, 1/s; NaN: unknown."""
     end: EndMark | None = None
+    """The early end of the flight; None: none, or unknown."""
 
     @property
     def end_time(self) -> float | None:
         """End of the last phase or mode, s since the flight began; None: there are none."""
         sections = self.phases or self.modes
         return sections[-1].end if sections else None
+
+
+@contextmanager
+def explain_other_version(*paths: Path) -> Iterator[None]:
+    """Turn errors caused by a summary of another version into a `RecordError` for the user."""
+    try:
+        yield
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        raise RecordError(
+            f"{' or '.join(map(str, paths))}: recorded by another version, or damaged ({error!r}); "
+            "rename its summary.json, and the figures are computed from flight.mcap"
+        ) from error
 
 
 def recorded(folder: Path) -> FlightData:

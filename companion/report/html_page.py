@@ -47,11 +47,15 @@ def rendered(package: str, template: str, title: str, plots: Sequence[Plot], **s
     )
     environment.filters["with_code"] = _with_code
     plotly = files("plotly") / "package_data" / "plotly.min.js"
+    plots_data: list[dict[str, Any]] = [
+        {"traces": plot.traces, "layout": {**plot.layout, "height": plot.height}} for plot in plots
+    ]
     return environment.get_template(template).render(
         title=title,
         plots=plots,
-        plots_json=_script_safe([_plot_data(plot) for plot in plots]),
-        plotly=_gzip_base64(plotly.read_bytes()),
+        plots_json=_script_safe(plots_data),
+        # Browsers since 2023 can unpack gzip.
+        plotly=b64encode(compress(plotly.read_bytes(), mtime=0)).decode("ascii"),
         version=version("mavlink-companion"),
         **shown,
     )
@@ -62,15 +66,6 @@ def _with_code(text: str) -> "Markup":
     from markupsafe import Markup, escape  # noqa: PLC0415  comes with jinja2
 
     return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
-
-
-def _gzip_base64(data: bytes) -> str:
-    """Data for a script element, as base64 of gzip, which browsers since 2023 can unpack."""
-    return b64encode(compress(data, mtime=0)).decode("ascii")
-
-
-def _plot_data(plot: Plot) -> dict[str, Any]:
-    return {"traces": plot.traces, "layout": {**plot.layout, "height": plot.height}}
 
 
 def _script_safe(data: Any) -> str:

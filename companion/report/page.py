@@ -1,15 +1,14 @@
 """Makes the page of one flight or of several: one HTML file that needs no network."""
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from companion.files.write_whole import write_whole
 from companion.recording.closing_words import ClosingWords, closing_words
-from companion.recording.flight_record import RECORD_FILE, RecordError
+from companion.recording.flight_record import RECORD_FILE
 from companion.report import PAGE
 from companion.report.control_plots import compared_steps, control_plots
-from companion.report.flight_data import FlightData, recorded
+from companion.report.flight_data import FlightData, explain_other_version, recorded
 from companion.report.html_page import rendered, require_extra
 from companion.report.motion_plots import motion_plots
 from companion.report.plots import Plot
@@ -54,10 +53,10 @@ def write_report(
         OSError: the page cannot be written.
     """
     require_extra()
-    flight = _read_all([path], on_fault)[0]
     if out is None:
         out = path.with_suffix(".html") if path.is_file() else path / PAGE
-    with _explain_other_version(path):
+    with explain_other_version(path):
+        flight = _read_all([path], on_fault)[0]
         words = None if flight.figures is None else closing_words(flight.figures, None)
         plots = [*timeline(flight), *motion_plots([flight]), *control_plots(flight)]
         tables = [*events_at_end(flight), *flight_tables(flight)]
@@ -75,9 +74,9 @@ def write_comparison(
         MissingExtraError, RecordError, LogError, OSError: see `write_report`.
     """
     require_extra()
-    flights = _read_all(paths, on_fault)
-    title = " and ".join(flight.name for flight in flights)
-    with _explain_other_version(*paths):
+    with explain_other_version(*paths):
+        flights = _read_all(paths, on_fault)
+        title = " and ".join(flight.name for flight in flights)
         plots = [*compared_steps(flights), *motion_plots(flights)]
         page = _page(title, None, flights, comparison_tables(flights), plots, None)
     write_whole(out, page)
@@ -91,22 +90,6 @@ def _read_all(paths: Sequence[Path], on_fault: Callable[[str], object] | None) -
         if flight.fault is not None and on_fault is not None:
             on_fault(flight.fault)
     return flights
-
-
-@contextmanager
-def _explain_other_version(*paths: Path) -> Iterator[None]:
-    """Turn errors caused by a summary of another version into a `RecordError` for the user.
-
-    Raises:
-        RecordError: a figure is missing or of another type.
-    """
-    try:
-        yield
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-        raise RecordError(
-            f"{' or '.join(map(str, paths))}: recorded by another version, or damaged ({error!r}); "
-            "rename its summary.json, and the figures are computed from flight.mcap"
-        ) from error
 
 
 def _page(
@@ -123,15 +106,13 @@ def _page(
         title,
         plots,
         words=words,
-        words_by_flight=_words_by_flight(flights),
+        words_by_flight=[
+            (flight.name, closing_words(flight.figures, None))
+            for flight in flights
+            if flight.figures is not None  # else it is a .tlog
+        ],
         flights=flights,
         tables=tables,
         settings=settings,
         telemetry_extremes=extremes(flights[0]),
     )
-
-
-def _words_by_flight(flights: Sequence[FlightData]) -> list[tuple[str, ClosingWords]]:
-    """Name and closing words of each flight that is no `.tlog`."""
-    known = [(flight.name, flight.figures) for flight in flights if flight.figures is not None]
-    return [(name, closing_words(figures, None)) for name, figures in known]

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from companion.recording.history import Span
 from companion.report.early_end import EndMark
-from companion.report.flight_data import Curve, FlightData, Floats
+from companion.report.flight_data import Curve, FlightData, Floats, Span
 
 MEASURED, REFERENCE, IDEAL, NEAREST = "#0072b2", "#d55e00", "#999999", "#009e73"
 CROSSED = "#c1121f"
@@ -27,21 +26,17 @@ _SIGNIFICANT_DIGITS = 5
 
 @dataclass(frozen=True)
 class Plot:
-    """One plot of the page.
-
-    Attributes:
-        title: shown above it.
-        note: text above the plot: the quantities shown, and how a good flight looks.
-        traces: Plotly's traces.
-        layout: Plotly's layout; the page adds fonts and colours.
-        height: height, px.
-    """
+    """One plot of the page."""
 
     title: str
+    """Shown above it."""
     note: str
+    """Text above the plot: the quantities shown, and how a good flight looks."""
     traces: list[dict[str, Any]]
     layout: dict[str, Any] = field(default_factory=dict)
+    """Plotly's layout; the page adds fonts and colours."""
     height: int = 320
+    """Height, px."""
 
 
 def line(name: str, x: Floats, y: Floats, colour: str, **more: Any) -> dict[str, Any]:
@@ -80,9 +75,9 @@ def kept_indices(values: Floats) -> Any:
     return np.array(sorted(kept))
 
 
-def even_indices(count: int) -> Any:
-    """Indices (M,) of evenly chosen points of a track, few enough for a small page."""
-    return np.unique(np.linspace(0, count - 1, min(count, _MAX_POINTS)).astype(int))
+def even_indices(count: int, most: int = _MAX_POINTS) -> Any:
+    """Indices (M,) of at most `most` of `count` points or rows, at even distances."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
 
 
 def numbers(values: Floats) -> list[float | None]:

@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,17 +18,13 @@ _PORT_AT_END = re.compile(r":\d+$")
 
 
 class Table(NamedTuple):
-    """A table of texts.
-
-    Attributes:
-        title: shown above it.
-        header: names of the columns.
-        rows: one text for each column.
-    """
+    """A table of texts."""
 
     title: str
+    """Shown above it."""
     header: tuple[str, ...]
     rows: Sequence[tuple[str, ...]]
+    """One text for each column."""
 
 
 def flight_tables(flight: FlightData) -> list[Table]:
@@ -126,27 +122,25 @@ def _figure_rows(figures: Any) -> Iterator[tuple[str, str]]:
     response = figures.get("response") or {}
     latency, link = figures.get("latency_us") or {}, figures.get("link") or {}
     constants = response.get("time_constant_s") or {}
-    wanted: list[tuple[str, Any, Callable[[Any], str]]] = [
-        ("result", figures.get("result"), str),
-        ("planner", figures.get("planner"), str),
-        ("time constant, north", constants.get("north"), _formatter("{:.3f} s")),
-        ("time constant, east", constants.get("east"), _formatter("{:.3f} s")),
-        (
-            "largest distance from the line of a step",
-            response.get("cross_axis_max"),
-            _formatter("{:.4f}"),
-        ),
-        ("samples", figures.get("samples"), _formatter("{:,}")),
-        ("setpoints", figures.get("setpoints"), _formatter("{:,}")),
-        ("frames lost", link.get("lost"), _formatter("{:,}")),
+    wanted: list[tuple[str, Any, str]] = [
+        ("result", figures.get("result"), "{}"),
+        ("planner", figures.get("planner"), "{}"),
+        ("time constant, north", constants.get("north"), "{:.3f} s"),
+        ("time constant, east", constants.get("east"), "{:.3f} s"),
+        ("largest distance from the line of a step", response.get("cross_axis_max"), "{:.4f}"),
+        ("samples", figures.get("samples"), "{:,}"),
+        ("setpoints", figures.get("setpoints"), "{:,}"),
+        ("frames lost", link.get("lost"), "{:,}"),
     ]
     if not figures.get("lockstep"):  # In lockstep, all latencies are 0.
         wanted += [
-            ("missed deadlines", figures.get("missed_deadlines"), _formatter("{:,}")),
-            ("latency, median", latency.get("p50"), _formatter("{:.0f} µs")),
-            ("latency, 99th percentile", latency.get("p99"), _formatter("{:.0f} µs")),
+            ("missed deadlines", figures.get("missed_deadlines"), "{:,}"),
+            ("latency, median", latency.get("p50"), "{:.0f} µs"),
+            ("latency, 99th percentile", latency.get("p99"), "{:.0f} µs"),
         ]
-    yield from ((label, show(value)) for label, value, show in wanted if value not in (None, ""))
+    yield from (
+        (label, text.format(value)) for label, value, text in wanted if value not in (None, "")
+    )
 
 
 def _tracking_rows(figures: Any) -> Iterator[tuple[str, str]]:
@@ -155,10 +149,6 @@ def _tracking_rows(figures: Any) -> Iterator[tuple[str, str]]:
         for key, label in (("level_rms_m", "horizontal RMS"), ("height_rms_m", "height RMS")):
             if maneuver.get(key) is not None:
                 yield f"{maneuver['name']}, {label}", f"{maneuver[key]:.3f} m"
-
-
-def _formatter(text: str) -> Callable[[Any], str]:
-    return text.format
 
 
 def _maneuver_table(figures: Any) -> Table:

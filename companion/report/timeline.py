@@ -3,8 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from companion.recording.history import Span
-from companion.report.flight_data import FlightData
+from companion.report.flight_data import FlightData, Span
 from companion.report.plots import IDEAL, MEASURED, REFERENCE, Plot, axes, end_mark
 
 _EVENT_COLOURS = {2: MEASURED, 3: "#e69f00", 4: REFERENCE}

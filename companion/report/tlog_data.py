@@ -11,9 +11,8 @@ from companion.attitude.representation import is_unit
 from companion.mavlink.errors import LogError
 from companion.mavlink.messages import Message
 from companion.mavlink.tlog_file import messages
-from companion.recording.history import Span
 from companion.recording.mcap_file.flight_events import Event
-from companion.report.flight_data import Curve, FlightData, Floats, spans
+from companion.report.flight_data import Curve, FlightData, Floats, Span, spans
 from companion.vehicle.flight_log import read_flight_log
 from companion.vehicle.registry import BY_NUMBER
 

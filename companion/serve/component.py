@@ -17,7 +17,6 @@ from companion.serve.mode_requests import MISSION_ITEMS
 from companion.serve.network.addresses import Address
 from companion.serve.network.client import Client
 from companion.serve.network.network import Network
-from companion.serve.network.routing import Channel
 
 _HEARTBEAT_PERIOD = 1.0
 _MAX_TEXT_LENGTH = 200
@@ -92,9 +91,9 @@ class Component:
         if message is not None:
             self._network.send_to(client, self._frame(message, sender))
 
-    def on_own_frame(self, client: Channel, frame: Frame) -> None:
+    def on_own_frame(self, client: Client, frame: Frame) -> None:
         """Refuse a command to our component, which carries out none; ignore other frames."""
-        if frame.message_id in _COMMAND_IDS and isinstance(client, Client):
+        if frame.message_id in _COMMAND_IDS:
             self.acknowledge(client, frame, dialect.MAV_RESULT_UNSUPPORTED, self._own_address)
 
     def _note_unless_repeated(self, client: Client | None, text: str) -> bool:

@@ -37,10 +37,7 @@ class FlightRecords:
     """
 
     def __init__(
-        self,
-        directory: Path | None,
-        environment: Environment,
-        note: Callable[[str], None],
+        self, directory: Path | None, environment: Environment, note: Callable[[str], None]
     ) -> None:
         self.grants: tuple[realtime.SettingResult, ...] = ()
         self.on_recorded: Callable[[Path], str | None] = lambda _: None
@@ -54,10 +51,9 @@ class FlightRecords:
             self._tap(time, frame)
 
     def new_record(self, config: Config) -> FlightFiles:
-        """The open record of a new flight; a record without folder if none can be created.
+        """The open record of a new flight, which begins with this configuration.
 
-        Args:
-            config: configuration at the beginning of the flight.
+        It is a record without folder if none can be created.
         """
         folder = None
         if self._directory is not None:

@@ -20,10 +20,6 @@ class KeptFence:
     in flight, so the fence stays where it is over the ground. Jumps of more than
     `safety.max_reset_m` would end a flight. After such jumps control is refused, because the
     position before them may have been wrong.
-
-    Args:
-        config: configuration of the vehicle.
-        link: link to the vehicle.
     """
 
     def __init__(self, config: Config, link: Link) -> None:

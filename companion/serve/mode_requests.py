@@ -86,12 +86,7 @@ def leaves_control(frame: Frame) -> bool:
 
 
 def reduces_telemetry(frame: Frame, needed: dict[str, float]) -> bool:
-    """Whether a frame could reduce telemetry below the rates that control needs.
-
-    Args:
-        frame: frame of a client.
-        needed: rates by message name, Hz.
-    """
+    """Whether a frame could reduce telemetry below the needed rates: Hz, by message name."""
     if frame.message_id == _REQUEST_DATA_STREAM:
         return True
     if frame.message_id not in (_COMMAND_LONG, _COMMAND_INT):

@@ -20,15 +20,12 @@ class ControlState(Enum):
 
 @dataclass
 class _Stream:
-    """The setpoints of one client.
-
-    Attributes:
-        newest: arrival of the newest setpoint, s.
-        previous: arrival of the setpoint before the newest, s.
-    """
+    """The setpoints of one client."""
 
     newest: float = -inf
+    """Arrival of the newest setpoint, s."""
     previous: float = -inf
+    """Arrival of the setpoint before the newest, s."""
 
 
 class Ownership:
@@ -66,9 +63,7 @@ class Ownership:
     def withdraw(self, client: Hashable, owner_before: Hashable | None) -> None:
         """Withdraw the setpoint that was noted last, because it cannot be flown.
 
-        Args:
-            client: sender of the setpoint.
-            owner_before: client in control before the setpoint.
+        `owner_before` was in control before the setpoint.
         """
         self.owner = owner_before
         stream = self._streams[client]

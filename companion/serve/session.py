@@ -25,7 +25,7 @@ from companion.serve.network.addresses import target_of
 from companion.serve.network.client import Client
 from companion.serve.network.network import Network
 from companion.serve.network.permission import Permission
-from companion.serve.network.routing import Channel, Routing
+from companion.serve.network.routing import Routing
 from companion.serve.setpoints.understand import SETPOINTS
 from companion.serve.situation import SituationKeeper
 from companion.vehicle.link import Link
@@ -189,9 +189,8 @@ class _FrameInterceptor:
         self._permission, self._component, self._control = permission, component, control
         self._routing, self._system = routing, system
 
-    def intercept(self, client: Channel, frame: Frame) -> bool:
+    def intercept(self, client: Client, frame: Frame) -> bool:
         """Whether a frame was refused or handled here, and so must not be forwarded."""
-        assert isinstance(client, Client)
         refusal = self._permission.refusal(client, frame)
         if refusal is not None:
             if frame.message_id != HEARTBEAT:  # every client sends heartbeats; no answer is due
@@ -207,7 +206,7 @@ class _FrameInterceptor:
             return False
         return self._control.intercept(client, frame)
 
-    def on_own_frame(self, client: Channel, frame: Frame) -> None:
+    def on_own_frame(self, client: Client, frame: Frame) -> None:
         """Take a frame addressed only to our component: fly a setpoint, refuse a command."""
         if frame.message_id not in SETPOINTS or not self.intercept(client, frame):
             self._component.on_own_frame(client, frame)

@@ -33,12 +33,7 @@ _NEW_ORIGIN_DISTANCE = 2.0
 
 
 class SituationKeeper:
-    """Keeps the vehicle's newest position and yaw, and the origin of its local frame.
-
-    Args:
-        link: link to the vehicle.
-        network: has the payload of the newest attitude.
-    """
+    """Keeps the vehicle's newest position and yaw, and the origin of its local frame."""
 
     def __init__(self, link: Link, network: Network) -> None:
         self._link, self._network = link, network
@@ -76,8 +71,7 @@ class SituationKeeper:
     async def keep_telemetry(self, wanted: Callable[[], Mapping[str, float]]) -> None:
         """Until cancelled, request telemetry whenever no attitude comes; ArduPilot needs a request.
 
-        Args:
-            wanted: rates by message name, Hz; called once the autopilot is known.
+        `wanted` returns rates by message name, Hz; it is called once the autopilot is known.
         """
         newest = self._network.attitude_payload
         while True:
@@ -126,14 +120,10 @@ class OriginEstimate:
         altitude: float,
         height: float,
     ) -> None:
-        """Take a pair of positions of the vehicle: one local, one global, at the same time.
+        """Take a pair of simultaneous positions of the vehicle: local (NED, m), and global.
 
-        Args:
-            position_ned: position in the local frame, m.
-            latitude: latitude, degrees.
-            longitude: longitude, degrees.
-            altitude: altitude above mean sea level, m.
-            height: height above home, m.
+        Latitude and longitude are in degrees, the altitude above mean sea level and the height
+        above home in m.
         """
         north, east, down = position_ned
         measured = Origin(

@@ -30,12 +30,6 @@ class ServedSource:
         start_pose: pose of the vehicle when control began; None before.
         resets: jumps of the autopilot's estimate, which are taken out of requests.
         failure: always None; a silent client does not count as a failure.
-
-    Args:
-        name: name of the client.
-        motion: follows commanded motions.
-        ownership: knows whether the client is silent.
-        heading_now: returns the vehicle's heading without resets, rad.
     """
 
     failure: str | None = None

@@ -167,12 +167,16 @@ def test_a_full_disk_leaves_no_torn_unit(begun, monkeypatch):
     campaign, out = begun
     (case,) = list(campaign.cases())[2:]
 
-    def full(_table, path):
-        path.write_bytes(b"PAR1 half a file")
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    sync, synced = os.fsync, []
 
-    monkeypatch.setattr(pyarrow.parquet, "write_table", full)
-    with pytest.raises(OSError, match="No space left"):
+    def full(descriptor):
+        synced.append(descriptor)
+        if len(synced) == 3:  # after the timing and its folder
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        sync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match=r"unit-00002\.parquet|No space left"):
         store.write_unit(out, campaign.file, 2, [row_of(case)], {})
     assert store.finished_units(out) == {0, 1}
     assert not list((out / "results").glob(".unit-*"))
@@ -181,11 +185,10 @@ def test_a_full_disk_leaves_no_torn_unit(begun, monkeypatch):
 def test_the_tables_of_a_report_are_whole_or_not_there(begun, monkeypatch, tmp_path):
     from companion.campaign.report import page  # noqa: PLC0415  slow to import
 
-    def full(_table, path):
-        path.write_bytes(b"half")
+    def full(_):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(pyarrow.parquet, "write_table", full)
+    monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(OSError, match="No space left"):
         page.write_tables(pyarrow.table({"a": [1]}), tmp_path)
     assert not list(tmp_path.glob("*results*"))

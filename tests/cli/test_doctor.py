@@ -175,7 +175,7 @@ def test_a_vehicle_that_cannot_be_flown_and_one_that_is_not_there_are_findings(c
         told, keys = found(out)
         assert (code, keys) == (1, {"vehicle.supported": "unsafe"})
         (finding,) = told["findings"]
-        assert words in f"{finding['found']}; {finding['mend']}"
+        assert words in f"{finding['found']}; {finding['fix']}"
     code, out, _ = doctor(capsys, "--config", config, "--json")
     told, keys = found(out)
     assert (code, told["result"], told["unsafe"]) == (1, "not connected", 0)

@@ -81,7 +81,7 @@ def test_a_closed_pipe_ends_a_command_about_a_recording_silently(
     for name in ("export_csv", "export_parquet"):
         monkeypatch.setattr(f"companion.recording.export.{name}", lambda *_: {written: 1})
     monkeypatch.setattr("companion.report.page.write_report", lambda *_: written)
-    monkeypatch.setattr("companion.recording.figure.draw_flight", lambda *_: None)
+    monkeypatch.setattr("companion.report.picture.draw_flight", lambda *_: None)
     monkeypatch.setattr(sys, "stdout", _ClosedPipe())
     assert main([*command.split(), str(tmp_path)]) == 1
     assert capsys.readouterr().err == ""
@@ -104,21 +104,21 @@ def test_ctrl_c_outside_a_flight_is_told(monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("what", "module", "given"),
     [
-        ("link", link, (2.0, 100.0, True)),
-        ("serve", bench_serve, (2.0, 100.0, True)),
-        ("planner", planner, (2.0, True)),
-        ("flight", flight, (2.0, True)),
+        ("link", link, {"rate_hz": 100.0}),
+        ("serve", bench_serve, {"rate_hz": 100.0}),
+        ("planner", planner, {}),
+        ("flight", flight, {"profile": False}),
     ],
 )
 def test_a_benchmark_prints_its_figures_as_one_line_of_json(
     monkeypatch, capsys, what, module, given
 ):
     asked = []
-    monkeypatch.setattr(module, "run", lambda *told, **_: (asked.append(told), {"p50_us": 1.5})[1])
-    rate = ["--rate", "100"] if len(given) == 3 else []
+    monkeypatch.setattr(module, "run", lambda **told: (asked.append(told), {"p50_us": 1.5})[1])
+    rate = ["--rate", "100"] if "rate_hz" in given else []
     assert main(["bench", what, "--seconds", "2", *rate, "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {"p50_us": 1.5}
-    assert asked == [given]
+    assert asked == [{"seconds": 2.0, "as_json": True, **given}]
     assert main(["bench", what, "--seconds", "2", *rate]) == 0
     assert capsys.readouterr().out == ""
 

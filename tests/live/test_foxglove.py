@@ -54,10 +54,10 @@ def flown(tmp_path_factory):
 
 def test_what_is_recorded_is_streamed(flown):
     record, datagrams = flown
-    streamed = {topic.name: [] for topic in TOPICS}
+    streamed = {topic: [] for topic in TOPICS}
     for datagram in datagrams:
         for number, time_ns, data in messages_of(datagram):
-            streamed[TOPICS[number].name].append((time_ns, data))
+            streamed[list(TOPICS)[number]].append((time_ns, data))
     recorded = record.content.messages
     assert {topic: found for topic, found in streamed.items() if found} == dict(recorded)
     assert len(recorded["/pose"]) > 100
@@ -66,8 +66,8 @@ def test_what_is_recorded_is_streamed(flown):
 
 def decoded(record, topic):
     """(time, message) of all messages of a topic."""
-    kind = next(each for each in TOPICS if each.name == topic)
-    decode = generate_dynamic(kind.type_name, kind.schema.decode())[kind.type_name]
+    name, schema = TOPICS[topic]
+    decode = generate_dynamic(name, schema.decode())[name]
     return [(time_ns, decode(data)) for time_ns, data in record.content.messages[topic]]
 
 
@@ -247,7 +247,7 @@ def test_clients_see_the_flight_and_its_end_and_the_next_flight_takes_the_port(f
     with served() as (helper, address):
         first = connected(address)
         assert first.info["capabilities"] == []
-        ours = {topic.name: (topic.type_name, topic.schema.decode()) for topic in TOPICS}
+        ours = {topic: (kind.name, kind.schema.decode()) for topic, kind in TOPICS.items()}
         theirs = {
             each["topic"]: (each["schemaName"], each["schema"]) for each in first.channels.values()
         }

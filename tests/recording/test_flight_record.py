@@ -15,7 +15,7 @@ from companion.recording.flight_record import RECORD_FILE, RecordError, read_fli
 from companion.recording.folder import flight_folder
 from companion.recording.mcap_file import cdr, reader, writer
 from companion.recording.mcap_file.batch import _FULL_BATCH, Batch, messages_of
-from companion.recording.mcap_file.channels import CHANNELS, OTHER_CHANNELS, RESOURCES
+from companion.recording.mcap_file.channels import CHANNELS, RESOURCES, TOPICS
 from companion.recording.mcap_file.loop_channels import ACTION, INPUT, SETPOINT, UNANSWERED_CODES
 from companion.recording.mcap_file.scene import Entity, scene_message
 from companion.recording.mcap_file.writer import McapWriter
@@ -89,12 +89,12 @@ def test_what_is_written_is_read_again_by_both_readers(tmp_path):
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         for schema, channel, _, message in reader.iter_decoded_messages():
             official.setdefault(channel.topic, []).append((schema.name, message))
-    assert set(official) == {*(channel.topic for channel in CHANNELS), *OTHER_CHANNELS}
+    assert set(official) == set(TOPICS)
     for channel in CHANNELS:
         newest = official[channel.topic][-1][1]
         for name in channel.dtype.names:
             assert getattr(newest, name) == record.rows(channel.name)[name][-1]
-        assert official[channel.topic][0][0] == channel.schema_name
+        assert official[channel.topic][0][0] == channel.type.name
     assert official["/log"][0][1].message == "armed"
     assert official["/tf"][0][1].child_frame_id == "vehicle"
     assert official["/tf"][0][1].translation.z == 3.0
@@ -202,22 +202,21 @@ def test_what_the_decompression_raises_is_damage(tmp_path, monkeypatch, error):
 
 
 def test_other_columns_are_refused_with_the_channel_and_the_version(tmp_path, monkeypatch):
-    now = McapWriter._register
+    def change(before, after):
+        schemas = {
+            topic: kind._replace(schema=kind.schema.replace(before, after))
+            for topic, kind in TOPICS.items()
+        }
+        monkeypatch.setattr(writer, "TOPICS", schemas)
 
-    def register(self, topic, name, schema):
-        now(self, topic, name, schema.replace(*self.changed))
-
-    monkeypatch.setattr(writer.McapWriter, "_register", register)
-    monkeypatch.setattr(writer.McapWriter, "changed", (b"# When", b"# At what time"), raising=False)
+    change(b"# When", b"# At what time")
     assert write_one(tmp_path, "/action", row(ACTION, 1.0, 0)).rows("action")["time_s"] == 1.0
-    without_last = (b"uint8 ACTION_STOP_TURNING=8\n", b"")  # as before this action existed
-    monkeypatch.setattr(writer.McapWriter, "changed", without_last)
+    change(b"uint8 ACTION_STOP_TURNING=8\n", b"")  # as before this action existed
     assert write_one(tmp_path, "/action", row(ACTION, 1.0, 0)).rows("action")["time_s"] == 1.0
-    other_meaning = (b"ACTION_FOLLOW=4", b"ACTION_FOLLOW=5")
-    monkeypatch.setattr(writer.McapWriter, "changed", other_meaning)
+    change(b"ACTION_FOLLOW=4", b"ACTION_FOLLOW=5")  # another meaning
     with pytest.raises(RecordError, match="of /action have other columns"):
         write_one(tmp_path, "/action", row(ACTION, 1.0, 0))
-    monkeypatch.setattr(writer.McapWriter, "changed", (b"float64 age_s", b"float64 age_ms"))
+    change(b"float64 age_s", b"float64 age_ms")
     with pytest.raises(RecordError, match=r"of /sample have other columns .* companion 0\.0\.7"):
         write_one(tmp_path, "/action", row(ACTION, 1.0, 0))
 

@@ -125,8 +125,16 @@ def test_a_chunk_that_the_disk_takes_in_part_is_a_full_disk(tmp_path, monkeypatc
         SpooledFile(tmp_path).append(b"12345678")
 
 
-def test_a_row_cut_off_at_the_end_of_a_file_is_left_out():
-    file = SpooledFile(None)
+def test_a_row_cut_off_at_the_end_of_a_file_is_left_out(tmp_path):
+    file = SpooledFile(tmp_path)
     assert file.read(2).size == 0
     file.append(np.arange(5.0).tobytes() + b"123")
     assert file.read(2).tolist() == [0.0, 1.0, 2.0, 3.0]
+
+
+def test_without_a_folder_all_rows_stay_in_memory():
+    before = set(threading.enumerate())
+    series = noted(100, Spool())
+    assert series.rows()[:, 0].tolist() == list(range(100))
+    assert series.rows(90)[:, 0].tolist() == list(range(90, 100))
+    assert (series.lost, set(threading.enumerate()) - before) == (0, set())

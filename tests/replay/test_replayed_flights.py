@@ -24,7 +24,7 @@ from companion.files.yaml_file import ConfigError
 from companion.guidance.drag_estimate import ANY_VEHICLE
 from companion.recording.flight_record import RecordError, read_flight
 from companion.recording.learned_file import LearnedFile
-from companion.recording.mcap_file.channels import CHANNELS, OTHER_CHANNELS
+from companion.recording.mcap_file.channels import TOPICS
 from companion.recording.mcap_file.flight_events import ValuesChange
 from companion.recording.measurements.recorded_summary import derived_summary, summary_of
 from companion.replay.recorded import RecordedAction, Setpoint
@@ -199,7 +199,7 @@ def test_other_readers_read_the_files(good):
         metadata = {each.name: each.metadata for each in reader.iter_metadata()}
     assert newest is not None
     elsewhere = {"/attitude_target", "/alarm", "/change"}  # nothing of these in this flight
-    assert set(counts) == {*(channel.topic for channel in CHANNELS), *OTHER_CHANNELS} - elsewhere
+    assert set(counts) == TOPICS.keys() - elsewhere
     assert schemas["/tf"] == "foxglove_msgs/msg/FrameTransform"
     assert counts["/setpoint"] == summary["setpoints"]
     assert metadata["flight"]["plan"] == "configuration"

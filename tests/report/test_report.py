@@ -270,9 +270,10 @@ def test_what_cannot_be_shown_is_one_sentence(tmp_path, capsys, monkeypatch):
     assert "[report]'" in capsys.readouterr().err
 
 
-def test_a_summary_with_values_of_another_kind_is_one_sentence(copied, capsys):
+@pytest.mark.parametrize("wrong", [{"maneuvers": [5]}, {"early_end": 3}])
+def test_a_summary_with_values_of_another_kind_is_one_sentence(copied, capsys, wrong):
     path = copied / "summary.json"
-    path.write_text(json.dumps({**json.loads(path.read_text()), "maneuvers": [5]}))
+    path.write_text(json.dumps({**json.loads(path.read_text()), **wrong}))
     assert main(["report", str(copied)]) == 2
     assert "rename its summary.json" in capsys.readouterr().err
 

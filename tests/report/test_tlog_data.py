@@ -8,9 +8,8 @@ from pymavlink.dialects.v20 import common as dialect
 
 from companion.config import Config
 from companion.mavlink.errors import LogError
-from companion.recording.history import Span
 from companion.report.early_end import early_end
-from companion.report.flight_data import FlightData
+from companion.report.flight_data import FlightData, Span
 from companion.report.plots import time_axis
 from companion.report.tables import events_at_end, extremes
 from companion.report.timeline import timeline

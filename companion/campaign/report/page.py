@@ -1,10 +1,10 @@
 """`companion campaign report`: the page about a campaign, and its results in one table."""
 
 import argparse
-import os
 import shlex
 from collections import Counter
 from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,16 +33,11 @@ PARQUET, CSV = "results.parquet", "results.csv"
 _DONE = 0  # exit code
 _GRID_LIKE, _FEW_SAMPLES = 12, 60
 """Number of different values of a factor: up to the first number it counts as a grid; a sampled
-factor needs the second number for its influence to be separated from that of other factors.
-"""
+factor needs the second number for its influence to be separated from that of other factors."""
 
 
 def run(options: argparse.Namespace) -> int:
     """Write the page and the tables of a campaign; returns the exit code.
-
-    Args:
-        options: `folder` of the campaign, and `out`: path of the page; None: `report.html` in the
-            folder.
 
     Raises:
         ConfigError: the folder holds no campaign or no results yet, or a file in it is damaged, or
@@ -78,25 +73,14 @@ def write_tables(table: "pa.Table", folder: Path) -> None:
     import pyarrow.csv  # noqa: PLC0415  an extra
     import pyarrow.parquet  # noqa: PLC0415
 
-    for name, write in (
-        (PARQUET, pyarrow.parquet.write_table),
-        (CSV, pyarrow.csv.write_csv),
-    ):
-        temporary = folder / f".{name}.{os.getpid()}"
-        try:
-            write(table, temporary)
-            temporary.replace(folder / name)
-        finally:
-            temporary.unlink(missing_ok=True)
+    for name, write in ((PARQUET, pyarrow.parquet.write_table), (CSV, pyarrow.csv.write_csv)):
+        content = BytesIO()
+        write(table, content)
+        write_whole(folder / name, content.getvalue())
 
 
 def page_text(results: Results, campaign: Campaign) -> str:
-    """The HTML of the page.
-
-    Args:
-        results: results of the campaign.
-        campaign: the campaign as stored in the folder.
-    """
+    """The HTML of the page about a campaign as stored in its folder."""
     by_outcome = {
         name: each
         for name in (results.error_outcome, RATES, "ok")
@@ -157,9 +141,7 @@ def missing_cases_note(results: Results) -> list[str]:
 def what_to_look_at(results: Results, by_outcome: dict[str, list[Influence]]) -> Iterator[str]:
     """The sentences at the head of the page: what was swept, and the most important results.
 
-    Args:
-        results: results of the campaign.
-        by_outcome: the influences of the factors on each outcome, the largest first.
+    `by_outcome` holds the influences of the factors on each outcome, the largest first.
     """
     yield f"Swept: {', '.join(results.factors) or 'nothing but noise and gusts'}."
     if crashed := results.true_cases("crashed"):

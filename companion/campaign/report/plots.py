@@ -7,13 +7,7 @@ import numpy as np
 
 from companion.campaign.report.results import RATES, THRUST, Floats, Results, label
 from companion.campaign.report.sensitivity import Influence
-from companion.campaign.report.statistics import (
-    choices,
-    levels,
-    median,
-    pareto_front,
-    share_of,
-)
+from companion.campaign.report.statistics import choices, levels, median, pareto_front, share_of
 from companion.report.plots import IDEAL, MEASURED, NEAREST, REFERENCE, Plot, axes, numbers
 
 _MOST_FACTORS = 6
@@ -34,12 +28,7 @@ _BINS = 40
 
 
 def success(results: Results, order: Sequence[str]) -> Iterator[Plot]:
-    """Success rate at each level of a factor, a plot for each of the most influential factors.
-
-    Args:
-        results: results of the campaign.
-        order: names of the factors, the most influential first.
-    """
+    """Success rate at each level of a factor; `order` names the most influential factors first."""
     for name in order[:_MOST_FACTORS]:
         groups = levels(results.columns[name])
         shares = [share_of(results.good[level.cases]) for level in groups]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from companion.campaign import store
 from companion.campaign.campaign_file import NOUNS
 from companion.campaign.folder import read_description
+from companion.campaign.outcomes import OUTCOME_LABELS
 from companion.config.units import unit_of
 
 if TYPE_CHECKING:
@@ -28,52 +29,28 @@ TRUE_ERROR = "position_rms_m"
 ERRORS = (TRUE_ERROR, "model_deviation_max")
 """Outcomes that may serve as the campaign's error; the first one that was measured is used."""
 RATES, THRUST = "rate_rms_rad_s", "thrust_rms"
-LABELS = {
-    "position_rms_m": "true position error, RMS",
-    "position_max_m": "true position error, largest",
-    "height_rms_m": "true height error, RMS",
-    "estimated_rms_m": "estimated position error, RMS",
-    "level_rms_m": "true horizontal error, RMS",
-    "estimated_level_rms_m": "estimated horizontal error, RMS",
-    "estimate_level_rms_m": "horizontal error of the estimate itself, RMS",
-    "cross_axis_max": "distance from the line of a step",
-    "model_deviation_max": "distance from the first-order model",
-    "time_constant_s": "time constant",
-    "rate_rms_rad_s": "commanded roll-pitch rate, RMS",
-    "rate_max_rad_s": "commanded roll-pitch rate, largest",
-    "thrust_rms": "thrust, deviation from its mean, RMS",
-    "saturated_share": "share of setpoints at a limit",
-    "max_tilt_rad": "largest true tilt",
-    "flight_s": "flight time",
-}
-"""Text for each outcome on the page."""
 
 
 def label(name: str) -> str:
     """Text and unit for an outcome or a factor on the page."""
-    text = LABELS.get(name, name)
+    text = OUTCOME_LABELS.get(name, name)
     return f"{text}, {unit_of(name)}" if unit_of(name) else text
 
 
 @dataclass(frozen=True)
 class Results:
-    """The cases of a campaign that have been flown.
-
-    Attributes:
-        folder: folder of the campaign.
-        name: name of the campaign.
-        kind: flights or batch.
-        planned: number of cases of the whole campaign, flown or not.
-        factors: metadata of each swept key, by name.
-        table: all rows, as returned by `store.read`.
-    """
+    """The cases of a campaign that have been flown."""
 
     folder: Path
     name: str
     kind: str
+    """flights or batch."""
     planned: int
+    """Number of cases of the whole campaign, flown or not."""
     factors: Mapping[str, Any]
+    """Metadata of each swept key, by name."""
     table: "pa.Table"
+    """All rows, as returned by `store.read`."""
 
     @classmethod
     def read(cls, folder: Path) -> "Results":

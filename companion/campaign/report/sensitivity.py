@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.campaign.report.results import Column, Floats, Results
+from companion.report.plots import even_indices
 
 FEWEST = 100
 """Smallest number of cases for useful indices."""
@@ -20,32 +21,24 @@ _SEED = 1
 
 
 class Influence(NamedTuple):
-    """The first-order Sobol index of a factor on an outcome.
-
-    Attributes:
-        factor: name of the factor.
-        share: the index, 0..1.
-        confidence: half width of its 95 % interval, by bootstrap; NaN where it cannot be found.
-    """
+    """The first-order Sobol index of a factor on an outcome."""
 
     factor: str
     share: float
+    """The index, 0..1."""
     confidence: float
+    """Half width of its 95 % interval, by bootstrap; NaN where it cannot be found."""
 
 
 def influences(results: Results, outcome: str) -> list[Influence]:
-    """The influence of each factor on an outcome, the largest first.
+    """The influence of each factor on an outcome (a column of numbers, or `ok`), the largest first.
 
     Factors with a single value are left out. The list is empty if no factor is left, if fewer than
     `FEWEST` cases were measured, or if the outcome is always the same.
-
-    Args:
-        results: results of the campaign.
-        outcome: a column of numbers, or `ok`.
     """
     values = np.array(results.columns[outcome], dtype=float)
     rows = np.flatnonzero(np.isfinite(values))
-    rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _MOST_CASES)).astype(int))]
+    rows = rows[even_indices(len(rows), _MOST_CASES)]
     values = values[rows]
     columns = {name: _as_numbers(results.columns[name][rows], values) for name in results.factors}
     columns = {name: column for name, column in columns.items() if np.ptp(column) > 0.0}
@@ -69,14 +62,11 @@ def influences(results: Results, outcome: str) -> list[Influence]:
 
 
 def _as_numbers(column: Column, values: Floats) -> Floats:
-    """A factor as numbers; texts and booleans are numbered in the order of their mean outcome.
+    """A factor (cases,) as numbers, for an outcome (cases,).
 
-    In another order, texts with different outcomes could share a class, and their difference would
-    be lost. A null among numbers becomes a number below all others.
-
-    Args:
-        column: (cases,) values of the factor.
-        values: (cases,) values of the outcome.
+    Texts and booleans are numbered in the order of their mean outcome. In another order, texts with
+    different outcomes could share a class, and their difference would be lost. A null among numbers
+    becomes a number below all others.
     """
     if column.dtype == float:
         return np.where(np.isfinite(column), column, np.nanmin(column, initial=0.0) - 1.0)

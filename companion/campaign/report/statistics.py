@@ -24,19 +24,16 @@ class Share(NamedTuple):
     """The share of cases that have a property, with its Wilson interval.
 
     The interval covers the true share in 95 % of campaigns.
-
-    Attributes:
-        chosen: number of cases that have the property.
-        total: number of all cases.
-        share: chosen / total; NaN for no case.
-        low: lower end of the interval.
-        high: upper end.
     """
 
     chosen: int
+    """Number of cases that have the property."""
     total: int
+    """Number of all cases."""
     share: float
+    """`chosen` / `total`; NaN for no case."""
     low: float
+    """The interval, from here to `high`."""
     high: float
 
     def __str__(self) -> str:
@@ -62,15 +59,12 @@ def share_of(chosen: NDArray[np.bool_]) -> Share:
 
 
 class Group(NamedTuple):
-    """Cases in which some factors have the same or similar values.
-
-    Attributes:
-        name: these values, as text.
-        cases: (cases,), whether each case belongs to the group.
-    """
+    """Cases in which some factors have the same or similar values."""
 
     name: str
+    """These values, as text."""
     cases: NDArray[np.bool_]
+    """(cases,), whether each case belongs to the group."""
 
 
 def levels(column: Column) -> list[Group]:

@@ -8,12 +8,14 @@ from math import isfinite
 import numpy as np
 
 from companion.campaign.campaign import Campaign
-from companion.campaign.report.results import LABELS, RATES, Floats, Results, label
+from companion.campaign.outcomes import OUTCOME_LABELS
+from companion.campaign.report.results import RATES, Floats, Results, label
 from companion.campaign.report.sensitivity import Influence
 from companion.campaign.report.statistics import levels, median, share_of, worst_rows
 from companion.config.reference import keys
 from companion.config.units import unit_of
 from companion.flight.flown_config import flattened
+from companion.report.plots import even_indices
 from companion.report.tables import Table
 from companion.testing.settings import complete_mock
 
@@ -114,7 +116,7 @@ def sensitivity(influences: dict[str, list[Influence]]) -> Table:
         (factor, *(known[outcome].get(factor, EMPTY) for outcome in influences))
         for factor in factors
     ]
-    header = ("factor", *("good" if name == "ok" else LABELS[name] for name in influences))
+    header = ("factor", *("good" if name == "ok" else OUTCOME_LABELS[name] for name in influences))
     return Table("Share of the variance that a factor explains by itself", header, rows)
 
 
@@ -150,7 +152,7 @@ def all_cases(results: Results) -> Table:
     """All cases or, if they are more, `_MOST_ROWS` of them at even distances."""
     shown = [name for name in results.columns if name not in ("seed", "digest")]
     count = results.count
-    chosen = np.unique(np.linspace(0, count - 1, min(count, _MOST_ROWS)).astype(int))
+    chosen = even_indices(count, _MOST_ROWS)
     rows = [tuple(_cell(results.columns[name][row]) for name in shown) for row in chosen]
     part = "" if len(chosen) == count else f", {len(chosen)} of {count}"
     return Table(

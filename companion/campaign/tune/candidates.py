@@ -9,7 +9,7 @@ import numpy as np
 from companion.campaign.campaign import Campaign
 from companion.campaign.campaign_file import Tune
 from companion.campaign.case import Case
-from companion.campaign.keys import with_keys
+from companion.campaign.keys import replaced, with_keys
 from companion.campaign.swept import Swept
 from companion.config import Config
 from companion.config.flight import OPEN_LOOP
@@ -28,20 +28,16 @@ _UNSEEN_SEED_OFFSET = 1_000_003
 _NEARBY_DEVIATION = 0.15
 """Standard deviation of the values around a start, as a share of the range of the key.
 
-With `loguniform` the range is that of the logarithm.
-"""
+With `loguniform` the range is that of the logarithm."""
 
 
 class Start(NamedTuple):
-    """A candidate with which the search starts.
-
-    Attributes:
-        name: source of its values, such as `companion tune`.
-        values: values of the searched keys. Optuna draws the value of a missing key.
-    """
+    """A candidate with which the search starts."""
 
     name: str
+    """Source of its values, such as `companion tune`."""
     values: Values
+    """Values of the searched keys. Optuna draws the value of a missing key."""
 
 
 def tune_section(campaign: Campaign) -> Tune:
@@ -80,12 +76,7 @@ def cases(campaign: Campaign, values: Values) -> list[Case]:
 
 
 def unseen_campaign(campaign: Campaign, samples: int) -> Campaign:
-    """The campaign with another seed, so that samples, noise and gusts differ from the search's.
-
-    Args:
-        campaign: the campaign.
-        samples: number of samples.
-    """
+    """The campaign with another seed, so that samples, noise and gusts differ from the search's."""
     update = {"seed": campaign.file.seed + _UNSEEN_SEED_OFFSET, "samples": samples}
     return replace(campaign, file=campaign.file.model_copy(update=update))
 
@@ -106,14 +97,9 @@ def suggested(trial: "Trial", search: Mapping[str, Swept]) -> dict[str, Any]:
 def starts(campaign: Campaign, tune: Tune, learned: Config | None = None) -> Iterator[Start]:
     """The starts: the present configuration, `learned`, and the proposal of `companion tune`.
 
+    `learned` is the configuration with the values that first flights measured; None: no such
+    flights. The proposal is computed from `learned` or, without it, from the present configuration.
     There is no proposal if the rate loop is not known.
-
-    Args:
-        campaign: its base is the present configuration.
-        tune: section `tune` of the campaign.
-        learned: the configuration with the values that first flights measured; None: no such
-            flights. The proposal is computed from `learned` or, without it, from the present
-            configuration.
     """
     yield Start(
         "the configuration",
@@ -124,7 +110,7 @@ def starts(campaign: Campaign, tune: Tune, learned: Config | None = None) -> Ite
     if learned is not None:
         yield Start("a first flight", clamped_to_search(present, tune.search))
     try:
-        changes = propose(_analysed(known)).changes
+        changes = propose(replaced(known, planner={"name": "auto"})).changes
     except ConfigError:
         return  # its rate loop is not known, or the linear analysis does not cover it
     proposed = {
@@ -141,12 +127,6 @@ def starts_near(
     """Candidates around a start: each number is moved by a normally distributed share of its range.
 
     The optimum is likelier near a reasonable start than elsewhere in the ranges.
-
-    Args:
-        start: the start.
-        search: range or choice of each searched key.
-        count: number of candidates.
-        seed: seed of the random numbers.
     """
     rng = np.random.default_rng(seed)
     for _ in range(count):
@@ -160,12 +140,6 @@ def starts_near(
                 low, high = swept.uniform
                 moved[key] = value + (high - low) * float(rng.normal(0.0, _NEARBY_DEVIATION))
         yield Start(f"near {start.name}", clamped_to_search(moved, search))
-
-
-def _analysed(config: Config) -> Config:
-    """The configuration with `planner.name: auto`, for the analysis of `companion tune`."""
-    planner = config.planner.model_copy(update={"name": "auto"})
-    return config.model_copy(update={"planner": planner})
 
 
 def _present_values(config: Config, keys: Collection[str]) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """Compares the result with the unchanged configuration on unseen cases, with 95 % intervals."""
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,27 +24,21 @@ class Interval(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """Two configurations compared on the same cases, with the same noise and gusts.
-
-    Attributes:
-        before: RMS horizontal distance of the true position from the reference, m, with the
-            configuration before the search.
-        after: the same distance with the result of the search, m.
-        ratio: after / before.
-        estimated: RMS horizontal distance of the estimated position from the reference, m, before
-            and after.
-        estimate: RMS horizontal distance of the estimated from the true position, m, before and
-            after.
-        better: number of samples in which the result has the smaller RMS error.
-        samples: number of samples that were compared.
-    """
+    """Two configurations compared on the same cases, with the same noise and gusts."""
 
     before: Interval
+    """RMS horizontal distance of the true position from the reference, m, with the configuration
+    before the search."""
     after: Interval
+    """The same distance with the result of the search, m."""
     ratio: Interval
+    """`after` / `before`."""
     estimated: tuple[float, float]
+    """RMS horizontal distance of the estimated position from the reference, m, before and after."""
     estimate: tuple[float, float]
+    """RMS horizontal distance of the estimated from the true position, m, before and after."""
     better: int
+    """Number of samples in which the result has the smaller RMS error."""
     samples: int
 
 
@@ -72,34 +67,38 @@ def compared(before: Score, after: Score, samples: int) -> Comparison | None:
     def pooled_compared(values: tuple[float, ...]) -> float:
         return pooled(np.array(values).reshape(samples, -1)[complete])
 
-    draws = np.random.default_rng(_SEED).integers(count, size=(_RESAMPLES, count))
-    old_resampled, new_resampled = _resampled(old, draws), _resampled(new, draws)
-    better = np.mean(np.square(new), axis=1) < np.mean(np.square(old), axis=1)
+    squares = [np.mean(np.square(each), axis=1) for each in (old, new)]
     return Comparison(
-        _interval(pooled(old), old_resampled),
-        _interval(pooled(new), new_resampled),
-        _interval(pooled(new) / pooled(old), new_resampled / old_resampled),
+        _interval(_rms, squares[0]),
+        _interval(_rms, squares[1]),
+        _interval(_ratio, *squares),
         (pooled_compared(before.estimated), pooled_compared(after.estimated)),
         (pooled_compared(before.estimate), pooled_compared(after.estimate)),
-        int(better.sum()),
+        int(np.sum(squares[1] < squares[0])),
         count,
     )
 
 
-def _resampled(errors: Floats, draws: "np.ndarray[tuple[int, ...], np.dtype[np.int64]]") -> Floats:
-    """(resamples,): RMS error over the cases of the drawn samples, m.
-
-    Args:
-        errors: (samples, cases of a sample), RMS error of each case, m.
-        draws: (resamples, samples), numbers of the drawn samples.
-    """
-    squares = np.mean(np.square(errors), axis=1)
-    resampled: Floats = np.sqrt(np.mean(squares[draws], axis=1))
-    return resampled
+def _rms(squares: Floats, axis: int = -1) -> Any:
+    """RMS error, m, from the mean squared error of each sample, m²."""
+    return np.sqrt(np.mean(squares, axis=axis))
 
 
-def _interval(value: float, resampled: Floats) -> Interval:
-    """A value with the 95 % interval of its bootstrap values, (resamples,)."""
-    tail = 0.5 * (1.0 - CONFIDENCE)
-    low, high = np.quantile(resampled, (tail, 1.0 - tail))
-    return Interval(value, float(low), float(high))
+def _ratio(before: Floats, after: Floats, axis: int = -1) -> Any:
+    return _rms(after, axis) / _rms(before, axis)
+
+
+def _interval(statistic: Callable[..., Any], *samples: Floats) -> Interval:
+    """A statistic of paired samples, each (samples,), with its interval by bootstrap."""
+    from scipy.stats import bootstrap  # noqa: PLC0415  takes a second to import
+
+    found = bootstrap(
+        samples,
+        statistic,
+        paired=True,
+        n_resamples=_RESAMPLES,
+        confidence_level=CONFIDENCE,
+        method="percentile",
+        rng=np.random.default_rng(_SEED),
+    ).confidence_interval
+    return Interval(float(statistic(*samples)), float(found.low), float(found.high))

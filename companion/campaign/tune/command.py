@@ -48,9 +48,6 @@ RESULT = "tuned.yaml"
 def run(options: argparse.Namespace) -> int:
     """Begin or continue a search; return the exit code.
 
-    Args:
-        options: `file`, `out`, `trials`, `scheduler` and `workers` of the command line.
-
     Raises:
         ConfigError: the file is wrong, or the folder cannot be used.
         MissingExtraError: the extra `campaign` is missing.
@@ -108,10 +105,7 @@ def _fly_on(client: "Client", campaign: Campaign) -> Fly:
 def _run_search(search: Search, trials: int, console: Console) -> SearchResults:
     """Search with a progress bar; if the storage fails, print the best candidate so far and raise.
 
-    Args:
-        search: the search.
-        trials: number of candidates, including those of earlier runs.
-        console: console for messages.
+    `trials` includes the candidates of earlier runs.
     """
     newest = SearchResults()
     best_so_far = TextColumn("{task.description}")

@@ -8,17 +8,15 @@ from companion.attitude.planner import FIRST_ORDER
 from companion.campaign.campaign import Campaign
 from companion.campaign.case import Case
 from companion.campaign.flight import CaseFlight
+from companion.campaign.keys import replaced
 from companion.config import Config
 from companion.config.files import changed, load
 from companion.files.yaml_file import ConfigError
 from companion.guidance.reference import GRAVITY
-from companion.identification import (
-    BadFitError,
-    identify_vehicle,
-    vehicle_fragment,
-)
+from companion.identification import BadFitError, identify_vehicle, vehicle_fragment
 from companion.mavlink.errors import LogError
 from companion.recording.learned_file import newest_learned
+from companion.recording.tlog import TLOG_FILE
 from companion.vehicle.flight_log import read_flight_log
 
 _DAMPING_KEY = "vehicle.damping"
@@ -45,14 +43,16 @@ def _identified(config: Config, case: Case, *, damped: bool) -> Config:
 
     It is unchanged if the response cannot be identified.
     """
-    planner = case.config.planner.model_copy(update={"name": FIRST_ORDER})
-    flight = case.config.flight.model_copy(update={"maneuvers": ("identify",), "trajectory": None})
-    doublets = case.config.model_copy(update={"planner": planner, "flight": flight})
+    doublets = replaced(
+        case.config,
+        planner={"name": FIRST_ORDER},
+        flight={"maneuvers": ("identify",), "trajectory": None},
+    )
     with tempfile.TemporaryDirectory(prefix="companion-identify-") as place:
         folder, fragment = Path(place) / "flight", Path(place) / "vehicle.yaml"
         CaseFlight(replace(case, config=doublets, fault=None), Path(place)).fly(folder)
         try:
-            rows = read_flight_log(folder / "flight.tlog")
+            rows = read_flight_log(folder / TLOG_FILE)
             vehicle = identify_vehicle(rows.setpoints, rows.rates, rows.specific_thrust)
             axes = config.vehicle.axes
             text = vehicle_fragment(vehicle, GRAVITY, axes, second_order=damped)
@@ -71,8 +71,4 @@ def _with_drag(config: Config, case: Case) -> Config:
         learned_file = newest_learned(Path(place))
     if learned_file is None:
         return config
-    drag = {
-        "drag_per_s": learned_file.drag.linear,
-        "quadratic_drag_per_m": learned_file.drag.quadratic,
-    }
-    return changed(config, {"guidance": drag}, "the drag that a flight learned")
+    return changed(config, learned_file.as_keys(), "the drag that a flight learned")

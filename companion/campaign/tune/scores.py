@@ -16,22 +16,19 @@ _ERROR_NAMES = "true", "estimated", "estimate"
 
 
 class Score(NamedTuple):
-    """The score of a candidate; each attribute has an entry for each case.
-
-    Attributes:
-        true: RMS horizontal distance of the true position from the reference, m; infinite where a
-            case was not flown to its end, or had no closed-loop maneuver.
-        estimated: RMS horizontal distance of the estimated position from the reference, m; infinite
-            where `true` is.
-        estimate: RMS horizontal distance of the estimated from the true position, m; infinite where
-            `true` is.
-        inside: whether the case was flown to its end and stayed inside the envelope.
-    """
+    """The score of a candidate; each attribute has an entry for each case."""
 
     true: tuple[float, ...]
+    """RMS horizontal distance of the true position from the reference, m; infinite where a case was
+    not flown to its end, or had no closed-loop maneuver."""
     estimated: tuple[float, ...]
+    """RMS horizontal distance of the estimated position from the reference, m; infinite where
+    `true` is."""
     estimate: tuple[float, ...]
+    """RMS horizontal distance of the estimated from the true position, m; infinite where `true`
+    is."""
     inside: tuple[bool, ...]
+    """Whether the case was flown to its end and stayed inside the envelope."""
 
     @property
     def rms(self) -> float:
@@ -45,18 +42,11 @@ class Score(NamedTuple):
 
     def first(self, count: int) -> "Score":
         """The score on the first `count` cases alone."""
-        return Score(
-            self.true[:count], self.estimated[:count], self.estimate[:count], self.inside[:count]
-        )
+        return Score._make(each[:count] for each in self)
 
     def combined_with(self, rest: "Score") -> "Score":
         """The score on these cases and those of `rest` together."""
-        return Score(
-            self.true + rest.true,
-            self.estimated + rest.estimated,
-            self.estimate + rest.estimate,
-            self.inside + rest.inside,
-        )
+        return Score._make(ours + theirs for ours, theirs in zip(self, rest, strict=True))
 
     def as_attributes(self) -> dict[str, Any]:
         """The score as JSON; an infinite number is null."""
@@ -77,11 +67,10 @@ class Score(NamedTuple):
 
 
 def scored(rows: Sequence[Row], envelope: float | None) -> Score:
-    """The score computed from rows of results.
+    """The score computed from rows of results, one for each case.
 
-    Args:
-        rows: one row for each case.
-        envelope: largest true distance from the reference inside the envelope, m; None: no limit.
+    `envelope` is the largest true distance from the reference inside the envelope, m; None: no
+    limit.
     """
     return Score(
         tuple(_number(row, "level_rms_m") for row in rows),

@@ -41,8 +41,7 @@ _FIRST_DIVISOR = 4
 _FEWEST_FIRST_CASES = 2
 _HOPELESS_FACTOR = 1.3
 """A candidate is abandoned when its error on the first cases is more than this factor times that of
-the best candidate on the same cases.
-"""
+the best candidate on the same cases."""
 _LARGEST_ERROR = 10.0
 """Larger errors are reported to Optuna as this one, m, and so are flights that ended early."""
 _VALUES, _SCORE, _VIOLATION, _COMPLETE = "values", "score", "missed", "whole"
@@ -51,35 +50,28 @@ _VALUES, _SCORE, _VIOLATION, _COMPLETE = "values", "score", "missed", "whole"
 
 @dataclass(frozen=True)
 class Candidate:
-    """A candidate that has flown all its cases.
-
-    Attributes:
-        number: number of the trial.
-        values: values of the searched keys.
-        score: score on the cases of the search.
-    """
+    """A candidate that has flown all its cases."""
 
     number: int
+    """Number of the trial."""
     values: Values
     score: Score
+    """Score on the cases of the search."""
 
 
 @dataclass
 class SearchResults:
-    """The results of a search so far.
-
-    Attributes:
-        tried: number of all candidates, including those of `stopped_early`.
-        stopped_early: number of candidates that were abandoned, or whose keys were refused.
-        best: candidate with the smallest error of those that met the constraint, `inside_share`;
-            None: none met it.
-        near: the best tenth, or at least the best three, of those that met it; the best first.
-    """
+    """The results of a search so far."""
 
     tried: int = 0
+    """Number of all candidates, including those of `stopped_early`."""
     stopped_early: int = 0
+    """Number of candidates that were abandoned, or whose keys were refused."""
     best: Candidate | None = None
+    """Candidate with the smallest error of those that met the constraint, `inside_share`; None:
+    none met it."""
     near: list[Candidate] = field(default_factory=list)
+    """The best tenth, or at least the best three, of those that met it; the best first."""
 
 
 class Search:
@@ -143,10 +135,16 @@ class Search:
     def results(self) -> SearchResults:
         """The results of all trials so far, including those of earlier runs."""
         complete = [each for each in self._ended_trials() if each.user_attrs.get(_COMPLETE)]
-        good = sorted(
-            (self._candidate(each) for each in complete if not self._violates(each)),
-            key=lambda each: each.score.rms,
-        )
+        found = [
+            Candidate(
+                each.number,
+                each.user_attrs[_VALUES],
+                Score.from_attributes(each.user_attrs[_SCORE]),
+            )
+            for each in complete
+            if each.user_attrs[_VIOLATION] <= 0.0
+        ]
+        good = sorted(found, key=lambda each: each.score.rms)
         tried = len(self._ended_trials())
         near = good[: max(3, len(good) // 10)]
         return SearchResults(tried, tried - len(complete), good[0] if good else None, near)
@@ -203,13 +201,7 @@ class Search:
         self._study.tell(trial, _capped_rms(score))
 
     def _stop(self, trial: "Trial", error: float, violation: float) -> None:
-        """End a candidate before all of its cases were flown.
-
-        Args:
-            trial: the candidate.
-            error: RMS error so far, m.
-            violation: `_shortfall` of the candidate.
-        """
+        """End a candidate before all of its cases were flown, with its RMS error so far, m."""
         self._set_violation(trial, violation)
         trial.report(error, 0)
         self._study.tell(trial, state=self._optuna.trial.TrialState.PRUNED)
@@ -233,15 +225,6 @@ class Search:
         return (
             best is not None
             and score.rms > _HOPELESS_FACTOR * best.score.first(len(score.true)).rms
-        )
-
-    def _violates(self, trial: "FrozenTrial") -> bool:
-        return float(trial.user_attrs[_VIOLATION]) > 0.0
-
-    def _candidate(self, trial: "FrozenTrial") -> Candidate:
-        attributes = trial.user_attrs
-        return Candidate(
-            trial.number, attributes[_VALUES], Score.from_attributes(attributes[_SCORE])
         )
 
 

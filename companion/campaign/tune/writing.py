@@ -17,23 +17,19 @@ _EDGE_SHARE = 0.02
 
 
 class CheckedResult(NamedTuple):
-    """The result of a search, checked on unseen cases.
-
-    Attributes:
-        campaign: the campaign, with its section `tune`.
-        found: results of the search.
-        best: the candidate that is proposed.
-        before: score of the configuration before the search, on the unseen cases.
-        after: score of `best`, on the unseen cases.
-        comparison: `after` compared with `before`; None: too few samples were flown to their end.
-    """
+    """The result of a search, checked on unseen cases."""
 
     campaign: Campaign
+    """The campaign, with its section `tune`."""
     found: SearchResults
     best: Candidate
+    """The candidate that is proposed."""
     before: Score
+    """Score of the configuration before the search, on the unseen cases."""
     after: Score
+    """Score of `best`, on the unseen cases."""
     comparison: Comparison | None
+    """`after` compared with `before`; None: too few samples were flown to their end."""
 
 
 def summary_lines(result: CheckedResult) -> list[str]:
@@ -92,9 +88,8 @@ def _certainty_lines(result: CheckedResult) -> Iterator[str]:
 def result_text(result: CheckedResult, present: Mapping[str, Any]) -> str:
     """The text of the result file.
 
-    Args:
-        result: result of the search.
-        present: values of the searched keys before the search; a key that was not set is missing.
+    `present` holds the values of the searched keys before the search, without keys that were not
+    set.
     """
     tune = result.campaign.file.tune
     assert tune is not None
@@ -129,14 +124,7 @@ def _values_lines(values: Values, reasons: Mapping[str, str]) -> Iterator[str]:
 
 
 def _reason(key: str, swept: Swept, result: CheckedResult, before: Any) -> str:
-    """Text about the value of a key: the value before, and those of the best candidates.
-
-    Args:
-        key: the key.
-        swept: range or choice of the key in the search.
-        result: result of the search.
-        before: value before the search; None: the key was not set.
-    """
+    """Text about a value: what it was before (None: not set), and those of the best candidates."""
     before_text = "not set before" if before is None else f"before {_value_text(before)}"
     near = [each.values[key] for each in result.found.near if key in each.values]
     pair = swept.uniform or swept.loguniform

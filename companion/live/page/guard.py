@@ -17,12 +17,7 @@ _COOKIE = "companion_watch"
 
 
 class Guard:
-    """ASGI middleware around the page; it checks every request and every WebSocket.
-
-    Args:
-        app: the page.
-        token: token that admits users.
-    """
+    """ASGI middleware around the page; it checks every request and every WebSocket."""
 
     def __init__(self, app: App, token: str) -> None:
         self._app, self._token = app, token

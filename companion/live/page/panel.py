@@ -24,11 +24,7 @@ _WRONG_TOKEN_DELAY = 1.0
 class Panel:
     """Inputs and buttons of one browser tab; each tab must be unlocked separately.
 
-    Args:
-        relay: passes changes to the flight.
-        store: holds the present values.
-        guard: checks the token.
-        unlocked: whether the tab was opened with the token.
+    `unlocked`: the tab was opened with the token.
     """
 
     def __init__(self, relay: Relay, store: Store, guard: Guard, *, unlocked: bool) -> None:

@@ -26,9 +26,6 @@ class Store:
         start: the configuration with which the flight began.
         can_undo: whether a change can be undone.
         over: how the flight ended; None: it has not ended.
-
-    Args:
-        config: configuration of the flight.
     """
 
     def __init__(self, config: Config) -> None:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from companion.recording.mcap_file.channels import TOPICS
 
 _HEAD = struct.Struct("<BQI")
-_TOPIC_NUMBERS = {topic.name: number for number, topic in enumerate(TOPICS)}
+_TOPIC_NUMBERS = {topic: number for number, topic in enumerate(TOPICS)}
 _FULL_BATCH = 32_000
 """Length above which a batch is sent, bytes; well below the buffer of a socket."""
 
@@ -21,25 +21,18 @@ SendBatch = Callable[[bytes], None]
 
 
 class StreamedMessage(NamedTuple):
-    """A message of the live stream.
-
-    Attributes:
-        number: index of its channel in `TOPICS`.
-        time_ns: time since 1970, ns; in vehicle time since the vehicle's boot.
-        data: payload, as in the file.
-    """
+    """A message of the live stream."""
 
     number: int
+    """Index of its channel in `TOPICS`."""
     time_ns: int
+    """Time since 1970, ns; in vehicle time since the vehicle's boot."""
     data: bytes
+    """Payload, as in the file."""
 
 
 class Batch:
-    """Collects messages and sends them together. Only one thread may use it.
-
-    Args:
-        send: takes the datagrams.
-    """
+    """Collects messages and passes them to `send` together. Only one thread may use it."""
 
     def __init__(self, send: SendBatch) -> None:
         self._send = send

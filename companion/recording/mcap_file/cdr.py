@@ -4,9 +4,8 @@ Foxglove, Lichtblick and PlotJuggler recognise these types by name and draw them
 """
 
 import struct
-from typing import NamedTuple
 
-from companion.recording.mcap_file.fields import CDR, PACKAGE
+from companion.recording.mcap_file.fields import CDR, PACKAGE, MessageType
 
 _POSE = struct.Struct("<7d")
 _STAMP = struct.Struct("<iI")
@@ -36,13 +35,6 @@ geometry_msgs/Quaternion orientation
 GEOMETRY = (_TIME, _QUATERNION, _VECTOR, _POINT, _POSE_TYPE)
 """Definitions of the types of time and geometry."""
 _SEPARATOR = "=" * 80 + "\n"
-
-
-class MessageType(NamedTuple):
-    """A message type: its ROS 2 name and its definition (ros2msg)."""
-
-    name: str
-    schema: bytes
 
 
 def message_type(name: str, *parts: str) -> MessageType:
@@ -99,12 +91,53 @@ Pose = tuple[float, float, float, float, float, float, float]
 """Position x, y, z (m), and orientation as a quaternion x, y, z, w."""
 
 
+class CdrMessage:
+    """A growing CDR message. Values are aligned to their size, counted after the header."""
+
+    def __init__(self) -> None:
+        self._bytes = bytearray(CDR)
+
+    def bytes(self) -> bytes:
+        """The message so far."""
+        return bytes(self._bytes)
+
+    def align(self, size: int) -> None:
+        """Pad to a multiple of `size` bytes."""
+        self._bytes += bytes(-(len(self._bytes) - len(CDR)) % size)
+
+    def flag(self, value: int) -> None:
+        """Add a uint8."""
+        self._bytes.append(value)
+
+    def count(self, number: int) -> None:
+        """Add a uint32, such as the length of a list."""
+        self.align(4)
+        self._bytes += _COUNT.pack(number)
+
+    def time(self, time_ns: int) -> None:
+        """Add a time in ns since 1970, as `builtin_interfaces/Time`."""
+        self.align(4)
+        self._bytes += _stamp(time_ns)
+
+    def doubles(self, *values: float) -> None:
+        """Add float64 values."""
+        self.align(8)
+        self._bytes += struct.pack(f"<{len(values)}d", *values)
+
+    def text(self, text: str) -> None:
+        """Add a string, with its length in front and a zero at its end."""
+        encoded = text.encode("utf-8", "replace") + b"\0"
+        self.count(len(encoded))
+        self._bytes += encoded
+
+
 def fields_message(numbers: tuple[float, ...], texts: tuple[str, ...]) -> bytes:
     """Encode float64 fields followed by strings, the form of PHASE, MANEUVER, ALARM and CHANGE."""
-    message = bytearray(struct.pack(f"<4s{len(numbers)}d", CDR, *numbers))
+    message = CdrMessage()
+    message.doubles(*numbers)
     for text in texts:
-        add_string(message, text)
-    return bytes(message)
+        message.text(text)
+    return message.bytes()
 
 
 def fields_of(message: bytes, numbers: int, texts: int) -> tuple[tuple[float, ...], list[str]]:
@@ -126,11 +159,13 @@ def fields_of(message: bytes, numbers: int, texts: int) -> tuple[tuple[float, ..
 
 def log_message(time_ns: int, level: int, text: str, name: str) -> bytes:
     """Encode a message of type LOG at a time in ns since 1970."""
-    message = bytearray(CDR + stamp(time_ns) + bytes((level,)))
-    for each in (text, name, ""):
-        add_string(message, each)
-    _align(message)
-    return bytes(message + _COUNT.pack(0))
+    message = CdrMessage()
+    message.time(time_ns)
+    message.flag(level)
+    for each in (text, name, ""):  # the last one: no source file
+        message.text(each)
+    message.count(0)  # no line of it
+    return message.bytes()
 
 
 def log_of(message: bytes) -> tuple[int, str, str]:
@@ -150,38 +185,24 @@ def log_of(message: bytes) -> tuple[int, str, str]:
 class PoseEncoder:
     """Encodes messages of type FRAME_TRANSFORM (two frames) or POSE_IN_FRAME (one frame).
 
-    Args:
-        frames: names of the frames, which are the same in all messages.
+    All messages have the same names of frames.
     """
 
     def __init__(self, *frames: str) -> None:
-        names = bytearray(12)
+        message = CdrMessage()
+        message.time(0)
         for frame in frames:
-            add_string(names, frame)
-        while (len(names) - 4) % 8:
-            names.append(0)
-        self._names = bytes(names[12:])
+            message.text(frame)
+        message.align(8)
+        self._names = message.bytes()[len(CDR) + _STAMP.size :]
 
     def message(self, time_ns: int, pose: Pose) -> bytes:
         """The message for `pose` at a time in ns since 1970."""
-        return CDR + stamp(time_ns) + self._names + _POSE.pack(*pose)
+        return CDR + _stamp(time_ns) + self._names + _POSE.pack(*pose)
 
 
-def stamp(time_ns: int) -> bytes:
-    """A time in ns since 1970, as `builtin_interfaces/Time`."""
+def _stamp(time_ns: int) -> bytes:
     return _STAMP.pack(*divmod(time_ns, _NANOSECONDS))
-
-
-def _align(message: bytearray) -> None:
-    """Pad to a multiple of 4 bytes: CDR counts from the end of its header, which has 4 bytes."""
-    message.extend(bytes(-len(message) % 4))
-
-
-def add_string(message: bytearray, text: str) -> None:
-    """Add a string to a message, with its length in front and a zero at its end."""
-    _align(message)
-    encoded = text.encode("utf-8", "replace") + b"\0"
-    message.extend(_COUNT.pack(len(encoded)) + encoded)
 
 
 def _string(message: bytes, at: int) -> tuple[str, int]:

@@ -4,8 +4,6 @@ The columns follow the conventions of `companion.recording.mcap_file.loop_channe
 MOTION counts from the beginning of the flight.
 """
 
-from typing import NamedTuple
-
 from companion.recording.mcap_file import cdr
 from companion.recording.mcap_file.fields import Channel, Field
 from companion.recording.mcap_file.loop_channels import (
@@ -76,7 +74,8 @@ CHANNELS = (
     RESOURCES,
 )
 """The channels of numbers."""
-OTHER_CHANNELS = {
+TOPICS = {
+    **{channel.topic: channel.type for channel in CHANNELS},
     "/phase": cdr.PHASE,
     "/maneuver": cdr.MANEUVER,
     "/alarm": cdr.ALARM,
@@ -89,27 +88,6 @@ OTHER_CHANNELS = {
     "/paths": SCENE_UPDATE,
     "/fence": SCENE_UPDATE,
 }
-"""The channels whose messages are not only numbers, and their types."""
-
-
-class Topic(NamedTuple):
-    """A channel as the file and the live stream announce it.
-
-    Attributes:
-        name: with a slash in front.
-        type_name: ROS 2 name of the message type.
-        schema: its definition (ros2msg).
-    """
-
-    name: str
-    type_name: str
-    schema: bytes
-
-
-TOPICS = (
-    *(Topic(channel.topic, channel.schema_name, channel.schema) for channel in CHANNELS),
-    *(Topic(name, kind.name, kind.schema) for name, kind in OTHER_CHANNELS.items()),
-)
-"""All channels."""
+"""All channels, and the types of their messages, as the file and the live stream announce them."""
 ENCODING, SCHEMA_ENCODING = "cdr", "ros2msg"
 """Encoding of the messages, and of their definitions, as MCAP names them."""

@@ -7,6 +7,7 @@ fields. So every message of a channel has the same length, and NumPy reads many 
 import struct
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,45 +20,41 @@ Rows = NDArray[np.void]
 """A structured array: one row per message, one named field per column."""
 
 
-@dataclass(frozen=True, slots=True)
-class Field:
-    """One column of a channel.
-
-    Attributes:
-        name: name, which ends with the unit if there is one.
-        meaning: description of the column.
-    """
+class MessageType(NamedTuple):
+    """A message type: its ROS 2 name and its definition (ros2msg)."""
 
     name: str
+    schema: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One column of a channel."""
+
+    name: str
+    """Name, which ends with the unit if there is one."""
     meaning: str
 
 
 @dataclass(frozen=True, slots=True)
 class CodeField(Field):
-    """A column of codes: small numbers that each have a name.
-
-    Attributes:
-        names: the name of each number; the first is that of 0.
-    """
+    """A column of codes: small numbers that each have a name."""
 
     names: tuple[str, ...] = ("no", "yes")
+    """The name of each number; the first is that of 0."""
 
 
 @dataclass(frozen=True)
 class Channel:
-    """A channel of numbers.
-
-    Attributes:
-        topic: name in the file, with a leading slash.
-        meaning: description of a message.
-        numbers: the float64 columns. NaN: unknown or not applicable.
-        codes: the uint8 columns.
-    """
+    """A channel of numbers."""
 
     topic: str
+    """Name in the file, with a leading slash."""
     meaning: str
     numbers: tuple[Field, ...]
+    """The float64 columns. NaN: unknown or not applicable."""
     codes: tuple[CodeField, ...] = ()
+    """The uint8 columns."""
 
     @property
     def name(self) -> str:
@@ -65,14 +62,9 @@ class Channel:
         return self.topic[1:]
 
     @property
-    def schema_name(self) -> str:
-        """The ROS 2 name of the message type."""
+    def type(self) -> MessageType:
+        """The message type, in whose definition the names of codes are constants."""
         words = "".join(word.capitalize() for word in self.name.split("_"))
-        return f"{PACKAGE}/{words}"
-
-    @cached_property
-    def schema(self) -> bytes:
-        """The message definition (ros2msg), in which the names of codes are constants."""
         lines = [f"# {self.meaning}"]
         for field in self.numbers:
             lines += [f"# {field.meaning}", f"float64 {field.name}"]
@@ -84,7 +76,7 @@ class Channel:
                     for number, name in enumerate(code.names)
                 ]
             lines.append(f"uint8 {code.name}")
-        return ("\n".join(lines) + "\n").encode()
+        return MessageType(f"{PACKAGE}/{words}", ("\n".join(lines) + "\n").encode())
 
     @cached_property
     def packing(self) -> struct.Struct:
@@ -100,10 +92,7 @@ class Channel:
         )
 
     def rows(self, messages: list[bytes]) -> Rows:
-        """All messages of the channel as a structured array.
-
-        Args:
-            messages: messages in the order of the file.
+        """All messages of the channel, in the order of the file, as a structured array.
 
         Raises:
             ValueError: a message has another length, or a code without a name.

@@ -4,63 +4,49 @@ from typing import Any, NamedTuple
 
 
 class Phase(NamedTuple):
-    """A phase of the flight.
-
-    Attributes:
-        time: its beginning, s since the flight began.
-        name: shown to the user.
-        waits_for: the condition that ends it.
-    """
+    """A phase of the flight."""
 
     time: float
+    """Its beginning, s since the flight began."""
     name: str
     waits_for: str
+    """The condition that ends it."""
 
 
 class Event(NamedTuple):
-    """An event, in words.
-
-    Attributes:
-        time: time since the flight began, s.
-        text: text as shown to the user.
-        level: as in foxglove_msgs/msg/Log: 2 (information), 3 (warning) or 4 (error). A recorded
-            flight has 3 for the source "safety", else 2. A `.tlog` has the autopilot's severity.
-        source: "flight", "safety", "autopilot" or "phase".
-    """
+    """An event, in words."""
 
     time: float
+    """Time since the flight began, s."""
     text: str
     level: int
+    """As in foxglove_msgs/msg/Log: 2 (information), 3 (warning) or 4 (error). A recorded flight has
+    3 for the source "safety", else 2. A `.tlog` has the autopilot's severity."""
     source: str
+    """"flight", "safety", "autopilot" or "phase"."""
 
 
 class AlarmChange(NamedTuple):
-    """A safety monitor raised or ended its alarm.
-
-    Attributes:
-        time: time since the flight began, s.
-        raised: true: the alarm was raised. False: it ended.
-        monitor: name of the monitor in `companion.safety.table`.
-        reason: description of the breach; empty when the alarm ended.
-        action: action of the flight, in words; empty when the alarm ended.
-    """
+    """A safety monitor raised or ended its alarm."""
 
     time: float
+    """Time since the flight began, s."""
     raised: bool
+    """True: the alarm was raised. False: it ended."""
     monitor: str
+    """Name of the monitor in `companion.safety.table`."""
     reason: str
+    """Description of the breach; empty when the alarm ended."""
     action: str
+    """Action of the flight, in words; empty when the alarm ended."""
 
 
 class ValuesChange(NamedTuple):
-    """A change of values of the configuration begins.
-
-    Attributes:
-        time: time on our clock, s.
-        at_once: whether the values change at once, without slewing.
-        values: new values, by section and key.
-    """
+    """A change of values of the configuration begins."""
 
     time: float
+    """Time on our clock, s."""
     at_once: bool
+    """Whether the values change at once, without slewing."""
     values: dict[str, dict[str, Any]]
+    """New values, by section and key."""

@@ -204,10 +204,7 @@ ACTION = Channel(
         Field("time_s", "When, on our clock, s."),
         Field("clock_offset_s", "Vehicle time minus our time, s; NaN: not known."),
         Field("drag_per_s", "Linear drag of an earlier flight, 1/s; of `drag_prior` only."),
-        Field(
-            "quadratic_drag_per_m",
-            "Quadratic drag of that flight, 1/m; of `drag_prior` only.",
-        ),
+        Field("quadratic_drag_per_m", "Quadratic drag of that flight, 1/m; of `drag_prior` only."),
     ),
     (CodeField("action", "The name of the call.", ACTIONS),),
 )

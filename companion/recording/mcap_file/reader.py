@@ -31,23 +31,20 @@ _DAMAGE_ERRORS = (
 
 @dataclass
 class McapContent:
-    """The content of a `.mcap`.
-
-    Attributes:
-        messages: (time ns, data) of each message, by topic, in the order of the file.
-        order: the topic of each message, in the order of the file.
-        schemas: the message definition of each topic.
-        metadata: metadata records by name; the last one if a name occurs several times.
-        complete: whether the file was closed, with its index at the end.
-        damage: why reading ended before the end of the file, or None.
-    """
+    """The content of a `.mcap`."""
 
     messages: dict[str, list[tuple[int, bytes]]] = field(default_factory=lambda: defaultdict(list))
+    """(time ns, data) of each message, by topic, in the order of the file."""
     order: list[str] = field(default_factory=list)
+    """The topic of each message, in the order of the file."""
     schemas: dict[str, bytes] = field(default_factory=dict)
+    """The message definition of each topic."""
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
+    """Metadata records by name; the last one if a name occurs several times."""
     complete: bool = False
+    """Whether the file was closed, with its index at the end."""
     damage: str | None = None
+    """Why reading ended before the end of the file, or None."""
 
 
 def read_mcap(path: Path) -> McapContent:
@@ -97,7 +94,7 @@ def changed_topic(content: McapContent) -> str | None:
 
     Names of codes that this version has added since the recording do not count as a change.
     """
-    ours = {topic.name: _columns(topic.schema) for topic in TOPICS}
+    ours = {topic: _columns(kind.schema) for topic, kind in TOPICS.items()}
     for topic, schema in content.schemas.items():
         recorded = _columns(schema)
         known = (line for line in ours.get(topic, recorded) if line in recorded or b"=" not in line)

@@ -3,13 +3,11 @@
 An entity stays until another one with the same id replaces it on the same topic.
 """
 
-import struct
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeVar
 
 from companion.recording.mcap_file import cdr
-from companion.recording.mcap_file.cdr import Pose
-from companion.recording.mcap_file.fields import CDR
+from companion.recording.mcap_file.cdr import CdrMessage, Pose
 
 T = TypeVar("T")
 Color = tuple[float, float, float, float]
@@ -45,31 +43,22 @@ class Cylinder(NamedTuple):
 
 
 class Line(NamedTuple):
-    """A line, 2 pixels thick.
-
-    Attributes:
-        points: x, y and z of each point, m.
-        color: color of the whole line.
-        pairs: True: each pair of points is a separate line. False: all points form one line.
-    """
+    """A line, 2 pixels thick."""
 
     points: Sequence[tuple[float, float, float]]
+    """(x, y, z) of each point, m."""
     color: Color
     pairs: bool = False
+    """True: each pair of points is a separate line. False: all points form one line."""
 
 
 class Entity(NamedTuple):
-    """Shapes that are replaced together.
-
-    Attributes:
-        name: id of the entity.
-        frame: frame of the shapes.
-        follows: whether they move with the frame until they are replaced.
-    """
+    """Shapes that are replaced together."""
 
     name: str
     frame: str
     follows: bool = False
+    """Whether they move with the frame until they are replaced."""
     arrows: Sequence[Arrow] = ()
     cubes: Sequence[Cube] = ()
     cylinders: Sequence[Cylinder] = ()
@@ -78,49 +67,20 @@ class Entity(NamedTuple):
 
 def scene_message(time_ns: int, entities: Sequence[Entity]) -> bytes:
     """Encode a message of type SCENE_UPDATE at a time in ns since 1970."""
-    message = _Message()
+    message = CdrMessage()
     message.count(0)  # deletions
-    message.each(entities, lambda entity: _entity(message, time_ns, entity))
+    _each(message, entities, lambda entity: _entity(message, time_ns, entity))
     return message.bytes()
 
 
-class _Message:
-    """A growing CDR message. Values are aligned to their size, counted after the header."""
-
-    def __init__(self) -> None:
-        self._bytes = bytearray(CDR)
-
-    def bytes(self) -> bytes:
-        return bytes(self._bytes)
-
-    def count(self, number: int) -> None:
-        self._align(4)
-        self._bytes += struct.pack("<I", number)
-
-    def flag(self, value: int) -> None:
-        self._bytes.append(value)
-
-    def doubles(self, *values: float) -> None:
-        self._align(8)
-        self._bytes += struct.pack(f"<{len(values)}d", *values)
-
-    def time(self, time_ns: int) -> None:
-        self._align(4)
-        self._bytes += cdr.stamp(time_ns)
-
-    def text(self, text: str) -> None:
-        cdr.add_string(self._bytes, text)
-
-    def each(self, items: Sequence[T], add: Callable[[T], None]) -> None:
-        self.count(len(items))
-        for item in items:
-            add(item)
-
-    def _align(self, size: int) -> None:
-        self._bytes += bytes(-(len(self._bytes) - len(CDR)) % size)
+def _each(message: CdrMessage, items: Sequence[T], add: Callable[[T], None]) -> None:
+    """Add a list: its length, and each item."""
+    message.count(len(items))
+    for item in items:
+        add(item)
 
 
-def _entity(message: _Message, time_ns: int, entity: Entity) -> None:
+def _entity(message: CdrMessage, time_ns: int, entity: Entity) -> None:
     def arrow(one: Arrow) -> None:
         message.doubles(*one.pose, *one[1:5], *one.color)
 
@@ -145,11 +105,11 @@ def _entity(message: _Message, time_ns: int, entity: Entity) -> None:
     message.time(0)  # lifetime: until it is replaced
     message.flag(entity.follows)
     message.count(0)  # metadata
-    message.each(entity.arrows, arrow)
-    message.each(entity.cubes, box)
+    _each(message, entity.arrows, arrow)
+    _each(message, entity.cubes, box)
     message.count(0)  # spheres
-    message.each(entity.cylinders, box)
-    message.each(entity.lines, line)
+    _each(message, entity.cylinders, box)
+    _each(message, entity.lines, line)
     for _ in ("triangles", "texts", "models"):
         message.count(0)
 

@@ -32,24 +32,15 @@ class McapWriter:
         self._writer = Writer(self._file, _CHUNK_LENGTH, CompressionType.LZ4)
         self._writer.start("ros2", "mavlink-companion")
         self._ids: dict[str, int] = {}
-        self._schemas: dict[str, int] = {}
-        for topic in TOPICS:
-            self._register(*topic)
+        schemas: dict[str, int] = {}
+        for topic, (name, schema) in TOPICS.items():
+            if name not in schemas:
+                schemas[name] = self._writer.register_schema(name, SCHEMA_ENCODING, schema)
+            self._ids[topic] = self._writer.register_channel(topic, ENCODING, schemas[name])
         self._batch = None if stream is None else Batch(stream)
 
-    def _register(self, topic: str, name: str, schema: bytes) -> None:
-        if name not in self._schemas:
-            self._schemas[name] = self._writer.register_schema(name, SCHEMA_ENCODING, schema)
-        self._ids[topic] = self._writer.register_channel(topic, ENCODING, self._schemas[name])
-
     def message(self, topic: str, time_ns: int, data: bytes) -> None:
-        """Add a message.
-
-        Args:
-            topic: topic of the message.
-            time_ns: time since 1970, ns; in vehicle time since the vehicle's boot.
-            data: encoded message.
-        """
+        """Add a message; its time counts from 1970, in vehicle time from the vehicle's boot."""
         if self._batch is not None:
             self._batch.add(topic, time_ns, data)
         self._writer.add_message(self._ids[topic], time_ns, data, time_ns)

@@ -12,15 +12,12 @@ result depends on the maneuver: by up to 3 ms over a flight, by up to 7 ms over 
 
 
 class AxisDeadTime(NamedTuple):
-    """Dead time of one axis: from a sample to the first effect of its setpoint, s.
-
-    Attributes:
-        measured: None: the flight had too little undisturbed rotation, or the lag is unknown.
-        configured: None: not configured.
-    """
+    """Dead time of one axis: from a sample to the first effect of its setpoint, s."""
 
     measured: float | None = None
+    """None: the flight had too little undisturbed rotation, or the lag is unknown."""
     configured: float | None = None
+    """None: not configured."""
 
     @property
     def is_wrong(self) -> bool:
@@ -47,19 +44,16 @@ class SampleAge(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class DeadTimes:
-    """Dead times measured in a flight.
-
-    Attributes:
-        axes: dead time by axis: roll, pitch, yaw.
-        sample_age: age of samples; NaN without TIMESYNC.
-        lag_known: whether the lag is configured, which the measurement needs.
-    """
+    """Dead times measured in a flight."""
 
     axes: dict[str, AxisDeadTime] = field(
         default_factory=lambda: dict.fromkeys(("roll", "pitch", "yaw"), AxisDeadTime())
     )
+    """Dead time by axis: roll, pitch, yaw."""
     sample_age: SampleAge = field(default_factory=SampleAge)
+    """Age of samples; NaN without TIMESYNC."""
     lag_known: bool = False
+    """Whether the lag is configured, which the measurement needs."""
 
     def warning(self) -> str | None:
         """A sentence on wrong dead times and their remedy; None if none is wrong."""

@@ -7,25 +7,22 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class EarlyEnd:
-    """Time, phase and cause of the end of a flight that failed in one of its phases.
-
-    Attributes:
-        time: time since the flight began, s.
-        since_takeoff: time since `FlightFacts.takeoff`, s; None: the vehicle was on the ground.
-        phase: the phase that failed.
-        maneuver: the maneuver that ran, or the last one before the vehicle held; None: another
-            phase ran, or no maneuver had begun.
-        into_maneuver: time from the beginning of `maneuver` to the end of the flight, or to the
-            hold, s; None: no maneuver.
-        monitor: name of the safety monitor that ended the flight, or None.
-    """
+    """Time, phase and cause of the end of a flight that failed in one of its phases."""
 
     time: float
+    """Time since the flight began, s."""
     since_takeoff: float | None
+    """Time since `FlightFacts.takeoff`, s; None: the vehicle was on the ground."""
     phase: str
+    """The phase that failed."""
     maneuver: str | None = None
+    """The maneuver that ran, or the last one before the vehicle held; None: another phase ran, or
+    no maneuver had begun."""
     into_maneuver: float | None = None
+    """Time from the beginning of `maneuver` to the end of the flight, or to the hold, s; None: no
+    maneuver."""
     monitor: str | None = None
+    """Name of the safety monitor that ended the flight, or None."""
 
     def as_dict(self) -> dict[str, Any]:
         """The early end as JSON."""
@@ -41,49 +38,46 @@ class EarlyEnd:
 
 @dataclass(frozen=True, slots=True)
 class FlightFacts:
-    """What happened in a flight, besides its figures. Times in s since the flight began.
-
-    Attributes:
-        began: beginning of the flight, s on our clock.
-        phases: beginning and name of each phase.
-        takeoff: time when the vehicle left the ground, or when the checks for a takeover in the air
-            passed; None: neither happened.
-        early_end: the early end; None: no phase failed.
-        vehicle_uid: hardware id of the vehicle's autopilot; None: unknown.
-        armed: whether the vehicle is armed at the end; None: unknown.
-        mode: mode of the vehicle at the end; None: unknown.
-        unheard: how long the vehicle was silent at the end, s, so that `armed` and `mode` may have
-            changed since; None: it was heard.
-        battery: remaining charge, 0..1, at take-off and at the end; None: unknown.
-        min_battery: smallest remaining charge allowed, 0..1, `limits.min_battery_percent`.
-        max_tilt: largest tilt of a target, `limits.max_tilt_deg`, rad; None: unknown.
-        deadline: longest latency allowed, `deadman.deadline_ms`, s.
-        lockstep: whether the flight ran in vehicle time (in lockstep or on a virtual clock); then
-            latencies are meaningless.
-        advice: sentences on what differs from the configuration (hover thrust, drag, dead time),
-            and on rows of the figures that were lost.
-        gain_warning: a sentence if the gain is above the largest sensible one, or None.
-        settings: keys of hover thrust and drag that the advice names, with values for `--set`.
-        changes: changes in flight, each with `time_s`, `by` and `keys` (values before and after).
-    """
+    """What happened in a flight, besides its figures. Times in s since the flight began."""
 
     began: float = 0.0
+    """Beginning of the flight, s on our clock."""
     phases: tuple[tuple[float, str], ...] = ()
+    """Beginning and name of each phase."""
     takeoff: float | None = None
+    """Time when the vehicle left the ground, or when the checks for a takeover in the air passed;
+    None: neither happened."""
     early_end: EarlyEnd | None = None
+    """The early end; None: no phase failed."""
     vehicle_uid: str | None = None
+    """Hardware id of the vehicle's autopilot; None: unknown."""
     armed: bool | None = None
+    """Whether the vehicle is armed at the end; None: unknown."""
     mode: str | None = None
+    """Mode of the vehicle at the end; None: unknown."""
     unheard: float | None = None
+    """How long the vehicle was silent at the end, s, so that `armed` and `mode` may have changed
+    since; None: it was heard."""
     battery: tuple[float | None, float | None] = (None, None)
+    """Remaining charge, 0..1, at take-off and at the end; None: unknown."""
     min_battery: float = 0.0
+    """Smallest remaining charge allowed, 0..1, `limits.min_battery_percent`."""
     max_tilt: float | None = None
+    """Largest tilt of a target, `limits.max_tilt_deg`, rad; None: unknown."""
     deadline: float = 0.004
+    """Longest latency allowed, `deadman.deadline_ms`, s."""
     lockstep: bool = False
+    """Whether the flight ran in vehicle time (in lockstep or on a virtual clock); then latencies
+    are meaningless."""
     advice: tuple[str, ...] = ()
+    """Sentences on what differs from the configuration (hover thrust, drag, dead time), and on rows
+    of the figures that were lost."""
     gain_warning: str | None = None
+    """A sentence if the gain is above the largest sensible one, or None."""
     settings: dict[str, str] = field(default_factory=dict)
+    """Keys of hover thrust and drag that the advice names, with values for `--set`."""
     changes: tuple[dict[str, Any], ...] = ()
+    """Changes in flight, each with `time_s`, `by` and `keys` (values before and after)."""
 
     def as_dict(self) -> dict[str, Any]:
         """The facts as JSON."""

@@ -27,38 +27,35 @@ class ManeuverFigures:
 
     `level` means horizontal (north and east). In open loop there is no reference position:
     `level_rms` and `level_max` are NaN, and `drift` says how far the vehicle moved away.
-
-    Attributes:
-        name: name of the maneuver.
-        begin: beginning of the maneuver, s since the flight began.
-        duration: its duration, s.
-        open_loop: whether a part of it is open loop.
-        settling_time: time at the beginning left out of RMS and largest errors, s.
-        level_rms: RMS of the horizontal error, m.
-        level_max: largest horizontal error, m.
-        height_rms: RMS of the height error, m.
-        height_max: largest height error, m.
-        height_mean: mean height error, m, positive above the reference.
-        settling_max: largest distance from the reference in that time, m.
-        drift: largest horizontal distance from where the maneuver began, m.
-        speed: largest speed of the reference (95th percentile), m/s; NaN without a reference.
-        swing: oscillation of roll and pitch; not measured in open loop.
     """
 
     name: str
     begin: float
+    """Beginning of the maneuver, s since the flight began."""
     duration: float
+    """Its duration, s."""
     open_loop: bool
+    """Whether a part of it is open loop."""
     settling_time: float
+    """Time at the beginning left out of RMS and largest errors, s."""
     level_rms: float
+    """RMS of the horizontal error, m."""
     level_max: float
+    """Largest horizontal error, m."""
     height_rms: float
+    """RMS of the height error, m."""
     height_max: float
+    """Largest height error, m."""
     height_mean: float
+    """Mean height error, m, positive above the reference."""
     settling_max: float
+    """Largest distance from the reference in that time, m."""
     drift: float
+    """Largest horizontal distance from where the maneuver began, m."""
     speed: float
+    """Largest speed of the reference (95th percentile), m/s; NaN without a reference."""
     swing: Swing = NOT_MEASURED
+    """Oscillation of roll and pitch; not measured in open loop."""
 
     def as_dict(self) -> dict[str, Any]:
         """The figures as JSON; null for values that were not measured."""
@@ -106,9 +103,7 @@ def measure_maneuvers(
 def settled_parts(rows: Floats, marks: Sequence[ManeuverMark]) -> list[Floats]:
     """The rows of each maneuver in closed loop, without the time left out at its beginning.
 
-    Args:
-        rows: (N, 7), rows of `FlightTrace.tracking`.
-        marks: marks of `FlightTrace.maneuvers`.
+    `rows` are the (N, 7) rows of `FlightTrace.tracking`.
     """
     parts = [part for _, part in _flown_maneuvers(rows, marks) if not _is_open_loop(part)]
     return [part[part[:, 0] >= part[0, 0] + _settling_time(part)] for part in parts]

@@ -26,37 +26,32 @@ of the step; a smaller component is noise or wind."""
 
 @dataclass(frozen=True, slots=True)
 class StepResponse:
-    """The response to all steps; coefficients are accelerations per specific thrust.
-
-    Attributes:
-        time_constant_north_s: time constant of the first-order model that fits a_N best (least
-            squares), s; NaN: no step goes north or south.
-        time_constant_east_s: the same for a_E, east or west.
-        step_size: largest commanded change of the coefficients, relative to those at the beginning
-            of the run; in wind the vehicle is not level there.
-        asked_tilt: largest tilt of a target, rad, before the tilt limit of the planner.
-        cross_axis_max: straightness: largest distance from the line of a step.
-        model_deviation_max: largest distance from the ideal model ċ = p·(c_d − c).
-        second_order: the second-order model with a dead time that fits best.
-        second_order_deviation_max: largest distance from that model.
-    """
+    """The response to all steps; coefficients are accelerations per specific thrust."""
 
     time_constant_north_s: float
+    """Time constant of the first-order model that fits a_N best (least squares), s; NaN: no step
+    goes north or south."""
     time_constant_east_s: float
+    """The same for a_E, east or west."""
     step_size: float
+    """Largest commanded change of the coefficients, relative to those at the beginning of the run;
+    in wind the vehicle is not level there."""
     asked_tilt: float
+    """Largest tilt of a target, rad, before the tilt limit of the planner."""
     cross_axis_max: float
+    """Straightness: largest distance from the line of a step."""
     model_deviation_max: float
+    """Largest distance from the ideal model ċ = p·(c_d − c)."""
     second_order: SecondOrderModel
+    """The second-order model with a dead time that fits best."""
     second_order_deviation_max: float
+    """Largest distance from that model."""
 
 
 def measure_response(rows: Floats, gain: float) -> StepResponse | None:
     """Measure the rows (N, 7) of `FlightTrace.response`; None without steps.
 
-    Args:
-        rows: vehicle time s, quaternion w x y z, target north, target east.
-        gain: p of the ideal model, 1/s.
+    `gain` is p of the ideal model, 1/s.
     """
     runs = step_runs(rows)
     if not runs:

@@ -25,17 +25,14 @@ _COMPASS = (
 
 
 class StepRun(NamedTuple):
-    """Steps flown without a pause between them, such as a doublet.
-
-    Attributes:
-        time: (n,), vehicle time, s, rising.
-        measured: (n, 2), coefficients north and east.
-        target: (n, 2), target coefficients when the sample of that row was answered.
-    """
+    """Steps flown without a pause between them, such as a doublet."""
 
     time: Floats
+    """(n,), vehicle time, s, rising."""
     measured: Floats
+    """(n, 2), coefficients north and east."""
     target: Floats
+    """(n, 2), target coefficients when the sample of that row was answered."""
 
     @property
     def changes(self) -> Floats:
@@ -62,11 +59,9 @@ class StepRun(NamedTuple):
 
     def steps(self) -> list["StepRun"]:
         """The single steps: each from one change of the target to the next."""
-        return [StepRun(*parts) for parts in zip(*self._by_target(), strict=True)]
-
-    def _by_target(self) -> list[list[Floats]]:
         changes = np.flatnonzero(np.any(np.diff(self.target, axis=0), axis=1)) + 1
-        return [np.split(column, changes) for column in self]
+        columns = [np.split(column, changes) for column in self]
+        return [StepRun(*parts) for parts in zip(*columns, strict=True)]
 
 
 def largest_norm(coefficients: Floats) -> float:
@@ -80,11 +75,7 @@ def step_runs(rows: Floats) -> list[StepRun]:
         return []
     parts = np.split(rows, np.flatnonzero(np.diff(rows[:, 0]) > _LONGEST_GAP) + 1)
     return [
-        StepRun(
-            part[:, 0],
-            np.array([coefficients(tuple(row[1:5])) for row in part]),
-            part[:, 5:7],
-        )
+        StepRun(part[:, 0], np.array([coefficients(tuple(row[1:5])) for row in part]), part[:, 5:7])
         for part in parts
         if len(part) > _TOO_FEW
     ]
@@ -103,25 +94,22 @@ in this time give the coefficients and the speed from which the model starts."""
 
 @dataclass(frozen=True, slots=True)
 class SecondOrderModel:
-    """Second-order model with dead time: c̈ = ω²·(c_d(t − dead time) − c) − 2ζω·ċ.
-
-    Attributes:
-        frequency: ω, rad/s.
-        damping: ζ.
-        dead_time: time from the sample at which the target changed to the first effect, s.
-    """
+    """Second-order model with dead time: c̈ = ω²·(c_d(t − dead time) − c) − 2ζω·ċ."""
 
     frequency: float
+    """ω, rad/s."""
     damping: float
+    """ζ."""
     dead_time: float
+    """Time from the sample at which the target changed to the first effect, s."""
 
-    def path(self, run: StepRun, thinning: int = 1) -> Floats:
-        """(n, 2) coefficients of the model at every `thinning`-th row of `run`.
+    def path(self, run: StepRun) -> Floats:
+        """(n, 2) coefficients of the model at the rows of `run`.
 
         It starts with the measured coefficients and speed, and keeps this speed until the first
         target has an effect.
         """
-        return self.path_at_rows(RunData.of(run, thinning))
+        return self.path_at_rows(RunData.of(run))
 
     def path_at_rows(self, data: "RunData") -> Floats:
         """(m, 2), coefficients of the model at the times in `data`; see `path`."""
@@ -153,19 +141,16 @@ class SecondOrderModel:
 
 
 class RunData(NamedTuple):
-    """The data of a run that a model needs.
-
-    Attributes:
-        time: (m,), times of the rows since the first row of the run, s.
-        start: (2, 2), coefficients and their speed (1/s), measured before the first step acts.
-        changes: (s,), when each target came into force, on the same clock; the first one is 0.
-        targets: (s, 2), coefficients of each target.
-    """
+    """The data of a run that a model needs."""
 
     time: Floats
+    """(m,), times of the rows since the first row of the run, s."""
     start: Floats
+    """(2, 2), coefficients and their speed (1/s), measured before the first step acts."""
     changes: Floats
+    """(s,), when each target came into force, on the same clock; the first one is 0."""
     targets: Floats
+    """(s, 2), coefficients of each target."""
 
     @classmethod
     def of(cls, run: StepRun, thinning: int = 1) -> "RunData":

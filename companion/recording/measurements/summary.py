@@ -2,7 +2,7 @@
 
 import json
 import math
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -36,42 +36,36 @@ _HEIGHT, _SPEED, _TILT = 2, 3, 4
 
 @dataclass(frozen=True, slots=True)
 class LoopCounts:
-    """Counts of the control loop.
-
-    Attributes:
-        samples: attitude samples received while control was switched on.
-        setpoints: setpoints sent.
-        missed_deadlines: answers that took longer than `deadman.deadline_ms`.
-        stale: samples not answered for other reasons than `refused`: the sample or the target was
-            too old or out of order, there was no target, the mode was not confirmed after a gap, or
-            the sample may come from another vehicle.
-        refused: samples not answered because no valid setpoint could be computed or sent.
-        unanswered: unanswered samples, by reason.
-        rate_hz: rate of setpoints in vehicle time during the maneuvers, Hz.
-    """
+    """Counts of the control loop, under the names of `--json`."""
 
     samples: int = 0
+    """Attitude samples received while control was switched on."""
     setpoints: int = 0
+    """Setpoints sent."""
     missed_deadlines: int = 0
+    """Answers that took longer than `deadman.deadline_ms`."""
     stale: int = 0
+    """Samples not answered for other reasons than `refused`: the sample or the target was too old
+    or out of order, there was no target, the mode was not confirmed after a gap, or the sample may
+    come from another vehicle."""
     refused: int = 0
-    rate_hz: float = 0.0
+    """Samples not answered because no valid setpoint could be computed or sent."""
     unanswered: dict[str, int] = field(default_factory=dict)
+    """Unanswered samples, by reason."""
+    rate_hz: float = 0.0
+    """Rate of setpoints in vehicle time during the maneuvers, Hz."""
 
 
 @dataclass(frozen=True, slots=True)
 class PredictiveFigures:
-    """Counts and times of predictive control.
-
-    Attributes:
-        flown: answers that were flown.
-        troubles: answers that were not flown, by reason.
-        seconds: computing time of each flown answer in the solver's process.
-    """
+    """Counts and times of predictive control."""
 
     flown: int
+    """Answers that were flown."""
     troubles: dict[str, int]
+    """Answers that were not flown, by reason."""
     seconds: tuple[float, ...]
+    """Computing time of each flown answer in the solver's process."""
 
     def as_dict(self) -> dict[str, Any]:
         """The figures as JSON, in milliseconds."""
@@ -82,36 +76,28 @@ class PredictiveFigures:
 
 @dataclass(frozen=True)
 class Summary:
-    """The summary of a finished flight.
-
-    Attributes:
-        result: "ok", or the reason why it ended early.
-        phase: the phase that failed, else the last one.
-        planner: name of the planner that flew.
-        gain: gain p of the planner, 1/s.
-        counts: counters of the control loop.
-        link: frames received, lost, damaged and so on, by name.
-        trace: recorded rows.
-        events: (s since the flight began, text) of each event.
-        log: the flight's folder.
-        dead_times: measured and configured.
-        predictive: counts of predictive control; None: it did not fly.
-        realtime: each real-time request to the operating system: "granted", or the reason why not.
-        facts: phases, end, and circumstances of the flight.
-    """
+    """The summary of a finished flight."""
 
     result: str
+    """"ok", or the reason why it ended early."""
     phase: str
+    """The phase that failed, else the last one."""
     planner: str
     gain: float
+    """Gain p of the planner, 1/s."""
     counts: LoopCounts
     link: dict[str, int]
+    """Frames received, lost, damaged and so on, by name."""
     trace: FlightTrace
     events: list[tuple[float, str]] = field(default_factory=list)
+    """(s since the flight began, text) of each event."""
     log: Path | None = None
+    """The flight's folder."""
     dead_times: DeadTimes = field(default_factory=DeadTimes)
     predictive: PredictiveFigures | None = None
+    """Counts of predictive control; None: it did not fly."""
     realtime: dict[str, str] = field(default_factory=dict)
+    """Each real-time request to the operating system: "granted", or the reason why not."""
     facts: FlightFacts = field(default_factory=FlightFacts)
 
     def response(self) -> StepResponse | None:
@@ -169,13 +155,7 @@ class Summary:
             "phase": self.phase,
             "planner": self.planner,
             "gain_per_s": self.gain,
-            "samples": self.counts.samples,
-            "setpoints": self.counts.setpoints,
-            "missed_deadlines": self.counts.missed_deadlines,
-            "stale": self.counts.stale,
-            "refused": self.counts.refused,
-            "unanswered": self.counts.unanswered,
-            "rate_hz": self.counts.rate_hz,
+            **asdict(self.counts),
             "latency_us": without_nan(self.latency_us()),
             "response": response_as_dict(self.response()),
             "dead_time_s": _dead_times_as_dict(self.dead_times),
@@ -200,10 +180,7 @@ class Summary:
 def tracking_errors(rows: "np.ndarray[Any, np.dtype[np.float64]]") -> dict[str, float]:
     """Position error of the rows with a whole reference, height error of those with a height, m.
 
-    NaN: there are no such rows.
-
-    Args:
-        rows: (N, 7), rows of `FlightTrace.tracking`.
+    `rows` are the (N, 7) rows of `FlightTrace.tracking`. NaN: there are no such rows.
     """
     error = rows[:, 4:7] - rows[:, 1:4]
     distance = np.linalg.norm(error[~np.isnan(error).any(axis=1)], axis=1)

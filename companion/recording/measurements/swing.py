@@ -16,19 +16,16 @@ Floats = NDArray[np.float64]
 
 
 class _Rule(NamedTuple):
-    """The criteria of a swing.
-
-    Attributes:
-        shortest_part: shortest part of a flight that is judged, s.
-        window: length of the moving mean, s; slower motion does not count.
-        passes: number of times that the moving mean is removed.
-        longest_period: longest period of a swing, s.
-    """
+    """The criteria of a swing."""
 
     shortest_part: float
+    """Shortest part of a flight that is judged, s."""
     window: float
+    """Length of the moving mean, s; slower motion does not count."""
     passes: int
+    """Number of times that the moving mean is removed."""
     longest_period: float
+    """Longest period of a swing, s."""
 
 
 _LONG_HOVER, _SHORT_HOVER = _Rule(5.0, 2.0, 1, 2.5), _Rule(2.9, 1.0, 1, 1.25)
@@ -39,22 +36,18 @@ _LONGEST_SAMPLE_PERIOD = 0.05
 """Longest time between samples, s."""
 _PEAK_SHARE = 0.9
 """The first peak of at least this share of the highest one gives the period, because multiples of
-the period also have peaks.
-"""
+the period also have peaks."""
 
 
 class Swing(NamedTuple):
-    """Oscillation of roll and pitch; NaN: not measured.
-
-    Attributes:
-        rms: RMS of roll and pitch together, without slow motion, rad.
-        period: period of the oscillation, s; NaN also if nothing repeats.
-        regularity: autocorrelation at that period: 1 repeats exactly, 0 not at all.
-    """
+    """Oscillation of roll and pitch; NaN: not measured."""
 
     rms: float = nan
+    """RMS of roll and pitch together, without slow motion, rad."""
     period: float = nan
+    """Period of the oscillation, s; NaN also if nothing repeats."""
     regularity: float = nan
+    """Autocorrelation at that period: 1 repeats exactly, 0 not at all."""
 
 
 NOT_MEASURED = Swing()

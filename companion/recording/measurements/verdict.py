@@ -37,22 +37,19 @@ LOST_ROWS = "rows of the flight's figures were lost"
 
 
 class Check(NamedTuple):
-    """One figure and its limit.
-
-    Attributes:
-        what: subject of the check.
-        found: the figure and its limit, in words.
-        good: whether it is within the limit.
-        remedy: what to do if it is not within the limit.
-        fault: what is wrong if it is not within the limit; without figures, so that a campaign can
-            count the flights with this fault.
-    """
+    """One figure and its limit."""
 
     what: str
+    """Subject of the check."""
     found: str
+    """The figure and its limit, in words."""
     good: bool
+    """Whether it is within the limit."""
     remedy: str
+    """What to do if it is not within the limit."""
     fault: str
+    """What is wrong if it is not within the limit; without figures, so that a campaign can count
+    the flights with this fault."""
 
 
 def checks(figures: Figures) -> list[Check]:

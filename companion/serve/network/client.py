@@ -17,17 +17,14 @@ _MAX_QUEUED_BYTES = 32_768
 
 @dataclass
 class ClientStats:
-    """Counters of one client, in frames.
-
-    Attributes:
-        received: intact frames from the client.
-        sent: frames passed to the kernel.
-        dropped: frames not sent, because the client or its connection is too slow.
-    """
+    """Counters of one client, in frames."""
 
     received: int = 0
+    """Intact frames from the client."""
     sent: int = 0
+    """Frames passed to the kernel."""
     dropped: int = 0
+    """Frames not sent, because the client or its connection is too slow."""
 
 
 class ClientListener(Protocol):
@@ -97,10 +94,7 @@ class Client(ABC):
         """Send queued frames without blocking; called only if some are queued."""
 
     def _dequeue(self, max_bytes: int) -> tuple[bytes, int]:
-        """Remove whole frames from the queue, at least one.
-
-        Args:
-            max_bytes: largest total number of bytes, if there are several frames.
+        """Remove whole frames: at least one, or several with at most `max_bytes` together.
 
         Returns:
             The bytes, and the number of frames in them.

@@ -63,9 +63,8 @@ def reads_only(frame: Frame) -> bool:
 class Permission:
     """Decides which frames of a client are forwarded.
 
-    Args:
-        trusted: hosts and serial devices that the configuration trusts.
-        signing: checks signatures; None: signatures are not checked and permit nothing.
+    `trusted` are the hosts and serial devices that the configuration trusts. Without `signing`,
+    signatures are not checked and permit nothing.
     """
 
     def __init__(self, trusted: Iterable[str], signing: Signing | None) -> None:

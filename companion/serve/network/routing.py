@@ -6,10 +6,11 @@ Nothing here sends: frames are only queued at the channels. Time comes only from
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 from companion.mavlink.framing import Frame
 from companion.serve.network.addresses import EVERYBODY, Address, source_of, target_of
+from companion.serve.network.client import Client
+from companion.serve.network.uplink import UplinkQueue
 
 _REPETITION_TIME = 0.2
 """A frame identical to one that was forwarded within this time is a repetition, s."""
@@ -17,44 +18,25 @@ _MAX_REMEMBERED_FRAMES = 4096
 """Largest number of remembered frames; in a flood, only the newest are remembered."""
 
 
-class Channel(Protocol):
-    """The connection of a client; several nodes may be behind it."""
-
-    def put(self, frame: bytes) -> None:
-        """Queue one whole frame, or drop and count it. It never blocks and never raises."""
-        ...
-
-
-class VehicleChannel(Protocol):
-    """The channel to the vehicle, and to the nodes connected to its autopilot."""
-
-    def put(self, frame: bytes, origin: Channel) -> None:
-        """Queue one whole frame of client `origin`, or drop and count it. Never block or raise."""
-        ...
-
-
-Intercept = Callable[[Channel, Frame], bool]
+Intercept = Callable[[Client, Frame], bool]
 """Called with a client's frame before forwarding; returns True if it must not be forwarded."""
 
 
 @dataclass
 class RoutingStats:
-    """Counters of forwarded and dropped frames.
-
-    Attributes:
-        to_clients: frames of the vehicle that were queued for clients, counted for each client.
-        to_vehicle: clients' frames that were queued for the vehicle.
-        between_clients: clients' frames that were queued for other clients.
-        looped: frames of clients and of other components that were dropped, because they were
-            repetitions, came from a client that had gone, or had our or the autopilot's address.
-        no_route: frames dropped because their target was never heard.
-    """
+    """Counters of forwarded and dropped frames."""
 
     to_clients: int = 0
+    """Frames of the vehicle that were queued for clients, counted for each client."""
     to_vehicle: int = 0
+    """Clients' frames that were queued for the vehicle."""
     between_clients: int = 0
+    """Clients' frames that were queued for other clients."""
     looped: int = 0
+    """Frames of clients and of other components that were dropped, because they were repetitions,
+    came from a client that had gone, or had our or the autopilot's address."""
     no_route: int = 0
+    """Frames dropped because their target was never heard."""
 
 
 class Routing:
@@ -66,11 +48,7 @@ class Routing:
     - A frame for our own component is not forwarded.
     - A message of an unknown kind goes to all channels but its own, as its target is not known.
 
-    Args:
-        vehicle: the channel to the autopilot.
-        autopilot: address of the autopilot.
-        own: address of our component.
-        clock: returns the event-loop time, s.
+    Several nodes may be behind a channel, also behind that to the vehicle.
 
     Attributes:
         stats: counters of frames.
@@ -79,27 +57,27 @@ class Routing:
     """
 
     def __init__(
-        self, vehicle: VehicleChannel, autopilot: Address, own: Address, clock: Callable[[], float]
+        self, vehicle: UplinkQueue, autopilot: Address, own: Address, clock: Callable[[], float]
     ) -> None:
         self.stats = RoutingStats()
         self.intercept: Intercept = lambda *_: True
-        self.on_own_frame: Callable[[Channel, Frame], None] | None = None
+        self.on_own_frame: Callable[[Client, Frame], None] | None = None
         self._vehicle, self._autopilot, self._own = vehicle, autopilot, own
-        self._heard: dict[Channel | VehicleChannel, set[Address]] = {vehicle: {autopilot}}
-        self._clients: tuple[Channel, ...] = ()
+        self._heard: dict[Client | UplinkQueue, set[Address]] = {vehicle: {autopilot}}
+        self._clients: tuple[Client, ...] = ()
         self._repeats = _Repeats(clock)
 
-    def attach(self, client: Channel) -> None:
+    def attach(self, client: Client) -> None:
         """Add a client; frames are forwarded to it from now on."""
         self._heard[client] = set()
         self._clients = (*self._clients, client)
 
-    def detach(self, client: Channel) -> None:
+    def detach(self, client: Client) -> None:
         """Remove a client and the addresses heard on its channel."""
         self._heard.pop(client, None)
         self._clients = tuple(each for each in self._clients if each is not client)
 
-    def is_at_client(self, target: Address, origin: Channel) -> bool:
+    def is_at_client(self, target: Address, origin: Client) -> bool:
         """Whether a target was heard on the channel of a client other than `origin`."""
         return any(self._reaches(each, target) for each in self._clients if each is not origin)
 
@@ -123,7 +101,7 @@ class Routing:
         for client in receivers:
             client.put(frame.raw)
 
-    def from_client(self, client: Channel, frame: Frame) -> None:
+    def from_client(self, client: Client, frame: Frame) -> None:
         """Forward a client's frame, unless it is looped, for our component, or intercepted.
 
         A looped frame (`RoutingStats`) is dropped. A frame for our component goes to
@@ -153,7 +131,7 @@ class Routing:
         for client in self._clients:
             client.put(frame)
 
-    def _forward(self, origin: Channel, raw: bytes, target: Address) -> None:
+    def _forward(self, origin: Client, raw: bytes, target: Address) -> None:
         others = [each for each in self._clients if each is not origin]
         if target != EVERYBODY:
             others = [each for each in others if self._reaches(each, target)]
@@ -173,7 +151,7 @@ class Routing:
             return True
         return target.system == self._autopilot.system and not known_to_client
 
-    def _reaches(self, channel: Channel | VehicleChannel, target: Address) -> bool:
+    def _reaches(self, channel: Client | UplinkQueue, target: Address) -> bool:
         heard = self._heard.get(channel, ())
         if target.system == 0:
             return True
@@ -187,9 +165,6 @@ class _Repeats:
 
     Sequence number and checksum distinguish a frame from its sender's next 255 frames. If a sender
     never increases its sequence number, equal frames are forwarded only once in 0.2 s.
-
-    Args:
-        clock: returns the event-loop time, s.
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:

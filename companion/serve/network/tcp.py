@@ -15,8 +15,7 @@ _MAX_UNSENT_BYTES = 65_536
 """Unsent bytes above which frames are dropped."""
 _KERNEL_BUFFER = 65_536
 """Size of the kernel's buffer for a client, bytes. It is small, because a client that paused must
-read all old bytes in it before it reads anything new.
-"""
+read all old bytes in it before it reads anything new."""
 _RETRY_PAUSE = 2.0
 """Pause before connecting again, s."""
 _CONNECT_TIMEOUT = 5.0

@@ -18,19 +18,16 @@ class AxisState(NamedTuple):
 
 
 class AxisLimits(NamedTuple):
-    """Limits of a motion along one axis, in SI units or radians.
-
-    Attributes:
-        velocity: largest velocity along the axis.
-        backward: largest speed against the axis.
-        acceleration: largest acceleration in both directions.
-        jerk: largest jerk in both directions.
-    """
+    """Limits of a motion along one axis, in SI units or radians."""
 
     velocity: float
+    """Largest velocity along the axis."""
     backward: float
+    """Largest speed against the axis."""
     acceleration: float
+    """Largest acceleration in both directions."""
     jerk: float
+    """Largest jerk in both directions."""
 
 
 class UnplannableError(ValueError):
@@ -38,14 +35,9 @@ class UnplannableError(ValueError):
 
 
 class Approach:
-    """A time-optimal motion of an error to zero.
+    """A time-optimal motion of an error to zero from the time `begin_time`, s.
 
-    Args:
-        error: initial error.
-        limits: limits of each axis.
-        begin_time: time when the motion begins, s.
-        by_velocity: whether only the velocity error must become zero, and the position error need
-            not.
+    `by_velocity`: only the velocity error must become zero, and the position error need not.
 
     Raises:
         UnplannableError: no such motion exists.

@@ -54,9 +54,7 @@ def attitude_target(message: Message) -> AttitudeRequest | RatesRequest:
 
 def _rates(message: Message) -> BodyRates:
     return BodyRates(
-        _rate(message.body_roll_rate),
-        _rate(message.body_pitch_rate),
-        _rate(message.body_yaw_rate),
+        _rate(message.body_roll_rate), _rate(message.body_pitch_rate), _rate(message.body_yaw_rate)
     )
 
 

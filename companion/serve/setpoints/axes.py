@@ -32,23 +32,19 @@ _MAX_LEAD_DISTANCE = 1.5
 """Largest distance between reference and vehicle if no position is commanded, m."""
 _MAX_LEAD_SPEED = 2.0
 """Largest difference between the velocities of reference and vehicle if only accelerations are
-commanded, m/s.
-"""
+commanded, m/s."""
 
 _MIN_LIMIT_SHARE = 0.25
 """Smallest share of its limits that an axis gets, even if the motion is perpendicular to it."""
 
 
 class Continuity(NamedTuple):
-    """Largest jump of a stream that is still followed directly.
-
-    Attributes:
-        position: m or rad.
-        velocity: m/s or rad/s.
-    """
+    """Largest jump of a stream that is still followed directly."""
 
     position: float
+    """m or rad."""
     velocity: float
+    """m/s or rad/s."""
 
 
 class CommandFollower:
@@ -93,10 +89,7 @@ class CommandFollower:
     def stop(self, now: float, actual: AxisMotion | None = None) -> None:
         """Come to rest within limits, and stay there.
 
-        Args:
-            now: present time, s.
-            actual: motion of the vehicle; if the state is too far from it, the stop begins at the
-                vehicle.
+        If the state is too far from `actual`, the motion of the vehicle, the stop begins there.
         """
         if actual is not None:
             current = self.at(now)
@@ -108,13 +101,9 @@ class CommandFollower:
         self.command(AxisDemand(None, self._zero, None), now)
 
     def command(self, demand: AxisDemand, now: float, actual: AxisMotion | None = None) -> None:
-        """Follow a new command.
+        """Follow a new command at the time `now`, s.
 
-        Args:
-            demand: the command.
-            now: present time, s.
-            actual: motion of the vehicle; without a commanded position, the state stays close to
-                the vehicle's.
+        Without a commanded position, the state stays close to `actual`, the motion of the vehicle.
 
         Raises:
             UnplannableError: no motion leads to it; the previous command stays in force.

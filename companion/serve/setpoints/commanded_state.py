@@ -7,15 +7,12 @@ from companion.serve.setpoints.approach import AxisState, AxisValues
 
 
 class AxisMotion(NamedTuple):
-    """Motion of the vehicle along some axes; SI units.
-
-    Attributes:
-        position: m.
-        velocity: m/s.
-    """
+    """Motion of the vehicle along some axes; SI units."""
 
     position: AxisValues
+    """m."""
     velocity: AxisValues
+    """m/s."""
 
 
 class CommandedState(NamedTuple):

@@ -15,8 +15,7 @@ _VERTICAL_CONTINUITY = Continuity(0.3, 0.4)
 _HEADING_CONTINUITY = Continuity(0.2, 1.0)
 _VERTICAL_ACCELERATION, _VERTICAL_JERK = 2.0, 6.0
 """Largest vertical acceleration, m/s², and jerk, m/s³: thrust used for climbing is not available
-for tilt.
-"""
+for tilt."""
 _YAW_ACCELERATION, _YAW_JERK = 2.0, 10.0
 """Largest yaw acceleration, rad/s², and jerk, rad/s³, after a jump of the yaw; yaw responds slowly.
 """
@@ -25,34 +24,26 @@ _MAX_STREAM_PERIOD = 0.25
 
 
 class MotionLimits(NamedTuple):
-    """Limits of motions after a jump of the setpoints.
-
-    Attributes:
-        speed: largest horizontal speed, m/s.
-        acceleration: largest acceleration, m/s²; vertically at most `_VERTICAL_ACCELERATION`.
-        jerk: largest jerk, m/s³; vertically at most `_VERTICAL_JERK`.
-        climb, descent: largest vertical speeds, m/s.
-        yaw_rate: largest yaw rate, rad/s.
-        timeout: time for which a request repeated unchanged is extrapolated, s. After it, a
-            commanded position stands still, and a commanded velocity stays constant.
-    """
+    """Limits of motions after a jump of the setpoints; SI units and radians."""
 
     speed: float
+    """Largest horizontal speed."""
     acceleration: float
+    """Largest acceleration; vertically at most `_VERTICAL_ACCELERATION`."""
     jerk: float
+    """Largest jerk; vertically at most `_VERTICAL_JERK`."""
     climb: float
     descent: float
     yaw_rate: float
     timeout: float
+    """Time for which a request repeated unchanged is extrapolated. After it, a commanded position
+    stands still, and a commanded velocity stays constant."""
 
 
 class CommandedMotion:
     """Turns requests into a reference that jumps by `Continuity` at most.
 
     Positions of requests and of the reference are in the same local frame.
-
-    Args:
-        limits: limits of the motion from one request to the next.
     """
 
     def __init__(self, limits: MotionLimits) -> None:

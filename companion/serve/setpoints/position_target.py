@@ -31,17 +31,14 @@ _MAX_POSITION, _MAX_SPEED, _MAX_ACCELERATION, _MAX_YAW_RATE = 10_000.0, 100.0, 1
 
 
 class _Frame(NamedTuple):
-    """A coordinate frame of SET_POSITION_TARGET_LOCAL_NED.
-
-    Attributes:
-        offset: whether positions are relative to the vehicle.
-        body: whether directions are relative to the vehicle's heading.
-        same_position: whether a position in this frame means the same to PX4 and ArduPilot.
-    """
+    """A coordinate frame of SET_POSITION_TARGET_LOCAL_NED."""
 
     offset: bool
+    """Whether positions are relative to the vehicle."""
     body: bool
+    """Whether directions are relative to the vehicle's heading."""
     same_position: bool = True
+    """Whether a position in this frame means the same to PX4 and ArduPilot."""
 
 
 _LOCAL_FRAMES = {
@@ -64,11 +61,8 @@ def local_target(
 ) -> MotionRequest:
     """The command of a SET_POSITION_TARGET_LOCAL_NED.
 
-    Args:
-        message: decoded message.
-        situation: present situation of the vehicle.
-        body_yaw_is_relative: whether a yaw in a body frame is relative to the present yaw
-            (ArduPilot) or to north (PX4).
+    `body_yaw_is_relative`: a yaw in a body frame is relative to the present yaw (ArduPilot), not to
+    north (PX4).
 
     Raises:
         RefusedSetpoint: the setpoint is contradictory, incomplete, not finite, too large, or of a
@@ -177,9 +171,7 @@ def _shifted(values: _Values, start: Vector) -> _Values:
 
 
 def _request(
-    groups: tuple[_Values, _Values, _Values],
-    yaw: float | None,
-    yaw_rate: float | None,
+    groups: tuple[_Values, _Values, _Values], yaw: float | None, yaw_rate: float | None
 ) -> MotionRequest:
     return MotionRequest(
         _demand(groups, _HORIZONTAL_AXES, "horizontal"),

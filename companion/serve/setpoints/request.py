@@ -15,75 +15,61 @@ class AxisDemand(NamedTuple):
 
     A position may come with a velocity, and both with an acceleration; a velocity may come with an
     acceleration. None: not commanded.
-
-    Attributes:
-        position: m, in the autopilot's local frame; rad for the heading.
-        velocity: m/s or rad/s.
-        acceleration: m/s² or rad/s².
     """
 
     position: tuple[float, ...] | None
+    """m, in the autopilot's local frame; rad for the heading."""
     velocity: tuple[float, ...] | None
+    """m/s or rad/s."""
     acceleration: tuple[float, ...] | None
+    """m/s² or rad/s²."""
 
 
 class MotionRequest(NamedTuple):
-    """A commanded motion, NED, SI units and radians.
-
-    Attributes:
-        horizontal: (north, east).
-        vertical: (down,).
-        yaw: rad from north; None: the present yaw, which `yaw_rate` changes.
-        yaw_rate: rad/s; None: not commanded.
-    """
+    """A commanded motion, NED, SI units and radians."""
 
     horizontal: AxisDemand
+    """(north, east)."""
     vertical: AxisDemand
+    """(down,)."""
     yaw: float | None
+    """rad from north; None: the present yaw, which `yaw_rate` changes."""
     yaw_rate: float | None
+    """rad/s; None: not commanded."""
 
 
 class AttitudeRequest(NamedTuple):
-    """A commanded attitude.
-
-    Attributes:
-        q: unit quaternion, body to world, w first.
-        yaw_rate: feedforward of the yaw rate, rad/s.
-        thrust: normalised, 0..1.
-    """
+    """A commanded attitude."""
 
     q: Quaternion
+    """Unit quaternion, body to world, w first."""
     yaw_rate: float
+    """Feedforward of the yaw rate, rad/s."""
     thrust: float
+    """Normalised, 0..1."""
 
 
 class RatesRequest(NamedTuple):
-    """Commanded body rates.
-
-    Attributes:
-        rates: rad/s about body x, y, z (FRD).
-        thrust: normalised, 0..1.
-    """
+    """Commanded body rates."""
 
     rates: BodyRates
+    """rad/s about body x, y, z (FRD)."""
     thrust: float
+    """Normalised, 0..1."""
 
 
 Request = MotionRequest | AttitudeRequest | RatesRequest
 
 
 class Situation(NamedTuple):
-    """State of the vehicle when a setpoint comes, for setpoints relative to it.
-
-    Attributes:
-        position_ned: position in the autopilot's local frame, m.
-        yaw: yaw of the body, rad from north.
-        origin: origin of the local frame; None: unknown.
-    """
+    """State of the vehicle when a setpoint comes, for setpoints relative to it."""
 
     position_ned: Vector
+    """Position in the autopilot's local frame, m."""
     yaw: float
+    """Yaw of the body, rad from north."""
     origin: "Origin | None" = None
+    """Origin of the local frame; None: unknown."""
 
 
 _MIN_TAKEOFF_HEIGHT, _MIN_TAKEOFF_SPEED = 1.0, 0.1
@@ -101,15 +87,10 @@ def climbs(request: Request, situation: Situation) -> bool:
 
 
 class Origin(NamedTuple):
-    """Origin of the local frame, WGS84.
-
-    Attributes:
-        latitude, longitude: degrees.
-        altitude: altitude above mean sea level, m.
-        home_altitude: altitude of home above mean sea level, m.
-    """
+    """Origin of the local frame, WGS84: degrees, and m above mean sea level."""
 
     latitude: float
     longitude: float
     altitude: float
     home_altitude: float
+    """Altitude of home."""

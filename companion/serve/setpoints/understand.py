@@ -23,12 +23,8 @@ def decode_setpoint(
 ) -> Request:
     """The request that a setpoint makes.
 
-    Args:
-        frame: frame of one of `SETPOINTS`.
-        situation: present situation of the vehicle.
-        targets: the autopilot and our component; a setpoint may be addressed to either.
-        body_yaw_is_relative: whether a yaw in a body frame is relative to the present yaw
-            (ArduPilot) or to north (PX4).
+    `targets` are the autopilot and our component; a setpoint may be addressed to either.
+    `body_yaw_is_relative`: see `local_target`.
 
     Raises:
         RefusedSetpoint: the setpoint is for another vehicle, contradictory, incomplete, not finite,

@@ -1,0 +1,153 @@
+"""A flight as a picture: response, straightness, ground track, history. Needs the extra `plot`."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from companion.extras import require
+from companion.recording.flight_record import RecordError
+from companion.recording.measurements.response import first_order
+from companion.recording.measurements.second_order import nearest_second_order
+from companion.report import PictureError
+from companion.report.flight_data import FlightData, explain_other_version, recorded
+from companion.report.picture_history import PANEL_HEIGHTS, draw_history
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Readable by the colour-blind.
+_MEASURED, _IDEAL, _NEAREST, _TARGET = "#0072b2", "#d55e00", "#009e73", "#999999"
+_STYLES = ("-", "--", ":")
+_WIDTH, _HEIGHT, _HISTORY_HEIGHT = 13.5, 4.4, 7.6
+"""Width of the picture, height of its upper panels and of its history, inches."""
+_LARGEST_VALID = 1e9
+"""Numbers above this, such as times in s and distances in m, are invalid."""
+_ROOM_FOR_LEGEND = 0.2
+"""Room above the curves, as a share of their height."""
+
+
+def draw_flight(folder: Path, out: Path) -> str | None:
+    """Draw the flight recorded in `folder` into the file `out`.
+
+    The suffix of `out` selects the format; without one it is PNG. Returns why not all of the flight
+    is drawn, as a sentence; None: all of it is.
+
+    Raises:
+        MissingExtraError: matplotlib is missing.
+        PictureError: there is nothing to draw, or the suffix of `out` is unknown.
+        RecordError: there is no readable record, or it or its summary has invalid values.
+        OSError: the picture cannot be written.
+    """
+    require("matplotlib", "plot", "drawing")
+    import matplotlib as mpl  # noqa: PLC0415  an extra, and slow to load
+
+    mpl.use("Agg")
+    from matplotlib import pyplot as plt  # noqa: PLC0415
+
+    with explain_other_version(folder):
+        flight = recorded(folder)
+        _check_numbers(flight, folder)
+        panels, history = _panels(flight), "motion" in flight.curves
+    if not panels and not history:
+        raise PictureError(f"{folder}: no flight with anything to draw is recorded there")
+    heights = [_HEIGHT] * bool(panels) + [_HISTORY_HEIGHT] * history
+    figure = plt.figure(figsize=(_WIDTH, sum(heights)), layout="constrained")
+    try:
+        parts = iter(figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0])
+        if panels:
+            grid = next(parts).subplots(1, len(panels), squeeze=False)
+            for axes, draw in zip(grid[0], panels, strict=True):
+                draw(axes)
+        if history:
+            grid = next(parts).subplots(
+                len(PANEL_HEIGHTS), 1, sharex=True, height_ratios=PANEL_HEIGHTS
+            )
+            draw_history(grid, flight)
+        # Without a format matplotlib would add a suffix to a name that has none.
+        figure.savefig(out, dpi=120, format=out.suffix[1:] or "png")
+    except ValueError as error:  # a suffix that matplotlib does not know
+        raise PictureError(f"{out}: {error}") from error
+    finally:
+        plt.close(figure)
+    return flight.fault
+
+
+def _check_numbers(flight: FlightData, folder: Path) -> None:
+    """Refuse a record with a number that is too large to be valid; NaN means that there is none."""
+    for name, curve in flight.curves.items():
+        for values in curve:
+            if np.abs(values[~np.isnan(values)]).max(initial=0.0) > _LARGEST_VALID:
+                raise RecordError(
+                    f"{folder}: {name}: not a valid record of a flight: a number is above "
+                    f"{_LARGEST_VALID:g}"
+                )
+
+
+def _panels(flight: FlightData) -> "list[Callable[[Axes], None]]":
+    """Functions that draw the upper panels."""
+    panels: list[Callable[[Axes], None]] = []
+    if flight.runs:
+        ideal = 1.0 / flight.gain
+        panels += [
+            lambda axes: _draw_steps(axes, flight, ideal),
+            lambda axes: _draw_plane(axes, flight),
+        ]
+    if "position" in flight.curves:
+        panels.append(lambda axes: _draw_ground(axes, flight))
+    return panels
+
+
+def _draw_steps(axes: "Axes", flight: FlightData, ideal: float) -> None:
+    """The first doublet along its direction, with the nearest and the ideal model.
+
+    `ideal` is the time constant of the ideal model, s.
+    """
+    run, model = flight.runs[0], nearest_second_order(flight.runs)
+    along, time = run.direction, run.time - run.time[0]
+    nearest = f"second order, {1e3 * model.dead_time:.0f} ms dead time"
+    axes.plot(time, run.target @ along, color=_TARGET, label="target")
+    exact = first_order(run, ideal) @ along
+    axes.plot(time, exact, "--", color=_IDEAL, label=f"ideal, 1/p = {ideal:.2g} s")
+    axes.plot(time, run.measured @ along, color=_MEASURED, label="measured")
+    axes.plot(time, model.path(run) @ along, ":", color=_NEAREST, label=nearest)
+    axes.set(
+        title="Response to the first doublet", xlabel="time, s", ylabel="acceleration / thrust"
+    )
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + _ROOM_FOR_LEGEND * (high - low))
+    axes.legend(loc="upper center", fontsize="small", ncols=2, handlelength=1.4, columnspacing=1.0)
+    axes.grid(alpha=0.3)
+
+
+def _draw_plane(axes: "Axes", flight: FlightData) -> None:
+    """All doublets, north over east coefficient: a linear response moves on straight lines."""
+    for number, run in enumerate(flight.runs):
+        style = _STYLES[number % len(_STYLES)]
+        north, east = run.measured.T
+        axes.plot(east, north, style, color=_MEASURED, label=run.compass)
+        axes.plot(run.target[:, 1], run.target[:, 0], "o", color=_TARGET, markersize=4)
+    axes.set(title="Straightness of all steps", xlabel="east: $a_E$", ylabel="north: $a_N$")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.legend(loc="upper right", fontsize="small")
+    axes.grid(alpha=0.3)
+
+
+def _draw_ground(axes: "Axes", flight: FlightData) -> None:
+    """The ground track, and its reference, which has gaps in open-loop steps."""
+    position, reference = flight.curves["position"].values, flight.curves["reference"].values
+    if not np.isnan(reference[:, 0]).all():
+        # On top, and thin: a good flight would hide it.
+        axes.plot(
+            *(reference[:, 1], reference[:, 0], "--"),
+            color=_IDEAL,
+            linewidth=1.0,
+            zorder=3,
+            label="reference",
+        )
+    axes.plot(position[:, 1], position[:, 0], color=_MEASURED, label="flown")
+    axes.set(title="Ground track", xlabel="east, m", ylabel="north, m")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.legend(loc="center", fontsize="small")
+    axes.grid(alpha=0.3)
