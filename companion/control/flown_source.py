@@ -102,9 +102,9 @@ class FlownSource:
     ) -> float | None:
         """Distance from the reference, m; `now` in s of event-loop time.
 
-        It is None without a pose, in open loop, and while the reference drifts. After open loop or
-        drift it stays None until the vehicle is back at its reference, but at most for
-        `_RETURN_TIME` in closed loop. Another open loop in between does not extend this time.
+        It is None without a pose, and while the reference does not hold the position. After that
+        it stays None until the vehicle is back at its reference, but at most for `_RETURN_TIME`.
+        Another time without position hold in between does not extend this time.
         """
         distance = dist(reference.position_ned, motion.position_ned)
         since = self._returning_since

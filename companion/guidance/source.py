@@ -204,11 +204,11 @@ class CommandedSource:
 
 
 def _kind(reference: Reference) -> tuple[bool, bool, bool]:
-    """The kind of command: whether it is closed loop, drifts, and holds the height.
+    """Whether it is in closed loop, and whether it holds the position, and the height.
 
     Accelerations of references of different kinds are not comparable.
     """
-    return reference.closed_loop, reference.drifting, reference.holds_height
+    return reference.closed_loop, reference.holds_position, reference.holds_height
 
 
 def continued(reference: Reference, jerk_ned: Vector, elapsed: float) -> Reference:

@@ -9,6 +9,7 @@ from companion.control.sample_rows import LoopFlags
 from companion.control.step_rows import StepFlags, StepInput
 from companion.drag import Drag
 from companion.guidance import Reference
+from companion.guidance.reference import VerticalMode
 from companion.recording.mcap_file.loop_channels import ACTIONS, UNANSWERED_CODES
 from companion.vehicle.clock_jumps import Misfit
 from companion.vehicle.records import (
@@ -139,7 +140,9 @@ def recorded_step(row: Row, target: Row | None, guidance: Row | None) -> Recorde
             _vector(guidance, "reference", "m"),
             _vector(guidance, "reference", "m_s"),
             heading=guidance["reference_heading_rad"],
-            thrust_steps=not guidance["height_steady"],
+            vertical=(
+                VerticalMode.HEIGHT if guidance["height_steady"] else VerticalMode.HEIGHT_IN_STEPS
+            ),
         )
     return RecordedStep(inputs, None if target is None else _command(target), reference)
 
