@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 from companion.attitude import BodyRates, Target
 from companion.control.guidance_command import GuidanceCommand
+from companion.control.heading_frame import HeadingFrame
 from companion.control.sample_rows import LoopFlags
 from companion.control.step_rows import StepFlags, StepInput
 from companion.drag import Drag
@@ -160,7 +161,7 @@ def _command(row: Row) -> GuidanceCommand:
         bool(row["is_step"]),
         None if no_body_rates else _rates(row, "body"),
         _none_if_nan(row["thrust"]),
-        row["turn_rad"],
+        HeadingFrame(row["turn_rad"]),
         later,
         row["period_s"],
     )

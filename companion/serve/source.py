@@ -125,7 +125,7 @@ class ServedSource:
             )
         return Reference(
             position,
-            heading=heading(request.q) - self.resets.turn,
+            heading=self.resets.frame.heading(heading(request.q)),
             heading_rate=request.yaw_rate,
             horizontal=TiltCommand(coefficients(request.q)),
             vertical=thrust,
@@ -137,7 +137,7 @@ class ServedSource:
         return request._replace(
             horizontal=_shifted(request.horizontal, (north, east)),
             vertical=_shifted(request.vertical, (down,)),
-            yaw=None if request.yaw is None else request.yaw - self.resets.turn,
+            yaw=None if request.yaw is None else self.resets.frame.heading(request.yaw),
         )
 
 
