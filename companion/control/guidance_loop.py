@@ -62,7 +62,7 @@ class GuidanceLoop:
         max_tilt: float,
         assumed_braking: AssumedBraking,
         period: float,
-        position_stale: float,
+        max_position_age: float,
         clock: Callable[[], float],
         vehicle_clock: Clock,
     ) -> None:
@@ -78,7 +78,7 @@ class GuidanceLoop:
         self._ground = ground
         self.record = TrackingRecord(trace, self.flown)
         self.hold = Hold(self.flown, self.maker, self.learning, max_tilt, assumed_braking)
-        self._fresh = FreshPosition(state, vehicle_clock, position_stale)
+        self._fresh = FreshPosition(state, vehicle_clock, max_position_age)
         self.before_step: Callable[[float], None] = lambda _: None
         self._clock = clock
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)

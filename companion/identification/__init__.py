@@ -17,14 +17,14 @@ here is therefore from a sample to the first effect of its command, like `vehicl
 
 A whole vehicle
     identify_vehicle          fits each axis and the thrust: an `IdentifiedVehicle`
-    IdentifiedVehicle         roll, pitch, yaw, thrust; `faults` says which fits must not be used
+    IdentifiedVehicle         roll, pitch, yaw, thrust; `flaws` says which fits must not be used
     vehicle_table             the fits as a table for the terminal
     vehicle_fragment          the fits as YAML for a configuration
     kept_axes                 configured values of the axes whose fit is bad
 
 One axis
     fit_rate_response         lag, dead time, gain and slew limit: a `RateResponse`
-    RateResponse              the fit; `is_good` and `reason` say whether it may be used
+    RateResponse              the fit; `is_good` and `flaw` say whether it may be used
     FitQuality, FitNeeds      how good a fit is, and how good it must be
     SecondOrderFit            the second-order response that fits best
     BadFitError               raised if bad fits leave an axis without values

@@ -84,11 +84,11 @@ class RateResponse:
     fit: FitQuality
     second_order: SecondOrderFit | None = None
 
-    def reason(self, needs: FitNeeds = DEFAULT_NEEDS) -> str | None:
+    def flaw(self, needs: FitNeeds = DEFAULT_NEEDS) -> str | None:
         """Why this fit must not be used, a sentence without full stop; None if it may be used."""
         fit, uncertainty = self.fit, max(self.fit.dead_time_error, self.fit.lag_error)
         low, high = needs.gain
-        faults = (
+        flaws = (
             (
                 isnan(self.dead_time) and fit.span == 0.0,
                 "too little excitation: no command changed while rates were measured; both need "
@@ -126,11 +126,11 @@ class RateResponse:
                 f"lag and dead time are uncertain by {1e3 * uncertainty:.1f} ms",
             ),
         )
-        return next((text for wrong, text in faults if wrong), None)
+        return next((text for wrong, text in flaws if wrong), None)
 
     def is_good(self, needs: FitNeeds = DEFAULT_NEEDS) -> bool:
-        """Whether the fit may be used: there is no `reason` against it."""
-        return self.reason(needs) is None
+        """Whether the fit may be used: it has no `flaw`."""
+        return self.flaw(needs) is None
 
 
 def _at_edge(value: float, searched: tuple[float, float]) -> bool:
@@ -167,7 +167,7 @@ def fit_rate_response(
 
     Returns:
         The response. If no command changed or there are fewer than 10 samples, its values are NaN
-        and `reason` names too little excitation.
+        and its `flaw` is too little excitation.
 
     Raises:
         ValueError: a time series and its values are not one-dimensional and equally long.

@@ -137,7 +137,7 @@ def control_loop(config: Config, s: Complex, error: ModelError = EXACT) -> Loop:
 
 def _slower_axis(config: Config) -> AxisResponse:
     """The configured response of the slower of roll and pitch; a heavy vehicle's if not known."""
-    if not config.vehicle.known:
+    if not config.vehicle.response_known:
         return AxisResponse(_USUAL_LAG, _USUAL_DEAD_TIME)
     lag, dead_time = slower_tilt(config)
     return AxisResponse(lag, dead_time, damping=tilt_damping(config))

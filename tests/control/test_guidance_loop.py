@@ -69,7 +69,7 @@ class Bench:
             max_tilt=radians(30.0),
             assumed_braking=AssumedBraking(0.3, 2.5),
             period=0.02,
-            position_stale=0.3,
+            max_position_age=0.3,
             clock=lambda: self.now,
             vehicle_clock=self.clock,
         )

@@ -26,7 +26,7 @@ from companion.guidance.trajectory import (
 from tests.flight.fly import CONFIGS
 
 REST = (0.0, 0.0, 0.0)
-LAPS = Laps(speed=3.0, along=True)
+LAPS = Laps(speed=3.0, face_path=True)
 POINTS = [(4.0, 0.0, 0.0), (4.0, 4.0, -1.0), (0.0, 4.0, 0.0)]
 
 
@@ -63,7 +63,7 @@ OURS = [
     Hover(0.0),
     Hover(2.0, heading=1.0),
     line((3.0, 1.0, -1.0), 2.0, 2.0, 4.0),
-    line((3.0, 1.0, -1.0), 2.0, 2.0, 4.0, along=True),
+    line((3.0, 1.0, -1.0), 2.0, 2.0, 4.0, face_path=True),
     circle(5.0, LAPS),
     helix(4.0, 1.0, LAPS),
     gerono_eight(3.0, LAPS),
