@@ -40,11 +40,11 @@ from companion.identification.correlation import (
     dead_time_by_correlation as dead_time_by_correlation,
 )
 from companion.identification.delayed_model import SecondOrderFit as SecondOrderFit
+from companion.identification.fit import FitQuality as FitQuality
 from companion.identification.fragment import kept_axes as kept_axes
 from companion.identification.fragment import vehicle_fragment as vehicle_fragment
 from companion.identification.response import BadFitError as BadFitError
 from companion.identification.response import FitNeeds as FitNeeds
-from companion.identification.response import FitQuality as FitQuality
 from companion.identification.response import RateResponse as RateResponse
 from companion.identification.response import fit_rate_response as fit_rate_response
 from companion.identification.table import vehicle_table as vehicle_table

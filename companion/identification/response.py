@@ -6,35 +6,12 @@ from math import isnan
 from numpy.typing import ArrayLike
 
 from companion.identification.delayed_model import DEAD_TIME_RANGE, SecondOrderFit
-from companion.identification.fit import LAG_RANGE, fit_lag
+from companion.identification.fit import LAG_RANGE, FitQuality, fit_lag
 from companion.identification.record import stretches
 
 
 class BadFitError(ValueError):
     """A fit must not be used; the message says why."""
-
-
-@dataclass(frozen=True, slots=True)
-class FitQuality:
-    """Quality of a fit.
-
-    Attributes:
-        explained: R², share of the measurements' variance that the model explains.
-        misfit: error of the model: RMS of the part of the residual that the commands explain, as a
-            share of the standard deviation of the measurements. It does not contain noise.
-        dead_time_error: standard error of the dead time due to noise, s.
-        lag_error: standard error of the lag due to noise, s.
-        span: largest minus smallest command, after the slew limit, rad/s.
-        excited: number of samples at which the model differs from the command by more than 2 %
-            of the span; only these contain information on lag and dead time.
-    """
-
-    explained: float
-    misfit: float
-    dead_time_error: float
-    lag_error: float
-    span: float
-    excited: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,14 +152,6 @@ def fit_rate_response(
     fit = fit_lag(stretches(time, commanded, measured_time, measured), gain)
     if fit is None:
         return _NOT_FOUND
-    quality = FitQuality(
-        fit.explained,
-        fit.misfit,
-        fit.dead_time_error,
-        fit.lag_error,
-        fit.span,
-        fit.excited,
-    )
     second_order = fit.second_order
     fitted_gain = fit.gain if second_order is None else second_order.gain
-    return RateResponse(fit.dead_time, fit.lag, fitted_gain, fit.slew, quality, second_order)
+    return RateResponse(fit.dead_time, fit.lag, fitted_gain, fit.slew, fit.quality, second_order)
