@@ -97,9 +97,10 @@ def largest_gain(config: Config) -> float:
 
 def largest_design(config: Config) -> Design:
     """The largest values that are searched for this vehicle."""
-    slews = [axis.acceleration_limit for axis in config.vehicle.axes.values()]
-    bandwidth = _LARGEST_DESIGN.bandwidth if slews[0] is None else _LARGEST_BANDWIDTH_SLEWING
-    return _LARGEST_DESIGN._replace(gain=largest_gain(config), bandwidth=bandwidth)
+    design = _LARGEST_DESIGN._replace(gain=largest_gain(config))
+    if config.vehicle.axes["roll"].acceleration_limit is None:
+        return design
+    return design._replace(bandwidth=_LARGEST_BANDWIDTH_SLEWING)
 
 
 def search(config: Config, disturbances: Disturbances, aims: Aims) -> Design:
