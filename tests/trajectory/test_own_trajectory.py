@@ -175,3 +175,12 @@ def test_shapes_of_numbers_that_are_none_are_refused_when_they_are_made(make):
 
 def test_waypoints_may_be_an_array():
     assert waypoints(np.array(POINTS), 3.0, 2.0).duration == waypoints(POINTS, 3.0, 2.0).duration
+
+
+def test_vectors_of_another_length_are_no_sample():
+    class Wrong(Sway):
+        def at(self, time):
+            return Sample((0.0,) * 4, (0.0,) * 2, (0.0,) * 3, (0.0,) * 3, 0.0, 0.0)
+
+    with pytest.raises(TypeError, match="which is no Sample"):
+        require_trajectory(Wrong())
