@@ -112,9 +112,12 @@ def stability(config: Config, error: ModelError = EXACT) -> Margins:
     Raises:
         ConfigError: see `control_loop`.
     """
-    s = frequencies()
-    loop = control_loop(config, s, error)
-    return smaller_margins(margins(s, loop.whole), margins(s, loop.outer))
+    return loop_margins(control_loop(config, frequencies(), error))
+
+
+def loop_margins(loop: Loop) -> Margins:
+    """Margins of a loop at `frequencies`: each the smaller of those of `whole` and `outer`."""
+    return smaller_margins(margins(loop.s, loop.whole), margins(loop.s, loop.outer))
 
 
 def expected_errors(loop: Loop, disturbances: Disturbances, period: float) -> Errors:

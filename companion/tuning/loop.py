@@ -79,12 +79,15 @@ class Loop:
 
     def by_position_error(self) -> tuple[Complex, Complex]:
         """Position (m) and commanded body rate (rad/s) per error of the position, m."""
-        tilt = self._tilt(self.position)
-        return GRAVITY * tilt / (self.s * (self.s + self.drag)), tilt / self.rates
+        return self._by_measurement_error(self.position)
 
     def by_velocity_error(self) -> tuple[Complex, Complex]:
         """Position (m) and commanded body rate (rad/s) per error of the velocity, m/s."""
-        tilt = self._tilt(self.velocity)
+        return self._by_measurement_error(self.velocity)
+
+    def _by_measurement_error(self, feedback: Complex) -> tuple[Complex, Complex]:
+        """Position and commanded body rate per error of a measurement with this feedback."""
+        tilt = self._tilt(feedback)
         return GRAVITY * tilt / (self.s * (self.s + self.drag)), tilt / self.rates
 
     def _tilt(self, subtracted: Complex) -> Complex:

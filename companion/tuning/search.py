@@ -8,9 +8,9 @@ from typing import NamedTuple
 from companion.config import Config
 from companion.control.hold_settings import attitude_delay, slewing_delay
 from companion.control.inner_loop import sensible_gain, with_gain
-from companion.tuning.expectation import Disturbances, expected_errors
+from companion.tuning.expectation import Disturbances, expected_errors, loop_margins
 from companion.tuning.loop import ModelError, control_loop
-from companion.tuning.margins import Margins, frequencies, margins, smaller_margins
+from companion.tuning.margins import Margins, frequencies, margins
 
 _FIRST_STEP, _LAST_STEP = 0.4, 0.08
 """First and last step of the search: changes of the natural logarithm of a value."""
@@ -176,8 +176,7 @@ def _cost(
     s = frequencies()
     loop = control_loop(candidate, s)
     expected = expected_errors(loop, disturbances, 1.0 / config.link.position_rate_hz)
-    exact = smaller_margins(margins(s, loop.whole), margins(s, loop.outer))
-    missed = _shortfall(exact, aims.gain_db, aims.phase_deg)
+    missed = _shortfall(loop_margins(loop), aims.gain_db, aims.phase_deg)
     missed += max(0.0, 3.0 * expected.rate / (aims.rate_share * config.limits.max_tilt_rate) - 1.0)
     cost = log(expected.position) + _COST_OF_MISSED_AIM * missed
     for error in errors_to_tolerate(candidate, aims):
