@@ -65,8 +65,8 @@ class StepFrame:
 
     def rates(self, q: Quaternion, rates: BodyRates) -> BodyRates:
         """Body rates in the estimator's frame, from body rates in this frame at attitude `q`."""
-        speed = self.offset_rate
-        if speed == 0.0:
+        rate = self.offset_rate
+        if rate == 0.0:
             return rates
         x, y, z = down_in_body(q)
-        return BodyRates(rates.roll + x * speed, rates.pitch + y * speed, rates.yaw + z * speed)
+        return BodyRates(rates.roll + x * rate, rates.pitch + y * rate, rates.yaw + z * rate)
