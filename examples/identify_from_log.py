@@ -18,7 +18,7 @@ for axis, response in vehicle.axes.items():
     nearer = response.second_order
     print(
         f"{axis:<5} lag {1e3 * response.lag:5.1f} ms, dead time {1e3 * response.dead_time:5.1f} ms,"
-        f" misfit {response.fit.misfit:.0%}: {response.reason() or 'a good fit'} of first order"
+        f" misfit {response.fit.misfit:.0%}: {response.flaw() or 'a good fit'} of first order"
         + (f"; nearer: {nearer.described}" if nearer is not None else "")
     )
 if vehicle.thrust is not None:

@@ -12,7 +12,14 @@ from companion.api.state import NewestState, State
 from companion.attitude import BodyRates, Coefficients
 from companion.flight.context import FlightContext
 from companion.guidance.finite import finite_vector
-from companion.guidance.reference import Reference, Vector
+from companion.guidance.reference import (
+    HorizontalCommand,
+    HorizontalMode,
+    Reference,
+    TiltCommand,
+    Vector,
+    VerticalMode,
+)
 from companion.guidance.source import CommandedSource
 from companion.safety.actions import FlightEnded
 
@@ -103,8 +110,8 @@ class Control:
                 self.state.velocity_ned,  # the drag at this velocity is compensated
                 acceleration_ned,
                 heading=self._heading(heading),
-                drifting=True,
-                holds_height=False,
+                horizontal=HorizontalMode.ACCELERATION,
+                vertical=VerticalMode.ACCELERATION,
             ),
             _ZERO_VECTOR,
         )
@@ -154,9 +161,8 @@ class Control:
             ValueError: a number is missing or not finite; the previous command stays in force.
             FlightEnded: control has ended.
         """
-        self.follow(
-            self._open_loop_reference(heading)._replace(coefficients=Coefficients(north, east))
-        )
+        tilt = TiltCommand(Coefficients(north, east))
+        self.follow(self._open_loop_reference(tilt, heading))
 
     def rotate(self, body_rates: BodyRates) -> None:
         """Command body rates, within the limits, and hold the height at which control began.
@@ -168,12 +174,15 @@ class Control:
             ValueError: a number is missing or not finite; the previous command stays in force.
             FlightEnded: control has ended.
         """
-        self.follow(self._open_loop_reference(None)._replace(body_rates=body_rates))
+        rates = BodyRates(*finite_vector("body_rates", body_rates))
+        self.follow(self._open_loop_reference(rates, None))
 
-    def _open_loop_reference(self, heading: float | None) -> Reference:
+    def _open_loop_reference(self, command: HorizontalCommand, heading: float | None) -> Reference:
         north, east, _ = self.state.position_ned
         return Reference(
-            (north, east, self._start_state.position_ned[2]), heading=self._heading(heading)
+            (north, east, self._start_state.position_ned[2]),
+            heading=self._heading(heading),
+            horizontal=command,
         )
 
     def _heading(self, heading: float | None) -> float:

@@ -30,9 +30,9 @@ from companion.guidance.follow import Follow, HeldHeadingManeuver, hover
 from companion.guidance.reference import Vector, minus
 from companion.guidance.source import CommandedSource
 from companion.guidance.trajectory import Hover, Trajectory, line
+from companion.guidance.trajectory.own_trajectory import checked_trajectory
 from companion.guidance.trajectory.sample import SMALLEST_DISTANCE
 from companion.guidance.trajectory.timed_curve import FixedHeading
-from companion.guidance.trajectory.user_trajectory import checked_trajectory
 from companion.recording.measurements.summary import Summary
 from companion.safety.actions import Exit, FlightEnded
 

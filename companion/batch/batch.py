@@ -77,7 +77,8 @@ def rates(
             plain function.
         ValueError: the shapes of `q` and `targets` are wrong or differ.
     """
-    planner, q, targets, loops = _prepared(planner, q, targets, dt, 1, compiled)
+    planner = _require_law_planner(planner)
+    q, targets, loops = _prepared(planner, q, targets, dt, 1, compiled)
     out = np.empty((3, q.shape[1]))
     loops.apply(q, targets, out, dt, planner.constants)
     return out
@@ -96,7 +97,8 @@ def advance(
     Arguments and errors are those of `rates`. Also, a negative `steps` raises ValueError, and one
     that is no integer TypeError.
     """
-    planner, q, targets, loops = _prepared(planner, q, targets, dt, steps, compiled)
+    planner = _require_law_planner(planner)
+    q, targets, loops = _prepared(planner, q, targets, dt, steps, compiled)
     after = _advanced(loops, planner, q, targets, dt, steps)
     if _turned_too_far(loops, after):
         loops = compiled_loops(planner.law, any_angle=True)
@@ -113,7 +115,8 @@ def simulate(
     compiled: bool | None = None,
 ) -> History:
     """As `advance`, but returns the attitudes and body rates of all samples."""
-    planner, q, targets, loops = _prepared(planner, q, targets, dt, steps, compiled)
+    planner = _require_law_planner(planner)
+    q, targets, loops = _prepared(planner, q, targets, dt, steps, compiled)
     history = History(np.empty((steps + 1, *q.shape)), np.empty((steps, 3, q.shape[1])))
     history.q[0] = q
     loops.record(history.q, targets, history.rates, dt, planner.constants)
@@ -144,21 +147,30 @@ def coefficients(q: ArrayLike) -> Array:
     return np.stack([-2.0 * np.asarray(ay), 2.0 * np.asarray(ax)], axis=-2)
 
 
+def _require_law_planner(planner: Planner) -> LawPlanner:
+    """The planner, which must be one without memory.
+
+    Raises:
+        TypeError: it keeps state between samples.
+    """
+    if isinstance(planner, LawPlanner):
+        return planner
+    raise TypeError(
+        f"a batch maps planners without memory ({', '.join(LAW_NAMES)}, or a law of your own, each "
+        f"made by make_planner), not {type(planner).__name__}; make one planner for each vehicle, "
+        "and call its rates() for each sample"
+    )
+
+
 def _prepared(
-    planner: Planner,
+    planner: LawPlanner,
     q: ArrayLike,
     targets: ArrayLike,
     dt: float,
     steps: int,
     compiled: bool | None,
-) -> tuple[LawPlanner, Array, Array, Loops]:
-    """Check the arguments; return planner, normalised attitudes, limited targets and loops."""
-    if not isinstance(planner, LawPlanner):
-        raise TypeError(
-            f"a batch maps planners without memory ({', '.join(LAW_NAMES)}, or a law of your own, "
-            f"each made by make_planner), not {type(planner).__name__}; make one planner for each "
-            "vehicle, and call its rates() for each sample"
-        )
+) -> tuple[Array, Array, Loops]:
+    """Check the arguments; return normalised attitudes, limited targets and loops."""
     q, targets = as_rows(q, "q"), as_rows(targets, "targets")
     if q.shape != targets.shape:
         raise ValueError(f"{q.shape[1]} attitudes, but {targets.shape[1]} targets")
@@ -174,10 +186,10 @@ def _prepared(
         _require_plain_function(planner.law)
         loops = compiled_loops(planner.law)
         if compiled_check()(q, targets, longest_target):
-            return planner, q, targets, loops
+            return q, targets, loops
     else:
         loops = plain_loops(planner.law)
-    return planner, unit_quaternions(q), limited_targets(targets, longest_target), loops
+    return unit_quaternions(q), limited_targets(targets, longest_target), loops
 
 
 def _is_plain_function(law: Law) -> bool:

@@ -121,13 +121,13 @@ def _fit(log: Path, out: Path, options: argparse.Namespace, console: FlightConso
         with suppress(OSError):
             console.print(vehicle_table(vehicle, GRAVITY))
             console.print("Not written, because the fit is bad:", style="bold red")
-            for axis, reason in vehicle.faults().items():
-                console.print(f"  {axis}: {reason}", soft_wrap=True)
+            for axis, flaw in vehicle.flaws().items():
+                console.print(f"  {axis}: {flaw}", soft_wrap=True)
         _print_json(options, {"result": str(error), "log": str(log), **_figures(vehicle)})
         return EXIT_FAILURE
     _write_fit(out, text, flown_folder=None if options.log is not None else log.parent)
     kept = {
-        axis: f"kept from the configuration ({keys.described()}): {vehicle.axes[axis].reason()}"
+        axis: f"kept from the configuration ({keys.described()}): {vehicle.axes[axis].flaw()}"
         for axis, keys in kept_axes(vehicle, configured_axes).items()
     }
     with suppress(OSError):

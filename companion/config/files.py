@@ -168,12 +168,12 @@ def _merge(merged: Contents, part: Contents) -> None:
     for section, values in part.keys.items():
         data.setdefault(section, {})
         if isinstance(values, dict) and isinstance(data[section], dict):
-            replaced: set[Where] = {(section, key) for key in values}
+            replaced_keys: set[Where] = {(section, key) for key in values}
             data[section] = {**data[section], **values}
         else:
-            replaced = {where for where in merged.places if where[:1] == (section,)}
+            replaced_keys = {where for where in merged.places if where[:1] == (section,)}
             data[section] = values
-        for where in [where for where in merged.places if where[:2] in replaced]:
+        for where in [where for where in merged.places if where[:2] in replaced_keys]:
             del merged.places[where]
     merged.places.update(part.places)
 

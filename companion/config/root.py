@@ -84,7 +84,7 @@ class Config(Section):
         """Name of the planner that flies, with `auto` resolved."""
         if self.planner.name != AUTO:
             return self.planner.name
-        return MODEL_FOLLOWING if self.vehicle.known else FIRST_ORDER
+        return MODEL_FOLLOWING if self.vehicle.response_known else FIRST_ORDER
 
     @property
     def fence(self) -> Fence:
@@ -114,7 +114,7 @@ def _contradictions(config: Config) -> list[tuple[bool, str]]:
     tilt = limits.max_tilt
     return [
         (
-            config.planner.name == MODEL_FOLLOWING and not config.vehicle.known,
+            config.planner.name == MODEL_FOLLOWING and not config.vehicle.response_known,
             "planner.name: model-following needs vehicle.lag_ms and vehicle.dead_time_ms",
         ),
         (

@@ -41,7 +41,7 @@ def suspect_values(config: Config) -> Iterator[SuspectValue]:
     """All suspect values of a configuration."""
     yield from _units(config)
     yield from _body_rate(config)
-    if config.vehicle.known and config.vehicle.identified is None and config.mock is None:
+    if config.vehicle.response_known and config.vehicle.identified is None and config.mock is None:
         yield SuspectValue(
             "vehicle.identified",
             "vehicle.lag_ms and vehicle.dead_time_ms were not measured on this vehicle",

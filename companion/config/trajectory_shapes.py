@@ -59,8 +59,8 @@ class LineShape(Section):
 
     def trajectory(self) -> Trajectory:
         """The trajectory of this shape."""
-        along = self.heading == "along"
-        return line(self.to_m, self.speed_m_s, self.acceleration_m_s2, self.jerk_m_s3, along)
+        face_path = self.heading == "along"
+        return line(self.to_m, self.speed_m_s, self.acceleration_m_s2, self.jerk_m_s3, face_path)
 
 
 class _LapShape(Section):
@@ -77,9 +77,9 @@ class _LapShape(Section):
     """fixed: the heading at the start. along: facing along the path."""
 
     def _laps(self, speed: float) -> Laps:
-        along = self.heading == "along"
+        face_path = self.heading == "along"
         direction = radians(self.direction_deg)
-        return Laps(speed, self.laps, self.acceleration_m_s2, direction, along)
+        return Laps(speed, self.laps, self.acceleration_m_s2, direction, face_path)
 
 
 class CircleShape(_LapShape):

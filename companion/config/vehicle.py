@@ -82,7 +82,7 @@ class VehicleConfig(Section):
     null: derived from the keys above if there is a slew limit (ArduPilot), else 0 (PX4)."""
 
     @property
-    def known(self) -> bool:
+    def response_known(self) -> bool:
         """Whether the response is known, so that `model-following` can plan with it."""
         return self.lag_ms is not None and self.dead_time_ms is not None
 

@@ -5,6 +5,7 @@ from math import isfinite
 
 from companion.control.flown_source import FlownSource
 from companion.control.guidance_command import GuidanceCommand
+from companion.control.heading_frame import HeadingFrame
 from companion.control.hover_learning import HoverLearning
 from companion.control.motion_estimate import MotionEstimate
 from companion.control.predictive import Predictive
@@ -55,7 +56,7 @@ class CommandMaker:
         now: float,
         inputs: GuidanceInput,
         heading: float,
-        turn: float,
+        frame: HeadingFrame,
         *,
         offboard_active: bool,
     ) -> tuple[Reference, GuidanceCommand | None]:
@@ -68,7 +69,7 @@ class CommandMaker:
             now: s of event-loop time.
             inputs: motion of the vehicle, wind, drag and thrust limits.
             heading: present heading of the vehicle, rad.
-            turn: sum of the heading resets, rad.
+            frame: the frame without heading resets.
             offboard_active: whether the autopilot obeys the setpoints.
         """
         # Target and heading are made from references at the same times.
@@ -77,8 +78,8 @@ class CommandMaker:
         linear = self.guidance.command(reference_at, now, inputs)
         if self.predictive is not None:
             vehicle = self._estimate.vehicle(now, inputs)
-            following = self._flown.following(now, turn)
-            linear = self.predictive.replacement_for(linear, turn, vehicle, following)
+            following = self._flown.following(now)
+            linear = self.predictive.replacement_for(linear, frame, vehicle, following)
         target, later, down = linear
         # Open-loop steps, predictive control and `InnerResponse.target` ignore the learned limit.
         target, later = (self._learning.limit_tilt(each, down) for each in (target, later))
@@ -92,7 +93,7 @@ class CommandMaker:
             is_step=reference.coefficients is not None and reference.thrust is None,
             body_rates=reference.body_rates,
             thrust=reference.thrust,
-            turn=turn,
+            frame=frame,
             later=later,
             period=self._period,
         )

@@ -6,8 +6,8 @@ ODOMETRY's `reset_counter`, which comes later and does not tell their size. Guid
 work in a frame without these jumps:
 
 - All position jumps are subtracted from a position.
-- Poses, references and targets have headings without jumps. An attitude is turned back by all
-  heading jumps before its heading is compared with these headings.
+- Poses, references and targets have headings without jumps. `EstimatorResets.frame` converts
+  between these and the estimator's headings and attitudes.
 
 Horizontal accelerations stay in the estimator's frame, in which position is measured. So they
 become right at once when the estimator corrects its heading.
@@ -16,10 +16,11 @@ become right at once when the estimator corrects its heading.
 from collections import deque
 from math import asin, atan2, hypot, radians, sqrt
 
-from companion.attitude import Quaternion, Target, is_unit
-from companion.attitude.rotation import after_constant_rates, turned_about_vertical, wrap_difference
+from companion.attitude import Quaternion, is_unit
+from companion.attitude.rotation import after_constant_rates, wrap_difference
+from companion.control.heading_frame import HeadingFrame
 from companion.control.rate_lag import RateLag
-from companion.guidance.reference import Vector, minus, rotated
+from companion.guidance.reference import Vector, minus
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
 _LONGEST_ATTITUDE_GAP = 0.1
@@ -43,7 +44,7 @@ class EstimatorResets:
     """Finds the jumps, adds them up and counts them.
 
     Attributes:
-        turn: sum of the heading jumps, rad.
+        frame: the frame without heading jumps; its `offset` is their sum.
         shift: sum of the position jumps, m NED.
         corrections: sum of the estimator's gradual heading corrections, rad: heading changes that
             the body rates do not explain, without the jumps; see `StepFrame`.
@@ -54,7 +55,7 @@ class EstimatorResets:
     """
 
     def __init__(self) -> None:
-        self.turn = 0.0
+        self.frame = HeadingFrame()
         self.shift: Vector = (0.0, 0.0, 0.0)
         self.corrections = 0.0
         self.rate_lag = RateLag()
@@ -79,7 +80,7 @@ class EstimatorResets:
         yaw, tilt, threshold = _attitude_jump(before, sample, predicted, dt)
         jumped = tilt > threshold
         if abs(yaw) > threshold:
-            self.turn = wrap_difference(self.turn + yaw)
+            self.frame = HeadingFrame(wrap_difference(self.frame.offset + yaw))
         elif not jumped:
             if dt <= _LONGEST_CORRECTED_GAP:
                 self.corrections += yaw
@@ -98,29 +99,13 @@ class EstimatorResets:
 
     def forget(self) -> None:
         """Forget all jumps: the frame without jumps is now the estimator's. Used on the ground."""
-        self.turn, self.shift, self._newest_position = 0.0, (0.0, 0.0, 0.0), None
+        self.frame, self.shift, self._newest_position = HeadingFrame(), (0.0, 0.0, 0.0), None
 
     def on_counter(self, counter: int | None, now: float) -> None:
         """Take ODOMETRY's `reset_counter`, which also counts resets too small to be detected."""
         if counter is not None and self._reset_counter not in (None, counter):
             self._count_reset(now)
         self._reset_counter = counter
-
-    def attitude(self, q: Quaternion) -> Quaternion:
-        """The attitude without the heading jumps."""
-        return q if self.turn == 0.0 else turned_about_vertical(q, -self.turn)
-
-    def target(self, target: Target, turn: float) -> Target:
-        """Turn the horizontal part of a target from the estimator's frame to the one without jumps.
-
-        Args:
-            target: the target; its heading stays, because it is in the frame without jumps already.
-            turn: `self.turn` when the target was made, rad.
-        """
-        if turn == 0.0:
-            return target
-        north, east = rotated(target.north, target.east, -turn)
-        return target._replace(north=north, east=east)
 
     def _find_position_jump(self, before: LocalPosition, position: LocalPosition) -> None:
         dt = position.vehicle_time - before.vehicle_time

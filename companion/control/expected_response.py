@@ -117,7 +117,7 @@ def expected_response(config: Config) -> ExpectedResponse:
 
 def _without_the_vehicle(config: Config, response: InnerResponse, speed: float) -> dict[str, float]:
     """Time constants (s) without lag and without dead time; empty if these are unknown."""
-    if not config.vehicle.known:
+    if not config.vehicle.response_known:
         return {}
     step = 2.0 * config.steps.coefficient
     axes = {"lag_ms": 0.0, "pitch_lag_ms": None, "damping": None, "pitch_damping": None}

@@ -75,20 +75,15 @@ class FlownSource:
         )
         return lambda _: held
 
-    def following(self, now: float, turn: float) -> Following | None:
-        """The trajectory that is followed at `now`; None if no trajectory is.
-
-        Args:
-            now: s of event-loop time.
-            turn: sum of the heading resets, rad.
-        """
+    def following(self, now: float) -> Following | None:
+        """The trajectory that is followed at `now`, s of event-loop time; None if none is."""
         source = self.source
         if not isinstance(source, ManeuverSource) or source.begun_at is None or self.pose is None:
             return None
         part, elapsed = source.maneuvers.part_at(now - source.begun_at)
         if not isinstance(part, Follow):
             return None
-        return Following(part, elapsed, self.pose, turn)
+        return Following(part, elapsed, self.pose)
 
     def source_commanding_rates(self, now: float, motion: VehicleMotion) -> str | None:
         """Name of the source if it commands body rates in open loop at `now`; else None."""
@@ -102,9 +97,9 @@ class FlownSource:
     ) -> float | None:
         """Distance from the reference, m; `now` in s of event-loop time.
 
-        It is None without a pose, in open loop, and while the reference drifts. After open loop or
-        drift it stays None until the vehicle is back at its reference, but at most for
-        `_RETURN_TIME` in closed loop. Another open loop in between does not extend this time.
+        It is None without a pose, and while the reference does not hold the position. After that
+        it stays None until the vehicle is back at its reference, but at most for `_RETURN_TIME`.
+        Another time without position hold in between does not extend this time.
         """
         distance = dist(reference.position_ned, motion.position_ned)
         since = self._returning_since

@@ -4,13 +4,14 @@ from typing import NamedTuple
 
 from companion.attitude import BodyRates, Target
 from companion.attitude.representation import wrap_angle
+from companion.control.heading_frame import HeadingFrame
 
 
 class GuidanceCommand(NamedTuple):
     """One command from guidance; it holds until the next one.
 
     Attributes:
-        target: target of the planner; its heading is in the frame without estimator resets.
+        target: target of the planner; only its heading is in the frame without estimator resets.
         acceleration_down: acceleration downwards that thrust and gravity shall give, m/s².
         made_at: when guidance made the command, s of event-loop time.
         idle: whether zero body rates and zero thrust are sent; only on the ground.
@@ -19,7 +20,7 @@ class GuidanceCommand(NamedTuple):
             planner's are sent.
         thrust: thrust that replaces the one computed from `acceleration_down`, within the limits,
             0..1; None: the computed thrust is sent.
-        turn: sum of the heading resets when the command was made, rad.
+        frame: the frame without heading resets when the command was made.
         later: the target `period` after `made_at`; the target moves there on a straight line and
             then stays. None: the target is constant.
         period: period of the guidance loop, s.
@@ -32,7 +33,7 @@ class GuidanceCommand(NamedTuple):
     is_step: bool = False
     body_rates: BodyRates | None = None
     thrust: float | None = None
-    turn: float = 0.0
+    frame: HeadingFrame = HeadingFrame()
     later: Target | None = None
     period: float = 0.0
 

@@ -62,7 +62,7 @@ class GuidanceLoop:
         max_tilt: float,
         assumed_braking: AssumedBraking,
         period: float,
-        position_stale: float,
+        max_position_age: float,
         clock: Callable[[], float],
         vehicle_clock: Clock,
     ) -> None:
@@ -78,7 +78,7 @@ class GuidanceLoop:
         self._ground = ground
         self.record = TrackingRecord(trace, self.flown)
         self.hold = Hold(self.flown, self.maker, self.learning, max_tilt, assumed_braking)
-        self._fresh = FreshPosition(state, vehicle_clock, position_stale)
+        self._fresh = FreshPosition(state, vehicle_clock, max_position_age)
         self.before_step: Callable[[float], None] = lambda _: None
         self._clock = clock
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
@@ -173,7 +173,7 @@ class GuidanceLoop:
 
     def attitude(self) -> Quaternion:
         """The newest attitude, in the frame without estimator resets."""
-        return self._loop.resets.attitude(self._q)
+        return self._loop.resets.frame.attitude(self._q)
 
     def step(self) -> None:
         """Make one command, unless the position is stale or the command would not be finite."""
@@ -209,7 +209,7 @@ class GuidanceLoop:
                 self._loop.command = GuidanceCommand(_LEVEL_TARGET, 0.0, now, idle=True)
                 return None
         position = self._loop.resets.without_jumps(position)
-        self.estimate.turn_to(self._loop.resets.turn)
+        self.estimate.note_heading_resets(self._loop.resets.frame.offset)
         self.estimate.note_position(position, offboard_active=self._loop.offboard_active)
         inputs = self.maker.guidance_input(now)
         self.motion, self.acceleration = inputs.now, inputs.acceleration
@@ -234,7 +234,7 @@ class GuidanceLoop:
             now,
             inputs,
             self._heading(),
-            self._loop.resets.turn,
+            self._loop.resets.frame,
             offboard_active=self._loop.offboard_active,
         )
         if command is not None:  # else the command before grows stale

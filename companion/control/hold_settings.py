@@ -99,7 +99,7 @@ def _rate_loop_delay(config: Config) -> float:
     """
     lag, dead_time = slower_tilt(config)
     share = FIRST_ORDER_SHARE if isfinite(tilt_damping(config)) else 1.0
-    return dead_time + (1.0 - 0.5 * share) * lag if config.vehicle.known else inf
+    return dead_time + (1.0 - 0.5 * share) * lag if config.vehicle.response_known else inf
 
 
 def observer_quickness(config: Config) -> float:
@@ -170,7 +170,7 @@ def attitude_delay(config: Config) -> float:
     delay = feedback_delay(config) + max(0.0, excess)
     if isfinite(tilt_damping(config)):
         delay += _SECOND_ORDER_SHARE * slower_tilt(config)[0]
-    return delay if config.vehicle.known else delay + _USUAL_RATE_LOOP_DELAY
+    return delay if config.vehicle.response_known else delay + _USUAL_RATE_LOOP_DELAY
 
 
 def _hold_delay(config: Config) -> float:

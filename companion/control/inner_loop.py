@@ -164,7 +164,8 @@ def tilt_damping(config: Config) -> float:
 def sensible_gain(config: Config) -> float:
     """Largest sensible gain of the planner, 1/s; infinite if the rate loop is not identified."""
     delay = sum(slower_tilt(config))
-    return LARGEST_GAIN_TIMES_DELAY / delay if config.vehicle.known and delay > 0.0 else inf
+    identified = config.vehicle.response_known and delay > 0.0
+    return LARGEST_GAIN_TIMES_DELAY / delay if identified else inf
 
 
 def heading_response(config: Config) -> InnerResponse:

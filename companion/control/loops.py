@@ -53,7 +53,7 @@ def make_loops(
         max_tilt=config.limits.max_tilt,
         assumed_braking=AssumedBraking(config.safety.reaction_s, config.safety.braking_m_s2),
         period=1.0 / config.guidance.rate_hz,
-        position_stale=deadman.position_stale,
+        max_position_age=deadman.position_stale,
         clock=clock,
         vehicle_clock=vehicle_clock,
     )

@@ -60,7 +60,7 @@ class MotionEstimate:
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
         self._body_rates = BodyRates(0.0, 0.0, 0.0)
         self._position: LocalPosition | None = None
-        self._turn = 0.0
+        self._heading_resets = 0.0
         self._heading = 0.0
 
     @property
@@ -86,17 +86,17 @@ class MotionEstimate:
         cosine = max(2.0 * square - 1.0, _LEAST_COS_TILT)
         self._slopes.add(sample.vehicle_time, (-2.0 * ay / cosine, 2.0 * ax / cosine))
 
-    def turn_to(self, turn: float) -> None:
-        """Take `turn`, the sum of the heading resets, rad.
+    def note_heading_resets(self, total: float) -> None:
+        """Take the sum of the heading resets, rad.
 
         If it changed, the disturbance is rotated, and the earlier attitudes and the filtered
         position correction are discarded.
         """
-        if turn != self._turn:
-            self._observer.turn(turn - self._turn)
+        if total != self._heading_resets:
+            self._observer.rotate_disturbance(total - self._heading_resets)
             self._slopes.forget()
             self._correction.reset()
-            self._turn = turn
+            self._heading_resets = total
 
     def note_position(self, position: LocalPosition, *, offboard_active: bool) -> None:
         """Take a measured position and velocity; the same message again is ignored.

@@ -17,6 +17,7 @@ from companion.attitude.model_following import SHORTEST_PERIOD, ModelFollowingPl
 from companion.attitude.rotation import limit_rates
 from companion.control.estimator_resets import EstimatorResets
 from companion.control.guidance_command import GuidanceCommand
+from companion.control.heading_frame import HeadingFrame
 from companion.control.step_frame import StepFrame
 from companion.vehicle.records import AttitudeSample, AttitudeTarget
 
@@ -48,12 +49,12 @@ class PlannerRunner:
         self._planner = planner
         self._follower = planner if isinstance(planner, ModelFollowingPlanner) else None
         self._resets, self._limits = resets, limits
-        self._frame = StepFrame()
+        self._steps = StepFrame()
         self._planned_at = -inf
         self._period = 0.0
         self._passed_target: AttitudeTarget | None = None
         self._reported_target: AttitudeTarget | None = None
-        self._turn, self._turned_at_ms = 0.0, -1
+        self._resets_frame, self._reset_at_ms = HeadingFrame(), -1
 
     def retune(self, constants: Constants, limits: Limits) -> None:
         """Use other gains and limits from the next sample on.
@@ -77,7 +78,7 @@ class PlannerRunner:
 
     def attitude(self, q: Quaternion) -> Quaternion:
         """An attitude of the autopilot in the frame that the planner sees."""
-        return self._frame.attitude(self._resets.attitude(q))
+        return self._steps.frame.attitude(self._resets.frame.attitude(q))
 
     def rates(
         self, sample: AttitudeSample, command: GuidanceCommand, arrival_period: float
@@ -94,8 +95,7 @@ class PlannerRunner:
         """
         rates = command.body_rates
         if rates is None:
-            target = command.target_at(sample.received - sample.age)
-            target = self._resets.target(target, command.turn)
+            target = command.frame.target(command.target_at(sample.received - sample.age))
             rates = self._planned_rates(sample, target, arrival_period, is_step=command.is_step)
         limits = self._limits
         return BodyRates(*limit_rates(*rates, limits.tilt_rate, limits.yaw_rate))
@@ -110,10 +110,10 @@ class PlannerRunner:
         period = sample.vehicle_time - self._planned_at
         # Over a gap the body rates are not known, so the frame does not follow the estimator.
         stepping = is_step and period <= _LONGEST_PERIOD
-        self._frame.advance(self._resets.corrections, min(abs(period), 10.0), stepping=stepping)
+        self._steps.advance(self._resets.corrections, min(abs(period), 10.0), stepping=stepping)
         q = self.attitude(sample.q)
         if not is_step:
-            target = self._frame.target(target)
+            target = self._steps.frame.target(target)
         if period > _LONGEST_PERIOD:
             self._planner.reset(q, sample.body_rates)
             # A gap is not the period of the samples, so an earlier period is used.
@@ -124,22 +124,22 @@ class PlannerRunner:
         self.planner_input = q, target
         # A vehicle's clock that stood still or went back must not keep the sample unanswered.
         rates = self._planner.rates(q, target, max(SHORTEST_PERIOD, period), sample.body_rates)
-        return rates if self._passed_target is None else self._frame.rates(q, rates)
+        return rates if self._passed_target is None else self._steps.rates(q, rates)
 
     def _note_attitude_target(self, sample: AttitudeSample) -> None:
         """Pass a new ATTITUDE_TARGET to the planner once a sample is at least as new.
 
         An ATTITUDE_TARGET from before a heading reset is ignored: its frame is not known.
         """
-        if self._resets.turn != self._turn:
-            self._turn, self._turned_at_ms = self._resets.turn, sample.time_boot_ms
+        if self._resets.frame != self._resets_frame:
+            self._resets_frame, self._reset_at_ms = self._resets.frame, sample.time_boot_ms
         target = self.attitude_target()
         if target is None or target is self._passed_target:
             return
         if target is not self._reported_target and self.on_attitude_target is not None:
             self._reported_target = target
             self.on_attitude_target(target)
-        if self._turned_at_ms < target.time_boot_ms <= sample.time_boot_ms:
+        if self._reset_at_ms < target.time_boot_ms <= sample.time_boot_ms:
             self._passed_target = target
             age = 1e-3 * (sample.time_boot_ms - target.time_boot_ms)
             self._planner.note_attitude_target(self.attitude(target.q), age)

@@ -9,6 +9,7 @@ from time import monotonic, sleep
 from typing import NamedTuple
 
 from companion.attitude import Target
+from companion.control.heading_frame import HeadingFrame
 from companion.guidance import GRAVITY, LinearCommand, Pose
 from companion.guidance.follow import Follow
 from companion.nmpc import Answer, Input, Request, Solver, Start, Trouble, Vehicle
@@ -26,13 +27,11 @@ class Following(NamedTuple):
         part: the trajectory as a maneuver.
         time: time since the maneuver began, s.
         pose: pose at which the maneuver began.
-        turn: sum of the heading resets, rad; the solver works in the estimator's own frame.
     """
 
     part: Follow
     time: float
     pose: Pose
-    turn: float = 0.0
 
 
 @dataclass
@@ -87,51 +86,37 @@ class Predictive:
         self._solver.close()
 
     def replacement_for(
-        self, linear: LinearCommand, turn: float, vehicle: Vehicle, following: Following | None
+        self,
+        linear: LinearCommand,
+        frame: HeadingFrame,
+        vehicle: Vehicle,
+        following: Following | None,
     ) -> LinearCommand:
-        """The command of predictive control if there is one for this step, else `linear`.
+        """The solver's answer for this step if there is one, else `linear`; requests the next one.
 
-        Predictive control works in the estimator's frame, whose heading jumps at each reset. Its
-        target is constant for a period, which its model takes into account.
+        The solver works in the estimator's frame, whose heading jumps at each reset. Its target is
+        constant for a period, which its model takes into account.
 
         Args:
             linear: command of linear guidance.
-            turn: sum of the heading resets, rad.
+            frame: the frame without heading resets.
             vehicle: present state of the vehicle.
             following: the trajectory that is followed, or None.
         """
-        own = linear.target._replace(heading=linear.target.heading + turn), linear.down
-        target, down = chosen = self.command(own, vehicle, following)
-        if chosen is own:
+        target, down = linear.target, linear.down
+        target = target._replace(heading=frame.estimated_heading(target.heading))
+        answer = None if following is None else self._answer(vehicle.time)
+        if answer is not None:
+            self.record.flown += 1
+            self.record.seconds.append(answer.seconds)
+            target, down = _command_of(answer)
+        self._record_input(vehicle.time, target, down)
+        if following is not None:
+            self._request(vehicle, following, frame)
+        if answer is None:
             return linear
-        target = target._replace(heading=target.heading - turn)
+        target = target._replace(heading=frame.heading(target.heading))
         return LinearCommand(target, target, down)
-
-    def command(
-        self, linear: tuple[Target, float], vehicle: Vehicle, following: Following | None
-    ) -> tuple[Target, float]:
-        """Choose the solver's answer for this step, else `linear`; request the next answer.
-
-        Args:
-            linear: target, in the estimator's frame, and downward acceleration (m/s²) of linear
-                guidance.
-            vehicle: present state of the vehicle.
-            following: the trajectory that is followed, or None.
-
-        Returns:
-            Target, in the estimator's frame, and downward acceleration (m/s²) to fly.
-        """
-        chosen = linear
-        if following is not None:
-            answer = self._answer(vehicle.time)
-            if answer is not None:
-                self.record.flown += 1
-                self.record.seconds.append(answer.seconds)
-                chosen = _command_of(answer)
-        self._record_input(vehicle.time, chosen)
-        if following is not None:
-            self._request(vehicle, following)
-        return chosen
 
     def _answer(self, now: float) -> Answer | None:
         if self._lockstep:
@@ -142,18 +127,17 @@ class Predictive:
             return None
         return answer
 
-    def _request(self, vehicle: Vehicle, following: Following) -> None:
+    def _request(self, vehicle: Vehicle, following: Following, frame: HeadingFrame) -> None:
         part, pose = following.part, following.pose
         at = following.time - part.turn_duration
         if at < 0.0:
             return
         self._number += 1
         turned = pose.heading if part.trajectory.holds_heading else 0.0
-        start = Start(pose.position_ned, turned + following.turn)
+        start = Start(pose.position_ned, frame.estimated_heading(turned))
         self._solver.request(Request(self._number, vehicle, at, start, tuple(self._inputs)))
 
-    def _record_input(self, now: float, command: tuple[Target, float]) -> None:
-        target, down = command
+    def _record_input(self, now: float, target: Target, down: float) -> None:
         lift = GRAVITY - down
         thrust = lift / max(0.2, sqrt(max(0.0, 1.0 - target.north**2 - target.east**2)))
         self._inputs.append(Input(now, target.north, target.east, target.heading, thrust))

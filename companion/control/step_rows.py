@@ -168,7 +168,7 @@ def _target_row(command: GuidanceCommand) -> tuple[float, ...]:
         command.acceleration_down,
         *(command.body_rates or _NO_VECTOR),
         _nan_if_none(command.thrust),
-        command.turn,
+        command.frame.offset,
         command.period,
         command.idle,
         command.is_step,

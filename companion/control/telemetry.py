@@ -67,16 +67,16 @@ class FreshPosition:
     Args:
         state: telemetry of the vehicle.
         vehicle_clock: the vehicle's clock.
-        stale: largest age of a position that is used, s.
+        max_age: largest age of a position that is used, s.
     """
 
-    def __init__(self, state: Telemetry, vehicle_clock: Clock, stale: float) -> None:
-        self._state, self._vehicle_clock, self._stale = state, vehicle_clock, stale
+    def __init__(self, state: Telemetry, vehicle_clock: Clock, max_age: float) -> None:
+        self._state, self._vehicle_clock, self._max_age = state, vehicle_clock, max_age
 
     def at(self, now: float) -> LocalPosition | None:
         """The newest position; None if its arrival or measurement is too old at `now`, s."""
         position = self._state.position
-        if position is None or now - position.received > self._stale:
+        if position is None or now - position.received > self._max_age:
             return None
         age = self._vehicle_clock.age(position.vehicle_time, now)
-        return None if age is not None and age > self._stale else position
+        return None if age is not None and age > self._max_age else position

@@ -75,7 +75,7 @@ class TrackingRecord:
                 self.note(f"maneuver: {name}")
         north, east, down = reference.position_ned
         if not reference.holds_position:
-            north = east = nan  # in open loop or drifting, only the height is a reference
+            north = east = nan  # only the height is a reference
         if not reference.holds_height:
             down = nan
         self._trace.add_tracking(vehicle_time, (north, east, down), motion.position_ned)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from companion.attitude import BodyRates
 from companion.guidance.maneuvers import check_times_between
-from companion.guidance.reference import Pose, Reference
+from companion.guidance.reference import Pose, Reference, VerticalMode
 
 _SMALL_SIZE = 0.5
 """Size of the first doublet of an axis as a share of its second one. From doublets of one size a
@@ -39,7 +39,7 @@ class _Doublet(NamedTuple):
         if self.body_rates is None:
             return self._climb_reference(time, hold)
         sign = self._doublet_sign(time)
-        return hold._replace(body_rates=BodyRates(*(sign * rate for rate in self.body_rates)))
+        return hold._replace(horizontal=BodyRates(*(sign * rate for rate in self.body_rates)))
 
     def _climb_reference(self, time: float, hold: Reference) -> Reference:
         step = self.step
@@ -57,7 +57,7 @@ class _Doublet(NamedTuple):
             position_ned=(north, east, down - up * height),
             velocity_ned=(0.0, 0.0, -up * speed),
             acceleration_ned=(0.0, 0.0, -up * self._doublet_sign(time)),
-            thrust_steps=True,
+            vertical=VerticalMode.HEIGHT_IN_STEPS,
         )
 
     def _doublet_sign(self, time: float) -> float:

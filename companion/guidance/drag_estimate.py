@@ -5,6 +5,7 @@ from math import hypot, isfinite, sqrt
 
 import numpy as np
 
+from companion.attitude.rotation import clamp
 from companion.drag import AxisDrag, Drag
 from companion.guidance.reference import Horizontal, Vector
 
@@ -134,11 +135,9 @@ class DragEstimate:
             row[2 + axis], row[4] = 1.0, -self._along_axes[axis] / span
             spread = self._covariance @ row
             variance = float(row @ spread) + _MEASUREMENT_DEVIATION**2
-            innovation, most = (
-                self._residual[axis] / span - float(row @ self._state),
-                _CLAMP_DEVIATIONS * sqrt(variance),
-            )
-            gain, innovation = spread / variance, min(max(innovation, -most), most)
+            most = _CLAMP_DEVIATIONS * sqrt(variance)
+            innovation = clamp(self._residual[axis] / span - float(row @ self._state), most)
+            gain = spread / variance
             self._innovation_sum += innovation * innovation / variance
             self._measurements += 1
             self._state = self._state + gain * innovation

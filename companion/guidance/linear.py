@@ -11,8 +11,10 @@ from companion.guidance.inner_response import InnerResponse
 from companion.guidance.reference import (
     GRAVITY,
     Horizontal,
+    HorizontalMode,
     Reference,
     ReferenceAt,
+    TiltCommand,
     Vector,
     VehicleMotion,
     limited,
@@ -113,34 +115,36 @@ class Guidance(Protocol):
         ...
 
 
-class RestingCoefficients:
-    """Mean target coefficients of the latest pause of the position hold (`Reference.drifting`).
+class Trim:
+    """Mean target coefficients of the latest pause of the position hold.
 
-    They balance wind and the error of the estimated attitude. Open-loop coefficients are added to
-    them, so that the vehicle accelerates as these coefficients ask.
+    In a pause the reference's `horizontal` is `HorizontalMode.ACCELERATION`. The mean balances wind
+    and the error of the estimated attitude. It is added to open-loop coefficients, so that the
+    vehicle accelerates as these ask.
     """
 
     def __init__(self) -> None:
         self._sum = 0j
         self._count = 0
-        self._drifting = False
+        self._pausing = False
 
-    def take(self, target: Target, *, drifting: bool) -> None:
+    def take(self, target: Target, *, pausing: bool) -> None:
         """Take the target of a closed-loop guidance step; each new pause begins a new mean."""
-        if drifting:
-            if not self._drifting:
+        if pausing:
+            if not self._pausing:
                 self._sum, self._count = 0j, 0
             self._sum += complex(target.north, target.east)
             self._count += 1
-        self._drifting = drifting
+        self._pausing = pausing
 
-    def add_to(self, coefficients: Coefficients, reference: Reference) -> Coefficients:
-        """Open-loop `coefficients`, plus the mean if `reference.from_rest` is true."""
-        self._drifting = False
-        if not reference.from_rest or self._count == 0:
-            return coefficients
+    def coefficients(self, command: TiltCommand) -> Coefficients:
+        """The open-loop coefficients to fly: those commanded, plus the mean if `trimmed`."""
+        self._pausing = False
+        if not command.trimmed or self._count == 0:
+            return command.coefficients
         mean = self._sum / self._count
-        return Coefficients(coefficients.north + mean.real, coefficients.east + mean.imag)
+        north, east = command.coefficients
+        return Coefficients(north + mean.real, east + mean.imag)
 
 
 class LinearGuidance:
@@ -153,7 +157,7 @@ class LinearGuidance:
 
     def __init__(self, settings: LinearSettings) -> None:
         self._settings = settings
-        self._rest = RestingCoefficients()
+        self._trim = Trim()
 
     def retune(self, settings: LinearSettings) -> None:
         """Use other settings from the next step on."""
@@ -178,8 +182,8 @@ class LinearGuidance:
         ahead = reference_at(time + self._settings.thrust_lag)
         down = acceleration_down(self._settings.height, reference, inputs.now, ahead, inputs.drag)
         ends = time, time + self._settings.period
-        if reference.coefficients is not None:
-            north, east = self._rest.add_to(reference.coefficients, reference)
+        if isinstance(reference.horizontal, TiltCommand):
+            north, east = self._trim.coefficients(reference.horizontal)
             target, later = (Target(north, east, *self._heading(reference_at, at)) for at in ends)
             return LinearCommand(target, later, down)
         feedback = self._feedback(reference, reference_at(time + self.acts_after), inputs)
@@ -191,7 +195,8 @@ class LinearGuidance:
             Target(*self._settings.tilt.target(path, at), *self._heading(reference_at, at))
             for at in ends
         )
-        self._rest.take(target, drifting=reference.drifting)
+        pausing = reference.horizontal is HorizontalMode.ACCELERATION
+        self._trim.take(target, pausing=pausing)
         return LinearCommand(target, later, down)
 
     def _feedback(self, now: Reference, acts: Reference, inputs: GuidanceInput) -> Horizontal:
@@ -200,7 +205,7 @@ class LinearGuidance:
         `now` is the reference now, `acts` the reference when the feedback takes effect.
         """
         settings, gains, wind = self._settings, self._settings.gains, inputs.disturbance
-        if now.drifting:
+        if now.horizontal is HorizontalMode.ACCELERATION:
             return limited(-wind[0], -wind[1], settings.max_horizontal)
         wanted, slowed = [], inputs.deceleration(inputs.now.velocity_ned)
         for axis in (0, 1):

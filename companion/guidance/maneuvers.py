@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from companion.attitude import Coefficients
-from companion.guidance.reference import Pose, Reference
+from companion.guidance.reference import HorizontalMode, Pose, Reference, TiltCommand
 
 _HOLD_PAUSE = 1.0
 """Pause of the position hold before open-loop steps, s. Its corrections would disturb the attitude
@@ -91,13 +91,14 @@ class Steps:
         within = time - index * self._doublet_period - _HOLD_PAUSE
         rest = Reference(start.position_ned, heading=start.heading)
         if within < 0.0:
-            return rest._replace(drifting=True)
+            return rest._replace(horizontal=HorizontalMode.ACCELERATION)
         if within >= 4.0 * self.step:
             return rest
         sign = -1.0 if self.step <= within < 3.0 * self.step else 1.0
         north, east = self.DIRECTIONS[index]
         c = sign * self.coefficient
-        return rest._replace(coefficients=Coefficients(c * north, c * east), from_rest=True)
+        coefficients = Coefficients(c * north, c * east)
+        return rest._replace(horizontal=TiltCommand(coefficients, trimmed=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,13 +150,13 @@ class Corners:
         """The reference: a pause, steps of the acceleration coefficients to each corner, a hold."""
         rest = Reference(start.position_ned, heading=start.heading)
         if time < _HOLD_PAUSE:
-            return rest._replace(drifting=True)
+            return rest._replace(horizontal=HorizontalMode.ACCELERATION)
         index = int((time - _HOLD_PAUSE) / self.step)
         if index >= len(self.CORNERS):
             return rest
         north, east = self.CORNERS[index]
         coefficients = Coefficients(self.north * north, self.east * east)
-        return rest._replace(coefficients=coefficients, from_rest=True)
+        return rest._replace(horizontal=TiltCommand(coefficients, trimmed=True))
 
 
 @dataclass(frozen=True, slots=True)

@@ -132,7 +132,7 @@ class MotionObserver:
         self._motion = VehicleMotion(_vector(position), _vector(velocity))
         self.disturbance = limited(found[0], found[1], settings.largest_disturbance)
 
-    def turn(self, angle: float) -> None:
+    def rotate_disturbance(self, angle: float) -> None:
         """Rotate the disturbance by `angle` (rad), because the estimated heading jumped by it.
 
         The vehicle itself did not turn, so it must keep the tilt that balances the disturbance.

@@ -83,10 +83,8 @@ class PositionCorrection:
 
         It is 0 if they are noisy or rounded, or if the vehicle is at rest.
         """
-        smoothness = min(
-            max(0.0, (_NOISY_ABOVE - sqrt(self._noise)) / (_NOISY_ABOVE - _SMOOTH_BELOW)), 1.0
-        )
-        return smoothness * self._moving
+        smoothness = (_NOISY_ABOVE - sqrt(self._noise)) / (_NOISY_ABOVE - _SMOOTH_BELOW)
+        return min(max(0.0, smoothness), 1.0) * self._moving
 
     def corrected(self, time: float, measured: VehicleMotion) -> VehicleMotion:
         """A measured motion with its horizontal position corrected.
@@ -143,9 +141,7 @@ class PositionCorrection:
         change = hypot(raw[0] - self._raw[0], raw[1] - self._raw[1])
         kept = exp(-dt / _NOISE_TIME)
         self._noise = change * change + kept * (self._noise - change * change)
-        shortest, longest = (
-            self._settings.filter_time,
-            max(self._settings.filter_time, _LONGEST_WINDOW),
-        )
+        shortest = self._settings.filter_time
+        longest = max(shortest, _LONGEST_WINDOW)
         window = min(shortest + _WINDOW_PER_NOISE * sqrt(self._noise), longest)
         return (2.0 - self._moving) * window

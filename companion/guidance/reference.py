@@ -1,6 +1,7 @@
 """Types of guidance: world NED, SI units, radians; headings are tilt-yaw headings."""
 
 from collections.abc import Callable, Sequence
+from enum import Enum, auto
 from math import cos, hypot, sin
 from typing import NamedTuple
 
@@ -30,21 +31,79 @@ class VehicleMotion(NamedTuple):
     velocity_ned: Vector
 
 
+class HorizontalMode(Enum):
+    """How guidance follows the horizontal part of a reference in closed loop.
+
+    Attributes:
+        POSITION: it corrects errors of position, velocity and acceleration.
+        ACCELERATION: it commands the acceleration alone. Position and velocity are not corrected;
+            drag at the reference's velocity and the disturbance are compensated.
+    """
+
+    POSITION = auto()
+    ACCELERATION = auto()
+
+
+class TiltCommand(NamedTuple):
+    """Acceleration coefficients in open loop: they become the target of the planner.
+
+    Attributes:
+        coefficients: north and east; the sine of the tilt is their length.
+        trimmed: whether guidance adds the trim: the mean target of the latest time in
+            `HorizontalMode.ACCELERATION`. It balances wind and the error of the estimated attitude.
+    """
+
+    coefficients: Coefficients
+    trimmed: bool = False
+
+
+HorizontalCommand = HorizontalMode | TiltCommand | BodyRates
+"""Closed loop, a tilt in open loop, or body rates in open loop (rad/s)."""
+
+
+class VerticalMode(Enum):
+    """How guidance follows the vertical part of a reference.
+
+    Attributes:
+        HEIGHT: it corrects errors of height and climb rate.
+        HEIGHT_IN_STEPS: the same, but the vertical acceleration jumps. The rotors do not follow
+            jumps, so the hover thrust is not learned meanwhile.
+        ACCELERATION: it commands the acceleration alone, without drag and feedback.
+    """
+
+    HEIGHT = auto()
+    HEIGHT_IN_STEPS = auto()
+    ACCELERATION = auto()
+
+
+class ThrustCommand(NamedTuple):
+    """Normalised thrust that replaces the one guidance computes.
+
+    Guidance still computes the vertical acceleration as in `VerticalMode.HEIGHT`.
+
+    Attributes:
+        thrust: 0..1.
+    """
+
+    thrust: float
+
+
+VerticalCommand = VerticalMode | ThrustCommand
+
+
 class Reference(NamedTuple):
     """What the vehicle should do at one instant; NED, m, m/s, m/s², rad.
 
-    `coefficients` or `body_rates` command the horizontal motion in open loop. Position and velocity
-    are then used for the height only.
-
     Attributes:
-        coefficients: acceleration coefficients in open loop; None: closed loop.
-        body_rates: body rates in open loop, rad/s; they command the heading, too.
-        thrust_steps: whether the vertical acceleration jumps.
-        drifting: whether the horizontal feedback pauses; drag and disturbance stay compensated.
-        from_rest: whether the mean target coefficients of the latest pause (`drifting`) are added
-            to `coefficients`, to balance wind and the error of the estimated attitude.
-        holds_height: False: `acceleration_ned` is commanded vertically without feedback.
-        thrust: normalised thrust that replaces the one guidance computes, 0..1.
+        position_ned: position in m; only its height counts if `horizontal` is in open loop.
+        velocity_ned: velocity in m/s.
+        acceleration_ned: acceleration in m/s².
+        heading: heading in rad.
+        heading_rate: its rate in rad/s.
+        horizontal: how the horizontal motion is commanded: in closed loop by position or by
+            acceleration; in open loop by tilt or by body rates in rad/s, which command the
+            heading, too.
+        vertical: how the vertical motion is commanded.
     """
 
     position_ned: Vector
@@ -52,23 +111,38 @@ class Reference(NamedTuple):
     acceleration_ned: Vector = (0.0, 0.0, 0.0)
     heading: float = 0.0
     heading_rate: float = 0.0
-    coefficients: Coefficients | None = None
-    body_rates: BodyRates | None = None
-    thrust_steps: bool = False
-    drifting: bool = False
-    from_rest: bool = False
-    holds_height: bool = True
-    thrust: float | None = None
+    horizontal: HorizontalCommand = HorizontalMode.POSITION
+    vertical: VerticalCommand = VerticalMode.HEIGHT
+
+    @property
+    def coefficients(self) -> Coefficients | None:
+        """The acceleration coefficients that are commanded in open loop; None: none are."""
+        return self.horizontal.coefficients if isinstance(self.horizontal, TiltCommand) else None
+
+    @property
+    def body_rates(self) -> BodyRates | None:
+        """The body rates that are commanded in open loop, rad/s; None: none are."""
+        return self.horizontal if isinstance(self.horizontal, BodyRates) else None
+
+    @property
+    def thrust(self) -> float | None:
+        """The normalised thrust that is commanded, 0..1; None: guidance computes it."""
+        return self.vertical.thrust if isinstance(self.vertical, ThrustCommand) else None
 
     @property
     def closed_loop(self) -> bool:
-        """Whether the horizontal motion is in closed loop: no coefficients or body rates given."""
-        return self.coefficients is None and self.body_rates is None
+        """Whether the horizontal motion is in closed loop: no tilt and no body rates."""
+        return isinstance(self.horizontal, HorizontalMode)
 
     @property
     def holds_position(self) -> bool:
-        """Whether guidance corrects the horizontal position: in closed loop and not drifting."""
-        return self.closed_loop and not self.drifting
+        """Whether guidance corrects the horizontal position."""
+        return self.horizontal is HorizontalMode.POSITION
+
+    @property
+    def holds_height(self) -> bool:
+        """Whether the vertical acceleration contains a correction of the height."""
+        return self.vertical is not VerticalMode.ACCELERATION
 
     @property
     def thrust_is_steady(self) -> bool:
@@ -76,7 +150,8 @@ class Reference(NamedTuple):
 
         False in the doublets of `identify`, and where body rates or the thrust are commanded.
         """
-        return not self.thrust_steps and self.body_rates is None and self.thrust is None
+        steady = self.vertical in (VerticalMode.HEIGHT, VerticalMode.ACCELERATION)
+        return steady and not isinstance(self.horizontal, BodyRates)
 
 
 ReferenceAt = Callable[[float], Reference]

@@ -98,12 +98,12 @@ class CommandedSource:
     """References that another program or the user's code gives one by one.
 
     After each reference the source extrapolates it by its velocity, acceleration and jerk. If a
-    reference becomes older than `stale` before the next one comes, the source fails: the vehicle
+    reference becomes older than `max_age` before the next one comes, the source fails: the vehicle
     holds its position, and later references are not flown.
 
     Args:
         name: who gives the references.
-        stale: largest age of a reference that is flown, s.
+        max_age: largest age of a reference that is flown, s.
         begins_within: time allowed for the first reference, s.
 
     Attributes:
@@ -111,10 +111,10 @@ class CommandedSource:
         pose: the pose at which the source began, or None.
     """
 
-    def __init__(self, name: str, stale: float, begins_within: float) -> None:
+    def __init__(self, name: str, max_age: float, begins_within: float) -> None:
         self.name = name
         self.pose: Pose | None = None
-        self._stale = stale
+        self._max_age = max_age
         self._begins_within = begins_within
         self._held: Reference | None = None
         self._newest: Reference | None = None
@@ -122,7 +122,7 @@ class CommandedSource:
         self._jerk = _NO_JERK
         self._base: Reference | None = None
         self._base_at = 0.0
-        self._ended = False
+        self._all_given = False
         self._failure: str | None = None
 
     def begin(self, now: float, pose: Pose) -> None:
@@ -160,7 +160,7 @@ class CommandedSource:
 
     def end(self) -> None:
         """Note that no more references will come."""
-        self._ended = True
+        self._all_given = True
 
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
         """The newest reference, extrapolated; before the first one, a hold of the initial pose.
@@ -185,8 +185,8 @@ class CommandedSource:
 
     def _require_fresh(self, now: float) -> None:
         """Note a failure if the newest reference is too old, or the first one is overdue."""
-        allowed = self._begins_within if self._newest is None else self._stale
-        if self._failure is None and not self._ended and now - self._given_at > allowed:
+        allowed = self._begins_within if self._newest is None else self._max_age
+        if self._failure is None and not self._all_given and now - self._given_at > allowed:
             self._failure = f"{self.name} gave no new command for {allowed:g} s"
 
     @property
@@ -200,15 +200,15 @@ class CommandedSource:
 
     def finished(self, now: float) -> bool:
         """Whether `end` was called."""
-        return self._ended
+        return self._all_given
 
 
 def _kind(reference: Reference) -> tuple[bool, bool, bool]:
-    """The kind of command: whether it is closed loop, drifts, and holds the height.
+    """Whether it is in closed loop, and whether it holds the position, and the height.
 
     Accelerations of references of different kinds are not comparable.
     """
-    return reference.closed_loop, reference.drifting, reference.holds_height
+    return reference.closed_loop, reference.holds_position, reference.holds_height
 
 
 def continued(reference: Reference, jerk_ned: Vector, elapsed: float) -> Reference:

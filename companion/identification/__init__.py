@@ -17,14 +17,14 @@ here is therefore from a sample to the first effect of its command, like `vehicl
 
 A whole vehicle
     identify_vehicle          fits each axis and the thrust: an `IdentifiedVehicle`
-    IdentifiedVehicle         roll, pitch, yaw, thrust; `faults` says which fits must not be used
+    IdentifiedVehicle         roll, pitch, yaw, thrust; `flaws` says which fits must not be used
     vehicle_table             the fits as a table for the terminal
     vehicle_fragment          the fits as YAML for a configuration
     kept_axes                 configured values of the axes whose fit is bad
 
 One axis
     fit_rate_response         lag, dead time, gain and slew limit: a `RateResponse`
-    RateResponse              the fit; `is_good` and `reason` say whether it may be used
+    RateResponse              the fit; `is_good` and `flaw` say whether it may be used
     FitQuality, FitNeeds      how good a fit is, and how good it must be
     SecondOrderFit            the second-order response that fits best
     BadFitError               raised if bad fits leave an axis without values
@@ -40,11 +40,11 @@ from companion.identification.correlation import (
     dead_time_by_correlation as dead_time_by_correlation,
 )
 from companion.identification.delayed_model import SecondOrderFit as SecondOrderFit
+from companion.identification.fit import FitQuality as FitQuality
 from companion.identification.fragment import kept_axes as kept_axes
 from companion.identification.fragment import vehicle_fragment as vehicle_fragment
 from companion.identification.response import BadFitError as BadFitError
 from companion.identification.response import FitNeeds as FitNeeds
-from companion.identification.response import FitQuality as FitQuality
 from companion.identification.response import RateResponse as RateResponse
 from companion.identification.response import fit_rate_response as fit_rate_response
 from companion.identification.table import vehicle_table as vehicle_table

@@ -6,7 +6,6 @@ second-order lag is tried too, and reported if it fits clearly better.
 
 from dataclasses import dataclass, replace
 from math import exp, log
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +54,30 @@ _NEIGHBOUR_DISTANCE = 0.005
 
 
 @dataclass(frozen=True, slots=True)
+class FitQuality:
+    """Quality of a fit.
+
+    Attributes:
+        explained: R², share of the measurements' variance that the model explains.
+        misfit: error of the model: RMS of the part of the residual that the commands explain, as a
+            share of the standard deviation of the measurements. It does not contain noise.
+        dead_time_error: standard error of the dead time due to noise, s.
+        lag_error: standard error of the lag due to noise, s.
+        span: largest minus smallest command, after the slew limit, in the unit of the
+            commands.
+        excited: number of samples at which the model differs from the command by more than 2 %
+            of the span; only these contain information on lag and dead time.
+    """
+
+    explained: float
+    misfit: float
+    dead_time_error: float
+    lag_error: float
+    span: float
+    excited: int
+
+
+@dataclass(frozen=True, slots=True)
 class LagFit:
     """Result of a fit, in s and the units of commands and measurements.
 
@@ -64,13 +87,7 @@ class LagFit:
         gain: measured per commanded value; fitted anew if lag and dead time are for a given one.
         offset: measurement at a command of zero.
         slew: slew limit of the command, per second; None: no sign of a limit.
-        explained: R².
-        misfit: RMS of the part of the residual that the commands explain, as a share of the
-            standard deviation of the measurements.
-        dead_time_error: standard error of the dead time due to noise, s.
-        lag_error: standard error of the lag due to noise, s.
-        span: largest command minus smallest command, after the slew limit.
-        excited: number of samples where model and command differ by more than 2 % of the span.
+        quality: quality of the fit.
         second_order: second-order fit, if it is clearly better; else None.
     """
 
@@ -79,12 +96,7 @@ class LagFit:
     gain: float
     offset: float
     slew: float | None
-    explained: float
-    misfit: float
-    dead_time_error: float
-    lag_error: float
-    span: float
-    excited: int
+    quality: FitQuality
     second_order: SecondOrderFit | None = None
 
 
@@ -168,7 +180,7 @@ def _second_order_fit(
         dead_time=data.dead_time(best.unknown),
         gain=float(best.weights[0]),
         slew=data.slew(best.unknown),
-        explained=data.explained(best),
+        explained=quality.explained,
         misfit=quality.misfit,
         dead_time_error=quality.dead_time_error,
         lag_error=quality.lag_error,
@@ -176,33 +188,18 @@ def _second_order_fit(
 
 
 def _lag_fit(data: DelayedModel, found: Solution) -> LagFit:
-    quality = _quality(data, found)
     return LagFit(
         dead_time=data.dead_time(found.unknown),
         lag=exp(found.unknown[0]),
         gain=float(found.weights[0]),
         offset=float(found.weights[1]),
         slew=data.slew(found.unknown),
-        explained=data.explained(found),
-        misfit=quality.misfit,
-        dead_time_error=quality.dead_time_error,
-        lag_error=quality.lag_error,
-        span=quality.span,
-        excited=quality.excited,
+        quality=_quality(data, found),
     )
 
 
-class _Quality(NamedTuple):
-    """Quality of a fit of either order; see `LagFit`."""
-
-    span: float
-    excited: int
-    misfit: float
-    lag_error: float
-    dead_time_error: float
-
-
-def _quality(data: DelayedModel, found: Solution) -> _Quality:
+def _quality(data: DelayedModel, found: Solution) -> FitQuality:
+    """The quality of a fit of either order."""
     unknown, lag = found.unknown, exp(found.unknown[0])
     commands = data.delayed_commands(unknown)
     span = float(np.ptp(commands))
@@ -218,12 +215,13 @@ def _quality(data: DelayedModel, found: Solution) -> _Quality:
         correlated_samples=1 + int(response_duration / max(sample_period, 1e-4)),
     )
     deviation = float(np.std(data.measured))
-    return _Quality(
-        span,
-        excited,
-        residuals.misfit / deviation if deviation > 0.0 else 0.0,
-        lag * float(residuals.errors[0]),
-        float(data.dead_time(residuals.errors)),
+    return FitQuality(
+        explained=data.explained(found),
+        misfit=residuals.misfit / deviation if deviation > 0.0 else 0.0,
+        dead_time_error=data.dead_time(residuals.errors),
+        lag_error=lag * float(residuals.errors[0]),
+        span=span,
+        excited=excited,
     )
 
 

@@ -112,14 +112,14 @@ def kept_axes(vehicle: IdentifiedVehicle, known: ConfiguredValues) -> dict[str, 
     Raises:
         BadFitError: no fit is good, or an axis with a bad fit has no configured values.
     """
-    faults = vehicle.faults()
+    flaws = vehicle.flaws()
     kept = {}
-    for name in faults:
+    for name in flaws:
         lag, dead_time, slew, damping = known.get(name, (None, None, None, None))
         if lag is not None and dead_time is not None:
             kept[name] = AxisValues(lag, dead_time, slew, damping)
-    if len(faults) == len(vehicle.axes) or len(kept) < len(faults):
-        raise BadFitError("; ".join(f"{name}: {reason}" for name, reason in faults.items()))
+    if len(flaws) == len(vehicle.axes) or len(kept) < len(flaws):
+        raise BadFitError("; ".join(f"{name}: {flaw}" for name, flaw in flaws.items()))
     return kept
 
 
@@ -179,7 +179,7 @@ def _comment(name: str, response: RateResponse, kept: Mapping[str, AxisValues]) 
     if name in kept:
         return (
             f"# {name}: kept from the configuration: {kept[name].described()}; the fit is bad: "
-            f"{response.reason()}"
+            f"{response.flaw()}"
         )
     fit = response.fit
     slew = "" if response.slew is None else f", slew {response.slew:.1f} rad/s²"

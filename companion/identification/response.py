@@ -6,35 +6,12 @@ from math import isnan
 from numpy.typing import ArrayLike
 
 from companion.identification.delayed_model import DEAD_TIME_RANGE, SecondOrderFit
-from companion.identification.fit import LAG_RANGE, fit_lag
+from companion.identification.fit import LAG_RANGE, FitQuality, fit_lag
 from companion.identification.record import stretches
 
 
 class BadFitError(ValueError):
     """A fit must not be used; the message says why."""
-
-
-@dataclass(frozen=True, slots=True)
-class FitQuality:
-    """Quality of a fit.
-
-    Attributes:
-        explained: R², share of the measurements' variance that the model explains.
-        misfit: error of the model: RMS of the part of the residual that the commands explain, as a
-            share of the standard deviation of the measurements. It does not contain noise.
-        dead_time_error: standard error of the dead time due to noise, s.
-        lag_error: standard error of the lag due to noise, s.
-        span: largest minus smallest command, after the slew limit, rad/s.
-        excited: number of samples at which the model differs from the command by more than 2 %
-            of the span; only these contain information on lag and dead time.
-    """
-
-    explained: float
-    misfit: float
-    dead_time_error: float
-    lag_error: float
-    span: float
-    excited: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,11 +61,11 @@ class RateResponse:
     fit: FitQuality
     second_order: SecondOrderFit | None = None
 
-    def reason(self, needs: FitNeeds = DEFAULT_NEEDS) -> str | None:
+    def flaw(self, needs: FitNeeds = DEFAULT_NEEDS) -> str | None:
         """Why this fit must not be used, a sentence without full stop; None if it may be used."""
         fit, uncertainty = self.fit, max(self.fit.dead_time_error, self.fit.lag_error)
         low, high = needs.gain
-        faults = (
+        flaws = (
             (
                 isnan(self.dead_time) and fit.span == 0.0,
                 "too little excitation: no command changed while rates were measured; both need "
@@ -126,11 +103,11 @@ class RateResponse:
                 f"lag and dead time are uncertain by {1e3 * uncertainty:.1f} ms",
             ),
         )
-        return next((text for wrong, text in faults if wrong), None)
+        return next((text for wrong, text in flaws if wrong), None)
 
     def is_good(self, needs: FitNeeds = DEFAULT_NEEDS) -> bool:
-        """Whether the fit may be used: there is no `reason` against it."""
-        return self.reason(needs) is None
+        """Whether the fit may be used: it has no `flaw`."""
+        return self.flaw(needs) is None
 
 
 def _at_edge(value: float, searched: tuple[float, float]) -> bool:
@@ -167,7 +144,7 @@ def fit_rate_response(
 
     Returns:
         The response. If no command changed or there are fewer than 10 samples, its values are NaN
-        and `reason` names too little excitation.
+        and its `flaw` is too little excitation.
 
     Raises:
         ValueError: a time series and its values are not one-dimensional and equally long.
@@ -175,14 +152,6 @@ def fit_rate_response(
     fit = fit_lag(stretches(time, commanded, measured_time, measured), gain)
     if fit is None:
         return _NOT_FOUND
-    quality = FitQuality(
-        fit.explained,
-        fit.misfit,
-        fit.dead_time_error,
-        fit.lag_error,
-        fit.span,
-        fit.excited,
-    )
     second_order = fit.second_order
     fitted_gain = fit.gain if second_order is None else second_order.gain
-    return RateResponse(fit.dead_time, fit.lag, fitted_gain, fit.slew, quality, second_order)
+    return RateResponse(fit.dead_time, fit.lag, fitted_gain, fit.slew, fit.quality, second_order)

@@ -115,4 +115,4 @@ def fit_thrust_map(
     fit = fit_lag(record, may_slew=False)
     if fit is None:
         return None
-    return ThrustMap(fit.gain, fit.offset, fit.lag, fit.dead_time, fit.explained)
+    return ThrustMap(fit.gain, fit.offset, fit.lag, fit.dead_time, fit.quality.explained)

@@ -37,10 +37,10 @@ class IdentifiedVehicle:
         """The responses by the name of the axis."""
         return dict(zip(AXES, (self.roll, self.pitch, self.yaw), strict=True))
 
-    def faults(self) -> dict[str, str]:
+    def flaws(self) -> dict[str, str]:
         """By axis, why its fit must not be used; empty if all fits may be used."""
-        reasons = {name: response.reason() for name, response in self.axes.items()}
-        return {name: reason for name, reason in reasons.items() if reason is not None}
+        flaws = {name: response.flaw() for name, response in self.axes.items()}
+        return {name: flaw for name, flaw in flaws.items() if flaw is not None}
 
 
 def identify_vehicle(

@@ -40,7 +40,7 @@ def dead_time(config: Config, evidence: Evidence) -> Iterator[Finding]:
     Only flights with the same planner and gain count: with another gain the response of the same
     vehicle differs, and an oscillating hold gives a wrong dead time.
     """
-    if not config.vehicle.known:
+    if not config.vehicle.response_known:
         return
     folder, measured = _newest_dead_times(config, evidence.identity.uid)
     if folder is None:

@@ -5,10 +5,12 @@ from typing import Any, NamedTuple
 
 from companion.attitude import BodyRates, Target
 from companion.control.guidance_command import GuidanceCommand
+from companion.control.heading_frame import HeadingFrame
 from companion.control.sample_rows import LoopFlags
 from companion.control.step_rows import StepFlags, StepInput
 from companion.drag import Drag
 from companion.guidance import Reference
+from companion.guidance.reference import VerticalMode
 from companion.recording.mcap_file.loop_channels import ACTIONS, UNANSWERED_CODES
 from companion.vehicle.clock_jumps import Misfit
 from companion.vehicle.records import (
@@ -162,7 +164,9 @@ def recorded_step(row: Row, target: Row | None, guidance: Row | None) -> Recorde
             _vector(guidance, "reference", "m"),
             _vector(guidance, "reference", "m_s"),
             heading=guidance["reference_heading_rad"],
-            thrust_steps=not guidance["height_steady"],
+            vertical=(
+                VerticalMode.HEIGHT if guidance["height_steady"] else VerticalMode.HEIGHT_IN_STEPS
+            ),
         )
     return RecordedStep(inputs, None if target is None else _command(target), reference)
 
@@ -180,7 +184,7 @@ def _command(row: Row) -> GuidanceCommand:
         bool(row["is_step"]),
         None if no_body_rates else _rates(row, "body"),
         _none_if_nan(row["thrust"]),
-        row["turn_rad"],
+        HeadingFrame(row["turn_rad"]),
         later,
         row["period_s"],
     )

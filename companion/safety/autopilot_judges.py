@@ -84,31 +84,31 @@ def any_estimator_reset(snapshot: Snapshot, _: bool) -> str | None:
     if found.recent == 0:
         return None
     return (
-        f"the estimator was reset: {found.shift:.1f} m and {degrees(found.turn):.0f}° of heading "
-        "in total; the references moved with it"
+        f"the estimator was reset: {found.shift:.1f} m and {degrees(found.heading):.0f}° of "
+        "heading in total; the references moved with it"
     )
 
 
-def too_many_estimator_resets(most: int, shift: float, turn: float) -> Judge:
+def too_many_estimator_resets(most: int, shift: float, heading: float) -> Judge:
     """The estimator was reset more than `most` times within 30 s, or by too much in this flight.
 
-    Too much: position jumps of more than `shift` (m) in total, heading jumps of more than `turn`
-    (rad) in total, or one jump of the thrust axis by more than half of `turn`.
+    Too much: position jumps of more than `shift` (m) in total, heading jumps of more than
+    `heading` (rad) in total, or one jump of the thrust axis by more than half of `heading`.
     """
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
         found = snapshot.resets
         if found.shift > shift:
             reset = f"by {found.shift:.1f} m, more than safety.max_reset_m = {shift:g}"
-        elif abs(found.turn) > turn:
+        elif abs(found.heading) > heading:
             reset = (
-                f"by {degrees(abs(found.turn)):.0f}° of heading, more than "
-                f"safety.max_reset_deg = {degrees(turn):g}"
+                f"by {degrees(abs(found.heading)):.0f}° of heading, more than "
+                f"safety.max_reset_deg = {degrees(heading):g}"
             )
-        elif found.tilt > 0.5 * turn:
+        elif found.tilt > 0.5 * heading:
             reset = (
                 f"by {degrees(found.tilt):.0f}° of tilt, more than half of "
-                f"safety.max_reset_deg = {degrees(turn):g}"
+                f"safety.max_reset_deg = {degrees(heading):g}"
             )
         elif found.recent > most:
             reset = f"{found.recent} times within 30 s, more than safety.max_resets = {most}"

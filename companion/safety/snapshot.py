@@ -117,13 +117,13 @@ class Resets(NamedTuple):
     Attributes:
         recent: number of resets within the last 30 s.
         shift: length of the vector sum of the position jumps, m.
-        turn: sum of the heading jumps, with their signs, rad.
+        heading: sum of the heading jumps, with their signs, rad.
         tilt: largest jump of the thrust axis, rad.
     """
 
     recent: int = 0
     shift: float = 0.0
-    turn: float = 0.0
+    heading: float = 0.0
     tilt: float = 0.0
 
 

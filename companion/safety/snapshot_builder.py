@@ -5,6 +5,7 @@ from math import dist, inf
 from companion.attitude.representation import wrap_angle
 from companion.control.control_loop import ControlLoop
 from companion.control.guidance_loop import GuidanceLoop
+from companion.control.heading_frame import HeadingFrame
 from companion.guidance.fence import FenceCentre, Place
 from companion.guidance.reference import Vector, minus
 from companion.safety.counter_window import CounterWindow
@@ -33,6 +34,8 @@ class SnapshotBuilder:
 
     Attributes:
         echo: takes each ATTITUDE_TARGET.
+        fence_centre_ned: centre of the fence in the frame without estimator resets, m NED; None:
+            not known. It is where control began, unless `begin` got another centre.
 
     Args:
         link: link to the vehicle.
@@ -49,10 +52,10 @@ class SnapshotBuilder:
         self._window = CounterWindow(link, loop.record, real_time=real_time)
         self._frames_heard = 0
         self._heard_at = 0.0
-        self._fence_centre_ned: Vector | None = None
+        self.fence_centre_ned: Vector | None = None
         self._fence_place: Place | None = None
         self._began_at = 0.0
-        self._turn_at_begin = 0.0
+        self._frame_at_begin = HeadingFrame()
         self._shift_at_begin: Vector = (0.0, 0.0, 0.0)
         self._good_flags = 0
         self._clock_changes = 0
@@ -66,12 +69,13 @@ class SnapshotBuilder:
         """
         state, resets = self._link.state, self._loop.resets
         motion = self._guidance_loop.motion
-        self._fence_centre_ned = None if motion is None else motion.position_ned
+        self.fence_centre_ned = None if motion is None else motion.position_ned
         self._fence_place = self._place(now)
         if centre is not None:
-            self._fence_centre_ned = minus(centre.position_ned, resets.shift)
+            self.fence_centre_ned = minus(centre.position_ned, resets.shift)
             self._fence_place = centre.place
-        self._began_at, self._turn_at_begin, self._shift_at_begin = now, resets.turn, resets.shift
+        self._began_at = now
+        self._frame_at_begin, self._shift_at_begin = resets.frame, resets.shift
         resets.largest_tilt_jump = 0.0
         self._good_flags = 0 if state.estimator is None else state.estimator.flags
         self._clock_changes = self._link.clock.changes
@@ -81,18 +85,10 @@ class SnapshotBuilder:
     @property
     def fence_centre(self) -> FenceCentre | None:
         """Centre of the fence in the autopilot's frame; None before control or without position."""
-        if self._fence_centre_ned is None:
+        if self.fence_centre_ned is None:
             return None
         back = minus((0.0, 0.0, 0.0), self._loop.resets.shift)
-        return FenceCentre(minus(self._fence_centre_ned, back), self._fence_place)
-
-    @property
-    def fence_centre_ned(self) -> Vector | None:
-        """Centre of the fence in the frame without estimator resets, m NED; None: not known.
-
-        It is where control began, unless `begin` got another centre.
-        """
-        return self._fence_centre_ned
+        return FenceCentre(minus(self.fence_centre_ned, back), self._fence_place)
 
     def unheard(self, now: float) -> float | None:
         """How long no frame has come from the vehicle at `now`, s; None: it is heard."""
@@ -144,7 +140,7 @@ class SnapshotBuilder:
         )
 
     def _motion(self) -> Motion:
-        guidance_loop, loop, start = self._guidance_loop, self._loop, self._fence_centre_ned
+        guidance_loop, loop, start = self._guidance_loop, self._loop, self.fence_centre_ned
         offset, velocity = None, (0.0, 0.0, 0.0)
         if guidance_loop.motion is not None:
             (north, east, down), velocity = guidance_loop.motion
@@ -179,7 +175,7 @@ class SnapshotBuilder:
         return Resets(
             sum(at > since for at in resets.times),
             dist(resets.shift, self._shift_at_begin),
-            wrap_angle(resets.turn - self._turn_at_begin),
+            wrap_angle(resets.frame.offset - self._frame_at_begin.offset),
             resets.largest_tilt_jump,
         )
 

@@ -5,7 +5,14 @@ from contextlib import suppress
 
 from companion.attitude import coefficients, heading
 from companion.control.estimator_resets import EstimatorResets
-from companion.guidance.reference import Pose, Reference, ReferenceAt, VehicleMotion
+from companion.guidance.reference import (
+    Pose,
+    Reference,
+    ReferenceAt,
+    ThrustCommand,
+    TiltCommand,
+    VehicleMotion,
+)
 from companion.serve.ownership import ControlState, Ownership
 from companion.serve.setpoints.approach import UnplannableError
 from companion.serve.setpoints.motion import CommandedMotion
@@ -105,16 +112,17 @@ class ServedSource:
 
     def _direct_reference(self, request: AttitudeRequest | RatesRequest) -> Reference:
         position, heading_now = self._vehicle.position_ned, self._heading_now()
+        thrust = ThrustCommand(request.thrust)
         if isinstance(request, RatesRequest):
             return Reference(
-                position, heading=heading_now, body_rates=request.rates, thrust=request.thrust
+                position, heading=heading_now, horizontal=request.rates, vertical=thrust
             )
         return Reference(
             position,
-            heading=heading(request.q) - self.resets.turn,
+            heading=self.resets.frame.heading(heading(request.q)),
             heading_rate=request.yaw_rate,
-            coefficients=coefficients(request.q),
-            thrust=request.thrust,
+            horizontal=TiltCommand(coefficients(request.q)),
+            vertical=thrust,
         )
 
     def _without_jumps(self, request: MotionRequest) -> MotionRequest:
@@ -123,7 +131,7 @@ class ServedSource:
         return request._replace(
             horizontal=_shifted(request.horizontal, (north, east)),
             vertical=_shifted(request.vertical, (down,)),
-            yaw=None if request.yaw is None else request.yaw - self.resets.turn,
+            yaw=None if request.yaw is None else self.resets.frame.heading(request.yaw),
         )
 
 

@@ -11,7 +11,7 @@ from companion.least_squares import minimise
 from companion.study.step import Floats, Response, Step
 
 FIT_COLUMNS = ("second order: dead time, ms", "second order: ω, rad/s", "second order: ζ")
-"""Titles of `SecondOrderFit.cells`."""
+"""Titles of `DelayedSecondOrder.cells`."""
 
 _THINNING = 10
 """The second-order model is fitted to every tenth sample."""
@@ -83,7 +83,7 @@ def best_and_worst(values: Floats) -> tuple[int, int]:
     return int(ranked.argmin()), int(ranked.argmax())
 
 
-class SecondOrderFit(NamedTuple):
+class DelayedSecondOrder(NamedTuple):
     """A second-order model with a dead time.
 
     Attributes:
@@ -100,7 +100,7 @@ class SecondOrderFit(NamedTuple):
         return 1e3 * self.dead_time, self.model.frequency, self.model.damping
 
 
-def second_order_path(step: Step, fit: SecondOrderFit, time: Floats) -> Floats:
+def second_order_path(step: Step, fit: DelayedSecondOrder, time: Floats) -> Floats:
     """(n, 2) coefficients of the fitted model, from rest, at (n,) times after the step, s."""
     moving = np.maximum(time - fit.dead_time, 0.0)
     return np.array(
@@ -108,7 +108,7 @@ def second_order_path(step: Step, fit: SecondOrderFit, time: Floats) -> Floats:
     )
 
 
-def fit_second_order(step: Step, path: Floats) -> SecondOrderFit:
+def fit_second_order(step: Step, path: Floats) -> DelayedSecondOrder:
     """Fit natural frequency, damping ratio and dead time to a response by least squares.
 
     Args:
@@ -124,6 +124,6 @@ def fit_second_order(step: Step, path: Floats) -> SecondOrderFit:
     return _fit_from(minimise(residual, start, _LOWER_BOUNDS, _UPPER_BOUNDS).unknown)
 
 
-def _fit_from(unknown: Floats) -> SecondOrderFit:
+def _fit_from(unknown: Floats) -> DelayedSecondOrder:
     frequency, damping, dead_time = (float(value) for value in unknown)
-    return SecondOrderFit(SecondOrderReference(exp(frequency), exp(damping)), dead_time)
+    return DelayedSecondOrder(SecondOrderReference(exp(frequency), exp(damping)), dead_time)

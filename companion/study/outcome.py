@@ -15,8 +15,8 @@ Tick = Callable[[str], None]
 
 Cell = str | float | int
 
-Source = Literal["paper", "ours"]
-"""Source of a statement: "paper" is a claim of the paper, "ours" a statement of this project."""
+Claimant = Literal["paper", "ours"]
+"""Who claims a statement: the paper, or this project."""
 
 
 @dataclass(frozen=True)
@@ -75,13 +75,13 @@ class Finding:
     """A statement, and whether the computed numbers support it.
 
     Attributes:
-        source: source of the statement.
+        claimant: who claims the statement.
         statement: one sentence that can be true or false.
         holds: whether the numbers support it.
         evidence: the numbers, and the bound with which they were compared.
     """
 
-    source: Source
+    claimant: Claimant
     statement: str
     holds: bool
     evidence: str

@@ -112,9 +112,12 @@ def stability(config: Config, error: ModelError = EXACT) -> Margins:
     Raises:
         ConfigError: see `control_loop`.
     """
-    s = frequencies()
-    loop = control_loop(config, s, error)
-    return smaller_margins(margins(s, loop.whole), margins(s, loop.outer))
+    return loop_margins(control_loop(config, frequencies(), error))
+
+
+def loop_margins(loop: Loop) -> Margins:
+    """Margins of a loop at `frequencies`: each the smaller of those of `whole` and `outer`."""
+    return smaller_margins(margins(loop.s, loop.whole), margins(loop.s, loop.outer))
 
 
 def expected_errors(loop: Loop, disturbances: Disturbances, period: float) -> Errors:
@@ -209,16 +212,8 @@ def _after_gust(config: Config) -> tuple[float, float]:
     s = np.asarray(offset + 1j * omega, dtype=np.complex128)
     position, _ = control_loop(config, s).by_acceleration()
     time = np.arange(0.0, _RESPONSE_DURATION, _RESPONSE_PERIOD)
-    terms = np.real(np.exp(1j * np.outer(time, omega)) @ (position * _trapezoid(omega)))
+    terms = np.trapezoid(np.exp(1j * np.outer(time, omega)) * position, omega).real
     response = np.abs(np.exp(offset * time) * terms / pi)
     peak = float(response.max())
     unsettled = np.flatnonzero(response > _SETTLED_SHARE * peak)
     return peak, float(time[unsettled[-1]]) + _RESPONSE_PERIOD
-
-
-def _trapezoid(omega: Floats) -> Floats:
-    """Weights of the trapezoidal rule at equally spaced points."""
-    weights = np.full_like(omega, omega[1] - omega[0])
-    weights[0] *= 0.5
-    weights[-1] *= 0.5
-    return weights

@@ -94,8 +94,8 @@ def autopilot_like(config: Config) -> str:
 
     Otherwise "px4".
     """
-    slews = [axis.acceleration_limit for axis in config.vehicle.axes.values()]
-    return "px4" if slews[0] is None else "ardupilot"
+    roll = config.vehicle.axes["roll"]
+    return "px4" if roll.acceleration_limit is None else "ardupilot"
 
 
 def fly_course(config: Config, course: Course, autopilot: str, seed: int = 3) -> CourseResult:

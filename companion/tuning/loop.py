@@ -79,12 +79,15 @@ class Loop:
 
     def by_position_error(self) -> tuple[Complex, Complex]:
         """Position (m) and commanded body rate (rad/s) per error of the position, m."""
-        tilt = self._tilt(self.position)
-        return GRAVITY * tilt / (self.s * (self.s + self.drag)), tilt / self.rates
+        return self._by_measurement_error(self.position)
 
     def by_velocity_error(self) -> tuple[Complex, Complex]:
         """Position (m) and commanded body rate (rad/s) per error of the velocity, m/s."""
-        tilt = self._tilt(self.velocity)
+        return self._by_measurement_error(self.velocity)
+
+    def _by_measurement_error(self, feedback: Complex) -> tuple[Complex, Complex]:
+        """Position and commanded body rate per error of a measurement with this feedback."""
+        tilt = self._tilt(feedback)
         return GRAVITY * tilt / (self.s * (self.s + self.drag)), tilt / self.rates
 
     def _tilt(self, subtracted: Complex) -> Complex:
@@ -137,7 +140,7 @@ def control_loop(config: Config, s: Complex, error: ModelError = EXACT) -> Loop:
 
 def _slower_axis(config: Config) -> AxisResponse:
     """The configured response of the slower of roll and pitch; a heavy vehicle's if not known."""
-    if not config.vehicle.known:
+    if not config.vehicle.response_known:
         return AxisResponse(_USUAL_LAG, _USUAL_DEAD_TIME)
     lag, dead_time = slower_tilt(config)
     return AxisResponse(lag, dead_time, damping=tilt_damping(config))

@@ -75,7 +75,7 @@ def propose(
         ConfigError: lag and dead time are unknown, the analysis does not support planner or
             guidance, or no values keep the margins.
     """
-    if not config.vehicle.known:
+    if not config.vehicle.response_known:
         raise ConfigError(
             "vehicle.lag_ms and vehicle.dead_time_ms are not known; run `companion identify`, and "
             "tune with the file that it writes"

@@ -8,9 +8,9 @@ from typing import NamedTuple
 from companion.config import Config
 from companion.control.hold_settings import attitude_delay, slewing_delay
 from companion.control.inner_loop import sensible_gain, with_gain
-from companion.tuning.expectation import Disturbances, expected_errors
+from companion.tuning.expectation import Disturbances, expected_errors, loop_margins
 from companion.tuning.loop import ModelError, control_loop
-from companion.tuning.margins import Margins, frequencies, margins, smaller_margins
+from companion.tuning.margins import Margins, frequencies, margins
 
 _FIRST_STEP, _LAST_STEP = 0.4, 0.08
 """First and last step of the search: changes of the natural logarithm of a value."""
@@ -97,9 +97,10 @@ def largest_gain(config: Config) -> float:
 
 def largest_design(config: Config) -> Design:
     """The largest values that are searched for this vehicle."""
-    slews = [axis.acceleration_limit for axis in config.vehicle.axes.values()]
-    bandwidth = _LARGEST_DESIGN.bandwidth if slews[0] is None else _LARGEST_BANDWIDTH_SLEWING
-    return _LARGEST_DESIGN._replace(gain=largest_gain(config), bandwidth=bandwidth)
+    design = _LARGEST_DESIGN._replace(gain=largest_gain(config))
+    if config.vehicle.axes["roll"].acceleration_limit is None:
+        return design
+    return design._replace(bandwidth=_LARGEST_BANDWIDTH_SLEWING)
 
 
 def search(config: Config, disturbances: Disturbances, aims: Aims) -> Design:
@@ -175,8 +176,7 @@ def _cost(
     s = frequencies()
     loop = control_loop(candidate, s)
     expected = expected_errors(loop, disturbances, 1.0 / config.link.position_rate_hz)
-    exact = smaller_margins(margins(s, loop.whole), margins(s, loop.outer))
-    missed = _shortfall(exact, aims.gain_db, aims.phase_deg)
+    missed = _shortfall(loop_margins(loop), aims.gain_db, aims.phase_deg)
     missed += max(0.0, 3.0 * expected.rate / (aims.rate_share * config.limits.max_tilt_rate) - 1.0)
     cost = log(expected.position) + _COST_OF_MISSED_AIM * missed
     for error in errors_to_tolerate(candidate, aims):

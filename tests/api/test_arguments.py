@@ -8,8 +8,9 @@ import pytest
 
 from companion import Reference
 from companion.api.commanded import copied
-from companion.attitude import Coefficients
+from companion.attitude import BodyRates, Coefficients
 from companion.files.yaml_file import ConfigError
+from companion.guidance.reference import ThrustCommand, TiltCommand
 from companion.guidance.trajectory import Hover, Sample
 from tests.api.test_flying import flown
 from tests.flight.fly import QuickVehicle
@@ -64,12 +65,22 @@ def test_references_are_copied_so_that_a_program_may_reuse_its_arrays():
 
 def test_a_copied_reference_holds_plain_numbers():
     arrays = Reference(np.ones(3), [1, 2, 3], np.zeros(3, np.float32), np.float64(1.0))
-    for reference in (arrays, arrays._replace(coefficients=np.zeros(2))):
+    for reference in (arrays, arrays._replace(horizontal=TiltCommand(np.zeros(2)))):
         made = copied(reference)
         assert made.position_ned == (1.0, 1.0, 1.0)
         assert made.velocity_ned == (1.0, 2.0, 3.0)
         assert type(made.heading) is type(made.acceleration_ned[0]) is float
-    assert isinstance(copied(arrays._replace(coefficients=(0, 0))).coefficients, Coefficients)
+    tilted = copied(arrays._replace(horizontal=TiltCommand((0, 0), trimmed=True))).horizontal
+    assert isinstance(tilted.coefficients, Coefficients)
+    assert tilted.trimmed
+
+
+@pytest.mark.parametrize(
+    "changes", [{"horizontal": Coefficients(0.0, 0.0)}, {"vertical": 0.5}, {"vertical": None}]
+)
+def test_a_command_of_another_type_is_refused_with_the_types_that_are_meant(changes):
+    with pytest.raises(TypeError, match=rf"^{next(iter(changes))} is a \w+Mode"):
+        copied(Reference(REST)._replace(**changes))
 
 
 @pytest.mark.parametrize(
@@ -80,12 +91,23 @@ def test_a_copied_reference_holds_plain_numbers():
         ("acceleration_ned", None),
         ("heading", "north"),
         ("heading_rate", nan),
-        ("body_rates", (0.0, 0.0)),
-        ("thrust", inf),
     ],
 )
 def test_what_is_wrong_in_a_reference_is_named(field, value):
     with pytest.raises(ValueError, match=f"{field} must be"):
+        copied(Reference(REST)._replace(**{field: value}))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "field", "value"),
+    [
+        ("body_rates", "horizontal", BodyRates(0.0, nan, 0.0)),
+        ("east", "horizontal", TiltCommand(Coefficients(0.0, inf))),
+        ("thrust", "vertical", ThrustCommand(inf)),
+    ],
+)
+def test_what_is_wrong_in_a_command_is_named(wrong, field, value):
+    with pytest.raises(ValueError, match=f"{wrong} must be"):
         copied(Reference(REST)._replace(**{field: value}))
 
 

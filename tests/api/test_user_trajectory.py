@@ -8,7 +8,7 @@ import pytest
 
 import companion
 from companion.guidance.trajectory import Sample, TrajectoryError, evenly_slowed, line
-from companion.guidance.trajectory.user_trajectory import UserTrajectory, checked_trajectory
+from companion.guidance.trajectory.own_trajectory import UserTrajectory, checked_trajectory
 from companion.testing import connect, run
 from companion.user_code import MESSAGE_START, UserCodeError, naming_user_code
 from tests.flight.fly import OTHER_VEHICLES, QUICK_FLIGHT, QuickVehicle, merged

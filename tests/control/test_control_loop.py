@@ -468,7 +468,7 @@ def test_after_a_jump_of_the_heading_the_target_is_told_without_it():
     bench.run(3)
     told = AttitudeTarget(3000 + 4 * 4, facing(0.3))
     bench.run(1, q=facing(0.5))
-    assert bench.loop.resets.turn == pytest.approx(0.5)
+    assert bench.loop.resets.frame.offset == pytest.approx(0.5)
     assert planner.noted == []
     told = AttitudeTarget(3000 + 4 * 5, facing(0.8))
     bench.run(1, q=facing(0.5))

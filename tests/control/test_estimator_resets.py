@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from companion.attitude import BodyRates, Target, coefficients, heading
 from companion.control.estimator_resets import EstimatorResets
+from companion.control.heading_frame import HeadingFrame
 from companion.vehicle.records import AttitudeSample, LocalPosition
 from tests.flight.fly import fly, mock_vehicle
 
@@ -44,7 +45,7 @@ class Tumbling:
 def test_a_tumbling_vehicle_is_not_taken_for_a_jump(dt):
     body = Tumbling(dt)
     assert not any(body.step() for _ in range(100))
-    assert (body.resets.turn, list(body.resets.times)) == (0.0, [])
+    assert (body.resets.frame.offset, list(body.resets.times)) == (0.0, [])
 
 
 def test_jumps_in_heading_add_up_the_short_way_and_the_attitude_goes_on_without_them():
@@ -54,27 +55,28 @@ def test_jumps_in_heading_add_up_the_short_way_and_the_attitude_goes_on_without_
         assert not body.step(turn(angle))
         body.time += 1.0  # too long ago to compare with
         body.step()
-    assert body.resets.turn == pytest.approx(3.3 - 2 * np.pi, abs=0.01)
+    assert body.resets.frame.offset == pytest.approx(3.3 - 2 * np.pi, abs=0.01)
     assert len(body.resets.times) == 3
-    before = turn(-body.resets.turn) * body.rotation
-    assert body.resets.attitude(quaternion(body.rotation)) == pytest.approx(quaternion(before))
+    before = turn(-body.resets.frame.offset) * body.rotation
+    assert body.resets.frame.attitude(quaternion(body.rotation)) == pytest.approx(
+        quaternion(before)
+    )
 
 
 def test_a_jump_of_the_thrust_axis_is_no_turn():
     body = Tumbling()
     body.step()
     assert body.step(Rotation.from_euler("x", 0.2))
-    assert body.resets.turn == 0.0
+    assert body.resets.frame.offset == 0.0
     assert body.resets.largest_tilt_jump == pytest.approx(0.2, abs=0.01)
 
 
 def test_a_target_is_turned_with_the_attitude_so_that_they_differ_as_before():
-    resets = EstimatorResets()
-    resets.turn = 0.4
+    frame = HeadingFrame(0.4)
     tilted = turn(0.4) * Rotation.from_euler("zyx", (0.2, 0.1, -0.3))
     there = coefficients(quaternion(tilted))
-    q = resets.attitude(quaternion(tilted))
-    assert resets.target(Target(*there, 1.0), 0.4)[:2] == pytest.approx(coefficients(q))
+    q = frame.attitude(quaternion(tilted))
+    assert frame.target(Target(*there, 1.0))[:2] == pytest.approx(coefficients(q))
     assert heading(q) == pytest.approx(heading(quaternion(tilted)) - 0.4)
 
 
@@ -117,7 +119,7 @@ def test_a_jump_in_heading_is_4_degrees_and_half_of_what_the_rates_changed(
     for time, angle, roll in ((5.0, 0.0, -0.5 * change), (5.0 + dt, turned, 0.5 * change)):
         q = quaternion(turn(angle))
         resets.on_attitude(AttitudeSample(0, time, time, 0, q, BodyRates(roll, 0.0, 0.0)))
-    assert resets.turn == pytest.approx(turned if found else 0.0)
+    assert resets.frame.offset == pytest.approx(turned if found else 0.0)
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from companion.config import Config
 from companion.control.estimator_resets import EstimatorResets
 from companion.control.guidance_command import GuidanceCommand
 from companion.control.guidance_loop import GuidanceLoop
+from companion.control.heading_frame import HeadingFrame
 from companion.control.outer_loop import make_guidance, motion_estimate
 from companion.guidance import Doublets, ManeuverSequence, Pose
 from companion.guidance.braking import AssumedBraking
@@ -68,7 +69,7 @@ class Bench:
             max_tilt=radians(30.0),
             assumed_braking=AssumedBraking(0.3, 2.5),
             period=0.02,
-            position_stale=0.3,
+            max_position_age=0.3,
             clock=lambda: self.now,
             vehicle_clock=self.clock,
         )
@@ -142,13 +143,16 @@ def test_a_vehicle_that_never_comes_back_from_open_loop_is_off_its_course():
 def test_jumps_on_the_ground_are_corrections_and_are_not_kept_out():
     """A compass or GPS that settles before take-off improves the estimate: no reset to hide."""
     bench = Bench()
-    bench.loop.resets.turn, bench.loop.resets.shift = 0.5, (3.0, 0.0, 0.0)
+    bench.loop.resets.frame, bench.loop.resets.shift = HeadingFrame(0.5), (3.0, 0.0, 0.0)
     bench.ground.standing = True
     bench.fly(IN_HOLD)
-    assert bench.loop.resets.turn == 0.5  # in control "landed" is not believed
+    assert bench.loop.resets.frame.offset == 0.5  # in control "landed" is not believed
     bench.loop.offboard_active = False
     bench.fly(IN_HOLD)
-    assert (bench.loop.resets.turn, bench.loop.resets.shift) == (0.0, (0.0, 0.0, 0.0))
+    assert (bench.loop.resets.frame, bench.loop.resets.shift) == (
+        HeadingFrame(0.0),
+        (0.0, 0.0, 0.0),
+    )
 
 
 def test_a_position_that_lags_the_attitude_is_as_old_as_it_says():
@@ -208,9 +212,9 @@ def test_on_the_ground_the_command_is_idle_only_while_that_is_safe():
 
 def test_a_command_tells_when_it_was_made_and_where_its_target_moves():
     bench = Bench()
-    bench.loop.resets.turn = 0.25
+    bench.loop.resets.frame = HeadingFrame(0.25)
     command = bench.fly(IN_HOLD)
-    assert (command.made_at, command.period, command.turn) == (13.0, 0.02, 0.25)
+    assert (command.made_at, command.period, command.frame.offset) == (13.0, 0.02, 0.25)
     assert (command.idle, command.is_step, command.thrust) == (False, False, None)
     assert command.later is not None
 

@@ -294,7 +294,7 @@ class Observer:
 
     def __init__(self):
         self.turns, self.settings = [], []
-        self.turn, self.retune = self.turns.append, self.settings.append
+        self.rotate_disturbance, self.retune = self.turns.append, self.settings.append
 
 
 def estimate(observer=None, **drag):
@@ -307,7 +307,7 @@ def estimate(observer=None, **drag):
 def test_only_a_new_reset_of_the_heading_turns_the_estimate():
     made, resets = estimate(observer := Observer())
     for turn in (0.0, 0.5, 0.5, 0.25):
-        made.turn_to(turn)
+        made.note_heading_resets(turn)
     assert (observer.turns, len(resets)) == ([0.5, -0.25], 2)
     made.retune("settings", "of the correction")
     assert (observer.settings, resets[2:]) == (["settings"], ["of the correction"])

@@ -4,6 +4,7 @@ from math import isnan, sqrt
 
 from companion.attitude import BodyRates, Target
 from companion.control.guidance_command import GuidanceCommand
+from companion.control.heading_frame import HeadingFrame
 from companion.control.step_rows import StepEntry, StepFlags, StepInput, StepOutput, StepRows
 from companion.drag import Drag
 from companion.guidance import GuidanceInput, Reference, VehicleMotion
@@ -34,7 +35,7 @@ COMMAND = GuidanceCommand(
     True,
     BodyRates(0.5, 0.6, 0.7),
     0.55,
-    0.8,
+    HeadingFrame(0.8),
     Target(0.11, 0.21, 0.31, 0.41),
     0.02,
 )

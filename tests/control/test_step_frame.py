@@ -85,7 +85,7 @@ def test_after_steps_the_turn_decays_and_guidance_gets_the_acceleration_it_asked
     vehicle.fly(DT, is_step=True)
     vehicle.fly(0.5, 4.0, is_step=True)
     seen = vehicle.fly(DT, is_step=False)
-    turn = heading(vehicle.runner._resets.attitude(turned_about_vertical(TRUE, vehicle.error)))
+    turn = heading(vehicle.resets.frame.attitude(turned_about_vertical(TRUE, vehicle.error)))
     turn -= heading(seen.q)
     assert turn == pytest.approx(radians(2.0), abs=1e-3)
     # The horizontal target is turned as the attitude is: the acceleration is what guidance asked.

@@ -10,6 +10,7 @@ from companion.control.flown_source import FlownSource
 from companion.control.tracking_record import FlownPart, TrackingRecord, flown_part
 from companion.guidance import Doublets, ManeuverSequence, Pose, Reference, VehicleMotion
 from companion.guidance.follow import Follow
+from companion.guidance.reference import HorizontalMode, TiltCommand, VerticalMode
 from companion.guidance.source import ManeuverSource
 from companion.guidance.trajectory import Laps, circle
 from companion.recording.trace import FlightTrace, ManeuverMark
@@ -40,12 +41,12 @@ def test_what_is_flown_has_its_name_and_its_time():
 
 def test_only_a_trajectory_is_followed():
     flown, follow = FlownSource(), Follow(circle(5.0, Laps(2.0)), yaw_rate=1.0)
-    assert flown.following(12.0, 0.25) is None
+    assert flown.following(12.0) is None
     flown.begin(program(), POSE, 10.0)
-    assert flown.following(12.0, 0.25) is None
+    assert flown.following(12.0) is None
     flown.begin(ManeuverSource(ManeuverSequence([DOUBLETS, follow])), POSE, 10.0)
-    assert flown.following(12.0, 0.25) is None
-    assert flown.following(12.5 + DOUBLETS.duration, 0.25) == (follow, 2.5, POSE, 0.25)
+    assert flown.following(12.0) is None
+    assert flown.following(12.5 + DOUBLETS.duration) == (follow, 2.5, POSE)
 
 
 def test_a_maneuver_is_told_once_and_its_end_is_marked():
@@ -65,9 +66,9 @@ def test_a_maneuver_is_told_once_and_its_end_is_marked():
 @pytest.mark.parametrize(
     ("reference", "known"),
     [
-        (Reference((1.0, 2.0, -3.0), drifting=True), [False, False, True]),
-        (Reference((1.0, 2.0, -3.0), body_rates=BodyRates(0.1, 0.0, 0.0)), [False, False, True]),
-        (Reference((1.0, 2.0, -3.0), holds_height=False), [True, True, False]),
+        (Reference((1.0, 2.0, -3.0), horizontal=HorizontalMode.ACCELERATION), [False, False, True]),
+        (Reference((1.0, 2.0, -3.0), horizontal=BodyRates(0.1, 0.0, 0.0)), [False, False, True]),
+        (Reference((1.0, 2.0, -3.0), vertical=VerticalMode.ACCELERATION), [True, True, False]),
     ],
 )
 def test_what_is_no_reference_is_nan(reference, known):
@@ -81,7 +82,7 @@ def test_open_loop_before_a_vehicle_has_returned_gives_it_no_more_time_to_return
     flown, away = FlownSource(), VehicleMotion((30.0, 2.0, -3.0), (0.0, 0.0, 0.0))
     flown.begin(program(), POSE, 0.0)
     hold = Reference(POSE.position_ned)
-    step = hold._replace(coefficients=Coefficients(0.2, 0.0))
+    step = hold._replace(horizontal=TiltCommand(Coefficients(0.2, 0.0)))
     for began in (0.0, 5.0, 10.0):
         for second in range(5):
             reference = step if second < 2 else hold

@@ -122,7 +122,7 @@ def test_px4s_response_is_found_as_the_judge_finds_it(px4, axis):
     assert found.lag == pytest.approx(lag, rel=0.05)
     assert found.dead_time == pytest.approx(dead_time, abs=0.003)
     assert found.slew is None
-    assert found.reason() is None
+    assert found.flaw() is None
 
 
 @pytest.mark.parametrize(
@@ -164,7 +164,7 @@ def test_a_first_order_rate_loop_gives_back_its_configured_numbers(tmp_path):
         assert found.dead_time == pytest.approx(delay + SENSOR_DELAY, abs=0.003), axis
         assert found.gain == pytest.approx(1.0, abs=0.02), axis
         assert found.slew is None
-    assert vehicle.faults() == {}
+    assert vehicle.flaws() == {}
 
 
 @pytest.mark.slow
@@ -188,7 +188,7 @@ def test_gusts_and_a_noisy_gyroscope_hardly_move_what_is_found(px4, tmp_path):
         # Of eight flights, seeds 1 to 8, the farthest: 4.0 % and 0.9 ms.
         assert found.lag == pytest.approx(calm.lag, rel=0.05), axis
         assert found.dead_time == pytest.approx(calm.dead_time, abs=0.0015), axis
-    assert vehicle.faults() == {}
+    assert vehicle.flaws() == {}
 
 
 @pytest.mark.slow
@@ -202,7 +202,7 @@ def test_ardupilots_acceleration_limits_are_told_from_its_lags(tmp_path):
     assert vehicle.roll.lag == pytest.approx(0.021, abs=0.009)
     assert vehicle.yaw.lag + vehicle.yaw.dead_time == pytest.approx(0.199, abs=0.015)
     assert vehicle.yaw.lag == pytest.approx(0.056, abs=0.009)
-    assert vehicle.faults() == {}
+    assert vehicle.flaws() == {}
 
 
 def test_a_doublet_that_tilts_too_far_is_given_up_and_the_vehicle_lands():

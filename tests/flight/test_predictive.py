@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from companion.attitude import BodyRates, Target
+from companion.control.heading_frame import HeadingFrame
 from companion.control.predictive import Following, Predictive
 from companion.guidance import GRAVITY, LinearCommand, Pose
 from companion.guidance.follow import Follow
@@ -122,6 +123,14 @@ def answer(number, time, north=0.3):
 LINEAR = Target(0.1, 0.2, 0.3), -0.5
 
 
+def command(predictive, vehicle, following):
+    """Target and downward acceleration to fly; the estimator was never reset."""
+    target, down = LINEAR
+    linear = LinearCommand(target, target, down)
+    flown = predictive.replacement_for(linear, HeadingFrame(), vehicle, following)
+    return flown.target, flown.down
+
+
 def where(time):
     part = Follow(circle(5.0, Laps(2.0)), yaw_rate=1.0)
     return Following(part, time, Pose((0.0, 0.0, -5.0), 0.4))
@@ -129,9 +138,9 @@ def where(time):
 
 def test_the_answer_for_now_is_flown_with_its_thrust():
     predictive, solver, _ = bench()
-    assert predictive.command(LINEAR, vehicle(10.0), where(0.0)) == LINEAR
+    assert command(predictive, vehicle(10.0), where(0.0)) == LINEAR
     solver.answer = answer(1, 10.02)
-    target, down = predictive.command(LINEAR, vehicle(10.02), where(0.02))
+    target, down = command(predictive, vehicle(10.02), where(0.02))
     assert target == Target(0.3, 0.0, 0.1)
     assert GRAVITY - down == pytest.approx(12.0 * (1.0 - 0.3**2) ** 0.5)
     asked = solver.requests[-1]
@@ -144,30 +153,30 @@ def test_it_works_in_the_estimators_frame_with_the_heading_resets():
     predictive, solver, _ = bench()
     later = Target(0.15, 0.25, 0.35)
     linear = LinearCommand(LINEAR[0], later, LINEAR[1])
-    following = where(0.0)._replace(turn=0.5)
-    assert predictive.replacement_for(linear, 0.5, vehicle(10.0), following) is linear
+    following, frame = where(0.0), HeadingFrame(0.5)
+    assert predictive.replacement_for(linear, frame, vehicle(10.0), following) is linear
     (asked,) = solver.requests
     assert (asked.vehicle, asked.start) == (vehicle(10.0), Start((0.0, 0.0, -5.0), 0.9))
     thrust = (GRAVITY + 0.5) / (1.0 - 0.1**2 - 0.2**2) ** 0.5
     (flown,) = asked.inputs
     assert flown == (10.0, 0.1, 0.2, pytest.approx(0.8), pytest.approx(thrust))
     solver.answer = answer(1, 10.02)
-    command = predictive.replacement_for(linear, 0.5, vehicle(10.02), following)
+    command = predictive.replacement_for(linear, frame, vehicle(10.02), following)
     assert command.target == command.later == Target(0.3, 0.0, pytest.approx(-0.4))
     assert command.down == pytest.approx(GRAVITY - 12.0 * (1.0 - 0.3**2) ** 0.5)
 
 
 def test_an_answer_for_another_time_is_not_flown():
     predictive, solver, _ = bench()
-    predictive.command(LINEAR, vehicle(10.0), where(0.0))
+    command(predictive, vehicle(10.0), where(0.0))
     solver.answer = answer(1, 10.02)
-    assert predictive.command(LINEAR, vehicle(10.2), where(0.2)) == LINEAR
+    assert command(predictive, vehicle(10.2), where(0.2)) == LINEAR
 
 
 def test_without_a_trajectory_nothing_is_asked():
     predictive, solver, _ = bench()
     solver.answer = answer(1, 10.0)
-    assert predictive.command(LINEAR, vehicle(10.0), None) == LINEAR
+    assert command(predictive, vehicle(10.0), None) == LINEAR
     assert solver.requests == []
 
 

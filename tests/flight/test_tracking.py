@@ -119,7 +119,7 @@ def test_what_the_limits_do_not_allow_is_refused_or_slowed_down():
 
 @pytest.mark.parametrize("heading", [0.0, 2.0, -3.0])
 def test_a_trajectory_along_its_path_begins_with_a_turn_from_the_vehicles_heading(heading):
-    eight = gerono_eight(3.0, Laps(2.0, along=True))
+    eight = gerono_eight(3.0, Laps(2.0, face_path=True))
     part, start = Follow(eight, yaw_rate=1.0), Pose((1.0, 2.0, -5.0), heading)
     longest = part.duration
     first = part.at(0.0, start)

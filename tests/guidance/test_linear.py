@@ -25,6 +25,7 @@ from companion.guidance import (
     specific_thrust,
 )
 from companion.guidance.feedback import ChainGains
+from companion.guidance.reference import HorizontalMode, TiltCommand, VerticalMode
 
 REST = (0.0, 0.0, 0.0)
 THRUST = 2.0, 18.0  # m/s²
@@ -150,7 +151,7 @@ def test_every_command_can_be_flown(position, velocity, thrust, disturbance):
 
 
 def test_open_loop_coefficients_pass_unchanged_while_height_is_held():
-    reference = Reference((0.0, 0.0, -5.0), coefficients=Coefficients(0.2, -0.1))
+    reference = Reference((0.0, 0.0, -5.0), horizontal=TiltCommand(Coefficients(0.2, -0.1)))
     motion = VehicleMotion((7.0, 7.0, -4.0), (3.0, 3.0, 0.0))
     situation = GuidanceInput(motion, motion, (0.0, 0.0), (1.0, 1.0), DRAG, THRUST)
     target, _, down = LinearGuidance(SETTINGS).command(lambda _: reference, 0.0, situation)
@@ -168,40 +169,43 @@ def test_thrust_balances_the_drag_of_climb_and_descent_where_the_height_is_held(
         return LinearGuidance(SETTINGS).command(lambda _: reference, 0.0, situation).down
 
     assert down(reference) == pytest.approx((0.8 + 0.1 * math.hypot(3.0, climb)) * climb)
-    assert down(reference._replace(holds_height=False)) == 0.0
+    assert down(reference._replace(vertical=VerticalMode.ACCELERATION)) == 0.0
 
 
-def test_drifting_it_asks_for_what_holds_against_the_wind_wherever_it_is():
+def test_by_acceleration_alone_it_asks_for_what_holds_against_the_wind_wherever_it_is():
     motion = VehicleMotion((7.0, 7.0, -5.0), (3.0, 3.0, 0.0))
     situation = GuidanceInput(motion, motion, (0.5, 0.5), (1.0, -0.5), DRAG, THRUST)
-    reference = Reference((0.0, 0.0, -5.0), drifting=True)
+    reference = Reference((0.0, 0.0, -5.0), horizontal=HorizontalMode.ACCELERATION)
     target, later, down = LinearGuidance(SETTINGS).command(lambda _: reference, 0.0, situation)
     assert acceleration(target, down)[:2] == pytest.approx([-1.0, 0.5])
     assert later == target
 
 
-def test_steps_from_rest_are_added_to_the_mean_of_the_drift_just_before_them():
+def test_trimmed_steps_are_added_to_the_mean_of_the_pause_just_before_them():
     guidance, motion = LinearGuidance(SETTINGS), VehicleMotion((0.0, 0.0, -5.0), REST)
 
-    def target(wind, **changes):
+    def target(wind, horizontal=HorizontalMode.POSITION):
         inputs = GuidanceInput(motion, motion, (0.0, 0.0), wind, DRAG, THRUST)
-        reference = Reference(motion.position_ned)._replace(**changes)
+        reference = Reference(motion.position_ned, horizontal=horizontal)
         return np.array(guidance.command(lambda _: reference, 0.0, inputs).target[:2])
 
-    def step(wind, **changes):
-        return target(wind, coefficients=Coefficients(0.2, -0.1), **changes)
+    def pause(wind):
+        return target(wind, HorizontalMode.ACCELERATION)
+
+    def step(wind, *, trimmed=True):
+        return target(wind, TiltCommand(Coefficients(0.2, -0.1), trimmed))
 
     strong = (3.0, 3.0)
-    assert step(strong, from_rest=True) == pytest.approx([0.2, -0.1])  # no drift came before
-    target(strong, drifting=True)
-    target(strong)  # the hold goes on: the drift that follows is another one
-    mean = 0.5 * (target((0.2, 0.4), drifting=True) + target((0.4, 0.2), drifting=True))
+    assert step(strong) == pytest.approx([0.2, -0.1])  # no pause came before
+    pause(strong)
+    target(strong)  # the hold goes on: the pause that follows is another one
+    mean = 0.5 * (pause((0.2, 0.4)) + pause((0.4, 0.2)))
     assert mean == pytest.approx([-0.3 / GRAVITY] * 2, rel=2e-3)
     for _ in range(2):
-        assert step(strong, from_rest=True) == pytest.approx(np.add([0.2, -0.1], mean))
-    assert step(strong) == pytest.approx([0.2, -0.1])
-    again = target((-0.2, 0.0), drifting=True)
-    assert step(strong, from_rest=True) == pytest.approx(np.add([0.2, -0.1], again))
+        assert step(strong) == pytest.approx(np.add([0.2, -0.1], mean))
+    assert step(strong, trimmed=False) == pytest.approx([0.2, -0.1])
+    again = pause((-0.2, 0.0))
+    assert step(strong) == pytest.approx(np.add([0.2, -0.1], again))
 
 
 def test_the_heading_is_asked_for_ahead_of_its_response():
@@ -223,7 +227,7 @@ def test_without_feedback_the_later_target_is_the_one_of_a_period_later():
 
 
 def test_an_open_loop_step_does_not_move():
-    step = Reference((0.0, 0.0, -5.0), coefficients=Coefficients(0.2, -0.1))
+    step = Reference((0.0, 0.0, -5.0), horizontal=TiltCommand(Coefficients(0.2, -0.1)))
     situation = GuidanceInput(
         VehicleMotion(REST, REST), VehicleMotion(REST, REST), (0.0, 0.0), (0.0, 0.0), DRAG, THRUST
     )

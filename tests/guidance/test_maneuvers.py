@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from companion.guidance import Corners, ManeuverSequence, Pose, Steps
 from companion.guidance.follow import circle, hover
+from companion.guidance.reference import HorizontalMode
 
 START = Pose((3.0, -2.0, -5.0), 0.7)
 CIRCLES = [(3.0, 2.0, 1.0), (1.0, 3.0, 0.2), (8.0, 0.5, 2.5)]
@@ -62,16 +63,15 @@ def test_steps_leave_an_ideal_vehicle_where_it_was():
 
 @pytest.mark.parametrize("maneuvers", [Steps(0.25, 1.0, 3.0), Corners(0.3, 0.4, 1.0, 2.0)])
 def test_the_hold_pauses_before_a_run_of_steps_and_nowhere_else(maneuvers):
-    drifted, before = 0.0, hover(1.0).at(0.0, START)
+    paused, before = 0.0, hover(1.0).at(0.0, START)
     for k in range(round(maneuvers.duration / 0.01)):
         reference = maneuvers.at(0.01 * k + 0.005, START)
-        assert not (reference.drifting and reference.coefficients)
-        drifted += 0.01 * reference.drifting
+        paused += 0.01 * (reference.horizontal is HorizontalMode.ACCELERATION)
         if reference.coefficients and not before.coefficients:
-            assert before.drifting
+            assert before.horizontal is HorizontalMode.ACCELERATION
         before = reference
     runs = 3 if isinstance(maneuvers, Steps) else 1
-    assert drifted == pytest.approx(runs * 1.0)
+    assert paused == pytest.approx(runs * 1.0)
 
 
 def test_the_circle_gathers_speed_as_a_raised_cosine_and_no_lap_is_too_long_to_check():

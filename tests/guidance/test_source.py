@@ -5,6 +5,7 @@ import pytest
 from companion.attitude import Coefficients
 from companion.guidance import ManeuverSequence, Pose, Reference, VehicleMotion
 from companion.guidance.maneuvers import Corners
+from companion.guidance.reference import HorizontalMode, TiltCommand, VerticalMode
 from companion.guidance.source import CommandedSource, ManeuverSource, continued
 
 POSE = Pose((1.0, 2.0, -3.0), 0.5)
@@ -113,9 +114,9 @@ def test_the_jerk_is_told_or_follows_from_the_reference_before():
 @pytest.mark.parametrize(
     "other",
     [
-        FIRST._replace(drifting=True),
-        FIRST._replace(holds_height=False),
-        FIRST._replace(coefficients=Coefficients(0.1, 0.0)),
+        FIRST._replace(horizontal=HorizontalMode.ACCELERATION),
+        FIRST._replace(vertical=VerticalMode.ACCELERATION),
+        FIRST._replace(horizontal=TiltCommand(Coefficients(0.1, 0.0))),
     ],
 )
 def test_another_kind_of_reference_has_no_jerk(other):

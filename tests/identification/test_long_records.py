@@ -50,7 +50,7 @@ def test_half_an_hour_at_250_hz_is_fitted_by_its_liveliest_part(work, slew):
     assert found.lag == pytest.approx(0.03, rel=0.05)
     assert found.dead_time == pytest.approx(0.04, abs=0.001)
     assert found.slew == (None if slew is None else pytest.approx(slew, rel=0.03))
-    assert found.is_good(), found.reason()
+    assert found.is_good(), found.flaw()
     assert max(work) < 40_000
     assert sum(work) < 15_000_000  # about 1 s; the whole record would be 50 times as much
 

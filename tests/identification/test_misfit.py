@@ -31,7 +31,7 @@ def flown(doublets, plant, seed, noise=RATE_NOISE):
 def test_a_second_order_is_good_repeats_and_is_told(plant, doublets):
     found = [fit_rate_response(*flown(doublets, plant, seed), gain=1.0) for seed in range(3)]
     for each in found:
-        assert each.is_good(), each.reason()
+        assert each.is_good(), each.flaw()
         assert 0.05 < each.fit.misfit < 0.2
         nearer = each.second_order
         assert 2.0 * nearer.damping / nearer.frequency + nearer.dead_time == pytest.approx(
@@ -66,7 +66,7 @@ def test_first_order_is_not_called_second_order():
 def test_a_loop_that_hardly_is_damped_is_a_poor_fit_without_any_noise():
     plant = {"frequency": 12.0, "damping": 0.08, "dead_time": 0.02}
     found = fit_rate_response(*flown(SLOW, plant, 1, 0.0), gain=1.0)
-    assert found.reason().startswith("poor fit: the model's error is")
+    assert found.flaw().startswith("poor fit: the model's error is")
     assert max(found.fit.lag_error, found.fit.dead_time_error) < 0.01
 
 
@@ -74,7 +74,7 @@ def test_the_yaw_of_a_real_arducopter_is_good():
     """Cut out of a flight that was refused as uncertain by 29 ms; five repeat within 3 ms."""
     recorded = np.load(CUT)
     found = fit_rate_response(*recorded["commands"].T, *recorded["rates"].T, gain=1.0)
-    assert found.is_good(), found.reason()
+    assert found.is_good(), found.flaw()
     assert found.lag == pytest.approx(0.054, abs=0.004)
     assert found.dead_time == pytest.approx(0.143, abs=0.004)
     assert np.degrees(found.slew) == pytest.approx(265.0, abs=8.0)
@@ -96,7 +96,7 @@ def test_unlike_axes_are_found_each_for_itself():
     setpoints = np.column_stack((times, asked, asked, asked, np.full(times.size, 0.5)))
     rates = np.column_stack((times, *(part[3] for part in parts)))
     vehicle = identify_vehicle(setpoints.tolist(), rates.tolist(), [])
-    assert vehicle.faults() == {}
+    assert vehicle.flaws() == {}
     whole = [each.lag + each.dead_time for each in (vehicle.roll, vehicle.pitch)]
     expected = [2 * p["damping"] / p["frequency"] + p["dead_time"] for p in axes[:2]]
     assert whole == pytest.approx(expected, rel=0.1)

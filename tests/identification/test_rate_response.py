@@ -28,7 +28,7 @@ def test_tilt_axes_come_back(lag, dead_time, rate_hz):
     assert found.dead_time == pytest.approx(dead_time, abs=0.001)
     assert found.gain == pytest.approx(1.0, abs=0.01)
     assert found.slew is None
-    assert found.is_good(), found.reason()
+    assert found.is_good(), found.flaw()
 
 
 def test_a_slow_axis_with_gain_and_offset_comes_back():
@@ -36,7 +36,7 @@ def test_a_slow_axis_with_gain_and_offset_comes_back():
     assert found.lag == pytest.approx(0.37, rel=0.02)
     assert found.dead_time == pytest.approx(0.102, abs=0.001)
     assert found.gain == pytest.approx(0.92, abs=0.01)
-    assert found.is_good(), found.reason()
+    assert found.is_good(), found.flaw()
 
 
 @pytest.mark.parametrize(
@@ -101,7 +101,7 @@ def test_the_mocks_roll_and_pitch_are_those_measured_on_px4(axis):
     assert found.lag == pytest.approx(0.047, rel=0.15)
     assert found.dead_time == pytest.approx(0.040, abs=0.005)
     assert found.slew is None
-    assert found.is_good(), found.reason()
+    assert found.is_good(), found.flaw()
 
 
 @pytest.mark.parametrize("sizes", [(0.5,), (0.3, 0.6, 1.2)])
@@ -115,21 +115,19 @@ def test_the_mocks_yaw_is_as_late_and_as_short_as_the_one_measured_on_px4():
     assert found.lag + found.dead_time == pytest.approx(2 * 0.94 / 5.6 + 0.045, rel=0.1)
     assert found.gain == pytest.approx(0.92, abs=0.03)
     assert found.slew is None
-    assert found.is_good(), found.reason()
+    assert found.is_good(), found.flaw()
 
 
 def test_constant_commands_find_nothing_and_say_so():
     times = regular(5.0, 100)
     found = fit_rate_response(times, np.zeros(500), times, np.zeros(500))
     assert np.isnan([found.lag, found.dead_time, found.gain]).all()
-    assert "too little excitation" in found.reason()
+    assert "too little excitation" in found.flaw()
 
 
 def test_small_commands_are_too_little():
     found = fit_rate_response(*fly(Doublets((0.05,)), 0.03, 0.04))
-    assert found.reason() == (
-        "too little excitation: the commands span 0.10 rad/s, 0.20 are needed"
-    )
+    assert found.flaw() == ("too little excitation: the commands span 0.10 rad/s, 0.20 are needed")
     assert found.is_good(FitNeeds(span=0.1 - 1e-9))
 
 
@@ -138,31 +136,31 @@ def test_rates_that_do_not_follow_or_are_lost_in_noise_are_refused():
     noise = np.random.default_rng(2).normal(0.0, 0.5, rates.size)
     assert not fit_rate_response(times, commanded, times, noise).is_good()
     lost = fit_rate_response(times, commanded, times, rates + noise)
-    assert lost.reason().startswith("lag and dead time are uncertain by")
+    assert lost.flaw().startswith("lag and dead time are uncertain by")
 
 
 def test_half_the_gain_is_refused():
     found = fit_rate_response(*fly(QUICK, 0.03, 0.04, gain=0.5))
-    assert found.reason() == "gain 0.50 is not near 1: the rates did not follow the commands"
+    assert found.flaw() == "gain 0.50 is not near 1: the rates did not follow the commands"
 
 
 def test_a_dead_time_past_what_is_searched_is_refused():
     found = fit_rate_response(*fly(Doublets((0.5,), 1.0), 0.03, 0.6))
-    assert "dead time is at the edge" in found.reason()
+    assert "dead time is at the edge" in found.flaw()
 
 
 def test_a_response_that_comes_before_its_command_is_refused():
     times, commanded, _, rates = fly(QUICK, 0.03, 0.0)
     found = fit_rate_response(times, commanded, times - 0.05, rates)
-    assert "dead time is at the edge" in found.reason()
+    assert "dead time is at the edge" in found.flaw()
 
 
 def test_too_few_samples_and_too_much_doubt_are_refused():
     found = fit_rate_response(*fly(QUICK, 0.03, 0.04))
     few = replace(found, fit=replace(found.fit, excited=19))
     doubtful = replace(found, fit=replace(found.fit, lag_error=0.0081))
-    assert few.reason() == "too little excitation: 19 samples show the response, 20 are needed"
-    assert doubtful.reason() == "lag and dead time are uncertain by 8.1 ms"
+    assert few.flaw() == "too little excitation: 19 samples show the response, 20 are needed"
+    assert doubtful.flaw() == "lag and dead time are uncertain by 8.1 ms"
 
 
 def test_times_without_their_values_are_an_error():
@@ -176,7 +174,7 @@ def test_times_that_do_not_meet_are_named_as_the_reason():
     commanded = np.sign(np.sin(2.0 * time))
     for scale, shift in ((1.0, 1000.0), (1000.0, 0.0)):  # another clock; ms
         found = fit_rate_response(scale * time, commanded, scale * time + shift, commanded)
-        assert "both need times in s on one clock" in found.reason()
+        assert "both need times in s on one clock" in found.flaw()
 
 
 @pytest.mark.parametrize(

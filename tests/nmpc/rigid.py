@@ -16,7 +16,7 @@ CONDITIONS = Conditions(*WIND, *DRAG, AXIS_DRAG)
 POSITION, VELOCITY = (1.0, -2.0, 3.0), (2.0, -1.0, 0.5)
 H = 1e-5
 """Step of the finite differences, s."""
-HELIX = helix(4.0, 3.0, Laps(4.0, laps=3.0, along=True))
+HELIX = helix(4.0, 3.0, Laps(4.0, laps=3.0, face_path=True))
 
 
 def acceleration(r, thrust, velocity):

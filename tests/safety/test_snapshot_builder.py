@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from companion.attitude import BodyRates
+from companion.control.heading_frame import HeadingFrame
 from companion.control.loop_record import LoopRecord, Unanswered
 from companion.guidance.fence import Place
 from companion.safety.snapshot import Autopilot, Health, Motion, Resets
@@ -48,7 +49,7 @@ class Flight:
             newest=SimpleNamespace(q=Q, body_rates=(0.1, 0.2, 0.3)),
             times=[],
             shift=(1.0, 2.0, 3.0),
-            turn=3.0,
+            frame=HeadingFrame(3.0),
             largest_tilt_jump=0.7,
             on_counter=lambda *seen: self.counted.append(seen),
         )
@@ -256,9 +257,9 @@ def test_gaps_count_for_five_seconds_and_resets_for_thirty_but_none_from_before(
 
 def test_resets_are_summed_from_where_control_began(flight):
     assert flight.snapshot().resets == Resets(0, 0.0, 0.0, 0.0)
-    flight.resets.shift, flight.resets.turn = (1.0, 5.0, 7.0), -3.0
+    flight.resets.shift, flight.resets.frame = (1.0, 5.0, 7.0), HeadingFrame(-3.0)
     flight.resets.largest_tilt_jump = 0.2
     found = flight.snapshot().resets
     assert found.shift == pytest.approx(5.0)
-    assert found.turn == pytest.approx(2.0 * 3.141592653589793 - 6.0)
+    assert found.heading == pytest.approx(2.0 * 3.141592653589793 - 6.0)
     assert found.tilt == 0.2

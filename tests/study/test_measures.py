@@ -6,7 +6,7 @@ import pytest
 from companion.attitude import Coefficients
 from companion.attitude.reference import SecondOrderReference
 from companion.study.measures import (
-    SecondOrderFit,
+    DelayedSecondOrder,
     cross_track,
     fit_second_order,
     heading_effect,
@@ -65,7 +65,7 @@ def test_the_tilt_rate_leaves_yaw_out():
 
 def test_a_second_order_response_is_found_again():
     model = SecondOrderReference(9.0, 0.7)
-    path = second_order_path(STEP, SecondOrderFit(model, 0.043), STEP.time)
+    path = second_order_path(STEP, DelayedSecondOrder(model, 0.043), STEP.time)
     assert path[4] == pytest.approx(STEP.start)  # still dead at 40 ms
     found = fit_second_order(STEP, path)
     assert found.dead_time == pytest.approx(0.043, rel=1e-3)

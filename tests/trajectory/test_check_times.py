@@ -42,7 +42,8 @@ def wavy(rng):
 def some(seed):
     """One trajectory of each kind, at random."""
     rng = np.random.default_rng(seed)
-    laps = Laps(rng.uniform(1.0, 8.0), int(rng.integers(1, 6)), rng.uniform(0.5, 6.0), along=True)
+    speed, count = rng.uniform(1.0, 8.0), int(rng.integers(1, 6))
+    laps = Laps(speed, count, rng.uniform(0.5, 6.0), face_path=True)
     size = rng.uniform(1.0, 8.0)
     points = [tuple(p) for p in rng.uniform(-8.0, 8.0, (6, 3)).tolist()]
     return [
@@ -51,7 +52,7 @@ def some(seed):
         gerono_eight(size, laps),
         bernoulli_eight(size, laps),
         line(points[0], laps.speed, laps.acceleration, 8.0),
-        waypoints(points, laps.speed, laps.acceleration, along=True),
+        waypoints(points, laps.speed, laps.acceleration, face_path=True),
         wavy(rng),
     ]
 
@@ -132,7 +133,7 @@ def test_the_looks_are_bounded_whatever_is_flown():
     """The worst that is accepted: ramps over many laps, long lines, a thousand waypoints."""
     worst = [
         helix(1000.0, 1000.0, Laps(99.0, 3)),
-        bernoulli_eight(3.0, Laps(8.0, 1000, acceleration=0.1, along=True)),
+        bernoulli_eight(3.0, Laps(8.0, 1000, acceleration=0.1, face_path=True)),
         line((9000.0, 9000.0, -9000.0), 100.0, 3.0, 3.0),
         waypoints([(float(k % 7), float(k), -1.0) for k in range(1, 1001)], 5.0, 3.0),
     ]
@@ -142,10 +143,10 @@ def test_the_looks_are_bounded_whatever_is_flown():
 
 def test_waypoints_that_would_last_for_days_are_refused_before_they_are_looked_at():
     with pytest.raises(TrajectoryError, match="3600 s is the longest"):
-        waypoints([(9000.0, 0.0, 0.0), (0.0, 0.0, 0.0)], 0.01, 1.0, along=True)
+        waypoints([(9000.0, 0.0, 0.0), (0.0, 0.0, 0.0)], 0.01, 1.0, face_path=True)
 
 
 def test_a_hover_and_a_turn_are_judged_too():
     assert Hover(5.0).check_times() == [0.0, 5.0]
-    turned = turned_first(circle(5.0, Laps(4.0, 2, along=True)), 1.0, 0.8)
+    turned = turned_first(circle(5.0, Laps(4.0, 2, face_path=True)), 1.0, 0.8)
     assert max(turned.check_times()) == pytest.approx(turned.duration)

@@ -77,7 +77,7 @@ def test_a_violation_says_when_what_and_how_much():
 # What each limit is about, a trajectory that reaches it, and what it needs, in the limit's unit.
 CASES = [
     ("max_tilt_rate", EIGHT, radians(125.0), "max_tilt_rate_deg_s", 1.0),
-    ("max_yaw_rate", circle(5.0, Laps(5.0, 2, along=True)), 1.0, "max_yaw_rate_deg_s", 0.0),
+    ("max_yaw_rate", circle(5.0, Laps(5.0, 2, face_path=True)), 1.0, "max_yaw_rate_deg_s", 0.0),
     ("min_thrust", CLIMB, G - 2.0, "min_thrust", 0.0),
     ("max_thrust", CLIMB, G + 2.0, "max_thrust", 0.0),
     ("max_climb", CLIMB, 3.0, "max_climb_m_s", 0.0),
@@ -132,7 +132,7 @@ def test_free_fall_demands_no_thrust_and_no_turning():
 
 @pytest.mark.parametrize("factor", [0.5, 3.0])
 def test_a_slowed_trajectory_has_right_derivatives_and_the_same_way(factor):
-    along = gerono_eight(3.0, Laps(2.0, 1, along=True))
+    along = gerono_eight(3.0, Laps(2.0, 1, face_path=True))
     slowed = evenly_slowed(along, factor)
     assert_derivatives_agree(slowed, inner_times(slowed))
     assert_rests_at_both_ends(slowed)
@@ -145,7 +145,7 @@ def test_a_slowed_trajectory_has_right_derivatives_and_the_same_way(factor):
 
 @pytest.mark.parametrize(("heading", "turned"), [(0.5, 1.07), (-2.0, -2.71), (4.0, -2.43)])
 def test_a_trajectory_with_a_heading_begins_with_a_turn_the_short_way(heading, turned):
-    along = circle(5.0, Laps(4.0, 2, along=True))
+    along = circle(5.0, Laps(4.0, 2, face_path=True))
     whole = turned_first(along, heading, 0.8)
     start = whole.at(0.0)
     assert np.exp(1j * start.heading) == pytest.approx(np.exp(1j * heading))
@@ -162,6 +162,6 @@ def test_a_trajectory_with_a_heading_begins_with_a_turn_the_short_way(heading, t
 
 
 def test_nothing_turns_that_need_not():
-    hover, along = Hover(3.0), line((0.0, 4.0, 0.0), 2.0, 2.0, 5.0, along=True)
+    hover, along = Hover(3.0), line((0.0, 4.0, 0.0), 2.0, 2.0, 5.0, face_path=True)
     assert turned_first(hover, 1.0, 0.8) is hover
     assert turned_first(along, along.at(0.0).heading, 0.8) is along

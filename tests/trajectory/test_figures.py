@@ -182,7 +182,7 @@ def test_hover_stays():
     ("make", "text"),
     [
         (lambda: line((0.0, 0.0, 0.0), 1.0, 1.0, 1.0), "end at another point"),
-        (lambda: line((0.0, 0.0, 1.0), 1.0, 1.0, 1.0, along=True), "vertical line"),
+        (lambda: line((0.0, 0.0, 1.0), 1.0, 1.0, 1.0, face_path=True), "vertical line"),
         (lambda: line((1.0, 0.0, 0.0), 1.0, 0.0, 1.0), "must be positive"),
         (lambda: circle(0.0, Laps(1.0)), "size, speed, laps and acceleration of a circle"),
         (lambda: helix(1.0, 1.0, Laps(1.0, 0.0)), "of a helix must be positive"),

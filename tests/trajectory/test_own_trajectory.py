@@ -26,7 +26,7 @@ from companion.guidance.trajectory import (
 from tests.flight.fly import CONFIGS
 
 REST = (0.0, 0.0, 0.0)
-LAPS = Laps(speed=3.0, along=True)
+LAPS = Laps(speed=3.0, face_path=True)
 POINTS = [(4.0, 0.0, 0.0), (4.0, 4.0, -1.0), (0.0, 4.0, 0.0)]
 
 
@@ -63,7 +63,7 @@ OURS = [
     Hover(0.0),
     Hover(2.0, heading=1.0),
     line((3.0, 1.0, -1.0), 2.0, 2.0, 4.0),
-    line((3.0, 1.0, -1.0), 2.0, 2.0, 4.0, along=True),
+    line((3.0, 1.0, -1.0), 2.0, 2.0, 4.0, face_path=True),
     circle(5.0, LAPS),
     helix(4.0, 1.0, LAPS),
     gerono_eight(3.0, LAPS),
@@ -175,3 +175,12 @@ def test_shapes_of_numbers_that_are_none_are_refused_when_they_are_made(make):
 
 def test_waypoints_may_be_an_array():
     assert waypoints(np.array(POINTS), 3.0, 2.0).duration == waypoints(POINTS, 3.0, 2.0).duration
+
+
+def test_vectors_of_another_length_are_no_sample():
+    class Wrong(Sway):
+        def at(self, time):
+            return Sample((0.0,) * 4, (0.0,) * 2, (0.0,) * 3, (0.0,) * 3, 0.0, 0.0)
+
+    with pytest.raises(TypeError, match="which is no Sample"):
+        require_trajectory(Wrong())

@@ -131,7 +131,7 @@ def _agilicious(frame_of_ned, body_of_frd, trajectory):
 )
 def test_a_file_of_agilicious_is_understood_in_its_frame(frame, ned_from_frame):
     """Position, derivatives and the heading of its quaternions; judged by SciPy's Rotation."""
-    flown = circle(5.0, Laps(4.0, 2, direction=0.4, along=True))
+    flown = circle(5.0, Laps(4.0, 2, direction=0.4, face_path=True))
     frame_of_ned = Rotation.from_matrix(ned_from_frame).inv()
     flu_to_frd = Rotation.from_euler("x", pi)
     lines = _agilicious(frame_of_ned, flu_to_frd, flown)
@@ -151,7 +151,7 @@ def test_the_default_frame_is_enu():
 
 
 def test_a_yaw_column_is_followed_fixed_or_passed_over():
-    around = circle(5.0, Laps(4.0, 2, along=True))
+    around = circle(5.0, Laps(4.0, 2, face_path=True))
     read = parse_csv(_lines(around, yaw=True), "x")
     followed = from_samples(read, NED)
     assert followed.at(8.0).heading == pytest.approx(around.at(8.0).heading, abs=1e-3)

@@ -48,7 +48,7 @@ ENVELOPE = Envelope(
     max_speed=8.0,
     drag=Drag(0.6, 0.03),
 )
-EIGHT = gerono_eight(3.0, Laps(5.0, 2, along=True))
+EIGHT = gerono_eight(3.0, Laps(5.0, 2, face_path=True))
 CORNERS = waypoints([(20.0, 0, 0), (20.0, 3.0, 0), (0, 3.0, -2.0)], 6.0, 9.0)
 
 

@@ -71,7 +71,7 @@ def test_the_way_does_not_depend_on_how_fast_it_is_flown():
 
 
 def test_facing_along_the_path():
-    path = waypoints(SQUARE, 3.0, 4.0, along=True)
+    path = waypoints(SQUARE, 3.0, 4.0, face_path=True)
     assert not path.holds_heading
     for t in np.linspace(0.2, 0.8, 50) * path.duration:
         sample = path.at(t)

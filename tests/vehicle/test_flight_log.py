@@ -210,8 +210,8 @@ def test_a_recording_of_px4_gives_what_was_measured_on_it():
         assert response.slew is None
         assert response.is_good()
     assert vehicle.thrust is None
-    assert set(vehicle.faults()) == {"yaw"}  # it was not turned
-    assert "too little excitation" in vehicle.faults()["yaw"]
+    assert set(vehicle.flaws()) == {"yaw"}  # it was not turned
+    assert "too little excitation" in vehicle.flaws()["yaw"]
 
 
 def test_a_recording_of_ardupilot_gives_what_was_measured_on_it():
@@ -221,4 +221,4 @@ def test_a_recording_of_ardupilot_gives_what_was_measured_on_it():
         assert 0.013 <= response.dead_time <= 0.021
         assert response.slew == pytest.approx(19.2, rel=0.25)  # 1100 °/s²
         assert response.is_good()
-    assert set(vehicle.faults()) == {"yaw"}
+    assert set(vehicle.flaws()) == {"yaw"}

@@ -164,9 +164,9 @@ class Search:
     def _enqueue_starts(self, learning_flight: Callable[[Campaign], Config | None]) -> None:
         """Enqueue the starts of a new search, and the candidates near the last one."""
         if not self._study.trials:
-            begin = list(starts(self._campaign, self._tune, learning_flight(self._campaign)))
+            initial = list(starts(self._campaign, self._tune, learning_flight(self._campaign)))
             seed, search = self._campaign.file.seed, self._tune.search
-            for start in (*begin, *starts_near(begin[-1], search, self._neighbour_count, seed)):
+            for start in (*initial, *starts_near(initial[-1], search, self._neighbour_count, seed)):
                 self._study.enqueue_trial(dict(start.values), user_attrs={"start": start.name})
 
     def _interrupted_trial(self) -> "Trial | None":

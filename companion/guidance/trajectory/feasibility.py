@@ -173,24 +173,39 @@ def broken_limits(motion: Motion, envelope: Envelope) -> tuple[Violation, ...]:
 
 def _needs(motion: Motion, envelope: Envelope) -> Iterator[_Need]:
     """All quantities that an envelope can limit, except the fence, over this motion."""
-    e, climb = envelope, -motion.velocity[:, 2]
-    rotors = demand(motion, e.drag, e.gravity)
-    turn = np.abs(motion.heading_rate)
+    limits, climb = envelope, -motion.velocity[:, 2]
+    needed = demand(motion, limits.drag, limits.gravity)
+    yaw_rate = np.abs(motion.heading_rate)
     speed = np.linalg.norm(motion.velocity, axis=1)
-    yield _Need(TILT_LIMIT, e.max_tilt, rotors.tilt, "° of tilt", _TO_DEGREES)
-    turning = rotors.tilt_rate
-    spin = "°/s of roll and pitch"
-    yield _Need("limits.max_tilt_rate_deg_s", e.max_tilt_rate, turning, spin, _TO_DEGREES)
-    yield _Need("limits.max_yaw_rate_deg_s", e.max_yaw_rate, turn, "°/s of yaw", _TO_DEGREES)
-    force, full = " m/s² of thrust", e.full_thrust
-    lowest, highest = e.min_thrust, e.max_thrust
+    yield _Need(TILT_LIMIT, limits.max_tilt, needed.tilt, "° of tilt", _TO_DEGREES)
     yield _Need(
-        "limits.min_thrust", lowest, rotors.thrust, force, is_lower_limit=True, key_scale=full
+        "limits.max_tilt_rate_deg_s",
+        limits.max_tilt_rate,
+        needed.tilt_rate,
+        "°/s of roll and pitch",
+        _TO_DEGREES,
     )
-    yield _Need("limits.max_thrust", highest, rotors.thrust, force, key_scale=full)
-    yield _Need("limits.max_climb_m_s", e.max_climb, climb, " m/s of climb")
-    yield _Need("limits.max_descent_m_s", e.max_descent, -climb, " m/s of descent")
-    yield _Need("safety.max_speed_m_s", e.max_speed, speed, " m/s of speed")
+    yield _Need(
+        "limits.max_yaw_rate_deg_s", limits.max_yaw_rate, yaw_rate, "°/s of yaw", _TO_DEGREES
+    )
+    yield _Need(
+        "limits.min_thrust",
+        limits.min_thrust,
+        needed.thrust,
+        " m/s² of thrust",
+        is_lower_limit=True,
+        key_scale=limits.full_thrust,
+    )
+    yield _Need(
+        "limits.max_thrust",
+        limits.max_thrust,
+        needed.thrust,
+        " m/s² of thrust",
+        key_scale=limits.full_thrust,
+    )
+    yield _Need("limits.max_climb_m_s", limits.max_climb, climb, " m/s of climb")
+    yield _Need("limits.max_descent_m_s", limits.max_descent, -climb, " m/s of descent")
+    yield _Need("safety.max_speed_m_s", limits.max_speed, speed, " m/s of speed")
 
 
 def _excess(need: _Need) -> Floats:

@@ -67,7 +67,7 @@ class Hover:
 
 
 def line(
-    to: Vector, speed: float, acceleration: float, jerk: float, along: bool = False
+    to: Vector, speed: float, acceleration: float, jerk: float, face_path: bool = False
 ) -> TimedCurve:
     """A straight line from rest to rest, as fast as three limits allow.
 
@@ -76,22 +76,22 @@ def line(
         speed: largest speed, m/s.
         acceleration: largest acceleration, m/s².
         jerk: largest jerk, m/s³.
-        along: face along the line instead of holding the heading.
+        face_path: face along the line instead of holding the heading.
 
     Raises:
         TrajectoryError: the line has no finite length, a limit is not positive, or it is vertical
-            and `along` is set.
+            and `face_path` is set.
     """
     length = sqrt(sum(x * x for x in to))
     if not isfinite(length):
         raise TrajectoryError("the end point of a line must be finite")
     if length < SMALLEST_DISTANCE:
         raise TrajectoryError("a line must end at another point than its start")
-    if along and hypot(to[0], to[1]) == 0.0:
+    if face_path and hypot(to[0], to[1]) == 0.0:
         raise TrajectoryError("a vertical line has no heading to face along")
     north, east, down = (x / length for x in to)
     law = LimitedJerk(length, speed, acceleration, jerk)
-    heading = TangentHeading(atan2(east, north)) if along else HeldHeading()
+    heading = TangentHeading(atan2(east, north)) if face_path else HeldHeading()
     return TimedCurve("line", Straight((north, east, down)), law, heading)
 
 
@@ -104,14 +104,14 @@ class Laps:
         laps: number of laps; both ramps are part of them.
         acceleration: largest acceleration along the path on a ramp, m/s². Few laps may need more.
         direction: direction from the start to the figure, clockwise from north, rad.
-        along: whether the vehicle faces along the path. Otherwise it holds its heading.
+        face_path: whether the vehicle faces along the path. Otherwise it holds its heading.
     """
 
     speed: float
     laps: float = 1.0
     acceleration: float = 3.0
     direction: float = 0.0
-    along: bool = False
+    face_path: bool = False
 
 
 def circle(radius: float, laps: Laps) -> TimedCurve:
@@ -189,5 +189,5 @@ def _flown_laps(
     if laps.direction:
         curve = Turned(curve, laps.direction)
         tangent = replace(tangent, middle=tangent.middle + laps.direction)
-    heading = tangent if laps.along else HeldHeading()
+    heading = tangent if laps.face_path else HeldHeading()
     return TimedCurve(name, curve, Cruise(length, rate, ramp, ramp), heading)

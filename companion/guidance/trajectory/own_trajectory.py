@@ -1,15 +1,16 @@
-"""Checks a trajectory of a user's class: its members, and whether its derivatives are right."""
+"""Trajectories of a user's class: checked before the flight, and in flight an error is named."""
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import chain, pairwise
 from math import inf, isfinite
 
 import numpy as np
 
-from companion.guidance.trajectory.sample import Sample, Trajectory, TrajectoryError
+from companion.guidance.trajectory.sample import Sample, Trajectory, TrajectoryError, Vector
+from companion.user_code import naming_user_code
 
 _MEMBERS = ("name", "duration", "holds_heading", "at", "check_times")
-_VECTORS = ("position", "velocity", "acceleration", "jerk")
+_ROLE = "trajectory"
 _SMALLEST_OFFSET = 1e-3  # m
 _SMALLEST_SPEED = 0.01  # m/s
 
@@ -60,16 +61,39 @@ def _sample(trajectory: Trajectory, time: float) -> Sample:
     """
     sample = trajectory.at(time)
     try:
-        made = Sample(*sample)
-        numbers = [float(x) for name in _VECTORS for x in getattr(made, name)]
-        numbers += [float(made.heading), float(made.heading_rate)]
+        plain = _plain(sample)
     except (TypeError, ValueError):
-        numbers = []
-    if len(numbers) != 3 * len(_VECTORS) + 2:
-        raise TypeError(f"at({time:g}) returned {sample!r}, which is no Sample")
-    if not all(map(isfinite, numbers)):
-        raise TrajectoryError(f"at {time:.2f} s a number is not finite: {made}")
-    return made
+        raise TypeError(f"at({time:g}) returned {sample!r}, which is no Sample") from None
+    if not _is_finite(plain):
+        raise TrajectoryError(f"at {time:.2f} s a number is not finite: {plain}")
+    return plain
+
+
+def _plain(sample: Sample) -> Sample:
+    """The sample as plain floats.
+
+    Raises:
+        TypeError, ValueError: it does not hold what a `Sample` holds.
+    """
+    made = Sample(*sample)
+    return Sample(
+        _plain_vector(made.position),
+        _plain_vector(made.velocity),
+        _plain_vector(made.acceleration),
+        _plain_vector(made.jerk),
+        float(made.heading),
+        float(made.heading_rate),
+    )
+
+
+def _plain_vector(vector: Vector) -> Vector:
+    north, east, down = vector
+    return float(north), float(east), float(down)
+
+
+def _is_finite(sample: Sample) -> bool:
+    *vectors, heading, rate = sample
+    return all(map(isfinite, (*chain.from_iterable(vectors), heading, rate)))
 
 
 def _require_rest(begin: Sample, end: Sample) -> None:
@@ -111,3 +135,57 @@ def _require_derivatives(trajectory: Trajectory, quantity: str, derivative: str,
                 f"at {time:.2f} s its {quantity} changes by {size:.2f} {unit}, but its {derivative}"
                 f" is {np.linalg.norm(told):.2f} {unit}: they must fit in size and direction"
             )
+
+
+def checked_trajectory(trajectory: Trajectory) -> "UserTrajectory":
+    """The trajectory as it is flown; raises as `require_trajectory`, and what its code raises."""
+    require_trajectory(trajectory)
+    return UserTrajectory(trajectory)
+
+
+class UserTrajectory:
+    """A trajectory of a user's program. What its code raises becomes a `UserCodeError`.
+
+    Args:
+        trajectory: the user's trajectory, or one of this program that may contain it.
+    """
+
+    def __init__(self, trajectory: Trajectory) -> None:
+        self.trajectory = trajectory
+
+    @property
+    def name(self) -> str:
+        """Name for messages."""
+        with naming_user_code(_ROLE, self.trajectory):
+            return str(self.trajectory.name)
+
+    @property
+    def duration(self) -> float:
+        """How long it lasts, s."""
+        with naming_user_code(_ROLE, self.trajectory):
+            return float(self.trajectory.duration)
+
+    @property
+    def holds_heading(self) -> bool:
+        """Whether the vehicle keeps its heading."""
+        with naming_user_code(_ROLE, self.trajectory):
+            return bool(self.trajectory.holds_heading)
+
+    def at(self, time: float) -> Sample:
+        """The sample `time` seconds after the start.
+
+        Raises:
+            UserCodeError: the trajectory raised, or returned something else than finite numbers.
+        """
+        with naming_user_code(_ROLE, self.trajectory):
+            sample = _plain(self.trajectory.at(time))
+            if not _is_finite(sample):
+                raise ValueError(
+                    f"at({time:g}) returned {sample}, with a number that is not finite"
+                )
+            return sample
+
+    def check_times(self) -> Sequence[float]:
+        """Times at which to check the trajectory, s; raises TrajectoryError if it is too long."""
+        with naming_user_code(_ROLE, self.trajectory, TrajectoryError):
+            return self.trajectory.check_times()

@@ -36,7 +36,7 @@ def waypoints(
     points: Sequence[Vector],
     speed: float,
     acceleration: float,
-    along: bool = False,
+    face_path: bool = False,
     headings: Sequence[float | None] = (),
 ) -> TimedCurve:
     """A trajectory through all points without a stop, from rest at the start to rest at the last.
@@ -48,18 +48,19 @@ def waypoints(
         points: (north, east, down) from the start, m, without the start itself.
         speed: largest speed, m/s.
         acceleration: largest acceleration, m/s².
-        along: face along the path instead of holding the heading.
+        face_path: face along the path instead of holding the heading.
         headings: heading at each point, rad from north, or None for any. The vehicle turns the
             short way from one to the next. The heading at the start follows from them.
 
     Raises:
         TrajectoryError: there are no points, two consecutive points are equal, a limit is not
-            positive, the number of headings is wrong, `along` and `headings` are both given, all
-            points are above each other and `along` is set, or the trajectory lasts too long.
+            positive, the number of headings is wrong, `face_path` and `headings` are both given,
+            all points are above each other and `face_path` is set, or the trajectory lasts too
+            long.
     """
     if not (0.0 < speed < inf and 0.0 < acceleration < inf):
         raise TrajectoryError("speed and acceleration of waypoints must be positive")
-    if along and headings:
+    if face_path and headings:
         raise TrajectoryError("waypoints have either their own headings or one along the path")
     places, distances = places_of(points, headings)
     knots = np.concatenate(([0.0], np.cumsum(_trapezoid_durations(distances, speed, acceleration))))
@@ -68,7 +69,7 @@ def waypoints(
     spline = _spline_through(knots, places)
     heading: Heading = HeldHeading()
     curve = SplineCurve(spline)
-    if along:
+    if face_path:
         curve = SplineCurve(spline, longest_step=HEADING_CHECK_STEP)
         heading = tangent_heading(spline, (True, True))
     elif any(angle is not None for angle in headings):

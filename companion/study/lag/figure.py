@@ -80,7 +80,7 @@ def draw_figure(grid: Grid, example: Example, complete: CompleteLoopFlights) -> 
     _draw_cut(panels["lag"], grid, over_lag, lags, "lag")
     for rate in RATES_HZ:
         _draw_ratios(panels[f"{rate:.0f}"], grid, rate)
-    _draw_errors(panels["example errors"], example.by_error)
+    _draw_errors(panels["example errors"], example.following)
     panels["example errors"].set_title(
         f"Wrong lag and dead time, the example, {EXAMPLE_ERRORS_HZ:.0f} Hz"
     )
@@ -123,7 +123,7 @@ def _draw_cut(
     for method in METHODS:
         cross_tracks = [grid[cell].by_method[method].cross_track for cell in cells]
         axes.plot(values_ms, cross_tracks, marker=".", **method.line)
-    with_true_delays = [grid[cell].by_method[FOLLOWING].cross_track for cell in cells]
+    with_true_delays = [grid[cell].following[NO_ERROR].cross_track for cell in cells]
     with_worst_delays = [grid[cell].worst_cross_track for cell in cells]
     axes.fill_between(
         values_ms,
@@ -182,9 +182,9 @@ def _draw_errors(axes: Axes, scores: dict[DelayError, Score]) -> None:
 
 def _draw_inner_loop_errors(axes: Axes, complete: CompleteLoopFlights) -> None:
     comparison = complete.by_rate[SHOWN_RATE_HZ]
-    _draw_errors(axes, comparison.by_error)
+    _draw_errors(axes, comparison.following)
     other = comparison.best_other
-    cross_track = comparison.by_method[other].cross_track
+    cross_track = comparison.others[other].cross_track
     axes.axhline(cross_track, **LIMIT)
     axes.annotate(
         f"{other.label}, the best of the others", (50, cross_track), ha="right", va="bottom"
@@ -200,7 +200,7 @@ def _draw_rates(axes: Axes, complete: CompleteLoopFlights) -> None:
     for method in METHODS:
         cross_tracks = [comparison.by_method[method].cross_track for comparison in comparisons]
         axes.plot(rates, cross_tracks, marker=".", **method.line)
-    with_true_delays = [comparison.by_error[NO_ERROR].cross_track for comparison in comparisons]
+    with_true_delays = [comparison.following[NO_ERROR].cross_track for comparison in comparisons]
     with_worst_delays = [comparison.worst_cross_track for comparison in comparisons]
     axes.fill_between(
         rates,

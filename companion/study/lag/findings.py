@@ -42,7 +42,7 @@ def find(
 def _on_the_example(example: Example) -> tuple[Finding, Finding, Finding]:
     cross_tracks = {m: score(r).cross_track for m, r in example.free[100.0].items()}
     best = min(OTHERS, key=lambda method: cross_tracks[method])
-    worst = max(wrong.cross_track for wrong in example.by_error.values())
+    worst = max(wrong.cross_track for wrong in example.following.values())
     rate = max(largest_tilt_rate(response) for response in example.limited.values())
     limited_cross_track = max(score(response).cross_track for response in example.limited.values())
     return (
@@ -75,12 +75,12 @@ def _over_the_grid(grid: Grid) -> Finding:
     def ratio(cell: GridCell) -> float:
         comparison = grid[cell]
         return (
-            comparison.by_method[FOLLOWING].cross_track
-            / comparison.by_method[comparison.best_other].cross_track
+            comparison.following[NO_ERROR].cross_track
+            / comparison.others[comparison.best_other].cross_track
         )
 
     closest = max(grid, key=ratio)
-    largest = max(comparison.by_method[FOLLOWING].cross_track for comparison in grid.values())
+    largest = max(comparison.following[NO_ERROR].cross_track for comparison in grid.values())
     return Finding(
         "ours",
         "With the true lag and dead time model-following is the straightest over the whole grid.",
@@ -107,7 +107,7 @@ def _wrong_delays_over_the_grid(grid: Grid) -> Finding:
         f"Worse than the best other method in {len(worse_cells)} of {len(grid)} cells{where}."
         f" The largest ratio is at {worst_cell}, with {comparison.worst_error}:"
         f" {comparison.worst_cross_track:.2g} against"
-        f" {comparison.by_method[other].cross_track:.2g} of"
+        f" {comparison.others[other].cross_track:.2g} of"
         f" {other.label}.",
     )
 
@@ -115,14 +115,14 @@ def _wrong_delays_over_the_grid(grid: Grid) -> Finding:
 def _too_long_or_too_short(grid: Grid, complete: CompleteLoopFlights) -> Finding:
     short, long = DelayError(-0.5, -0.5), DelayError(0.5, 0.5)
     pairs = [
-        (comparison.by_error[long], comparison.by_error[short])
+        (comparison.following[long], comparison.following[short])
         for cell, comparison in grid.items()
         if cell.dead_time_ms > 0
     ]
     too_long = max(at_long.cross_track for at_long, _ in pairs)
     too_short = max(at_short.cross_track for _, at_short in pairs)
     straighter = sum(at_long.cross_track < at_short.cross_track for at_long, at_short in pairs)
-    loop = complete.by_rate[SHOWN_RATE_HZ].by_error
+    loop = complete.by_rate[SHOWN_RATE_HZ].following
     return Finding(
         "ours",
         "A lag and dead time 50 % too long are better than both 50 % too short.",
@@ -147,7 +147,7 @@ def _with_the_complete_loop(
             "With the complete inner loop and transport delay model-following is the straightest"
             " at every sample rate.",
             all(
-                each.by_error[NO_ERROR].cross_track < each.by_method[each.best_other].cross_track
+                each.following[NO_ERROR].cross_track < each.others[each.best_other].cross_track
                 for each in by_rate.values()
             ),
             f"Cross-track at {SHOWN_RATE_HZ:.0f} Hz {cross_tracks[FOLLOWING]:.2g}; first-order"
@@ -160,7 +160,7 @@ def _with_the_complete_loop(
             comparison.ratio < 1.0,
             f"The largest ratio is at {worst_rate:.0f} Hz, with {comparison.worst_error}:"
             f" {comparison.worst_cross_track:.2g} against"
-            f" {comparison.by_method[comparison.best_other].cross_track:.2g} of"
+            f" {comparison.others[comparison.best_other].cross_track:.2g} of"
             f" {comparison.best_other.label}.",
         ),
         Finding(

@@ -11,11 +11,11 @@ from companion.study.lag_loop import LagLoop
 from companion.study.measures import cross_track, settling_time
 from companion.study.methods import EXACT, FOLLOWING, PAPER_METHODS, Method
 from companion.study.outcome import Tick
-from companion.study.step import FIGURE_2, Loop, Response, Step, fly_loop
+from companion.study.step import FIGURE_2, Loop, Response, fly_loop
 
-METHODS = (*PAPER_METHODS, EXACT, FOLLOWING)
-OTHERS = tuple(method for method in METHODS if method is not FOLLOWING)
-"""All methods but model-following; they do not use lag and dead time of the rate loop."""
+OTHERS = (*PAPER_METHODS, EXACT)
+"""The methods that do not use lag and dead time of the rate loop."""
+METHODS = (*OTHERS, FOLLOWING)
 RATES_HZ = (50.0, 100.0, 250.0)
 DEAD_TIMES_MS = (0, 20, 40, 60, 80)
 LAGS_MS = (10, 25, 40, 60)
@@ -91,32 +91,39 @@ class Comparison(NamedTuple):
     """Scores with one rate loop at one sample rate.
 
     Attributes:
-        by_method: score of every method; model-following assumes the true lag and dead time.
-        by_error: score of model-following for each error of its assumed lag and dead time.
+        others: score of each method of `OTHERS`.
+        following: score of model-following for each error of its assumed lag and dead time,
+            `NO_ERROR` included.
     """
 
-    by_method: dict[Method, Score]
-    by_error: dict[DelayError, Score]
+    others: dict[Method, Score]
+    following: dict[DelayError, Score]
+
+    @property
+    def by_method(self) -> dict[Method, Score]:
+        """Score of every method; model-following assumes the true lag and dead time."""
+        return {**self.others, FOLLOWING: self.following[NO_ERROR]}
 
     @property
     def best_other(self) -> Method:
         """The method of `OTHERS` with the smallest cross-track."""
-        return min(OTHERS, key=lambda method: self.by_method[method].cross_track)
+        return min(self.others, key=lambda method: self.others[method].cross_track)
 
     @property
     def worst_error(self) -> DelayError:
         """The error of the assumed lag and dead time that gives the largest cross-track."""
-        return max(self.by_error, key=lambda error: self.by_error[error].cross_track)
+        errors = [error for error in self.following if error != NO_ERROR]
+        return max(errors, key=lambda error: self.following[error].cross_track)
 
     @property
     def worst_cross_track(self) -> float:
         """Cross-track of model-following with `worst_error`."""
-        return self.by_error[self.worst_error].cross_track
+        return self.following[self.worst_error].cross_track
 
     @property
     def ratio(self) -> float:
         """`worst_cross_track` / cross-track of `best_other`; below 1 model-following is better."""
-        return self.worst_cross_track / self.by_method[self.best_other].cross_track
+        return self.worst_cross_track / self.others[self.best_other].cross_track
 
 
 class GridCell(NamedTuple):
@@ -139,19 +146,19 @@ class Example(NamedTuple):
     Attributes:
         free: responses of every method by sample rate (Hz), without limits.
         limited: responses of model-following with tilt rates up to W_M, by sample rate (Hz).
-        by_error: as in `Comparison`, at the sample rate `EXAMPLE_ERRORS_HZ`; includes `NO_ERROR`.
+        following: as in `Comparison`, at the sample rate `EXAMPLE_ERRORS_HZ`.
     """
 
     free: dict[float, dict[Method, Response]]
     limited: dict[float, Response]
-    by_error: dict[DelayError, Score]
+    following: dict[DelayError, Score]
 
 
 class CompleteLoopFlights(NamedTuple):
     """The flights with the complete inner loop.
 
     Attributes:
-        by_rate: comparison at each sample rate (Hz); its `by_error` includes `NO_ERROR`.
+        by_rate: comparison at each sample rate (Hz).
         shown: responses of every method at `SHOWN_RATE_HZ`.
     """
 
@@ -169,11 +176,6 @@ def score(response: Response) -> Score:
     return Score(float(cross_track(response)[0]), float(settling_time(response)[0]))
 
 
-def step_at(rate_hz: float) -> Step:
-    """The step of figure 2 at heading 0; at another heading only `euler` responds differently."""
-    return replace(FIGURE_2, headings=(0.0,), rate_hz=rate_hz)
-
-
 def fly_grid(tick: Tick) -> Grid:
     """Fly every method in every cell, model-following also with lag and dead time wrong by 50 %."""
     grid = {}
@@ -181,14 +183,10 @@ def fly_grid(tick: Tick) -> Grid:
         tick(f"dead time {dead_time} ms, lag {lag} ms")
         loop = LagLoop(lag, dead_time)
         delays = _delays_of(loop)
-        errors = [
-            error
-            for error in _combined(GRID_ERRORS)
-            if error != NO_ERROR and (dead_time or not error.dead_time)
-        ]
+        errors = [each for each in _combined(GRID_ERRORS) if dead_time or not each.dead_time]
         for rate in RATES_HZ:
             grid[GridCell(rate, dead_time, lag)] = Comparison(
-                {m: score(_fly(m, delays, loop, rate)) for m in METHODS},
+                {m: score(_fly(m, delays, loop, rate)) for m in OTHERS},
                 _with_errors(errors, delays, loop, rate),
             )
     return grid
@@ -212,7 +210,7 @@ def fly_complete(tick: Tick) -> CompleteLoopFlights:
         tick(f"complete inner loop at {rate:.0f} Hz")
         flown[rate] = {m: _fly(m, COMPLETE_DELAYS, COMPLETE_LOOP, rate) for m in METHODS}
         by_rate[rate] = Comparison(
-            {method: score(response) for method, response in flown[rate].items()},
+            {method: score(flown[rate][method]) for method in OTHERS},
             _with_errors(_combined(FINE_ERRORS), COMPLETE_DELAYS, COMPLETE_LOOP, rate),
         )
     return CompleteLoopFlights(by_rate, flown[SHOWN_RATE_HZ])
@@ -247,4 +245,6 @@ def _fly(
     """Fly a method; only model-following uses `delays`, the lag and dead time that it assumes."""
     options = delays._asdict() if method is FOLLOWING else {}
     planner: Planner = make_planner(method.planner, FIGURE_2.gain, limits=limits, **options)
-    return fly_loop(planner, step_at(rate_hz), loop)
+    # One heading is enough: at another one only `euler` responds differently.
+    step = replace(FIGURE_2, headings=(0.0,), rate_hz=rate_hz)
+    return fly_loop(planner, step, loop)

@@ -12,6 +12,7 @@ from companion.study.lag.flights import (
     FINE_ERRORS,
     LAGS_MS,
     METHODS,
+    NO_ERROR,
     RATES_HZ,
     SHOWN_RATE_HZ,
     CompleteLoopFlights,
@@ -28,7 +29,7 @@ from companion.study.lag.flights import (
 )
 from companion.study.measures import (
     FIT_COLUMNS,
-    SecondOrderFit,
+    DelayedSecondOrder,
     fit_second_order,
     largest_deviation,
     largest_tilt_rate,
@@ -46,7 +47,7 @@ _SCORE_COLUMNS = ("cross-track", "time to 5 %, s")
 class _Fitted(NamedTuple):
     """The second-order model fitted to a response, and the largest deviation from it."""
 
-    fit: SecondOrderFit
+    fit: DelayedSecondOrder
     deviation: float  # largest deviation of the response from the model
 
 
@@ -80,7 +81,7 @@ def run(tick: Tick) -> Outcome:
                 "lag-wrong-knowledge",
                 f"Cross-track of model-following at {EXAMPLE_ERRORS_HZ:.0f} Hz in the example, by"
                 " the error of the assumed lag (rows) and dead time (columns).",
-                example.by_error,
+                example.following,
             ),
             _worst_table(grid),
             _fit_table(complete, fitted),
@@ -90,7 +91,7 @@ def run(tick: Tick) -> Outcome:
                 "Cross-track of model-following with the complete inner loop at"
                 f" {SHOWN_RATE_HZ:.0f} Hz, by the error of its lags (rows) and dead times (columns)"
                 " against those fitted to the inner loop.",
-                complete.by_rate[SHOWN_RATE_HZ].by_error,
+                complete.by_rate[SHOWN_RATE_HZ].following,
             ),
         ),
         findings=find(
@@ -147,7 +148,7 @@ def _worst_table(grid: Grid) -> Table:
     for rate, lag in product(RATES_HZ, sorted({cell.lag_ms for cell in grid})):
         comparisons = [grid[GridCell(rate, dead_time, lag)] for dead_time in dead_times]
         others = [
-            comparison.by_method[comparison.best_other].cross_track for comparison in comparisons
+            comparison.others[comparison.best_other].cross_track for comparison in comparisons
         ]
         rows.append(
             (
@@ -228,7 +229,8 @@ def _grid_series(grid: Grid) -> tuple[Table, Table]:
             tuple(
                 (cell.dead_time_ms, cell.lag_ms, cell.rate_hz, *error, *flown)
                 for cell, comparison in grid.items()
-                for error, flown in comparison.by_error.items()
+                for error, flown in comparison.following.items()
+                if error != NO_ERROR
             ),
         ),
     )
@@ -243,6 +245,6 @@ def _complete_series(complete: CompleteLoopFlights) -> Table:
         tuple(
             (rate, *error, flown.cross_track)
             for rate, comparison in complete.by_rate.items()
-            for error, flown in comparison.by_error.items()
+            for error, flown in comparison.following.items()
         ),
     )

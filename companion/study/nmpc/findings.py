@@ -18,7 +18,7 @@ from companion.study.nmpc.variants import (
     UNLIMITED,
     Variant,
 )
-from companion.study.outcome import Finding, Source
+from companion.study.outcome import Claimant, Finding
 
 _SETTLED_M = 0.1
 """A flight has settled if its errors in the last 2 s are at most this, m."""
@@ -42,7 +42,7 @@ def find(flown: Flights, counts: ColdStarts, times: ProcessTimes) -> tuple[Findi
     )
 
 
-def _solved_faster(source: Source, others: Sequence[ModelName], flown: Flights) -> Finding:
+def _solved_faster(claimant: Claimant, others: Sequence[ModelName], flown: Flights) -> Finding:
     """Whether the proposed model is solved faster than `others`, with one or all iterations."""
     ratios = {
         (model, iterations): _median_ms(model, iterations, flown)
@@ -57,7 +57,7 @@ def _solved_faster(source: Source, others: Sequence[ModelName], flown: Flights) 
     )
     names = " and ".join(STYLES[model].label for model in others)
     return Finding(
-        source,
+        claimant,
         f"The proposed model is solved faster than {names}.",
         min(ratios.values()) > 1.0,
         f"Medians: {medians}.",

@@ -26,13 +26,13 @@ class State(NamedTuple):
     """A state of the vehicle from which it should fly the circle at 5 m/s.
 
     Attributes:
-        offset: position relative to the reference position on the circle, m, NED.
+        position_error: position minus the reference position on the circle, m, NED.
         velocity: m/s, NED.
         coefficients: acceleration coefficients (north, east) of its attitude.
         body_rates: rad/s.
     """
 
-    offset: Vector
+    position_error: Vector
     velocity: Vector
     coefficients: Coefficients
     body_rates: BodyRates
@@ -74,7 +74,7 @@ def count_iterations() -> ColdStarts:
 def _request_from_state(state: State) -> Request:
     vehicle = Vehicle(
         0.0,
-        state.offset,
+        state.position_error,
         state.velocity,
         attitude(state.coefficients, 0.0),
         state.body_rates,

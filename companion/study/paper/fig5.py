@@ -22,7 +22,7 @@ from companion.study.methods import (
     REFERENCE,
     SO3,
 )
-from companion.study.outcome import Finding, Outcome, Source, Table, Tick
+from companion.study.outcome import Claimant, Finding, Outcome, Table, Tick
 from companion.study.paper.fig5_flights import (
     MEASURED,
     METHODS,
@@ -200,10 +200,10 @@ def _findings(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> tuple[
     )
 
 
-def _straightest(source: Source, speed: str, loop: LoopFlights) -> Finding:
+def _straightest(claimant: Claimant, speed: str, loop: LoopFlights) -> Finding:
     cross_tracks = {m: loop.cross_track(m) for m in (PROPOSED, QUATERNION, SO3, EULER)}
     return Finding(
-        source,
+        claimant,
         f"With a complete inner loop that is {speed} ({1e3 * loop.time_63:.0f} ms) the proposed"
         " method still is the straightest.",
         cross_tracks[PROPOSED]
@@ -214,11 +214,11 @@ def _straightest(source: Source, speed: str, loop: LoopFlights) -> Finding:
     )
 
 
-def _second_order(source: Source, speed: str, loop: LoopFlights) -> Finding:
+def _second_order(claimant: Claimant, speed: str, loop: LoopFlights) -> Finding:
     fit, away = loop.fits[PROPOSED], loop.from_second_order(PROPOSED)
     bound = _SECOND_ORDER_SHARE * hypot(*np.subtract(FIGURE_2.target, FIGURE_2.start))
     return Finding(
-        source,
+        claimant,
         f"With a complete inner loop that is {speed} the response of the proposed method is second"
         " order.",
         away < bound,

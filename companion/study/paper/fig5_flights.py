@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from companion.study.inner_loop import quickened
 from companion.study.measures import (
-    SecondOrderFit,
+    DelayedSecondOrder,
     cross_track,
     fit_second_order,
     largest_deviation,
@@ -38,7 +38,7 @@ class LoopFlights(NamedTuple):
 
     time_63: float
     responses: dict[Method, Response]
-    fits: dict[Method, SecondOrderFit]
+    fits: dict[Method, DelayedSecondOrder]
 
     def worst_heading(self, method: Method) -> int:
         """Index of the heading at which a method has its largest cross-track."""
