@@ -3,7 +3,7 @@
 from math import radians
 from typing import Annotated, NamedTuple
 
-from pydantic import Field, StrictBool
+from pydantic import Field
 
 from companion.config.limits import Share
 from companion.config.units import converted, seconds
@@ -145,7 +145,7 @@ class ThrustConfig(Section):
     voltage, or does not measure it."""
     lag_ms: Milliseconds | None = None
     """Time constant of the rotors' thrust, which guidance compensates. null: unknown."""
-    autopilot_compensates_tilt: StrictBool = False
+    autopilot_compensates_tilt: bool = False
     """Whether the autopilot divides thrust by cos(tilt) itself (ArduPilot: ATC_ANGLE_BOOST). PX4
     does not."""
 
