@@ -79,7 +79,7 @@ class TextAssembler:
         self._id, self._pieces = 0, []
 
     def _keep(self, now: float, severity: int, text: str) -> None:
-        text = text.rstrip("\t ").strip()
+        text = text.strip()
         if text and not _is_repetition(self._events, text, now):
             self.texts.append(StatusText(now, severity, text))
 
