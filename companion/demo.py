@@ -29,15 +29,12 @@ _START_TIMEOUT = 20.0
 
 
 class Wire(NamedTuple):
-    """The connection between the program and the mock vehicle.
-
-    Attributes:
-        endpoint: our end, in the notation of `link.endpoint`.
-        vehicle_arguments: the vehicle's end, as arguments of its command line.
-    """
+    """The connection between the program and the mock vehicle."""
 
     endpoint: str
+    """Our end, in the notation of `link.endpoint`."""
     vehicle_arguments: tuple[str, ...]
+    """The vehicle's end, as arguments of its command line."""
 
 
 class VehicleStoppedError(Exception):

@@ -25,25 +25,20 @@ _LINE_WIDTH = 98
 
 
 class ConfigKey(NamedTuple):
-    """One key of a section.
-
-    Attributes:
-        section: name of its section.
-        name: name of the key.
-        value: its value, as plain data that YAML can hold.
-        default: its default, as plain data too.
-        unit: unit such as °/s; empty without a unit.
-        allowed: range or choices, in words; empty if the type allows any value.
-        meaning: what the key means.
-    """
+    """One key of a section."""
 
     section: str
     name: str
     value: Any
+    """Its value, as plain data that YAML can hold."""
     default: Any
+    """Its default, as plain data too."""
     unit: str
+    """Unit such as °/s; empty without a unit."""
     allowed: str
+    """Range or choices, in words; empty if the type allows any value."""
     meaning: str
+    """What the key means."""
 
 
 def sections() -> dict[str, type[BaseModel]]:

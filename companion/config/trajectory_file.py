@@ -97,16 +97,12 @@ class CsvShape(Section):
 
 
 class LoadedTrajectory(NamedTuple):
-    """A trajectory from a file.
-
-    Attributes:
-        trajectory: trajectory to be flown.
-        notes: how a table was read, or how far a curve leaves the lines between its waypoints; one
-            sentence each.
-    """
+    """A trajectory from a file."""
 
     trajectory: Trajectory
     notes: tuple[str, ...] = ()
+    """How a table was read, or how far a curve leaves the lines between its waypoints; one sentence
+    each."""
 
 
 _AXES = {

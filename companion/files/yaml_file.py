@@ -101,30 +101,22 @@ class UnreadableFileError(ConfigError):
 
 
 class Place(NamedTuple):
-    """Where a key stands: file and line.
-
-    Attributes:
-        file: name of the file.
-        line: line number, from 1; None: unknown.
-    """
+    """Where a key stands: file and line."""
 
     file: str
     line: int | None = None
+    """Line number, from 1; None: unknown."""
 
     def __str__(self) -> str:
         return self.file if self.line is None else f"{self.file}, line {self.line}"
 
 
 class Contents(NamedTuple):
-    """A YAML file that was read but not yet checked against a model.
-
-    Attributes:
-        keys: keys and values.
-        places: where each key and each item of a list stands.
-    """
+    """A YAML file that was read but not yet checked against a model."""
 
     keys: dict[str, Any]
     places: dict[Where, Place]
+    """Where each key and each item of a list stands."""
 
 
 def load(path: Path, model: type[Model]) -> Model:

@@ -57,16 +57,11 @@ def result_name(result: int) -> str:
 
 @dataclass(slots=True)
 class _Try:
-    """A COMMAND_LONG that was sent and has no final ACK yet.
-
-    Attributes:
-        answers: Receives the results of its ACKs.
-        deadline: Event-loop time until which an ACK counts for this try, s; inf while its call
-            waits.
-    """
+    """A COMMAND_LONG that was sent and has no final ACK yet."""
 
     answers: AnswerQueue[int]
     deadline: float = inf
+    """Event-loop time until which an ACK counts for this try, s; inf while its call waits."""
 
 
 class CommandClient:
