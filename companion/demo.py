@@ -9,7 +9,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-from companion.config.files import shipped
 from companion.files.yaml_file import ConfigError
 from companion.mavlink.transport.endpoint import (
     SerialPort,
@@ -30,28 +29,16 @@ _START_TIMEOUT = 20.0
 
 
 class Wire(NamedTuple):
-    """The connection between the program and the mock vehicle.
-
-    Attributes:
-        endpoint: our end, in the notation of `link.endpoint`.
-        vehicle_arguments: the vehicle's end, as arguments of its command line.
-    """
+    """The connection between the program and the mock vehicle."""
 
     endpoint: str
+    """Our end, in the notation of `link.endpoint`."""
     vehicle_arguments: tuple[str, ...]
+    """The vehicle's end, as arguments of its command line."""
 
 
 class VehicleStoppedError(Exception):
     """The mock vehicle did not start, or ended before the flight did."""
-
-
-def default_config() -> Path:
-    """Path of the shipped mock-px4.yaml: in the repository, or where pip installed it.
-
-    Raises:
-        ConfigError: the file is in neither place.
-    """
-    return shipped("mock-px4.yaml")
 
 
 def udp_wire() -> Wire:
@@ -92,10 +79,7 @@ def check_mock(config: Path) -> None:
     Raises:
         ConfigError: the section is wrong; the message is the vehicle's.
     """
-    _run_check([sys.executable, "-m", "sitl_mock", "--check", "--config", str(config)])
-
-
-def _run_check(command: list[str]) -> None:
+    command = [sys.executable, "-m", "sitl_mock", "--check", "--config", str(config)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise ConfigError(done.stderr.strip() or "the mock vehicle refused its configuration")
@@ -115,9 +99,9 @@ def bundled_vehicle(config: Path, wire: Wire, log: Path, *, lockstep: bool) -> I
             output), or was not ready within `_START_TIMEOUT`.
     """
     command = [sys.executable, "-m", "sitl_mock", "--headless", "--config", str(config)]
-    command += ["--end-with-stdin"]
     # No link for a ground station: its fixed port may be in use.
-    command += [*wire.vehicle_arguments, "--gcs-port", "0", *(["--lockstep"] if lockstep else [])]
+    command += ["--end-with-stdin", *wire.vehicle_arguments, "--gcs-port", "0"]
+    command += ["--lockstep"] if lockstep else []
     with log.open("wb") as output:
         process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=output, stderr=output, start_new_session=True

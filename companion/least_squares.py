@@ -23,20 +23,17 @@ _MOST_STEPS = 60
 
 
 class Solution(NamedTuple):
-    """The unknowns with the smallest sum of squares that was found.
-
-    Attributes:
-        unknown: (k,), the nonlinear unknowns.
-        weights: (c,), the linear unknowns.
-        residual: (m,), measured − modelled.
-        slopes: (m, k), Jacobian of the residual with respect to `unknown`; the weights are
-            the best ones at each point.
-    """
+    """The unknowns with the smallest sum of squares that was found."""
 
     unknown: Floats
+    """(k,), the nonlinear unknowns."""
     weights: Floats
+    """(c,), the linear unknowns."""
     residual: Floats
+    """(m,), measured − modelled."""
     slopes: Floats
+    """(m, k), Jacobian of the residual with respect to `unknown`; the weights are the best ones at
+    each point."""
 
     @property
     def squares(self) -> float:

@@ -73,17 +73,14 @@ class Refused(Exception):  # noqa: N818 - a refusal is not an error of this prog
 
 
 class SettingResult(NamedTuple):
-    """One setting that was requested.
-
-    Attributes:
-        name: its key in the section `realtime`.
-        setting: the setting in words.
-        refusal: why it was refused and how to get it; None: granted.
-    """
+    """One setting that was requested."""
 
     name: str
+    """Its key in the section `realtime`."""
     setting: str
+    """The setting in words."""
     refusal: str | None = None
+    """Why it was refused and how to get it; None: granted."""
 
     def __str__(self) -> str:
         if self.refusal is None:
@@ -93,21 +90,18 @@ class SettingResult(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class RealtimeSettings:
-    """The settings to request.
-
-    Attributes:
-        fifo_priority: priority of SCHED_FIFO, 1..99; None: keep the scheduler.
-        processors: numbers of the processors to run on; empty: any.
-        lock_memory: keep all memory in RAM.
-        freeze_gc: switch the garbage collector off.
-        required: whether a refusal is an error.
-    """
+    """The settings to request."""
 
     fifo_priority: int | None = None
+    """Priority of SCHED_FIFO, 1..99; None: keep the scheduler."""
     processors: tuple[int, ...] = ()
+    """Numbers of the processors to run on; empty: any."""
     lock_memory: bool = False
+    """Keep all memory in RAM."""
     freeze_gc: bool = False
+    """Switch the garbage collector off."""
     required: bool = False
+    """Whether a refusal is an error."""
 
 
 @contextmanager

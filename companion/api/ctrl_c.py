@@ -33,7 +33,7 @@ def on_ctrl_c(loop: FlightLoop, interrupt: Callable[[str], object]) -> Iterator[
     previous: Callable[[int, FrameType | None], object] = before
 
     def on_signal(number: int, frame: FrameType | None) -> None:
-        loop.post(_ReactionCheck(loop, interrupt).begin)
+        loop.post(_require_reaction, loop, interrupt)
         previous(number, frame)
 
     signal.signal(signal.SIGINT, on_signal)
@@ -44,25 +44,13 @@ def on_ctrl_c(loop: FlightLoop, interrupt: Callable[[str], object]) -> Iterator[
             signal.signal(signal.SIGINT, before)
 
 
-class _ReactionCheck:
-    """Waits in the flight's loop for the program's loop, and hands back if that does not run.
+def _require_reaction(loop: FlightLoop, interrupt: Callable[[str], object]) -> None:
+    """Hand back unless the program's loop runs within `REACTION_TIMEOUT`; for the flight's loop."""
+    reacted = threading.Event()
+    loop.post_to_program(reacted.set)
 
-    Args:
-        loop: loop of the flight.
-        interrupt: hands the vehicle back for a reason.
-    """
+    def hand_back_without_reaction() -> None:
+        if not reacted.is_set():
+            interrupt("interrupted by the user (Ctrl-C)")
 
-    def __init__(self, loop: FlightLoop, interrupt: Callable[[str], object]) -> None:
-        self._loop, self._interrupt, self._reacted = loop, interrupt, False
-
-    def begin(self) -> None:
-        """Begin to wait for the program's loop to run."""
-        self._loop.post_to_program(self._note_reaction)
-        asyncio.get_running_loop().call_later(REACTION_TIMEOUT, self._hand_back_without_reaction)
-
-    def _note_reaction(self) -> None:
-        self._reacted = True
-
-    def _hand_back_without_reaction(self) -> None:
-        if not self._reacted:
-            self._interrupt("interrupted by the user (Ctrl-C)")
+    asyncio.get_running_loop().call_later(REACTION_TIMEOUT, hand_back_without_reaction)

@@ -1,8 +1,10 @@
 """The event loop of a program's flight: a loop in a thread of its own; in lockstep the program's.
 
 With a thread for the flight, a program that computes, blocks or never yields delays only its own
-commands.
-The flight continues to answer samples, notices the missing commands, and hands the vehicle back.
+commands. The flight continues to answer samples, notices the missing commands, and hands the
+vehicle back.
+
+`OwnThreadLoop` and `SharedLoop` have the same methods, for the program's loop to call.
 """
 
 import asyncio
@@ -11,7 +13,7 @@ import threading
 from collections.abc import Awaitable, Callable, Coroutine, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager, suppress
-from typing import Any, Protocol, TypeVar, TypeVarTuple
+from typing import Any, TypeVar, TypeVarTuple
 
 from companion.api.program import ended_by
 from companion.mavlink.lockstep import LockstepEventLoop
@@ -30,45 +32,13 @@ _CHECK_PERIOD = 0.1
 """Period with which the flight checks whether the program still exists, s."""
 
 
-class FlightLoop(Protocol):
-    """The event loop of the flight, seen from the program's loop."""
-
-    def time(self) -> float:
-        """The clock of the flight, s."""
-        ...
-
-    def start(self, work: Coroutine[Any, Any, T]) -> asyncio.Future[T]:
-        """Run a coroutine in the flight's loop; the future belongs to the program's loop.
-
-        Raises:
-            FlightEnded: the flight is over.
-        """
-        ...
-
-    def post(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
-        """Call a function in the flight's loop without waiting for it."""
-        ...
-
-    def post_to_program(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
-        """Call a function in the program's loop; the flight does not wait for it."""
-        ...
-
-    def register_end(self, end: Callable[[], Awaitable[object]]) -> None:
-        """Register `end`, which ends the flight if it still runs when the loop ends.
-
-        The loop ends by `close`, or because the program's loop or thread has ended.
-        """
-        ...
-
-    def close(self, *, wait: bool) -> None:
-        """End the loop's own thread, if it has one; with `wait`, return when it has ended."""
-        ...
-
-
 class SharedLoop:
     """Runs the flight in the program's own loop, if the vehicle waits for each answer.
 
     The vehicle waits in lockstep, and when `companion.testing` runs it on a virtual clock.
+
+    Attributes:
+        time: the clock of the flight: a function that returns s.
     """
 
     def __init__(self) -> None:
@@ -98,6 +68,9 @@ class OwnThreadLoop:
 
     If the program's loop or thread ends without `close`, the flight hands the vehicle back. The
     interpreter waits for that before it ends.
+
+    Attributes:
+        time: the clock of the flight: a function that returns s.
     """
 
     def __init__(self) -> None:
@@ -191,6 +164,9 @@ def quick_switches() -> Iterator[None]:
             _intervals_before.pop()
             if not _intervals_before:
                 sys.setswitchinterval(before)
+
+
+FlightLoop = SharedLoop | OwnThreadLoop
 
 
 def flight_loop() -> FlightLoop:

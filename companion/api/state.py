@@ -42,13 +42,10 @@ class NewestState:
     Args:
         context: context of the flight.
         loop: loop of the flight.
-
-    Attributes:
-        newest: the newest state; None before the first one.
     """
 
     def __init__(self, context: FlightContext, loop: FlightLoop) -> None:
-        self.newest: State | None = None
+        self._newest: State | None = None
         self._context, self._loop = context, loop
         self._wakes: tuple[_Wake, ...] = ()
         context.link.subscribe("ATTITUDE_QUATERNION", self._publish)
@@ -59,9 +56,9 @@ class NewestState:
         Raises:
             RuntimeError: no position or no attitude has come yet.
         """
-        if self.newest is None:
+        if self._newest is None:
             raise RuntimeError("no position or no attitude has come from the vehicle yet")
-        return self.newest
+        return self._newest
 
     def subscribe(self, callback: Callable[[], object]) -> Callable[[], None]:
         """Call `callback` in the program's loop after each new state; call the result to stop.
@@ -77,10 +74,24 @@ class NewestState:
         return unsubscribe
 
     def _publish(self, _: object) -> None:
+        context, guidance = self._context, self._context.guidance_loop
+        sample = context.loop.resets.newest
         try:
-            self.newest = state_of(self._context, self._loop.time())
+            motion = guidance.motion_now()
         except RuntimeError:  # no position yet
             return
+        if sample is None:
+            return
+        q = guidance.attitude()
+        self._newest = State(
+            self._loop.time(),
+            motion.position_ned,
+            motion.velocity_ned,
+            q,
+            sample.body_rates,
+            heading(q),
+            context.link.state.height,
+        )
         for wake in self._wakes:
             wake()
 
@@ -99,25 +110,3 @@ class _Wake:
     def _run(self) -> None:
         self._pending = False
         self._callback()
-
-
-def state_of(context: FlightContext, now: float) -> State:
-    """The newest state; `now` is the event-loop time of the flight, s.
-
-    Raises:
-        RuntimeError: no position or no attitude has come yet.
-    """
-    sample = context.loop.resets.newest
-    if sample is None:
-        raise RuntimeError("no attitude has come from the vehicle yet")
-    motion = context.guidance_loop.motion_now()
-    q = context.guidance_loop.attitude()
-    return State(
-        now,
-        motion.position_ned,
-        motion.velocity_ned,
-        q,
-        sample.body_rates,
-        heading(q),
-        context.link.state.height,
-    )

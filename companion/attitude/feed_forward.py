@@ -127,23 +127,12 @@ class FeedForward:
         self._still_rate = still_after
         mean_still = 0.5 * (still_before + still_after)
         self.frame.advance(yaw, mean_still, dt)
-        self._append_plan(x, y, mean_still * dt, dt)
-        return self._roll.command(dt, start_heading), self._pitch.command(dt, start_heading), yaw
-
-    def _append_plan(self, x: float, y: float, still_turn: float, dt: float) -> None:
-        """Append the plan for the time `dt` seconds later.
-
-        Args:
-            x: planned roll rate at heading 0, rad/s.
-            y: planned pitch rate at heading 0, rad/s.
-            still_turn: yaw angle during `dt` that keeps the heading still, rad.
-            dt: s.
-        """
-        model, body = self._model, self._body
-        still_angle = self.plans.tilt.newest.still_angle + still_turn
+        model, body, plans = self._model, self._body, self.plans
+        still_angle = plans.tilt.newest.still_angle + mean_still * dt
         slopes = model.rate_slopes(x, y)
-        self.plans.add(
+        plans.add(
             dt,
-            PlannedTilt(model.north, model.east, still_angle, x, y, *slopes, self._still_rate),
+            PlannedTilt(model.north, model.east, still_angle, x, y, *slopes, still_after),
             PlannedYaw(self._heading.heading, body.turned, body.rate),
         )
+        return self._roll.command(dt, start_heading), self._pitch.command(dt, start_heading), yaw

@@ -4,8 +4,7 @@ from collections.abc import Callable
 from math import inf
 from typing import Any, Protocol
 
-from companion.attitude.body_error import quaternion, so3
-from companion.attitude.euler import euler
+from companion.attitude.comparison_laws import euler, quaternion, so3
 from companion.attitude.exact import exact
 from companion.attitude.first_order import first_order
 from companion.attitude.limits import Constants, Limits
@@ -125,10 +124,6 @@ LAW_NAMES = tuple(_LAWS)
 PLANNER_NAMES = (*LAW_NAMES, MODEL_FOLLOWING)
 
 
-PlannerFactory = Callable[[Constants], Planner]
-"""Makes a planner, which unlike a law may have a memory; usually its class."""
-
-
 def make_planner(
     name: str | Law | type[Planner],
     gain: float = 5.0,
@@ -173,7 +168,7 @@ def make_planner(
     return LawPlanner(_LAWS[name], constants_of(name, gain, yaw_gain, limits, options))
 
 
-def _made_planner(factory: PlannerFactory, constants: Constants) -> Planner:
+def _made_planner(factory: Callable[[Constants], Planner], constants: Constants) -> Planner:
     """Make a planner of a user's class.
 
     Raises:

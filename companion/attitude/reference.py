@@ -58,11 +58,6 @@ class SecondOrderReference:
     frequency: float
     damping: float = 1.0
 
-    @classmethod
-    def with_lag(cls, gain: float, lag: float) -> "SecondOrderReference":
-        """Model of a proportional gain p (1/s) behind a lag τ (s): c̈ = (p·(c_d − c) − ċ)/τ."""
-        return cls(sqrt(gain / lag), 0.5 / sqrt(gain * lag))
-
     def after(
         self, c: Coefficients, speed: Coefficients, target: Coefficients, dt: float
     ) -> tuple[Coefficients, Coefficients]:

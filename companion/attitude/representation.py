@@ -22,14 +22,11 @@ _LARGEST_BODY_RATE = 100.0
 """A measured body rate above this is implausible, rad/s."""
 
 
-def _norm(q: Quaternion) -> float:
-    w, x, y, z = q
-    return sqrt(w * w + x * x + y * y + z * z)
-
-
 def is_unit(q: Quaternion) -> bool:
     """Whether a planner accepts `q`: finite, and with a norm within 1e-3 of 1."""
-    return abs(_norm(q) - 1.0) <= NORM_TOLERANCE  # false for NaN, too
+    w, x, y, z = q
+    norm = sqrt(w * w + x * x + y * y + z * z)
+    return abs(norm - 1.0) <= NORM_TOLERANCE  # false for NaN, too
 
 
 def normalised(q: Quaternion) -> Quaternion:

@@ -13,7 +13,7 @@ from companion.cli.helper_process import environment, helper_process
 from companion.cli.signals import fly_interruptibly
 from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
-from companion.config.files import changed, load, parse_assignments
+from companion.config.files import changed, load, parse_assignments, shipped
 from companion.extras import MissingExtraError
 from companion.files.os_errors import reason_of
 from companion.files.yaml_file import ConfigError
@@ -163,7 +163,7 @@ def fly_bundled(
         ConfigError: the configuration, or its section `mock`, is wrong.
         VehicleStoppedError: the vehicle ended before the flight did.
     """
-    path = path or demo.default_config()
+    path = path or shipped("mock-px4.yaml")
     config = config_as_read = load(path)
     with demo.wire_like(config.link.endpoint) as wire:
         options.endpoint, options.arm = wire.endpoint, True

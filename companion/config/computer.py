@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, StrictBool, model_validator
+from pydantic import Field, model_validator
 
 from companion.files.yaml_file import PathKey, Section
 
@@ -30,7 +30,7 @@ class LinkConfig(Section):
     signing_key_file: PathKey | None = None
     """File whose first line is the signing passphrase, relative to the file that names it. With it
     we sign every message and refuse unsigned ones."""
-    lockstep: StrictBool = False
+    lockstep: bool = False
     """Run on the mock vehicle's clock, step by step. Never with a real vehicle."""
     attitude_rate_hz: Annotated[float, Field(ge=20.0, le=1000.0)] = 250.0
     """Rate requested for ATTITUDE_QUATERNION. The control loop runs at the rate that arrives."""
@@ -70,11 +70,11 @@ class RealtimeConfig(Section):
         tuple[Annotated[int, Field(ge=0, le=1023)], ...], Field(max_length=1024)
     ] = ()
     """Processors to run on, numbered from 0. Empty: any."""
-    lock_memory: StrictBool = False
+    lock_memory: bool = False
     """Lock the program's memory in RAM, so that a step never waits for the disk."""
-    freeze_gc: StrictBool = False
+    freeze_gc: bool = False
     """Switch the garbage collector off in flight. It runs after the flight."""
-    required: StrictBool = False
+    required: bool = False
     """Refuse to fly unless every requested setting is granted."""
 
 

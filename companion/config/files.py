@@ -46,9 +46,9 @@ def load(path: Path | str) -> Config:
         )
     own = _read(path)
     require_kind(path, own.keys, FileKind.CONFIG)
-    merged = Contents({}, {})
-    _IncludeReader(merged).add_included((path,), own.keys)
-    _merge(merged, own)
+    reader = _IncludeReader()
+    reader.add((path,), own)
+    merged = reader.merged
     _drop_foreign_identified(merged)
     return yaml_file.validated(merged.keys, str(path), Config, merged.places)
 
@@ -58,9 +58,9 @@ def files_of(path: Path) -> tuple[Path, ...]:
 
     Reading stops at the first file that is missing or faulty, which is then the last of the result.
     """
-    reader = _IncludeReader(Contents({}, {}))
+    reader = _IncludeReader()
     with suppress(ConfigError):
-        reader.add_included((path,), _read(path).keys)
+        reader.add((path,), _read(path))
     return (path, *reader.files)
 
 
@@ -90,33 +90,32 @@ def _drop_foreign_identified(merged: Contents) -> None:
 
 
 class _IncludeReader:
-    """Reads included files; the keys of an including file override theirs.
-
-    Args:
-        merged: receives the keys of the included files.
+    """Reads the files that a file includes; the keys of an including file override theirs.
 
     Attributes:
-        files: files that were opened.
+        merged: the keys that were read.
+        files: included files that were opened.
     """
 
-    def __init__(self, merged: Contents) -> None:
-        self._merged = merged
+    def __init__(self) -> None:
+        self.merged = Contents({}, {})
         self.files: list[Path] = []
 
-    def add_included(self, chain: tuple[Path, ...], keys: dict[str, Any]) -> None:
-        """Add the keys of the files that the last file of `chain` includes, not its own keys.
+    def add(self, chain: tuple[Path, ...], own: Contents) -> None:
+        """Add the keys of a file, after those of the files that it includes.
 
         Args:
             chain: the including files, the outermost first, and at the end the file itself.
-            keys: keys of that last file.
+            own: contents of that last file.
 
         Raises:
             ConfigError: see `load`.
         """
-        for path in _included(chain[-1], keys):
-            self._add((*chain, path))
+        for path in _included(chain[-1], own.keys):
+            self.add((*chain, path), self._read_included(*chain, path))
+        _merge(self.merged, own)
 
-    def _add(self, chain: tuple[Path, ...]) -> None:
+    def _read_included(self, *chain: Path) -> Contents:
         *_, including_file, path = chain
         self.files.append(path)
         if len(self.files) > MOST_INCLUDED:
@@ -133,8 +132,7 @@ class _IncludeReader:
         except UnreadableFileError as error:
             raise ConfigError(f"{error} (included by {including_file})") from error
         _check_part(path, part.keys)
-        self.add_included(chain, part.keys)
-        _merge(self._merged, part)
+        return part
 
 
 def _included(path: Path, own: dict[str, Any]) -> list[Path]:

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field, StrictBool
+from pydantic import Field
 
 from companion.config.units import Si
 from companion.files.yaml_file import PathKey, Section
@@ -38,7 +38,7 @@ class FlightConfig(Section):
     slow_down_reserve_m_s2: Annotated[float, Field(ge=0.0, le=10.0)] = 0.5
     """Part of the horizontal acceleration at limits.max_tilt_deg that is kept for feedback and wind
     when a trajectory is slowed down."""
-    arm: StrictBool = False
+    arm: bool = False
     """The program arms the vehicle; so does `fly --arm`. Otherwise it waits for the pilot to
     arm."""
     accept: Annotated[tuple[Annotated[str, Field(max_length=100)], ...], Field(max_length=100)] = ()

@@ -17,14 +17,7 @@ Values = Mapping[str, Mapping[str, Any]]
 
 
 class Difference(NamedTuple):
-    """A key with two values.
-
-    Attributes:
-        section: section of the key.
-        key: name of the key.
-        before: old value.
-        after: new value.
-    """
+    """A key with its value before and after a change."""
 
     section: str
     key: str

@@ -22,17 +22,14 @@ _LARGEST_DRAG = Drag(ANY_VEHICLE.drag.linear + ANY_VEHICLE.linear_deviation)
 
 
 class KnownDrag(NamedTuple):
-    """Knowledge of a vehicle's drag before its flight.
-
-    Attributes:
-        drag: configured or learned drag; None: unknown.
-        source: the file of a learned drag; None: configured or unknown.
-        trouble: why the file of a learned drag could not be used; None: no such fault, or no file.
-    """
+    """Knowledge of a vehicle's drag before its flight."""
 
     drag: Drag | None = None
+    """Configured or learned drag; None: unknown."""
     source: Path | None = None
+    """The file of a learned drag; None: configured or unknown."""
     trouble: str | None = None
+    """Why the file of a learned drag could not be used; None: no such fault, or no file."""
 
     @property
     def least(self) -> Drag:

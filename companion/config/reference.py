@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from companion.config import Config
 from companion.config.markers import IN_FLIGHT
 from companion.config.units import unit_of
-from companion.files import bounded_yaml
+from companion.files.bounded_yaml import dump_value
 
 _BOUNDS = (
     ("minimum", "at least {:g}"),
@@ -25,25 +25,20 @@ _LINE_WIDTH = 98
 
 
 class ConfigKey(NamedTuple):
-    """One key of a section.
-
-    Attributes:
-        section: name of its section.
-        name: name of the key.
-        value: its value, as plain data that YAML can hold.
-        default: its default, as plain data too.
-        unit: unit such as °/s; empty without a unit.
-        allowed: range or choices, in words; empty if the type allows any value.
-        meaning: what the key means.
-    """
+    """One key of a section."""
 
     section: str
     name: str
     value: Any
+    """Its value, as plain data that YAML can hold."""
     default: Any
+    """Its default, as plain data too."""
     unit: str
+    """Unit such as °/s; empty without a unit."""
     allowed: str
+    """Range or choices, in words; empty if the type allows any value."""
     meaning: str
+    """What the key means."""
 
 
 def sections() -> dict[str, type[BaseModel]]:
@@ -96,9 +91,9 @@ def as_yaml(described: Iterable[ConfigKey]) -> str:
         lines += _comment(key.meaning, "  ")
         limits = ", ".join(part for part in (key.unit, key.allowed) if part)
         if key.value != key.default:
-            limits += f"; default: {_yaml(key.default)}"
+            limits += f"; default: {dump_value(key.default)}"
         note = f"  # {limits.removeprefix('; ')}" if limits else ""
-        lines.append(f"  {key.name}: {_yaml(key.value)}{note}")
+        lines.append(f"  {key.name}: {dump_value(key.value)}{note}")
     return "\n".join(lines).strip() + "\n"
 
 
@@ -110,7 +105,13 @@ def as_markdown(described: Iterable[ConfigKey]) -> str:
             section = key.section
             lines += ["", f"## {section}", "", _one_line(models[section].__doc__ or ""), ""]
             lines += ["| key | default | unit | range | meaning |", "|---|---|---|---|---|"]
-        cells = (f"`{key.name}`", f"`{_yaml(key.default)}`", key.unit, key.allowed, key.meaning)
+        cells = (
+            f"`{key.name}`",
+            f"`{dump_value(key.default)}`",
+            key.unit,
+            key.allowed,
+            key.meaning,
+        )
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(lines).strip() + "\n"
 
@@ -128,10 +129,6 @@ def _allowed(schema: dict[str, Any]) -> str:
     if IN_FLIGHT in schema:
         words.append(f"changeable in flight {schema[IN_FLIGHT]}")
     return ", ".join(words)
-
-
-def _yaml(value: Any) -> str:
-    return bounded_yaml.dump_value(value)
 
 
 def _comment(text: str, indent: str) -> list[str]:

@@ -3,7 +3,7 @@
 The defaults are right for the mock vehicle.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from math import ceil, cos, degrees, floor, hypot, sin
 from typing import Annotated, Any, ClassVar
 
@@ -102,58 +102,28 @@ class Config(Section):
 
     @model_validator(mode="after")
     def _consistent(self) -> "Config":
-        faults = [text for wrong, text in _contradictions(self) if wrong]
+        faults = list(_contradictions(self))
         if faults:
             raise ValueError("; ".join(faults))
         return self
 
 
-def _contradictions(config: Config) -> list[tuple[bool, str]]:
-    """Rules between sections: pairs of (rule is broken, message)."""
-    limits, thrust, flown = config.limits, config.thrust, config.flight.maneuvers
-    tilt = limits.max_tilt
-    return [
-        (
-            config.planner.name == MODEL_FOLLOWING and not config.vehicle.response_known,
-            "planner.name: model-following needs vehicle.lag_ms and vehicle.dead_time_ms",
-        ),
-        (
-            not limits.min_thrust < thrust.hover_thrust < limits.max_thrust,
-            "thrust.hover_thrust must lie between limits.min_thrust and limits.max_thrust",
-        ),
-        *_thrust_contradictions(config),
-        (
-            config.deadman.target_stale_ms < 2000.0 / config.guidance.rate_hz,
-            "deadman.target_stale_ms must be at least two periods of guidance.rate_hz",
-        ),
-        (
-            config.deadman.telemetry_stale_ms <= 1000.0 / config.link.attitude_rate_hz,
-            "deadman.telemetry_stale_ms must be longer than a period of link.attitude_rate_hz",
-        ),
-        (
-            "steps" in flown and config.steps.coefficient > sin(tilt),
-            "steps.coefficient must not exceed the sine of limits.max_tilt_deg",
-        ),
-        (
-            "corners" in flown
-            and hypot(config.corners.north_coefficient, config.corners.east_coefficient)
-            > sin(tilt),
-            "√(north² + east²) of corners' coefficients must not exceed the sine of "
-            "limits.max_tilt_deg",
-        ),
-        (
-            "trajectory" in flown
-            and config.flight.slow_down
-            and config.flight.slow_down_reserve_m_s2 >= limits.largest_horizontal,
-            f"flight.slow_down_reserve_m_s2 {config.flight.slow_down_reserve_m_s2:g} must be less "
-            f"than the {limits.largest_horizontal:.2f} m/s² that limits.max_tilt_deg "
-            f"{limits.max_tilt_deg:g} gives; lower it",
-        ),
-        *(_identify_contradictions(config) if "identify" in flown else ()),
-    ]
+def _contradictions(config: Config) -> Iterator[str]:
+    """The rules between sections that are broken, each as a message."""
+    limits, thrust, deadman = config.limits, config.thrust, config.deadman
+    if config.planner.name == MODEL_FOLLOWING and not config.vehicle.response_known:
+        yield "planner.name: model-following needs vehicle.lag_ms and vehicle.dead_time_ms"
+    if not limits.min_thrust < thrust.hover_thrust < limits.max_thrust:
+        yield "thrust.hover_thrust must lie between limits.min_thrust and limits.max_thrust"
+    yield from _thrust_contradictions(config)
+    if deadman.target_stale_ms < 2000.0 / config.guidance.rate_hz:
+        yield "deadman.target_stale_ms must be at least two periods of guidance.rate_hz"
+    if deadman.telemetry_stale_ms <= 1000.0 / config.link.attitude_rate_hz:
+        yield "deadman.telemetry_stale_ms must be longer than a period of link.attitude_rate_hz"
+    yield from _maneuver_contradictions(config)
 
 
-def _thrust_contradictions(config: Config) -> list[tuple[bool, str]]:
+def _thrust_contradictions(config: Config) -> Iterator[str]:
     """Like `_contradictions`: whether thrust can hold the height at the largest tilt."""
     limits, thrust = config.limits, config.thrust
     curve = ThrustCurve(thrust.curve_factor)
@@ -161,42 +131,56 @@ def _thrust_contradictions(config: Config) -> list[tuple[bool, str]]:
     # An autopilot that compensates the tilt may use the full thrust.
     most_share = 1.0 if thrust.autopilot_compensates_tilt else curve.share(limits.max_thrust)
     tilt = degrees(largest_tilt(hover_share, most_share))
+    if hover_share >= most_share or tilt >= limits.max_tilt_deg:
+        return
     needed_share = hover_share / cos(limits.max_tilt) / TILT_THRUST_SHARE
     remedy = f"lower limits.max_tilt_deg to {max(1, floor(tilt))}"
     if needed_share <= 1.0 and not thrust.autopilot_compensates_tilt:
         remedy += (
             f" or raise limits.max_thrust to {ceil(100.0 * curve.signal(needed_share)) / 100.0:.2f}"
         )
-    return [
-        (
-            hover_share < most_share and tilt < limits.max_tilt_deg,
-            f"limits.max_tilt_deg {limits.max_tilt_deg:g} does not fit limits.max_thrust "
-            f"{limits.max_thrust:g}: with thrust.hover_thrust {thrust.hover_thrust:g} the "
-            f"vehicle holds its height only up to {tilt:.0f}°; {remedy}",
+    yield (
+        f"limits.max_tilt_deg {limits.max_tilt_deg:g} does not fit limits.max_thrust "
+        f"{limits.max_thrust:g}: with thrust.hover_thrust {thrust.hover_thrust:g} the "
+        f"vehicle holds its height only up to {tilt:.0f}°; {remedy}"
+    )
+
+
+def _maneuver_contradictions(config: Config) -> Iterator[str]:
+    """Like `_contradictions`, for the maneuvers that are flown."""
+    limits, flight, corners = config.limits, config.flight, config.corners
+    largest_coefficient = sin(limits.max_tilt)
+    if "steps" in flight.maneuvers and config.steps.coefficient > largest_coefficient:
+        yield "steps.coefficient must not exceed the sine of limits.max_tilt_deg"
+    corner = hypot(corners.north_coefficient, corners.east_coefficient)
+    if "corners" in flight.maneuvers and corner > largest_coefficient:
+        yield (
+            "√(north² + east²) of corners' coefficients must not exceed the sine of "
+            "limits.max_tilt_deg"
         )
-    ]
+    slows_down = "trajectory" in flight.maneuvers and flight.slow_down
+    if slows_down and flight.slow_down_reserve_m_s2 >= limits.largest_horizontal:
+        yield (
+            f"flight.slow_down_reserve_m_s2 {flight.slow_down_reserve_m_s2:g} must be less "
+            f"than the {limits.largest_horizontal:.2f} m/s² that limits.max_tilt_deg "
+            f"{limits.max_tilt_deg:g} gives; lower it"
+        )
+    if "identify" in flight.maneuvers:
+        yield from _identify_contradictions(config)
 
 
-def _identify_contradictions(config: Config) -> list[tuple[bool, str]]:
+def _identify_contradictions(config: Config) -> Iterator[str]:
     """Like `_contradictions`, for the maneuver `identify`."""
     limits, identify = config.limits, config.identify
-    return [
-        (
-            len(config.flight.maneuvers) > 1,
-            "flight.maneuvers: identify must be the only maneuver of a flight",
-        ),
-        (
-            identify.tilt_rate_deg_s * identify.tilt_duration_s
-            > _DOUBLET_TILT_SHARE * limits.max_tilt_deg,
+    if len(config.flight.maneuvers) > 1:
+        yield "flight.maneuvers: identify must be the only maneuver of a flight"
+    doublet_tilt_deg = identify.tilt_rate_deg_s * identify.tilt_duration_s
+    if doublet_tilt_deg > _DOUBLET_TILT_SHARE * limits.max_tilt_deg:
+        yield (
             "identify.tilt_rate_deg_s × identify.tilt_duration_s must not exceed "
-            f"{_DOUBLET_TILT_SHARE} × limits.max_tilt_deg",
-        ),
-        (
-            identify.tilt_rate_deg_s > limits.max_tilt_rate_deg_s,
-            "identify.tilt_rate_deg_s must not exceed limits.max_tilt_rate_deg_s",
-        ),
-        (
-            identify.yaw_rate_deg_s > limits.max_yaw_rate_deg_s,
-            "identify.yaw_rate_deg_s must not exceed limits.max_yaw_rate_deg_s",
-        ),
-    ]
+            f"{_DOUBLET_TILT_SHARE} × limits.max_tilt_deg"
+        )
+    if identify.tilt_rate_deg_s > limits.max_tilt_rate_deg_s:
+        yield "identify.tilt_rate_deg_s must not exceed limits.max_tilt_rate_deg_s"
+    if identify.yaw_rate_deg_s > limits.max_yaw_rate_deg_s:
+        yield "identify.yaw_rate_deg_s must not exceed limits.max_yaw_rate_deg_s"

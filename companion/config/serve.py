@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from pydantic import Field, StrictBool
+from pydantic import Field
 
 from companion.config.units import Si
 from companion.files.yaml_file import Section
@@ -26,7 +26,7 @@ class ServeConfig(Section):
     """IP addresses and serial devices that may command without signing. Clients on this computer
     may always command; all others only read, unless they sign with the vehicle's key.
     """
-    control: StrictBool = True
+    control: bool = True
     """Fly the setpoints of clients (extra `serve`). false: pass them on as everything else."""
     setpoint_timeout_ms: Annotated[float, Field(ge=100.0, le=2000.0)] = 500.0
     """Longest time between setpoints of a client. After it the vehicle is held."""

@@ -18,19 +18,15 @@ _MIN_MEANT_SHARE = 1.0 / 5.0
 
 
 class SuspectValue(NamedTuple):
-    """A suspect value of the configuration.
-
-    Attributes:
-        key: key of the configuration.
-        found: the present value, as a clause.
-        because: the consequence of the value.
-        fix: what the user should do.
-    """
+    """A suspect value of the configuration."""
 
     key: str
     found: str
+    """The present value, as a clause."""
     because: str
+    """The consequence of the value."""
     fix: str
+    """What the user should do."""
 
     def sentence(self) -> str:
         """The message for the user."""

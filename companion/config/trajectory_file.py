@@ -1,7 +1,7 @@
 """Trajectories as files: one shape in YAML, or a CSV table of samples."""
 
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple, Protocol
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field, model_validator
 
@@ -40,12 +40,6 @@ _SHORTEST_RAMP = 0.05
 """Shortest extra duration by ramps that a note reports, s."""
 _MOST_ROWS_COMPARED = 2000
 """Tables with more rows are not compared with the path, because their rows are dense."""
-
-
-class _Shape(Protocol):
-    """A section that describes a trajectory."""
-
-    def trajectory(self) -> Trajectory: ...
 
 
 class CsvShape(Section):
@@ -103,16 +97,12 @@ class CsvShape(Section):
 
 
 class LoadedTrajectory(NamedTuple):
-    """A trajectory from a file.
-
-    Attributes:
-        trajectory: trajectory to be flown.
-        notes: how a table was read, or how far a curve leaves the lines between its waypoints; one
-            sentence each.
-    """
+    """A trajectory from a file."""
 
     trajectory: Trajectory
     notes: tuple[str, ...] = ()
+    """How a table was read, or how far a curve leaves the lines between its waypoints; one sentence
+    each."""
 
 
 _AXES = {
@@ -195,8 +185,7 @@ class TrajectoryFile(Section):
         if self.csv is not None:
             return self.csv.read(folder)
         (name,) = self.model_fields_set
-        shape: _Shape = getattr(self, name)
-        trajectory = shape.trajectory()
+        trajectory: Trajectory = getattr(self, name).trajectory()
         return LoadedTrajectory(trajectory, _detour_notes(trajectory))
 
 

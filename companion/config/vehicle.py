@@ -3,7 +3,7 @@
 from math import radians
 from typing import Annotated, NamedTuple
 
-from pydantic import Field, StrictBool
+from pydantic import Field
 
 from companion.config.limits import Share
 from companion.config.units import converted, seconds
@@ -108,21 +108,14 @@ class VehicleConfig(Section):
 
     @property
     def response(self) -> dict[str, float]:
-        """The response as options of `make_planner`, in SI units, without keys that are null."""
-        options = {
-            "lag": converted(self.lag_ms, seconds),
-            "dead_time": converted(self.dead_time_ms, seconds),
-            "acceleration": converted(self.acceleration_limit_deg_s2, radians),
-            "damping": self.damping,
-            "pitch_lag": converted(self.pitch_lag_ms, seconds),
-            "pitch_dead_time": converted(self.pitch_dead_time_ms, seconds),
-            "pitch_acceleration": converted(self.pitch_acceleration_limit_deg_s2, radians),
-            "pitch_damping": self.pitch_damping,
-            "yaw_lag": converted(self.yaw_lag_ms, seconds),
-            "yaw_dead_time": converted(self.yaw_dead_time_ms, seconds),
-            "yaw_acceleration": converted(self.yaw_acceleration_limit_deg_s2, radians),
-            "frame_lead": converted(self.yaw_frame_lead_ms, seconds),
-        }
+        """The response as options of `make_planner`, in SI units, without what is unknown."""
+        options = {"frame_lead": converted(self.yaw_frame_lead_ms, seconds)}
+        for name, axis in self.axes.items():
+            prefix = "" if name == "roll" else f"{name}_"
+            options[f"{prefix}lag"] = axis.lag
+            options[f"{prefix}dead_time"] = axis.dead_time
+            options[f"{prefix}acceleration"] = axis.acceleration_limit
+            options[f"{prefix}damping"] = axis.damping
         return {name: value for name, value in options.items() if value is not None}
 
 
@@ -145,7 +138,7 @@ class ThrustConfig(Section):
     voltage, or does not measure it."""
     lag_ms: Milliseconds | None = None
     """Time constant of the rotors' thrust, which guidance compensates. null: unknown."""
-    autopilot_compensates_tilt: StrictBool = False
+    autopilot_compensates_tilt: bool = False
     """Whether the autopilot divides thrust by cos(tilt) itself (ArduPilot: ATC_ANGLE_BOOST). PX4
     does not."""
 

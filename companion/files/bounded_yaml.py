@@ -55,15 +55,11 @@ Where = tuple[str | int, ...]
 
 
 class Document(NamedTuple):
-    """A YAML document.
-
-    Attributes:
-        root: value of the document.
-        lines: the line on which each key and each item of a list stands, from 1.
-    """
+    """A YAML document."""
 
     root: Any
     lines: dict[Where, int]
+    """The line on which each key and each item of a list stands, from 1."""
 
 
 def parse(text: str) -> Any:

@@ -170,7 +170,8 @@ def _unknown_key(location: Location, value: Any, model: type[BaseModel]) -> str:
     section, _, key = name.partition(".")
     if len(location) == 1 and ((section,), key) in _keys(model):
         return f"contains a dot; write `{section}: {{{key}: {shortened(value)}}}`"
-    section_keys = list(_model_at(location, model).model_fields)
+    around = _types_at(location[:-1], model)
+    section_keys = [key for kind in around for key in getattr(kind, "model_fields", ())]
     other_keys = [(key, place) for place, key in _keys(model) if place != location[:-1]]
     if not isinstance(value, dict) and not any(key.startswith(f"{name}_") for key in section_keys):
         same_name = [".".join((*place, key)) for key, place in other_keys if key == name]
@@ -202,15 +203,3 @@ def _keys(model: type[BaseModel]) -> Iterator[tuple[tuple[str, ...], str]]:
         for kind in kinds_in(field.annotation):
             if isinstance(kind, type) and issubclass(kind, BaseModel):
                 yield from (((section,), key) for key in kind.model_fields)
-
-
-def _model_at(location: Location, model: type[BaseModel]) -> type[BaseModel]:
-    """The model of the section that holds the last key of a location."""
-    for part in location[:-1]:
-        if str(part) not in model.model_fields:
-            continue  # a name that the user gave, or a position in a list
-        field = model.model_fields[str(part)].annotation
-        for kind in (field, *get_args(field)):
-            if isinstance(kind, type) and issubclass(kind, BaseModel):
-                model = kind
-    return model

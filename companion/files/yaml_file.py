@@ -72,34 +72,24 @@ class Section(BaseModel):
 
     @field_validator("*", mode="before")
     @classmethod
-    def _no_boolean_number(cls, value: Any, field: ValidationInfo) -> Any:
-        """Refuse booleans as numbers and words as booleans: pydantic would accept both."""
-        wanted = bool in kinds_in(cls.model_fields[str(field.field_name)].annotation)
-        if isinstance(value, bool) and not wanted:
-            raise ValueError("must not be true or false")
-        if wanted and not isinstance(value, bool):
+    def _not_converted(cls, value: Any, field: ValidationInfo) -> Any:
+        """Refuse what pydantic would convert: "20" or true as a number, "yes" as a boolean.
+
+        Paths that name nothing, are too long, or hold a null character are refused, too; `~` in a
+        path is expanded.
+        """
+        kinds = kinds_in(cls.model_fields[str(field.field_name)].annotation)
+        if bool in kinds and not isinstance(value, bool):
             raise ValueError("must be true or false")
-        return value
-
-    @field_validator("*", mode="before")
-    @classmethod
-    def _no_quoted_number(cls, value: Any, field: ValidationInfo) -> Any:
-        """Refuse texts as numbers: pydantic would accept "20" and " 1_0 "."""
-        kinds = kinds_in(cls.model_fields[str(field.field_name)].annotation)
-        if isinstance(value, str) and kinds & {int, float} and not kinds & {str, Path}:
-            raise ValueError("must be a number")
-        return value
-
-    @field_validator("*", mode="before")
-    @classmethod
-    def _path(cls, value: Any, field: ValidationInfo) -> Any:
-        """Refuse paths that name nothing, are too long, or hold a null character; expand `~`."""
-        kinds = kinds_in(cls.model_fields[str(field.field_name)].annotation)
-        if not isinstance(value, str) or Path not in kinds:
+        if isinstance(value, bool) and bool not in kinds:
+            raise ValueError("must not be true or false")
+        if not isinstance(value, str):
             return value
-        if not is_path(value):
+        if kinds & {int, float} and not kinds & {str, Path}:
+            raise ValueError("must be a number")
+        if Path in kinds and not is_path(value):
             raise ValueError("must name a file or a folder")
-        return expanded(value)
+        return expanded(value) if Path in kinds else value
 
 
 class ConfigError(Exception):
@@ -111,30 +101,22 @@ class UnreadableFileError(ConfigError):
 
 
 class Place(NamedTuple):
-    """Where a key stands: file and line.
-
-    Attributes:
-        file: name of the file.
-        line: line number, from 1; None: unknown.
-    """
+    """Where a key stands: file and line."""
 
     file: str
     line: int | None = None
+    """Line number, from 1; None: unknown."""
 
     def __str__(self) -> str:
         return self.file if self.line is None else f"{self.file}, line {self.line}"
 
 
 class Contents(NamedTuple):
-    """A YAML file that was read but not yet checked against a model.
-
-    Attributes:
-        keys: keys and values.
-        places: where each key and each item of a list stands.
-    """
+    """A YAML file that was read but not yet checked against a model."""
 
     keys: dict[str, Any]
     places: dict[Where, Place]
+    """Where each key and each item of a list stands."""
 
 
 def load(path: Path, model: type[Model]) -> Model:

@@ -11,7 +11,7 @@ from math import isfinite
 from fastcrc import crc16
 
 from companion.attitude.types import BodyRates, Quaternion
-from companion.mavlink.errors import InvalidSetpoint, NonFiniteSetpoint
+from companion.mavlink.errors import InvalidSetpoint
 from companion.mavlink.framing import SIGNED, V2
 from companion.mavlink.messages import CRC_EXTRA
 
@@ -85,8 +85,8 @@ class SetpointEncoder:
             thrust: Collective thrust, 0..1.
 
         Raises:
-            NonFiniteSetpoint: A rate or the thrust is not finite as float32.
-            InvalidSetpoint: Thrust outside 0..1 or time stamp outside uint32.
+            InvalidSetpoint: A rate or the thrust is not finite as float32, the thrust is outside
+                0..1, or the time stamp outside uint32.
         """
         roll, pitch, yaw = rates
         # Written so that NaN fails too: every comparison with it is false.
@@ -128,7 +128,7 @@ class SetpointEncoder:
 
 def _refusal(time_boot_ms: int, rates: BodyRates, thrust: float) -> InvalidSetpoint:
     if not all(isfinite(value) and abs(value) <= _FLOAT32_MAX for value in (*rates, thrust)):
-        return NonFiniteSetpoint(
+        return InvalidSetpoint(
             f"setpoint not sent: rates {tuple(rates)} rad/s and thrust {thrust} must be finite"
         )
     if not 0.0 <= thrust <= 1.0:

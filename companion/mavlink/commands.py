@@ -57,16 +57,11 @@ def result_name(result: int) -> str:
 
 @dataclass(slots=True)
 class _Try:
-    """A COMMAND_LONG that was sent and has no final ACK yet.
-
-    Attributes:
-        answers: Receives the results of its ACKs.
-        deadline: Event-loop time until which an ACK counts for this try, s; inf while its call
-            waits.
-    """
+    """A COMMAND_LONG that was sent and has no final ACK yet."""
 
     answers: AnswerQueue[int]
     deadline: float = inf
+    """Event-loop time until which an ACK counts for this try, s; inf while its call waits."""
 
 
 class CommandClient:
@@ -135,9 +130,9 @@ class CommandClient:
             self._send_try(command, params, confirmation)
             try:
                 result = await answers.next(timeout_s)
-                return (
-                    await self._final_result(command, answers) if result == _IN_PROGRESS else result
-                )
+                if result == _IN_PROGRESS:
+                    result = await self._final_result(command, answers)
+                return result
             except TimeoutError:  # the ACK is lost, or after a stall it may be in the backlog
                 deadline = time() + _BACKLOG_S if time() - deadline > _STALL_S else -inf
             finally:
@@ -190,10 +185,8 @@ class CommandClient:
 
     def _expected_tries(self, command: int) -> deque[_Try]:
         """The tries of a command whose ACK may still come, oldest first."""
-        now, tries = (
-            asyncio.get_running_loop().time(),
-            self._unanswered.setdefault(command, deque()),
-        )
+        now = asyncio.get_running_loop().time()
+        tries = self._unanswered.setdefault(command, deque())
         while tries and tries[0].deadline < now:
             tries.popleft()
         return tries

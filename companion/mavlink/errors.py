@@ -41,10 +41,6 @@ class InvalidSetpoint(LinkError, ValueError):  # noqa: N818
     """A setpoint that must not reach the vehicle; nothing was sent."""
 
 
-class NonFiniteSetpoint(InvalidSetpoint):
-    """A rate or thrust is NaN, infinite or too large for the wire; nothing was sent."""
-
-
 class CommandTimeout(LinkTimeout):
     """No COMMAND_ACK came for a command after all retries."""
 

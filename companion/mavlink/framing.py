@@ -29,25 +29,21 @@ _NOT_A_FRAME = 0
 
 
 class Frame(NamedTuple):
-    """One intact frame.
-
-    Attributes:
-        message_id: Number of the message.
-        system: Source system id.
-        component: Source component id.
-        sequence: The sender's sequence number, 0..255.
-        payload: Payload as sent; version 2 cuts trailing zeros, so pad it before unpacking.
-        raw: The whole frame with header, checksum and signature.
-        signed: Whether the frame carries a signature; it has not been checked.
-    """
+    """One intact frame."""
 
     message_id: int
     system: int
+    """Source system id."""
     component: int
+    """Source component id."""
     sequence: int
+    """The sender's sequence number, 0..255."""
     payload: bytes
+    """Payload as sent; version 2 cuts trailing zeros, so pad it before unpacking."""
     raw: bytes
+    """The whole frame with header, checksum and signature."""
     signed: bool
+    """Whether the frame carries a signature; it has not been checked."""
 
 
 class FrameScanner:

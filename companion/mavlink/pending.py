@@ -1,7 +1,7 @@
 """Queues of answers for which tasks wait; when the connection drops, every wait ends at once."""
 
 import asyncio
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from companion.mavlink.errors import LinkLost
 
@@ -15,16 +15,12 @@ class AnswerQueue(Generic[T]):
     """
 
     def __init__(self, registry: "AnswerQueueRegistry") -> None:
-        self._registry = registry
+        self._waiting = registry.waiting
         self._queue: asyncio.Queue[T | LinkLost] = asyncio.Queue()
 
-    def put(self, answer: T) -> None:
-        """Add an answer."""
+    def put(self, answer: T | LinkLost) -> None:
+        """Add an answer, or the error that ends the wait."""
         self._queue.put_nowait(answer)
-
-    def fail(self, error: LinkLost) -> None:
-        """End the wait: `next` raises `error`."""
-        self._queue.put_nowait(error)
 
     async def next(self, timeout_s: float) -> T:
         """Wait for the next answer.
@@ -40,29 +36,24 @@ class AnswerQueue(Generic[T]):
         return answer
 
     def __enter__(self) -> "AnswerQueue[T]":
-        self._registry.add(self)
+        self._waiting[self] = None
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._registry.discard(self)
+        del self._waiting[self]
 
 
 class AnswerQueueRegistry:
-    """All queues of a link on which a task waits."""
+    """All queues of a link on which a task waits.
+
+    Attributes:
+        waiting: the queues, as keys: a dict keeps their order, so that flights are repeatable.
+    """
 
     def __init__(self) -> None:
-        # A dict has a fixed order, which keeps flights repeatable; a set has none.
-        self._waiting: dict[int, AnswerQueue[object]] = {}
-
-    def add(self, pending: AnswerQueue[T]) -> None:
-        """Add a queue."""
-        self._waiting[id(pending)] = pending  # type: ignore[assignment]
-
-    def discard(self, pending: AnswerQueue[T]) -> None:
-        """Remove a queue."""
-        self._waiting.pop(id(pending), None)
+        self.waiting: dict[AnswerQueue[Any], None] = {}
 
     def fail(self, reason: str) -> None:
         """End every wait with `LinkLost`, whose message names `reason`."""
-        for pending in tuple(self._waiting.values()):
-            pending.fail(LinkLost(f"the link dropped while waiting for an answer ({reason})"))
+        for queue in tuple(self.waiting):
+            queue.put(LinkLost(f"the link dropped while waiting for an answer ({reason})"))

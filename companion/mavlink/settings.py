@@ -11,30 +11,26 @@ MAV_TYPE_GCS = 6
 
 @dataclass(frozen=True)
 class LinkSettings:
-    """The endpoint, and the ids of the vehicle and of this program.
-
-    Attributes:
-        endpoint: Such as `udpin://0.0.0.0:14540` or `serial:///dev/ttyAMA0:921600`; see
-            `parse_endpoint`.
-        target_system: System id of the vehicle; frames of other systems are ignored.
-        target_component: Component id of the vehicle; 1 is the autopilot.
-        source_system: System id of this program; a companion computer has that of its vehicle.
-        source_component: Component id of this program.
-        heartbeat_type: MAV_TYPE in the heartbeats that are sent. PX4 sends its STATUSTEXTs only on
-            links where it receives heartbeats of type GCS (6).
-        heartbeat_rate_hz: Rate of the heartbeats that are sent, Hz. No setpoint depends on it.
-        signing: Signs frames that are sent and checks those received; `None`: no signing.
-        lockstep: Vehicle time drives the event loop; needs `companion.mavlink.lockstep.run`.
-        first_beacon_timeout_s: Wall time to wait for the first beacon in lockstep, s.
-    """
+    """The endpoint, and the ids of the vehicle and of this program."""
 
     endpoint: str
+    """Such as `udpin://0.0.0.0:14540` or `serial:///dev/ttyAMA0:921600`; see `parse_endpoint`."""
     target_system: int = 1
+    """System id of the vehicle; frames of other systems are ignored."""
     target_component: int = 1
+    """Component id of the vehicle; 1 is the autopilot."""
     source_system: int = 1
+    """System id of this program; a companion computer has that of its vehicle."""
     source_component: int = MAV_COMP_ID_ONBOARD_COMPUTER
+    """Component id of this program."""
     heartbeat_type: int = MAV_TYPE_ONBOARD_CONTROLLER
+    """MAV_TYPE in the heartbeats that are sent. PX4 sends its STATUSTEXTs only on links where it
+    receives heartbeats of type GCS (6)."""
     heartbeat_rate_hz: float = 1.0
+    """Rate of the heartbeats that are sent, Hz. No setpoint depends on it."""
     signing: Signing | None = None
+    """Signs frames that are sent and checks those received; `None`: no signing."""
     lockstep: bool = False
+    """Vehicle time drives the event loop; needs `companion.mavlink.lockstep.run`."""
     first_beacon_timeout_s: float = 10.0
+    """Wall time to wait for the first beacon in lockstep, s."""

@@ -43,18 +43,15 @@ class SignatureResult(Enum):
 
 @dataclass(frozen=True)
 class Stamps:
-    """The stamps kept from one run of the program to the next, in ticks of 10 us.
-
-    Attributes:
-        date: This program's date when the stamps were written.
-        sent: The newest stamp that was sent.
-        streams: The newest stamps accepted on each stream: one near this program's date, and one
-            far ahead of it, if the vehicle proved that date (see `StampJudge`).
-    """
+    """The stamps kept from one run of the program to the next, in ticks of 10 us."""
 
     date: int = 0
+    """This program's date when the stamps were written."""
     sent: int = 0
+    """The newest stamp that was sent."""
     streams: dict[Stream, tuple[int, ...]] = field(default_factory=dict)
+    """The newest stamps accepted on each stream: one near this program's date, and one far ahead of
+    it, if the vehicle proved that date (see `StampJudge`)."""
 
 
 class StampJudge:

@@ -13,56 +13,52 @@ def share_lost(frames: int, lost: int) -> float:
 
 @dataclass
 class LinkStats:
-    """Counters of one link.
-
-    Attributes:
-        frames: Frames accepted from the vehicle.
-        lost: Frames missing in the vehicle's sequence numbers.
-        repeated: Frames received twice or late.
-        bad_crc: Frames with a wrong checksum.
-        unknown: Frames of messages that the dialect does not know.
-        bad_signature: Frames unsigned, wrongly signed, replayed or dated too far ahead, while
-            signing is on.
-        ignored_foreign: Frames of other systems or components than the vehicle's.
-        unclaimed: Frames with the vehicle's ids, from a sender that is not the peer (`PeerRule`).
-        non_finite: Messages refused for a NaN or infinity.
-        non_finite_at: Event-loop time at which the newest of them came, s, by message name.
-        outdated: Positions refused because one with the same or a later time stamp had come.
-        stamped_ahead: Positions refused because they were stamped ahead of the vehicle's clock.
-        malformed: Messages that could not be decoded or whose values are impossible.
-        sent: Frames of this program that were passed to the kernel.
-        forwarded: Frames of other nodes that were passed to the kernel unchanged.
-        not_sent: Frames of this program dropped because they could not be sent (no peer, buffer
-            full, connection down).
-        reconnects: Number of times that the connection was opened again; of a TCP server, number of
-            times that its client was lost.
-        peers: Number of times that the peer changed to another address or port, or another TCP
-            client. A peer that returns at the same address and port does not count. A serial port
-            or TCP connection that this program opens again counts only in `reconnects`.
-        by_message: Accepted frames for each message id.
-        foreign_sources: (system, component) of frames that are ignored.
-    """
+    """Counters of one link."""
 
     frames: int = 0
+    """Frames accepted from the vehicle."""
     lost: int = 0
+    """Frames missing in the vehicle's sequence numbers."""
     repeated: int = 0
+    """Frames received twice or late."""
     bad_crc: int = 0
+    """Frames with a wrong checksum."""
     unknown: int = 0
+    """Frames of messages that the dialect does not know."""
     bad_signature: int = 0
+    """Frames unsigned, wrongly signed, replayed or dated too far ahead, while signing is on."""
     ignored_foreign: int = 0
+    """Frames of other systems or components than the vehicle's."""
     unclaimed: int = 0
+    """Frames with the vehicle's ids, from a sender that is not the peer (`PeerRule`)."""
     non_finite: int = 0
+    """Messages refused for a NaN or infinity."""
     non_finite_at: dict[str, float] = field(default_factory=dict)
+    """Event-loop time at which the newest of them came, s, by message name."""
     outdated: int = 0
+    """Positions refused because one with the same or a later time stamp had come."""
     stamped_ahead: int = 0
+    """Positions refused because they were stamped ahead of the vehicle's clock."""
     malformed: int = 0
+    """Messages that could not be decoded or whose values are impossible."""
     sent: int = 0
+    """Frames of this program that were passed to the kernel."""
     forwarded: int = 0
+    """Frames of other nodes that were passed to the kernel unchanged."""
     not_sent: int = 0
+    """Frames of this program dropped because they could not be sent (no peer, buffer full,
+    connection down)."""
     reconnects: int = 0
+    """Number of times that the connection was opened again; of a TCP server, number of times that
+    its client was lost."""
     peers: int = 0
+    """Number of times that the peer changed to another address or port, or another TCP client. A
+    peer that returns at the same address and port does not count. A serial port or TCP connection
+    that this program opens again counts only in `reconnects`."""
     by_message: dict[int, int] = field(default_factory=dict)
+    """Accepted frames for each message id."""
     foreign_sources: set[tuple[int, int]] = field(default_factory=set)
+    """(system, component) of frames that are ignored."""
 
     def refuse_non_finite(self, message: str, now: float) -> None:
         """Count a message of that name as refused at `now`, s of event-loop time."""

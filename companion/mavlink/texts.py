@@ -14,16 +14,12 @@ _REPETITION_TIME_S = 1.0
 
 
 class StatusText(NamedTuple):
-    """A text of the autopilot.
-
-    Attributes:
-        time: Event-loop time at which the last piece arrived, s.
-        severity: MAV_SEVERITY, 0 emergency to 7 debug.
-        text: The whole text.
-    """
+    """A text of the autopilot."""
 
     time: float
+    """Event-loop time at which the last piece arrived, s."""
     severity: int
+    """MAV_SEVERITY, 0 emergency to 7 debug."""
     text: str
 
 
@@ -79,7 +75,7 @@ class TextAssembler:
         self._id, self._pieces = 0, []
 
     def _keep(self, now: float, severity: int, text: str) -> None:
-        text = text.rstrip("\t ").strip()
+        text = text.strip()
         if text and not _is_repetition(self._events, text, now):
             self.texts.append(StatusText(now, severity, text))
 

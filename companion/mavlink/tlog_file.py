@@ -8,11 +8,11 @@ from collections.abc import Iterator, Set
 from pathlib import Path
 
 from companion.mavlink.errors import LogError
-from companion.mavlink.framing import V1, V2, Frame, FrameScanner
+from companion.mavlink.framing import SIGNATURE_LENGTH, SIGNED, V1, V2, Frame, FrameScanner
 from companion.mavlink.messages import CRC_EXTRA, MESSAGE_IDS, Message, decode
 
 _STAMP_BYTES = 8
-_V1_OVERHEAD, _V2_OVERHEAD, _SIGNATURE_BYTES = 8, 12, 13
+_V1_OVERHEAD, _V2_OVERHEAD = 8, 12  # bytes of header and checksum
 
 
 def messages(path: Path, names: Set[str]) -> Iterator[tuple[Frame, Message]]:
@@ -41,7 +41,7 @@ def _records(path: Path) -> Iterator[bytes]:
     while start + 3 <= len(data):
         magic, size, flags = data[start : start + 3]
         if magic == V2:
-            end = start + _V2_OVERHEAD + size + (_SIGNATURE_BYTES if flags & 1 else 0)
+            end = start + _V2_OVERHEAD + size + (SIGNATURE_LENGTH if flags & SIGNED else 0)
         elif magic == V1:
             end = start + _V1_OVERHEAD + size
         elif start == _STAMP_BYTES:

@@ -13,7 +13,7 @@ from companion.mavlink.errors import LinkError
 from companion.mavlink.frame_filter import Notice
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.transport.base import Lost, Receiver, Tap, Transport
-from companion.mavlink.transport.endpoint import Endpoint, UdpIn
+from companion.mavlink.transport.endpoint import Endpoint
 from companion.mavsdk_link.transport import MavsdkTransport
 from companion.vehicle.link import Link
 
@@ -43,8 +43,7 @@ class MavsdkLink(Link):
         if settings.lockstep or settings.signing is not None:
             raise LinkError("MAVSDK can neither fly in lockstep nor sign; use link.backend: direct")
 
-        async def opener(where: Endpoint, receiver: Receiver, _lost: Lost) -> Transport:
-            speaks_first = not isinstance(where, UdpIn)
-            return MavsdkTransport(settings, receiver.receive, speaks_first=speaks_first)
+        async def opener(_endpoint: Endpoint, receiver: Receiver, _lost: Lost) -> Transport:
+            return MavsdkTransport(settings, receiver.receive)
 
         super().__init__(settings, tap, opener, notice)

@@ -32,6 +32,14 @@ from companion.mavlink.transport.endpoint import (
     parse_endpoint,
 )
 
+_SCHEMES: dict[type[Endpoint], str] = {
+    UdpIn: "udpin",
+    UdpOut: "udpout",
+    TcpClient: "tcpout",
+    TcpServer: "tcpin",
+    SerialPort: "serial",
+}
+
 
 def connection_url(endpoint: str) -> str:
     """Convert an endpoint to the URL that `Mavsdk.add_any_connection` takes.
@@ -45,27 +53,10 @@ def connection_url(endpoint: str) -> str:
             f"endpoint {endpoint!r}: MAVSDK accepts every sender; remove ?peer=, or use "
             "link.backend: direct"
         )
-    return f"{_scheme(where)}://{_address(where)}"
-
-
-def _scheme(where: Endpoint) -> str:
-    match where:
-        case UdpIn():
-            return "udpin"
-        case UdpOut():
-            return "udpout"
-        case TcpClient():
-            return "tcpout"
-        case TcpServer():
-            return "tcpin"
-        case SerialPort():
-            return "serial"
-
-
-def _address(where: Endpoint) -> str:
+    scheme = _SCHEMES[type(where)]
     if isinstance(where, SerialPort):
-        return f"{where.device}:{where.baud}"
-    return f"{where.host}:{where.port}"
+        return f"{scheme}://{where.device}:{where.baud}"
+    return f"{scheme}://{where.host}:{where.port}"
 
 
 _MOST_WAITING = 1000
@@ -85,8 +76,6 @@ class MavsdkTransport:
         settings: The endpoint and ids. MAVSDK itself uses the component id above
             `source_component`, because it does not forward frames that are addressed to itself.
         receive: Called in the event loop for each frame except MAVSDK's own.
-        speaks_first: Whether frames can be sent before one has been received. A listening UDP
-            endpoint does not know the vehicle's address until then.
 
     Raises:
         EndpointError: The endpoint cannot be parsed, or MAVSDK cannot open it; the message says
@@ -95,13 +84,14 @@ class MavsdkTransport:
 
     reconnects = False
 
-    def __init__(self, settings: LinkSettings, receive: Receive, *, speaks_first: bool) -> None:
+    def __init__(self, settings: LinkSettings, receive: Receive) -> None:
         url = connection_url(settings.endpoint)
         log_subscribe(lambda *_: True)  # otherwise MAVSDK logs to standard output
         component = settings.source_component % 255 + 1
         self._own = bytes((settings.source_system, component))
         self._receive = receive
-        self._has_peer = speaks_first
+        # A listening UDP port knows no address to send to before it has received a frame.
+        self._has_peer = not url.startswith(_SCHEMES[UdpIn])
         self._waiting: deque[tuple[bytes, int]] = deque(maxlen=_MOST_WAITING)
         self._loop = asyncio.get_running_loop()
         self._wakeup = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)

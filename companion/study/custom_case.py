@@ -3,7 +3,7 @@
 from math import hypot, radians, sin
 from typing import Annotated, Literal
 
-from pydantic import Field, StrictBool, model_validator
+from pydantic import Field, model_validator
 
 from companion.attitude import LAW_NAMES, Coefficients, Limits
 from companion.files.yaml_file import Section
@@ -60,7 +60,7 @@ class Case(Section):
     """Duration of the response."""
     limits: CaseLimits = CaseLimits()
     """Limits of the planners."""
-    inner_loop: StrictBool = False
+    inner_loop: bool = False
     """True: fly with the mock vehicle's rate loop, rotors and rigid body. False: ideal rates."""
     quickness: Annotated[int, Field(ge=1, le=10)] = 1
     """All times of the inner loop are divided by this; at 1 it responds as measured on a PX4."""

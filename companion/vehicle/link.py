@@ -209,8 +209,7 @@ class Link(VehicleClient):
             Whether it was sent; False if the connection is down or the kernel refuses it.
 
         Raises:
-            InvalidSetpoint: A value is out of range, or not finite (`NonFiniteSetpoint`); nothing
-                was sent.
+            InvalidSetpoint: A value is out of range, or not finite; nothing was sent.
         """
         if self._lockstep is not None and self._lockstep.step_ms == time_boot_ms:
             self._outbox.latch(time_boot_ms, rates, thrust)

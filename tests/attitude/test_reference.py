@@ -1,5 +1,7 @@
 """The linear models, which are closed solutions, against SciPy's integration and exponential."""
 
+from math import sqrt
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -36,6 +38,11 @@ def test_second_order_is_the_matrix_exponential(damping, dt):
     assert np.array(speed) == pytest.approx(expected_speed, abs=1e-11)
 
 
+def behind_a_lag(gain, lag):
+    """A proportional gain p (1/s) behind a lag τ (s): c̈ = (p·(c_d − c) − ċ)/τ."""
+    return SecondOrderReference(sqrt(gain / lag), 0.5 / sqrt(gain * lag))
+
+
 @pytest.mark.parametrize(("gain", "lag"), [(5.0, 0.02), (5.0, 0.05), (5.0, 0.2), (2.0, 0.5)])
 def test_second_order_with_a_lag_is_first_order_behind_it(gain, lag):
     """Two first-order systems in a row, integrated: the lag's output is the speed."""
@@ -48,15 +55,15 @@ def test_second_order_with_a_lag_is_first_order_behind_it(gain, lag):
         atol=1e-13,
         method="DOP853",
     )
-    model = SecondOrderReference.with_lag(gain, lag)
+    model = behind_a_lag(gain, lag)
     for t, state in zip(solution.t, solution.y.T, strict=True):
         c, speed = model.after(START, SPEED, GOAL, float(t))
         assert [*c, *speed] == pytest.approx(state, abs=1e-9)
-    assert SecondOrderReference.with_lag(5.0, 0.05).damping == pytest.approx(1.0, abs=1e-15)
+    assert behind_a_lag(5.0, 0.05).damping == pytest.approx(1.0, abs=1e-15)
 
 
 def test_an_overdamped_model_a_long_time_later():
-    model = SecondOrderReference.with_lag(5.0, 1e-3)
+    model = behind_a_lag(5.0, 1e-3)
     c, speed = model.after(START, SPEED, GOAL, 2.0)
     expected_c, expected_speed = exponential(model.frequency, model.damping, 2.0)
     assert [*c, *speed] == pytest.approx([*expected_c, *expected_speed], abs=1e-9)

@@ -54,11 +54,11 @@ def _leave_cores():
     server.SPIN_S = lockstep._SPIN_S = 0.0
 
 
-def checked_here(command: list[str]) -> None:
+def checked_here(config: Path) -> None:
     """What `companion check-config` lets the mock vehicle check, without a process for it."""
     words = StringIO()
     with redirect_stdout(words), redirect_stderr(words):
-        code = command_line.main(command[command.index("sitl_mock") + 1 :])
+        code = command_line.main(["--check", "--config", str(config)])
     if code != 0:
         raise ConfigError(words.getvalue())
 

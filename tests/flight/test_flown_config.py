@@ -3,7 +3,6 @@
 import pytest
 import yaml
 
-from companion import demo
 from companion.cli.main import main
 from companion.config import trajectory_file
 from companion.config.files import load
@@ -50,7 +49,8 @@ def configured(home, name):
 @pytest.mark.parametrize("name", FIGURES)
 def test_a_record_describes_the_same_flight_from_any_folder(home, monkeypatch, name):
     monkeypatch.chdir(home / "paths")
-    monkeypatch.setattr(demo, "_run_check", checked_here)  # a process is started by test_configs
+    # A process is started by test_configs.
+    monkeypatch.setattr("companion.cli.config.check_mock", checked_here)
     config = load(configured(home, name))
     before = configured_maneuvers(config).parts[0]
     flown_config.record(config, home / "flight")

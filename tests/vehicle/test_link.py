@@ -11,9 +11,9 @@ from pymavlink.dialects.v20 import common as dialect
 from companion.attitude import BodyRates
 from companion.mavlink.errors import (
     EndpointError,
+    InvalidSetpoint,
     LinkError,
     LinkTimeout,
-    NonFiniteSetpoint,
     NotConnected,
     UnsupportedAutopilot,
 )
@@ -94,7 +94,7 @@ def test_a_bad_setpoint_sends_nothing(run):
     async def scene():
         async with linked() as (link, vehicle):
             sent = link.stats.sent
-            with pytest.raises(NonFiniteSetpoint):
+            with pytest.raises(InvalidSetpoint, match="must be finite"):
                 link.send_setpoint(4, BodyRates(math.nan, 0.0, 0.0), 0.5)
             assert link.stats.sent == sent
             assert vehicle.of("SET_ATTITUDE_TARGET") == []

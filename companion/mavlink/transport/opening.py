@@ -10,21 +10,20 @@ from companion.mavlink.transport.endpoint import (
     TcpServer,
     UdpIn,
     UdpOut,
-    parse_endpoint,
 )
 from companion.mavlink.transport.serial_port import SerialTransport
 from companion.mavlink.transport.tcp import open_tcp_client, open_tcp_server
 from companion.mavlink.transport.udp import open_udp
 
 OpenTransport = Callable[[Endpoint, Receiver, Lost], Awaitable[Transport]]
-"""A function like `open_transport`, for a parsed endpoint."""
+"""A function like `open_transport`."""
 
 
-async def open_transport(endpoint: str | Endpoint, receiver: Receiver, lost: Lost) -> Transport:
+async def open_transport(endpoint: Endpoint, receiver: Receiver, lost: Lost) -> Transport:
     """Open the transport that the endpoint describes.
 
     Args:
-        endpoint: A parsed endpoint or its text.
+        endpoint: The parsed endpoint.
         receiver: Takes all bytes that arrive.
         lost: Called with the reason when an open connection drops: once; for a TCP server, each
             time that its peer drops. Never called for UDP, nor after `close`.
@@ -32,13 +31,12 @@ async def open_transport(endpoint: str | Endpoint, receiver: Receiver, lost: Los
     Raises:
         EndpointError: The transport cannot be opened; the message says why and what to do.
     """
-    parsed = parse_endpoint(endpoint) if isinstance(endpoint, str) else endpoint
-    match parsed:
+    match endpoint:
         case UdpIn() | UdpOut():
-            return await open_udp(parsed, receiver)
+            return await open_udp(endpoint, receiver)
         case TcpClient():
-            return await open_tcp_client(parsed, receiver, lost)
+            return await open_tcp_client(endpoint, receiver, lost)
         case TcpServer():
-            return await open_tcp_server(parsed, receiver, lost)
+            return await open_tcp_server(endpoint, receiver, lost)
         case SerialPort():
-            return SerialTransport(parsed, receiver.receive, lost)
+            return SerialTransport(endpoint, receiver.receive, lost)

@@ -39,17 +39,14 @@ async def open_udp(endpoint: UdpIn | UdpOut, receiver: Receiver) -> "UdpTranspor
 
 
 class UdpAddress(NamedTuple):
-    """The addresses of an endpoint.
-
-    Attributes:
-        family: Address family of the socket.
-        address: Socket address to bind or to send to.
-        named_peers: The senders that the endpoint names.
-    """
+    """The addresses of an endpoint."""
 
     family: socket.AddressFamily
+    """Address family of the socket."""
     address: Any
+    """Socket address to bind or to send to."""
     named_peers: NamedPeers
+    """The senders that the endpoint names."""
 
 
 async def udp_address(endpoint: UdpIn | UdpOut) -> UdpAddress:

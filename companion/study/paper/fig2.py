@@ -5,7 +5,7 @@ from math import degrees
 import numpy as np
 from matplotlib.figure import Figure
 
-from companion.attitude import Quaternion, Target, body_error
+from companion.attitude import Quaternion, Target, comparison_laws
 from companion.attitude.limits import Constants
 from companion.attitude.planner import LawPlanner
 from companion.study.drawing import (
@@ -52,7 +52,7 @@ def _printed_quaternion_law(
     error in the body frame. Its use as body rates shows the effect of the misprint.
     """
     w, x, y, z = q
-    i, j, k = body_error.quaternion(q, target, dt, constants)
+    i, j, k = comparison_laws.quaternion(q, target, dt, constants)
     t_x, t_y, t_z = 2.0 * (y * k - z * j), 2.0 * (z * i - x * k), 2.0 * (x * j - y * i)
     return (
         i + w * t_x + y * t_z - z * t_y,

@@ -17,7 +17,7 @@ import numpy as np
 from companion import demo
 from companion.child_process import end_with_parent
 from companion.config import Config
-from companion.config.files import changed, load
+from companion.config.files import changed, load, shipped
 from companion.files import bounded_yaml
 from companion.flight.observer import SilentObserver, decline_landing
 from companion.flight.session import Session
@@ -127,13 +127,11 @@ def fly(task: Task) -> TrackedFlight:
     with tempfile.TemporaryDirectory(prefix="companion-track-") as name:
         folder = Path(name)
         wire, truth_port = demo.udp_wire(), free_port()
-        shipped = load(demo.default_config())
+        base = load(shipped("mock-px4.yaml"))
         vehicle, course = folder / "vehicle.yaml", folder / "course.yaml"
-        vehicle.write_text(
-            bounded_yaml.dump({"mock": _vehicle_settings(shipped, task, truth_port)})
-        )
+        vehicle.write_text(bounded_yaml.dump({"mock": _vehicle_settings(base, task, truth_port)}))
         course.write_text(bounded_yaml.dump(task.course.file_content))
-        config = _task_config(shipped, task, course, wire.endpoint)
+        config = _task_config(base, task, course, wire.endpoint)
         truth = TruthRecorder(truth_port)
         session = Session(config, folder, truth, decline_landing)
         with demo.bundled_vehicle(vehicle, wire, folder / "vehicle.log", lockstep=True):
@@ -144,13 +142,13 @@ def fly(task: Task) -> TrackedFlight:
     return _measure(summary.trace.tracking_rows(), truth.rows())
 
 
-def _vehicle_settings(shipped: Config, task: Task, truth_port: int) -> dict[str, Any]:
+def _vehicle_settings(base: Config, task: Task, truth_port: int) -> dict[str, Any]:
     """Settings of the shipped mock vehicle, with the wind of the task."""
     wind = {"speed_m_s": task.wind, "gust_m_s": GUST_SHARE * task.wind}
-    return {**(shipped.mock or {}), **_SHORT_PHASES, "control_port": truth_port, "wind": wind}
+    return {**(base.mock or {}), **_SHORT_PHASES, "control_port": truth_port, "wind": wind}
 
 
-def _task_config(shipped: Config, task: Task, course: Path, endpoint: str) -> Config:
+def _task_config(base: Config, task: Task, course: Path, endpoint: str) -> Config:
     """The shipped configuration with the changes for the task."""
     changes: dict[str, dict[str, Any]] = {
         "link": {
@@ -173,7 +171,7 @@ def _task_config(shipped: Config, task: Task, course: Path, endpoint: str) -> Co
         },
         "hover": {"duration_s": HOLD_S},
     }
-    return changed(shipped, changes, "study track")
+    return changed(base, changes, "study track")
 
 
 class TruthRecorder(SilentObserver):

@@ -1,13 +1,21 @@
-"""`quaternion` and `so3`: the paper's section 4.2 with the attitude error in the body frame.
+"""The laws that the paper compares its own with, section 4.2: `quaternion`, `so3` and `euler`.
 
-The paper claims the same response at every heading. This holds for the error q⁻¹ ⊗ q_d, used here,
-and not for the paper's q_d ⊗ q⁻¹. As in the paper, one gain serves all three axes.
+The paper claims that `quaternion` and `so3` respond in the same way at every heading. This holds
+for the attitude error in the body frame, q⁻¹ ⊗ q_d, used here, and not for the paper's q_d ⊗ q⁻¹.
+As in the paper, one gain serves all three axes.
 """
 
-from math import sqrt
+from math import cos, sin, sqrt
 
 from companion.attitude.limits import Constants
-from companion.attitude.rotation import angle_per_sine, attitude_of, body_error, limit_rates
+from companion.attitude.rotation import (
+    angle_per_sine,
+    attitude_of,
+    body_error,
+    euler_angles,
+    limit_rates,
+    wrap_difference,
+)
 from companion.attitude.types import Quaternion, Target
 
 
@@ -40,6 +48,30 @@ def _scaled_rates(
         scale * x,
         scale * y,
         scale * z + heading_rate,
+        constants.max_tilt_rate,
+        constants.max_yaw_rate,
+    )
+
+
+def euler(
+    q: Quaternion, target: Target, dt: float, constants: Constants
+) -> tuple[float, float, float]:
+    """Body rates p·M(φ, θ)·(wrapped errors of the Z-Y-X Euler angles), rad/s.
+
+    The response depends on the heading.
+    """
+    gain = constants.gain
+    north, east, heading, heading_rate = target
+    roll, pitch, yaw = euler_angles(q)
+    roll_d, pitch_d, yaw_d = euler_angles(attitude_of(north, east, heading))
+    e_roll = gain * wrap_difference(roll_d - roll)
+    e_pitch = gain * wrap_difference(pitch_d - pitch)
+    e_yaw = gain * wrap_difference(yaw_d - yaw)
+    turning = e_yaw * cos(pitch)
+    return limit_rates(
+        e_roll - e_yaw * sin(pitch),
+        e_pitch * cos(roll) + turning * sin(roll),
+        turning * cos(roll) - e_pitch * sin(roll) + heading_rate,
         constants.max_tilt_rate,
         constants.max_yaw_rate,
     )
