@@ -5,7 +5,7 @@ from enum import Enum, IntEnum, auto
 from math import nan
 
 from sitl_mock.physics.quaternion import Quaternion, Vector
-from sitl_mock.physics.vehicle import ActuatorCommand, Estimate
+from sitl_mock.physics.vehicle import STILL, ActuatorCommand, Estimate
 
 NAN_VECTOR = (nan, nan, nan)
 
@@ -101,9 +101,7 @@ class State:
     home_ned: Vector = (0.0, 0.0, 0.0)
     home_q: Quaternion = (1.0, 0.0, 0.0, 0.0)
     home_set_at_us: int = 0
-    command: ActuatorCommand = field(
-        default_factory=lambda: ActuatorCommand(False, 0.0, 0.0, 0.0, 0.0)
-    )
+    command: ActuatorCommand = STILL
     attitude_target: AttitudeTargetEcho = field(default_factory=AttitudeTargetEcho)
     height_controlled: bool = False
     position_controlled: bool = False

@@ -21,6 +21,7 @@ from sitl_mock.physics.rate_shaping import Shaped
 from sitl_mock.physics.rotors import Four
 from sitl_mock.physics.sensors import Estimate, Estimator
 from sitl_mock.physics.vehicle_step import (
+    STILL,
     ActuatorCommand,
     Plant,
     PythonPlant,
@@ -29,7 +30,7 @@ from sitl_mock.physics.vehicle_step import (
     truth_row,
 )
 
-__all__ = ["ActuatorCommand", "BatteryState", "Estimate", "TruthState", "Vehicle"]
+__all__ = ["STILL", "ActuatorCommand", "BatteryState", "Estimate", "TruthState", "Vehicle"]
 
 SLOW_STEP_S = 0.01
 """Step of wind and battery, which change slowly, s."""
