@@ -41,7 +41,7 @@ class ArduPilotMotionTelemetry(MotionTelemetry):
         return dialect.MAVLink_raw_imu_message(
             self._state.shown_us,
             *(round(1e3 * force / GRAVITY) for force in estimate.specific_force_frd),
-            *(round(1e3 * rate) for rate in estimate.gyro),
+            *(round(1e3 * rate) for rate in estimate.body_rates),
             *(round(1e3 * field) for field in MAGNETIC_FIELD_NED),
         )
 

@@ -161,7 +161,7 @@ class MotionTelemetry:
         return dialect.MAVLink_highres_imu_message(
             self._state.shown_us,
             *estimate.specific_force_frd,
-            *estimate.gyro,
+            *estimate.body_rates,
             *MAGNETIC_FIELD_NED,
             self.pressure_hpa(),
             0.0,
