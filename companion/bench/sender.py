@@ -40,7 +40,7 @@ class Sender:
     """Simulates one vehicle for one program.
 
     Args:
-        program: The program that answers.
+        program: The program that answers; `close` stops it.
         stamp: Finds the time stamp in a setpoint.
         modulus: Value at which the time stamps in setpoints wrap, ms.
         extra_messages: Messages that follow each sample, each in a datagram of its own.
@@ -84,7 +84,8 @@ class Sender:
         return self._program.name
 
     def close(self) -> None:
-        """Close the socket."""
+        """Stop the program, and close the socket."""
+        self._program.stop()
         self._socket.close()
 
     def heartbeat(self) -> None:

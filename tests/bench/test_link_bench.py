@@ -37,7 +37,6 @@ def test_every_sample_is_answered_and_its_time_taken(module):
         assert sender.cpu_ns > 0
     finally:
         sender.close()
-        program.stop()
 
 
 def test_the_echo_is_of_a_setpoints_size():
