@@ -13,42 +13,38 @@ from rich.console import Console
 
 from companion.bench.figures import measure, print_table
 from companion.bench.process import BenchmarkedProgram
-from companion.bench.sender import Sender, Stamp, stamp_by_time, stamp_by_yaw_rate
+from companion.bench.sender import (
+    TIME_MODULUS,
+    Sender,
+    Stamp,
+    stamp_by_time,
+    stamp_by_yaw_rate,
+)
 from companion.extras import require
 
-_NO_WRAP = 2**32  # as the uint32 time stamp
 _YAW_RATE_WRAP = 8192  # STAMP_MODULUS of `mavsdk_program`
-_PYMAVLINK_PROGRAM = "companion.bench.pymavlink_program"
-_BACKEND_PROGRAM = "companion.bench.backend_program"
 
 
 class _Program(NamedTuple):
-    """A program to measure.
-
-    Attributes:
-        key: key of the program in the result.
-        title: name for the user.
-        module: module that is run.
-        stamp, modulus: how its setpoints are matched with samples; see `Sender`.
-    """
+    """A program to measure."""
 
     key: str
+    """Key of the program in the result."""
     title: str
+    """Name for the user."""
     module: str
-    stamp: Stamp
-    modulus: int
+    """Module of `companion.bench` that is run."""
+    stamp: Stamp = stamp_by_time
+    modulus: int = TIME_MODULUS
+    """How its setpoints are matched with samples; see `Sender`."""
 
 
 _PROGRAMS = (
-    _Program("echo", "blocking echo", "companion.bench.echo_program", stamp_by_time, _NO_WRAP),
-    _Program(
-        "companion", "companion", "companion.bench.companion_program", stamp_by_time, _NO_WRAP
-    ),
-    _Program("pymavlink", "blocking pymavlink", _PYMAVLINK_PROGRAM, stamp_by_time, _NO_WRAP),
-    _Program("companion_mavsdk", "companion by MAVSDK", _BACKEND_PROGRAM, stamp_by_time, _NO_WRAP),
-    _Program(
-        "mavsdk", "MAVSDK", "companion.bench.mavsdk_program", stamp_by_yaw_rate, _YAW_RATE_WRAP
-    ),
+    _Program("echo", "blocking echo", "echo_program"),
+    _Program("companion", "companion", "companion_program"),
+    _Program("pymavlink", "blocking pymavlink", "pymavlink_program"),
+    _Program("companion_mavsdk", "companion by MAVSDK", "backend_program"),
+    _Program("mavsdk", "MAVSDK", "mavsdk_program", stamp_by_yaw_rate, _YAW_RATE_WRAP),
 )
 
 
@@ -87,7 +83,7 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
 
 
 def _start(program: _Program) -> Sender:
-    benchmarked = BenchmarkedProgram(program.title, program.module)
+    benchmarked = BenchmarkedProgram(program.title, f"companion.bench.{program.module}")
     return Sender(benchmarked, program.stamp, program.modulus)
 
 

@@ -15,7 +15,8 @@ from companion.bench.process import BenchmarkedProgram, BenchmarkError
 
 Stamp = Callable[[bytes], int]
 """Function from the bytes of a setpoint to the time stamp of its sample, ms, modulo `modulus`."""
-
+TIME_MODULUS = 2**32
+"""Value at which `time_boot_ms` wraps, ms."""
 _SETPOINT_BYTES = 51
 _SETPOINT_ID = 82
 _TIME_OFFSET, _YAW_RATE_OFFSET = 10, 38
@@ -55,8 +56,8 @@ class Sender:
     def __init__(
         self,
         program: BenchmarkedProgram,
-        stamp: Stamp,
-        modulus: int,
+        stamp: Stamp = stamp_by_time,
+        modulus: int = TIME_MODULUS,
         extra_messages: Sequence[Any] = (),
     ) -> None:
         self._extra_messages = extra_messages

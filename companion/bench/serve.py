@@ -17,12 +17,11 @@ from rich.console import Console
 
 from companion.bench.figures import ROUND_S, measure, print_table
 from companion.bench.process import BenchmarkedProgram, BenchmarkError
-from companion.bench.sender import Sender, stamp_by_time
+from companion.bench.sender import Sender
 from companion.child_process import end_with_parent
 from companion.mavlink.transport.free_port import free_port
 
 _CLIENTS = 3
-_NO_WRAP = 2**32
 _ZEROS = [0.0] * 21
 _TELEMETRY = (
     dialect.MAVLink_attitude_message(1, 0.1, 0.1, 0.1, 0.01, 0.02, 0.03),
@@ -77,7 +76,7 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
 
 def _start(key: str, client_port: int) -> Sender:
     program = BenchmarkedProgram(_TITLES[key], "companion.bench.serve_program", str(client_port))
-    return Sender(program, stamp_by_time, _NO_WRAP, _TELEMETRY)
+    return Sender(program, extra_messages=_TELEMETRY)
 
 
 def _start_clients(stack: ExitStack, port: int, count: int) -> subprocess.Popen[str]:
