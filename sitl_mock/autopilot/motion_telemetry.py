@@ -98,14 +98,11 @@ class MotionTelemetry:
         state = self._state
         if not state.position_valid:
             return None
-        geodetic = to_geodetic(self._origin, state.estimate.position_ned)
         vx, vy, vz = state.estimate.velocity_ned
         height = state.home_ned[2] - state.estimate.position_ned[2]
         return dialect.MAVLink_global_position_int_message(
             self._boot_ms,
-            round(geodetic.latitude_deg * 1e7),
-            round(geodetic.longitude_deg * 1e7),
-            round(geodetic.altitude_m * 1e3),
+            *to_geodetic(self._origin, state.estimate.position_ned).as_integers(),
             round(height * 1e3),
             clip(vx * 100, 15),
             clip(vy * 100, 15),
