@@ -1,4 +1,4 @@
-"""The mock vehicle as a process of its own, for `companion demo` and the study `track`."""
+"""The mock vehicle as a process of its own, for `companion demo`."""
 
 import subprocess
 import sys

@@ -30,6 +30,18 @@ def schedule_as_usual(pid: int) -> None:
         os.sched_setscheduler(pid, os.SCHED_OTHER, os.sched_param(0))
 
 
+@contextmanager
+def no_garbage_collection() -> Iterator[None]:
+    """Switch Python's garbage collector off in the block."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
 class _Frozen:
     """State of `frozen_objects` in this process.
 
@@ -188,7 +200,5 @@ def _lock_memory() -> _Undo:
 def _stop_collecting() -> _Undo:
     undo = ExitStack()
     undo.enter_context(frozen_objects())
-    if gc.isenabled():
-        undo.callback(gc.enable)
-    gc.disable()
+    undo.enter_context(no_garbage_collection())
     return undo.close

@@ -1,6 +1,8 @@
 """The connections of one vehicle: companion, ground station, control channel."""
 
+import contextlib
 import select
+import socket
 
 from sitl_mock.config.endpoint import SerialLine, TcpIn, parse_endpoint
 from sitl_mock.config.settings import GCS_PORT_OFFSET, PORT_OFFSET
@@ -10,7 +12,7 @@ from sitl_mock.link.endpoint import Endpoint
 from sitl_mock.link.link import Link
 from sitl_mock.link.serial_endpoint import SerialEndpoint
 from sitl_mock.link.tcp_endpoint import TcpEndpoint
-from sitl_mock.link.udp_endpoint import UdpEndpoint
+from sitl_mock.link.udp_endpoint import MAX_DATAGRAM, UdpEndpoint, bound_socket
 from sitl_mock.settings import MockSettings
 from sitl_mock.simulation import Simulation
 
@@ -38,11 +40,9 @@ class Connections:
         if settings.gcs_port:
             gcs = UdpEndpoint(settings.gcs_port + GCS_PORT_OFFSET, settings.gcs_port, "--gcs-port")
             self._links[gcs] = simulation.gcs
-        self._control = (
-            UdpEndpoint(settings.control_port, None, "--control-port")
-            if settings.control_port
-            else None
-        )
+        self._control: socket.socket | None = None
+        if settings.control_port:
+            self._control = bound_socket(settings.control_port, "--control-port")
 
     def close(self) -> None:
         """Close all endpoints and the control channel."""
@@ -57,11 +57,10 @@ class Connections:
         Requests on the control channel are answered here.
         """
         by_descriptor = {fd: endpoint for endpoint in self._links for fd in endpoint.readable}
-        control = self._control
-        control_fds = [] if control is None else control.readable
-        readable, _, _ = select.select([*by_descriptor, *control_fds], (), (), timeout_s)
-        if control is not None and control_fds[0] in readable:
-            self._answer_requests(control)
+        control = [] if self._control is None else [self._control.fileno()]
+        readable, _, _ = select.select([*by_descriptor, *control], (), (), timeout_s)
+        if self._control is not None and self._control.fileno() in readable:
+            self._answer_requests(self._control)
         return [by_descriptor[fd] for fd in readable if fd in by_descriptor]
 
     def deliver(self, arrived: list[Arrived], endpoint: Endpoint) -> None:
@@ -78,10 +77,11 @@ class Connections:
             own_beacon = beacon if endpoint is self.companion else None
             endpoint.send(self._exchange.outgoing(link, own_beacon))
 
-    def _answer_requests(self, control: UdpEndpoint) -> None:
-        while (request := control.receive_from()) is not None:
-            datagram, sender = request
-            control.send_to(reply(self._simulation, datagram), sender)
+    def _answer_requests(self, control: socket.socket) -> None:
+        with contextlib.suppress(OSError):  # no further request waits, or its sender is gone
+            while True:
+                request, sender = control.recvfrom(MAX_DATAGRAM)
+                control.sendto(reply(self._simulation, request), sender)
 
 
 def _companion_endpoint(settings: MockSettings) -> Endpoint:

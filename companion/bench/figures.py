@@ -1,30 +1,53 @@
-"""What the latency benchmarks share: the length of a round, and the figures of a sender."""
+"""What the latency benchmarks share: rounds, figures of a program, and their table."""
 
-import gc
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Mapping
+from math import ceil
 from typing import Any
+
+from rich.console import Console
+from rich.table import Table
 
 from companion.bench.process import BenchmarkError
 from companion.bench.sender import Sender
+from companion.realtime import no_garbage_collection
 
 ROUND_S = 1.0
 """The programs are measured in turn, in rounds of this length, s, so load affects all equally."""
 
 
-@contextmanager
-def no_garbage_collection() -> Iterator[None]:
-    """Switch Python's garbage collector off in the context, so that the sender does not pause."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
+def measure(senders: Mapping[str, Sender], rate_hz: float, seconds: float) -> dict[str, Any]:
+    """Measure every program for `seconds`, in interleaved rounds; return its figures by key.
+
+    Raises:
+        BenchmarkError: A program ended, or answered no sample in time.
+    """
+    rounds = ceil(seconds / ROUND_S)
+    with no_garbage_collection():  # the senders must not pause
+        for _ in range(rounds):
+            for measured in senders.values():
+                measured.send_for(rate_hz, seconds / rounds)
+                for sender in senders.values():
+                    sender.heartbeat()
+    return {key: _figures_of(sender) for key, sender in senders.items()}
 
 
-def figures_of(sender: Sender) -> dict[str, Any]:
+def print_table(title: str, names: Mapping[str, str], figures: Mapping[str, Any]) -> None:
+    """Print the figures of the programs with these names, both by key."""
+    table = Table(title=title)
+    for heading in ("", "p50 µs", "p99 µs", "max µs", "CPU %", "unanswered"):
+        table.add_column(heading, justify="right" if heading else "left")
+    for key, name in names.items():
+        row = figures[key]
+        table.add_row(
+            name,
+            *(f"{row[figure]:.0f}" for figure in ("p50_us", "p99_us", "max_us")),
+            f"{row['cpu_percent']:.1f}",
+            f"{row['unanswered']} of {row['samples']}",
+        )
+    Console().print(table)
+
+
+def _figures_of(sender: Sender) -> dict[str, Any]:
     """The figures of one program: round trips in µs, processor time in % of a core, and counts.
 
     Raises:

@@ -6,51 +6,45 @@ program, a simple loop on pymavlink, this program with MAVSDK as its link, and a
 with MAVSDK alone.
 """
 
-from contextlib import ExitStack
-from math import ceil
+from contextlib import ExitStack, closing
 from typing import Any, NamedTuple
 
 from rich.console import Console
-from rich.table import Table
 
-from companion.bench.figures import ROUND_S, figures_of, no_garbage_collection
+from companion.bench.figures import measure, print_table
 from companion.bench.process import BenchmarkedProgram
-from companion.bench.sender import Sender, Stamp, stamp_by_time, stamp_by_yaw_rate
+from companion.bench.sender import (
+    TIME_MODULUS,
+    Sender,
+    Stamp,
+    stamp_by_time,
+    stamp_by_yaw_rate,
+)
 from companion.extras import require
 
-_NO_WRAP = 2**32  # as the uint32 time stamp
 _YAW_RATE_WRAP = 8192  # STAMP_MODULUS of `mavsdk_program`
-_PYMAVLINK_PROGRAM = "companion.bench.pymavlink_program"
-_BACKEND_PROGRAM = "companion.bench.backend_program"
 
 
 class _Program(NamedTuple):
-    """A program to measure.
-
-    Attributes:
-        key: key of the program in the result.
-        title: name for the user.
-        module: module that is run.
-        stamp, modulus: how its setpoints are matched with samples; see `Sender`.
-    """
+    """A program to measure."""
 
     key: str
+    """Key of the program in the result."""
     title: str
+    """Name for the user."""
     module: str
-    stamp: Stamp
-    modulus: int
+    """Module of `companion.bench` that is run."""
+    stamp: Stamp = stamp_by_time
+    modulus: int = TIME_MODULUS
+    """How its setpoints are matched with samples; see `Sender`."""
 
 
 _PROGRAMS = (
-    _Program("echo", "blocking echo", "companion.bench.echo_program", stamp_by_time, _NO_WRAP),
-    _Program(
-        "companion", "companion", "companion.bench.companion_program", stamp_by_time, _NO_WRAP
-    ),
-    _Program("pymavlink", "blocking pymavlink", _PYMAVLINK_PROGRAM, stamp_by_time, _NO_WRAP),
-    _Program("companion_mavsdk", "companion by MAVSDK", _BACKEND_PROGRAM, stamp_by_time, _NO_WRAP),
-    _Program(
-        "mavsdk", "MAVSDK", "companion.bench.mavsdk_program", stamp_by_yaw_rate, _YAW_RATE_WRAP
-    ),
+    _Program("echo", "blocking echo", "echo_program"),
+    _Program("companion", "companion", "companion_program"),
+    _Program("pymavlink", "blocking pymavlink", "pymavlink_program"),
+    _Program("companion_mavsdk", "companion by MAVSDK", "backend_program"),
+    _Program("mavsdk", "MAVSDK", "mavsdk_program", stamp_by_yaw_rate, _YAW_RATE_WRAP),
 )
 
 
@@ -74,17 +68,11 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
         LinkError: There are no free ports.
     """
     require("mavsdk", "mavsdk", "this benchmark")
-    rounds = ceil(seconds / ROUND_S)
-    with ExitStack() as stack, no_garbage_collection():
-        senders = {program.key: _start(stack, program) for program in _PROGRAMS}
+    with ExitStack() as stack:
+        senders = {each.key: stack.enter_context(closing(_start(each))) for each in _PROGRAMS}
         for sender in senders.values():
             sender.wait_ready()
-        for _ in range(rounds):
-            for measured in senders.values():
-                measured.send_for(rate_hz, seconds / rounds)
-                for sender in senders.values():
-                    sender.heartbeat()
-        figures = {key: figures_of(sender) for key, sender in senders.items()}
+        figures = measure(senders, rate_hz, seconds)
     figures["ratio"] = {
         f"companion_to_{other}": round(figures["companion"]["p50_us"] / figures[other]["p50_us"], 3)
         for other in ("echo", "pymavlink", "mavsdk")
@@ -94,30 +82,16 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
     return figures
 
 
-def _start(stack: ExitStack, program: _Program) -> Sender:
-    benchmarked = BenchmarkedProgram(program.title, program.module)
-    stack.callback(benchmarked.stop)
-    sender = Sender(benchmarked, program.stamp, program.modulus)
-    stack.callback(sender.close)
-    return sender
+def _start(program: _Program) -> Sender:
+    benchmarked = BenchmarkedProgram(program.title, f"companion.bench.{program.module}")
+    return Sender(benchmarked, program.stamp, program.modulus)
 
 
 def _show(figures: dict[str, Any], rate_hz: float) -> None:
-    table = Table(title=f"sample out → setpoint in, at {rate_hz:g} Hz")
-    for heading in ("", "p50 µs", "p99 µs", "max µs", "CPU %", "unanswered"):
-        table.add_column(heading, justify="right" if heading else "left")
-    for program in _PROGRAMS:
-        row = figures[program.key]
-        table.add_row(
-            program.title,
-            *(f"{row[key]:.0f}" for key in ("p50_us", "p99_us", "max_us")),
-            f"{row['cpu_percent']:.1f}",
-            f"{row['unanswered']} of {row['samples']}",
-        )
+    title = f"sample out → setpoint in, at {rate_hz:g} Hz"
+    print_table(title, {program.key: program.title for program in _PROGRAMS}, figures)
     ratio = figures["ratio"]
-    console = Console()
-    console.print(table)
-    console.print(
+    Console().print(
         f"p50 of companion: {ratio['companion_to_echo']:.2f} × echo, "
         f"{ratio['companion_to_pymavlink']:.2f} × pymavlink, "
         f"{ratio['companion_to_mavsdk']:.2f} × MAVSDK",

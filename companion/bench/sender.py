@@ -15,7 +15,8 @@ from companion.bench.process import BenchmarkedProgram, BenchmarkError
 
 Stamp = Callable[[bytes], int]
 """Function from the bytes of a setpoint to the time stamp of its sample, ms, modulo `modulus`."""
-
+TIME_MODULUS = 2**32
+"""Value at which `time_boot_ms` wraps, ms."""
 _SETPOINT_BYTES = 51
 _SETPOINT_ID = 82
 _TIME_OFFSET, _YAW_RATE_OFFSET = 10, 38
@@ -40,7 +41,7 @@ class Sender:
     """Simulates one vehicle for one program.
 
     Args:
-        program: The program that answers.
+        program: The program that answers; `close` stops it.
         stamp: Finds the time stamp in a setpoint.
         modulus: Value at which the time stamps in setpoints wrap, ms.
         extra_messages: Messages that follow each sample, each in a datagram of its own.
@@ -55,8 +56,8 @@ class Sender:
     def __init__(
         self,
         program: BenchmarkedProgram,
-        stamp: Stamp,
-        modulus: int,
+        stamp: Stamp = stamp_by_time,
+        modulus: int = TIME_MODULUS,
         extra_messages: Sequence[Any] = (),
     ) -> None:
         self._extra_messages = extra_messages
@@ -84,7 +85,8 @@ class Sender:
         return self._program.name
 
     def close(self) -> None:
-        """Close the socket."""
+        """Stop the program, and close the socket."""
+        self._program.stop()
         self._socket.close()
 
     def heartbeat(self) -> None:

@@ -9,22 +9,19 @@ import json
 import signal
 import subprocess
 import sys
-from contextlib import ExitStack
-from math import ceil
+from contextlib import ExitStack, closing
 from typing import Any
 
 from pymavlink.dialects.v20 import common as dialect
 from rich.console import Console
-from rich.table import Table
 
-from companion.bench.figures import ROUND_S, figures_of, no_garbage_collection
+from companion.bench.figures import ROUND_S, measure, print_table
 from companion.bench.process import BenchmarkedProgram, BenchmarkError
-from companion.bench.sender import Sender, stamp_by_time
+from companion.bench.sender import Sender
 from companion.child_process import end_with_parent
 from companion.mavlink.transport.free_port import free_port
 
 _CLIENTS = 3
-_NO_WRAP = 2**32
 _ZEROS = [0.0] * 21
 _TELEMETRY = (
     dialect.MAVLink_attitude_message(1, 0.1, 0.1, 0.1, 0.01, 0.02, 0.03),
@@ -56,10 +53,9 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
         BenchmarkError: A program failed.
         LinkError: There are no free ports.
     """
-    rounds = ceil(seconds / ROUND_S)
-    with ExitStack() as stack, no_garbage_collection():
+    with ExitStack() as stack:
         ports = {key: free_port() for key in _TITLES}
-        senders = {key: _start(stack, key, port) for key, port in ports.items()}
+        senders = {key: stack.enter_context(closing(_start(key, ports[key]))) for key in _TITLES}
         for sender in senders.values():
             sender.wait_ready()
         reading = _start_clients(stack, ports["with_clients"], _CLIENTS)
@@ -67,12 +63,7 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
         senders["with_clients"].send_for(rate_hz, ROUND_S)  # all four connect, and receive
         stopped.send_signal(signal.SIGSTOP)
         senders["with_clients"].reset_measurements()
-        for _ in range(rounds):
-            for measured in senders.values():
-                measured.send_for(rate_hz, seconds / rounds)
-                for sender in senders.values():
-                    sender.heartbeat()
-        figures: dict[str, Any] = {key: figures_of(sender) for key, sender in senders.items()}
+        figures = measure(senders, rate_hz, seconds)
         figures["clients"] = _read_counts(reading)
     alone, with_clients = figures["alone"], figures["with_clients"]
     figures["ratio"] = {
@@ -83,12 +74,9 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
     return figures
 
 
-def _start(stack: ExitStack, key: str, client_port: int) -> Sender:
+def _start(key: str, client_port: int) -> Sender:
     program = BenchmarkedProgram(_TITLES[key], "companion.bench.serve_program", str(client_port))
-    stack.callback(program.stop)
-    sender = Sender(program, stamp_by_time, _NO_WRAP, _TELEMETRY)
-    stack.callback(sender.close)
-    return sender
+    return Sender(program, extra_messages=_TELEMETRY)
 
 
 def _start_clients(stack: ExitStack, port: int, count: int) -> subprocess.Popen[str]:
@@ -114,22 +102,11 @@ def _read_counts(process: subprocess.Popen[str]) -> list[dict[str, int]]:
 
 
 def _show(figures: dict[str, Any], rate_hz: float) -> None:
-    table = Table(title=f"sample out → setpoint in, at {rate_hz:g} Hz, forwarding full telemetry")
-    for heading in ("", "p50 µs", "p99 µs", "max µs", "CPU %", "unanswered"):
-        table.add_column(heading, justify="right" if heading else "left")
-    for key, title in _TITLES.items():
-        row = figures[key]
-        table.add_row(
-            title,
-            *(f"{row[name]:.0f}" for name in ("p50_us", "p99_us", "max_us")),
-            f"{row['cpu_percent']:.1f}",
-            f"{row['unanswered']} of {row['samples']}",
-        )
+    title = f"sample out → setpoint in, at {rate_hz:g} Hz, forwarding full telemetry"
+    print_table(title, _TITLES, figures)
     ratio, lost = figures["ratio"], sum(each["lost"] for each in figures["clients"])
     received = sum(each["received"] for each in figures["clients"])
-    console = Console()
-    console.print(table)
-    console.print(
+    Console().print(
         f"with clients: p50 {ratio['p50']:.2f} ×, p99 {ratio['p99']:.2f} ×; "
         f"lost {lost} of {received + lost} forwarded frames",
         highlight=False,

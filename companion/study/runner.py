@@ -56,7 +56,6 @@ def run(
         ConfigError: `out` or the case cannot be used, a case is missing, or the study takes none.
         OSError: a result cannot be written, a worker was killed, or the solver process of the
             study `nmpc` does not start (ChildProcessError).
-        VehicleStoppedError: the mock vehicle of the study `track` ended before its flight did.
     """
     jobs = {study.name: _make_job(study, case_file) for study in registry.chosen(name)}
     page = _prepare_folder(out, "study" if name == registry.ALL else name)

@@ -1,9 +1,8 @@
 """Flies a configuration against a mock vehicle in memory."""
 
 import asyncio
-import gc
-from collections.abc import AsyncGenerator, Coroutine, Iterator
-from contextlib import asynccontextmanager, contextmanager
+from collections.abc import AsyncGenerator, Coroutine
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -16,6 +15,7 @@ from companion.flight.environment import Environment
 from companion.flight.flight import AskLanding
 from companion.flight.observer import Observer, SilentObserver, decline_landing
 from companion.flight.session import Session
+from companion.realtime import no_garbage_collection
 from companion.recording.measurements.summary import Summary
 from companion.testing.vehicle import MockVehicle
 from companion.testing.virtual_loop import VirtualClock, VirtualEventLoop
@@ -47,7 +47,8 @@ def run(vehicle: MockVehicle, main: Coroutine[Any, Any, T]) -> T:
 
     if not asyncio.iscoroutine(main):
         raise ValueError(f"a coroutine was expected, as in run(vehicle, main()), not {main!r}")
-    with _without_garbage_collection(), asyncio.Runner(loop_factory=make_loop) as runner:
+    # Garbage collection costs 7 % of a flight's time.
+    with no_garbage_collection(), asyncio.Runner(loop_factory=make_loop) as runner:
         runner.get_loop().set_exception_handler(lambda _, context: unseen.append(context))
         result = runner.run(_cancelled_by_ctrl_c(main))
     if unseen:
@@ -66,18 +67,6 @@ async def _cancelled_by_ctrl_c(main: Coroutine[Any, Any, T]) -> T:
     if task is not None and task.cancelling():
         raise asyncio.CancelledError
     return result
-
-
-@contextmanager
-def _without_garbage_collection() -> Iterator[None]:
-    """Disable the garbage collector until the end, because it costs 7 % of a flight's time."""
-    was_enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_enabled:
-            gc.enable()
 
 
 def _loop_time_ns() -> int:

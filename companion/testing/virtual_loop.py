@@ -26,10 +26,6 @@ class VirtualClock:
         """The loop's time, s."""
         return self.now
 
-    def read_ns(self) -> int:
-        """The loop's time, ns."""
-        return round(self.now * 1e9)
-
     def advance(self, vehicle_time: float) -> bool:
         """Set the time by a lockstep beacon, s; return false for a repeated one."""
         if self._last_beacon is not None and vehicle_time <= self._last_beacon:
@@ -41,7 +37,7 @@ class VirtualClock:
 class World(Protocol):
     """What is outside the program: delivers datagrams, and moves the clock while it is idle."""
 
-    def deliver_due(self) -> None:
+    def deliver_due(self) -> object:
         """Deliver the datagrams that arrive at the present time."""
         ...
 

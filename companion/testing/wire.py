@@ -124,10 +124,6 @@ class FreeWire(Wire):
         self._behind_clock = clock.now - vehicle.time
         vehicle.set_clock(lambda: round((clock.now - self._behind_clock) * 1e9))
 
-    def deliver_due(self) -> None:
-        """Deliver what arrives at the present time, in the order of sending."""
-        self._deliver_due()
-
     def advance(self, until: float) -> None:
         """Advance until something reaches the program, but at most to `until`."""
         clock, in_transit = self._clock, self._in_transit
@@ -135,21 +131,21 @@ class FreeWire(Wire):
         while True:
             arrival = in_transit[0][0] if in_transit else step_at
             clock.now = max(clock.now, min(until, arrival, step_at))
-            received = clock.now >= arrival and self._deliver_due()
+            received = clock.now >= arrival and self.deliver_due()
             if clock.now >= step_at:
                 self._send(self._vehicle.begin())
                 self._send(self._vehicle.step())
                 self._behind_clock += self._vehicle.take_slip()
                 step_at = self._next_step_at()
-                received = self._deliver_due() or received
+                received = self.deliver_due() or received
             if received or clock.now >= until:
                 return
 
     def _next_step_at(self) -> float:
         return burst_time(self._vehicle.next_step_at, self._burst) + self._behind_clock
 
-    def _deliver_due(self) -> bool:
-        """Deliver what is due; return whether the program received something."""
+    def deliver_due(self) -> bool:
+        """Deliver what is due, in order; return whether the program received something."""
         in_transit, now, received = self._in_transit, self._clock.now, False
         while in_transit and in_transit[0][0] <= now:
             _, to_program, datagram = in_transit.popleft()

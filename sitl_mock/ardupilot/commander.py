@@ -153,7 +153,7 @@ class ArduPilotCommander:
         setpoint = position_setpoint(message)
         if setpoint is not None:
             self._stream.accept(setpoint, state.time_us)
-            self._guided.follow_position(setpoint, state.time_us)
+            self._guided.follow(setpoint, state.time_us)
 
     def _take_attitude_setpoint(self, message: Message) -> None:
         state = self._state
@@ -168,7 +168,7 @@ class ArduPilotCommander:
         if setpoint.rates is not None and any(map(isnan, setpoint.rates)):
             self._announce_internal_error()
         self._stream.accept(setpoint, state.time_us)
-        self._guided.follow_angle(setpoint, state.time_us)
+        self._guided.follow(setpoint, state.time_us)
 
     def _announce_internal_error(self) -> None:
         if not self._internal_error:

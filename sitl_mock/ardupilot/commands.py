@@ -94,10 +94,13 @@ class ArduPilotCommands(Commands):
         return FAILED if mode is None else self._commander.request_mode(mode)
 
     def _set_interval(self, command: Command, link: Link) -> int:
-        message_id, interval_us = command.parameters[:2]
-        if not isfinite(message_id) or not isfinite(interval_us):
+        if not all(map(isfinite, command.parameters[:2])):
             return DENIED
-        refused = link.streams.set_interval(int(message_id), interval_us, self._state.time_us)
+        message_id, interval_us = int(command.parameters[0]), command.parameters[1]
+        if message_id in self._builders:
+            refused = link.streams.set_interval(message_id, interval_us, self._state.time_us)
+        else:
+            refused = f"No ap_message for mavlink id ({message_id})"
         if refused is None:
             return ACCEPTED
         self._announce.say(refused, INFO)

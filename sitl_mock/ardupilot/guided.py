@@ -9,7 +9,7 @@ from sitl_mock.autopilot.setpoints import (
     THROTTLE_IGNORED,
     YAW_RATE_IGNORED,
     AttitudeSetpoint,
-    PositionSetpoint,
+    Setpoint,
 )
 from sitl_mock.link.framing import Message
 
@@ -54,7 +54,9 @@ class Task(Enum):
     HOLD = auto()
     TAKE_OFF = auto()
     ANGLE = auto()
+    """Follow an `AttitudeSetpoint`: rates or an attitude, with thrust."""
     POSITION = auto()
+    """Follow a `PositionSetpoint`."""
 
 
 class Guided:
@@ -64,10 +66,10 @@ class Guided:
         self.task = Task.HOLD
         self.takeoff_height = 0.0
         """Height of TAKE_OFF, m above home."""
-        self.angle: AttitudeSetpoint | None = None
-        self.position: PositionSetpoint | None = None
+        self.setpoint: Setpoint | None = None
+        """The latest setpoint."""
         self.setpoint_us = 0
-        """Vehicle time of the latest setpoint, us."""
+        """Its vehicle time, us."""
         self.changed = True
         """Whether the task has just begun; `GuidedFlight` clears this."""
 
@@ -84,17 +86,12 @@ class Guided:
         self.takeoff_height = height
         self._begin(Task.TAKE_OFF)
 
-    def follow_angle(self, setpoint: AttitudeSetpoint, now_us: int) -> None:
-        """Follow rates or an attitude, with thrust."""
-        self.angle, self.setpoint_us = setpoint, now_us
-        if self.task is not Task.ANGLE:
-            self._begin(Task.ANGLE)
-
-    def follow_position(self, setpoint: PositionSetpoint, now_us: int) -> None:
-        """Follow a position, a velocity or an acceleration."""
-        self.position, self.setpoint_us = setpoint, now_us
-        if self.task is not Task.POSITION:
-            self._begin(Task.POSITION)
+    def follow(self, setpoint: Setpoint, now_us: int) -> None:
+        """Follow a setpoint that was received at `now_us`."""
+        task = Task.ANGLE if isinstance(setpoint, AttitudeSetpoint) else Task.POSITION
+        self.setpoint, self.setpoint_us = setpoint, now_us
+        if self.task is not task:
+            self._begin(task)
 
     def silent(self, now_us: int, timeout_s: float) -> bool:
         """Whether the latest setpoint is older than GUID_TIMEOUT (``timeout_s``)."""

@@ -8,7 +8,7 @@ from sitl_mock.ardupilot.hold import PositionHold, approach_speed
 from sitl_mock.ardupilot.thrust import angle_boosted, climb_rate_of_setpoint, thrust_of_setpoint
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.position_control import setpoint_demand
-from sitl_mock.autopilot.setpoints import AttitudeSetpoint
+from sitl_mock.autopilot.setpoints import AttitudeSetpoint, PositionSetpoint
 from sitl_mock.autopilot.state import State
 from sitl_mock.physics.quaternion import from_yaw
 from sitl_mock.physics.vehicle import ActuatorCommand
@@ -59,12 +59,13 @@ class GuidedFlight:
         if began:
             self._hold.begin()
             self._spooling_since_us = self._state.time_us
-        if guided.task is Task.TAKE_OFF:
-            return self._take_off(dt)
-        if guided.task is Task.ANGLE and guided.angle is not None:
-            return self._follow_angle(guided.angle, dt, began=began)
-        if guided.task is Task.POSITION:
-            return self._follow_position(dt)
+        match guided.task, guided.setpoint:
+            case Task.TAKE_OFF, _:
+                return self._take_off(dt)
+            case Task.ANGLE, AttitudeSetpoint() as setpoint:
+                return self._follow_angle(setpoint, dt, began=began)
+            case Task.POSITION, PositionSetpoint() as setpoint:
+                return self._follow_position(setpoint, dt)
         return self._output.follow(self._hold.step(0.0, dt), dt)
 
     def _take_off(self, dt: float) -> ActuatorCommand:
@@ -114,13 +115,10 @@ class GuidedFlight:
         state.attitude_target.q = setpoint.q
         return self._output.rates((p + rates[0], q + rates[1], r + rates[2]), thrust)
 
-    def _follow_position(self, dt: float) -> ActuatorCommand:
+    def _follow_position(self, setpoint: PositionSetpoint, dt: float) -> ActuatorCommand:
         guided, parameters = self._guided, self._parameters
-        setpoint = guided.position
-        has_no_position = setpoint is not None and isnan(setpoint.position[0])
-        if setpoint is None or (
-            has_no_position and guided.silent(self._state.time_us, parameters["GUID_TIMEOUT"])
-        ):
+        silent = guided.silent(self._state.time_us, parameters["GUID_TIMEOUT"])
+        if silent and isnan(setpoint.position[0]):
             guided.hold()
             return self._output.follow(self._hold.step(0.0, dt), dt)
         hold = self._hold

@@ -11,13 +11,11 @@ from sitl_mock.ardupilot.thrust import angle_boosted, specific_thrust
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.state import Mode, State
 from sitl_mock.physics.quaternion import Vector, from_yaw
-from sitl_mock.physics.vehicle import ActuatorCommand
+from sitl_mock.physics.vehicle import STILL, ActuatorCommand
 
 TOUCHDOWN_THRUST_RATE = 0.43
 """After contact in LAND the normalised thrust decreases by this per second (recorded: landed after
 1.6 s)."""
-_STILL = ActuatorCommand(False, 0.0, 0.0, 0.0, 0.0)
-"""Command while disarmed: the rotors stand still."""
 
 
 class ArduPilotModeControl:
@@ -85,7 +83,7 @@ class ArduPilotModeControl:
         )
         if not state.armed:
             self._hold.begin()
-            command = _STILL
+            command = STILL
         elif state.landed and not self.taking_off:
             self._hold.begin()
             self._output.thrust = 0.0

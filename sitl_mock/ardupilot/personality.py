@@ -3,7 +3,6 @@
 from collections.abc import Collection, Iterable
 from typing import Any
 
-from pymavlink.dialects.v20 import ardupilotmega
 from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.ardupilot.boot import INITIALISED_S, RECORDED_READY_S, Boot, Notifier
@@ -40,35 +39,6 @@ DEFAULT_LOOP_HZ = 400.0
 _HOME_MESSAGES = (dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, dialect.MAVLINK_MSG_ID_HOME_POSITION)
 _BOOT_RATES = {dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0, dialect.MAVLINK_MSG_ID_TIMESYNC: 0.1}
 """Message id -> rate from boot on, Hz."""
-_REQUESTABLE = frozenset(
-    {
-        *_BOOT_RATES,
-        dialect.MAVLINK_MSG_ID_ATTITUDE,
-        dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
-        dialect.MAVLINK_MSG_ID_ATTITUDE_TARGET,
-        dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
-        dialect.MAVLINK_MSG_ID_BATTERY_STATUS,
-        dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
-        dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
-        dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
-        dialect.MAVLINK_MSG_ID_GPS_RAW_INT,
-        dialect.MAVLINK_MSG_ID_HIGHRES_IMU,
-        dialect.MAVLINK_MSG_ID_HOME_POSITION,
-        dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
-        dialect.MAVLINK_MSG_ID_MISSION_CURRENT,
-        dialect.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED,
-        dialect.MAVLINK_MSG_ID_RAW_IMU,
-        dialect.MAVLINK_MSG_ID_RC_CHANNELS,
-        dialect.MAVLINK_MSG_ID_SCALED_PRESSURE,
-        dialect.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW,
-        dialect.MAVLINK_MSG_ID_SYS_STATUS,
-        dialect.MAVLINK_MSG_ID_SYSTEM_TIME,
-        dialect.MAVLINK_MSG_ID_VFR_HUD,
-        dialect.MAVLINK_MSG_ID_VIBRATION,
-        ardupilotmega.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
-    }
-)
-"""Messages that can be requested."""
 
 
 class ArduPilot:
@@ -100,7 +70,6 @@ class ArduPilot:
         booting_s = settings.prearm_delay_s * INITIALISED_S / RECORDED_READY_S
         return ArduPilotStreams(
             _BOOT_RATES,
-            _REQUESTABLE,
             loop_us=self.slot_us(settings),
             booting_until_us=booting_s * 1e6,
         )
@@ -150,12 +119,7 @@ class ArduPilot:
     def _builders(self, parts: VehicleParts, boot: Boot) -> dict[int, Builder]:
         motion = ArduPilotMotionTelemetry(parts.state, parts.vehicle, parts.origin, parts.slips)
         system = ArduPilotSystemTelemetry(
-            parts.state,
-            parts.origin,
-            self.identity,
-            parts.vehicle,
-            initialised=lambda: boot.initialised,
-            origin_set=lambda: boot.origin_set,
+            parts.state, parts.origin, self.identity, parts.vehicle, boot
         )
         return motion.builders() | system.builders()
 

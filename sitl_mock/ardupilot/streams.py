@@ -6,7 +6,7 @@ stays. A message is sent in the first cycle after it is due and keeps its phase:
 400 Hz loop gives four steps of 2.5 ms and one of 5 ms, 333 Hz on average.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 
 LONGEST_MS = 60_000
 """Longest interval; longer ones are reduced to it."""
@@ -17,7 +17,6 @@ class ArduPilotStreams:
 
     Args:
         rates: message id -> Hz at boot.
-        supported: ids of the messages that can be requested.
         loop_us: period of the main loop.
         booting_until_us: before this time only the streams of the boot are sent.
     """
@@ -25,13 +24,11 @@ class ArduPilotStreams:
     def __init__(
         self,
         rates: Mapping[int, float],
-        supported: Collection[int],
         *,
         loop_us: int,
         booting_until_us: float,
     ) -> None:
         self._defaults = {message: round(1e6 / hz) for message, hz in rates.items()}
-        self._supported = supported
         self._loop_us = loop_us
         self._booting_until_us = booting_until_us
         self._intervals = dict(self._defaults)
@@ -43,8 +40,6 @@ class ArduPilotStreams:
         Returns:
             the reason for a refusal in ArduPilot's words, None if accepted.
         """
-        if message_id not in self._supported:
-            return f"No ap_message for mavlink id ({message_id})"
         if interval_us < 0.0:
             self._intervals.pop(message_id, None)
             return None

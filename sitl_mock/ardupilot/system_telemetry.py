@@ -1,11 +1,11 @@
 """Telemetry of the autopilot's state in ArduCopter's conventions."""
 
-from collections.abc import Callable
 from math import nan
 
 from pymavlink.dialects.v20 import ardupilotmega
 from pymavlink.dialects.v20 import development as dialect
 
+from sitl_mock.ardupilot.boot import Boot
 from sitl_mock.ardupilot.modes import MODE_NUMBERS, base_mode
 from sitl_mock.autopilot.motion_telemetry import Builder
 from sitl_mock.autopilot.personality import Identity
@@ -41,23 +41,14 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
         origin: origin of the local frame.
         identity: content of AUTOPILOT_VERSION.
         vehicle: the vehicle, for its battery.
-        initialised: whether the autopilot accepts commands: see `Boot.initialised`.
-        origin_set: whether the estimator has an origin.
+        boot: progress of the boot.
     """
 
     def __init__(
-        self,
-        state: State,
-        origin: Geodetic,
-        identity: Identity,
-        vehicle: Vehicle,
-        *,
-        initialised: Callable[[], bool],
-        origin_set: Callable[[], bool],
+        self, state: State, origin: Geodetic, identity: Identity, vehicle: Vehicle, boot: Boot
     ) -> None:
         super().__init__(state, origin, identity, vehicle)
-        self._initialised = initialised
-        self._origin_set = origin_set
+        self._boot = boot
 
     def builders(self) -> dict[int, Builder]:
         """Return message id -> builder."""
@@ -73,7 +64,7 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
     def heartbeat(self) -> Message:
         """Return HEARTBEAT; during the boot the guided bit is set (recorded: 89)."""
         state = self._state
-        controlled = state.position_controlled or not self._initialised()
+        controlled = state.position_controlled or not self._boot.initialised
         return dialect.MAVLink_heartbeat_message(
             dialect.MAV_TYPE_QUADROTOR,
             dialect.MAV_AUTOPILOT_ARDUPILOTMEGA,
@@ -88,7 +79,7 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
         state = self._state
         if state.failsafe:
             return int(dialect.MAV_STATE_CRITICAL)
-        if not self._initialised():
+        if not self._boot.initialised:
             return int(dialect.MAV_STATE_BOOT)
         return int(dialect.MAV_STATE_STANDBY if state.landed else dialect.MAV_STATE_ACTIVE)
 
@@ -112,13 +103,13 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
     def gps_raw_int(self) -> Message:
         """Return GPS_RAW_INT: no fix during the boot or without GPS, else an RTK fix (recorded)."""
         state = self._state
-        if not state.gps_ok or not self._initialised():
+        if not state.gps_ok or not self._boot.initialised:
             return dialect.MAVLink_gps_raw_int_message(0, 0, 0, 0, 0, NO_VALUE, NO_VALUE, 0, 0, 0)
         return self._gps_fix(dialect.GPS_FIX_TYPE_RTK_FIXED, (121, 200), 0, (300, 300))
 
     def ekf_status_report(self) -> Message:
         """Return EKF_STATUS_REPORT with the recorded flags and typical variances."""
-        if not self._initialised():
+        if not self._boot.initialised:
             flags, variances = ardupilotmega.EKF_UNINITIALIZED, (0.0,) * 5
         elif not self._state.position_valid:
             flags, variances = _EKF_NO_POSITION, (0.0, 0.0, 0.001, 0.03, 0.0)
@@ -133,8 +124,8 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
 
     def home_position(self) -> Message | None:
         """Return HOME_POSITION, without attitude (recorded); None before home is set."""
-        return self._home_position((nan, nan, nan, nan)) if self._origin_set() else None
+        return self._home_position((nan, nan, nan, nan)) if self._boot.origin_set else None
 
     def gps_global_origin(self) -> Message | None:
         """Return GPS_GLOBAL_ORIGIN; None before it is set."""
-        return super().gps_global_origin() if self._origin_set() else None
+        return super().gps_global_origin() if self._boot.origin_set else None

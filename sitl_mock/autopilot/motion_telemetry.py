@@ -67,6 +67,11 @@ class MotionTelemetry:
     def _boot_ms(self) -> int:
         return self._state.shown_us // 1000
 
+    @property
+    def _altitude(self) -> float:
+        """Estimated altitude above mean sea level, m."""
+        return self._origin.altitude_m - self._state.estimate.position_ned[2]
+
     def attitude(self) -> Message:
         """Return ATTITUDE."""
         estimate = self._state.estimate
@@ -98,14 +103,11 @@ class MotionTelemetry:
         state = self._state
         if not state.position_valid:
             return None
-        geodetic = to_geodetic(self._origin, state.estimate.position_ned)
         vx, vy, vz = state.estimate.velocity_ned
         height = state.home_ned[2] - state.estimate.position_ned[2]
         return dialect.MAVLink_global_position_int_message(
             self._boot_ms,
-            round(geodetic.latitude_deg * 1e7),
-            round(geodetic.longitude_deg * 1e7),
-            round(geodetic.altitude_m * 1e3),
+            *to_geodetic(self._origin, state.estimate.position_ned).as_integers(),
             round(height * 1e3),
             clip(vx * 100, 15),
             clip(vy * 100, 15),
@@ -157,23 +159,21 @@ class MotionTelemetry:
     def highres_imu(self) -> Message:
         """Return HIGHRES_IMU."""
         estimate = self._state.estimate
-        altitude = self._origin.altitude_m - estimate.position_ned[2]
         return dialect.MAVLink_highres_imu_message(
             self._state.shown_us,
             *estimate.specific_force_frd,
-            *estimate.gyro,
+            *estimate.body_rates,
             *MAGNETIC_FIELD_NED,
             self.pressure_hpa(),
             0.0,
-            altitude,
+            self._altitude,
             15.0,
             63,
         )
 
     def pressure_hpa(self) -> float:
         """Return the air pressure at the estimated height (ICAO standard atmosphere)."""
-        altitude = self._origin.altitude_m - self._state.estimate.position_ned[2]
-        return float(_SEA_LEVEL_HPA * (1.0 - 2.25577e-5 * altitude) ** 5.25588)
+        return float(_SEA_LEVEL_HPA * (1.0 - 2.25577e-5 * self._altitude) ** 5.25588)
 
     def vfr_hud(self) -> Message:
         """Return VFR_HUD."""
@@ -181,18 +181,16 @@ class MotionTelemetry:
         vx, vy, vz = state.estimate.velocity_ned
         thrust = state.attitude_target.thrust
         percent = 0 if isnan(thrust) else round(100 * max(0.0, min(1.0, thrust)))
-        altitude = self._origin.altitude_m - state.estimate.position_ned[2]
         return dialect.MAVLink_vfr_hud_message(
-            self.airspeed, hypot(vx, vy), int(self._heading_deg()), percent, altitude, -vz
+            self.airspeed, hypot(vx, vy), int(self._heading_deg()), percent, self._altitude, -vz
         )
 
     def altitude(self) -> Message:
         """Return ALTITUDE."""
         state = self._state
-        up = -state.estimate.position_ned[2]
-        amsl = self._origin.altitude_m + up
+        up, altitude = -state.estimate.position_ned[2], self._altitude
         return dialect.MAVLink_altitude_message(
-            state.shown_us, amsl, amsl, up, up + state.home_ned[2], 0.0, up
+            state.shown_us, altitude, altitude, up, up + state.home_ned[2], 0.0, up
         )
 
     def servo_output_raw(self) -> Message:

@@ -5,7 +5,7 @@ from enum import Enum, IntEnum, auto
 from math import nan
 
 from sitl_mock.physics.quaternion import Quaternion, Vector
-from sitl_mock.physics.vehicle import ActuatorCommand, Estimate
+from sitl_mock.physics.vehicle import STILL, ActuatorCommand, Estimate
 
 NAN_VECTOR = (nan, nan, nan)
 
@@ -68,32 +68,30 @@ class PositionTargetEcho:
 
 @dataclass
 class State:
-    """The autopilot's present state.
-
-    Times are vehicle time in us since boot. ``shown_us`` is the time in telemetry; it differs from
-    ``time_us`` only while a fault freezes the clock. ``prearm_problem``: why arming is refused,
-    None if it is not. ``contact``: the vehicle touches the ground; ``landed``: the land detector's
-    result; ``flown``: it took off since arming. ``status_us``: when the status (mode and arming)
-    was last published. ``after_disarming``: the mode that PX4 enters when it disarms.
-    ``height_controlled`` and ``position_controlled``: these controllers of ArduPilot run.
-    ``aborted``: ArduPilot's process has ended, so it sends nothing more.
-    """
+    """The autopilot's present state; times are vehicle time since boot."""
 
     estimate: Estimate
     time_us: int = 0
     shown_us: int = 0
+    """Time in telemetry; it differs from ``time_us`` only while a fault freezes the clock."""
     armed: bool = False
     armed_at_us: int = 0
     mode: Mode = Mode.LOITER
     intended_mode: Mode = Mode.LOITER
     after_disarming: Mode = Mode.LOITER
+    """The mode that PX4 enters when it disarms."""
     status_us: int = 0
+    """When PX4 last published its status (mode and arming)."""
     failsafe: bool = False
     prearm_problem: str | None = "system is booting"
+    """Why arming is refused, None if it is not."""
     contact: bool = True
+    """The vehicle touches the ground."""
     landed: bool = True
+    """The land detector's result."""
     landed_state: Landed = Landed.ON_GROUND
     flown: bool = False
+    """It took off since arming."""
     position_valid: bool = True
     gps_ok: bool = True
     battery_remaining: float = 1.0
@@ -101,14 +99,15 @@ class State:
     home_ned: Vector = (0.0, 0.0, 0.0)
     home_q: Quaternion = (1.0, 0.0, 0.0, 0.0)
     home_set_at_us: int = 0
-    command: ActuatorCommand = field(
-        default_factory=lambda: ActuatorCommand(False, 0.0, 0.0, 0.0, 0.0)
-    )
+    command: ActuatorCommand = STILL
     attitude_target: AttitudeTargetEcho = field(default_factory=AttitudeTargetEcho)
-    height_controlled: bool = False
-    position_controlled: bool = False
-    aborted: bool = False
     position_target: PositionTargetEcho = field(default_factory=PositionTargetEcho)
+    height_controlled: bool = False
+    """ArduPilot's height controller runs."""
+    position_controlled: bool = False
+    """ArduPilot's horizontal position controller runs."""
+    aborted: bool = False
+    """ArduPilot's process has ended, so it sends nothing more."""
 
     @property
     def time_s(self) -> float:

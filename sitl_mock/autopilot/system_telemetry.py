@@ -97,20 +97,17 @@ class SystemTelemetry:
     ) -> Message:
         """Return GPS_RAW_INT at the estimated position; arguments in the units of the message."""
         state = self._state
-        geodetic = to_geodetic(self._origin, state.estimate.position_ned)
-        altitude_mm = round(geodetic.altitude_m * 1e3)
+        position = to_geodetic(self._origin, state.estimate.position_ned).as_integers()
         vx, vy, _ = state.estimate.velocity_ned
         return dialect.MAVLink_gps_raw_int_message(
             state.shown_us,
             fix,
-            round(geodetic.latitude_deg * 1e7),
-            round(geodetic.longitude_deg * 1e7),
-            altitude_mm,
+            *position,
             *dilutions,
             clip(hypot(vx, vy) * 100, 15),
             course,
             10,
-            altitude_mm,
+            position[2],
             *accuracies,
         )
 
@@ -120,11 +117,8 @@ class SystemTelemetry:
 
     def _home_position(self, q: Quaternion) -> Message:
         state = self._state
-        geodetic = to_geodetic(self._origin, state.home_ned)
         return dialect.MAVLink_home_position_message(
-            round(geodetic.latitude_deg * 1e7),
-            round(geodetic.longitude_deg * 1e7),
-            round(geodetic.altitude_m * 1e3),
+            *to_geodetic(self._origin, state.home_ned).as_integers(),
             *state.home_ned,
             q,
             0.0,
@@ -135,10 +129,7 @@ class SystemTelemetry:
 
     def gps_global_origin(self) -> Message | None:
         """Return GPS_GLOBAL_ORIGIN."""
-        latitude, longitude, altitude = self._origin
-        return dialect.MAVLink_gps_global_origin_message(
-            round(latitude * 1e7), round(longitude * 1e7), round(altitude * 1e3), 0
-        )
+        return dialect.MAVLink_gps_global_origin_message(*self._origin.as_integers(), 0)
 
     def system_time(self) -> Message:
         """Return SYSTEM_TIME."""

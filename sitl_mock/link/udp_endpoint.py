@@ -6,7 +6,34 @@ import socket
 from sitl_mock.config.section import ConfigError
 
 HOST = "127.0.0.1"
-_MAX_DATAGRAM = 2048
+MAX_DATAGRAM = 2048
+"""Largest datagram that is received, bytes; longer ones are truncated."""
+
+
+def bound_socket(port: int, option: str) -> socket.socket:
+    """Return a non-blocking socket that is bound to a port on this machine.
+
+    Args:
+        port: port to bind.
+        option: command-line option of the port, for the error message.
+
+    Raises:
+        ConfigError: there is no such port, or it cannot be bound, for example because it is in use.
+    """
+    bound = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        bound.bind((HOST, port))
+    except OverflowError as error:
+        bound.close()
+        raise ConfigError(f"there is no UDP port {port}; choose a smaller {option}") from error
+    except OSError as error:
+        bound.close()
+        raise ConfigError(
+            f"UDP port {port} on {HOST} cannot be used ({error.strerror}): is another mock running?"
+            f" Choose a different {option}"
+        ) from error
+    bound.setblocking(False)
+    return bound
 
 
 class UdpEndpoint:
@@ -16,33 +43,18 @@ class UdpEndpoint:
 
     Args:
         local_port: port to bind.
-        remote_port: first destination port; None = send nothing before something is received.
+        remote_port: first destination port.
         option: command-line option of the port, for the error message.
 
     Raises:
-        ConfigError: there is no such local port, or it cannot be bound, for example because it is
-            in use.
+        ConfigError: as of `bound_socket`.
     """
 
-    def __init__(self, local_port: int, remote_port: int | None, option: str) -> None:
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        try:
-            self.socket.bind((HOST, local_port))
-        except OverflowError as error:
-            self.socket.close()
-            raise ConfigError(
-                f"there is no UDP port {local_port}; choose a smaller {option}"
-            ) from error
-        except OSError as error:
-            self.socket.close()
-            raise ConfigError(
-                f"UDP port {local_port} on {HOST} cannot be used ({error.strerror}): is another"
-                f" mock running? Choose a different {option}"
-            ) from error
-        self.socket.setblocking(False)
+    def __init__(self, local_port: int, remote_port: int, option: str) -> None:
+        self.socket = bound_socket(local_port, option)
         self.where = f"UDP {HOST}:{local_port}"
         self.heard = False
-        self._partner = None if remote_port is None else (HOST, remote_port)
+        self._partner = (HOST, remote_port)
 
     @property
     def connected(self) -> bool:
@@ -57,7 +69,7 @@ class UdpEndpoint:
     def receive(self) -> tuple[bytes, bool] | None:
         """Return the next datagram and whether the partner sent it; None if there is none."""
         try:
-            datagram, sender = self.socket.recvfrom(_MAX_DATAGRAM)
+            datagram, sender = self.socket.recvfrom(MAX_DATAGRAM)
         except OSError:
             return None
         if not self.heard:
@@ -65,22 +77,8 @@ class UdpEndpoint:
             self._partner = sender
         return datagram, sender == self._partner
 
-    def receive_from(self) -> tuple[bytes, tuple[str, int]] | None:
-        """Return the next datagram and its sender; the partner stays unchanged."""
-        try:
-            return self.socket.recvfrom(_MAX_DATAGRAM)
-        except OSError:
-            return None
-
-    def send_to(self, datagram: bytes, address: tuple[str, int]) -> None:
-        """Send one datagram to an address."""
-        with contextlib.suppress(OSError):
-            self.socket.sendto(datagram, address)
-
     def send(self, datagrams: list[bytes]) -> None:
         """Send to the partner; datagrams that the kernel refuses are dropped."""
-        if self._partner is None:
-            return
         for datagram in datagrams:
             with contextlib.suppress(OSError):
                 self.socket.sendto(datagram, self._partner)

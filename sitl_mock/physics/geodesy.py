@@ -15,6 +15,11 @@ class Geodetic(NamedTuple):
     longitude_deg: float
     altitude_m: float
 
+    def as_integers(self) -> tuple[int, int, int]:
+        """Return latitude and longitude, 1e-7 degrees, and altitude, mm, as MAVLink sends them."""
+        latitude, longitude, altitude = self
+        return round(latitude * 1e7), round(longitude * 1e7), round(altitude * 1e3)
+
 
 def to_geodetic(origin: Geodetic, position: Vector) -> Geodetic:
     """Return the geodetic position of a local NED position (m)."""

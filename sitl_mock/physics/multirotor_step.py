@@ -219,5 +219,4 @@ def move(law: MultirotorLaw, body: Kinematics, load: Load) -> tuple[Kinematics, 
 
 def sinks(law: MultirotorLaw, body: Kinematics, load: Load) -> bool:
     """Whether the body does not accelerate upward under this load."""
-    vn, ve, vd, w, x, y, z, p, q, r = body[0]
-    return derivative(vn, ve, vd, w, x, y, z, p, q, r, load, law.body)[2] >= 0.0
+    return derivative(body[0], load, law.body)[2] >= 0.0

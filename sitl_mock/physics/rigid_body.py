@@ -53,26 +53,14 @@ def _per_mass(mass: float, along_axes: Vector) -> Vector:
     return x / mass, y / mass, z / mass
 
 
-def derivative(
-    vn: float,
-    ve: float,
-    vd: float,
-    w: float,
-    x: float,
-    y: float,
-    z: float,
-    p: float,
-    q: float,
-    r: float,
-    load: Load,
-    body: Body,
-) -> Motion:
-    """Return the time derivative of a `Motion` (Newton, Euler, quaternion kinematics).
+def derivative(motion: Motion, load: Load, body: Body) -> Motion:
+    """Return the time derivative of a motion (Newton, Euler, quaternion kinematics).
 
     v' = g - T z_body - (drag + quadratic |u|) u - f with u = v - wind, specific thrust T and drag
     per mass; f has the components (axis_drag_i |u_i| + momentum_drag_i sqrt(T / g)) u_i along the
     body axes. J w' = torque - damping w - w x J w; q' = q (0, w) / 2.
     """
+    vn, ve, vd, w, x, y, z, p, q, r = motion
     thrust, torque_x, torque_y, torque_z, wind_n, wind_e, wind_d = load
     jx, jy, jz, drag, quadratic, axis, momentum, damping, gravity = body
     air_n, air_e, air_d = wind_n - vn, wind_e - ve, wind_d - vd
@@ -102,54 +90,22 @@ def derivative(
     )
 
 
-def _slopes(motion: Motion, load: Load, body: Body, dt: float) -> tuple[Motion, ...]:
-    """Return the four derivatives k1 to k4 of a classical Runge-Kutta step of `dt` seconds."""
-    half = 0.5 * dt
+def _after(motion: Motion, slope: Motion, dt: float) -> Motion:
+    """Return the motion `dt` seconds later if its derivative were constant."""
     vn, ve, vd, w, x, y, z, p, q, r = motion
-    a0, a1, a2, a3, a4, a5, a6, a7, a8, a9 = k1 = derivative(*motion, load, body)
-    b0, b1, b2, b3, b4, b5, b6, b7, b8, b9 = k2 = derivative(
-        vn + half * a0,
-        ve + half * a1,
-        vd + half * a2,
-        w + half * a3,
-        x + half * a4,
-        y + half * a5,
-        z + half * a6,
-        p + half * a7,
-        q + half * a8,
-        r + half * a9,
-        load,
-        body,
+    a0, a1, a2, a3, a4, a5, a6, a7, a8, a9 = slope
+    return (
+        vn + dt * a0,
+        ve + dt * a1,
+        vd + dt * a2,
+        w + dt * a3,
+        x + dt * a4,
+        y + dt * a5,
+        z + dt * a6,
+        p + dt * a7,
+        q + dt * a8,
+        r + dt * a9,
     )
-    c0, c1, c2, c3, c4, c5, c6, c7, c8, c9 = k3 = derivative(
-        vn + half * b0,
-        ve + half * b1,
-        vd + half * b2,
-        w + half * b3,
-        x + half * b4,
-        y + half * b5,
-        z + half * b6,
-        p + half * b7,
-        q + half * b8,
-        r + half * b9,
-        load,
-        body,
-    )
-    k4 = derivative(
-        vn + dt * c0,
-        ve + dt * c1,
-        vd + dt * c2,
-        w + dt * c3,
-        x + dt * c4,
-        y + dt * c5,
-        z + dt * c6,
-        p + dt * c7,
-        q + dt * c8,
-        r + dt * c9,
-        load,
-        body,
-    )
-    return k1, k2, k3, k4
 
 
 def advance(motion: Motion, load: Load, body: Body, dt: float) -> tuple[Motion, Vector]:
@@ -160,7 +116,10 @@ def advance(motion: Motion, load: Load, body: Body, dt: float) -> tuple[Motion, 
         does not depend on the position, so the position's stages reduce to
         v dt + (k1 + k2 + k3) dt^2 / 6.
     """
-    k1, k2, k3, k4 = _slopes(motion, load, body, dt)
+    k1 = derivative(motion, load, body)
+    k2 = derivative(_after(motion, k1, 0.5 * dt), load, body)
+    k3 = derivative(_after(motion, k2, 0.5 * dt), load, body)
+    k4 = derivative(_after(motion, k3, dt), load, body)
     vn, ve, vd, w, x, y, z, p, q, r = motion
     a0, a1, a2, a3, a4, a5, a6, a7, a8, a9 = k1
     b0, b1, b2, b3, b4, b5, b6, b7, b8, b9 = k2

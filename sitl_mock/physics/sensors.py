@@ -39,11 +39,10 @@ class Estimate(NamedTuple):
     """The autopilot's estimate. SI; world NED (origin: where it booted), body FRD."""
 
     q: Quaternion
-    body_rates: Vector  # rad/s
+    body_rates: Vector  # rad/s, what the gyro measures
     position_ned: Vector  # m
     velocity_ned: Vector  # m/s
     specific_force_frd: Vector  # m/s^2, what an accelerometer measures
-    gyro: Vector  # rad/s, what the gyro measures
 
 
 class SensorLaw(NamedTuple):
@@ -111,11 +110,10 @@ def estimate(
     tilted = multiply(state.yaw, rotated_slightly(error.rotation, q))
     rate_row = history[(steps - law.rate_delay) % len(history)]
     yaw_rate = rate_row[9] + law.yaw_rate_bias + noise[5]
-    gyro = (rate_row[7] + noise[3], rate_row[8] + noise[4], yaw_rate)
     position, velocity, offset = error.position, error.velocity, state.offset
     estimated = Estimate(
         normalise(multiply(tilted, (1.0, noise[0], noise[1], noise[2]))),
-        gyro,
+        (rate_row[7] + noise[3], rate_row[8] + noise[4], yaw_rate),
         (
             position_row[10] + position[0] + offset[0] + noise[6],
             position_row[11] + position[1] + offset[1] + noise[7],
@@ -127,7 +125,6 @@ def estimate(
             position_row[2] + velocity[2] + noise[11],
         ),
         (fx + noise[12], fy + noise[13], fz + noise[14]),
-        gyro,
     )
     return estimated, error.rotation
 

@@ -21,6 +21,7 @@ from sitl_mock.physics.rate_shaping import Shaped
 from sitl_mock.physics.rotors import Four
 from sitl_mock.physics.sensors import Estimate, Estimator
 from sitl_mock.physics.vehicle_step import (
+    STILL,
     ActuatorCommand,
     Plant,
     PythonPlant,
@@ -29,7 +30,7 @@ from sitl_mock.physics.vehicle_step import (
     truth_row,
 )
 
-__all__ = ["ActuatorCommand", "BatteryState", "Estimate", "TruthState", "Vehicle"]
+__all__ = ["STILL", "ActuatorCommand", "BatteryState", "Estimate", "TruthState", "Vehicle"]
 
 SLOW_STEP_S = 0.01
 """Step of wind and battery, which change slowly, s."""
@@ -66,7 +67,6 @@ class Vehicle:
 
     Attributes:
         steps: physics steps since boot.
-        step_s: length of one physics step, s.
         on_ground: whether the vehicle stands on the ground.
         crashed: whether a touchdown was a crash.
         estimator: errors of the estimate.
@@ -91,7 +91,7 @@ class Vehicle:
         self._thrust = 0.0  # of all rotors, N
         self._rate_hz = airframe.physics_rate_hz
         self._multirotor = multirotor_law(airframe, rate_loop or RateLoopConfig())
-        self.step_s = dt = self._multirotor.rates.dt
+        dt = self._multirotor.rates.dt
         self._slow_steps = round(SLOW_STEP_S * self._rate_hz)
         self._slow_dt = self._slow_steps * dt
         self._wind = Wind(wind or WindConfig(), self._slow_dt, seed)
@@ -171,7 +171,7 @@ class Vehicle:
         return shaped._replace(target=multiply(self.estimator.state.yaw, shaped.target))
 
     def step(self, command: ActuatorCommand, count: int = 1) -> None:
-        """Advance by `count` physics steps of `step_s` seconds under one command."""
+        """Advance by `count` physics steps under one command."""
         while count > 0:
             since_slow_step = self.steps % self._slow_steps
             if since_slow_step == 0:

@@ -40,6 +40,10 @@ class ActuatorCommand(NamedTuple):
     thrust: float
 
 
+STILL = ActuatorCommand(False, 0.0, 0.0, 0.0, 0.0)
+"""Command while disarmed: the rotors stand still."""
+
+
 class VehicleState(NamedTuple):
     """State of the vehicle after a step."""
 

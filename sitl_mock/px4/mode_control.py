@@ -12,7 +12,7 @@ from sitl_mock.autopilot.position_control import (
 from sitl_mock.autopilot.setpoints import OffboardStream, PositionSetpoint
 from sitl_mock.autopilot.state import NAN_VECTOR, Mode, PositionTargetEcho, State
 from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw, yaw
-from sitl_mock.physics.vehicle import ActuatorCommand
+from sitl_mock.physics.vehicle import STILL, ActuatorCommand
 from sitl_mock.px4.flight_tasks import FlightTasks
 from sitl_mock.px4.modes import PILOTED
 
@@ -23,8 +23,6 @@ TOUCHDOWN_THRUST_RATE = 0.4
 """After contact in LAND the normalised thrust decreases by this per second."""
 DISARMED_ACCELERATION: Vector = (0.0, 0.0, 100.0)
 """Acceleration setpoint of PX4's own modes while disarmed, m/s^2 (recorded)."""
-_STILL = ActuatorCommand(False, 0.0, 0.0, 0.0, 0.0)
-"""Command while disarmed: the rotors stand still."""
 
 
 class Px4ModeControl:
@@ -73,7 +71,7 @@ class Px4ModeControl:
                 state.position_target = PositionTargetEcho(
                     True, NAN_VECTOR, NAN_VECTOR, DISARMED_ACCELERATION, yaw_now
                 )
-            command = _STILL
+            command = STILL
         elif state.mode is Mode.OFFBOARD:
             command = self._follow_offboard(dt, fresh=fresh)
         elif state.landed and state.mode is not Mode.TAKEOFF:

@@ -42,7 +42,7 @@ def tcp():
 
 def test_ports_above_the_largest_are_refused():
     with pytest.raises(ConfigError, match="no UDP port 65536; choose a smaller --port"):
-        UdpEndpoint(65536, None, "--port")
+        UdpEndpoint(65536, 14540, "--port")
     with pytest.raises(ConfigError, match="no TCP port 65536 for vehicle 3"):
         MockSettings(endpoint="tcpin://127.0.0.1:65534").for_vehicle(2)
 

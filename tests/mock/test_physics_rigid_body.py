@@ -127,16 +127,15 @@ def test_ardupilots_drag_is_that_measured():
     body = body_of(MockSettings.model_validate({"autopilot": "ardupilot"}).airframe)
     for speed, share in ((2.0, 0.31), (5.0, 0.41)):
         motion = (speed, 0.0, 0.0, *LEVEL, 0.0, 0.0, 0.0)
-        slowing = -derivative(*motion, (body.gravity, *NO_LOAD[1:]), body)[0]
+        slowing = -derivative(motion, (body.gravity, *NO_LOAD[1:]), body)[0]
         assert slowing / speed == pytest.approx(share, abs=0.015)
 
 
 def test_the_momentum_drag_grows_with_the_root_of_the_thrust():
     body = FREE._replace(momentum_drag=(0.25, 0.3, 0.2))
     for share in (0.0, 1.0, 4.0):
-        rate = derivative(
-            1.0, 2.0, 0.0, *LEVEL, 0.0, 0.0, 0.0, (share * 9.80665, *NO_LOAD[1:]), body
-        )
+        motion = (1.0, 2.0, 0.0, *LEVEL, 0.0, 0.0, 0.0)
+        rate = derivative(motion, (share * 9.80665, *NO_LOAD[1:]), body)
         assert rate[:2] == pytest.approx((-0.25 * sqrt(share), -0.6 * sqrt(share)))
 
 
@@ -150,7 +149,8 @@ def test_thrust_pushes_against_the_bodys_down_axis():
     """Nose up flies backwards, right side down flies to the right."""
     for x, y, direction in ((0.0, 0.1, (-1.0, 0.0)), (0.1, 0.0, (0.0, 1.0))):
         q = (sqrt(0.99), x, y, 0.0)
-        rate = derivative(0.0, 0.0, 0.0, *q, 0.0, 0.0, 0.0, (10.0, *NO_LOAD[1:]), FREE)
+        motion = (0.0, 0.0, 0.0, *q, 0.0, 0.0, 0.0)
+        rate = derivative(motion, (10.0, *NO_LOAD[1:]), FREE)
         size = 10.0 * 2.0 * 0.1 * sqrt(0.99)  # 10 m/s^2 times the sine of the tilt
         assert rate[:2] == pytest.approx((size * direction[0], size * direction[1]), abs=1e-12)
 

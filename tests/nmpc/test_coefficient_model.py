@@ -60,11 +60,9 @@ def test_the_longest_target_is_the_tilt_limit_or_the_tilt_at_the_start():
     ("changes", "words"),
     [
         ({"lag": 0.01}, "half a step of the horizon"),
-        ({"gain": 0.0}, "gain must be positive"),
-        ({"dead_time": -0.1}, "dead_time must be finite and not negative"),
-        ({"max_tilt": 1.6}, "between 0 and 90°"),
+        ({"yaw_gain": 0.0}, "yaw_gain must be positive"),
+        ({"min_thrust": 0.0}, "min_thrust must be positive"),
         ({"max_thrust": 9.0}, "gravity must lie between"),
-        ({"deadline": float("nan")}, "deadline must be positive"),
     ],
 )
 def test_settings_that_make_no_sense_are_refused(changes, words):

@@ -232,18 +232,18 @@ if __name__ == "__main__":
 
 
 @pytest.mark.slow
-def test_interrupted_it_leaves_no_vehicle_behind(tmp_path):
+def test_interrupted_it_leaves_no_flight_behind(tmp_path):
     command = [sys.executable, "-c", SHORT, "study", "track", "--out", str(tmp_path)]
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
 
-    def vehicles():
+    def workers():
         family = psutil.Process(process.pid).children(recursive=True)
-        return [one for one in family if "sitl_mock" in one.cmdline()]
+        return [one for one in family if "--multiprocessing-fork" in one.cmdline()]
 
     deadline = time.monotonic() + 30.0
-    while not (left := vehicles()):
+    while not (left := workers()):
         assert time.monotonic() < deadline
         time.sleep(0.05)
     os.killpg(process.pid, signal.SIGINT)

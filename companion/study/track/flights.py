@@ -1,12 +1,9 @@
-"""The flights of the study `track`: the mock vehicle follows a course, in lockstep by socket."""
+"""The flights of the study `track`: the mock vehicle follows a course in lockstep, in memory."""
 
 import asyncio
-import json
-import socket
 import tempfile
 from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from contextlib import suppress
 from math import inf
 from multiprocessing import get_context
 from pathlib import Path
@@ -14,19 +11,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from companion import demo
+from companion.batch import can_compile
 from companion.child_process import end_with_parent
 from companion.config import Config
 from companion.config.files import changed, load, shipped
 from companion.files import bounded_yaml
-from companion.flight.observer import SilentObserver, decline_landing
-from companion.flight.session import Session
-from companion.mavlink import lockstep
-from companion.mavlink.transport.free_port import free_port
+from companion.flight.observer import SilentObserver
 from companion.study.outcome import Tick
 from companion.study.step import Floats
 from companion.study.track.tasks import Task
 from companion.study.workers import cores, interrupts_blocked
+from companion.testing import MockVehicle
+from companion.testing import fly as fly_in_memory
 
 POSITION_RATE_HZ = 30.0
 MAX_TILT_DEG, MAX_TILT_RATE_DEG_S, MAX_THRUST = 58.0, 250.0, 0.98
@@ -48,9 +44,7 @@ _SHORT_PHASES = {
 }
 """Vehicle settings that shorten take-off and landing."""
 _TRUTH_PERIOD = 0.02
-"""Time between two requests for the true position, s of vehicle time."""
-_TRUTH_TIMEOUT = 1.0
-"""Time allowed for the answer to such a request, s of wall time; it takes about 0.1 ms."""
+"""Time between two records of the true position, s of vehicle time."""
 _MEASURED_PHASE = "maneuvers"
 
 
@@ -89,11 +83,10 @@ def fly_all(tasks: Sequence[Task], tick: Tick) -> Flown:
     """Fly every task, with as many flights at a time as cores; call `tick` as each begins.
 
     The result of a flight does not depend on other flights. On Ctrl-C this function waits for the
-    flights in progress, so that no vehicle process is left behind.
+    flights in progress, so that no process is left behind.
 
     Raises:
-        ConfigError, LinkError, VehicleStoppedError: raised by a flight, see `fly`; no further
-            flights are begun.
+        ConfigError: raised by a flight, see `fly`; no further flights are begun.
     """
     count = cores()
     flown: dict[Task, Future[TrackedFlight]] = {}
@@ -117,45 +110,30 @@ def _await_a_free_core(flights: Sequence[Future[TrackedFlight]], count: int) -> 
 
 
 def fly(task: Task) -> TrackedFlight:
-    """Start the mock vehicle, fly the task with it, and measure the errors.
+    """Fly the task with the mock vehicle, and measure the errors.
 
     Raises:
         ConfigError: the shipped configuration cannot be found or used.
-        LinkError: there are no free ports.
-        VehicleStoppedError: the vehicle did not start, or ended before the flight did.
     """
-    with tempfile.TemporaryDirectory(prefix="companion-track-") as name:
-        folder = Path(name)
-        wire, truth_port = demo.udp_wire(), free_port()
-        base = load(shipped("mock-px4.yaml"))
-        vehicle, course = folder / "vehicle.yaml", folder / "course.yaml"
-        vehicle.write_text(bounded_yaml.dump({"mock": _vehicle_settings(base, task, truth_port)}))
+    base = load(shipped("mock-px4.yaml"))
+    wind = {"speed_m_s": task.wind, "gust_m_s": GUST_SHARE * task.wind}
+    settings = {**(base.mock or {}), **_SHORT_PHASES, "wind": wind}
+    vehicle = MockVehicle(**settings, compiled=can_compile())
+    truth = TruthRecorder(vehicle)
+    with tempfile.TemporaryDirectory(prefix="companion-track-") as folder:
+        course = Path(folder, "course.yaml")
         course.write_text(bounded_yaml.dump(task.course.file_content))
-        config = _task_config(base, task, course, wire.endpoint)
-        truth = TruthRecorder(truth_port)
-        session = Session(config, folder, truth, decline_landing)
-        with demo.bundled_vehicle(vehicle, wire, folder / "vehicle.log", lockstep=True):
-            summary = lockstep.run(session.fly())
+        summary = fly_in_memory(_task_config(base, task, course), vehicle, observer=truth)
     if summary.result != "ok":
         failed = PositionError(inf, inf)
         return TrackedFlight(summary.result, failed, failed, np.empty((0, 4)))
     return _measure(summary.trace.tracking_rows(), truth.rows())
 
 
-def _vehicle_settings(base: Config, task: Task, truth_port: int) -> dict[str, Any]:
-    """Settings of the shipped mock vehicle, with the wind of the task."""
-    wind = {"speed_m_s": task.wind, "gust_m_s": GUST_SHARE * task.wind}
-    return {**(base.mock or {}), **_SHORT_PHASES, "control_port": truth_port, "wind": wind}
-
-
-def _task_config(base: Config, task: Task, course: Path, endpoint: str) -> Config:
+def _task_config(base: Config, task: Task, course: Path) -> Config:
     """The shipped configuration with the changes for the task."""
     changes: dict[str, dict[str, Any]] = {
-        "link": {
-            "endpoint": endpoint,
-            "lockstep": True,
-            "position_rate_hz": POSITION_RATE_HZ,
-        },
+        "link": {"position_rate_hz": POSITION_RATE_HZ},
         "planner": {"name": task.planner},
         "limits": {
             "max_tilt_deg": MAX_TILT_DEG,
@@ -175,41 +153,33 @@ def _task_config(base: Config, task: Task, course: Path, endpoint: str) -> Confi
 
 
 class TruthRecorder(SilentObserver):
-    """Requests the true position from the vehicle's control channel during the measured phase.
-
-    In lockstep, vehicle time stops until `companion` answers. A request may therefore block the
-    event loop, and its answer belongs to the present vehicle time.
+    """Records the true position of a vehicle during the measured phase.
 
     Args:
-        port: port of the control channel on this computer.
+        vehicle: the vehicle that is flown.
     """
 
-    def __init__(self, port: int) -> None:
-        self._address = ("127.0.0.1", port)
+    def __init__(self, vehicle: MockVehicle) -> None:
+        self._vehicle = vehicle
         self._rows: list[tuple[float, ...]] = []
-        self._request_task: asyncio.Task[None] | None = None
+        self._recording: asyncio.Task[None] | None = None
 
     def phase(self, name: str, waits_for: str) -> None:
-        """Start the requests when the measured phase begins, and stop them when the next begins."""
+        """Start to record when the measured phase begins, and stop when the next begins."""
         if name == _MEASURED_PHASE:
-            self._request_task = asyncio.create_task(self._request_truth())
-        elif self._request_task is not None:
-            self._request_task.cancel()
+            self._recording = asyncio.create_task(self._record())
+        elif self._recording is not None:
+            self._recording.cancel()
 
     def rows(self) -> Floats:
         """(n, 4): vehicle time, s, and position north, east and down of home, m."""
         return np.array(self._rows).reshape(-1, 4)
 
-    async def _request_truth(self) -> None:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as channel, suppress(OSError):
-            # No answer means that the vehicle is gone; the result of the flight will say so.
-            channel.settimeout(_TRUTH_TIMEOUT)
-            channel.connect(self._address)
-            while True:
-                channel.send(b'{"state": true}')
-                truth = json.loads(channel.recv(65536))
-                self._rows.append((truth["time"], *truth["position"]))
-                await asyncio.sleep(_TRUTH_PERIOD)
+    async def _record(self) -> None:
+        while True:
+            truth = self._vehicle.state()
+            self._rows.append((truth["time"], *truth["position"]))
+            await asyncio.sleep(_TRUTH_PERIOD)
 
 
 def _measure(tracking: Floats, truth: Floats) -> TrackedFlight:

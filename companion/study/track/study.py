@@ -40,7 +40,7 @@ def run(tick: Tick) -> Outcome:
     """Fly every task, and measure its position error.
 
     Raises:
-        ConfigError, VehicleStoppedError: as `fly_all`.
+        ConfigError: as `fly_all`.
     """
     flown = fly_all(tasks(), tick)
     return Outcome(
