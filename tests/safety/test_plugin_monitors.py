@@ -17,6 +17,7 @@ from tests.test_extending import block
 
 CODE = """
 
+import asyncio
 import sys
 from companion.safety.actions import Stream
 
@@ -34,6 +35,13 @@ def leaving(config):
     def judge(snapshot, raised):
         if snapshot.motion.height is not None and snapshot.motion.height > 1.0:
             sys.exit(1)
+    return made(config, judge)
+
+def blocking(config):
+    times = [1.5]
+    def judge(snapshot, raised):
+        if times and snapshot.motion.height is not None and snapshot.motion.height > 1.0:
+            asyncio.get_running_loop().clock.now += times.pop()
     return made(config, judge)
 
 def silent(config):
@@ -54,8 +62,8 @@ def unmade(config):
 def nothing(config):
     return None
 """
-NAMES = ("sinking", "high", "leaving", "silent", "raising", "counting", "releasing", "unmade",
-         "nothing")  # fmt: skip
+NAMES = ("sinking", "high", "leaving", "blocking", "silent", "raising", "counting", "releasing",
+         "unmade", "nothing")  # fmt: skip
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 
 
@@ -112,6 +120,14 @@ def test_a_judge_that_raises_hands_the_vehicle_back_and_is_named(autopilot, name
     assert vehicle.state()["mode"] == {"px4": "LOITER", "ardupilot": "BRAKE"}[autopilot]
     assert not vehicle.state()["crashed"]
     assert not any("internal error" in text for _, text in summary.events)
+
+
+def test_a_judge_that_blocks_is_not_taken_for_a_silent_vehicle():
+    vehicle = QuickVehicle("ardupilot", lockstep=False, delay_s=0.015)
+    config = merged(QUICK_FLIGHT, {"safety": {"monitors": ["blocking"]}})
+    summary = fly(config, vehicle)
+    assert summary.result.startswith("this program did not run for 1.5 s"), summary.events
+    assert vehicle.state()["mode"] == "BRAKE"
 
 
 def test_a_judge_that_raises_is_asked_once_and_stops_no_other_monitor():
