@@ -9,6 +9,7 @@ from companion.flight.environment import Environment
 from companion.flight.observer import Observer
 from companion.mavlink.framing import Frame
 from companion.preflight.session import wanted_rates
+from companion.serve import refusals
 from companion.serve.component import Component
 from companion.serve.flight_records import FlightRecords
 from companion.serve.kept_fence import KeptFence
@@ -36,8 +37,6 @@ from companion.serve.situation import SituationKeeper
 from companion.vehicle.autopilot import ControlEntry, Role
 from companion.vehicle.link import Link
 
-_ENDING_TEXT = "control is ending and the vehicle is held; request control again when it has ended"
-_ON_GROUND_TEXT = "take off first: setpoints are flown only in the air"
 _RETRY_PAUSE = 2.0
 """Time after a failed takeover during which setpoints alone do not begin another takeover, s."""
 
@@ -107,9 +106,9 @@ class ServedControl:
             return False
         if steers_in_our_mode(frame, autopilot):
             self._component.answer(client, f"refused: {owner} is in control; change the mode first")
-            self._answer(client, frame, REJECTED)
+            self._component.acknowledge(client, frame, REJECTED, self._autopilot)
         elif reduces_telemetry(frame, wanted_rates(self._config, self._link)):
-            self._answer(client, frame, ACCEPTED)
+            self._component.acknowledge(client, frame, ACCEPTED, self._autopilot)
         else:
             if isinstance(owner, Program) and owner.client is client and leaves_control(frame):
                 flight.expect_release()
@@ -164,9 +163,9 @@ class ServedControl:
             flight.give(request)
         self._programs.keep(owner, request)
         if flight is not None and flight.is_ending:
-            return _ENDING_TEXT
+            return refusals.ENDING
         if self._flight is None and self._give_control(owner, now):
-            self._begin_flight(owner, None, from_ground=False)
+            self._begin_flight(owner, request, None, from_ground=False)
         return None
 
     def _give_control(self, program: Program, now: float) -> bool:
@@ -180,7 +179,7 @@ class ServedControl:
         if state.mode is None or Role.READY not in autopilot.roles(state.mode):
             return False
         if not state.flying:
-            self._component.answer(program.client, _ON_GROUND_TEXT)
+            self._component.answer(program.client, refusals.ON_GROUND)
             return False
         if not self.ownership.has_stream(program, now):
             return False
@@ -192,25 +191,28 @@ class ServedControl:
     def _take_control_request(self, client: Client, frame: Frame) -> None:
         """Answer a command that requests control: by a takeover or a refusal."""
         now, owner = self._clock(), self._programs.sender_of(client, frame)
-        refusal, on_ground = self.ownership.request_control(owner, now), not self._link.state.flying
-        if refusal is None and self._flight is not None and self._flight.is_ending:
-            refusal = _ENDING_TEXT
-        elif refusal is None and self._flight is None:
-            refusal = self._fence.refusal()
-            if refusal is None and on_ground:
-                refusal = self._keeper.takeoff_refusal(self._programs.newest(owner))
+        request, on_ground = self._programs.newest(owner), not self._link.state.flying
+        refusal = self.ownership.request_control(owner, now)
+        if refusal is None and self._flight is not None:
+            refusal = refusals.ENDING if self._flight.is_ending else None
+        elif refusal is None:
+            refusal = self._fence.refusal() if request is not None else refusals.FORGOTTEN
+            if refusal is None and request is not None and on_ground:
+                refusal = self._keeper.takeoff_refusal(request)
+        result = ACCEPTED if self.in_control else IN_PROGRESS
         if refusal is not None:
             if self._flight is None:
                 self.ownership.release()
             self._component.answer(client, f"control refused: {refusal}")
-            self._answer(client, frame, REJECTED)
-        elif self._flight is None:
-            self._begin_flight(owner, ControlRequest(client, frame), from_ground=on_ground)
-        else:
-            self._answer(client, frame, ACCEPTED if self.in_control else IN_PROGRESS)
+            result = REJECTED
+        elif self._flight is None and request is not None:
+            command = ControlRequest(client, frame)
+            self._begin_flight(owner, request, command, from_ground=on_ground)
+            return
+        self._component.acknowledge(client, frame, result, self._autopilot)
 
     def _begin_flight(
-        self, owner: Program, command: ControlRequest | None, *, from_ground: bool
+        self, owner: Program, request: Request, command: ControlRequest | None, *, from_ground: bool
     ) -> None:
         self._flight = flight = ServedFlight(
             str(owner),
@@ -225,7 +227,7 @@ class ServedControl:
             self._fence.centre,
             from_ground=from_ground,
         )
-        flight.give(self._programs.newest(owner))
+        flight.give(request)
         self._task = task = asyncio.create_task(self._fly(flight, command))
         self._unfinished.add(task)
         task.add_done_callback(self._unfinished.discard)
@@ -244,7 +246,3 @@ class ServedControl:
             await flight.save()
             if self._flight is None and self._config.realtime.freeze_gc:  # between flights
                 gc.collect()
-
-    def _answer(self, client: Client, frame: Frame, result: int) -> None:
-        """Answer a client's frame to the autopilot, in the autopilot's name."""
-        self._component.acknowledge(client, frame, result, self._autopilot)
