@@ -137,6 +137,7 @@ class ServeSession:
                 self.records,
                 self.changes,
             )
+            network.flown = SETPOINTS
             background.append(keeper.keep_telemetry(lambda: wanted_rates(self._config, link)))
         gate = _FrameInterceptor(
             permission, component, self.control, network.routing, link.settings.target_system

@@ -23,11 +23,13 @@ class ClientStats:
         received: intact frames from the client.
         sent: frames passed to the kernel.
         dropped: frames not sent, because the client or its connection is too slow.
+        flooded: datagrams of the client that were not read, because it sent too many.
     """
 
     received: int = 0
     sent: int = 0
     dropped: int = 0
+    flooded: int = 0
 
 
 class ClientListener(Protocol):
@@ -126,14 +128,26 @@ class FloodDetector:
     """Length of the window in which frames are counted, and of a pause in reading, s."""
     _MAX_COUNT = 64
     """Largest number of frames or datagrams in one window."""
+    _BYTES_PER_COUNT = 64
+    """So many bytes count as a frame: to search noise for frames costs time, too."""
 
     def __init__(self) -> None:
         self._window_start = 0.0
         self._count = 0
 
-    def count(self, number: int, now: float) -> bool:
-        """Count `number` frames received at `now`, s; return whether reading must pause."""
+    def count(self, number: int, size: int, now: float) -> bool:
+        """Count what was received; return whether it is too much.
+
+        Args:
+            number: number of frames or datagrams.
+            size: number of bytes.
+            now: event-loop time, s.
+        """
         if now - self._window_start > self.WINDOW:
             self._window_start, self._count = now, 0
-        self._count += number
+        self._count += max(number, size // self._BYTES_PER_COUNT)
         return self._count > self._MAX_COUNT
+
+    def is_flood(self, now: float) -> bool:
+        """Whether too much was received already in the window of `now`, s."""
+        return now - self._window_start <= self.WINDOW and self._count > self._MAX_COUNT
