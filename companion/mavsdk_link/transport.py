@@ -101,7 +101,7 @@ class MavsdkTransport:
         component = settings.source_component % 255 + 1
         self._own = bytes((settings.source_system, component))
         self._receive = receive
-        self._has_peer = speaks_first
+        self._has_peer, self._is_open = speaks_first, True
         self._waiting: deque[tuple[bytes, int]] = deque(maxlen=_MOST_WAITING)
         self._loop = asyncio.get_running_loop()
         self._wakeup = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
@@ -117,14 +117,22 @@ class MavsdkTransport:
         watch(self._loop, self._wakeup, self._read)
 
     def send(self, frame: bytes) -> bool:
-        """Have MAVSDK forward one frame, once; return False if the vehicle was not heard yet."""
-        if not self._has_peer:
+        """Have MAVSDK forward one frame, once.
+
+        Returns:
+            False if the vehicle was not heard yet, or after `close`: MAVSDK's library would then
+            end this process by a segmentation fault.
+        """
+        if not (self._has_peer and self._is_open):
             return False
         self._mavsdk.pass_received_raw_bytes(frame)
         return True
 
     def close(self) -> None:
-        """Stop MAVSDK with all its threads."""
+        """Stop MAVSDK with all its threads; a second call does nothing."""
+        if not self._is_open:
+            return
+        self._is_open = False
         unwatch(self._loop, self._wakeup)
         self._mavsdk.destroy()
         os.close(self._wakeup)
