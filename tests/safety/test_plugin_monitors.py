@@ -53,6 +53,9 @@ def raising(config):
 def counting(config):
     return made(config, lambda snapshot, raised: 5)
 
+def wordless(config):
+    return made(config, lambda snapshot, raised: "")
+
 def releasing(config):
     return made(config, lambda snapshot, raised: None, Action.RELEASE)
 
@@ -62,8 +65,8 @@ def unmade(config):
 def nothing(config):
     return None
 """
-NAMES = ("sinking", "high", "leaving", "blocking", "silent", "raising", "counting", "releasing",
-         "unmade", "nothing")  # fmt: skip
+NAMES = ("sinking", "high", "leaving", "blocking", "silent", "raising", "counting", "wordless",
+         "releasing", "unmade", "nothing")  # fmt: skip
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 
 
@@ -154,6 +157,7 @@ def test_it_can_only_choose_among_the_actions():
     [
         ("raising", "cannot be used where a value is not known: .* raised TypeError: unsupported"),
         ("counting", "it returned 5, which is neither a text nor None"),
+        ("wordless", "it returned '', which is neither a text nor None"),
         ("releasing", "its action must be WARN, HOLD, HAND_BACK or LAND"),
         ("unmade", "the monitor unmade of the module my_monitors raised OSError: no file"),
         ("nothing", "made no companion.safety.monitor.Monitor but None"),
