@@ -1,6 +1,7 @@
 """What a client that sends too much, or many programs, cost the others."""
 
 import asyncio
+import socket
 from contextlib import suppress
 from types import SimpleNamespace
 
@@ -8,6 +9,7 @@ from companion import testing
 from companion.mavlink.framing import Frame
 from companion.mavlink.settings import LinkSettings
 from companion.serve.component import Component
+from companion.serve.network import tcp
 from companion.serve.network.addresses import Address
 from companion.serve.network.routing import _MAX_ADDRESSES, Routing
 from companion.serve.network.setpoint_limit import SetpointLimit
@@ -50,6 +52,27 @@ def test_noise_of_a_tcp_client_does_not_keep_samples_from_being_answered(run):
             await asyncio.sleep(0.2)
             assert sum(sizes) - read_before <= 4096 * (2 + (net.now() - began) / 0.02)
             flood.close()
+
+    run(scene())
+
+
+def test_a_tcp_client_whose_network_is_gone_keeps_its_place_for_a_minute_only(run, monkeypatch):
+    accepted, attach = [], tcp.TcpClient.__init__
+
+    def init(self, name, host, transport):
+        attach(self, name, host, transport)
+        accepted.append(transport.get_extra_info("socket"))
+
+    monkeypatch.setattr(tcp.TcpClient, "__init__", init)
+
+    async def scene():
+        async with network("tcpin://127.0.0.1:0") as (net, _, _):
+            client = await tcp_client(net.ports[0].local[1])
+            await until(lambda: net.clients)
+            (connection,) = accepted
+            timeout = connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT)
+            assert timeout == 60_000
+            client.close()
 
     run(scene())
 

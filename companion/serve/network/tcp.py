@@ -20,6 +20,10 @@ read all old bytes in it before it reads anything new.
 _READ_BYTES = 4096
 """Largest number of bytes that are read at once; asyncio would read 256 KiB, which costs so long
 that the control loop would stop."""
+_DEAD_TIMEOUT = 60.0
+"""A client that acknowledges nothing, or reads nothing, for this long is gone, s. Linux gives it up
+after 15 minutes. Meanwhile one that connects again and again from a bad network takes all places.
+"""
 _RETRY_PAUSE = 2.0
 """Pause before connecting again, s."""
 _CONNECT_TIMEOUT = 5.0
@@ -102,6 +106,7 @@ class TcpPort:
         sock = transport.get_extra_info("socket")
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _KERNEL_BUFFER)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(1e3 * _DEAD_TIMEOUT))
         name, host = f"tcp {host_and_port(address)}", plain_host(str(address[0]))
         client = TcpClient(name, host, transport)
         self._open.add(client)
