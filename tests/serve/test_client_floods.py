@@ -15,7 +15,15 @@ from companion.serve.network.routing import _MAX_ADDRESSES, Routing
 from companion.serve.network.setpoint_limit import SetpointLimit
 from tests.mavlink.fakes import attitude, until
 from tests.serve.clients import heartbeat, network, tcp_client, udp_client
-from tests.serve.virtual import ALL, MemoryClient, airborne, begin_control, mock, serving
+from tests.serve.virtual import (
+    ALL,
+    MemoryClient,
+    airborne,
+    begin_control,
+    mock,
+    serving,
+    stream,
+)
 
 REJECTED = 1
 
@@ -195,5 +203,30 @@ def test_more_programs_than_are_remembered_do_not_end_control_for_ever():
             assert session.control.ownership.owner is None
             await begin_control(session, script, "px4", lambda *_: script.local(ALL, home))
         assert not [text for text in notes if "internal error" in text]
+
+    testing.run(vehicle, whole())
+
+
+def test_a_client_that_goes_on_for_a_silent_one_is_named():
+    """The pilot was told that the first one was in control, to the end."""
+    vehicle = mock("px4")
+
+    async def whole():
+        async with serving(vehicle, "px4", hold_s=1.0) as session:
+            ground = await airborne(session, vehicle, "px4")
+            first, second = (
+                MemoryClient(name, ids).connect(session)
+                for name, ids in (("first", (245, 190)), ("second", (246, 190)))
+            )
+            home = session.control._link.state.position.position_ned
+            await begin_control(session, first, "px4", lambda *_: first.local(ALL, home))
+            await asyncio.sleep(0.7)
+            await stream(0.3, lambda _: second.local(ALL, home))
+            assert ground.texts()[-2:] == [
+                "first (245/190): the owner is silent, and the vehicle is held",
+                "second (246/190) is in control",
+            ]
+            await asyncio.sleep(2.5)
+            assert ground.texts()[-1] == "control by second (246/190) has ended: handed back"
 
     testing.run(vehicle, whole())
